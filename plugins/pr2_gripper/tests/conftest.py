@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from graspsense.plugin_api import create
-from graspsense_pr2_gripper import link, opening
+from graspsense_pr2_gripper import device_time, link, opening
 from graspsense_pr2_gripper.config import FaultConfig
 from graspsense_pr2_gripper.discovery import LIBRARY
 from graspsense_pr2_gripper.emulator import board as emulated_boards
@@ -71,7 +71,7 @@ def threads_have_time_to_end(monkeypatch: pytest.MonkeyPatch) -> None:
 def answered(monkeypatch: pytest.MonkeyPatch) -> None:
     """A paced board goes on once its last report was answered by a command, however late: no machine is too slow.
 
-    Neither its watchdog nor the driver's bound on the age of reports can then tell the machine's load.
+    Neither its watchdog nor the driver's bounds on the times of reports can then tell the machine's load.
     """
     answer = threading.Event()
     on_time, transport = emulated.on_time, emulated.PacedTransport
@@ -98,6 +98,7 @@ def answered(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(transport, "write", writes)
     monkeypatch.setattr(transport, "close", closes)
     monkeypatch.setattr(link, "OLDEST_S", math.inf)
+    monkeypatch.setattr(device_time, "OFF_S", math.inf)
 
 
 @pytest.fixture(autouse=True)
@@ -203,6 +204,8 @@ def machine(monkeypatch: pytest.MonkeyPatch) -> Machine:
     module.device = lambda: Device(made)  # type: ignore[attr-defined]
     monkeypatch.setitem(sys.modules, LIBRARY, module)
     monkeypatch.setattr(opening, "POLL_S", 0.001)
-    # Its time stands still between two ticks, so on a machine that is busy every report looks old.
+    # Its time stands still between two ticks, so on a machine that is busy every report looks old, and many ticks at
+    # once look like a clock that jumps.
     monkeypatch.setattr(link, "OLDEST_S", math.inf)
+    monkeypatch.setattr(device_time, "OFF_S", math.inf)
     return made

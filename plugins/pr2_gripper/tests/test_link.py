@@ -5,6 +5,7 @@ from __future__ import annotations
 import queue
 import threading
 import time
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -72,33 +73,42 @@ def test_oldest_reports_of_a_full_buffer_are_not_acted_on(monkeypatch: pytest.Mo
     assert clock.age_s(1.3005, 100.3005) < 0.001
 
 
-def test_reader_counts_what_was_too_old_and_hands_on_the_fresh_one() -> None:
+@pytest.fixture
+def host(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    """The host's clock, which stands still until a test sets it."""
+    now = [100.0]
+    monkeypatch.setattr(links, "time", SimpleNamespace(monotonic=lambda: now[0]))
+    return now
+
+
+def test_reader_counts_what_was_too_old_and_hands_on_the_fresh_one(host: list[float]) -> None:
+    """After a stall of 300 ms the buffer holds the 64 reports that came first."""
     wire = Fed()
     link = ThreadedLink(wire)
     try:
         now_us = 10_000_000
         wire.reports.put(report(1, now_us))
         assert link.next(60.0) is not None
+        host[0] += 0.3
         for i in range(64):
-            wire.reports.put(report(2 + i, now_us - 300_000 + 1000 * i))
+            wire.reports.put(report(2 + i, now_us + 1000 * (1 + i)))
         drained(link, wire, 65)
-        wire.reports.put(report(400, now_us + 3_600_000_000))  # fresher than all: a shorter delay than ever
+        wire.reports.put(report(301, now_us + 300_000))
         arrival = link.next(60.0)
         assert arrival is not None
-        assert arrival.report.sequence == 400
+        assert arrival.report.sequence == 301
         assert link.discarded == 64
     finally:
         link.close()
 
 
+@pytest.mark.usefixtures("host")
 def test_newest_report_replaces_the_one_nobody_asked_for() -> None:
     wire = Fed()
     link = ThreadedLink(wire)
     try:
-        for i in range(5):
-            wire.reports.put(report(i, 1000 * i + 3_600_000_000 * i))
-        drained(link, wire, 5)
-        wire.reports.put(report(5, 3_600_000_000 * 9))
+        for i in range(6):
+            wire.reports.put(report(i, 1000 * i))
         drained(link, wire, 6)
         arrival = link.next(60.0)
         while arrival is not None and arrival.report.sequence < 5:
@@ -106,7 +116,7 @@ def test_newest_report_replaces_the_one_nobody_asked_for() -> None:
         assert arrival is not None
         assert arrival.report.sequence == 5
         assert link.skipped >= 4
-        assert link.next(0.001) is None
+        assert link.next(0.0) is None
     finally:
         link.close()
 

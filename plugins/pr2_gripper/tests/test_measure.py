@@ -10,8 +10,9 @@ import pytest
 from graspsense.plugin_api import LoadTable, Pads, TareRefused, gap_and_rate, revolutions_at
 from graspsense_pr2_gripper.config import Pr2Config
 from graspsense_pr2_gripper.linkage import LINKAGES
-from graspsense_pr2_gripper.measure import BAD_CELL, BEYOND_TABLE, Measure
+from graspsense_pr2_gripper.measure import Measure
 from graspsense_pr2_gripper.protocol import LEFT_ABSENT, InputReport
+from graspsense_pr2_gripper.status import BAD_CELL, BEYOND_TABLE
 from graspsense_pr2_gripper.stream import RawImage
 
 TIP = tuple(3000.0 + i for i in range(22))

@@ -20,7 +20,7 @@ import usb.backend.libusb1
 import usb.core
 
 from graspsense.plugin_api import EFFORT, Command, DeviceLost, NoDevice, PluginUnavailable
-from graspsense_pr2_gripper import link
+from graspsense_pr2_gripper import device_time, link
 from graspsense_pr2_gripper.backend import Pr2Backend
 from graspsense_pr2_gripper.config import Pr2Config
 from graspsense_pr2_gripper.faults import Wire
@@ -161,8 +161,10 @@ class Libusb(usb.backend.IBackend):  # type: ignore[misc]
 def port(monkeypatch: pytest.MonkeyPatch, board: Any) -> Libusb:
     backend = Libusb(board())
     monkeypatch.setattr(usb.backend.libusb1, "get_backend", lambda *a, **k: backend)
-    # Its time stands still between two ticks, so on a machine that is busy every report looks old.
+    # Its time stands still between two ticks, so on a machine that is busy every report looks old, and many ticks at
+    # once look like a clock that jumps.
     monkeypatch.setattr(link, "OLDEST_S", math.inf)
+    monkeypatch.setattr(device_time, "OFF_S", math.inf)
     return backend
 
 

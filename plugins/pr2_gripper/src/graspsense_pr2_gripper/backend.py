@@ -25,10 +25,12 @@ from graspsense.plugin_api import (
     stored_zero,
 )
 from graspsense_pr2_gripper.accelerometer import CHANNEL as ACCELERATION
+from graspsense_pr2_gripper.ceilings import EFFORT_CEILING_N, SPEED_CEILING_M_S
 from graspsense_pr2_gripper.config import Pr2Config
 from graspsense_pr2_gripper.emulation import emulated_body
 from graspsense_pr2_gripper.fingertip import fingertips
 from graspsense_pr2_gripper.link import LockStepLink
+from graspsense_pr2_gripper.linkage import FRICTION_N
 from graspsense_pr2_gripper.measure import Measure
 from graspsense_pr2_gripper.opening import Opened, open_board
 from graspsense_pr2_gripper.protocol import (
@@ -41,6 +43,7 @@ from graspsense_pr2_gripper.protocol import (
     limit,
     micro,
 )
+from graspsense_pr2_gripper.status import status_bits
 
 _RATE_HZ: Final = 1000.0
 _PADS_RATE_HZ: Final = 24.39
@@ -133,20 +136,22 @@ class Pr2Backend(SensorBackend[Pr2Config]):
         return self._measure.reading(report, arrival.image, arrival.words, arrival.sampled)
 
     def apply(self, command: Command) -> None:
-        """Send an effort within the limits of the device. Raises DeviceLost.
+        """Send an effort within the limits of the device and of the host. Raises DeviceLost.
 
         Any other command, and an effort of NaN, relaxes the gripper.
         """
         numbers = RELEASE_REPORT
         if command.kind == EFFORT:
-            most = self._effort_limit_n
             with suppress(ProtocolError):
+                most_un = limit(min(command.effort_limit_n, self._effort_limit_n))
+                effort_un = micro(min(max(command.value, -self._effort_limit_n), self._effort_limit_n))
                 numbers = OutputReport(
                     0,
                     EFFORT_KIND,
-                    micro(min(max(command.value, -most), most)),
-                    limit(min(command.effort_limit_n, most)),
-                    limit(command.speed_limit_m_s),
+                    # In whole numbers, since the board reports an effort that it must clamp.
+                    min(max(effort_un, -most_un), most_un),
+                    most_un,
+                    limit(min(command.speed_limit_m_s, self._speed_limit_m_s)),
                 )
         self._send(self._open(), numbers)
 
@@ -192,13 +197,16 @@ class Pr2Backend(SensorBackend[Pr2Config]):
             stored_zero(found["tare"]) if "tare" in found else None,
             stored_tables(found["load-cell"]) if "load-cell" in found else None,
         )
-        self._effort_limit_n = identity.effort_limit_un / 1e6
+        self._effort_limit_n = min(identity.effort_limit_un / 1e6, EFFORT_CEILING_N)
+        self._speed_limit_m_s = min(identity.speed_limit_um_s / 1e6, SPEED_CEILING_M_S)
         self._sent = self._echo = 0
         self._heard_us = 0
         notes = [f"calibration {kind} of {one.made} is in use" for kind, one in found.items()]
+        friction_n = FRICTION_N
         if "friction" in found:
             _, closing, _ = stored_friction(found["friction"])
-            notes.append(f"breakaway {min(closing):.1f} to {max(closing):.1f} N, closing")
+            friction_n = max(closing, default=FRICTION_N)
+            notes.append(f"breakaway {min(closing, default=FRICTION_N):.1f} to {friction_n:.1f} N, closing")
         if config.accelerometer and not identity.accelerometer_g:
             notes.append("the board has no accelerometer: the channel acceleration stays empty")
         if emulation is not None:
@@ -213,13 +221,15 @@ class Pr2Backend(SensorBackend[Pr2Config]):
             simulated=emulation is not None and emulation.body_info.simulated,
             rate_hz=identity.report_rate_hz,
             effort_limit_n=self._effort_limit_n,
-            speed_limit_m_s=identity.speed_limit_um_s / 1e6,
+            speed_limit_m_s=self._speed_limit_m_s,
             opening=Command(EFFORT, OPENING_N, math.inf, math.inf),
             relaxed=Command(EFFORT, 0.0, math.inf, math.inf),
             tare_images=TARE_IMAGES,
             numbers=device_numbers(identity),
             calibration={kind: one.sha256 for kind, one in found.items()},
             notes=tuple(notes),
+            friction_n=friction_n,
+            status_bits=status_bits(config.swap_fingers),
         )
 
     def _send(self, opened: Opened, command: OutputReport) -> None:

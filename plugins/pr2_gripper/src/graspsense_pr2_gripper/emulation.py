@@ -8,6 +8,7 @@ from attrs import fields_dict, has
 
 from graspsense.plugin_api import ConfigError, DeviceInfo, SensorBackend, create
 from graspsense_pr2_gripper.accelerometer import RANGE_G, has_accelerometer
+from graspsense_pr2_gripper.ceilings import EFFORT_CEILING_N, SPEED_CEILING_M_S
 from graspsense_pr2_gripper.config import Pr2Config
 from graspsense_pr2_gripper.faults import Wire
 from graspsense_pr2_gripper.firmware import STRONG_N, Firmware
@@ -20,9 +21,6 @@ from graspsense_pr2_gripper.linkage import (
 from graspsense_pr2_gripper.protocol import Identity, ProtocolError, encode_identity
 
 EMULATED_SERIAL: Final = "EMULATED"
-EFFORT_LIMIT_UN: Final = 100_000_000
-SPEED_LIMIT_UM_S: Final = 200_000
-"""Software limits of the PR2 gripper at the time of the paper (pr2_defs, gripper_defs.urdf.xacro, August 2009)."""
 IMAGE_PERIOD_US: Final = 41_000
 WATCHDOG_MS: Final = 100
 
@@ -80,8 +78,8 @@ def emulated_board(config: Pr2Config, seed: int) -> Emulation:
         pad_counts_per_n=PAD_COUNTS_PER_N,
         side_counts_per_n=SIDE_COUNTS_PER_N,
         edge_counts_per_n=EDGE_COUNTS_PER_N,
-        effort_limit_un=EFFORT_LIMIT_UN,
-        speed_limit_um_s=SPEED_LIMIT_UM_S,
+        effort_limit_un=round(EFFORT_CEILING_N * 1e6),
+        speed_limit_um_s=round(SPEED_CEILING_M_S * 1e6),
         report_rate_hz=round(info.rate_hz),
         image_period_us=IMAGE_PERIOD_US,
         watchdog_ms=WATCHDOG_MS,

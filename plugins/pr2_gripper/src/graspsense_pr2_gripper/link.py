@@ -15,6 +15,7 @@ from typing import Final, NamedTuple, final
 
 from graspsense.plugin_api import DeviceLost
 from graspsense_pr2_gripper.clock import DeviceClock
+from graspsense_pr2_gripper.device_time import ClockFault, CountedTime, HostTime, PassingTime
 from graspsense_pr2_gripper.protocol import MAX_SAMPLES, InputReport
 from graspsense_pr2_gripper.stream import RawImage, Restarted, Stream
 from graspsense_pr2_gripper.transports.interface import Transport, TransportGone
@@ -23,6 +24,8 @@ READ_S: Final = 0.05
 """Longest wait of a read, so that the reader notices a stop."""
 OLDEST_S: Final = 0.05
 """Age above which a report is discarded."""
+BUFFERED: Final = 64
+"""Reports that a buffer of the system holds. More old ones in a row mean that the clock of the device falls behind."""
 JOIN_S: Final = 1.0
 """Time for which closing waits for the reader, and then for the device."""
 
@@ -48,6 +51,7 @@ class Link(ABC):
         self.transport = transport
         self.stream = Stream()
         self.clock = DeviceClock()
+        self.time = PassingTime()
         self.discarded = 0
         """Number of reports that were too old."""
         self.skipped = 0
@@ -89,6 +93,7 @@ class LockStepLink(Link):
     def __init__(self, transport: Transport, period_s: float) -> None:
         super().__init__(transport)
         self._period_s = period_s
+        self._counted = CountedTime(round(period_s * 1e6))
 
     def next(self, timeout_s: float) -> Arrival | None:
         """Advance the device time until a report is valid, at most by `timeout_s`."""
@@ -99,12 +104,13 @@ class LockStepLink(Link):
                 data = read(self._period_s)
                 while data:
                     report = take(data)
-                    if report is not None:
+                    if report is not None and self.time.passes(report.time_us):
+                        self._counted.check(report.sequence, report.time_us)
                         newest = self._arrival(report, time.monotonic(), newest)
                     data = read(0.0)
                 if newest is not None:
                     return newest
-        except (TransportGone, Restarted) as gone:
+        except (TransportGone, Restarted, ClockFault) as gone:
             self.gone = _lost(gone)
             raise DeviceLost(self.gone) from gone
         return None
@@ -125,6 +131,9 @@ class ThreadedLink(Link):
         self._newest: Arrival | None = None
         self._stop = threading.Event()
         self._closed = False
+        self._host = HostTime()
+        self._old = 0
+        """Number of consecutive reports that were too old."""
         self._reader = threading.Thread(target=self._run, name="PR2 reader", daemon=True)
         self._reader.start()
 
@@ -154,7 +163,7 @@ class ThreadedLink(Link):
         return close_within(self.transport, JOIN_S)
 
     def _run(self) -> None:
-        stream, clock = self.stream, self.clock
+        stream = self.stream
         try:
             while not self._stop.is_set():
                 data = self.transport.read(READ_S)
@@ -162,20 +171,35 @@ class ThreadedLink(Link):
                     continue
                 host_s = time.monotonic()
                 report = stream.take(data)
-                if report is None:
-                    continue
-                if clock.age_s(report.time_us * 1e-6, host_s) > OLDEST_S:
-                    self.discarded += 1
+                if report is None or not self._in_time(report, host_s):
                     continue
                 with self._arrived:
                     if self._newest is not None:
                         self.skipped += 1
                     self._newest = self._arrival(report, host_s, self._newest)
                     self._arrived.notify()
-        except (TransportGone, Restarted) as gone:
+        except (TransportGone, Restarted, ClockFault) as gone:
             with self._arrived:
                 self.gone = _lost(gone)
                 self._arrived.notify()
+
+    def _in_time(self, report: InputReport, host_s: float) -> bool:
+        """Return whether a report is new enough to be acted on. Raises ClockFault."""
+        if not self.time.passes(report.time_us):
+            return False
+        device_s = report.time_us * 1e-6
+        self._host.check(device_s, host_s)
+        if self.clock.age_s(device_s, host_s) <= OLDEST_S:
+            self._old = 0
+            return True
+        self.discarded += 1
+        self._old += 1
+        if self._old > BUFFERED:
+            raise ClockFault(
+                f"its clock falls behind: {self._old} reports in a row were more than {OLDEST_S:g} s old by the clock "
+                "of this computer"
+            )
+        return False
 
 
 def close_within(transport: Transport, time_s: float) -> bool:
@@ -187,4 +211,9 @@ def close_within(transport: Transport, time_s: float) -> bool:
 
 
 def _lost(why: Exception) -> str:
+    if isinstance(why, ClockFault):
+        return (
+            f"the times of the PR2 gripper cannot be trusted ({why}): power the board off and on, then "
+            "`graspsense doctor`"
+        )
     return f"the PR2 gripper is gone ({why}): check its cable and power, then `graspsense devices`"

@@ -47,6 +47,9 @@ LINKAGES: Final[Mapping[str, ScrewLinkage]] = {
 ENCODER_TICKS: Final = 1200
 """Encoder pulses in one revolution of the motor (pr2_ethercat_drivers, actuators.conf)."""
 
+FRICTION_N: Final = 7.0
+"""Coulomb friction that pr2_gripper_sensor feeds forward to its position servo, as effort (gripper_controller.h)."""
+
 PAD_COUNTS_PER_N: Final = 1600
 """Counts of the sum of the fifteen cells of the gripping face under one newton (fingertip_pressure, scripts/
 fingertip_geometry.py)."""

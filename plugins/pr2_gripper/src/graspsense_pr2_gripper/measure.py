@@ -24,13 +24,18 @@ from graspsense_pr2_gripper.accelerometer import Accelerometer
 from graspsense_pr2_gripper.config import Pr2Config
 from graspsense_pr2_gripper.fingertip import CELLS, FIRST_PAD_CELL
 from graspsense_pr2_gripper.linkage import LINKAGES, edge_scale
-from graspsense_pr2_gripper.protocol import LEFT_ABSENT, RIGHT_ABSENT, Identity, InputReport
+from graspsense_pr2_gripper.protocol import LEFT_ABSENT, RIGHT_ABSENT, SLICES, Identity, InputReport
+from graspsense_pr2_gripper.status import (
+    BAD_CELL,
+    BEYOND_TABLE,
+    ENDURED_CELLS,
+    LEFT_DEAD,
+    OLD_IMAGE,
+    RESULT_BITS,
+    RIGHT_DEAD,
+)
 from graspsense_pr2_gripper.stream import RawImage
 
-BAD_CELL: Final = 1 << 16
-"""Status: a cell of the last image is dead and left out of the forces."""
-BEYOND_TABLE: Final = 1 << 17
-"""Status: a pad force is outside its load table."""
 UNLOADED_COUNTS: Final = 4500.0
 """Without a stored tare, a pad whose cells read more than this in the mean counts as loaded: users report
 2900 to 3800 without a load (public PressureListener scripts for the PR2, differing by finger and run)."""
@@ -76,6 +81,10 @@ class Measure:
     ) -> None:
         self._link = LINKAGES[identity.transmission]
         self._period_us = round(1e6 / identity.report_rate_hz)
+        # The board keeps an image until the next one is latched, or until all its slices have been sent.
+        self._oldest_us = (
+            max(identity.image_period_us, SLICES * self._period_us) + identity.image_period_us // 2
+        )
         self._ticks_rev = float(identity.encoder_ticks_rev)
         self._pad_per_n = float(identity.pad_counts_per_n)
         side, edge = float(identity.side_counts_per_n), float(identity.edge_counts_per_n)
@@ -102,6 +111,10 @@ class Measure:
             self._take(image)
         gap, rate = gap_and_rate(self._link, report.encoder_ticks / self._ticks_rev)
         forces, status = self._forces, report.status
+        if report.command_result in RESULT_BITS:
+            status |= RESULT_BITS[report.command_result]
+        if report.image_age_us > self._oldest_us and report.image:
+            status |= OLD_IMAGE
         left, right = forces.left_n, forces.right_n
         if status & (LEFT_ABSENT | RIGHT_ABSENT):
             swap = self._swap
@@ -154,16 +167,20 @@ class Measure:
         self._compute_forces()
 
     def _compute_forces(self) -> None:
-        zero = self._zero
-        if zero is None:
-            # Without a tare there is no force: the offsets alone are some thousand counts for each cell.
-            self._forces = _PadForces(0.0, 0.0, 0.0, 0.0, 0)
-            return
-        left, left_bad = masked(self._pads.left, zero[0])
-        right, right_bad = masked(self._pads.right, zero[1])
+        pads = self._pads
+        # Without a tare, a cell is dead by its value alone.
+        zero = (pads.left, pads.right) if self._zero is None else self._zero
+        left, left_bad = masked(pads.left, zero[0])
+        right, right_bad = masked(pads.right, zero[1])
         bad = left_bad + right_bad
         self.bad_cells = max(self.bad_cells, bad)
-        status = BAD_CELL if bad else 0
+        status = 0
+        if bad:
+            status = BAD_CELL | _dead(LEFT_DEAD, pads.left, zero[0]) | _dead(RIGHT_DEAD, pads.right, zero[1])
+        if self._zero is None:
+            # Without a tare there is no force: the offsets alone are some thousand counts for each cell.
+            self._forces = _PadForces(0.0, 0.0, 0.0, 0.0, status)
+            return
         left_n = pad_force(left, zero[0], self._pad_per_n, FIRST_PAD_CELL)
         right_n = pad_force(right, zero[1], self._pad_per_n, FIRST_PAD_CELL)
         if self._tables is not None:
@@ -178,3 +195,8 @@ class Measure:
             edge_force(right, zero[1], self._edge_per_n),
             status,
         )
+
+
+def _dead(bit: int, cells: tuple[float, ...], zero: tuple[float, ...]) -> int:
+    """Return the bit if too many cells on the face of a pad do not answer, else 0."""
+    return bit if masked(cells[FIRST_PAD_CELL:], zero[FIRST_PAD_CELL:])[1] > ENDURED_CELLS else 0

@@ -8,6 +8,7 @@ from functools import partial
 from typing import Final, NamedTuple
 
 from graspsense.plugin_api import NoDevice
+from graspsense_pr2_gripper.ceilings import refuse_implausible
 from graspsense_pr2_gripper.config import Pr2Config
 from graspsense_pr2_gripper.discovery import search
 from graspsense_pr2_gripper.emulation import Emulation, emulated_board
@@ -37,31 +38,53 @@ def open_board(config: Pr2Config, seed: int, wait_s: float) -> Opened:
         return _emulated(config, seed)
     transport = _open_transport(config, wait_s)
     try:
-        identity = decode_identity(transport.feature(FEATURE_ID))
+        identity = _identified(config, transport)
         # An old report can remain in the device; all reports after it would count as lost.
         transport.read(READ_S)
+    except NoDevice:
+        close_within(transport, JOIN_S)
+        raise
+    except TransportGone as error:
+        close_within(transport, JOIN_S)
+        raise _no_answer(config, error) from error
+    return Opened(ThreadedLink(transport), identity, None)
+
+
+def _identified(config: Pr2Config, transport: Transport) -> Identity:
+    """Return the identity of the board. Raises NoDevice for one that is no PR2 gripper, or claims what none has."""
+    try:
+        identity = decode_identity(transport.feature(FEATURE_ID))
         if config.serial and identity.serial != config.serial:
             raise ProtocolError(
                 f"its feature report says serial {identity.serial!r}, but the settings ask for {config.serial!r}"
             )
     except (ProtocolError, TransportGone) as error:
-        close_within(transport, JOIN_S)
-        raise NoDevice(
-            f"the device {config.vendor_id:04x}:{config.product_id:04x} does not answer as a PR2 gripper: "
-            f"{error}\n  try: other USB ids with -o gripper.vendor_id and gripper.product_id, or -o gripper.serial"
-        ) from error
-    return Opened(ThreadedLink(transport), identity, None)
+        raise _no_answer(config, error) from error
+    refuse_implausible(identity)
+    return identity
+
+
+def _no_answer(config: Pr2Config, error: Exception) -> NoDevice:
+    return NoDevice(
+        f"the device {config.vendor_id:04x}:{config.product_id:04x} does not answer as a PR2 gripper: "
+        f"{error}\n  try: other USB ids with -o gripper.vendor_id and gripper.product_id, or -o gripper.serial"
+    )
 
 
 def _emulated(config: Pr2Config, seed: int) -> Opened:
     emulation = emulated_board(config, seed)
     wire = emulation.wire
-    identity = decode_identity(wire.feature())
+    transport = LockStepTransport(wire) if config.pace == "lock-step" else PacedTransport(wire)
+    try:
+        identity = _identified(config, transport)
+    except NoDevice:
+        transport.close()
+        raise
     link: Link
-    if config.pace == "lock-step":
-        link = LockStepLink(LockStepTransport(wire), 1.0 / identity.report_rate_hz)
+    if isinstance(transport, LockStepTransport):
+        link = LockStepLink(transport, 1.0 / identity.report_rate_hz)
     else:
-        link = ThreadedLink(PacedTransport(wire))
+        link = ThreadedLink(transport)
     return Opened(link, identity, emulation)
 
 

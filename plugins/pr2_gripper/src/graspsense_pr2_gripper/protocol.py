@@ -249,6 +249,8 @@ def _sealed(body: bytes) -> bytes:
 
 
 def _check(data: bytes, report_id: int) -> None:
+    if not isinstance(data, bytes | bytearray | memoryview):
+        raise ProtocolError(f"report {report_id} is {data!r} instead of {REPORT_SIZE} bytes")
     if len(data) != REPORT_SIZE:
         raise ProtocolError(f"a report has {REPORT_SIZE} bytes, this one {len(data)}")
     if _CRC.unpack_from(data, _BODY)[0] != crc32(data[:_BODY]):

@@ -1,0 +1,161 @@
+"""A board that claims what no PR2 gripper has is not opened, and no board raises the ceilings of the host."""
+
+from __future__ import annotations
+
+import math
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from graspsense.plugin_api import EFFORT, Command, NoDevice
+from graspsense_pr2_gripper.backend import Pr2Backend
+from graspsense_pr2_gripper.ceilings import RANGES
+from graspsense_pr2_gripper.config import FaultConfig, Pr2Config
+from graspsense_pr2_gripper.discovery import LIBRARY
+from graspsense_pr2_gripper.protocol import EFFORT_KIND, OutputReport, decode_output
+
+
+def emulated(**faults: Any) -> Pr2Backend:
+    return Pr2Backend(Pr2Config(transport="emulated", object="none", faults=FaultConfig(**faults)))
+
+
+SPECIFICATION = Path(__file__).parents[3] / "specs" / "pr2_hid.md"
+IMPLAUSIBLE = [
+    ("watchdog_ms", 65535),
+    ("watchdog_ms", 101),
+    ("watchdog_ms", 1),
+    ("effort_limit_un", 2_147_000_000),
+    ("effort_limit_un", 200_000_001),
+    ("effort_limit_un", 100),  # newtons instead of µN
+    ("speed_limit_um_s", 0xFFFFFFFF),
+    ("speed_limit_um_s", 200),  # mm/s instead of µm/s
+    ("report_rate_hz", 65535),
+    ("report_rate_hz", 1),
+    ("image_period_us", 41),  # ms instead of µs
+    ("pad_counts_per_n", 1),
+    ("pad_counts_per_n", 65535),
+    ("side_counts_per_n", 1601),
+    ("edge_counts_per_n", 149),
+    ("encoder_ticks_rev", 1),
+    ("encoder_ticks_rev", 65535),
+    ("accelerometer_g", 255),
+]
+
+
+@pytest.mark.parametrize(("number", "value"), IMPLAUSIBLE)
+def test_number_that_no_pr2_gripper_has_is_refused_with_what_is_allowed(number: str, value: int) -> None:
+    with pytest.raises(NoDevice) as refused:
+        emulated(identity={number: value}).open(0)
+    text = str(refused.value)
+    assert f"{number} is {value}" in text
+    assert "allowed are" in text
+    assert "firmware" in text
+
+
+def test_all_numbers_that_are_wrong_are_named_at_once() -> None:
+    with pytest.raises(NoDevice, match=r"(?s)watchdog_ms.*effort_limit_un"):
+        emulated(identity={"watchdog_ms": 65535, "effort_limit_un": 2_147_000_000}).open(0)
+
+
+@pytest.mark.parametrize("end", ["least", "most"])
+@pytest.mark.parametrize("number", [one.number for one in RANGES])
+def test_both_ends_of_a_range_are_allowed(number: str, end: str) -> None:
+    (allowed,) = [one for one in RANGES if one.number == number]
+    backend = emulated(identity={number: round(getattr(allowed, end))})
+    backend.open(0)
+    backend.close()
+
+
+@pytest.mark.parametrize("numbers", [{"watchdog_ms": 65535}, {"effort_limit_un": 2_147_000_000}])
+def test_real_board_is_refused_too_and_closed(machine: Any, board: Any, numbers: dict[str, int]) -> None:
+    machine.plug("/dev/hidraw3", board(**numbers))
+    with pytest.raises(NoDevice, match=next(iter(numbers))):
+        Pr2Backend(Pr2Config()).open(0)
+    assert machine.open_handles == []
+
+
+@pytest.mark.parametrize("answer", [None, [], b"", bytes(10), b"\3GSPR", 0, "GSPR", [999] * 64], ids=repr)
+def test_feature_report_that_is_none_is_no_gripper(
+    machine: Any, board: Any, monkeypatch: pytest.MonkeyPatch, answer: Any
+) -> None:
+    machine.plug("/dev/hidraw3", board())
+    device = type(sys.modules[LIBRARY].device())
+    monkeypatch.setattr(device, "get_feature_report", lambda *given: answer)
+    with pytest.raises(NoDevice, match="does not answer as a PR2 gripper"):
+        Pr2Backend(Pr2Config()).open(0)
+    assert machine.open_handles == []
+
+
+@pytest.mark.parametrize("pace", ["lock-step", "device"])
+@pytest.mark.parametrize("count", [0, 1, 63])
+def test_emulated_feature_report_that_is_cut_short_is_no_gripper(pace: Any, count: int) -> None:
+    backend = Pr2Backend(Pr2Config(transport="emulated", pace=pace, faults=FaultConfig(feature_bytes=count)))
+    with pytest.raises(NoDevice, match=f"64 bytes, this one {count}"):
+        backend.open(0)
+
+
+NUMBERS = st.floats(allow_nan=True, allow_infinity=True) | st.floats(-300.0, 300.0)
+OPENED: list[tuple[Pr2Backend, list[OutputReport]]] = []
+
+
+def strong() -> tuple[Pr2Backend, list[OutputReport]]:
+    """Return an open gripper whose board allows 200 N and 0.5 m/s, and the list of what reaches the board."""
+    if not OPENED:
+        backend = emulated(identity={"effort_limit_un": 200_000_000, "speed_limit_um_s": 500_000})
+        info = backend.open(0)
+        assert (info.effort_limit_n, info.speed_limit_m_s) == (100.0, 0.2)
+        sent: list[OutputReport] = []
+        wire = backend._open().emulation.wire  # type: ignore[union-attr]
+        wire.output = lambda data: sent.append(decode_output(data))  # type: ignore[method-assign]
+        OPENED.append((backend, sent))
+    return OPENED[0]
+
+
+@given(value=NUMBERS, effort_limit=NUMBERS, speed_limit=NUMBERS)
+def test_no_command_is_above_the_ceilings_whatever_the_board_allows(
+    value: float, effort_limit: float, speed_limit: float
+) -> None:
+    backend, sent = strong()
+    backend.apply(Command(EFFORT, value, effort_limit, speed_limit))
+    command = sent[-1]
+    assert abs(command.effort_un) <= 100_000_000
+    assert command.effort_limit_un <= 100_000_000
+    assert command.speed_limit_um_s <= 200_000
+    good = not math.isnan(value) and effort_limit >= 0.0 and speed_limit >= 0.0
+    assert (command.kind == EFFORT_KIND) == good
+    assert abs(command.effort_un) <= command.effort_limit_un, "the board has nothing to clamp"
+    if good:
+        most = min(effort_limit, 100.0)
+        assert command.effort_un == pytest.approx(min(max(value, -most), most) * 1e6, abs=1.0)
+
+
+def test_effort_at_its_limit_is_not_clamped_by_the_board() -> None:
+    """20.0000006 N is 20 000 001 µN, and its limit is rounded down."""
+    backend = emulated()
+    backend.open(0)
+    statuses = []
+    for _ in range(3):
+        backend.apply(Command(EFFORT, 20.0000006, 20.0000006, 0.1))
+        reading = backend.read(0.1)
+        assert reading is not None
+        statuses.append(reading.frame.status)
+    backend.close()
+    assert statuses == [0, 0, 0]
+
+
+def test_limit_of_a_weaker_board_is_the_grippers() -> None:
+    backend = emulated(identity={"effort_limit_un": 50_000_000, "speed_limit_um_s": 100_000})
+    info = backend.open(0)
+    backend.close()
+    assert (info.effort_limit_n, info.speed_limit_m_s) == (50.0, 0.1)
+
+
+def test_specification_has_the_ranges_of_the_code() -> None:
+    rows = re.findall(r"^\| (\w+) \| (\d+) to (\d+) \| ([^|]+) \|", SPECIFICATION.read_text(), re.M)
+    found = {(number, int(least), int(most), unit) for number, least, most, unit in rows}
+    assert found == {(one.number, round(one.least), round(one.most), one.unit) for one in RANGES}

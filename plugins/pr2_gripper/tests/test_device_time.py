@@ -1,0 +1,195 @@
+"""Device time that stands still, jumps or runs at another rate is a lost device within a bounded time, with words."""
+
+from __future__ import annotations
+
+import queue
+import random
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from attrs import evolve
+from hypothesis import given
+from hypothesis import strategies as st
+
+from graspsense.core.runner import run_grasp
+from graspsense.plugin_api import DeviceLost, Outcome, RunConfig, create
+from graspsense_pr2_gripper import link as links
+from graspsense_pr2_gripper.backend import Pr2Backend
+from graspsense_pr2_gripper.config import FaultConfig, Pr2Config
+from graspsense_pr2_gripper.device_time import (
+    OFF_S,
+    STILL_REPORTS,
+    ClockFault,
+    CountedTime,
+    HostTime,
+    PassingTime,
+)
+from graspsense_pr2_gripper.link import Link, LockStepLink, ThreadedLink
+from graspsense_pr2_gripper.protocol import InputReport, encode_input
+from graspsense_pr2_gripper.transports.interface import Transport
+
+NEAR: dict[str, Any] = {"object": "can:empty_open", "body_config": {"open_gap_m": 0.075}}
+"""A can, and fingers that stand near it: they touch it at 1.3 s, and squeeze it until 1.6 s."""
+
+
+def report(sequence: int, time_us: int) -> bytes:
+    return encode_input(InputReport(sequence, time_us, 0, 0, 0, 0, 0, (), 0, 0, (0, 0, 0, 0), 0, 0))
+
+
+class Fed(Transport):
+    """Hands over the reports that a test puts in."""
+
+    def __init__(self, times_us: list[int]) -> None:
+        self.reports: queue.SimpleQueue[bytes] = queue.SimpleQueue()
+        for sequence, time_us in enumerate(times_us):
+            self.reports.put(report(sequence, time_us))
+
+    def read(self, timeout_s: float) -> bytes:
+        try:
+            return self.reports.get(timeout=timeout_s)
+        except queue.Empty:
+            return b""
+
+    def write(self, report: bytes) -> None:
+        raise NotImplementedError
+
+    def feature(self, report_id: int) -> bytes:
+        raise NotImplementedError
+
+    def close(self) -> None:
+        pass
+
+
+class Fast(Fed):
+    """The same, without waiting where there is none."""
+
+    def read(self, timeout_s: float) -> bytes:
+        return super().read(1e-9) if timeout_s else b""
+
+
+def read_on(backend: Pr2Backend) -> None:
+    while backend.read(60.0):
+        pass
+
+
+def take_all(link: Link, times_us: list[int]) -> None:
+    while (arrival := link.next(60.0)) is not None:
+        times_us.append(arrival.report.time_us)
+
+
+@pytest.mark.parametrize(("rate", "at_s"), [(0.0, 0.1), (0.0, 1.4), (0.5, 1.0), (3.0, 1.6)])
+def test_grasp_ends_soon_after_the_clock_of_the_board_goes_wrong(rate: float, at_s: float) -> None:
+    """In lock-step: 50 ms where it stands still, 0.2 s where it loses half, and then the effort is off."""
+    faults = FaultConfig(clock_rate=rate, clock_at_s=at_s)
+    backend = Pr2Backend(Pr2Config(transport="emulated", faults=faults, **NEAR))
+    ended = run_grasp(backend, create("controller", "hybrid"), RunConfig(seed=1))
+    ended = evolve(ended, report=dict(backend.report()))
+    assert ended.outcome == Outcome.DEVICE_LOST
+    assert "clock" in ended.reason
+    assert "doctor" in ended.reason
+    counted_s = (ended.report["reports"] - 1) * 1e-3
+    bound_s = STILL_REPORTS * 1e-3 if rate == 0.0 else OFF_S / abs(rate - 1.0)
+    assert counted_s - at_s == pytest.approx(bound_s, abs=0.003)
+    assert ended.report["let_go_after_s"] <= 0.1
+
+
+def test_frozen_clock_of_a_board_in_real_time_is_a_lost_device() -> None:
+    """It ends by the number of reports, however fast this machine is."""
+    faults = FaultConfig(clock_rate=0.0, clock_at_s=0.05)
+    backend = Pr2Backend(Pr2Config(transport="emulated", pace="device", faults=faults, **NEAR))
+    backend.open(0)
+    try:
+        with pytest.raises(DeviceLost, match="clock"):
+            read_on(backend)
+    finally:
+        backend.close()
+
+
+@pytest.mark.parametrize("kind", [Fast, Fed])
+@pytest.mark.parametrize("jump_us", [-300_000, -1])
+def test_time_that_goes_back_is_not_handed_on_and_is_told_if_it_stays_behind(kind: Any, jump_us: int) -> None:
+    """A single early report is left out; after a jump back of 0.3 s, fifty are."""
+    times = [10_000_000 + 1000 * i for i in range(100)]
+    wire = kind([*times[:50], *(time_us + jump_us - 1000 for time_us in times[50:])])
+    link = LockStepLink(wire, 0.001) if kind is Fast else ThreadedLink(wire)
+    seen: list[int] = []
+    try:
+        if jump_us == -300_000:
+            with pytest.raises(DeviceLost, match=r"went back: 50 reports.*10\.049 s"):
+                take_all(link, seen)
+        else:
+            while not seen or seen[-1] < times[-1] - 1001:
+                arrival = link.next(60.0)
+                assert arrival is not None
+                seen.append(arrival.report.time_us)
+            assert not link.gone
+    finally:
+        link.close()
+    assert seen == sorted(set(seen))
+
+
+def test_clock_that_falls_behind_the_hosts_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """64 old reports can come from a buffer; the 65th cannot."""
+    host = [100.0]
+    monkeypatch.setattr(links, "time", SimpleNamespace(monotonic=lambda: host[0]))
+    wire = Fed([0])
+    link = ThreadedLink(wire)
+    try:
+        assert link.next(60.0) is not None
+        host[0] += 0.2
+        for i in range(1, 66):
+            wire.reports.put(report(i, 1000 * i))
+        with pytest.raises(DeviceLost, match="falls behind: 65 reports"):
+            link.next(60.0)
+    finally:
+        link.close()
+
+
+def host_times(rate: float, seconds: float, jump_s: float = 0.0) -> float:
+    """Return the host time at which a device clock of this rate is found wrong."""
+    check = HostTime()
+    for i in range(round(seconds * 1000)):
+        host_s = 500.0 + i * 1e-3
+        device_s = i * 1e-3 * rate + (jump_s if i > 1500 else 0.0)
+        try:
+            check.check(device_s, host_s)
+        except ClockFault:
+            return host_s - 500.0
+    return float("inf")
+
+
+@pytest.mark.parametrize(("rate", "within_s"), [(1.2, 2.0), (2.0, 1.2), (100.0, 1.01)])
+def test_fast_clock_is_found_in_about_a_second(rate: float, within_s: float) -> None:
+    assert host_times(rate, 5.0) < within_s
+
+
+def test_jump_of_more_than_a_tenth_of_a_second_is_found_at_once() -> None:
+    assert host_times(1.0, 5.0, jump_s=0.11) == pytest.approx(1.501)
+    assert host_times(1.0, 5.0, jump_s=0.09) == float("inf")
+
+
+@given(st.integers(0, 2**32), st.floats(-200e-6, 200e-6))
+def test_good_clock_with_late_reports_is_never_told(seed: int, off: float) -> None:
+    """A crystal is good to 200 parts in a million; each half second, one report comes within 50 ms."""
+    chance = random.Random(seed)
+    check, passing, host_s = HostTime(), PassingTime(), 0.0
+    for i in range(400):
+        device_s = 0.02 * i * (1.0 + off)
+        until_prompt_s = 0.02 * (-i % 25)
+        late_s = min(chance.expovariate(5.0), until_prompt_s) if i % 25 else chance.uniform(0.0, 0.05)
+        host_s = max(host_s, 0.02 * i + late_s)
+        check.check(device_s, host_s)
+        assert passing.passes(round(device_s * 1e6))
+
+
+@given(st.lists(st.integers(1, 5000), min_size=1, max_size=50), st.integers(0, 2**32 - 1))
+def test_reports_that_were_lost_count_as_time(steps: list[int], first: int) -> None:
+    """The sequence goes on while nothing arrives, and wraps."""
+    check, count = CountedTime(1000), 0
+    check.check(first, 7_000_000)
+    for step in steps:
+        count += step
+        check.check((first + count) & 0xFFFFFFFF, 7_000_000 + 1000 * count)
+    with pytest.raises(ClockFault):
+        check.check((first + count + 1) & 0xFFFFFFFF, 7_000_000 + 1000 * count + 200_000)

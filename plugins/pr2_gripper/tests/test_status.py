@@ -1,0 +1,171 @@
+"""Every bit that a frame can have is declared with words and a limit, and what a report says is in the frame."""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from graspsense.plugin_api import Pads
+from graspsense_pr2_gripper.backend import Pr2Backend
+from graspsense_pr2_gripper.config import FaultConfig, Pr2Config
+from graspsense_pr2_gripper.measure import Measure
+from graspsense_pr2_gripper.protocol import (
+    CLAMPED,
+    LEFT_ABSENT,
+    REFUSED,
+    RIGHT_ABSENT,
+    Identity,
+    InputReport,
+)
+from graspsense_pr2_gripper.status import (
+    BAD_CELL,
+    COMMAND_CLAMPED,
+    COMMAND_REFUSED,
+    LEFT_DEAD,
+    OLD_IMAGE,
+    RIGHT_DEAD,
+    status_bits,
+)
+from graspsense_pr2_gripper.stream import RawImage
+
+PAGE = Path(__file__).parents[3] / "docs" / "pr2.md"
+TIP = (3000.0,) * 22
+IDENTITY = Identity(
+    firmware=(1, 2, 3), serial="L7", transmission="pr2", pad_counts_per_n=1600, side_counts_per_n=400,
+    edge_counts_per_n=600, effort_limit_un=100_000_000, speed_limit_um_s=200_000, report_rate_hz=1000,
+    image_period_us=41_000, watchdog_ms=100, encoder_ticks_rev=1200, accelerometer_g=8,
+)  # fmt: skip
+"""The PR2 as published."""
+
+
+def report(**changes: Any) -> InputReport:
+    healthy = InputReport(0, 0, 0, 0, 0, 0, 0, (), 1, 0, (3000, 3000, 3000, 3000), 1, 20_000)
+    return healthy._replace(**changes)
+
+
+def measure(identity: Any, swap: bool = False) -> Measure:
+    made = Measure(identity, Pr2Config(swap_fingers=swap), None, None)
+    made.tare([Pads(0.041 * i, i, TIP, TIP) for i in range(1, 7)])
+    return made
+
+
+def dead(left: int = 0, right: int = 0) -> RawImage:
+    """An image in which so many cells on the face of each pad read 0."""
+    cells = [[3000.0] * (22 - count) + [0.0] * count for count in (left, right)]
+    return RawImage(9, 0, (*cells[0], *cells[1]))
+
+
+@pytest.mark.parametrize("swap", [False, True])
+def test_every_bit_of_the_board_has_a_name_a_meaning_and_one_declaration(swap: bool) -> None:
+    bits = status_bits(swap)
+    for bit in range(16):
+        (declared,) = [one for one in bits if one.mask & 1 << bit]
+        assert declared.mask == 1 << bit
+        assert declared.name
+        assert declared.meaning
+    assert len({one.name for one in bits}) == len(bits)
+
+
+def test_opened_gripper_declares_the_bits_and_the_friction_of_its_drive() -> None:
+    """7 N is what pr2_gripper_sensor feeds forward; nothing was measured here."""
+    backend = Pr2Backend(Pr2Config(transport="emulated", swap_fingers=True))
+    info = backend.open(0)
+    backend.close()
+    assert info.status_bits == status_bits(swap_fingers=True)
+    assert info.friction_n == 7.0
+    assert not info.harmless
+
+
+@given(
+    reported=st.builds(
+        report,
+        status=st.integers(0, 0xFFFF),
+        command_result=st.integers(0, 3),
+        image_age_us=st.integers(0, 0xFFFF),
+    ),
+    image=st.builds(dead, st.integers(0, 22), st.integers(0, 22)),
+    swap=st.booleans(),
+)
+def test_no_frame_has_a_bit_that_is_not_declared(reported: InputReport, image: RawImage, swap: bool) -> None:
+    frame = measure(IDENTITY, swap).reading(reported, image).frame
+    declared = sum(one.mask for one in status_bits(swap))
+    assert frame.status & ~declared == 0
+    assert frame.status & 0xFFFF == reported.status
+
+
+@pytest.mark.parametrize(
+    ("result", "bit"), [(0, 0), (1, 0), (CLAMPED, COMMAND_CLAMPED), (REFUSED, COMMAND_REFUSED)]
+)
+def test_result_of_a_command_is_in_the_frame(result: int, bit: int) -> None:
+    assert measure(IDENTITY).reading(report(command_result=result), None).frame.status == bit
+
+
+@pytest.mark.parametrize(
+    ("rate_hz", "age_us", "old"),
+    [(1000, 61_000, False), (1000, 62_000, True), (1000, 0xFFFF, True), (100, 0xFFFF, False)],
+)
+def test_image_is_old_half_a_period_after_the_next_one_was_due(rate_hz: int, age_us: int, old: bool) -> None:
+    """41 ms and a half of it; at 100 Hz the eleven slices of an image take 110 ms, which the field cannot say."""
+    slow = IDENTITY._replace(report_rate_hz=rate_hz)
+    frame = measure(slow).reading(report(image_age_us=age_us), None).frame
+    assert frame.status == (OLD_IMAGE if old else 0)
+    assert measure(slow).reading(report(image=0, image_age_us=age_us), None).frame.status == 0, (
+        "none came yet"
+    )
+
+
+def test_pad_with_more_than_a_third_of_its_cells_dead_is_dead() -> None:
+    assert measure(IDENTITY).reading(report(), dead(left=5)).frame.status == BAD_CELL
+    assert measure(IDENTITY).reading(report(), dead(left=6)).frame.status == BAD_CELL | LEFT_DEAD
+    assert measure(IDENTITY).reading(report(), dead(right=15)).frame.status == BAD_CELL | RIGHT_DEAD
+    swapped = measure(IDENTITY, swap=True).reading(report(), dead(left=6)).frame
+    assert swapped.status == BAD_CELL | RIGHT_DEAD
+
+
+def test_dead_pad_shows_before_the_tare() -> None:
+    frame = Measure(IDENTITY, Pr2Config(), None, None).reading(report(), dead(left=15)).frame
+    assert frame.status == BAD_CELL | LEFT_DEAD
+
+
+@pytest.mark.parametrize("swap", [False, True])
+@pytest.mark.parametrize("bit", [LEFT_ABSENT, RIGHT_ABSENT])
+def test_words_name_the_pad_that_has_no_force(bit: int, swap: bool) -> None:
+    (declared,) = [one for one in status_bits(swap) if one.mask == bit]
+    frame = measure(IDENTITY, swap).reading(report(status=bit), dead()).frame
+    side = "left" if math.isnan(frame.force_left_n) else "right"
+    assert declared.name == f"{side} fingertip absent"
+    assert math.isnan(frame.force_left_n) != math.isnan(frame.force_right_n)
+
+
+def test_what_a_grasp_cannot_do_without_has_a_limit_and_what_only_informs_has_none() -> None:
+    endless = {one.name for one in status_bits(False) if one.limit_s == math.inf}
+    assert endless == {"samples missed", "bad cell", "beyond load table", "command refused"}
+    assert all(0.0 < one.limit_s <= 0.2 for one in status_bits(False) if one.name not in endless)
+
+
+def test_page_has_the_table_of_the_code() -> None:
+    rows = re.findall(r"^\| (\d+) \| ([^|]+) \| [^|]+ \| ([^|]+) \|", PAGE.read_text(), re.M)
+    found = {int(bit): (name, limit) for bit, name, limit in rows}
+    reserved = {bit for bit in range(16) if bit >= 6}
+    expected = {
+        one.mask.bit_length() - 1: (one.name, "-" if one.limit_s == math.inf else f"{one.limit_s:g} s")
+        for one in status_bits(False)
+    }
+    assert found == {bit: row for bit, row in expected.items() if bit not in reserved}
+    assert "| 6 to 15 | unknown bit | " in PAGE.read_text()
+
+
+def test_bits_that_the_board_sets_reach_the_frames() -> None:
+    for bit in range(16):
+        faults = FaultConfig(status_bits=1 << bit, status_at_s=0.002)
+        backend = Pr2Backend(Pr2Config(transport="emulated", faults=faults))
+        backend.open(0)
+        readings = [backend.read(0.1) for _ in range(4)]
+        backend.close()
+        assert [one.frame.status for one in readings if one] == [0, 0, 1 << bit, 1 << bit]
