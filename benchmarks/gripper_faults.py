@@ -4,8 +4,8 @@
 
 The emulated board is treated as a real gripper, with the limits of a first closing. Each fault begins at five times:
 while the fingers open, early and late in the approach, in the squeeze, and in the hold; those times are taken from a
-grasp without a fault. The fault is on the left fingertip, then on the right one. The controllers are the three of graspsense,
-and four hostile ones. Effort and force are those of the simulated body, whatever the board reported.
+grasp without a fault. The fault is on the left fingertip, then on the right one. The controllers are the three of
+graspsense, and four hostile ones. Effort and force are those of the simulated body, whatever the board reported.
 
 The table has a row for each fault and group of controllers, with the worst of its grasps. `--write` puts it between
 the marks of the page. `--short` runs a few of the grasps. Emulated and simulated; nothing was measured on a gripper.
@@ -17,9 +17,9 @@ import argparse
 import json
 import sys
 from collections.abc import Iterable, Iterator, Mapping
-from math import inf, nan
+from math import inf
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 from attrs import asdict, evolve, frozen
@@ -30,14 +30,12 @@ from graspsense.plugin_api import (
     APPROACH,
     EFFORT,
     HOLD,
-    RUNNING,
     SQUEEZE,
-    Command,
     Controller,
-    Reading,
     SensorBackend,
     create,
 )
+from graspsense.testing.hostile import HOSTILE
 from graspsense_pr2_gripper.backend import Pr2Backend
 from graspsense_pr2_gripper.config import FaultConfig, Pr2Config
 
@@ -47,77 +45,6 @@ CONTROLLERS: Final = ("hybrid", "velocity", "force")
 BEGIN, END = "<!-- faults: begin -->", "<!-- faults: end -->"
 
 
-class HostileState(NamedTuple):
-    """The state of a law that never ends."""
-
-    phase: int
-    outcome: int
-    ticks: int
-
-
-class Hostile(Controller[None]):
-    """A law that reads nothing and never ends."""
-
-    requires = ()
-    commands = ("effort",)
-
-    def params(self) -> tuple[()]:
-        """Return no parameters."""
-        return ()
-
-    def init(self) -> HostileState:
-        """Return the first state."""
-        return HostileState(APPROACH, RUNNING, 0)
-
-
-def _not_a_number(params: Any, state: Any, reading: Reading) -> tuple[Command, Any]:
-    value = nan if reading.frame.gap_m < 0.07 else 20.0
-    return Command(EFFORT, value, inf, inf), state
-
-
-def _huge(params: Any, state: Any, reading: Reading) -> tuple[Command, Any]:
-    return Command(EFFORT, 1e308, inf, inf), state
-
-
-def _oscillating(params: Any, state: Any, reading: Reading) -> tuple[Command, Any]:
-    value = 100.0 if state.ticks % 200 < 150 else -100.0
-    return Command(EFFORT, value, inf, inf), HostileState(SQUEEZE, RUNNING, state.ticks + 1)
-
-
-def _never_ending(params: Any, state: Any, reading: Reading) -> tuple[Command, Any]:
-    return Command(EFFORT, 100.0, inf, inf), HostileState(HOLD, RUNNING, 0)
-
-
-class NotANumber(Hostile):
-    """Commands NaN from a gap of 70 mm on."""
-
-    step = staticmethod(_not_a_number)
-
-
-class Huge(Hostile):
-    """Commands 1e308 N."""
-
-    step = staticmethod(_huge)
-
-
-class Oscillating(Hostile):
-    """Commands 100 N, closing and opening in turn, and calls it a squeeze."""
-
-    step = staticmethod(_oscillating)
-
-
-class NeverEnding(Hostile):
-    """Commands 100 N and calls it a hold, without an end."""
-
-    step = staticmethod(_never_ending)
-
-
-HOSTILE: Final[Mapping[str, type[Hostile]]] = {
-    "NaN": NotANumber,
-    "1e308": Huge,
-    "oscillating": Oscillating,
-    "never ending": NeverEnding,
-}
 RUN: Final = RunConfig(grasp_timeout_s=10.0)
 
 
@@ -178,7 +105,7 @@ def grasped(controller: Controller[Any], faults: FaultConfig, run: RunConfig = R
 def controller_named(name: str) -> Controller[Any]:
     """Return one of graspsense's controllers, or a hostile one."""
     if name in HOSTILE:
-        return HOSTILE[name](None)
+        return HOSTILE[name](EFFORT)
     built: Controller[Any] = create("controller", name)
     return built
 

@@ -30,7 +30,7 @@ OPENING: Final = int(Phase.OPENING)
 
 
 def lasting(seconds: float, present: bool, dt_s: float) -> float:
-    """Return for how long (s) a difference has been there; it is forgotten as fast as it is gathered.
+    """Return for how long (s) a difference has been there; it is forgotten at half the rate at which it is gathered.
 
     A command that the guard switches on and off at a limit of the speed shows a difference in half of the ticks only.
     """

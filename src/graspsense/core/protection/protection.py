@@ -50,11 +50,13 @@ class Protection:
         )
         self._opening_n = max(self._ceiling_n, opening_n)
         contact_n = controller.contact_force_n()
+        # Where only the entry of a plugin declares the channels, the frames show which there are.
+        self._declared = bool(rates)
         self._has_pads = "force_left" in rates and "force_right" in rates
         self._touch, self._drift = Touch(contact_n), Drift(contact_n)
         self._stuck = StuckForce()
         self._fingertips = Fingertips()
-        self._motor = Motor("effort" in rates)
+        self._motor = Motor("effort" in rates or not rates)
         self._status = Status(info.status_bits)
         self._reports = Reports(info.rate_hz, rates.get("pads", 0.0))
 
@@ -73,6 +75,8 @@ class Protection:
         for fault in self._status.see(frame, phase):
             self._see(fault)
         self._see(self._motor.see(frame, phase))
+        if not self._declared and frame.force_left_n == frame.force_left_n:
+            self._has_pads = True
         if self._has_pads:
             self._see_pads(reading, phase, command)
         allowed = self._limited(phase, command)

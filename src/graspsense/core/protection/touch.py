@@ -37,6 +37,8 @@ PUSHED_SHARE: Final = 4.0
 LEAST_S: Final = 0.1
 MOST_S: Final = 3.0
 """Bounds of the time that stands for this travel, for fast and for slow approaches."""
+USUAL_M_S: Final = 0.010
+"""The speed that is assumed for an approach that has not begun to move: that of the paper."""
 MOVED_M: Final = 0.001
 """Travel after which the fingers have overcome static friction: a later stop is not the start of the motion."""
 STALL_M: Final = 0.0005
@@ -149,7 +151,7 @@ class Touch:
         """Return the time (s) that the approach takes for this travel, within bounds."""
         speed_m_s = self._approach_m_s.value
         if not speed_m_s > 0.0:
-            return MOST_S
+            speed_m_s = USUAL_M_S
         return min(max(travel_m / speed_m_s, LEAST_S), MOST_S)
 
     def _alone(self, frame: Frame) -> Fault | None:
