@@ -98,7 +98,7 @@ def answered(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(transport, "write", writes)
     monkeypatch.setattr(transport, "close", closes)
     monkeypatch.setattr(link, "OLDEST_S", math.inf)
-    monkeypatch.setattr(device_time, "OFF_S", math.inf)
+    monkeypatch.setattr(device_time, "AHEAD_S", math.inf)
 
 
 @pytest.fixture(autouse=True)
@@ -207,5 +207,5 @@ def machine(monkeypatch: pytest.MonkeyPatch) -> Machine:
     # Its time stands still between two ticks, so on a machine that is busy every report looks old, and many ticks at
     # once look like a clock that jumps.
     monkeypatch.setattr(link, "OLDEST_S", math.inf)
-    monkeypatch.setattr(device_time, "OFF_S", math.inf)
+    monkeypatch.setattr(device_time, "AHEAD_S", math.inf)
     return made

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import queue
 import random
+import time
 from types import SimpleNamespace
 from typing import Any
 
@@ -13,12 +14,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from graspsense.core.runner import run_grasp
-from graspsense.plugin_api import DeviceLost, Outcome, RunConfig, create
+from graspsense.plugin_api import EFFORT, Command, DeviceLost, Outcome, RunConfig, create
 from graspsense_pr2_gripper import link as links
 from graspsense_pr2_gripper.backend import Pr2Backend
 from graspsense_pr2_gripper.config import FaultConfig, Pr2Config
 from graspsense_pr2_gripper.device_time import (
-    OFF_S,
+    COUNTED_OFF_S,
     STILL_REPORTS,
     ClockFault,
     CountedTime,
@@ -80,7 +81,10 @@ def take_all(link: Link, times_us: list[int]) -> None:
 
 @pytest.mark.parametrize(("rate", "at_s"), [(0.0, 0.1), (0.0, 1.4), (0.5, 1.0), (3.0, 1.6)])
 def test_grasp_ends_soon_after_the_clock_of_the_board_goes_wrong(rate: float, at_s: float) -> None:
-    """In lock-step: 50 ms where it stands still, 0.2 s where it loses half, and then the effort is off."""
+    """In lock-step: 50 ms where it stands still, 0.2 s where it loses half.
+
+    The effort is switched off by a command, since a watchdog with this clock would never act.
+    """
     faults = FaultConfig(clock_rate=rate, clock_at_s=at_s)
     backend = Pr2Backend(Pr2Config(transport="emulated", faults=faults, **NEAR))
     ended = run_grasp(backend, create("controller", "hybrid"), RunConfig(seed=1))
@@ -89,9 +93,9 @@ def test_grasp_ends_soon_after_the_clock_of_the_board_goes_wrong(rate: float, at
     assert "clock" in ended.reason
     assert "doctor" in ended.reason
     counted_s = (ended.report["reports"] - 1) * 1e-3
-    bound_s = STILL_REPORTS * 1e-3 if rate == 0.0 else OFF_S / abs(rate - 1.0)
+    bound_s = STILL_REPORTS * 1e-3 if rate == 0.0 else COUNTED_OFF_S / abs(rate - 1.0)
     assert counted_s - at_s == pytest.approx(bound_s, abs=0.003)
-    assert ended.report["let_go_after_s"] <= 0.1
+    assert ended.report["let_go_after_s"] == 0.0
 
 
 def test_frozen_clock_of_a_board_in_real_time_is_a_lost_device() -> None:
@@ -102,6 +106,7 @@ def test_frozen_clock_of_a_board_in_real_time_is_a_lost_device() -> None:
     try:
         with pytest.raises(DeviceLost, match="clock"):
             read_on(backend)
+        backend.apply(Command(EFFORT, 0.0, float("inf"), float("inf")))
     finally:
         backend.close()
 
@@ -112,7 +117,7 @@ def test_time_that_goes_back_is_not_handed_on_and_is_told_if_it_stays_behind(kin
     """A single early report is left out; after a jump back of 0.3 s, fifty are."""
     times = [10_000_000 + 1000 * i for i in range(100)]
     wire = kind([*times[:50], *(time_us + jump_us - 1000 for time_us in times[50:])])
-    link = LockStepLink(wire, 0.001) if kind is Fast else ThreadedLink(wire)
+    link = LockStepLink(wire, 0.001) if kind is Fast else ThreadedLink(wire, 0.001)
     seen: list[int] = []
     try:
         if jump_us == -300_000:
@@ -129,21 +134,53 @@ def test_time_that_goes_back_is_not_handed_on_and_is_told_if_it_stays_behind(kin
     assert seen == sorted(set(seen))
 
 
-def test_clock_that_falls_behind_the_hosts_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    """64 old reports can come from a buffer; the 65th cannot."""
+@pytest.mark.parametrize(("old", "told"), [(64, False), (65, True)])
+def test_clock_that_falls_behind_the_hosts_is_told(
+    monkeypatch: pytest.MonkeyPatch, old: int, told: bool
+) -> None:
+    """64 old reports can come from a buffer; the 65th cannot. The board is slow in all it does, reports too."""
     host = [100.0]
     monkeypatch.setattr(links, "time", SimpleNamespace(monotonic=lambda: host[0]))
     wire = Fed([0])
-    link = ThreadedLink(wire)
+    link = ThreadedLink(wire, 0.001)
     try:
         assert link.next(60.0) is not None
         host[0] += 0.2
-        for i in range(1, 66):
+        for i in range(1, old + 1):
             wire.reports.put(report(i, 1000 * i))
-        with pytest.raises(DeviceLost, match="falls behind: 65 reports"):
-            link.next(60.0)
+        while link.discarded < old:
+            time.sleep(0.001)
+        if told:
+            with pytest.raises(DeviceLost, match=r"clock falls behind.* last 65 reports"):
+                link.next(0.0)
+        else:
+            assert link.next(0.0) is None
     finally:
         link.close()
+
+
+def test_board_in_real_time_may_leave_out_reports_without_a_number_but_no_time() -> None:
+    """A board that could not send for 30 s gave no numbers meanwhile; one whose clock runs at half the rate is told."""
+    check = CountedTime(1000, numbers_all=False)
+    check.check(1, 1000)
+    check.check(2, 30_000_000)
+    slow = CountedTime(1000, numbers_all=False)
+    found = next(i for i in range(1000) if not right(slow, i, 500 * i))
+    assert found == pytest.approx(COUNTED_OFF_S / 0.5e-3, abs=2)
+
+
+def right(check: CountedTime, sequence: int, time_us: int) -> bool:
+    try:
+        check.check(sequence, time_us)
+    except ClockFault:
+        return False
+    return True
+
+
+def test_two_crystals_of_200_parts_in_a_million_never_differ_too_much() -> None:
+    """The board's ticks come from one, its times from the other: in ten minutes they differ by 0.12 s."""
+    check = CountedTime(1000, numbers_all=True)
+    assert all(right(check, i, round(1000 * i * (1 + 200e-6))) for i in range(0, 600_000, 50))
 
 
 def host_times(rate: float, seconds: float, jump_s: float = 0.0) -> float:
@@ -151,7 +188,7 @@ def host_times(rate: float, seconds: float, jump_s: float = 0.0) -> float:
     check = HostTime()
     for i in range(round(seconds * 1000)):
         host_s = 500.0 + i * 1e-3
-        device_s = i * 1e-3 * rate + (jump_s if i > 1500 else 0.0)
+        device_s = i * 1e-3 * rate + (jump_s if i > 3500 else 0.0)
         try:
             check.check(device_s, host_s)
         except ClockFault:
@@ -159,14 +196,14 @@ def host_times(rate: float, seconds: float, jump_s: float = 0.0) -> float:
     return float("inf")
 
 
-@pytest.mark.parametrize(("rate", "within_s"), [(1.2, 2.0), (2.0, 1.2), (100.0, 1.01)])
-def test_fast_clock_is_found_in_about_a_second(rate: float, within_s: float) -> None:
+@pytest.mark.parametrize(("rate", "within_s"), [(1.2, 4.01), (2.0, 2.3), (100.0, 2.01)])
+def test_fast_clock_is_found_in_a_few_seconds(rate: float, within_s: float) -> None:
     assert host_times(rate, 5.0) < within_s
 
 
-def test_jump_of_more_than_a_tenth_of_a_second_is_found_at_once() -> None:
-    assert host_times(1.0, 5.0, jump_s=0.11) == pytest.approx(1.501)
-    assert host_times(1.0, 5.0, jump_s=0.09) == float("inf")
+def test_jump_of_more_than_a_quarter_of_a_second_is_found_at_once() -> None:
+    assert host_times(1.0, 5.0, jump_s=0.26) == pytest.approx(3.501)
+    assert host_times(1.0, 5.0, jump_s=0.24) == float("inf")
 
 
 @given(st.integers(0, 2**32), st.floats(-200e-6, 200e-6))
@@ -186,7 +223,7 @@ def test_good_clock_with_late_reports_is_never_told(seed: int, off: float) -> No
 @given(st.lists(st.integers(1, 5000), min_size=1, max_size=50), st.integers(0, 2**32 - 1))
 def test_reports_that_were_lost_count_as_time(steps: list[int], first: int) -> None:
     """The sequence goes on while nothing arrives, and wraps."""
-    check, count = CountedTime(1000), 0
+    check, count = CountedTime(1000, numbers_all=True), 0
     check.check(first, 7_000_000)
     for step in steps:
         count += step

@@ -84,7 +84,7 @@ def host(monkeypatch: pytest.MonkeyPatch) -> list[float]:
 def test_reader_counts_what_was_too_old_and_hands_on_the_fresh_one(host: list[float]) -> None:
     """After a stall of 300 ms the buffer holds the 64 reports that came first."""
     wire = Fed()
-    link = ThreadedLink(wire)
+    link = ThreadedLink(wire, 0.001)
     try:
         now_us = 10_000_000
         wire.reports.put(report(1, now_us))
@@ -105,7 +105,7 @@ def test_reader_counts_what_was_too_old_and_hands_on_the_fresh_one(host: list[fl
 @pytest.mark.usefixtures("host")
 def test_newest_report_replaces_the_one_nobody_asked_for() -> None:
     wire = Fed()
-    link = ThreadedLink(wire)
+    link = ThreadedLink(wire, 0.001)
     try:
         for i in range(6):
             wire.reports.put(report(i, 1000 * i))
@@ -123,7 +123,7 @@ def test_newest_report_replaces_the_one_nobody_asked_for() -> None:
 
 def test_loss_is_told_with_its_reason() -> None:
     wire = Fed()
-    link = ThreadedLink(wire)
+    link = ThreadedLink(wire, 0.001)
     wire.reports.put(TransportGone("read error"))
     with pytest.raises(DeviceLost, match=r"read error.*graspsense devices"):
         link.next(60.0)
@@ -136,7 +136,7 @@ def test_loss_is_told_with_its_reason() -> None:
 
 def test_closing_twice_is_closing_once() -> None:
     wire = Fed()
-    link = ThreadedLink(wire)
+    link = ThreadedLink(wire, 0.001)
     assert link.close()
     wire.closed.clear()
     assert link.close()
@@ -149,7 +149,7 @@ def test_closing_is_bounded_where_the_library_hangs(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(links, "JOIN_S", 0.3)
     wire = Fed()
     setattr(wire, where, True)
-    link = ThreadedLink(wire)
+    link = ThreadedLink(wire, 0.001)
     if where == "stuck_in_close":
         # The reader has ended already, so that what is waited for in vain is the device alone.
         link._stop.set()

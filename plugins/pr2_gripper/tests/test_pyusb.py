@@ -164,7 +164,7 @@ def port(monkeypatch: pytest.MonkeyPatch, board: Any) -> Libusb:
     # Its time stands still between two ticks, so on a machine that is busy every report looks old, and many ticks at
     # once look like a clock that jumps.
     monkeypatch.setattr(link, "OLDEST_S", math.inf)
-    monkeypatch.setattr(device_time, "OFF_S", math.inf)
+    monkeypatch.setattr(device_time, "AHEAD_S", math.inf)
     return backend
 
 

@@ -11,10 +11,13 @@ from typing import Final
 
 STILL_REPORTS: Final = 50
 """Consecutive reports whose time does not pass, after which the clock counts as broken: 50 ms."""
-OFF_S: Final = 0.1
-"""Largest difference between the time that passed for the device and for the host."""
-WINDOW_S: Final = 1.0
-"""The fastest report of a window is what the next window is compared with."""
+COUNTED_OFF_S: Final = 0.1
+"""Largest difference between the time that passed and the periods of the reports, in `COUNTED_S`."""
+COUNTED_S: Final = 60.0
+"""Time after which the count begins again, so that two good crystals never differ by so much."""
+AHEAD_S: Final = 0.25
+"""Time by which no report can be ahead of the fastest one of the window before."""
+WINDOW_S: Final = 2.0
 
 
 class ClockFault(Exception):
@@ -49,10 +52,14 @@ class PassingTime:
 
 
 class CountedTime:
-    """Holds device time against the number of reports, each of which stands for one period."""
+    """Holds device time against the number of reports, each of which stands for one period.
 
-    def __init__(self, period_us: int) -> None:
+    Without `numbers_all`, more time may pass: a board that cannot send a report for a while may give it no number.
+    """
+
+    def __init__(self, period_us: int, numbers_all: bool) -> None:
         self._period_us = period_us
+        self._numbers_all = numbers_all
         self._began: tuple[int, int] | None = None
 
     def check(self, sequence: int, time_us: int) -> None:
@@ -62,10 +69,14 @@ class CountedTime:
         first, began_us = self._began
         counted_s = ((sequence - first) & 0xFFFFFFFF) * self._period_us * 1e-6
         passed_s = (time_us - began_us) * 1e-6
-        if abs(passed_s - counted_s) > OFF_S:
+        if passed_s < counted_s - COUNTED_OFF_S or (
+            self._numbers_all and passed_s > counted_s + COUNTED_OFF_S
+        ):
             raise ClockFault(
                 f"its clock is wrong: {passed_s:.3f} s of device time passed in reports of {counted_s:.3f} s"
             )
+        if passed_s > COUNTED_S:
+            self._began = None
 
 
 class HostTime:
@@ -86,7 +97,7 @@ class HostTime:
             self._before_s, self._fastest_s = self._fastest_s, offset_s
         self._fastest_s = min(self._fastest_s, offset_s)
         ahead_s = self._before_s - offset_s
-        if OFF_S < ahead_s < math.inf:
+        if AHEAD_S < ahead_s < math.inf:
             raise ClockFault(
-                f"its clock jumped or runs fast: it is {ahead_s:.3f} s ahead of the fastest report of the second before"
+                f"its clock jumped or runs fast: by the clock of this computer it gained {ahead_s:.3f} s"
             )

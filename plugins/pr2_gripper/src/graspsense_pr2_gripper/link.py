@@ -25,7 +25,7 @@ READ_S: Final = 0.05
 OLDEST_S: Final = 0.05
 """Age above which a report is discarded."""
 BUFFERED: Final = 64
-"""Reports that a buffer of the system holds. More old ones in a row mean that the clock of the device falls behind."""
+"""Reports that a buffer of the system holds. More old ones in a row are no rest of a stall of the host."""
 JOIN_S: Final = 1.0
 """Time for which closing waits for the reader, and then for the device."""
 
@@ -45,19 +45,22 @@ class Arrival(NamedTuple):
 
 
 class Link(ABC):
-    """An open device as the driver sees it."""
+    """An open device as the driver sees it, which sends a report each `period_s`; `numbers_all`: of `CountedTime`."""
 
-    def __init__(self, transport: Transport) -> None:
+    def __init__(self, transport: Transport, period_s: float, numbers_all: bool) -> None:
         self.transport = transport
         self.stream = Stream()
         self.clock = DeviceClock()
-        self.time = PassingTime()
+        self._passing = PassingTime()
+        self._counted = CountedTime(round(period_s * 1e6), numbers_all)
         self.discarded = 0
         """Number of reports that were too old."""
         self.skipped = 0
         """Number of reports that a newer one replaced before the driver read them."""
         self.gone = ""
-        """The reason why the device is gone; empty while it is connected."""
+        """The reason why the device counts as lost; empty while it does not."""
+        self.reachable = True
+        """Whether commands are still sent: a device that restarted, or whose clock is wrong, can let go."""
 
     def _arrival(self, report: InputReport, host_s: float, skipped: Arrival | None) -> Arrival:
         """Return a report of the stream as an arrival; `skipped`: the arrival that it replaces."""
@@ -65,6 +68,13 @@ class Link(ABC):
         if skipped is not None and skipped.sampled + len(words) == stream.sampled:
             words = (*skipped.words, *words)[-MAX_SAMPLES:]
         return Arrival(report, stream.image, host_s, words, stream.sampled)
+
+    def _passes(self, report: InputReport) -> bool:
+        """Return whether a report of the stream has a later time than those before. Raises ClockFault."""
+        if not self._passing.passes(report.time_us):
+            return False
+        self._counted.check(report.sequence, report.time_us)
+        return True
 
     @abstractmethod
     def next(self, timeout_s: float) -> Arrival | None:
@@ -75,15 +85,20 @@ class Link(ABC):
         """Close the device in a bounded time; return whether it closed cleanly."""
 
     def send(self, report: bytes) -> None:
-        """Send a command. Raises DeviceLost, at once if the device is known to be gone."""
-        if self.gone:
+        """Send a command. Raises DeviceLost, at once if the device is known to be out of reach."""
+        if not self.reachable:
             # Each write to a device that does not respond may block for seconds.
             raise DeviceLost(self.gone)
         try:
             self.transport.write(report)
         except TransportGone as gone:
-            self.gone = _lost(gone)
+            self._lose(gone)
             raise DeviceLost(self.gone) from gone
+
+    def _lose(self, why: TransportGone | Restarted | ClockFault) -> None:
+        """Set why the device counts as lost."""
+        self.reachable = self.reachable and not isinstance(why, TransportGone)
+        self.gone = _lost(why)
 
 
 @final
@@ -91,9 +106,8 @@ class LockStepLink(Link):
     """Reads on demand; each read without a waiting report advances the device time by `period_s`."""
 
     def __init__(self, transport: Transport, period_s: float) -> None:
-        super().__init__(transport)
+        super().__init__(transport, period_s, numbers_all=True)
         self._period_s = period_s
-        self._counted = CountedTime(round(period_s * 1e6))
 
     def next(self, timeout_s: float) -> Arrival | None:
         """Advance the device time until a report is valid, at most by `timeout_s`."""
@@ -104,14 +118,13 @@ class LockStepLink(Link):
                 data = read(self._period_s)
                 while data:
                     report = take(data)
-                    if report is not None and self.time.passes(report.time_us):
-                        self._counted.check(report.sequence, report.time_us)
+                    if report is not None and self._passes(report):
                         newest = self._arrival(report, time.monotonic(), newest)
                     data = read(0.0)
                 if newest is not None:
                     return newest
         except (TransportGone, Restarted, ClockFault) as gone:
-            self.gone = _lost(gone)
+            self._lose(gone)
             raise DeviceLost(self.gone) from gone
         return None
 
@@ -125,8 +138,8 @@ class LockStepLink(Link):
 class ThreadedLink(Link):
     """Reads in a daemon thread that starts at construction."""
 
-    def __init__(self, transport: Transport) -> None:
-        super().__init__(transport)
+    def __init__(self, transport: Transport, period_s: float) -> None:
+        super().__init__(transport, period_s, numbers_all=False)
         self._arrived = threading.Condition()
         self._newest: Arrival | None = None
         self._stop = threading.Event()
@@ -146,7 +159,15 @@ class ThreadedLink(Link):
                     raise DeviceLost(self.gone)
                 left = give_up - time.monotonic()
                 if left <= 0.0:
-                    return None
+                    if self._old <= BUFFERED:
+                        return None
+                    self._lose(
+                        ClockFault(
+                            "its clock falls behind that of this computer, or this computer does not keep up: the last "
+                            f"{self._old} reports were more than {OLDEST_S:g} s old"
+                        )
+                    )
+                    continue
                 self._arrived.wait(left)
             newest, self._newest = self._newest, None
             return newest
@@ -180,12 +201,12 @@ class ThreadedLink(Link):
                     self._arrived.notify()
         except (TransportGone, Restarted, ClockFault) as gone:
             with self._arrived:
-                self.gone = _lost(gone)
+                self._lose(gone)
                 self._arrived.notify()
 
     def _in_time(self, report: InputReport, host_s: float) -> bool:
         """Return whether a report is new enough to be acted on. Raises ClockFault."""
-        if not self.time.passes(report.time_us):
+        if not self._passes(report):
             return False
         device_s = report.time_us * 1e-6
         self._host.check(device_s, host_s)
@@ -194,11 +215,6 @@ class ThreadedLink(Link):
             return True
         self.discarded += 1
         self._old += 1
-        if self._old > BUFFERED:
-            raise ClockFault(
-                f"its clock falls behind: {self._old} reports in a row were more than {OLDEST_S:g} s old by the clock "
-                "of this computer"
-            )
         return False
 
 

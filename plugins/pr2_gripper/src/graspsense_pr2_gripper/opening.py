@@ -47,7 +47,7 @@ def open_board(config: Pr2Config, seed: int, wait_s: float) -> Opened:
     except TransportGone as error:
         close_within(transport, JOIN_S)
         raise _no_answer(config, error) from error
-    return Opened(ThreadedLink(transport), identity, None)
+    return Opened(ThreadedLink(transport, 1.0 / identity.report_rate_hz), identity, None)
 
 
 def _identified(config: Pr2Config, transport: Transport) -> Identity:
@@ -80,12 +80,8 @@ def _emulated(config: Pr2Config, seed: int) -> Opened:
     except NoDevice:
         transport.close()
         raise
-    link: Link
-    if isinstance(transport, LockStepTransport):
-        link = LockStepLink(transport, 1.0 / identity.report_rate_hz)
-    else:
-        link = ThreadedLink(transport)
-    return Opened(link, identity, emulation)
+    kind = LockStepLink if config.pace == "lock-step" else ThreadedLink
+    return Opened(kind(transport, 1.0 / identity.report_rate_hz), identity, emulation)
 
 
 def _open_transport(config: Pr2Config, wait_s: float) -> Transport:
