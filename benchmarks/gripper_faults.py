@@ -95,11 +95,11 @@ class FaultyGrasp:
     words: str
 
 
-def grasped(controller: Controller[Any], faults: FaultConfig, run: RunConfig = RUN) -> Grasp:
+def grasped(controller: Controller[Any], faults: FaultConfig, seed: int = SEED) -> Grasp:
     """Grasp with the emulated board, treated as a real gripper."""
     config = Pr2Config(transport="emulated", pace="device", calibration="none", object=OBJECT, faults=faults)
     backend: SensorBackend[Any] = Pr2Backend(config).dry_run_backend()
-    return run_grasp(backend, controller, evolve(run, seed=SEED))
+    return run_grasp(backend, controller, evolve(RUN, seed=seed))
 
 
 def controller_named(name: str) -> Controller[Any]:

@@ -56,7 +56,7 @@ class Protection:
         self._touch, self._drift = Touch(contact_n), Drift(contact_n)
         self._stuck = StuckForce()
         self._fingertips = Fingertips()
-        self._motor = Motor("effort" in rates or not rates)
+        self._motor = Motor("effort" in rates)
         self._status = Status(info.status_bits)
         self._reports = Reports(info.rate_hz, rates.get("pads", 0.0))
 

@@ -217,7 +217,8 @@ class Touch:
         if self._moved_gap_m - frame.gap_m >= STALL_M or not closes(asked, frame, self._needed_n.value):
             self._moved_t_s, self._moved_gap_m = frame.t_s, frame.gap_m
             return None
-        felt = self._left.felt and self._right.felt
+        # One pad alone, and both of them, have bounds of their own.
+        felt = self._left.felt or self._right.felt
         if phase != APPROACH or felt or not self._has_moved(frame):
             return None
         elapsed_s = frame.t_s - self._moved_t_s
