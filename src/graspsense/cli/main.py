@@ -18,6 +18,7 @@ import click
 from graspsense import __version__
 from graspsense.cli.terminal import Style, echo, has_colour
 from graspsense.core.errors import GraspsenseError, PluginUnavailable, UnknownName, suggestion
+from graspsense.core.interrupts import ended_like_ctrl_c
 
 PROGRAM: Final = "graspsense"
 COMPLETION_VARIABLE: Final = "_GRASPSENSE_COMPLETE"
@@ -129,7 +130,9 @@ def cli(ctx: click.Context) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run the command line and exit with its code; no argument means the process's own."""
-    sys.exit(_exit_code(list(sys.argv[1:] if arguments is None else arguments)))
+    with ended_like_ctrl_c():
+        code = _exit_code(list(sys.argv[1:] if arguments is None else arguments))
+    sys.exit(code)
 
 
 def _exit_code(arguments: list[str]) -> int:

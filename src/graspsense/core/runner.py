@@ -19,7 +19,14 @@ from attrs import evolve, frozen
 from graspsense.core.binding import bind, maker
 from graspsense.core.contact import CONTACT_FORCE_N, RestState, at_rest, update_rest
 from graspsense.core.entries import Channel
-from graspsense.core.errors import DeviceLost, GraspsenseError, RecordingEnded, TareRefused, named
+from graspsense.core.errors import (
+    FAILURES,
+    DeviceLost,
+    GraspsenseError,
+    RecordingEnded,
+    TareRefused,
+    named,
+)
 from graspsense.core.garbage_collection import no_collection
 from graspsense.core.guard import GuardParams, GuardState, guard
 from graspsense.core.interrupts import Interrupts
@@ -86,6 +93,8 @@ class Grasp:
     events: tuple[GraspEvent, ...]
     seconds_simulated: float | None
     seconds_wall: float
+    interrupted: bool = False
+    """Whether the user asked for an end; a signal during the release leaves the outcome as it was."""
 
 
 def tick_params(info: DeviceInfo, controller: Controller[Any], run: RunConfig) -> TickParams:
@@ -189,13 +198,13 @@ def run_grasp(
         # The trace must survive a backend that fails on closing.
         try:
             backend.close()
-        except Exception as error:
+        except FAILURES as error:
             reason = f"the gripper could not be closed: {named(error)} ({reason or outcome.words})"
             outcome = Outcome.ABORTED
         # After closing, so that the report covers it.
         try:
             report = dict(backend.report())
-        except Exception as error:
+        except FAILURES as error:
             report = {"report_failed": named(error)}
     frames = grasp.recorder.frames
     commands = backend.recorded_commands()
@@ -211,7 +220,26 @@ def run_grasp(
         events=tuple(grasp.events),
         seconds_simulated=grasp.seconds() if info.clock == "virtual" else None,
         seconds_wall=time.perf_counter() - began,
+        interrupted=grasp.interrupted or interrupts.count > 0,
     )
+
+
+def run_uninterrupted(
+    backend: SensorBackend[Any],
+    controller: Controller[Any],
+    run: RunConfig,
+    *,
+    on_event: Callable[[GraspEvent], None] | None = None,
+    on_open: Callable[[DeviceInfo], None] | None = None,
+) -> Grasp:
+    """Run one grasp as `run_grasp` does, for a caller that has no use for an interrupted one.
+
+    Raises KeyboardInterrupt, after the gripper was released, if the user asked for an end.
+    """
+    grasp = run_grasp(backend, controller, run, on_event=on_event, on_open=on_open)
+    if grasp.interrupted:
+        raise KeyboardInterrupt
+    return grasp
 
 
 def _opened(backend: SensorBackend[Any], seed: int) -> DeviceInfo:
@@ -221,6 +249,8 @@ def _opened(backend: SensorBackend[Any], seed: int) -> DeviceInfo:
         info = backend.open(seed)
     except GraspsenseError:
         raise
+    except SystemExit as error:
+        raise DeviceLost(f"`open` of the gripper {name} raised {named(error)}") from error
     except Exception as error:
         error.add_note(f"`open` of the gripper {name} raised it")
         raise
@@ -259,7 +289,7 @@ class _Grasp:
         self.backend, self.run, self.info, self.on_event = backend, run, info, on_event
         self.watcher: Watcher | None = None
         self.stop_reason = ""
-        self.sinks, self.interrupts = list(sinks), interrupts
+        self.sinks, self.interrupts, self.interrupted = list(sinks), interrupts, False
         self.step = type(controller).step
         self.event_names = type(controller).events
         self.params = tick_params(info, controller, run)
@@ -289,11 +319,13 @@ class _Grasp:
         except (TareRefused, _Overdue) as error:
             ending = Outcome.ABORTED, str(error)
         except KeyboardInterrupt:
+            self.interrupted = True
             ending = Outcome.ABORTED, "interrupted"
-        except Exception as error:
+        except FAILURES as error:
             # A controller can raise anything; the gripper must still be released and the trace kept.
             ending = Outcome.ABORTED, named(error)
         finally:
+            self.interrupts.deferred = True
             # A lost gripper may still receive commands, so it is commanded to relax.
             self._let_go(opens=not lost and not self.state.done)
         if ending is None:
@@ -406,7 +438,7 @@ class _Grasp:
         for sink in self.sinks:
             try:
                 sink.take(reading, phase, command)
-            except Exception as error:
+            except FAILURES as error:
                 self.sinks = [other for other in self.sinks if other is not sink]
                 self._event(reading.frame.t_s, Phase(phase), f"{type(sink).__name__} failed: {named(error)}")
 
@@ -430,7 +462,7 @@ class _Grasp:
             self.on_event(event)
         for sink in self.sinks:
             if isinstance(sink, EventSink):
-                with suppress(Exception):  # as with ticks, a failing sink must not change the outcome
+                with suppress(*FAILURES):  # as with ticks, a failing sink must not change the outcome
                     sink.event(event)
         return event
 
@@ -470,9 +502,9 @@ class _Grasp:
                         frame.t_s - began_s > run.opening_timeout_s
                     ):
                         break
-        except (KeyboardInterrupt, Exception):
+        except (KeyboardInterrupt, *FAILURES):
             pass
-        with suppress(KeyboardInterrupt, Exception):
+        with suppress(KeyboardInterrupt, *FAILURES):
             self.backend.apply(info.relaxed)
 
     def _recording_ended(self) -> tuple[Outcome, str]:
