@@ -30,6 +30,7 @@ from graspsense.core.errors import (
 from graspsense.core.garbage_collection import no_collection
 from graspsense.core.guard import GuardParams, GuardState, guard
 from graspsense.core.interrupts import Interrupts
+from graspsense.core.plain_command import with_plain_commands
 from graspsense.core.roles import Controller, DeviceInfo, SensorBackend
 from graspsense.core.run_config import RunConfig
 from graspsense.core.signals import (
@@ -159,7 +160,13 @@ def ended_by_itself(stopped: int, outcome: int) -> tuple[Outcome, str]:
     """
     if stopped:
         return Outcome.ABORTED, "the controller commanded NaN, so the guard stopped the grasp"
-    return Outcome(outcome), ""
+    try:
+        return Outcome(outcome), ""
+    except ValueError:
+        return (
+            Outcome.ABORTED,
+            f"the controller ended the grasp with the outcome {outcome!r}, which there is not",
+        )
 
 
 def run_grasp(
@@ -334,10 +341,9 @@ class _Grasp:
         if self.stop_reason and not failed:
             return Outcome.RECOGNISED, self.stop_reason
         if self.state.law.outcome != RUNNING and failed:
-            ending = (
-                ending[0],
-                f"{ending[1]} (after the grasp had ended: {Outcome(self.state.law.outcome).words})",
-            )
+            before, unknown = ended_by_itself(0, self.state.law.outcome)
+            if not unknown:
+                ending = ending[0], f"{ending[1]} (after the grasp had ended: {before.words})"
         return ending
 
     def seconds(self) -> float:
@@ -346,7 +352,8 @@ class _Grasp:
 
     def _loop(self) -> None:
         read, apply, run = self.backend.read, self.backend.apply, self.run
-        advance = bind(tick, step=self.step, events_told=events_of(self.step), TickState=maker(TickState))
+        step = with_plain_commands(self.step)
+        advance = bind(tick, step=step, events_told=events_of(self.step), TickState=maker(TickState))
         params, record = self.params, self.recorder.add
         on_device_clock = self.info.clock == "device"
         late_s = run.late_periods / self.info.rate_hz if on_device_clock else float("inf")

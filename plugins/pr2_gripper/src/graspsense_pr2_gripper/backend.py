@@ -196,6 +196,8 @@ class Pr2Backend(SensorBackend[Pr2Config]):
         self._sent = self._echo = 0
         self._heard_us = 0
         notes = [f"calibration {kind} of {one.made} is in use" for kind, one in found.items()]
+        if config.calibration not in ("", UNCALIBRATED) and not found:
+            notes.append(f"{config.calibration} has no calibration of {identity.serial}: uncalibrated")
         if "friction" in found:
             _, closing, _ = stored_friction(found["friction"])
             notes.append(f"breakaway {min(closing):.1f} to {max(closing):.1f} N, closing")
