@@ -136,9 +136,10 @@ def _set_up(asked: Mapping[str, Any], replace: bool) -> Iterator[_Setup]:
     try:
         info = backend.open(settings.run.seed)
         # A calibration that cannot be kept is not begun.
-        calibration_path(folder, info.serial, UNCALIBRATED)
+        place = calibration_path(folder, info.serial, UNCALIBRATED).parent
         rig = Rig(backend, info, settings.run)
-        stored = {} if replace else calibrations_of(folder, info.serial, info.numbers)
+        compares = place.is_dir() and not replace
+        stored = calibrations_of(folder, info.serial, info.numbers) if compares else {}
         yield _Setup(backend, info, rig, folder, stored, settings.run.first_effort_n)
     finally:
         backend.close()

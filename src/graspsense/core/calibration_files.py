@@ -63,7 +63,7 @@ def calibration_path(folder: str | Path, serial: str, kind: str) -> Path:
 
 def _folder(given: str | Path) -> Path | None:
     if given:
-        return Path(given)
+        return Path(given).expanduser()
     data = data_folder()
     return None if data is None else data / "calibration"
 
@@ -93,14 +93,19 @@ def write_calibration(path: Path, calibration: Calibration) -> Calibration:
 def read_calibration(path: Path) -> Calibration:
     """Return the calibration in this file.
 
-    Raises DataDamaged if it is not a calibration of graspsense, was changed since it was written, or has invalid
-    numbers; FileNotFoundError if it is missing.
+    Raises ConfigError if the machine cannot read it, DataDamaged if it is not a calibration of graspsense, was changed
+    since it was written, or has invalid numbers; FileNotFoundError if it is missing.
     """
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise
-    except (OSError, ValueError) as error:
+    except OSError as error:
+        raise ConfigError(
+            f"calibration {path} cannot be read: {error.strerror}. Its content may be whole: check the disk and the "
+            "permissions of the file"
+        ) from error
+    except ValueError as error:
         raise DataDamaged(f"{path} cannot be read as a calibration: {error}") from error
     if not isinstance(content, dict) or content.get("format") != FORMAT:
         raise DataDamaged(f"{path} is not a calibration of graspsense: its format is not {FORMAT!r}")
@@ -131,13 +136,21 @@ def read_calibration(path: Path) -> Calibration:
 
 
 def calibrations_of(folder: str | Path, serial: str, device: Mapping[str, Any]) -> dict[str, Calibration]:
-    """Return the calibrations of this device by kind; empty if `folder` is `none` or the folder does not exist.
+    """Return the calibrations of this device by kind; empty if `folder` is `none`.
 
-    Raises ConfigError if a file was made on another device, or on this one with other numbers, and names the two
-    choices; raises DataDamaged.
+    Raises ConfigError if `folder` names a folder that does not exist, or if a file was made on another device, or on
+    this one with other numbers; raises DataDamaged.
     """
-    if folder == UNCALIBRATED or _folder(folder) is None:
+    place = None if folder == UNCALIBRATED else _folder(folder)
+    if place is None:
         return {}
+    if folder and not place.is_dir():
+        raise ConfigError(
+            f"gripper.calibration is {str(folder)!r}, and there is no such folder. There are three choices:\n"
+            "  correct its name\n"
+            "  calibrate this device into it:  graspsense calibrate tare\n"
+            "  run without:                    -o gripper.calibration=none"
+        )
     found: dict[str, Calibration] = {}
     for kind in KINDS:
         path = calibration_path(folder, serial, kind)

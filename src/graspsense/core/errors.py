@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from difflib import get_close_matches
+from typing import Final
 
 
 class GraspsenseError(Exception):
@@ -60,6 +61,13 @@ class DataDamaged(GraspsenseError):
     """A file whose content is not what its format requires."""
 
     exit_code = 5
+
+
+FAILURES: Final = (Exception, SystemExit)
+"""What the code of a plugin can raise, apart from KeyboardInterrupt, which is the user's.
+
+SystemExit is a failure of the plugin too: it must not end the program, nor lose what was measured.
+"""
 
 
 class RecordingEnded(Exception):

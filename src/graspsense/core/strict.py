@@ -18,7 +18,7 @@ import attrs
 import cattrs
 from attrs import frozen
 
-from graspsense.core.errors import suggestion
+from graspsense.core.errors import FAILURES, suggestion
 from graspsense.core.setting import declared, implausible
 from graspsense.core.toml_lines import KeyPath
 
@@ -73,12 +73,12 @@ def structured(values: Mapping[str, Any], cls: type[ConfigT], called: str) -> Co
             )
         except ValidationFailed as misfit:
             problems += misfit.under(name)
-        except Exception as error:  # for a type without a rule below
+        except FAILURES as error:  # for a type without a rule below
             problems.append(InvalidValue((name,), f"cannot be read as {field.type}: {_words(error)}"))
     if not problems:
         try:
             return cls(**given)
-        except Exception as error:
+        except FAILURES as error:
             raise ValidationFailed(
                 _complaints(cls, fields, given) or [InvalidValue((), _words(error))]
             ) from error
@@ -164,7 +164,7 @@ def _complaints(
     try:
         with attrs.validators.disabled():
             instance = cls(**given)
-    except Exception:
+    except FAILURES:
         return []
     problems = []
     for name in given:
@@ -172,12 +172,12 @@ def _complaints(
         if field.validator is not None:
             try:
                 field.validator(instance, field, getattr(instance, field.name))
-            except Exception as error:
+            except FAILURES as error:
                 problems.append(InvalidValue((name,), _words(error)))
     return problems
 
 
-def _words(error: Exception) -> str:
+def _words(error: BaseException) -> str:
     """Return the text of an error, without the attribute and the value that errors of attrs append."""
     return (
         error.args[0] if error.args and isinstance(error.args[0], str) else f"{type(error).__name__}: {error}"

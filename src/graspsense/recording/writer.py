@@ -117,7 +117,7 @@ class RecordingWriter:
         now_ns = time.time_ns()
         if self._base_ns is None:
             self._base_ns = now_ns - _ns(t_s)
-        log_ns = max(0, self._base_ns + _ns(t_s))
+        log_ns = min(max(0, self._base_ns + _ns(t_s)), _LAST_NS)
         if not self._open_chunk:
             self._open_chunk, self._chunk_log_ns, self._chunk_wall_ns = True, log_ns, now_ns
         number = self._counts[topic]
@@ -150,6 +150,10 @@ class _Hashed:
 
     def close(self) -> None:
         os.close(self.fd)
+
+
+_LAST_NS: Final = 2**64 - 1
+"""The last time that a message can have, in the year 2554."""
 
 
 def _ns(t_s: float) -> int:

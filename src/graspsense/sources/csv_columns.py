@@ -18,6 +18,7 @@ from typing import Final
 
 import numpy as np
 
+from graspsense.core.csv_text import text_of_cell
 from graspsense.core.errors import ConfigError, DataDamaged, suggestion
 from graspsense.core.features import FeatureTable
 from graspsense.core.target_value import name_and_unit
@@ -137,13 +138,13 @@ def _rows(path: Path, text: str) -> tuple[list[str], list[int], list[list[str]]]
             if not any(cell.strip() for cell in row):
                 continue
             if not header:
-                header = [cell.strip() for cell in row]
+                header = [text_of_cell(cell.strip()) for cell in row]
                 continue
             if len(row) != len(header):
                 raise DataDamaged(
                     f"{path}, line {reader.line_num}: {len(row)} values, but the header names {len(header)} columns"
                 )
-            rows.append([cell.strip() for cell in row])
+            rows.append([text_of_cell(cell.strip()) for cell in row])
             lines.append(reader.line_num)
     except csv.Error as error:
         raise DataDamaged(f"{path}, line {reader.line_num}: {error}") from None

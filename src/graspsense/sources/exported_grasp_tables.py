@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from graspsense.core.channels import from_json, further
+from graspsense.core.csv_text import text_of_cell
 from graspsense.core.entries import Channel, FastChannel, TactileArray
 from graspsense.core.errors import ConfigError, DataDamaged
 from graspsense.recording.export_trace import beside, declared_beside
@@ -109,7 +110,7 @@ def header_of(path: Path) -> Sequence[str]:
     """Return the names in the first line of a CSV file; none if it cannot be read."""
     try:
         with path.open(newline="", encoding="utf-8") as file:
-            return next(csv.reader(file), ())
+            return [text_of_cell(cell) for cell in next(csv.reader(file), ())]
     except (OSError, ValueError, csv.Error):
         return ()
 
@@ -129,4 +130,4 @@ def _columns(path: Path) -> Columns:
         raise ConfigError(f"{path} cannot be read: {error.strerror}") from error
     except (ValueError, csv.Error) as error:
         raise DataDamaged(f"{path} is not as `graspsense export` writes it: {error}") from error
-    return {name: table[:, i] for i, name in enumerate(names)}
+    return {text_of_cell(name): table[:, i] for i, name in enumerate(names)}

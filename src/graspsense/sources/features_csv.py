@@ -6,18 +6,18 @@ describe a trial are never features, and every feature remains one even if no tr
 
 from __future__ import annotations
 
-import csv
 import math
-import os
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
+from graspsense.core.csv_text import csv_text
 from graspsense.core.errors import ConfigError, DataDamaged
 from graspsense.core.features import UNKNOWN, FeatureTable
 from graspsense.core.labelled import Labelled
 from graspsense.core.target_value import TargetValue
+from graspsense.recording.atomic_file import write_or_replace
 from graspsense.recording.controls import Controls, controls
 from graspsense.sources.csv_columns import CsvColumns, is_missing
 from graspsense.sources.exported_table import ExportedTable, exported
@@ -122,7 +122,7 @@ def read_table(path: Path, names: Sequence[str]) -> FeatureTable:
 
 
 def write_labelled(path: Path, labelled: Labelled) -> None:
-    """Write labels, instances, order and features; `read_labelled` returns the same table. Raises OSError."""
+    """Write labels, instances, order and features; `read_labelled` returns the same table. Raises SaveFailed."""
     table = labelled.table
     extra: dict[str, Sequence[object]] = {"label": labelled.labels}
     if labelled.instances is not None:
@@ -132,14 +132,8 @@ def write_labelled(path: Path, labelled: Labelled) -> None:
     headings = [
         f"{name} [{unit}]" if unit else name for name, unit in zip(table.names, table.units, strict=True)
     ]
-    part = path.with_name(path.name + ".part")
-    with part.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow([*extra, *headings])
-        for i, row in enumerate(table.values.tolist()):
-            cells = ["" if math.isnan(value) else repr(value) for value in row]
-            writer.writerow([*(column[i] for column in extra.values()), *cells])
-    os.replace(part, path)
+    rows = [[*(column[i] for column in extra.values()), *row] for i, row in enumerate(table.values.tolist())]
+    write_or_replace(path, csv_text([[*extra, *headings], *rows]).encode())
 
 
 def _labels(columns: CsvColumns, label: str | None) -> list[str]:

@@ -60,7 +60,7 @@ def recordings_to_import(
     if bad and not good:
         first = bad[0].error
         if len(bad) > 1:
-            raise type(first)(f"none of {len(bad)} recordings can be read. The first: {first}")
+            raise type(first)(f"none of {len(bad)} recordings can be read. The first: {first}") from first
         raise first
     return good, bad
 

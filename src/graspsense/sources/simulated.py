@@ -22,7 +22,7 @@ from graspsense.core.errors import ComponentFailed, ConfigError, named
 from graspsense.core.features import FeatureRows, Features
 from graspsense.core.labelled import Labelled, class_of
 from graspsense.core.roles import BatchBackend, DeviceInfo, FeatureSet
-from graspsense.core.runner import run_grasp
+from graspsense.core.runner import run_uninterrupted
 from graspsense.core.strict import plain
 from graspsense.core.wiring import check
 from graspsense.recording.before_contact import (
@@ -349,7 +349,7 @@ def _grasps(
         run = evolve(settings.run, seed=seed)
         gripper = backend.with_object(scene)
         gripper.expect_features(extract.feature_set)
-        grasp = run_grasp(gripper, controller, run, on_open=_refuse_real_device)
+        grasp = run_uninterrupted(gripper, controller, run, on_open=_refuse_real_device)
         yield *extract(grasp.trace), grasp.trace, grasp.report
         if progress is not None:
             progress(k + 1, total)

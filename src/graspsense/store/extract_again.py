@@ -17,7 +17,7 @@ from graspsense.core.checkpoints import with_checkpoints
 from graspsense.core.config import NONE, Flag, Settings, resolve, without_followers
 from graspsense.core.errors import ComponentFailed, ConfigError, named
 from graspsense.core.layers import Layer
-from graspsense.core.runner import run_grasp
+from graspsense.core.runner import run_uninterrupted
 from graspsense.core.wiring import check
 from graspsense.recording.before_contact import before_contact, contact_force_of
 from graspsense.recording.trial_record import FeatureValues
@@ -116,7 +116,7 @@ def _resolved(
 def _extracted(settings: Settings, recording: str, checkpoints_s: Sequence[float]) -> ExtractedAgain:
     gripper = settings.gripper
     backend = gripper.component.create(evolve(gripper.config, recording=recording))
-    grasp = run_grasp(backend, settings.controller.create(), settings.run)
+    grasp = run_uninterrupted(backend, settings.controller.create(), settings.run)
     try:
         feature_set = with_checkpoints(settings.features.create(), checkpoints_s)
         features = feature_set.extract(grasp.trace)

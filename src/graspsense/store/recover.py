@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 from attrs import asdict, evolve, frozen
 
 from graspsense.core.config import build
-from graspsense.core.errors import ConfigError, DataDamaged, GraspsenseError
+from graspsense.core.errors import FAILURES, ConfigError, DataDamaged, GraspsenseError
 from graspsense.core.features import Features
 from graspsense.core.plugins import installed
 from graspsense.recording.atomic_file import SaveFailed
@@ -25,7 +25,8 @@ from graspsense.recording.reader import RecordedGrasp, TopicRows, read_recorded
 from graspsense.recording.recording_info import RecordingInfo
 from graspsense.recording.trial_record import FeatureValues, TrialRecord, TrialResult
 from graspsense.recording.writer import RecordingWriter
-from graspsense.store.store import Store
+from graspsense.store.opening import damaged
+from graspsense.store.store import Store, integrity
 
 if TYPE_CHECKING:
     from graspsense.core.trace import Trace
@@ -60,7 +61,13 @@ class Recovered:
 
 
 def recover_store(store: Store) -> list[Recovered]:
-    """Complete every unfinished recording of a store, and add a row for each that has none. Raises SaveFailed."""
+    """Complete every unfinished recording of a store, and add a row for each that has none.
+
+    Raises DataDamaged, before anything is changed, if the database of the store is malformed; SaveFailed.
+    """
+    problems = integrity(store)
+    if problems:
+        raise damaged(store.folder, f"the database: {problems[0]}")
     results = []
     known = store.recording_names()
     folder = store.recordings
@@ -203,7 +210,7 @@ def _features(trace: Trace, record: TrialRecord, why: str) -> FeatureValues:
         table = dict(record.settings["features"])
         component = installed().find("feature-set", table.pop("type"))
         extracted: Features = component.create(build(component, table)).extract(trace)
-    except (GraspsenseError, KeyError) as error:
+    except FAILURES as error:
         reason = f"{why}; its features cannot be extracted here: {error}"
         return FeatureValues(features=(), values=(), reasons={"": reason})
     return FeatureValues.of(extracted)

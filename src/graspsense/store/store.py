@@ -33,6 +33,7 @@ from graspsense.store.opening import (
     damaged,
     is_new,
     make_safe,
+    refuse_read_fault,
     sqlite_errors,
 )
 from graspsense.store.rows import (
@@ -281,8 +282,10 @@ def stored_rows(store: Store) -> Iterator[tuple[int, str, EncodedRow]]:
 
 
 def integrity(store: Store) -> list[str]:
-    """Return the problems that SQLite finds in the file."""
+    """Return the problems that SQLite finds in the file. Raises SaveFailed if the disk cannot be read."""
     problems = [str(line) for (line,) in store.query("PRAGMA integrity_check(20)") if line != "ok"]
+    for problem in problems:
+        refuse_read_fault(store.folder, problem)
     return problems + [
         f"{row[0]} row {row[1]} has no {row[2]}" for row in store.query("PRAGMA foreign_key_check")
     ]

@@ -37,9 +37,7 @@ class DaskCluster:
         if address is None:
             # Dask retries a task once: its worker may have been dying because of another task.
             dask.config.set({"distributed.scheduler.allowed-failures": 1})
-            self._cluster = self._distributed.LocalCluster(
-                n_workers=workers, threads_per_worker=1, dashboard_address=":0", silence_logs=50
-            )
+            self._cluster = self._local_cluster(workers)
         try:
             self._client = self._distributed.Client(address or self._cluster, timeout=CONNECTING_S)
         except (OSError, TimeoutError, ValueError) as error:
@@ -49,6 +47,21 @@ class DaskCluster:
             ) from error
         self._futures: list[Any] = []
         self._seen = time.monotonic()
+
+    def _local_cluster(self, workers: int) -> Any:
+        """Return a cluster on this machine. Raises ConfigError if none can be started, as without shared memory."""
+        try:
+            return self._distributed.LocalCluster(
+                n_workers=workers, threads_per_worker=1, dashboard_address=":0", silence_logs=50
+            )
+        except Exception as error:  # Dask raises various exceptions, from several layers
+            cause: BaseException = error
+            while cause.__cause__ is not None:
+                cause = cause.__cause__
+            raise ConfigError(
+                f"no local Dask cluster can be started here: {named(error)} ({named(cause)}). Dask needs shared memory "
+                "(/dev/shm) and sockets of this machine. Use --executor processes, or name a running scheduler"
+            ) from error
 
     @property
     def workers(self) -> int:

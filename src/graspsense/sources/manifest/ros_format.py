@@ -6,11 +6,12 @@ are the messages of the topic, among those that are used, that has the most; eac
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from graspsense.core.errors import ConfigError, DataDamaged, PluginUnavailable, named
 from graspsense.sources.manifest.table import ColumnTable, Numbers
@@ -37,13 +38,13 @@ def read_bag(path: Path, topics: Collection[str] = ()) -> list[ColumnTable]:
     if not messages:
         raise DataDamaged(f"{path} has no messages with numbers")
     clock = max(messages, key=lambda topic: len(messages[topic]))
-    times = np.array([t_ns for t_ns, _ in messages[clock]], dtype=np.int64)
-    order = np.argsort(times, kind="stable")
-    times = times[order]
-    numbers: dict[str, Numbers] = {}
     for found in messages.values():
         found.sort(key=lambda one: one[0])
-        last = np.searchsorted([t_ns for t_ns, _ in found], times, side="right") - 1
+    since_ns = _since_first(path, messages, clock)
+    t_s = np.array([t_ns for t_ns, _ in messages[clock]], dtype=np.float64) * 1e-9
+    numbers: dict[str, Numbers] = {}
+    for topic, found in messages.items():
+        last = np.searchsorted(since_ns[topic], since_ns[clock], side="right") - 1
         for name, example in found[0][1].items():
             width = np.size(example)
             rows = [one.get(name, np.full(width, np.nan)) for _, one in found]
@@ -52,7 +53,22 @@ def read_bag(path: Path, topics: Collection[str] = ()) -> list[ColumnTable]:
             values = np.array(rows, dtype=np.float64).reshape(len(rows), -1)[np.maximum(last, 0)]
             values[last < 0] = np.nan
             numbers[name] = values[:, 0] if values.shape[1] == 1 else values
-    return [ColumnTable(source=path.name, numbers=numbers, t_s=times.astype(np.float64) * 1e-9)]
+    return [ColumnTable(source=path.name, numbers=numbers, t_s=t_s)]
+
+
+def _since_first(
+    path: Path, messages: Mapping[str, Sequence[tuple[int, Any]]], clock: str
+) -> dict[str, NDArray[np.int64]]:
+    """Return the times of the messages (ns) since the first of this topic. Raises DataDamaged."""
+    # From 2262 on, nanoseconds since 1970 do not fit into an int64; their differences do.
+    began_ns = messages[clock][0][0]
+    try:
+        return {
+            topic: np.array([t_ns - began_ns for t_ns, _ in found], dtype=np.int64)
+            for topic, found in messages.items()
+        }
+    except OverflowError as error:
+        raise DataDamaged(f"{path} has messages that are more than 292 years apart") from error
 
 
 def _messages(path: Path, topics: Collection[str]) -> Iterator[tuple[str, int, Any]]:
