@@ -15,6 +15,7 @@ from graspsense.experiments.kinds import kind_of
 from graspsense.experiments.results import EXPERIMENT, Results
 from graspsense.experiments.summary import ConditionResult, Summary
 from graspsense.experiments.task_results import RecognitionResult
+from graspsense.recording.provenance import commit_text
 from graspsense.report.evaluation_sections import code, confusion_section, controls_section, tree_section
 from graspsense.report.html import Page, Section, bullets, facts, folded, pair, paragraph, table
 from graspsense.report.rates import RateRow, rates_over, rates_picture, rates_table
@@ -264,8 +265,6 @@ def measurement_sections(summary: Summary, best: ConditionResult) -> list[Sectio
 def _made_of(summary: Summary, results: Results) -> Section:
     made = results.provenance()
     one = summary.planned.experiment
-    git = (made.get("git") or {}).get("graspsense") or {}
-    commit = f"{git.get('commit')}{' (with changes)' if git.get('dirty') else ''}" if git else "unknown"
     result = next(iter(summary.results.values()), None)
     notes = result.notes if isinstance(result, RecognitionResult) else ()
     pairs = [
@@ -276,7 +275,7 @@ def _made_of(summary: Summary, results: Results) -> Section:
         ("cases, seeds", f"{len(summary.planned.cases)} cases, seeds {_ranges(summary.planned.seeds)}"),
         ("computing time", f"{summary.seconds:.0f} s, all tasks together"),
         ("machine", f"{made.get('host', '?')}, {made.get('system', '?')}"),
-        ("code", f"graspsense {made.get('graspsense', '?')}, commit {commit}"),
+        ("code", f"graspsense {made.get('graspsense', '?')}, commit {commit_text(made)}"),
         *((f"hash of {name}", value) for name, value in (made.get("files") or {}).items()),
     ]
     versions = sorted((str(k), str(v)) for k, v in (made.get("versions") or {}).items())
