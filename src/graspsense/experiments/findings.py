@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from html import escape
-from pathlib import Path
 from typing import Any, Final
 
 from attrs import field, frozen
@@ -102,11 +101,6 @@ class Findings:
         if self.notes:
             lines += ["## Notes", "", *(f"- {_cell(one)}" for one in self.notes), ""]
         return "\n".join(lines)
-
-
-def write_markdown(path: Path, text: str) -> None:
-    """Write the Markdown file."""
-    path.write_text(text, encoding="utf-8")
 
 
 def percent(rate: float) -> str:

@@ -10,11 +10,12 @@ from typing import Final
 
 from graspsense.core.model import worded
 from graspsense.experiments.answer import answer, headline
-from graspsense.experiments.findings import MARKDOWN, Findings, write_markdown
+from graspsense.experiments.findings import MARKDOWN, Findings
 from graspsense.experiments.kinds import kind_of
 from graspsense.experiments.results import EXPERIMENT, Results
 from graspsense.experiments.summary import ConditionResult, Summary
 from graspsense.experiments.task_results import RecognitionResult
+from graspsense.recording.atomic_file import write_or_replace
 from graspsense.recording.provenance import commit_text
 from graspsense.report.evaluation_sections import code, confusion_section, controls_section, tree_section
 from graspsense.report.html import Page, Section, bullets, facts, folded, pair, paragraph, table
@@ -41,7 +42,7 @@ def write_page(summary: Summary, results: Results) -> Path:
     found = findings_of(summary)
     if found is not None:
         text = found.markdown(summary.planned.experiment.title, results.provenance(), summary.cpu_seconds)
-        write_markdown(results.folder / MARKDOWN, text)
+        write_or_replace(results.folder / MARKDOWN, text.encode())
     return path
 
 

@@ -7,8 +7,8 @@ describe a trial are never features, and every feature remains one even if no tr
 from __future__ import annotations
 
 import csv
+import io
 import math
-import os
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -18,6 +18,7 @@ from graspsense.core.errors import ConfigError, DataDamaged
 from graspsense.core.features import UNKNOWN, FeatureTable
 from graspsense.core.labelled import Labelled
 from graspsense.core.target_value import TargetValue
+from graspsense.core.whole_file import write_whole
 from graspsense.recording.controls import Controls, controls
 from graspsense.sources.csv_columns import CsvColumns, is_missing
 from graspsense.sources.exported_table import ExportedTable, exported
@@ -132,14 +133,13 @@ def write_labelled(path: Path, labelled: Labelled) -> None:
     headings = [
         f"{name} [{unit}]" if unit else name for name, unit in zip(table.names, table.units, strict=True)
     ]
-    part = path.with_name(path.name + ".part")
-    with part.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow([*extra, *headings])
-        for i, row in enumerate(table.values.tolist()):
-            cells = ["" if math.isnan(value) else repr(value) for value in row]
-            writer.writerow([*(column[i] for column in extra.values()), *cells])
-    os.replace(part, path)
+    text = io.StringIO(newline="")
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow([*extra, *headings])
+    for i, row in enumerate(table.values.tolist()):
+        cells = ["" if math.isnan(value) else repr(value) for value in row]
+        writer.writerow([*(column[i] for column in extra.values()), *cells])
+    write_whole(path, text.getvalue().encode())
 
 
 def _labels(columns: CsvColumns, label: str | None) -> list[str]:
