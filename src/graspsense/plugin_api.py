@@ -201,6 +201,8 @@ _TABLE: Final[Table] = {
         "config": ("create", "recipe_of"),
         "plugins": ("collect",),
         "user_folders": ("cache_folder",),
+        "whole_file": ("write_whole",),
+        "closed_paths": ("is_closed", "make_closed"),
     },
     "Errors": {
         "errors": (

@@ -224,6 +224,9 @@ from graspsense.core.config import create as create
 from graspsense.core.config import recipe_of as recipe_of
 from graspsense.core.plugins import collect as collect
 from graspsense.core.user_folders import cache_folder as cache_folder
+from graspsense.core.whole_file import write_whole as write_whole
+from graspsense.core.closed_paths import is_closed as is_closed
+from graspsense.core.closed_paths import make_closed as make_closed
 
 # Errors
 from graspsense.core.errors import ConfigError as ConfigError

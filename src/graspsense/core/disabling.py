@@ -9,6 +9,7 @@ from pathlib import Path
 
 from graspsense.core.errors import ConfigError
 from graspsense.core.user_folders import NOWHERE, config_folder
+from graspsense.core.whole_file import write_whole
 
 
 def config_file() -> Path | None:
@@ -51,7 +52,5 @@ def write_disabled(names: Iterable[str]) -> Path:
         path.unlink(missing_ok=True)
         return path
     path.parent.mkdir(parents=True, exist_ok=True)
-    other = path.with_suffix(".new")
-    other.write_text(f"disabled = {json.dumps(wanted)}\n", encoding="utf-8")
-    other.replace(path)
+    write_whole(path, f"disabled = {json.dumps(wanted)}\n".encode())
     return path

@@ -9,7 +9,6 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-import os
 import platform
 import shlex
 from collections import Counter
@@ -32,6 +31,7 @@ from graspsense.core.reasons import Reason
 from graspsense.core.setting import CHANGES_NO_RESULT, NAMES_INPUT, UNIT_OF_ENDING, settings_marked
 from graspsense.core.temperature import at_temperature
 from graspsense.core.units import display_unit, without_underscores
+from graspsense.core.whole_file import write_whole
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -367,9 +367,7 @@ def write_json_lines(path: Path, content: Mapping[str, Any]) -> None:
     """Write the content of a model atomically, one line for each key. Raises OSError."""
     # Readable, and much shorter than one line for each number.
     lines = (f"{json.dumps(key)}: {_json(value)}" for key, value in content.items())
-    part = path.with_name(path.name + ".part")
-    part.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="utf-8")
-    os.replace(part, path)
+    write_whole(path, ("{\n" + ",\n".join(lines) + "\n}\n").encode())
 
 
 def load_model(name: str, plugins: Plugins, component: Component | None = None) -> Model:

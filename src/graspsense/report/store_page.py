@@ -11,6 +11,7 @@ from attrs import frozen
 from graspsense.core.config import SelectedComponent, select_component
 from graspsense.core.errors import ConfigError, DataDamaged
 from graspsense.evaluation.evaluate import evaluate
+from graspsense.recording.provenance import commit_text
 from graspsense.recording.reader import read_recorded
 from graspsense.report.evaluation_sections import (
     code,
@@ -251,14 +252,13 @@ def _provenance(
 ) -> Section:
     total = sum(count.trials for count in counts)
     made = trial.record.provenance
-    git = (made.get("git") or {}).get("graspsense") or {}
     pairs = [
         ("store", folder),
         ("trials", f"{total}, the newest made {listed[0].made_at}"),
         ("grippers", ", ".join(sorted({one.device for one in listed}))),
         ("simulated", f"{sum(one.simulated for one in listed)} of the newest {len(listed)}"),
         ("machine", f"{made.get('host', '?')}, {made.get('system', '?')}"),
-        ("code", f"graspsense {made.get('graspsense', '?')}, commit {git.get('commit', 'unknown')}"),
+        ("code", f"graspsense {made.get('graspsense', '?')}, commit {commit_text(made)}"),
         *((f"component {name}", str(one)) for name, one in (made.get("components") or {}).items()),
     ]
     by_label = [

@@ -72,14 +72,18 @@ def recover_store(store: Store) -> list[Recovered]:
     known = store.recording_names()
     folder = store.recordings
     for path in sorted(folder.glob(f"*{RECOVERED}{PART}")):
+        if not path.is_file():
+            continue
         with _locked(path) as mine:
             if mine:  # an unfinished copy, whose original still exists
                 path.unlink()
-    without_row = [path for path in folder.glob("*.mcap") if path.name not in known]
+    without_row = [path for path in folder.glob("*.mcap") if path.name not in known and path.is_file()]
     # With several of them the database is lost: their trials get their numbers in the order of recording.
     for path in sorted(without_row, key=_made_at) if len(without_row) > 1 else without_row:
         results.append(_add_row(store, path))
     for path in sorted(folder.glob(f"*.mcap{PART}")):
+        if not path.is_file():
+            continue  # `verify` names it
         with _locked(path) as mine:
             if not mine:
                 results.append(Recovered(file=path, what="busy", why="it is being written"))
@@ -238,6 +242,8 @@ def is_being_written(path: Path) -> bool:
 def _locked(path: Path) -> Iterator[bool]:
     """Hold the lock that the writer of this file holds; yield False if a writer has it."""
     try:
+        if path.exists() and not path.is_file():
+            raise ConfigError(f"{path} is not a file")
         file = path.open("rb")
     except FileNotFoundError:
         raise ConfigError(f"there is no recording {path}") from None

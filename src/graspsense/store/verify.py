@@ -79,7 +79,9 @@ def verify_store(folder: str | Path, progress: Progress | None = None) -> Verifi
         ]
         unfinished = []
         for path in sorted(store.recordings.iterdir() if store.recordings.is_dir() else ()):
-            if path.name.endswith(PART):
+            if not path.is_file():
+                unfinished.append(f"{path.name} is not a file")
+            elif path.name.endswith(PART):
                 if not is_being_written(path):
                     unfinished.append(f"{path.name} was never finished")
             elif path.suffix == ".mcap" and path.name not in names:
@@ -108,6 +110,8 @@ def verify_file(path: str | Path) -> Verified:
 
 def _problem_of(path: Path, sha256: str, size: int) -> str:
     """Return what is wrong with a recording, empty if nothing is. Raises OSError if the machine cannot read it."""
+    if path.exists() and not path.is_file():
+        return f"its recording {path.name} is not a file"
     try:
         with path.open("rb") as file:
             if hashlib.file_digest(file, "sha256").hexdigest() == sha256:
