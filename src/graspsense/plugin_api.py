@@ -150,6 +150,7 @@ _TABLE: Final[Table] = {
         "features": ("UNKNOWN", "FeatureTable", "Prediction", "table_of"),
         "reasons": ("Contribution", "FeatureValue", "Reason", "contribution_reasons", "missing_feature"),
         "roles": ("Classifier", "ClassifierConfig"),
+        "stored_values": ("LARGEST_SEED", "StoredValueError", "StoredValues"),
         "tree": ("TreeNode",),
     },
     "Data sets": {

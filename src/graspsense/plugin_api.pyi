@@ -158,6 +158,9 @@ from graspsense.core.reasons import contribution_reasons as contribution_reasons
 from graspsense.core.reasons import missing_feature as missing_feature
 from graspsense.core.roles import Classifier as Classifier
 from graspsense.core.roles import ClassifierConfig as ClassifierConfig
+from graspsense.core.stored_values import LARGEST_SEED as LARGEST_SEED
+from graspsense.core.stored_values import StoredValueError as StoredValueError
+from graspsense.core.stored_values import StoredValues as StoredValues
 from graspsense.core.tree import TreeNode as TreeNode
 
 # Data sets

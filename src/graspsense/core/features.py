@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from array import array
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from attrs import field, frozen
 
@@ -14,6 +14,9 @@ from graspsense.core.reasons import Reason
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
+
+LARGEST_VALUE: Final = 1e100
+"""The largest magnitude of a number to learn from: the squares of its differences, and their sums, are still finite."""
 
 
 @frozen(kw_only=True)
