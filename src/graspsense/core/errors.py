@@ -62,6 +62,10 @@ class DataDamaged(GraspsenseError):
     exit_code = 5
 
 
+class TooLarge(DataDamaged):
+    """A file that unpacks to more than is allowed; `graspsense.recording.unpacked` has the limit."""
+
+
 class RecordingEnded(Exception):
     """A replayed recording has no further frame. The runner turns this into an outcome."""
 

@@ -11,6 +11,7 @@ from attrs import frozen
 from graspsense.core.config import SelectedComponent, select_component
 from graspsense.core.errors import ConfigError, DataDamaged
 from graspsense.evaluation.evaluate import evaluate
+from graspsense.recording.readable import readable
 from graspsense.recording.reader import read_recorded
 from graspsense.report.evaluation_sections import (
     code,
@@ -134,7 +135,8 @@ def _curves(store: Store) -> list[GraspCurve]:
         if count[label] >= GRASPS:
             continue
         try:
-            trace = read_recorded(store.recording_path(recording)).trace()
+            with readable(f"trial {number} of {store.folder}"):
+                trace = read_recorded(store.recording_path(recording)).trace()
         except (ConfigError, DataDamaged):
             continue
         count[label] += 1
