@@ -97,9 +97,13 @@ def _pieces_of(decompressor: Any, data: bytes) -> Iterator[bytes]:
 
 
 def _pieces_of_zstd(data: bytes) -> Iterator[bytes]:
+    size, done = zstandard.frame_content_size(data), 0
     with zstandard.ZstdDecompressor().stream_reader(data) as stream:
         while part := stream.read(_PIECE):
+            done += len(part)
             yield part
+    if size >= 0 and done != size:
+        raise ValueError(f"the compressed data ends after {done} of {size} bytes")
 
 
 _PIECES: Final[Mapping[str, Callable[[bytes], Iterator[bytes]]]] = {

@@ -73,12 +73,7 @@ def store_page(
         listed = store.page(set_aside=None, limit=LISTED)
         if not listed:
             raise ConfigError(f"the store in {folder} has no trials yet: graspsense collect --save {folder}")
-        if grasp is not None:
-            number = grasp
-        else:
-            usable = (one for one in listed if one.complete and one.set_aside is None)
-            number = next(usable, listed[0]).id
-        trial = store.trial(number)
+        trial = _newest_readable(store, listed) if grasp is None else store.trial(grasp)
         counts = _trial_counts(store)
         curves = _curves(store)
         changes = history(store)
@@ -114,6 +109,21 @@ def store_page(
         beside=_beside(evaluation, labelled, target),
         sections=tuple(sections),
     )
+
+
+def _newest_readable(store: Store, listed: Sequence[TrialSummary]) -> StoredTrial:
+    """Return the newest trial that is complete, not set aside, and readable; else another one.
+
+    Raises DataDamaged if none can be read.
+    """
+    damage: DataDamaged | None = None
+    for summary in sorted(listed, key=lambda one: not (one.complete and one.set_aside is None)):
+        try:
+            return store.trial(summary.id)
+        except DataDamaged as error:
+            damage = damage or error
+    assert damage is not None  # there is a trial
+    raise damage
 
 
 def _trial_counts(store: Store) -> list[_TrialCount]:

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 _COMPRESSIONS: Final = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 """Those that NumPy writes. Others allocate what the file asks for."""
 _MEMBER: Final = ".npy"
+_END_BYTES: Final = 66_000
+"""The largest end of an archive."""
 _PIECE: Final = 1 << 20
 
 
@@ -40,7 +42,10 @@ def npz_arrays(path: Path) -> dict[str, NDArray[Any]]:
     unpacked = Unpacked(path)
     with readable(path):
         refuse_devices(path)
-        with zipfile.ZipFile(path) as archive:
+        with path.open("rb") as opened:
+            opened.seek(max(0, path.stat().st_size - _END_BYTES))
+            opened.read(_END_BYTES)  # an error of the disk there would be told as a damaged archive
+            archive = zipfile.ZipFile(opened)
             members = [one for one in archive.infolist() if one.filename.endswith(_MEMBER)]
             unpacked.expect(sum(one.file_size for one in members))
             arrays = {}

@@ -30,6 +30,8 @@ LONGEST_ARRAY: Final = 10_000
 """Limit on the fixed length of an array of messages or texts; rosbags writes a line of code for each of its items."""
 _OBJECT_BYTES: Final = 32
 """Bytes that a byte of a sequence of messages or texts becomes in memory, about."""
+_NO_FIELD: Final = "structure_needs_at_least_one_member"
+"""The field that rosbags gives to a type without fields. It takes no place in a message of ROS 1."""
 _SQLITE: Final = b"SQLite format 3\0"
 _NOT_A_TABLE: Final = re.compile(r"\bvirtual\b|\bgenerated\b|\bas\s*\(", re.IGNORECASE)
 
@@ -149,7 +151,7 @@ class Definitions:
             )
         if inner_kind == Nodetype.NAME:
             self._objects_in(inner, within)
-            if not self.fields[inner][1]:
+            if [inner_field for inner_field, _ in self.fields[inner][1]] == [_NO_FIELD]:
                 raise DataDamaged(f"{self.path}: {field} of {name} is a list of messages without fields")
         return True
 
