@@ -70,6 +70,10 @@ SystemExit is a failure of the plugin too: it must not end the program, nor lose
 """
 
 
+class TooLarge(DataDamaged):
+    """A file that unpacks to more than is allowed; `graspsense.recording.unpacked` has the limit."""
+
+
 class RecordingEnded(Exception):
     """A replayed recording has no further frame. The runner turns this into an outcome."""
 

@@ -22,6 +22,7 @@ from graspsense.core.csv_text import text_of_cell
 from graspsense.core.errors import ConfigError, DataDamaged, suggestion
 from graspsense.core.features import FeatureTable
 from graspsense.core.target_value import name_and_unit
+from graspsense.recording.readable import not_opened, refuse_devices
 
 _MISSING: Final = frozenset({"", "nan", "na", "n/a", "null", "none", "?"})
 _DECIMAL_COMMA: Final = re.compile(r"[-+]?\d+,\d+")
@@ -155,10 +156,11 @@ def _rows(path: Path, text: str) -> tuple[list[str], list[int], list[list[str]]]
 
 def text_of(path: Path) -> str:
     """Return the text of a file in UTF-8. Raises ConfigError if it cannot be read, DataDamaged if it is not text."""
+    refuse_devices(path)
     try:
         data = path.read_bytes()
     except OSError as error:
-        raise ConfigError(f"{path} cannot be read: {error.strerror}") from error
+        raise not_opened(path, error) from error
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         raise DataDamaged(f"{path} is UTF-16: save it as UTF-8")
     if b"\0" in data:

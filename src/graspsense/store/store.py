@@ -13,14 +13,13 @@ import re
 import secrets
 import shutil
 import sqlite3
-import struct
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Final
 
-from graspsense.core.errors import ConfigError, DataDamaged
+from graspsense.core.errors import ConfigError, DataDamaged, named
 from graspsense.recording.atomic_file import SaveFailed
 from graspsense.recording.recording_info import RecordingInfo
 from graspsense.recording.trial_record import TrialRecord
@@ -193,9 +192,10 @@ class Store:
             return decoded(summary, row, self.recording_path(summary.recording))
         except DataDamaged as error:
             raise damaged(self.folder, str(error)) from error
-        except (ValueError, TypeError, KeyError, AttributeError, RecursionError, struct.error) as error:
-            problem = f"trial {number} cannot be read ({type(error).__name__}: {error})"
-            raise damaged(self.folder, problem) from error
+        except MemoryError:
+            raise
+        except Exception as error:  # a row can hold any value in any place
+            raise damaged(self.folder, f"trial {number} cannot be read ({named(error)})") from error
 
     def encoded_row(self, number: int) -> tuple[str, EncodedRow]:
         """Return the stored hash and the columns of a trial. Raises DataDamaged if there are not all of them."""

@@ -10,10 +10,12 @@ from typing import Final
 import numpy as np
 
 from graspsense.core.errors import ConfigError, DataDamaged
+from graspsense.recording.readable import readable
 from graspsense.sources.manifest.available import AvailableColumns, number_in
 from graspsense.sources.manifest.description import ReadManifest
 from graspsense.sources.manifest.files import NamedFile
 from graspsense.sources.manifest.table import ColumnTable
+from graspsense.sources.numpy_files import npy_array
 
 _FIELD: Final = re.compile(r"\{(\w+)\}")
 _NOT_IN_LABELS: Final = re.compile(r"[\s#,]+")
@@ -109,10 +111,8 @@ def _number_beside(path: Path) -> float | None:
     if not path.is_file():
         return None
     if path.suffix == ".npy":
-        try:
-            return float(np.load(path, allow_pickle=False).reshape(()))
-        except (OSError, ValueError, TypeError) as error:
-            raise DataDamaged(f"{path} does not hold a single number: {error}") from None
+        with readable(path):
+            return float(npy_array(path).reshape(()))
     text = path.read_text(encoding="utf-8", errors="replace").strip()
     number = number_in(text)
     if number is None:

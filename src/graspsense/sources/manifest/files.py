@@ -21,12 +21,15 @@ _FIELD: Final = re.compile(r"\{(?P<name>\w+)(?P<digits>:d)?\}|(?P<deep>\*\*/)|(?
 class NamedFile:
     """A file with the facts that its path, or its row of a list, tells.
 
-    `rows` are the first and the last row that are used, counted from 1, if only a part of the file is.
+    `name` is its path from the folder of the manifest. `rows` are the first and the last row that are used, counted
+    from 1, if only a part of the file is. `problem` is why the row of a list cannot be used, empty if it can be.
     """
 
     path: Path
+    name: str
     fields: dict[str, str]
     rows: tuple[int, int] | None = None
+    problem: str = ""
 
 
 def files_of(manifest: ReadManifest) -> list[NamedFile]:
@@ -55,7 +58,7 @@ def _matching(manifest: ReadManifest) -> Iterator[NamedFile]:
             continue
         match = next(filter(None, (pattern.fullmatch(name) for pattern in patterns)), None)
         if match is not None:
-            yield NamedFile(path=path, fields=match.groupdict())
+            yield NamedFile(path=path, name=name, fields=match.groupdict())
 
 
 def _pattern(manifest: ReadManifest, text: str) -> re.Pattern[str]:
@@ -110,19 +113,26 @@ def _listed(manifest: ReadManifest) -> Iterator[NamedFile]:
             for one, cells in columns.cells.items()
             if one != "file" and not is_missing(cells[k])
         }
-        path = manifest.base / name
-        if not path.exists():
-            raise ConfigError(f"{place}, line {columns.lines[k]}: there is no file {path}")
-        yield NamedFile(path=path, fields=row, rows=_rows(place, columns.lines[k], row))
+        path, where = manifest.base / name, f"{place}, line {columns.lines[k]}"
+        rows, problem = None, "" if path.exists() else f"{where}: there is no file {path}"
+        try:
+            rows = _rows(where, row)
+        except ConfigError as error:
+            problem = str(error)
+        yield NamedFile(path=path, name=name, fields=row, rows=rows, problem=problem)
 
 
-def _rows(place: Path, line: int, row: dict[str, str]) -> tuple[int, int] | None:
+def _rows(where: str, row: dict[str, str]) -> tuple[int, int] | None:
     given = [row.pop(name, "") for name in ("first_row", "last_row")]
     if not any(given):
         return None
-    if not all(one.isdecimal() for one in given) or not 1 <= int(given[0]) <= int(given[1]):
+    if not all(_is_row(one) for one in given) or not 1 <= int(given[0]) <= int(given[1]):
         raise ConfigError(
-            f"{place}, line {line}: first_row and last_row are {given[0]!r} and {given[1]!r}: give two numbers of "
+            f"{where}: first_row and last_row are {given[0]!r} and {given[1]!r}: give two numbers of "
             "rows, counted from 1, the first not behind the last"
         )
     return int(given[0]), int(given[1])
+
+
+def _is_row(text: str) -> bool:
+    return text.isdecimal() and len(text) < 16

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import numpy as np
 
 from graspsense.core.errors import ConfigError, DataDamaged
 from graspsense.recording.labelled_recording import LabelledRecording, UnreadableRecording
+from graspsense.recording.readable import each_readable, refuse_devices
 from graspsense.sources.grasp_columns import checked_recording
 from graspsense.sources.manifest.description import ReadManifest, read_manifest
 from graspsense.sources.manifest.facts import instance_of, label_of, order_of, recorded_at_of, values_of
@@ -28,21 +30,18 @@ def read_recordings(place: str) -> Iterator[LabelledRecording | UnreadableRecord
     """
     manifest = read_manifest(Path(place).expanduser())
     for file in files_of(manifest):
-        name = file.path.relative_to(manifest.base).as_posix()
-        try:
-            tables = tables_of(manifest, file)
-        except (ConfigError, DataDamaged) as error:
-            yield UnreadableRecording(source=name, error=error)
-            continue
-        for table in tables:
-            try:
-                yield from grasps_in(manifest, file, table)
-            except (ConfigError, DataDamaged) as error:
-                yield UnreadableRecording(source=table.source, error=error)
+        for table in each_readable(file.name, partial(tables_of, manifest, file)):
+            if isinstance(table, UnreadableRecording):
+                yield table
+            else:
+                yield from each_readable(table.source, partial(grasps_in, manifest, file, table))
 
 
 def tables_of(manifest: ReadManifest, file: NamedFile) -> list[ColumnTable]:
     """Return the tables of a file, each with the facts of its path. Raises ConfigError, DataDamaged."""
+    if file.problem:
+        raise ConfigError(file.problem)
+    refuse_devices(file.path)
     read = _format(manifest, file.path)
     tables = [table.with_fields(file.fields) for table in read(file.path)]
     if file.rows is not None:
