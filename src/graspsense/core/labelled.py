@@ -9,6 +9,7 @@ from attrs import evolve, field, frozen
 
 from graspsense.core.errors import ConfigError, suggestion
 from graspsense.core.features import FeatureTable
+from graspsense.core.limits import CLASSES, FEATURES
 from graspsense.core.target_value import TargetValue
 
 if TYPE_CHECKING:
@@ -43,6 +44,9 @@ class Labelled:
     the width alone. `variants` are further tables to evaluate. If rates on these
     trials say nothing about other objects, `no_interval` is the reason, and they get no interval. `notes` tell what a
     reader of a rate must know, `provenance` how the trials were made.
+
+    Raises ValueError if the columns differ in length, and ConfigError for more labels or features than the limits
+    `CLASSES` and `FEATURES` accept.
     """
 
     source: str
@@ -71,6 +75,10 @@ class Labelled:
                 raise ValueError(
                     f"{len(self.table)} trials and {len(column)} {name}: give one for each trial"
                 )
+        labels = len(set(self.labels)) if self.value is None else 1
+        too_many = CLASSES.exceeded(labels) or FEATURES.exceeded(len(self.table.names))
+        if too_many:
+            raise ConfigError(f"{self.source} has {too_many}")
 
     def __len__(self) -> int:
         """Return the number of trials."""

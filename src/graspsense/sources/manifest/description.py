@@ -14,6 +14,7 @@ from graspsense.core.layers import read_toml
 from graspsense.core.setting import setting
 from graspsense.core.strict import ValidationFailed, structured
 from graspsense.sources.manifest.expression import Expression, ExpressionError, parse
+from graspsense.sources.manifest.patterns import regular_expression
 
 Text = str | tuple[str, ...]
 """An expression, or several of which the first is used whose columns exist."""
@@ -22,10 +23,7 @@ _AMOUNT: Final = re.compile(r"(?P<number>\d+(?:\.\d+)?)\s*(?P<unit>samples?|s|ms
 
 
 def _is_regex(_config: object, _attribute: Attribute[str], value: str) -> None:
-    try:
-        re.compile(value)
-    except re.error as error:
-        raise ValueError(f"{value!r} is not a regular expression: {error}") from None
+    regular_expression(value)
 
 
 def _is_amount(_config: object, _attribute: Attribute[str], value: str) -> None:

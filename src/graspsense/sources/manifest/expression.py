@@ -11,23 +11,20 @@ matrix of a MAT file has, counts as several as well. `force[2]` is the component
 from __future__ import annotations
 
 import ast
-import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from fnmatch import fnmatchcase
 from typing import TYPE_CHECKING, Any, Final, NoReturn
 
 import numpy as np
 from attrs import frozen
 
-from graspsense.core.errors import ConfigError, suggestion
+from graspsense.core.errors import ConfigError, listed, suggestion
+from graspsense.sources.manifest.patterns import PatternError, wildcard
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 LONGEST: Final = 2000
 """Limit on the characters of an expression."""
-MOST_NAMED: Final = 24
-"""Limit on the columns that an error lists."""
 
 Values = Any
 """A float array of shape (n,) for one column, (n, k) for several."""
@@ -55,7 +52,6 @@ _OPERATORS: Final[Mapping[type[ast.operator], Callable[[Any, Any], Any]]] = {
     ast.Mult: np.multiply,
     ast.Div: np.divide,
 }
-_UNIT: Final = re.compile(r"(?P<text>.*\S)\s+\[(?P<unit>[^\[\]']*[^\[\]'\d\s][^\[\]']*)\]\s*", re.DOTALL)
 
 
 class ExpressionError(ConfigError):
@@ -150,16 +146,18 @@ class Expression:
         if name in known:
             return (name,)
         quoted = isinstance(node, ast.Constant)
-        found = (
-            tuple(one for one in known if fnmatchcase(one, name)) if quoted and set("*?") & set(name) else ()
-        )
+        found: tuple[str, ...] = ()
+        if quoted and set("*?") & set(name):
+            try:
+                pattern = wildcard(name)
+            except PatternError as error:
+                self._refuse(node, str(error))
+            found = tuple(column for column in known if pattern.fullmatch(column))
         if not found:
-            listed = ", ".join(map(_shown, known[:MOST_NAMED]))
-            more = f" and {len(known) - MOST_NAMED} more" if len(known) > MOST_NAMED else ""
             what = (
                 f"no column matches {name!r}" if quoted and set("*?") & set(name) else f"no column {name!r}"
             )
-            self._refuse(node, f"{what}. Columns: {listed or 'none'}{more}.{suggestion(name, known)}")
+            self._refuse(node, f"{what}. Columns: {_listed(known) or 'none'}.{suggestion(name, known)}")
         return found
 
     def _refuse(self, node: ast.expr, why: str) -> NoReturn:
@@ -168,8 +166,7 @@ class Expression:
 
 def parse(text: str) -> Expression:
     """Return the expression that this text is. Raises ExpressionError that shows the place of what is not allowed."""
-    match = _UNIT.fullmatch(text)
-    body, unit = (match["text"], match["unit"].strip()) if match else (text.strip(), "")
+    body, unit = _body_and_unit(text.strip())
     if not body:
         raise ExpressionError(
             f"{text!r} is empty: name a column, or compute with columns as in 0.06 - Pos*0.001"
@@ -192,6 +189,19 @@ def parse(text: str) -> Expression:
         raise ExpressionError(f"{body[:60]!r} is not an expression, or is nested too deep") from None
     _check(tree, body, 0)
     return Expression(text=body, unit=unit, tree=tree)
+
+
+def _body_and_unit(text: str) -> tuple[str, str]:
+    """Return an expression and the unit in brackets behind it: `Pos [mm]`, but not an index as in `force[2]`."""
+    before, bracket, unit = text[:-1].rpartition("[") if text.endswith("]") else ("", "", "")
+    is_unit = (
+        bracket
+        and before.strip()
+        and before[-1].isspace()
+        and not set("]'") & set(unit)
+        and any(not (sign.isdecimal() or sign.isspace()) for sign in unit)
+    )
+    return (before.rstrip(), unit.strip()) if is_unit else (text, "")
 
 
 def _check(node: ast.AST, text: str, depth: int) -> None:
@@ -272,6 +282,10 @@ def _aligned(left: Values, right: Values) -> tuple[Values, Values]:
 
 def _width(value: Values) -> tuple[int, ...]:
     return (value.shape[1] if value.ndim == 2 else 1,)
+
+
+def _listed(names: Sequence[str]) -> str:
+    return listed([_shown(name) for name in names])
 
 
 def _shown(name: str) -> str:
