@@ -100,7 +100,7 @@ def read_calibration(path: Path) -> Calibration:
         content = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise DataDamaged(f"{path} cannot be read as a calibration: {error}") from error
     if not isinstance(content, dict) or content.get("format") != FORMAT:
         raise DataDamaged(f"{path} is not a calibration of graspsense: its format is not {FORMAT!r}")

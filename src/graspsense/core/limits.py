@@ -1,7 +1,7 @@
 """Limits on what a file can make the program read, store or compute. Each has a name, and can be raised.
 
 A number, a count or a size in a file is compared with its limit before anything is allocated. An environment variable
-of the name of the limit replaces its value: `GRASPSENSE_MOST_COLUMNS=50000`. The limits guard against files that
+of the name of the limit replaces its value: `GRASPSENSE_MAX_COLUMNS=50000`. The limits guard against files that
 were made by mistake or to do harm; no recording of a grasp comes near them.
 """
 
@@ -49,17 +49,19 @@ class Limit:
         )
 
 
-TEXT_BYTES: Final = Limit("GRASPSENSE_MOST_TEXT_BYTES", 256 * 2**20, "bytes of a text file")
-LINE_CHARACTERS: Final = Limit("GRASPSENSE_MOST_LINE_CHARACTERS", 2_000_000, "characters of a line")
-COLUMNS: Final = Limit("GRASPSENSE_MOST_COLUMNS", 10_000, "columns of a table")
-CELLS: Final = Limit("GRASPSENSE_MOST_CELLS", 20_000_000, "cells of a table")
-SAMPLES: Final = Limit("GRASPSENSE_MOST_SAMPLES", 5_000_000, "samples of a grasp")
-SETTINGS_BYTES: Final = Limit("GRASPSENSE_MOST_SETTINGS_BYTES", 2**20, "bytes of a file of settings")
-CASES: Final = Limit("GRASPSENSE_MOST_CASES", 10_000, "cases of an experiment")
-RECORDINGS: Final = Limit("GRASPSENSE_MOST_RECORDINGS", 200_000, "recordings of a data set")
-CLASSES: Final = Limit("GRASPSENSE_MOST_CLASSES", 200, "different labels")
-FEATURES: Final = Limit("GRASPSENSE_MOST_FEATURES", 5_000, "features of a trial")
-CHECKPOINTS: Final = Limit("GRASPSENSE_MOST_CHECKPOINTS", 100, "checkpoints of a grasp")
+TEXT_BYTES: Final = Limit("GRASPSENSE_MAX_TEXT_BYTES", 256 * 2**20, "bytes of a text file")
+LINE_CHARACTERS: Final = Limit("GRASPSENSE_MAX_LINE_CHARACTERS", 2_000_000, "characters of a line")
+COLUMNS: Final = Limit("GRASPSENSE_MAX_COLUMNS", 10_000, "columns of a table")
+CELLS: Final = Limit("GRASPSENSE_MAX_CELLS", 10_000_000, "cells of a table")
+SAMPLES: Final = Limit("GRASPSENSE_MAX_SAMPLES", 5_000_000, "samples of a grasp")
+SETTINGS_BYTES: Final = Limit("GRASPSENSE_MAX_SETTINGS_BYTES", 2**20, "bytes of a file of settings")
+CHANNEL_NUMBERS: Final = Limit("GRASPSENSE_MAX_CHANNEL_NUMBERS", 65_536, "numbers of a channel in one sample")
+ENTRIES: Final = Limit("GRASPSENSE_MAX_ENTRIES", 500, "entries of a key of a manifest")
+CASES: Final = Limit("GRASPSENSE_MAX_CASES", 10_000, "cases of an experiment")
+RECORDINGS: Final = Limit("GRASPSENSE_MAX_RECORDINGS", 20_000, "recordings of a data set")
+CLASSES: Final = Limit("GRASPSENSE_MAX_CLASSES", 200, "different labels")
+FEATURES: Final = Limit("GRASPSENSE_MAX_FEATURES", 5_000, "features of a trial")
+CHECKPOINTS: Final = Limit("GRASPSENSE_MAX_CHECKPOINTS", 100, "checkpoints of a grasp")
 
 LIMITS: Final = (
     TEXT_BYTES,
@@ -68,6 +70,8 @@ LIMITS: Final = (
     CELLS,
     SAMPLES,
     SETTINGS_BYTES,
+    CHANNEL_NUMBERS,
+    ENTRIES,
     CASES,
     RECORDINGS,
     CLASSES,

@@ -11,6 +11,7 @@ matrix of a MAT file has, counts as several as well. `force[2]` is the component
 from __future__ import annotations
 
 import ast
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final, NoReturn
 
@@ -18,11 +19,14 @@ import numpy as np
 from attrs import frozen
 
 from graspsense.core.errors import ConfigError, listed, suggestion
+from graspsense.core.limits import CELLS
 from graspsense.sources.manifest.patterns import PatternError, wildcard
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+LARGEST: Final = 1e300
+"""Limit on the magnitude of a number in an expression."""
 LONGEST: Final = 2000
 """Limit on the characters of an expression."""
 
@@ -40,7 +44,7 @@ FOLDS: Final[Mapping[str, Callable[[Any], Any]]] = {
 OVER_TIME: Final[Mapping[str, Callable[[Any], Any]]] = {
     "first": lambda a: a[:1],
     "last": lambda a: a[-1:],
-    "peak": lambda a: np.nanmax(a, axis=0, keepdims=True),
+    "peak": lambda a: np.fmax.reduce(a, axis=0, keepdims=True),
 }
 """Functions of one column over the whole grasp: its first value, its last one, its largest one."""
 PLAIN: Final[Mapping[str, Callable[[Any], Any]]] = {"abs": np.abs, "sqrt": np.sqrt}
@@ -116,7 +120,11 @@ class Expression:
             return value[:, index] if value.ndim == 2 else value
         assert isinstance(node, ast.Call)
         assert isinstance(node.func, ast.Name)
-        arguments = [self._value(one, columns) for one in node.args]
+        arguments: list[Values] = []
+        for argument in node.args:
+            arguments.append(self._value(argument, columns))
+            if too_many := CELLS.exceeded(sum(value.size for value in arguments)):
+                self._refuse(node, too_many)
         return self._called(node, node.func.id, arguments)
 
     def _called(self, node: ast.Call, name: str, arguments: list[Values]) -> Values:
@@ -177,7 +185,9 @@ def parse(text: str) -> Expression:
         raise ExpressionError("an expression is a single line")
     try:
         # Python counts columns in bytes of UTF-8, and reports no place after some errors.
-        tree = ast.parse(body, mode="eval").body
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of odd literals, which are refused or mean nothing here
+            tree = ast.parse(body, mode="eval").body
     except SyntaxError as error:
         raise _error(
             body,
@@ -213,6 +223,8 @@ def _check(node: ast.AST, text: str, depth: int) -> None:
     if isinstance(node, ast.Constant):
         if type(node.value) not in (int, float, str):
             raise _error(text, at, f"{node.value!r} is not a number")
+        if isinstance(node.value, int | float) and not abs(node.value) <= LARGEST:
+            raise _error(text, at, f"a number is at most {LARGEST:g}")
     elif isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.UAdd | ast.USub):
         inner = (node.operand,)
     elif isinstance(node, ast.BinOp):

@@ -6,7 +6,6 @@ import os
 import re
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Final
 
 from attrs import frozen
 
@@ -14,9 +13,6 @@ from graspsense.core.errors import ConfigError
 from graspsense.sources.csv_columns import CsvColumns, is_missing
 from graspsense.sources.manifest.description import ReadManifest
 from graspsense.sources.manifest.patterns import FileTemplate, PatternError, file_template
-
-LONGEST_NUMBER: Final = 15
-"""Limit on the digits of the number of a row."""
 
 
 @frozen(kw_only=True)
@@ -111,8 +107,7 @@ def _rows(place: Path, line: int, row: dict[str, str]) -> tuple[int, int] | None
     given = [row.pop(name, "") for name in ("first_row", "last_row")]
     if not any(given):
         return None
-    numbers = all(one.isdecimal() and len(one) <= LONGEST_NUMBER for one in given)
-    if not numbers or not 1 <= int(given[0]) <= int(given[1]):
+    if not all(one.isdecimal() for one in given) or not 1 <= int(given[0]) <= int(given[1]):
         raise ConfigError(
             f"{place}, line {line}: first_row and last_row are {given[0]!r} and {given[1]!r}: give two numbers of "
             "rows, counted from 1, the first not behind the last"

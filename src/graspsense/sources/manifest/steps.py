@@ -104,7 +104,7 @@ def resampled(columns: GraspColumns, rate_hz: float) -> GraspColumns:
     duration_s = float(t[-1] - t[0])
     samples = duration_s * rate_hz + 1.0
     if not samples <= SAMPLES.most:
-        many = int(samples) if np.isfinite(samples) else SAMPLES.most + 1
+        many = int(min(samples, 1e18))
         raise DataDamaged(
             f"{columns.source}: {duration_s:g} s at resample_hz = {rate_hz:g} are {SAMPLES.exceeded(many)}"
         )

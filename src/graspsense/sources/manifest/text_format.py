@@ -109,17 +109,11 @@ def _table(path: Path, part: _Part, where: str) -> ColumnTable:
 
 def _rows(path: Path, part: _Part, separator: str) -> list[list[str]]:
     """Return the cells of each line. Raises DataDamaged for too many of them."""
-    rows: list[list[str]] = []
-    most_rows = 0
-    for number, line in part.lines:
-        cells = _cells(path, number, line, separator)
-        if not rows:
-            check_columns(path, cells)
-            most_rows = max(CELLS.most // max(len(cells), 1), 1)
-        elif len(rows) >= most_rows:
-            raise DataDamaged(f"{path}: {CELLS.exceeded((len(rows) + 1) * len(cells))}")
-        rows.append(cells)
-    return rows
+    first = _cells(path, *part.lines[0], separator)
+    check_columns(path, first)
+    if too_many := CELLS.exceeded(len(part.lines) * len(first)):
+        raise DataDamaged(f"{path}: {too_many}")
+    return [first, *(_cells(path, number, line, separator) for number, line in part.lines[1:])]
 
 
 def _separator(lines: Sequence[str]) -> str:
