@@ -33,6 +33,7 @@ _TABLE: Final[Table] = {
             "TactileArray",
         ),
         "setting": ("CHANGES_NO_RESULT", "NAMES_INPUT", "setting"),
+        "toml_text": ("TomlError", "toml_values"),
         "figure_origins": ("fitted_results", "given_claims", "gives"),
     },
     "Signals: what passes between a gripper and a controller": {

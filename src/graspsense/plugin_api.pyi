@@ -21,6 +21,8 @@ from graspsense.core.entries import TactileArray as TactileArray
 from graspsense.core.setting import CHANGES_NO_RESULT as CHANGES_NO_RESULT
 from graspsense.core.setting import NAMES_INPUT as NAMES_INPUT
 from graspsense.core.setting import setting as setting
+from graspsense.core.toml_text import TomlError as TomlError
+from graspsense.core.toml_text import toml_values as toml_values
 from graspsense.core.figure_origins import fitted_results as fitted_results
 from graspsense.core.figure_origins import given_claims as given_claims
 from graspsense.core.figure_origins import gives as gives

@@ -101,7 +101,7 @@ def read_calibration(path: Path) -> Calibration:
             f"calibration {path} cannot be read: {error.strerror}. Its content may be whole: check the disk and the "
             "permissions of the file"
         ) from error
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise DataDamaged(f"{path} cannot be read as a calibration: {error}") from error
     if not isinstance(content, dict) or content.get("format") != FORMAT:
         raise DataDamaged(f"{path} is not a calibration of graspsense: its format is not {FORMAT!r}")

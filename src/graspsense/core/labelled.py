@@ -9,6 +9,7 @@ from attrs import evolve, field, frozen
 
 from graspsense.core.errors import ConfigError, DataDamaged, suggestion
 from graspsense.core.features import LARGEST_VALUE, FeatureTable
+from graspsense.core.limits import CLASSES, FEATURES
 from graspsense.core.target_value import TargetValue
 
 if TYPE_CHECKING:
@@ -46,6 +47,9 @@ class Labelled:
     the width alone. `variants` are further tables to evaluate. If rates on these
     trials say nothing about other objects, `no_interval` is the reason, and they get no interval. `notes` tell what a
     reader of a rate must know, `provenance` how the trials were made.
+
+    Raises ValueError if the columns differ in length, and ConfigError for more labels or features than the limits
+    `CLASSES` and `FEATURES` accept.
     """
 
     source: str
@@ -77,6 +81,10 @@ class Labelled:
         _refuse_too_large(self.table)
         if self.value is not None:
             _refuse_large_target(self.value)
+        labels = len(set(self.labels)) if self.value is None else 1
+        too_many = CLASSES.exceeded(labels) or FEATURES.exceeded(len(self.table.names))
+        if too_many:
+            raise ConfigError(f"{self.source} has {too_many}")
 
     def __len__(self) -> int:
         """Return the number of trials."""

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 import struct
-import tomllib
 from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
 from math import isnan, nan
@@ -24,6 +23,7 @@ from graspsense.core.entries import Channel, TactileArray
 from graspsense.core.errors import DataDamaged
 from graspsense.core.json_values import json_text
 from graspsense.core.signals import Outcome
+from graspsense.core.toml_text import toml_values
 from graspsense.core.trial import trial_as_json
 from graspsense.recording.before_contact import before_contact, contact_force_of
 from graspsense.recording.layout import DEVICE, RESULT, START, VERSION
@@ -306,7 +306,7 @@ def _start(texts: Mapping[str, str]) -> TrialRecord:
     datetime.fromisoformat(texts["made_at"])
     if texts["origin"] not in get_args(Origin):
         raise ValueError(f"origin {texts['origin'][:20]!r}")
-    settings = tomllib.loads(texts["settings"])
+    settings = toml_values(texts["settings"])
     dict(settings["gripper"])  # every pipeline has this table
     return TrialRecord(
         made_at=texts["made_at"],

@@ -78,6 +78,7 @@ class C45Config(ClassifierConfig):
     rep_folds: int = setting(
         default=3,
         minimum=2,
+        plausible=(2, 100),
         meaning="reduced_error holds out one of this number of parts.",
     )
 

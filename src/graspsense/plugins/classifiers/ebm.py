@@ -46,14 +46,22 @@ class EbmConfig(ClassifierConfig):
     """Settings of the boosting."""
 
     pairs: int = setting(
-        default=10, minimum=0, meaning="Largest number of pairs of features with a function."
+        default=10,
+        minimum=0,
+        plausible=(0, 1000),
+        meaning="Largest number of pairs of features with a function.",
     )
     bags: int = setting(
         default=8, minimum=1, plausible=(1, 1000), meaning="Number of fits, whose scores are averaged."
     )
-    bins: int = setting(default=64, minimum=4, meaning="Largest number of intervals of a feature.")
+    bins: int = setting(
+        default=64, minimum=4, plausible=(4, 4096), meaning="Largest number of intervals of a feature."
+    )
     pair_bins: int = setting(
-        default=16, minimum=4, meaning="Largest number of intervals of a feature in a pair."
+        default=16,
+        minimum=4,
+        plausible=(4, 256),
+        meaning="Largest number of intervals of a feature in a pair.",
     )
     learning_rate: float = setting(
         default=0.05, above=0.0, plausible=(0.001, 1.0), meaning="Factor of each boosting step."

@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from graspsense.core.errors import ConfigError, DataDamaged
+from graspsense.core.errors import ConfigError, DataDamaged, listed
 from graspsense.recording.readable import readable
 from graspsense.sources.manifest.available import AvailableColumns, number_in
 from graspsense.sources.manifest.description import ReadManifest
@@ -28,7 +28,7 @@ def _filled(manifest: ReadManifest, key: str, template: str, table: ColumnTable)
     def value(match: re.Match[str]) -> str:
         text = table.value(match[1])
         if text is None:
-            known = ", ".join((*table.fields, *table.texts, *table.numbers))
+            known = listed((*table.fields, *table.texts, *table.numbers))
             raise ConfigError(
                 f"{manifest.place}: {key}: {table.source} has no field or column {match[1]!r}. It has: {known}"
             )

@@ -6,15 +6,13 @@ import os
 import re
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Final
 
 from attrs import frozen
 
 from graspsense.core.errors import ConfigError
 from graspsense.sources.csv_columns import CsvColumns, is_missing
 from graspsense.sources.manifest.description import ReadManifest
-
-_FIELD: Final = re.compile(r"\{(?P<name>\w+)(?P<digits>:d)?\}|(?P<deep>\*\*/)|(?P<any>\*)|(?P<one>\?)")
+from graspsense.sources.manifest.patterns import FileTemplate, PatternError, file_template
 
 
 @frozen(kw_only=True)
@@ -51,37 +49,26 @@ def files_of(manifest: ReadManifest) -> list[NamedFile]:
 
 
 def _matching(manifest: ReadManifest) -> Iterator[NamedFile]:
-    given = manifest.keys.files
-    patterns = [_pattern(manifest, one) for one in ((given,) if isinstance(given, str) else given)]
+    templates = _templates(manifest)
     for name, path in _tree(manifest.base):
         if path.name == manifest.place.name and path.resolve() == manifest.place.resolve():
             continue
-        match = next(filter(None, (pattern.fullmatch(name) for pattern in patterns)), None)
-        if match is not None:
-            yield NamedFile(path=path, name=name, fields=match.groupdict())
+        try:
+            found = (template.fields(name) for template in templates)
+            fields = next((one for one in found if one is not None), None)
+        except PatternError as error:
+            raise ConfigError(f"{manifest.place}: files: {error}") from None
+        if fields is not None:
+            yield NamedFile(path=path, name=name, fields=fields)
 
 
-def _pattern(manifest: ReadManifest, text: str) -> re.Pattern[str]:
-    """Return the regular expression of a pattern. Raises ConfigError."""
-    parts, end, names = [], 0, set()
-    for match in _FIELD.finditer(text):
-        parts.append(re.escape(text[end : match.start()]))
-        end = match.end()
-        if match["deep"]:
-            parts.append("(?:.+/)?")
-        elif match["one"]:
-            parts.append("[^/]")
-        elif match["any"]:
-            parts.append("[^/]*")
-        elif match["name"] in names:
-            parts.append(f"(?P={match['name']})")
-        else:
-            names.add(match["name"])
-            parts.append(f"(?P<{match['name']}>{r'[0-9]+' if match['digits'] else '[^/]+'})")
+def _templates(manifest: ReadManifest) -> list[FileTemplate]:
+    """Return the patterns of the files. Raises ConfigError."""
+    given = manifest.keys.files
     try:
-        return re.compile("".join([*parts, re.escape(text[end:])]))
-    except re.error as error:
-        raise ConfigError(f"{manifest.place}: files: {text!r} is not a pattern: {error}") from None
+        return [file_template(one) for one in ((given,) if isinstance(given, str) else given)]
+    except PatternError as error:
+        raise ConfigError(f"{manifest.place}: files: {error}") from None
 
 
 def _tree(base: Path) -> Iterator[tuple[str, Path]]:

@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from graspsense.core.errors import ConfigError, DataDamaged
+from graspsense.core.errors import ConfigError, DataDamaged, listed
+from graspsense.core.limits import RECORDINGS
 from graspsense.recording.labelled_recording import LabelledRecording, UnreadableRecording
 from graspsense.recording.readable import each_readable, refuse_devices
 from graspsense.sources.grasp_columns import checked_recording
@@ -51,6 +52,8 @@ def tables_of(manifest: ReadManifest, file: NamedFile) -> list[ColumnTable]:
         tables = [tables[0].rows(slice(first - 1, last), f"rows {first} to {last}")]
     split = manifest.keys.split
     if split == "rows":
+        if too_many := RECORDINGS.exceeded(sum(map(len, tables))):
+            raise DataDamaged(f"{file.path}: {too_many}")
         return [table.rows(slice(k, k + 1), f"row {k + 1}") for table in tables for k in range(len(table))]
     if split and split != "force":
         return [part for table in tables for part in _by_column(table, split)]
@@ -122,11 +125,13 @@ def _by_column(table: ColumnTable, column: str) -> list[ColumnTable]:
     elif column in table.numbers and table.numbers[column].ndim == 1:
         values = table.numbers[column].tolist()
     else:
-        known = ", ".join((*table.numbers, *table.texts))
+        known = listed((*table.numbers, *table.texts))
         raise ConfigError(f"split: {table.source} has no column {column!r}. Columns: {known}")
     rows: dict[Any, list[int]] = {}
     for k, value in enumerate(values):
         rows.setdefault(value, []).append(k)
+    if too_many := RECORDINGS.exceeded(len(rows)):
+        raise DataDamaged(f"{table.source}: {too_many}")
     return [
         table.rows(
             np.array(which), f"{column} {value:g}" if isinstance(value, float) else f"{column} {value}"
