@@ -7,7 +7,7 @@ import random
 import sys
 from dataclasses import dataclass, field
 from math import inf, nan
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import attrs
 import numpy as np
@@ -42,6 +42,7 @@ from graspsense.plugin_api import (
     FreeMotion,
     ObjectKind,
     Reading,
+    StatusBit,
     UnknownName,
     setting,
 )
@@ -827,6 +828,53 @@ class Dreaming(Hand):
     def open(self, seed):
         self.config = HandConfig(vanishes_s=self.config.vanishes_s)
         return super().open(seed)
+
+
+class Described(Hand):
+    """A hand with another description."""
+
+    changes: ClassVar[dict] = {}
+
+    def open(self, seed):
+        return evolve(super().open(seed), **self.changes)
+
+
+@mutant("sensor-backend", "declares-what-protects", "at most half of its effort limit")
+class Rusty(Described):
+    changes: ClassVar = {"friction_n": 80.0}
+
+
+@mutant("sensor-backend", "declares-what-protects", "a physical gripper can hurt what it holds")
+class Reckless(Described):
+    changes: ClassVar = {"harmless": True, "simulated": False}
+
+
+@mutant("sensor-backend", "declares-what-protects", "is declared twice")
+class Repetitive(Described):
+    changes: ClassVar = {"status_bits": (StatusBit(mask=1, name="hot", meaning="too hot"),) * 2}
+
+
+@mutant("sensor-backend", "declares-what-protects", "declare each bit as a StatusBit")
+class Cryptic(Hand):
+    def read(self, timeout_s):
+        reading = super().read(timeout_s)
+        return reading._replace(frame=reading.frame._replace(status=8))
+
+
+@mutant("sensor-backend", "hostile-laws-stay-below-the-ceiling", "exerts an effort")
+class Pressing(Described):
+    changes: ClassVar = {"relaxed": Command(EFFORT, 5.0, inf, inf)}
+
+
+@mutant("sensor-backend", "a-silent-pad-ends-the-grasp", "accept the relaxing command at any time")
+class Clinging(Hand):
+    squeezed = False
+
+    def apply(self, command):
+        self.squeezed = self.squeezed or (self._zero is not None and command.value > 0.0)
+        if self.squeezed and command.value == 0.0:
+            raise RuntimeError("busy")
+        super().apply(command)
 
 
 # Classifiers.

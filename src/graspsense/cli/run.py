@@ -214,6 +214,8 @@ def print_trial(trial: Trial) -> None:
     echo()
     reason = f": {trial.reason}" if trial.reason else ""
     echo_entry("outcome", f"{trial.outcome.words}{reason}", outcome_style(trial.outcome.words))
+    for warning in trial.warnings:
+        echo_entry("warning", warning, Style.CAUTION)
     features = trial.features
     wide = max([LABEL_WIDTH, *(len(name) + 1 for name in features.names)])
     for name, value, unit in zip(features.names, features.values, features.units, strict=True):

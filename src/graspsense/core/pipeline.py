@@ -129,6 +129,7 @@ def grasp_with(
         seconds_simulated=grasp.seconds_simulated,
         seconds_wall=grasp.seconds_wall,
         checkpoints=checkpoints,
+        warnings=grasp.warnings,
     )
     plugins.run_finished(run, trial)
     return trial

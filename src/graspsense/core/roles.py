@@ -25,6 +25,7 @@ from typing import (
 
 from attrs import field, frozen
 
+from graspsense.core.contact import CONTACT_FORCE_N
 from graspsense.core.errors import ConfigError
 from graspsense.core.faults import StatusBit
 from graspsense.core.free_motion import FreeMotion
@@ -424,6 +425,18 @@ class Controller(ABC, Generic[ConfigT]):
     @abstractmethod
     def step(params: Any, state: Any, reading: Reading) -> tuple[Command, Any]:
         """Return the command for this tick, and the state after it."""
+
+    def asked_force_n(self) -> float | None:
+        """Return the greatest force (N) on each finger that this law asks for; None if it asks for none.
+
+        The effort of a real gripper stays below it, plus a margin and the friction of the drive, whatever `step`
+        commands (`run.effort_ceiling_n`). A law that squeezes with a force returns that force.
+        """
+        return None
+
+    def contact_force_n(self) -> float:
+        """Return the force (N) on a pad from which on this law takes it to touch the object."""
+        return CONTACT_FORCE_N
 
     def params(self) -> Any:
         """Return the parameters of `step`, a named tuple of floats and integers.

@@ -67,6 +67,15 @@ class RunConfig:
         plausible=(1e-4, 0.1),
         meaning="Limit of the speed on a real gripper before the first contact.",
     )
+    effort_ceiling_n: float | None = setting(
+        default=None,
+        unit="N",
+        above=0.0,
+        plausible=(0.1, 200.0),
+        meaning="Greatest effort with which the fingers close on anything that can be hurt, whatever the controller "
+        "commands; not set: a quarter above the force that it asks for (20 N where it asks for none), plus the "
+        "friction of the drive.",
+    )
     stop_when_sure: bool = setting(
         default=False,
         meaning="Whether the squeeze ends as soon as the prediction set has one label; needs a model with checkpoints "

@@ -17,12 +17,14 @@ from typing import TYPE_CHECKING, Any, Final, Protocol, runtime_checkable
 from attrs import evolve, frozen
 
 from graspsense.core.binding import bind, maker
-from graspsense.core.contact import CONTACT_FORCE_N, RestState, at_rest, update_rest
+from graspsense.core.contact import RestState, at_rest, update_rest
 from graspsense.core.entries import Channel
 from graspsense.core.errors import DeviceLost, GraspsenseError, RecordingEnded, TareRefused, named
+from graspsense.core.faults import Fault
 from graspsense.core.garbage_collection import no_collection
 from graspsense.core.guard import GuardParams, GuardState, guard
 from graspsense.core.interrupts import Interrupts
+from graspsense.core.protection.protection import Protection
 from graspsense.core.roles import Controller, DeviceInfo, SensorBackend
 from graspsense.core.run_config import RunConfig
 from graspsense.core.signals import (
@@ -75,7 +77,7 @@ class EventSink(Protocol):
 
 @frozen(kw_only=True, eq=False)
 class Grasp:
-    """The result of the runner: the trace and the outcome."""
+    """The result of the runner: the trace and the outcome. `warnings` are the faults that were seen, in words."""
 
     trace: Trace
     outcome: Outcome
@@ -86,6 +88,7 @@ class Grasp:
     events: tuple[GraspEvent, ...]
     seconds_simulated: float | None
     seconds_wall: float
+    warnings: tuple[str, ...] = ()
 
 
 def tick_params(info: DeviceInfo, controller: Controller[Any], run: RunConfig) -> TickParams:
@@ -106,7 +109,7 @@ def tick_params(info: DeviceInfo, controller: Controller[Any], run: RunConfig) -
             speed_limit_m_s=info.speed_limit_m_s,
             first_effort_n=run.first_effort_n if real else infinite,
             first_speed_m_s=run.first_speed_m_s if real else infinite,
-            contact_force_n=getattr(controller.config, "contact_force_n", CONTACT_FORCE_N),
+            contact_force_n=controller.contact_force_n(),
         ),
         law=controller.params(),
     )
@@ -211,6 +214,7 @@ def run_grasp(
         events=tuple(grasp.events),
         seconds_simulated=grasp.seconds() if info.clock == "virtual" else None,
         seconds_wall=time.perf_counter() - began,
+        warnings=() if grasp.protection is None else grasp.protection.warnings,
     )
 
 
@@ -263,6 +267,7 @@ class _Grasp:
         self.step = type(controller).step
         self.event_names = type(controller).events
         self.params = tick_params(info, controller, run)
+        self.protection = None if info.harmless else Protection(info, controller, run, self._fault_seen)
         self.state: TickState = first_state(controller.init())
         self.recorder = TraceRecorder({**SI_UNITS, **info.units})
         self.events: list[GraspEvent] = []
@@ -295,7 +300,10 @@ class _Grasp:
             ending = Outcome.ABORTED, named(error)
         finally:
             # A lost gripper may still receive commands, so it is commanded to relax.
-            self._let_go(opens=not lost and not self.state.done)
+            fault = self._fault()
+            self._let_go(opens=not (lost or self.state.done or (fault is not None and fault.relaxes)))
+        if ending is None and fault is not None:
+            ending = fault.outcome, fault.told
         if ending is None:
             ending = ended_by_itself(self.state.guard.stopped, self.state.law.outcome)
         failed = ending[0] in (Outcome.DEVICE_LOST, Outcome.ABORTED)
@@ -315,7 +323,7 @@ class _Grasp:
     def _loop(self) -> None:
         read, apply, run = self.backend.read, self.backend.apply, self.run
         advance = bind(tick, step=self.step, events_told=events_of(self.step), TickState=maker(TickState))
-        params, record = self.params, self.recorder.add
+        params, record, protection = self.params, self.recorder.add, self.protection
         on_device_clock = self.info.clock == "device"
         late_s = run.late_periods / self.info.rate_hz if on_device_clock else float("inf")
         timeout_s = frame_timeout_s(run, self.info)
@@ -332,7 +340,7 @@ class _Grasp:
             self.last = frame
             if self.first_t_s is None:
                 self.first_t_s = frame.t_s
-            acted = state.guard.acted
+            acted = self._acted(state)
             command, state = advance(params, state, reading)
             self.state = state
             stepped, same_phase = phase != TARING, state.phase == phase
@@ -340,18 +348,19 @@ class _Grasp:
                 newest = pads.counter
                 images.append(pads)
             if not same_phase:
-                if phase == TARING:
-                    self.backend.tare(images)
+                if phase == TARING and not self._tared(images, frame):
+                    return
                 phase, newest = state.phase, pads.counter
                 self._event(frame.t_s, Phase(phase), Phase(phase).name.lower())
             if state.guard is not watcher:
                 self._guard_event(frame, watcher, state.guard)
                 watcher = state.guard
+            command = command if protection is None else protection.limit(reading, phase, command)
             # The frame that ended the taring still has forces relative to the old zero.
             recorded = phase >= APPROACH and stepped
             if recorded:
                 self.late += frame.dt_s > late_s
-                self.guarded += state.guard.acted - acted
+                self.guarded += self._acted(state) > acted
             try:
                 apply(command)
             finally:
@@ -365,7 +374,7 @@ class _Grasp:
                     self._show(reading, phase, command)
                 if self.watcher is not None and phase < RELEASE and not state.done:
                     state = self._watched(self.watcher, frame, state)
-            if state.done or watcher.stopped:
+            if state.done or watcher.stopped or self._fault() is not None:
                 return
             if leaps and same_phase and phase != SQUEEZE and phase != HOLD:
                 n_ticks += self._leap(phase, reading, int(most_ticks - n_ticks))
@@ -382,7 +391,7 @@ class _Grasp:
     def _leaps(self) -> bool:
         """Return whether the gripper is asked for ticks of free motion at once; watchers need only the squeeze."""
         offers = type(self.backend).free_ticks is not SensorBackend.free_ticks
-        return offers and self.info.clock == "virtual"
+        return offers and self.info.harmless and self.info.clock == "virtual"
 
     def _leap(self, phase: int, before: Reading, most: int) -> int:
         """Let the gripper run ticks of free motion at once, record and show them, and return their number.
@@ -409,6 +418,25 @@ class _Grasp:
             except Exception as error:
                 self.sinks = [other for other in self.sinks if other is not sink]
                 self._event(reading.frame.t_s, Phase(phase), f"{type(sink).__name__} failed: {named(error)}")
+
+    def _tared(self, images: list[Pads], frame: Frame) -> bool:
+        """Set the zero of the pads; return whether the fingers may close."""
+        self.backend.tare(images)
+        return self.protection is None or self.protection.before_closing(frame) is None
+
+    def _acted(self, state: TickState) -> int:
+        """Return the number of commands that guard and protection have limited so far."""
+        return state.guard.acted + (0 if self.protection is None else self.protection.acted)
+
+    def _fault(self) -> Fault | None:
+        """Return the fault that ended the grasp, if one did."""
+        return None if self.protection is None else self.protection.ending
+
+    def _fault_seen(self, fault: Fault) -> None:
+        """Log a fault of the gripper at its first sight."""
+        t_s = 0.0 if self.last is None else self.last.t_s
+        phase = Phase(max(self.state.phase, Phase.OPENING))
+        self._event(t_s, phase, f"{'fault' if fault.ends else 'warning'}: {fault.told}")
 
     def _guard_event(self, frame: Frame, before: GuardState, now: GuardState) -> None:
         if now.stopped and not before.stopped:
@@ -462,6 +490,8 @@ class _Grasp:
                     self.backend.apply(command)
                     reading = self.backend.read(frame_timeout_s(run, info))
                     if reading is None:
+                        break
+                    if self.protection is not None and self.protection.opens_wrongly(reading, command):
                         break
                     self.last = reading.frame
                     frame = self.last

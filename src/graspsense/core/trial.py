@@ -58,6 +58,7 @@ class Trial:
     the counters of the gripper, and the true values if it is simulated. `counts` are those of the runner: ticks, late
     frames, actions of the guard. `checkpoints` are the predictions while the grasp went on. With the outcome
     `recognised`, the last of them ended the squeeze: it is the prediction, and its features are those of the trial.
+    `warnings` are faults of pads, motor and connection that were seen in the grasp, each in a sentence.
     """
 
     run: RunInfo
@@ -73,6 +74,7 @@ class Trial:
     seconds_simulated: float | None
     seconds_wall: float
     checkpoints: tuple[CheckpointPrediction, ...] = ()
+    warnings: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         parts = [self.outcome.words, *self.run.labels.values(), f"{len(self.trace)} ticks"]
@@ -92,6 +94,7 @@ def trial_as_json(trial: Trial) -> dict[str, Any]:
     return {
         "outcome": trial.outcome.words,
         "reason": trial.reason,
+        "warnings": list(trial.warnings),
         "features": features.as_dict(),
         "units": dict(zip(features.names, features.units, strict=True)),
         "reasons": dict(features.reasons),

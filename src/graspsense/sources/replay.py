@@ -171,6 +171,7 @@ class ReplayBackend(SensorBackend[ReplayConfig]):
         return DeviceInfo(
             name=recording.name,
             clock="virtual",
+            harmless=True,
             rate_hz=recording.rate_hz,
             effort_limit_n=inf,
             speed_limit_m_s=inf,

@@ -31,7 +31,7 @@ from graspsense.core.signals import (
     Reading,
     Samples,
 )
-from graspsense.testing import component
+from graspsense.testing import component, protection
 from graspsense.testing.checks import CheckFailed, CheckSkipped, checks_of, demand
 from graspsense.testing.gentle import EFFORT_N, FORCE_N, GentleController, kind_of
 from graspsense.testing.model_gripper import CHANNELS_OF_FIELD
@@ -771,5 +771,8 @@ CHECKS: Final = (
         dry_run_accepts_the_same_commands,
         reports_a_lost_device,
         reports_a_missing_device,
+        protection.declares_what_protects,
+        protection.hostile_laws_stay_below_the_ceiling,
+        protection.a_silent_pad_ends_the_grasp,
     ),
 )

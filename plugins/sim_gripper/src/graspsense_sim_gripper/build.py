@@ -71,6 +71,7 @@ def device_info(config: SimConfig) -> DeviceInfo:
         name="simulated PR2 gripper",
         clock="virtual",
         simulated=True,
+        harmless=True,
         rate_hz=config.rate_hz,
         effort_limit_n=EFFORT_LIMIT_N,
         speed_limit_m_s=SPEED_LIMIT_M_S,

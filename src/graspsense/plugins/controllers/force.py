@@ -171,6 +171,14 @@ class ForceController(Controller[ForceConfig]):
     events = EVENTS
     free_motion = FreeMotion(free_begin, free_command, free_end)
 
+    def asked_force_n(self) -> float:
+        """Return the probing force (N)."""
+        return float(self.config.probing_force_n)
+
+    def contact_force_n(self) -> float:
+        """Return the contact force (N) of the supervision."""
+        return float(self.config.contact_force_n)
+
     def params(self) -> ForceParams:
         """Return the parameters of the law."""
         return ForceParams(

@@ -154,6 +154,14 @@ class HybridController(Controller[HybridConfig]):
     events = EVENTS
     free_motion = FreeMotion(free_begin, free_command, free_end)
 
+    def asked_force_n(self) -> float:
+        """Return the probing force (N)."""
+        return float(self.config.probing_force_n)
+
+    def contact_force_n(self) -> float:
+        """Return the contact force (N) of the supervision."""
+        return float(self.config.contact_force_n)
+
     def params(self) -> HybridParams:
         """Return the parameters of the law."""
         return HybridParams(

@@ -178,6 +178,10 @@ class VelocityController(Controller[VelocityConfig]):
     events = EVENTS
     free_motion = FreeMotion(free_begin, free_command, free_end)
 
+    def contact_force_n(self) -> float:
+        """Return the contact force (N) of the supervision."""
+        return float(self.config.contact_force_n)
+
     def params(self) -> VelocityParams:
         """Return the parameters of the law."""
         return VelocityParams(

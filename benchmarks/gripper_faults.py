@@ -1,0 +1,224 @@
+"""Inject faults in every phase of a grasp with an emulated PR2 gripper, and print what its fingers then did.
+
+    python benchmarks/gripper_faults.py [--write docs/pr2.md] [--json] [--short]
+
+The emulated board is treated as a real gripper, with the limits of a first closing. Each fault begins at five times:
+while the fingers open, early and late in the approach, in the squeeze, and in the hold; those times are taken from a
+grasp without a fault. The fault is on the left fingertip, then on the right one. The controllers are the three of
+graspsense, and four hostile ones. Effort and force are those of the simulated body, whatever the board reported.
+
+The table has a row for each fault and group of controllers, with the worst of its grasps. `--write` puts it between
+the marks of the page. `--short` runs a few of the grasps. Emulated and simulated; nothing was measured on a gripper.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Iterable, Iterator, Mapping
+from math import inf
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from attrs import asdict, evolve, frozen
+
+from graspsense.core.run_config import RunConfig
+from graspsense.core.runner import Grasp, run_grasp
+from graspsense.plugin_api import (
+    APPROACH,
+    EFFORT,
+    HOLD,
+    SQUEEZE,
+    Controller,
+    SensorBackend,
+    create,
+)
+from graspsense.testing.hostile import HOSTILE
+from graspsense_pr2_gripper.backend import Pr2Backend
+from graspsense_pr2_gripper.config import FaultConfig, Pr2Config
+
+OBJECT: Final = "odwalla:full_open"
+SEED: Final = 0
+CONTROLLERS: Final = ("hybrid", "velocity", "force")
+BEGIN, END = "<!-- faults: begin -->", "<!-- faults: end -->"
+
+
+RUN: Final = RunConfig(grasp_timeout_s=10.0)
+
+
+@frozen
+class Injected:
+    """A fault as settings of the emulated board, but for its time and side; `sided`: it is of one fingertip."""
+
+    name: str
+    settings: Mapping[str, Any]
+    at: str
+    sided: bool = False
+    strong_s: float = 0.0
+    """Time for which the motor may apply more than the ceiling before the fault is certain."""
+
+
+FAULTS: Final = (
+    Injected("fingertip absent", {"pad_fault": "absent"}, "pad_at_s", sided=True),
+    Injected("fingertip stuck", {"pad_fault": "stuck"}, "pad_at_s", sided=True),
+    Injected("fingertip reads 0", {"pad_fault": "zero"}, "pad_at_s", sided=True),
+    Injected("zero drifts by 50 counts/s", {"drift_counts_s": 50.0}, "pad_at_s", sided=True),
+    Injected("zero drifts by -50 counts/s", {"drift_counts_s": -50.0}, "pad_at_s", sided=True),
+    Injected("both zeros drift by 200 counts/s", {"drift_counts_s": 200.0}, "pad_at_s"),
+    Injected("both fingertips stuck", {"pad_fault": "stuck"}, "pad_at_s"),
+    Injected("cell images stop", {"image_fault": "frozen"}, "image_at_s"),
+    Injected("encoder fault bit", {"status_bits": 4}, "status_at_s"),
+    Injected("motor applies twice the command", {"motor_gain": 2.0}, "motor_at_s", strong_s=0.1),
+    Injected("motor applies a third of the command", {"motor_gain": 0.33}, "motor_at_s"),
+    Injected("motor turns the wrong way", {"motor_gain": -1.0}, "motor_at_s"),
+    Injected("reports five times the effort", {"effort_report_gain": 5.0}, "effort_report_at_s"),
+    Injected("clock of the board stands still", {"clock_rate": 0.0}, "clock_at_s"),
+)
+
+
+@frozen
+class FaultyGrasp:
+    """What the fingers did in a grasp with a fault that began in this phase."""
+
+    fault: str
+    side: str
+    phase: str
+    controller: str
+    largest_effort_n: float
+    strong_s: float
+    largest_force_n: float
+    released_after_s: float
+    """Time from the fault to the release; infinity if there was no fault."""
+    outcome: str
+    words: str
+
+
+def grasped(controller: Controller[Any], faults: FaultConfig, seed: int = SEED) -> Grasp:
+    """Grasp with the emulated board, treated as a real gripper."""
+    config = Pr2Config(transport="emulated", pace="device", calibration="none", object=OBJECT, faults=faults)
+    backend: SensorBackend[Any] = Pr2Backend(config).dry_run_backend()
+    return run_grasp(backend, controller, evolve(RUN, seed=seed))
+
+
+def controller_named(name: str) -> Controller[Any]:
+    """Return one of graspsense's controllers, or a hostile one."""
+    if name in HOSTILE:
+        return HOSTILE[name](EFFORT)
+    built: Controller[Any] = create("controller", name)
+    return built
+
+
+def moments(grasp: Grasp) -> dict[str, float]:
+    """Return five device times (s) of a grasp without a fault: in the opening, the approach, the squeeze, the hold."""
+    trace = grasp.trace
+    begins = {phase: trace.t_s[trace.phase == phase] for phase in (APPROACH, SQUEEZE, HOLD)}
+    approach, squeeze, hold = (begins[phase] for phase in (APPROACH, SQUEEZE, HOLD))
+    start, end = float(approach[0]), float(approach[-1])
+    times = {
+        "opening": 0.5 * start,
+        "approach, early": start + 0.2 * (end - start),
+        "approach, late": start + 0.8 * (end - start),
+        "squeeze": float(np.mean(squeeze)) if len(squeeze) else end,
+        "hold": float(np.mean(hold)) if len(hold) else float(trace.t_s[-1]),
+    }
+    return times
+
+
+def result_of(fault: str, side: str, phase: str, controller: str, at_s: float, grasp: Grasp) -> FaultyGrasp:
+    """Return what the fingers did."""
+    report, trace = grasp.report, grasp.trace
+    closing = np.flatnonzero(trace.phase <= HOLD)
+    end_s = float(trace.t_s[closing[-1]]) if len(closing) else 0.0
+    return FaultyGrasp(
+        fault,
+        side,
+        phase,
+        controller,
+        float(report["largest_effort_n"]),
+        float(report["seconds_above_30_n"]),
+        float(report["largest_force_n"]),
+        end_s - at_s,
+        grasp.outcome.words,
+        "; ".join(warning.split(":")[0] for warning in grasp.warnings),
+    )
+
+
+def injected(
+    controllers: Iterable[str], faults: Iterable[Injected] = FAULTS, sides: Iterable[str] = ("left", "right")
+) -> Iterator[FaultyGrasp]:
+    """Grasp with each of these faults at each of five times, on each side, under each controller."""
+    sides = tuple(sides)
+    for name in controllers:
+        healthy = grasped(controller_named(name), FaultConfig())
+        yield result_of("none", "", "", name, inf, healthy)
+        for fault in faults:
+            for side in sides if fault.sided else ("both",):
+                for phase, at_s in moments(healthy).items():
+                    settings = {**fault.settings, fault.at: at_s}
+                    if fault.sided:
+                        settings["pad_side"] = side
+                    grasp = grasped(controller_named(name), FaultConfig(**settings))
+                    yield result_of(fault.name, side, phase, name, at_s, grasp)
+
+
+def hostile() -> Iterator[FaultyGrasp]:
+    """Grasp under each hostile controller, without a fault and with a stuck fingertip."""
+    for name in HOSTILE:
+        yield result_of("none", "", "", name, inf, grasped(controller_named(name), FaultConfig()))
+        stuck = FaultConfig(pad_fault="stuck", pad_side="left", pad_at_s=2.0)
+        yield result_of("fingertip stuck", "left", "2 s", name, 2.0, grasped(controller_named(name), stuck))
+
+
+def table(rows: Iterable[FaultyGrasp]) -> str:
+    """Return the worst of each fault and controller as a table in Markdown."""
+    groups: dict[tuple[str, str], list[FaultyGrasp]] = {}
+    for row in rows:
+        groups.setdefault((row.fault, row.controller), []).append(row)
+    lines = [
+        "| fault | controller | grasps | greatest effort | longest above 30 N | greatest force on a pad "
+        "| longest until release | outcomes | told |",
+        "|---|---|---|---|---|---|---|---|---|",
+    ]
+    for (fault, controller), found in groups.items():
+        outcomes = ", ".join(dict.fromkeys(row.outcome for row in found))
+        told = ", ".join(dict.fromkeys(word for row in found for word in row.words.split("; ") if word))
+        # A fault in the opening counts from the moment at which the fingers close.
+        longest = max(row.released_after_s for row in found)
+        released = "" if longest == -inf else f"{longest:.2f} s"
+        lines.append(
+            f"| {fault} | {controller} | {len(found)} | {max(row.largest_effort_n for row in found):.1f} N "
+            f"| {max(row.strong_s for row in found):.2f} s | {max(row.largest_force_n for row in found):.1f} N "
+            f"| {released} | {outcomes} | {told} |"
+        )
+    return "\n".join(lines)
+
+
+def main() -> None:
+    """Run the grasps and print the table."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--write", type=Path, help="page whose table is replaced")
+    parser.add_argument("--json", action="store_true")
+    parser.add_argument("--short", action="store_true")
+    given = parser.parse_args()
+    rows = list(injected(("hybrid",), FAULTS[:1], ("left",)) if given.short else injected(CONTROLLERS))
+    rows += hostile()
+    if given.json:
+        json.dump([asdict(row) for row in rows], sys.stdout, indent=1)
+        return
+    text = table(rows)
+    print(text)
+    if given.write is not None:
+        page = given.write.read_text(encoding="utf-8")
+        head, _, tail = page.partition(BEGIN)
+        _, mark, tail = tail.partition(END)
+        if not mark:
+            sys.exit(f"{given.write} has no {BEGIN} and {END} to put the table between")
+        given.write.write_text(f"{head}{BEGIN}\n{text}\n{END}{tail}", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,78 @@
+"""Faults injected in every phase of a grasp with the emulated board: nothing is crushed, and the fault is told."""
+
+import gripper_faults
+import pytest
+from gripper_faults import CONTROLLERS, FAULTS, FaultyGrasp
+
+from graspsense_pr2_gripper.config import FaultConfig
+
+CEILING_N = 1.25 * 20.0 + 7.0
+"""The effort of a grasp with the usual probing force: a quarter more, and the declared friction."""
+TELLS_NOTHING = {
+    # Within the last quarter of a second there is no time left to see it, and nothing moves any more.
+    "hold",
+    "squeeze",
+}
+
+
+def check(row: FaultyGrasp, healthy_n: float) -> None:
+    """The invariants of one grasp: effort, true force on the object, and time until the release."""
+    name = f"{row.fault}, {row.side}, {row.phase}, {row.controller}: {row.outcome} ({row.words})"
+    motor = "motor" in row.fault
+    allowed_n = 2.0 * CEILING_N if motor else CEILING_N
+    assert row.largest_effort_n <= allowed_n + 1e-6, name
+    assert row.strong_s <= (0.1 if motor else 0.0) or row.largest_effort_n <= CEILING_N, name
+    assert row.largest_force_n <= 1.5 * healthy_n, name
+    assert row.outcome != "running", name
+    if row.phase not in TELLS_NOTHING:
+        assert row.words, name
+
+
+def rows_of(controller, faults=FAULTS, sides=("left", "right")):
+    healthy, *rows = gripper_faults.injected((controller,), faults, sides)
+    assert healthy.outcome == "steady", healthy
+    return healthy, rows
+
+
+@pytest.mark.parametrize("fault", ["fingertip absent", "fingertip stuck", "motor turns the wrong way"])
+def test_a_fault_in_any_phase_crushes_nothing(fault):
+    healthy, rows = rows_of("hybrid", [found for found in FAULTS if found.name == fault], ("left",))
+    assert len(rows) == 5
+    for row in rows:
+        check(row, healthy.largest_force_n)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("controller", CONTROLLERS)
+def test_every_fault_in_every_phase_on_both_sides_crushes_nothing(controller):
+    healthy, rows = rows_of(controller)
+    sided = sum(fault.sided for fault in FAULTS)
+    assert len(rows) == 5 * (2 * sided + len(FAULTS) - sided)
+    for row in rows:
+        check(row, healthy.largest_force_n)
+
+
+@pytest.mark.slow
+def test_hostile_laws_crush_nothing():
+    rows = list(gripper_faults.hostile())
+    assert len(rows) == 8
+    for row in rows:
+        assert row.largest_effort_n <= CEILING_N, row
+        assert row.largest_force_n <= 20.0, row
+        assert row.outcome == "aborted", row
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_healthy_grasp_has_no_warnings(seed):
+    for name in ("hybrid", "force"):
+        grasp = gripper_faults.grasped(gripper_faults.controller_named(name), FaultConfig(), seed=seed)
+        assert (grasp.outcome.words, grasp.warnings) == ("steady", ())
+
+
+def test_a_pad_that_is_known_to_be_bad_refuses_the_grasp():
+    faults = FaultConfig(pad_fault="absent", pad_side="right")
+    grasp = gripper_faults.grasped(gripper_faults.controller_named("hybrid"), faults)
+    assert grasp.outcome.words == "aborted"
+    assert "right" in grasp.reason
+    # The fingers never closed.
+    assert grasp.report["largest_effort_n"] == 0.0

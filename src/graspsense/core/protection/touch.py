@@ -1,0 +1,242 @@
+"""Whether both pads feel what the fingers do: one finger alone, a stalled motor, and a contact in free air.
+
+The fingers press an object that a pad does not feel in three ways. One pad feels and the other does not. The fingers
+stop although neither pad feels. Or both pads claim a contact in free air, and the squeeze then starts far from the
+object. Each is bounded by a travel of the gap, or by the time that the approach takes for this travel.
+
+An object that does not stand in the middle is felt by one pad first, which pushes it until the other touches too. A
+full bottle is pushed by up to 13 mm in the simulated catalogue, with at most 2 N. It moves on at the speed of the
+approach; an object that is pressed does not.
+"""
+
+from __future__ import annotations
+
+from math import inf, nan
+from typing import Final
+
+from graspsense.core.faults import Fault
+from graspsense.core.signals import (
+    APPROACH,
+    EFFORT,
+    FORCE,
+    HOLD,
+    POSITION,
+    SQUEEZE,
+    VELOCITY,
+    Command,
+    Frame,
+    Outcome,
+)
+
+TRAVEL_M: Final = 0.003
+"""Travel of the gap after which the fingers must have made clear what they touch: 0.3 s at the paper's 10 mm/s."""
+PUSHED_M: Final = 0.015
+"""Travel for which one pad may push an object before the other one feels it."""
+PUSHED_SHARE: Final = 4.0
+"""The force on the pad that pushes an object, over the contact force, above which it presses."""
+LEAST_S: Final = 0.1
+MOST_S: Final = 3.0
+"""Bounds of the time that stands for this travel, for fast and for slow approaches."""
+USUAL_M_S: Final = 0.010
+"""The speed that is assumed for an approach that has not begun to move: that of the paper."""
+MOVED_M: Final = 0.001
+"""Travel after which the fingers have overcome static friction: a later stop is not the start of the motion."""
+STALL_M: Final = 0.0005
+"""Travel within which a stalled motor is searched for."""
+STALL_SHARE: Final = 0.2
+"""Share of the approach speed below which the motor counts as stalled."""
+SLOWED_SHARE: Final = 0.7
+"""Share of the approach speed below which the fingers have met a resistance."""
+SMOOTHING_S: Final = 0.2
+"""Time constant of the means of effort and speed over the approach."""
+SPEED_SMOOTHING_S: Final = 0.01
+"""Time constant of the present speed, several steps of an encoder."""
+NEEDED_MARGIN: Final = 1.25
+NEEDED_CONTACTS: Final = 2.0
+"""By how much the effort may exceed the mean effort of the approach while a contact is not clear: by a quarter, and by
+so many times the contact force."""
+
+
+class Mean:
+    """A mean that forgets: each value counts less by a factor e after `time_s`."""
+
+    def __init__(self, time_s: float) -> None:
+        self._time_s, self._seen_s = time_s, 0.0
+        self.value = nan
+
+    def add(self, value: float, dt_s: float) -> None:
+        """Add a value that held for this time."""
+        if not (dt_s > 0.0 and value == value):
+            return
+        self._seen_s += dt_s
+        # The plain mean until the time constant has passed.
+        share = dt_s / min(self._seen_s, self._time_s) if self._seen_s > dt_s else 1.0
+        self.value = value if share >= 1.0 else self.value + share * (value - self.value)
+
+
+class Pad:
+    """Whether a pad feels a contact: from the contact force on, until its force falls below half of it."""
+
+    def __init__(self, contact_force_n: float) -> None:
+        self._contact_n = contact_force_n
+        self.felt = False
+        self.force_n = nan
+
+    def see(self, force_n: float) -> None:
+        """Take the force (N) of this tick; NaN is not felt."""
+        self.force_n = force_n
+        self.felt = force_n >= (0.5 * self._contact_n if self.felt else self._contact_n)
+
+    @property
+    def presses(self) -> bool:
+        """Whether the force is at or above the contact force now."""
+        return self.force_n >= self._contact_n
+
+
+class Touch:
+    """Watches both pads against the motion of the fingers, from the approach to the hold."""
+
+    def __init__(self, contact_force_n: float) -> None:
+        self._contact_n = contact_force_n
+        self._left, self._right = Pad(contact_force_n), Pad(contact_force_n)
+        self._needed_n, self._approach_m_s = Mean(SMOOTHING_S), Mean(SMOOTHING_S)
+        self._speed_m_s = Mean(SPEED_SMOOTHING_S)
+        self._start_gap_m = nan
+        self._alone_t_s = self._alone_gap_m = nan
+        self._moved_t_s = self._moved_gap_m = nan
+        self._claimed_t_s = self._claimed_gap_m = nan
+        self._witnessed = False
+
+    def see(self, frame: Frame, phase: int, asked: Command) -> Fault | None:
+        """Take the frame of a tick and the command that the controller asks for; return a fault that ends the grasp."""
+        if phase not in (APPROACH, SQUEEZE, HOLD):
+            return None
+        if self._start_gap_m != self._start_gap_m:
+            self._start_gap_m = frame.gap_m
+            self._moved_t_s, self._moved_gap_m = frame.t_s, frame.gap_m
+        self._left.see(frame.force_left_n)
+        self._right.see(frame.force_right_n)
+        self._speed_m_s.add(-frame.velocity_m_s, frame.dt_s)
+        self._approached(frame, asked)
+        return self._alone(frame) or self._free_air(frame, asked) or self._stalled(frame, phase, asked)
+
+    def closing_limit_n(self) -> float:
+        """Return the greatest closing effort (N) in this tick: that of the approach while a contact is not clear."""
+        unclear = self._alone_t_s == self._alone_t_s or self._claimed_t_s == self._claimed_t_s
+        needed_n = self._needed_n.value
+        if not unclear or needed_n != needed_n:
+            return inf
+        return NEEDED_MARGIN * needed_n + NEEDED_CONTACTS * self._contact_n
+
+    def free(self) -> bool:
+        """Whether neither pad feels anything."""
+        return not (self._left.felt or self._right.felt)
+
+    def _approached(self, frame: Frame, asked: Command) -> None:
+        """Learn the speed and the effort of the approach, while the fingers move and neither pad feels."""
+        speed_m_s = self._speed_m_s.value
+        mean_m_s = self._approach_m_s.value
+        if not self.free() or not self._has_moved(frame) or not speed_m_s > 0.0:
+            return
+        if mean_m_s == mean_m_s and speed_m_s < SLOWED_SHARE * mean_m_s:
+            return
+        self._approach_m_s.add(speed_m_s, frame.dt_s)
+        effort_n = asked.value if asked.kind in (EFFORT, FORCE) else frame.effort_n
+        self._needed_n.add(max(min(effort_n, asked.effort_limit_n), 0.0), frame.dt_s)
+
+    def _has_moved(self, frame: Frame) -> bool:
+        return self._start_gap_m - frame.gap_m >= MOVED_M
+
+    def _allowed_s(self, travel_m: float) -> float:
+        """Return the time (s) that the approach takes for this travel, within bounds."""
+        speed_m_s = self._approach_m_s.value
+        if not speed_m_s > 0.0:
+            speed_m_s = USUAL_M_S
+        return min(max(travel_m / speed_m_s, LEAST_S), MOST_S)
+
+    def _alone(self, frame: Frame) -> Fault | None:
+        left, right = self._left, self._right
+        alone = (left.presses and not right.felt) or (right.presses and not left.felt)
+        if not alone:
+            if left.felt == right.felt:
+                self._alone_t_s = nan
+            return None
+        if self._alone_t_s != self._alone_t_s:
+            self._alone_t_s, self._alone_gap_m = frame.t_s, frame.gap_m
+        elapsed_s, travel_m = frame.t_s - self._alone_t_s, self._alone_gap_m - frame.gap_m
+        feels, other = ("left", right) if left.presses else ("right", left)
+        if not self._presses((left if left.presses else right).force_n, elapsed_s, travel_m):
+            return None
+        lacking = "right" if feels == "left" else "left"
+        why = "gives no force" if other.force_n != other.force_n else f"reads {other.force_n:.2f} N"
+        return Fault(
+            f"{feels} finger alone",
+            f"the {feels} pad has felt a contact for {elapsed_s:.2f} s and {travel_m * 1e3:.1f} mm, the {lacking} one "
+            f"{why}: check the {lacking} fingertip, or place the object between both fingers",
+            ends=True,
+            outcome=Outcome.ONE_FINGER,
+        )
+
+    def _presses(self, force_n: float, elapsed_s: float, travel_m: float) -> bool:
+        """Return whether the pad that feels presses the object, or has pushed it for long enough."""
+        if elapsed_s >= self._allowed_s(PUSHED_M) or travel_m >= PUSHED_M:
+            return True
+        if elapsed_s < self._allowed_s(TRAVEL_M) and travel_m < TRAVEL_M:
+            return False
+        slow = not self._speed_m_s.value >= STALL_SHARE * self._approach_m_s.value
+        return slow or force_n >= PUSHED_SHARE * self._contact_n
+
+    def _free_air(self, frame: Frame, asked: Command) -> Fault | None:
+        """A contact that both pads claim has a witness: the fingers slow down, or the force goes on rising."""
+        if self._witnessed or not (self._left.felt and self._right.felt):
+            return None
+        if self._claimed_t_s != self._claimed_t_s:
+            self._claimed_t_s, self._claimed_gap_m = frame.t_s, frame.gap_m
+        mean_m_s = self._approach_m_s.value
+        needed_n = self._needed_n.value
+        slowed = not self._speed_m_s.value >= SLOWED_SHARE * mean_m_s
+        risen = max(self._left.force_n, self._right.force_n) >= 2.0 * self._contact_n
+        pressed = asked.kind == EFFORT and frame.effort_n > NEEDED_MARGIN * needed_n + 2.0 * self._contact_n
+        if mean_m_s != mean_m_s or slowed or risen or pressed:
+            self._witnessed = True
+            self._claimed_t_s = nan
+            return None
+        elapsed_s, travel_m = frame.t_s - self._claimed_t_s, self._claimed_gap_m - frame.gap_m
+        if elapsed_s < self._allowed_s(TRAVEL_M) and not travel_m >= TRAVEL_M:
+            return None
+        return Fault(
+            "contact in free air",
+            f"both pads claim a contact, but the fingers moved on by {travel_m * 1e3:.1f} mm in {elapsed_s:.2f} s "
+            "without slowing down, and the force did not rise: the zero of the pads drifts; let them warm up, and "
+            "try again",
+            ends=True,
+        )
+
+    def _stalled(self, frame: Frame, phase: int, asked: Command) -> Fault | None:
+        """The fingers moved and stand still now, under a command that closes, and the pads do not feel why."""
+        if self._moved_gap_m - frame.gap_m >= STALL_M or not closes(asked, frame, self._needed_n.value):
+            self._moved_t_s, self._moved_gap_m = frame.t_s, frame.gap_m
+            return None
+        # One pad alone, and both of them, have bounds of their own.
+        felt = self._left.felt or self._right.felt
+        if phase != APPROACH or felt or not self._has_moved(frame):
+            return None
+        elapsed_s = frame.t_s - self._moved_t_s
+        if elapsed_s < max(self._allowed_s(STALL_M / STALL_SHARE), 2.0 * LEAST_S):
+            return None
+        return Fault(
+            "stalled",
+            f"the fingers have stood still for {elapsed_s:.2f} s under a closing command, and the pads do not both "
+            "feel a contact: something is in the way that they do not feel; check the fingertips and the drive",
+            ends=True,
+        )
+
+
+def closes(asked: Command, frame: Frame, needed_n: float) -> bool:
+    """Return whether a command closes the fingers; an effort only from half of that of the approach on."""
+    kind, value, _, _ = asked
+    if kind in (EFFORT, FORCE):
+        return value > 0.0 and not value < 0.5 * needed_n
+    if kind == VELOCITY:
+        return value < 0.0
+    return kind == POSITION and value < frame.gap_m

@@ -1,0 +1,388 @@
+"""The protection of a grasp: what a healthy gripper may do, and each fault that warns or ends the grasp."""
+
+from math import inf, nan
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from graspsense.core.faults import StatusBit
+from graspsense.core.protection.cells import Fingertips
+from graspsense.core.protection.drift import PadDrift
+from graspsense.core.protection.effort_ceiling import effort_ceiling_n, limited
+from graspsense.core.protection.motor import Motor
+from graspsense.core.protection.reports import Reports
+from graspsense.core.protection.status import Status
+from graspsense.core.protection.stuck_force import StuckForce
+from graspsense.core.protection.touch import Touch
+from graspsense.core.roles import DeviceInfo
+from graspsense.core.run_config import RunConfig
+from graspsense.core.signals import (
+    APPROACH,
+    EFFORT,
+    FORCE,
+    HOLD,
+    POSITION,
+    SQUEEZE,
+    VELOCITY,
+    Command,
+    Frame,
+    Outcome,
+    Pads,
+    Phase,
+    Reading,
+)
+from graspsense.plugins.controllers.hybrid import HybridConfig, HybridController
+from graspsense.plugins.controllers.velocity import VelocityConfig, VelocityController
+
+CONTACT_N = 0.625
+CLOSING = Command(EFFORT, 8.0, inf, inf)
+
+
+def frame(t, gap=0.05, velocity=-0.01, effort=8.0, left=0.0, right=0.0, dt=0.001, status=0):
+    return Frame(t, dt, gap, velocity, effort, left, right, 0.0, 0.0, status)
+
+
+def gripper(**changes):
+    given_ = {
+        "name": "test",
+        "clock": "device",
+        "rate_hz": 1000.0,
+        "effort_limit_n": 100.0,
+        "speed_limit_m_s": 0.2,
+        "opening": Command(EFFORT, -20.0, inf, inf),
+        "relaxed": Command(EFFORT, 0.0, inf, inf),
+        "friction_n": 7.0,
+    }
+    return DeviceInfo(**{**given_, **changes})
+
+
+@pytest.mark.parametrize(
+    ("controller", "run", "ceiling_n"),
+    [
+        # A quarter over the probing force, plus the friction.
+        (HybridController(HybridConfig()), RunConfig(), 1.25 * 20.0 + 7.0),
+        # A law without a force: as for the paper's 20 N.
+        (VelocityController(VelocityConfig()), RunConfig(), 1.25 * 20.0 + 7.0),
+        # Never below what the first closing is allowed.
+        (HybridController(HybridConfig(probing_force_n=2.0)), RunConfig(), 12.0),
+        (HybridController(HybridConfig()), RunConfig(effort_ceiling_n=60.0), 60.0),
+        # The gripper's own limit holds too.
+        (HybridController(HybridConfig(probing_force_n=90.0)), RunConfig(), 100.0),
+    ],
+)
+def test_the_ceiling_follows_from_what_was_asked(controller, run, ceiling_n):
+    assert effort_ceiling_n(gripper(), controller, run) == pytest.approx(ceiling_n)
+
+
+@given(
+    st.sampled_from([EFFORT, FORCE, VELOCITY, POSITION]),
+    st.floats(allow_nan=False, allow_infinity=False),
+    st.floats(min_value=0.0, allow_nan=False),
+)
+def test_no_command_closes_with_more_than_the_ceiling(kind, value, own_limit):
+    allowed = limited(Command(kind, value, own_limit, inf), 30.0, 40.0)
+    effort = allowed.value if kind in (EFFORT, FORCE) else allowed.effort_limit_n
+    assert effort <= 30.0
+    if kind == EFFORT:
+        assert allowed.value >= -40.0
+
+
+class Approach:
+    """A touch that watches an approach at 10 mm/s with 8 N, which goes on as the test says."""
+
+    def __init__(self, seconds=2.0):
+        self.touch = Touch(CONTACT_N)
+        self.t, self.gap = 0.0, 0.09
+        self.go(seconds)
+
+    def go(self, seconds, left=0.0, right=0.0, speed=0.01, effort=8.0, phase=APPROACH):
+        """Return the first fault in these seconds, and the time until it."""
+        for k in range(round(seconds * 1000)):
+            self.t += 0.001
+            self.gap -= speed * 0.001
+            now = frame(self.t, self.gap, -speed, effort, left, right)
+            fault = self.touch.see(now, phase, CLOSING._replace(value=effort))
+            if fault is not None:
+                return fault, (k + 1) * 0.001
+        return None, seconds
+
+
+def test_an_approach_has_no_fault_and_no_limit():
+    approach = Approach()
+    assert approach.go(1.0) == (None, 1.0)
+    assert approach.touch.closing_limit_n() == inf
+
+
+def test_a_heavy_bottle_may_be_pushed_by_one_finger():
+    # In the catalogue up to 13 mm, with up to 2 N, before the other finger touches.
+    assert Approach().go(1.3, right=2.0)[0] is None
+
+
+@pytest.mark.parametrize(("left", "right"), [(3.0, 0.0), (0.0, 3.0), (3.0, nan)])
+def test_a_finger_that_presses_alone_is_released_after_three_tenths_of_a_second(left, right):
+    fault, after_s = Approach().go(2.0, left=left, right=right, speed=0.002)
+    assert fault.outcome is Outcome.ONE_FINGER
+    assert fault.ends
+    assert after_s == pytest.approx(0.3, abs=0.02)
+
+
+def test_a_finger_that_stands_still_alone_is_released_too():
+    fault, after_s = Approach().go(2.0, right=0.7, speed=0.0)
+    assert fault.outcome is Outcome.ONE_FINGER
+    assert after_s == pytest.approx(0.3, abs=0.02)
+
+
+def test_while_one_finger_touches_the_effort_is_that_of_the_approach():
+    approach = Approach()
+    approach.go(0.05, right=1.0)
+    # 8 N in the approach: a quarter more, and twice the contact force.
+    assert approach.touch.closing_limit_n() == pytest.approx(1.25 * 8.0 + 2 * CONTACT_N, rel=0.01)
+
+
+def test_a_pad_that_falls_silent_in_the_squeeze_ends_it():
+    approach = Approach()
+    assert approach.go(0.3, left=4.0, right=4.0, speed=0.001, phase=SQUEEZE)[0] is None
+    fault, after_s = approach.go(2.0, left=0.0, right=4.0, speed=0.0, phase=SQUEEZE)
+    assert fault.outcome is Outcome.ONE_FINGER
+    assert after_s < 0.35
+
+
+def test_a_contact_in_free_air_is_not_squeezed():
+    approach = Approach()
+    fault, after_s = approach.go(1.0, left=0.7, right=0.7, phase=SQUEEZE)
+    assert fault.name == "contact in free air"
+    assert after_s == pytest.approx(0.3, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    "felt",
+    [{"left": 0.7, "right": 0.7, "speed": 0.001}, {"left": 1.3, "right": 0.7}],
+    ids=["slower", "rises"],
+)
+def test_a_contact_with_a_witness_is_squeezed(felt):
+    approach = Approach()
+    assert approach.go(0.5, **felt, phase=SQUEEZE)[0] is None
+    assert approach.touch.closing_limit_n() == inf
+
+
+def test_fingers_that_stop_without_a_feeling_are_released():
+    fault, after_s = Approach().go(1.0, speed=0.0)
+    assert fault.name == "stalled"
+    assert after_s < 0.3
+
+
+def test_fingers_that_have_not_moved_yet_are_not_stalled():
+    assert Approach(seconds=0.0).go(2.0, speed=0.0)[0] is None
+
+
+def test_a_law_that_pauses_is_not_stalled():
+    assert Approach().go(1.0, speed=0.0, effort=0.0)[0] is None
+
+
+# ------------------------------------------------------------------------------------------------------- the motor
+
+
+def answered(asked, answer, seconds=1.0, phase=APPROACH, gap=lambda t: 0.05, motor=None):
+    """Return the faults of a motor that is asked for one effort and answers with another."""
+    motor = motor or Motor(reports_effort=True)
+    seen = []
+    for k in range(round(seconds * 1000)):
+        t = 0.001 * k
+        fault = motor.see(frame(t, gap(t), effort=answer), phase)
+        if fault is not None:
+            seen.append((t, fault))
+        motor.apply(t, Command(EFFORT, asked, inf, inf))
+    return seen
+
+
+def test_a_motor_within_a_quarter_of_its_command_is_sound():
+    assert answered(20.0, 24.0) == answered(20.0, 16.0) == answered(-20.0, -17.0) == []
+
+
+def test_a_motor_that_gives_five_times_its_command_ends_the_grasp_at_once():
+    first = next((t, fault) for t, fault in answered(20.0, 100.0) if fault.ends)
+    assert first[1].name == "motor too strong"
+    assert first[0] < 0.1
+
+
+def test_a_motor_that_gives_half_as_much_again_warns_and_then_ends_the_grasp():
+    seen = answered(20.0, 29.0)
+    assert not seen[0][1].ends
+    assert seen[-1][1].ends
+
+
+def test_a_weak_motor_warns_first():
+    seen = answered(20.0, 5.0)
+    assert (seen[0][1].name, seen[0][1].ends, seen[-1][1].ends) == ("motor too weak", False, True)
+
+
+@pytest.mark.parametrize("asked", [20.0, -20.0])
+def test_an_effort_in_the_other_direction_only_relaxes(asked):
+    fault = answered(asked, -asked)[-1][1]
+    assert (fault.name, fault.ends, fault.relaxes) == ("motor reversed", True, True)
+
+
+def test_fingers_that_close_on_the_opening_command_are_relaxed():
+    seen = answered(-20.0, -20.0, phase=int(Phase.RELEASE), gap=lambda t: 0.05 - 0.02 * t)
+    assert seen[0][1].relaxes
+    # After 3 mm, and some hundredths of a second to be sure.
+    assert 0.05 - 0.02 * seen[0][0] > 0.0455
+
+
+def test_fingers_that_a_spring_pushes_open_in_the_squeeze_are_not_reversed():
+    assert answered(20.0, 20.0, phase=SQUEEZE, gap=lambda t: 0.05 + 0.01 * t) == []
+
+
+def test_commands_of_a_velocity_are_not_compared():
+    motor = Motor(reports_effort=True)
+    for k in range(1000):
+        assert motor.see(frame(0.001 * k, effort=50.0), APPROACH) is None
+        motor.apply(0.001 * k, Command(VELOCITY, -0.01, inf, inf))
+
+
+# ------------------------------------------------------------------------------------------------------- the status
+
+HOT = StatusBit(mask=1, name="hot", meaning="it is too hot")
+BROKEN = StatusBit(mask=4, name="encoder fault", meaning="the gap is not known", limit_s=0.01)
+
+
+def test_a_bit_without_a_limit_warns_and_one_beyond_its_limit_ends_the_grasp():
+    status = Status((HOT, BROKEN))
+    faults = [status.see(frame(0.001 * k, status=5), SQUEEZE) for k in range(20)]
+    assert [(fault.name, fault.ends) for fault in faults[0]] == [("hot", False), ("encoder fault", False)]
+    assert [(fault.name, fault.ends) for fault in faults[-1]] == [("hot", False), ("encoder fault", True)]
+
+
+def test_only_a_bit_with_a_limit_refuses_the_grasp():
+    status = Status((HOT, BROKEN))
+    assert [fault.name for fault in status.before_closing(frame(0.0, status=5))] == ["encoder fault"]
+    assert status.before_closing(frame(0.0, status=1)) == []
+
+
+def test_a_bit_that_nobody_declared_is_told():
+    assert Status((HOT,)).see(frame(0.0, status=8), SQUEEZE)[0].name == "status 0x8"
+
+
+# ------------------------------------------------------------------------------------------- frames, images and cells
+
+
+def reading(t, counter=0, left=(), right=(), dt=0.001):
+    return Reading(frame(t, dt=dt), Pads(t, counter, left, right))
+
+
+def test_a_clock_that_stands_still_ends_the_grasp_after_a_tenth_of_a_second_of_frames():
+    reports = Reports(1000.0, 0.0)
+    faults = [reports.see(reading(1.0, dt=0.0), HOLD) for _ in range(200)]
+    assert [fault is not None for fault in faults].index(True) == pytest.approx(100, abs=2)
+    assert next(fault for fault in faults if fault is not None).ends
+
+
+def test_images_that_stop_end_the_grasp():
+    reports = Reports(1000.0, 25.0)
+    faults = [reports.see(reading(0.001 * k, counter=min(1 + k // 40, 5)), SQUEEZE) for k in range(1000)]
+    first = [fault is not None for fault in faults].index(True)
+    # The fifth image came at 0.16 s, and five periods are allowed.
+    assert first == pytest.approx(160 + 200, abs=2)
+    assert faults[first].ends
+
+
+def test_lost_frames_are_told_with_their_share():
+    reports = Reports(1000.0, 0.0)
+    faults = [reports.see(reading(0.002 * k, dt=0.002), APPROACH) for k in range(400)]
+    assert "50 %" in faults[-1].words
+    assert not faults[-1].ends
+
+
+def images(n, frozen=(), noise=15.0, seed=0):
+    """Return images of 22 noisy cells a side; `frozen` cells of the left side keep their first value."""
+    rng = np.random.default_rng(seed)
+    left = np.round(3000.0 + noise * rng.standard_normal((n, 22)))
+    right = np.round(3000.0 + noise * rng.standard_normal((n, 22)))
+    left[:, list(frozen)] = left[0, list(frozen)]
+    return [Pads(0.04 * k, k + 1, tuple(left[k]), tuple(right[k])) for k in range(n)]
+
+
+def seen(pads):
+    tips = Fingertips()
+    return [tips.see(image, True) for image in pads][-1]
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.4, 2.0, 15.0])
+@pytest.mark.parametrize("seed", range(5))
+def test_sound_cells_are_never_frozen(noise, seed):
+    assert seen(images(100, noise=noise, seed=seed)) == []
+
+
+def test_a_frozen_cell_is_named_and_does_not_end_the_grasp():
+    (fault,) = seen(images(60, frozen=(15,)))
+    assert "(15)" in fault.words
+    assert not fault.ends
+
+
+def test_a_fingertip_whose_cells_all_stand_still_ends_the_grasp():
+    (fault,) = seen(images(60, frozen=range(22)))
+    assert fault.name == "left fingertip stuck"
+    assert fault.ends
+
+
+def test_a_fingertip_that_goes_blank_ends_the_grasp_with_the_second_image():
+    tips = Fingertips()
+    for image in images(10):
+        assert tips.see(image, True) == []
+    blank = images(12)[10:]
+    assert tips.see(blank[0]._replace(right=(0.0,) * 22), True) == []
+    (fault,) = tips.see(blank[1]._replace(right=(0.0,) * 22), True)
+    assert fault.name == "right fingertip without signal"
+
+
+def test_a_force_that_stands_still_while_the_other_one_rises_is_stuck():
+    stuck = StuckForce()
+    faults = [stuck.see(frame(0.001 * k, left=2.0, right=2.0 + 0.01 * (k // 40))) for k in range(200)]
+    assert faults == [None] * 200
+    faults = [stuck.see(frame(0.2 + 0.001 * k, left=2.0, right=2.0 + 0.01 * k)) for k in range(400)]
+    assert next(fault for fault in faults if fault is not None).name == "left pad stuck"
+
+
+# ------------------------------------------------------------------------------------------------------------ drift
+
+
+def drifted(force, cells=None, seconds=2.0, speed=0.01, seed=1):
+    """Return the first fault of a pad whose force (N) is `force(t)`, with the usual noise, at 10 mm/s."""
+    rng, pad = np.random.default_rng(seed), PadDrift("left", CONTACT_N)
+    t = 0.0
+    while t < seconds:
+        image = () if cells is None else tuple(cells(t) + 15.0 * rng.standard_normal(22))
+        fault = pad.see(force(t) + 0.03 * rng.standard_normal(), 0.09 - speed * t, image)
+        if fault is not None and fault.ends:
+            return fault
+        t += 0.04
+    return None
+
+
+def all_cells(t):
+    return np.full(22, 3000.0 + 50.0 * t)
+
+
+def facing_cells(t):
+    return 3000.0 + 50.0 * t * (np.arange(22) >= 7)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_slow_change_of_all_cells_is_drift(sign):
+    fault = drifted(lambda t: sign * 0.47 * t, lambda t: 6000.0 - all_cells(t) if sign < 0 else all_cells(t))
+    assert fault.name == "left pad drifts"
+
+
+def test_a_soft_object_on_the_facing_cells_is_no_drift():
+    assert drifted(lambda t: 0.47 * t, facing_cells, seconds=1.3) is None
+
+
+def test_a_contact_within_a_millimetre_is_no_drift():
+    assert drifted(lambda t: max(0.0, 6.0 * (t - 1.0)), None, seconds=1.1) is None
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_noise_is_no_drift(seed):
+    assert drifted(lambda t: 0.0, all_cells if seed % 2 else None, seed=seed) is None
