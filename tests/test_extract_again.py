@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 import pytest
 from kept import frame, keep
@@ -94,7 +95,14 @@ def test_what_cannot_be_changed_is_told(folder, option, says):
 def test_a_lost_recording_is_told(folder):
     with Store.read(folder) as store:
         store.recording_path(store.summary(3).recording).unlink()
-    with pytest.raises(DataDamaged, match=r"the recording of trial 3 .* is lost"):
+    found = labelled_store(folder, ["features.force=left"])
+    assert len(found) == 5
+    (told,) = (note for note in found.notes if "cannot be read" in note)
+    assert re.search(r"1 of 6 .* the recording of trial 3 .* is lost", told)
+    with Store.read(folder) as store:
+        for path in store.recordings.iterdir():
+            path.unlink()
+    with pytest.raises(DataDamaged, match="none of 6 recordings"):
         labelled_store(folder, ["features.force=left"])
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 
 import numpy as np
 import pytest
@@ -91,7 +92,12 @@ def test_a_folder_without_grasps_and_a_damaged_file(folder, tmp_path):
     with pytest.raises(ConfigError, match="contains no file of the iCub Grasp Dataset"):
         read(tmp_path / "empty")
     (folder / "can_2.txt").write_text((folder / "can_2.txt").read_text()[:-40])
-    with pytest.raises(DataDamaged, match=r"can_2\.txt, line"):
+    found = read(folder)
+    assert len(found) == 5
+    assert any(re.search(r"1 of 6 recordings cannot be read.*can_2\.txt, line", note) for note in found.notes)
+    for path in folder.glob("*.txt"):
+        path.write_text("nothing\n")
+    with pytest.raises(DataDamaged, match=r"none of 6 .*_1\.txt, line"):
         read(folder)
 
 

@@ -14,7 +14,7 @@ __version__: Final = "0.1.0"
 PUBLIC: Final = LazyNames(
     __name__,
     {
-        "Running a grasp": {"pipeline": ("load_pipeline",), "trial": ("Trial",)},
+        "Running a grasp": {"pipeline": ("GraspInterrupted", "load_pipeline"), "trial": ("Trial",)},
         "What a grasp returns": {
             "signals": ("Outcome", "Phase"),
             "trace": ("Trace",),

@@ -3,6 +3,7 @@
 __version__: str
 
 # Running a grasp
+from graspsense.core.pipeline import GraspInterrupted as GraspInterrupted
 from graspsense.core.pipeline import load_pipeline as load_pipeline
 from graspsense.core.trial import Trial as Trial
 

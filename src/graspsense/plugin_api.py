@@ -33,6 +33,7 @@ _TABLE: Final[Table] = {
             "TactileArray",
         ),
         "setting": ("CHANGES_NO_RESULT", "NAMES_INPUT", "setting"),
+        "toml_text": ("TomlError", "toml_values"),
         "figure_origins": ("fitted_results", "given_claims", "gives"),
     },
     "Signals: what passes between a gripper and a controller": {
@@ -150,6 +151,7 @@ _TABLE: Final[Table] = {
         "features": ("UNKNOWN", "FeatureTable", "Prediction", "table_of"),
         "reasons": ("Contribution", "FeatureValue", "Reason", "contribution_reasons", "missing_feature"),
         "roles": ("Classifier", "ClassifierConfig"),
+        "stored_values": ("LARGEST_SEED", "StoredValueError", "StoredValues"),
         "tree": ("TreeNode",),
     },
     "Data sets": {
@@ -201,6 +203,8 @@ _TABLE: Final[Table] = {
         "config": ("create", "recipe_of"),
         "plugins": ("collect",),
         "user_folders": ("cache_folder",),
+        "whole_file": ("write_whole",),
+        "closed_paths": ("is_closed", "make_closed"),
     },
     "Errors": {
         "errors": (

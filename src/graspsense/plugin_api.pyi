@@ -21,6 +21,8 @@ from graspsense.core.entries import TactileArray as TactileArray
 from graspsense.core.setting import CHANGES_NO_RESULT as CHANGES_NO_RESULT
 from graspsense.core.setting import NAMES_INPUT as NAMES_INPUT
 from graspsense.core.setting import setting as setting
+from graspsense.core.toml_text import TomlError as TomlError
+from graspsense.core.toml_text import toml_values as toml_values
 from graspsense.core.figure_origins import fitted_results as fitted_results
 from graspsense.core.figure_origins import given_claims as given_claims
 from graspsense.core.figure_origins import gives as gives
@@ -158,6 +160,9 @@ from graspsense.core.reasons import contribution_reasons as contribution_reasons
 from graspsense.core.reasons import missing_feature as missing_feature
 from graspsense.core.roles import Classifier as Classifier
 from graspsense.core.roles import ClassifierConfig as ClassifierConfig
+from graspsense.core.stored_values import LARGEST_SEED as LARGEST_SEED
+from graspsense.core.stored_values import StoredValueError as StoredValueError
+from graspsense.core.stored_values import StoredValues as StoredValues
 from graspsense.core.tree import TreeNode as TreeNode
 
 # Data sets
@@ -224,6 +229,9 @@ from graspsense.core.config import create as create
 from graspsense.core.config import recipe_of as recipe_of
 from graspsense.core.plugins import collect as collect
 from graspsense.core.user_folders import cache_folder as cache_folder
+from graspsense.core.whole_file import write_whole as write_whole
+from graspsense.core.closed_paths import is_closed as is_closed
+from graspsense.core.closed_paths import make_closed as make_closed
 
 # Errors
 from graspsense.core.errors import ConfigError as ConfigError

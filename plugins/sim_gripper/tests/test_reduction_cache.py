@@ -1,5 +1,6 @@
 """A verified model is found again by its content, in memory and on disk, and by the same code alone."""
 
+import json
 import os
 import pwd
 
@@ -108,6 +109,44 @@ def test_a_damaged_one_is_made_anew(trials, folder, damage):
     assert select() == made
     assert select() == made
     assert len(trials) == 2
+
+
+@pytest.mark.slow
+def test_one_that_was_edited_is_made_anew(trials, folder):
+    made = select()
+    (kept,) = folder.iterdir()
+    content = json.loads(kept.read_text())
+    assert content["model"]["treatment"]
+    content["model"]["treatment"] = [*content["model"]["treatment"][::-1], "dropped"]
+    kept.write_text(json.dumps(content))
+    assert select() == made
+    assert len(trials) == 2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("change", ["file", "folder", "above", "owner"])
+def test_one_that_another_user_could_have_written_is_not_used(trials, folder, change, monkeypatch):
+    made = select()
+    (kept,) = folder.iterdir()
+    if change != "owner":
+        {"file": kept, "folder": folder, "above": folder.parent}[change].chmod(0o777)
+    elif os.geteuid() == 0:
+        os.chown(kept, 4711, 4711)
+    else:  # the same by the eyes of another user
+        monkeypatch.setattr(os, "geteuid", lambda: 4711)
+    with pytest.warns(UserWarning, match="choices of models .* not used"):
+        assert select() == made
+    assert len(trials) == 2
+
+
+@pytest.mark.slow
+def test_with_any_mask_of_the_user_what_is_kept_is_used(trials):
+    mask = os.umask(0)
+    try:
+        assert select() == select()
+    finally:
+        os.umask(mask)
+    assert len(trials) == 1
 
 
 def test_a_folder_that_cannot_be_made_costs_nothing_but_time(trials, folder):

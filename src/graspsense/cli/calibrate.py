@@ -136,9 +136,10 @@ def _set_up(asked: Mapping[str, Any], replace: bool) -> Iterator[_Setup]:
     try:
         info = backend.open(settings.run.seed)
         # A calibration that cannot be kept is not begun.
-        calibration_path(folder, info.serial, UNCALIBRATED)
+        place = calibration_path(folder, info.serial, UNCALIBRATED).parent
         rig = Rig(backend, info, settings.run)
-        stored = {} if replace else calibrations_of(folder, info.serial, info.numbers)
+        compares = place.is_dir() and not replace
+        stored = calibrations_of(folder, info.serial, info.numbers) if compares else {}
         yield _Setup(backend, info, rig, folder, stored, settings.run.first_effort_n)
     finally:
         backend.close()
@@ -189,28 +190,30 @@ def _counts_per_n(setup: _Setup) -> float:
 
 
 def _tables(path: str, counts_per_n: float) -> dict[str, Any]:
-    import csv
+    from math import isnan
+    from pathlib import Path
 
     from graspsense.core.calibration import load_table
     from graspsense.core.errors import DataDamaged
+    from graspsense.sources.csv_columns import CsvColumns
 
+    columns = CsvColumns(Path(path))
+    missing = {"side", "pad_counts", "load_n"} - set(columns.names)
+    if missing:
+        raise DataDamaged(f"{path} lacks the columns {', '.join(sorted(missing))}")
     readings: dict[str, list[tuple[float, float]]] = {"left": [], "right": []}
-    with open(path, newline="", encoding="utf-8-sig") as file:
-        rows = csv.DictReader(file)
-        missing = {"side", "pad_counts", "load_n"} - set(rows.fieldnames or ())
-        if missing:
-            raise DataDamaged(f"{path} lacks the columns {', '.join(sorted(missing))}")
-        for row in rows:
-            try:
-                side, pad_n, load_n = (
-                    row["side"],
-                    float(row["pad_counts"]) / counts_per_n,
-                    float(row["load_n"]),
-                )
-                readings[side].append((pad_n, load_n))
-            except (KeyError, TypeError, ValueError):
-                raise DataDamaged(
-                    f"{path}:{rows.line_num}: expected side left or right and two numbers, found {row}"
-                ) from None
+    rows = zip(
+        columns.lines,
+        columns.cells["side"],
+        columns.numbers("pad_counts"),
+        columns.numbers("load_n"),
+        strict=True,
+    )
+    for line, side, pad_counts, load_n in rows:
+        if side not in readings:
+            raise DataDamaged(f"{path}:{line}: side is {side[:40]!r}, expected left or right")
+        if isnan(pad_counts) or isnan(load_n):
+            raise DataDamaged(f"{path}:{line}: expected two numbers, pad_counts and load_n")
+        readings[side].append((pad_counts / counts_per_n, load_n))
     tables = {side: load_table(pairs) for side, pairs in readings.items()}
     return {side: {"pad_n": list(one.pad_n), "load_n": list(one.load_n)} for side, one in tables.items()}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 import sys
 from typing import TYPE_CHECKING
 
@@ -20,7 +19,6 @@ from graspsense.cli.terminal import Style, echo_entry, talk
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from types import FrameType
 
     from graspsense.core.config import Settings
     from graspsense.core.trial import Trial
@@ -70,8 +68,9 @@ def collect(
     Keys: Enter grasps the object, u undoes the last trial, r repeats the last trial, s skips this object, q stops,
     ? shows the keys.
 
-    Objects are grasped in rounds, so that no class is recorded as one batch. The command can be stopped or killed, and
-    continues where it was. With a simulated gripper, the label selects the object. Answers can come from a file.
+    Objects are grasped in rounds, so that no class is recorded as one batch. The command continues where it was stopped
+    or killed. Ctrl-C opens the gripper, stores a running grasp as aborted, and stops. With a simulated gripper, the
+    label selects the object. Answers can come from a file.
     """
     from graspsense.core.plugins import installed
     from graspsense.core.target_value import value_label
@@ -107,8 +106,17 @@ def collect(
             show=_show,
             changed=changed,
         )
-        _run_until_stopped(collection)
+        _run(collection, save, as_json)
+
+
+def _run(collection: Collection, save: str, as_json: bool) -> None:
+    """Run the collection and print what there is of each label, also if the operator interrupts it."""
+    try:
+        collection.run()
+    except KeyboardInterrupt:
         _print_counts(save, collection, as_json)
+        raise
+    _print_counts(save, collection, as_json)
 
 
 def _show(word: str, trial: Trial) -> None:
@@ -143,7 +151,7 @@ def _print_counts(save: str, collection: Collection, as_json: bool) -> None:
         echo_json(
             {
                 "store": save,
-                "trials": collection.numbers,
+                "trials": list(collection.collected),
                 "counts": counts,
                 "each": each,
                 "complete": done,
@@ -210,21 +218,6 @@ def _recover(store: Store) -> None:
     for one in recover_store(store):
         number = f" as trial {one.trial}" if one.trial is not None else ""
         talk(f"{one.file.name}: {one.what}{number}{f' ({one.why})' if one.why else ''}")
-
-
-def _run_until_stopped(collection: Collection) -> None:
-    """Run the collection; SIGTERM ends it as Ctrl-C does."""
-
-    def stop(signum: int, frame: FrameType | None) -> None:
-        del signum, frame
-        collection.stopping = True
-        raise KeyboardInterrupt
-
-    previous = signal.signal(signal.SIGTERM, stop)
-    try:
-        collection.run()
-    finally:
-        signal.signal(signal.SIGTERM, previous)
 
 
 def _ask(question: str) -> str | None:

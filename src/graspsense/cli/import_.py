@@ -181,8 +181,11 @@ def _import(
 ) -> None:
     """Import the recordings and print what became of each; those that cannot be replayed join `unreadable`."""
     from graspsense.core.errors import ConfigError
+    from graspsense.recording.readable import error_of_all
 
     stored = _store(save, recordings, unreadable, chosen)
+    if not stored.kept and not stored.refused:
+        raise error_of_all(unreadable)
     if not stored.kept and not unreadable:
         raise ConfigError(stored.refused[0])
     if not stored.kept:
@@ -220,11 +223,13 @@ def _import(
 def _store(
     save: str, recordings: Sequence[ImportedRecording], unreadable: list[UnreadableRecording], chosen: _Chosen
 ) -> _Stored:
-    """Store the recordings that the store does not have. Raises ConfigError, SaveFailed."""
+    """Store the recordings that the store does not have. Raises SaveFailed."""
     from graspsense.cli.progress import ProgressLine
-    from graspsense.core.errors import DataDamaged
+    from graspsense.core.errors import GraspsenseError
     from graspsense.core.plugins import installed
+    from graspsense.recording.atomic_file import SaveFailed
     from graspsense.recording.labelled_recording import UnreadableRecording
+    from graspsense.recording.readable import readable
     from graspsense.sources.dataset_recordings import handed_over
     from graspsense.sources.importing import import_recording
     from graspsense.store.imported_contents import AlreadyImported, ImportedContents
@@ -237,12 +242,15 @@ def _store(
             source = one.labelled.source
             with handed_over(one.name, one.labelled.recording):
                 try:
-                    settings = chosen.settings(one)
-                    trial, number = import_recording(store, settings, installed(), one.labelled, contents)
+                    with readable(source):
+                        settings = chosen.settings(one)
+                        trial, number = import_recording(store, settings, installed(), one.labelled, contents)
                 except AlreadyImported as error:
                     stored.refused.append(str(error))
                     continue
-                except DataDamaged as error:
+                except SaveFailed:
+                    raise
+                except GraspsenseError as error:
                     unreadable.append(UnreadableRecording(source=source, error=error))
                     continue
             stored.kept.append({"source": source, "trial": number, "outcome": trial.outcome.words})

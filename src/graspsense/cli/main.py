@@ -18,6 +18,7 @@ import click
 from graspsense import __version__
 from graspsense.cli.terminal import Style, echo, has_colour
 from graspsense.core.errors import GraspsenseError, PluginUnavailable, UnknownName, suggestion
+from graspsense.core.interrupts import ended_like_ctrl_c
 
 PROGRAM: Final = "graspsense"
 COMPLETION_VARIABLE: Final = "_GRASPSENSE_COMPLETE"
@@ -129,7 +130,9 @@ def cli(ctx: click.Context) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run the command line and exit with its code; no argument means the process's own."""
-    sys.exit(_exit_code(list(sys.argv[1:] if arguments is None else arguments)))
+    with ended_like_ctrl_c():
+        code = _exit_code(list(sys.argv[1:] if arguments is None else arguments))
+    sys.exit(code)
 
 
 def _exit_code(arguments: list[str]) -> int:
@@ -163,8 +166,23 @@ def _exit_code(arguments: list[str]) -> int:
     except BrokenPipeError:
         _give_up_stdout()  # the reader of the pipe has gone
         return EXIT_BROKEN_PIPE
+    except SystemExit as error:
+        if next((one for one in arguments if not one.startswith("-")), "") not in COMMANDS:
+            raise  # the command of a plugin may choose its exit code
+        return _report(_plugin_exit(error), as_json="--json" in arguments)
     except Exception as error:
         return _report(error, as_json="--json" in arguments)
+
+
+def _plugin_exit(error: SystemExit) -> PluginUnavailable:
+    """Return the error for a plugin that tried to end the program in the middle of one of our commands."""
+    *_, last = traceback.extract_tb(error.__traceback__)
+    unusable = PluginUnavailable(
+        f"a plugin tried to end the program: SystemExit: {error.code} in {last.name}, {last.filename}:{last.lineno}. "
+        "Correct the plugin, or choose another component"
+    )
+    unusable.__cause__ = error
+    return unusable
 
 
 def _report(error: Exception, as_json: bool) -> int:

@@ -29,6 +29,8 @@ def file_to_write(ctx: click.Context, param: click.Parameter, value: str | None)
     """Callback of an option that names a file: refuse a file that cannot be written, before the work and not after."""
     if value is not None and Path(value).is_dir():
         raise click.BadParameter(f"{value} is a folder: name a file in it", ctx, param)
+    if value is not None and Path(value).exists() and not Path(value).is_file():
+        raise click.BadParameter(f"{value} is a device or a pipe: name a file", ctx, param)
     if value is not None and not Path(value).parent.is_dir():
         raise click.BadParameter(
             f"{value} cannot be written: there is no folder {Path(value).parent}", ctx, param

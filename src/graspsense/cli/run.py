@@ -74,9 +74,6 @@ def run(
     Without options, a simulated gripper squeezes a full, closed bottle. Exit codes: 0 the grasp ended by itself,
     whatever its outcome; 2 wrong settings; 3 device not found; 4 grasp aborted or device lost.
     """
-    from graspsense.core.pipeline import grasp_with
-    from graspsense.core.plugins import installed
-    from graspsense.core.signals import Outcome
     from graspsense.core.trial import trial_as_json
     from graspsense.core.wiring import check
 
@@ -96,11 +93,12 @@ def run(
     sinks = () if as_json else (LiveRows(),)
     kept: dict[str, Any] | None = None
     if save is None:
-        trial = grasp_with(settings, installed(), sinks=sinks)
+        trial, interrupted = _grasped(settings, sinks)
     else:
-        trial, kept = _kept(save, label, settings, sinks, changed)
+        trial, interrupted, kept = _kept(save, label, settings, sinks, changed)
 
-    condition = _condition(settings) if explain_model and "model" in trial.report else None
+    asked = explain_model and "model" in trial.report and not interrupted
+    condition = _condition(settings) if asked else None
     if as_json:
         further = {} if condition is None else {"condition": condition.as_values()}
         echo_json({**trial_as_json(trial), **({} if kept is None else {"kept": kept}), **further})
@@ -109,11 +107,31 @@ def run(
         _print_model(trial, condition)
     if plot is not None:
         draw_grasp(trial, Path(plot))
-    if kept is not None and kept["problem"]:
-        talk(f"graspsense: {kept['problem']}")
+    _exit(trial, interrupted, "" if kept is None else kept["problem"])
+
+
+def _grasped(settings: Settings, sinks: Sequence[Sink]) -> tuple[Trial, bool]:
+    """Grasp, and return the trial and whether it was interrupted."""
+    from graspsense.core.pipeline import GraspInterrupted, grasp_with
+    from graspsense.core.plugins import installed
+
+    try:
+        return grasp_with(settings, installed(), sinks=sinks), False
+    except GraspInterrupted as error:
+        return error.trial, True
+
+
+def _exit(trial: Trial, interrupted: bool, problem: str) -> None:
+    """End the command with an exit code if the trial was not stored, did not end by itself, or was interrupted."""
+    from graspsense.core.signals import Outcome
+
+    if problem:
+        talk(f"graspsense: {problem}")
         raise click.exceptions.Exit(EXIT_NOT_KEPT)
     if trial.outcome in (Outcome.ABORTED, Outcome.DEVICE_LOST):
         raise click.exceptions.Exit(EXIT_ABORTED)
+    if interrupted:  # during the release, when the grasp had its outcome
+        raise KeyboardInterrupt
 
 
 def _condition(settings: Settings) -> Conditions | None:
@@ -173,8 +191,8 @@ def draw_grasp(trial: Trial, path: Path) -> None:
 
 def _kept(
     save: str, label: str | None, settings: Settings, sinks: Sequence[Sink], changed: bool
-) -> tuple[Trial, dict[str, Any]]:
-    """Grasp and store the trial; return it, and what to print about the stored trial.
+) -> tuple[Trial, bool, dict[str, Any]]:
+    """Grasp and store the trial; return it, whether it was interrupted, and what to print about the stored trial.
 
     Unless `changed`, settings and gripper must be those of the newest grasp in the store. Raises ConfigError.
     """
@@ -201,12 +219,13 @@ def _kept(
         talk(f"kept as trial {grasp.number} in {save}")
         if grasp.counts["dropped"]:
             warn(f"the recorder could not follow: {grasp.counts['dropped']} messages are missing")
-    return grasp.trial, {
+    kept = {
         "store": save,
         "trial": grasp.number,
         "recorder": dict(grasp.counts),
         "problem": grasp.problem,
     }
+    return grasp.trial, grasp.interrupted, kept
 
 
 def print_trial(trial: Trial) -> None:

@@ -206,8 +206,10 @@ def _drawn(path: Path, found: SimulationTrade, sensed: SensedTrade | None) -> li
 
 def write_text(path: str, text: str) -> None:
     """Write a page and say where it is. Raises ClickException if that is not possible."""
+    from graspsense.core.whole_file import write_whole
+
     try:
-        Path(path).write_text(text, encoding="utf-8")
+        write_whole(Path(path), text.encode())
     except OSError as error:
         raise click.ClickException(f"{path} cannot be written: {error.strerror}") from error
     talk(f"written to {path}")

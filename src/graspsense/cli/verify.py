@@ -10,13 +10,17 @@ from graspsense.cli.output import echo_json
 from graspsense.cli.terminal import Style, echo, echo_entry
 
 EXIT_DAMAGED = 5
+EXIT_UNREAD = 2
 
 
 @click.command(short_help="Check a store or a recording for damage.")
 @click.argument("source", metavar="DIR|FILE")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def verify(source: str, as_json: bool) -> None:
-    """Check the store DIR with all its recordings, or one recording FILE. Exit code 5 means damage."""
+    """Check the store DIR with all its recordings, or one recording FILE.
+
+    Exit code 5 means damage, and 2 that the disk could not be read.
+    """
     from graspsense.cli.progress import ProgressLine
     from graspsense.store.verify import verify_file, verify_store
 
@@ -30,11 +34,20 @@ def verify(source: str, as_json: bool) -> None:
     else:
         for problem in found.problems:
             echo_entry("damaged", str(problem), Style.BAD)
+        for one in found.unread:
+            echo_entry("not read", str(one), Style.CAUTION)
         for one in found.unfinished:
             echo_entry("unfinished", str(one), Style.CAUTION)
         counts = f"{found.trials} trials, {found.recordings} recordings, {len(found.problems)} damaged"
-        echo(counts, Style.BAD if found.problems else Style.GOOD)
+        counts += f", {len(found.unread)} not read" if found.unread else ""
+        echo(counts, Style.BAD if found.problems else Style.CAUTION if found.unread else Style.GOOD)
+        if found.unread:
+            echo(
+                "the disk could not be read: nothing is known of this data, which may be whole. Check the disk"
+            )
         if found.unfinished:
             echo("graspsense recover saves what is unfinished")
     if found.problems:
         raise click.exceptions.Exit(EXIT_DAMAGED)
+    if found.unread:
+        raise click.exceptions.Exit(EXIT_UNREAD)

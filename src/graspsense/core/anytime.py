@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Final, Protocol
 from attrs import frozen
 
 from graspsense.core.checkpoints import until_checkpoint
-from graspsense.core.errors import ConfigError, named
+from graspsense.core.errors import FAILURES, ConfigError, named
 from graspsense.core.features import UNKNOWN, percent
 from graspsense.core.signals import HOLD, SQUEEZE
 from graspsense.core.trace import trace_of
@@ -171,7 +171,7 @@ class Anytime:
         """Report a prediction; return the reason to stop if it is sure. A failure must not end the grasp."""
         try:
             features, prediction = result()
-        except Exception as error:
+        except FAILURES as error:
             self._tell(t_s, phase, f"{after_s:g} s after the contact: the prediction failed: {named(error)}")
             return ""
         made = CheckpointPrediction(after_s=after_s, t_s=t_s, features=features, prediction=prediction)

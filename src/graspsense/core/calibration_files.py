@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import re
 from collections.abc import Mapping
 from datetime import datetime
@@ -20,8 +19,10 @@ from typing import Any, Final
 from attrs import frozen
 
 from graspsense.core.calibration import Cells, LoadTable
+from graspsense.core.closed_paths import make_closed, why_open
 from graspsense.core.errors import ConfigError, DataDamaged
 from graspsense.core.user_folders import NOWHERE, data_folder
+from graspsense.core.whole_file import write_whole
 
 FORMAT: Final = "graspsense-calibration"
 VERSION: Final = 1
@@ -63,7 +64,7 @@ def calibration_path(folder: str | Path, serial: str, kind: str) -> Path:
 
 def _folder(given: str | Path) -> Path | None:
     if given:
-        return Path(given)
+        return Path(given).expanduser()
     data = data_folder()
     return None if data is None else data / "calibration"
 
@@ -80,27 +81,27 @@ def write_calibration(path: Path, calibration: Calibration) -> Calibration:
         "data": dict(calibration.data),
     }
     sha256 = _hash(content)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(path.name + ".part")
-    with part.open("w", encoding="utf-8") as file:
-        json.dump({**content, "sha256": sha256}, file, indent=1)
-        file.flush()
-        os.fsync(file.fileno())
-    part.replace(path)
+    make_closed(path.parent)
+    write_whole(path, json.dumps({**content, "sha256": sha256}, indent=1).encode(), mode=0o644)
     return read_calibration(path)
 
 
 def read_calibration(path: Path) -> Calibration:
     """Return the calibration in this file.
 
-    Raises DataDamaged if it is not a calibration of graspsense, was changed since it was written, or has invalid
-    numbers; FileNotFoundError if it is missing.
+    Raises ConfigError if the machine cannot read it, DataDamaged if it is not a calibration of graspsense, was changed
+    since it was written, or has invalid numbers; FileNotFoundError if it is missing.
     """
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise
-    except (OSError, ValueError) as error:
+    except OSError as error:
+        raise ConfigError(
+            f"calibration {path} cannot be read: {error.strerror}. Its content may be whole: check the disk and the "
+            "permissions of the file"
+        ) from error
+    except (ValueError, RecursionError) as error:
         raise DataDamaged(f"{path} cannot be read as a calibration: {error}") from error
     if not isinstance(content, dict) or content.get("format") != FORMAT:
         raise DataDamaged(f"{path} is not a calibration of graspsense: its format is not {FORMAT!r}")
@@ -131,16 +132,25 @@ def read_calibration(path: Path) -> Calibration:
 
 
 def calibrations_of(folder: str | Path, serial: str, device: Mapping[str, Any]) -> dict[str, Calibration]:
-    """Return the calibrations of this device by kind; empty if `folder` is `none` or the folder does not exist.
+    """Return the calibrations of this device by kind; empty if `folder` is `none`.
 
-    Raises ConfigError if a file was made on another device, or on this one with other numbers, and names the two
-    choices; raises DataDamaged.
+    Raises ConfigError if `folder` names a folder that does not exist, if another user could have changed a file, or if
+    a file was made on another device, or on this one with other numbers; it names the choices. Raises DataDamaged.
     """
-    if folder == UNCALIBRATED or _folder(folder) is None:
+    place = None if folder == UNCALIBRATED else _folder(folder)
+    if place is None:
         return {}
+    if folder and not place.is_dir():
+        raise ConfigError(
+            f"gripper.calibration is {str(folder)!r}, and there is no such folder. There are three choices:\n"
+            "  correct its name\n"
+            "  calibrate this device into it:  graspsense calibrate tare\n"
+            "  run without:                    -o gripper.calibration=none"
+        )
     found: dict[str, Calibration] = {}
     for kind in KINDS:
         path = calibration_path(folder, serial, kind)
+        _refuse_open(path)
         try:
             calibration = read_calibration(path)
         except FileNotFoundError:
@@ -162,6 +172,18 @@ def calibrations_of(folder: str | Path, serial: str, device: Mapping[str, Any]) 
             )
         found[kind] = calibration
     return found
+
+
+def _refuse_open(path: Path) -> None:
+    """Raise ConfigError if another user could have changed this calibration, and with it what the gripper measures."""
+    reason = why_open(path) if path.exists() else ""
+    if reason:
+        raise ConfigError(
+            f"the calibration {path} is not used, because another user could have changed it: {reason}. "
+            "There are two choices:\n"
+            "  use a copy:             copy it to a folder of yours, named by -o gripper.calibration=FOLDER\n"
+            "  run without:            -o gripper.calibration=none"
+        )
 
 
 def stored_zero(calibration: Calibration) -> tuple[Cells, Cells]:

@@ -11,6 +11,7 @@ from typing import Any, Final
 from attrs import asdict
 
 from graspsense.core.entries import Channel, FastChannel, TactileArray
+from graspsense.core.limits import CHANNEL_NUMBERS
 from graspsense.core.signals import CHANNELS, Image, Samples
 
 KINDS: Final[Mapping[str, type[Channel]]] = {
@@ -78,7 +79,15 @@ def from_json(value: Mapping[str, Any]) -> Channel:
     for name, listed in given.items():
         if isinstance(listed, list):
             given[name] = tuple(_place(one) if isinstance(one, list) else one for one in listed)
-    return cls(**given)
+    channel: Channel = cls(**given)
+    numbers = 1
+    if isinstance(channel, TactileArray):
+        numbers = channel.cells
+    elif isinstance(channel, FastChannel):
+        numbers = channel.samples * len(channel.axes)
+    if too_many := CHANNEL_NUMBERS.exceeded(numbers):
+        raise ValueError(f"{channel.name} has {too_many}")
+    return channel
 
 
 def _place(numbers: Iterable[float | None]) -> tuple[float, ...]:

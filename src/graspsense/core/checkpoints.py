@@ -17,6 +17,7 @@ from attrs import evolve, frozen
 from graspsense.core.errors import ConfigError
 from graspsense.core.features import Features, FeatureTable, missing
 from graspsense.core.labelled import ControlFeatures, Labelled
+from graspsense.core.limits import CHECKPOINTS
 from graspsense.core.roles import FeatureSet
 from graspsense.core.signals import HOLD, SQUEEZE
 
@@ -78,7 +79,14 @@ def checkpoints_of(text: str | None) -> tuple[float, ...]:
         ) from None
     if not all(isfinite(t) and t > 0.0 for t in times) or list(times) != sorted(set(times)):
         raise ConfigError(f"checkpoints {text!r}: write increasing times above 0 s, as in 0.1,0.2,0.4")
-    return times
+    return checked_checkpoints(times)
+
+
+def checked_checkpoints(times: Sequence[float]) -> tuple[float, ...]:
+    """Return the checkpoints (s). Raises ConfigError for too many of them."""
+    if too_many := CHECKPOINTS.exceeded(len(times)):
+        raise ConfigError(too_many)
+    return tuple(times)
 
 
 class CheckpointFeatures(FeatureSet[Any]):
@@ -124,7 +132,9 @@ class CheckpointFeatures(FeatureSet[Any]):
 
 def with_checkpoints(feature_set: FeatureSet[Any], checkpoints_s: Sequence[float]) -> FeatureSet[Any]:
     """Return a feature set that extracts the features at these checkpoints as well, if there are any."""
-    return CheckpointFeatures(feature_set, checkpoints_s) if checkpoints_s else feature_set
+    return (
+        CheckpointFeatures(feature_set, checked_checkpoints(checkpoints_s)) if checkpoints_s else feature_set
+    )
 
 
 def _at(name: str, after_s: float | None) -> str:

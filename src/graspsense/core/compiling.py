@@ -17,7 +17,6 @@ by name for this.
 from __future__ import annotations
 
 import hashlib
-import os
 import re
 import types
 from collections import Counter
@@ -41,7 +40,7 @@ from graspsense.core.call_graph import (
     plain_function,
     times_read,
 )
-from graspsense.core.compiled_code_folder import compiled_code_folder
+from graspsense.core.compiled_code_folder import folder_of_source
 from graspsense.core.garbage_collection import no_collection
 
 MAX_COMPILED: Final = 4096
@@ -98,8 +97,8 @@ def compile_function(
     """Return `function` compiled with all the Python functions that it calls.
 
     The machine code is made at the first call with arguments of each type, or loaded from disk; see `first_call`. It is
-    kept in the user's cache folder, or in NUMBA_CACHE_DIR where that is set. The compiled function runs without the
-    interpreter's lock, unless the options say otherwise.
+    kept in the user's cache folder, or in NUMBA_CACHE_DIR where that is set; a folder that another user can write to is
+    not used. The compiled function runs without the interpreter's lock, unless the options say otherwise.
 
     Raises NotCompilable for closures, for recursion (which numba's cache cannot hold), for anything that is not a
     function written in Python, and where numba cannot be imported.
@@ -121,17 +120,14 @@ def is_on_disk(function: Callable[..., Any], options: CompileOptions | None = No
     `compile_function` does for the function.
     """
     plain = plain_function(function)
-    folder = os.environ.get("NUMBA_CACHE_DIR") or compiled_code_folder()
-    if folder is None:
+    kept = folder_of_source(plain.__code__.co_filename)
+    if kept is None:
         return False
     try:
         digest = _Compilation(None, options or CompileOptions()).digest(plain)
     except PackageNotFoundError:
         return False
-    # numba has a folder for each folder of sources, and names the index of a function after its qualified name, which
-    # ends with the digest.
-    sources = os.path.dirname(os.path.abspath(plain.__code__.co_filename))
-    kept = Path(folder) / f"{Path(sources).name}_{hashlib.sha1(sources.encode()).hexdigest()}"
+    # numba names the index of a function after its qualified name, which ends with the digest.
     return any(kept.glob(f"*_{digest}-*.nbi"))
 
 
@@ -298,19 +294,24 @@ def _versions() -> tuple[str, ...]:
 def _cache_folder(numba: types.ModuleType, function: types.FunctionType) -> Iterator[bool]:
     """Let functions that are declared inside this context be kept in the user's folder; yield whether they can be."""
     config: Any = numba.config
-    if not Path(function.__code__.co_filename).is_file():
-        yield False
-        return
-    if config.CACHE_DIR:
-        yield True
-        return
-    folder = compiled_code_folder()
+    source = function.__code__.co_filename
+    folder = folder_of_source(source, _set_by_program(config)) if Path(source).is_file() else None
     if folder is None:
         yield False
         return
     # Set for this function alone, since other packages in this process keep their own compiled code elsewhere.
-    config.CACHE_DIR = str(folder)
+    before = config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES
+    config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES = str(folder.parent), "UserProvidedCacheLocator"
     try:
         yield True
     finally:
-        config.CACHE_DIR = ""
+        config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES = before
+
+
+def _set_by_program(config: Any) -> str:
+    """Return the folder that a program has set as `numba.config.CACHE_DIR`, or an empty text.
+
+    One that numba has read from a file in the current folder does not count: it could hold anybody's code.
+    """
+    read = getattr(getattr(config, "_env_reloader", None), "old_environ", {})
+    return "" if read.get("NUMBA_CACHE_DIR", "") == config.CACHE_DIR else str(config.CACHE_DIR)

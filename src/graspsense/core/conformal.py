@@ -29,11 +29,15 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from attrs import frozen
 
+from graspsense.core.stored_values import StoredValues
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 COVERAGE: Final = 0.9
 """Share of the trials whose set shall contain the true label."""
+_COVERAGES: Final = (0.01, 0.999)
+"""The coverages that a stored model may have; each needs a number of units that can be counted."""
 _ROUNDING: Final = 1e-9
 _CLOSENESS: Final = 1e-3
 """Weight of the closeness in a score: it only matters among probabilities that are equal, or almost."""
@@ -170,21 +174,30 @@ class PredictionSets:
         }
 
 
-def sets_from(kept: Mapping[str, Any], classes: Sequence[str]) -> PredictionSets:
-    """Return the sets of a stored model. Raises KeyError, TypeError or ValueError if they do not fit its classes."""
-    thresholds = {
-        str(name): LabelThreshold(score=float(value), units=int(units), own=bool(own))
-        for name, (value, units, own) in kept["thresholds"].items()
-    }
+def sets_from(kept: StoredValues, classes: Sequence[str]) -> PredictionSets:
+    """Return the sets of a stored model. Raises DataDamaged if they do not fit its classes."""
+    thresholds, stored = {}, kept.table("thresholds")
+    for name in stored:
+        if len(stored.items(name)) != 3:
+            raise stored.refusal(
+                name, "expected a score, a number of units, and whether it is the label's own"
+            )
+        entry = StoredValues(
+            dict(zip(("score", "units", "own"), stored.items(name), strict=True)), stored.field(name)
+        )
+        thresholds[name] = LabelThreshold(
+            score=entry.number("score"), units=entry.whole("units"), own=entry.flag("own")
+        )
     if thresholds and set(thresholds) != set(classes):
-        raise ValueError("the thresholds of its prediction sets are not those of its labels")
+        raise kept.refusal("thresholds", "the thresholds of its prediction sets are not those of its labels")
+    trials = kept.whole("trials")
     return PredictionSets(
-        coverage=float(kept["coverage"]),
-        unit=str(kept["unit"]),
+        coverage=kept.number("coverage", *_COVERAGES),
+        unit=kept.choice("unit", ("instances", "trials")),
         thresholds=thresholds,
-        reason=str(kept["reason"]),
-        unknown=int(kept["unknown"]),
-        trials=int(kept["trials"]),
+        reason=kept.text("reason"),
+        unknown=kept.whole("unknown", most=trials),
+        trials=trials,
     )
 
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
-import tomllib
 from collections.abc import Iterable
 from pathlib import Path
 
 from graspsense.core.errors import ConfigError
+from graspsense.core.toml_text import TomlError, toml_values
 from graspsense.core.user_folders import NOWHERE, config_folder
+from graspsense.core.whole_file import write_whole
 
 
 def config_file() -> Path | None:
@@ -32,8 +33,8 @@ def disabled_in_config() -> tuple[str, ...]:
     except (OSError, UnicodeDecodeError) as error:
         raise ConfigError(f"{path} cannot be read: {error}") from error
     try:
-        values = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+        values = toml_values(text)
+    except TomlError as error:
         raise ConfigError(f'{path}: {error}. It holds one line, disabled = ["NAME", ...]') from error
     names = values.pop("disabled", [])
     if values or not isinstance(names, list) or not all(isinstance(one, str) for one in names):
@@ -51,7 +52,5 @@ def write_disabled(names: Iterable[str]) -> Path:
         path.unlink(missing_ok=True)
         return path
     path.parent.mkdir(parents=True, exist_ok=True)
-    other = path.with_suffix(".new")
-    other.write_text(f"disabled = {json.dumps(wanted)}\n", encoding="utf-8")
-    other.replace(path)
+    write_whole(path, f"disabled = {json.dumps(wanted)}\n".encode())
     return path

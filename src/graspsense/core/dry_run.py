@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from graspsense.core.entries import KINDS
 from graspsense.core.roles import Controller, DeviceInfo, FeatureSet, SensorBackend
 from graspsense.core.run_config import RunConfig
-from graspsense.core.runner import run_grasp
+from graspsense.core.runner import run_uninterrupted
 from graspsense.core.signals import EFFORT, FORCE, VELOCITY, Command, Pads, Phase, Reading
 from graspsense.core.trial import GraspEvent
 
@@ -47,7 +47,7 @@ def dry_run(backend: SensorBackend[Any], controller: Controller[Any], run: RunCo
     if emulated is None:
         return None
     recorder = _CommandRecorder(emulated, run)
-    grasp = run_grasp(recorder, controller, run, on_event=recorder.begin)
+    grasp = run_uninterrupted(recorder, controller, run, on_event=recorder.begin)
     return DryRun(grasp.device.name, grasp.outcome.words, tuple(recorder.phases()))
 
 

@@ -6,8 +6,15 @@ Each class has the exit code of the command line. A grasp that fails is not an e
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
+from itertools import islice
+from typing import Final
+
+MOST_NAMED: Final = 24
+"""Limit on the names that an error lists."""
+_LONGEST_NAME: Final = 100
+_MOST_COMPARED: Final = 1000
 
 
 class GraspsenseError(Exception):
@@ -62,6 +69,17 @@ class DataDamaged(GraspsenseError):
     exit_code = 5
 
 
+FAILURES: Final = (Exception, SystemExit)
+"""What the code of a plugin can raise, apart from KeyboardInterrupt, which is the user's.
+
+SystemExit is a failure of the plugin too: it must not end the program, nor lose what was measured.
+"""
+
+
+class TooLarge(DataDamaged):
+    """A file that unpacks to more than is allowed; `graspsense.recording.unpacked` has the limit."""
+
+
 class RecordingEnded(Exception):
     """A replayed recording has no further frame. The runner turns this into an outcome."""
 
@@ -73,5 +91,18 @@ def named(error: BaseException) -> str:
 
 def suggestion(found: str, allowed: Iterable[str]) -> str:
     """Return `" Did you mean 'x'?"` for the nearest allowed name, or an empty string."""
-    near = get_close_matches(found, sorted(allowed), n=1, cutoff=0.5)
+    if len(found) > _LONGEST_NAME:
+        return ""
+    comparable = sorted(islice((name for name in allowed if len(name) <= _LONGEST_NAME), _MOST_COMPARED))
+    near = get_close_matches(found, comparable, n=1, cutoff=0.5)
     return f" Did you mean {near[0]!r}?" if near else ""
+
+
+def listed(names: Sequence[str]) -> str:
+    """Return names with commas between them, at most `MOST_NAMED` of them, and how many more there are.
+
+    >>> listed(["t", "gap"])
+    't, gap'
+    """
+    more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
+    return ", ".join(names[:MOST_NAMED]) + more

@@ -5,15 +5,19 @@ from __future__ import annotations
 import math
 from array import array
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from attrs import field, frozen
 
+from graspsense.core.errors import listed
 from graspsense.core.reasons import Reason
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
+
+LARGEST_VALUE: Final = 1e100
+"""The largest magnitude of a number to learn from: the squares of its differences, and their sums, are still finite."""
 
 
 @frozen(kw_only=True)
@@ -61,7 +65,7 @@ class Features:
         try:
             return self.values[self.names.index(name)]
         except ValueError:
-            raise KeyError(f"no feature {name!r}; there are {', '.join(self.names)}") from None
+            raise KeyError(f"no feature {name!r}; there are {listed(self.names)}") from None
 
     def as_dict(self) -> dict[str, float | None]:
         """Return name to value, with None for a missing one (JSON has no NaN)."""
@@ -86,10 +90,11 @@ class FeatureTable:
 
     def columns(self, names: Sequence[str]) -> FeatureTable:
         """Return the table of these features, in this order. KeyError names the known ones."""
+        places = {name: i for i, name in enumerate(self.names)}
         for name in names:
-            if name not in self.names:
-                raise KeyError(f"no feature {name!r}; there are {', '.join(self.names)}")
-        which = [self.names.index(name) for name in names]
+            if name not in places:
+                raise KeyError(f"no feature {name!r}; there are {listed(self.names)}")
+        which = [places[name] for name in names]
         return FeatureTable(
             names=tuple(names), units=tuple(self.units[i] for i in which), values=self.values[:, which]
         )

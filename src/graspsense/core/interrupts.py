@@ -1,10 +1,11 @@
-"""Signals that end a grasp. The first one ends it; none interrupts the release of the gripper."""
+"""Signals that end a grasp or a command. The first one ends a grasp; none interrupts the release of the gripper."""
 
 from __future__ import annotations
 
 import signal
 import threading
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from types import FrameType, TracebackType
 from typing import Any, Final
 
@@ -18,12 +19,13 @@ class Interrupts:
     """Within this context, the first signal raises KeyboardInterrupt; later ones are only counted in `count`.
 
     The way out of a grasp is therefore never interrupted, however often the user presses Ctrl-C; it may read `count`
-    and hurry. Only the main thread receives signals; in other threads this has no effect. A signal that the process
-    ignores stays ignored.
+    and hurry. While `deferred` is set, the first signal is only counted as well. Only the main thread receives
+    signals; in other threads this has no effect. A signal that the process ignores stays ignored.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, *, deferred: bool = False) -> None:
         self.count = 0
+        self.deferred = deferred
         self._previous: dict[int, Any] = {}
 
     def __enter__(self) -> Interrupts:
@@ -49,5 +51,23 @@ class Interrupts:
             # The previous handler is called too; its KeyboardInterrupt is raised below, once.
             with suppress(KeyboardInterrupt):
                 previous(number, frame)
-        if self.count == 1:
+        if self.count == 1 and not self.deferred:
             raise KeyboardInterrupt
+
+
+@contextmanager
+def ended_like_ctrl_c() -> Iterator[None]:
+    """Within this context, SIGTERM and SIGHUP raise KeyboardInterrupt, unless the process handles or ignores them.
+
+    A command that is ended by them therefore lets go of its gripper, and removes what it has half written.
+    """
+    previous = {}
+    if threading.current_thread() is threading.main_thread():
+        for number in ENDING:
+            if signal.getsignal(number) is signal.SIG_DFL:
+                previous[number] = signal.signal(number, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        for number, before in previous.items():
+            signal.signal(number, before)

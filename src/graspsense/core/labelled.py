@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 from attrs import evolve, field, frozen
 
-from graspsense.core.errors import ConfigError, suggestion
-from graspsense.core.features import FeatureTable
+from graspsense.core.errors import ConfigError, DataDamaged, suggestion
+from graspsense.core.features import LARGEST_VALUE, FeatureTable
+from graspsense.core.limits import CLASSES, FEATURES
 from graspsense.core.target_value import TargetValue
 
 if TYPE_CHECKING:
@@ -31,6 +32,9 @@ class ControlFeatures:
     what: str
     missing: str = ""
 
+    def __attrs_post_init__(self) -> None:
+        _refuse_too_large(self.table)
+
 
 @frozen(kw_only=True, eq=False)
 class Labelled:
@@ -43,6 +47,9 @@ class Labelled:
     the width alone. `variants` are further tables to evaluate. If rates on these
     trials say nothing about other objects, `no_interval` is the reason, and they get no interval. `notes` tell what a
     reader of a rate must know, `provenance` how the trials were made.
+
+    Raises ValueError if the columns differ in length, and ConfigError for more labels or features than the limits
+    `CLASSES` and `FEATURES` accept.
     """
 
     source: str
@@ -71,6 +78,13 @@ class Labelled:
                 raise ValueError(
                     f"{len(self.table)} trials and {len(column)} {name}: give one for each trial"
                 )
+        _refuse_too_large(self.table)
+        if self.value is not None:
+            _refuse_large_target(self.value)
+        labels = len(set(self.labels)) if self.value is None else 1
+        too_many = CLASSES.exceeded(labels) or FEATURES.exceeded(len(self.table.names))
+        if too_many:
+            raise ConfigError(f"{self.source} has {too_many}")
 
     def __len__(self) -> int:
         """Return the number of trials."""
@@ -113,7 +127,14 @@ class Labelled:
         return self.rows(np.flatnonzero(of))
 
     def aimed(self, target: str) -> Labelled:
-        """Return the trials with one of `TARGETS` as labels. Raises ConfigError if the labels have no state."""
+        """Return the trials with one of `TARGETS` as labels.
+
+        Raises ConfigError if the labels have no state, DataDamaged for another target, which only a model can have.
+        """
+        if target not in TARGETS:
+            raise DataDamaged(
+                f"a model predicts one of {', '.join(TARGETS)}; the target of this one is {target!r}"
+            )
         if target == "both":
             return self
         if target == "class":
@@ -125,6 +146,28 @@ class Labelled:
                     "Choose --target both, which takes labels as they are"
                 )
         return evolve(self, labels=tuple(label.partition(":")[2] for label in self.labels))
+
+
+def _refuse_too_large(table: FeatureTable) -> None:
+    """Raise DataDamaged for a number that nothing can be learned from, since its square is not finite."""
+    import numpy as np
+
+    large = np.abs(table.values) > LARGEST_VALUE
+    if large.any():
+        trial, column = (int(number) for number in np.argwhere(large)[0])
+        raise DataDamaged(
+            f"feature {table.names[column]!r} of trial {trial + 1} is {table.values[trial, column]:g}: the largest "
+            f"magnitude to learn from is {LARGEST_VALUE:g}. Correct it, or leave this feature out (--features)"
+        )
+
+
+def _refuse_large_target(target: TargetValue) -> None:
+    for trial, value in enumerate(target.values):
+        if abs(value) > LARGEST_VALUE:
+            raise DataDamaged(
+                f"{target.name!r} of trial {trial + 1} is {value:g}: the largest magnitude to predict is "
+                f"{LARGEST_VALUE:g}"
+            )
 
 
 def class_of(label: str) -> str:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
-import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from difflib import get_close_matches
 from importlib.resources.abc import Traversable
@@ -14,9 +12,11 @@ from typing import Any
 from attrs import define, field, frozen
 
 from graspsense.core.errors import ConfigError, UnknownName
+from graspsense.core.limits import SETTINGS_BYTES
 from graspsense.core.plugins import Plugins
 from graspsense.core.strict import InvalidValue, shown
 from graspsense.core.toml_lines import KeyPath, key_lines
+from graspsense.core.toml_text import TomlError, toml_values
 
 
 @frozen(eq=False, kw_only=True)
@@ -88,9 +88,12 @@ class Merged:
                     inner = into[key] = {}
                 self._add(inner, here, value, layer)
             else:
+                table = isinstance(into.get(key), dict)
                 into[key] = value
                 self.owner[here] = layer
-                for below in [one for one in self.owner if one[: len(here)] == here and one != here]:
+                for below in [
+                    one for one in self.owner if table and one[: len(here)] == here and one != here
+                ]:
                     del self.owner[below]
 
     def owner_of(self, path: KeyPath) -> Layer | None:
@@ -160,31 +163,36 @@ def _located(asked: str, base: Path, asker: str, plugins: Plugins) -> tuple[Trav
 
 def read_toml(source: Traversable, label: str, what: str) -> Layer:
     """Read a TOML file, which errors call `what` and `label`. Raises ConfigError."""
+    text = _settings_text(source, label, what)
     try:
-        data = source.read_bytes()
+        values = toml_values(text)
+    except TomlError as error:
+        line = f":{error.line}" if error.line else ""
+        column = f", column {error.column}" if error.column else ""
+        raise ConfigError(f"{label}{line}{column}: {error}") from None
+    return Layer(label=label, values=values, lines=key_lines(text))
+
+
+def _settings_text(source: Traversable, label: str, what: str) -> str:
+    """Return the text of a file of settings. Raises ConfigError."""
+    try:
+        with source.open("rb") as file:
+            data: bytes = file.read(SETTINGS_BYTES.most + 1)
     except FileNotFoundError:
         raise ConfigError(f"no {what} {label!r}{_nearby(source)}") from None
     except OSError as error:
         raise ConfigError(f"cannot read the {what} {label!r}: {error.strerror or error}") from None
+    why = SETTINGS_BYTES.exceeded(len(data))
+    if why:
+        raise ConfigError(f"{label}: {why}")
     try:
-        text = data.decode("utf-8-sig")
+        return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
         raise ConfigError(
             f"{label}:{line}: not UTF-8 text (byte 0x{data[error.start]:02x}): "
             "TOML files are UTF-8; is this the right file?"
         ) from None
-    try:
-        values = tomllib.loads(text)
-    except RecursionError:
-        raise ConfigError(f"{label}: lists or tables nested too deep") from None
-    except ValueError as error:
-        place = re.search(r" \(at (?:line (\d+), column (\d+)|end of document)\)$", str(error))
-        said = str(error)[: place.start()] if place else str(error)
-        line = int(place[1]) if place and place[1] else text.count("\n") + 1
-        column = f", column {place[2]}" if place and place[2] else ""
-        raise ConfigError(f"{label}:{line}{column}: not TOML: {said}") from None
-    return Layer(label=label, values=values, lines=key_lines(text))
 
 
 def _nearby(missing: Traversable) -> str:
@@ -218,7 +226,7 @@ def option_layers(options: Sequence[str]) -> tuple[list[Layer], list[str]]:
 
 def _key_parts(key: str) -> list[str]:
     try:
-        table: Any = tomllib.loads(f"{key}=0")
+        table: Any = toml_values(f"{key}=0")
     except ValueError:
         return []
     parts = []
@@ -233,10 +241,10 @@ def _key_parts(key: str) -> list[str]:
 def _toml_value(text: str) -> Any:
     """Return the TOML value of this text, or the text itself unless it is exactly one value."""
     try:
-        value = tomllib.loads(f"value = {text}")["value"]
+        value = toml_values(f"value = {text}")["value"]
         # Within brackets, a comment hides the end, and a second key is not TOML.
-        return value if len(tomllib.loads(f"value = [{text}]")["value"]) == 1 else text
-    except (ValueError, RecursionError):
+        return value if len(toml_values(f"value = [{text}]")["value"]) == 1 else text
+    except TomlError:
         return text
 
 

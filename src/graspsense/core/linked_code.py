@@ -6,6 +6,7 @@ again there. For a loop that a few hundred functions make up that is half of the
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from typing import Any
 
@@ -121,3 +122,11 @@ class KeptCode(FunctionCache):
             self._prepare()
             self._is_prepared = True
         return found
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep the code in files that nobody else can write to, whatever the mask of the user is."""
+        mask = os.umask(0o077)
+        try:
+            super().save_overload(sig, data)  # type: ignore[no-untyped-call]
+        finally:
+            os.umask(mask)

@@ -6,32 +6,42 @@ unpickled. Its `sha256` is the hash of the other content, which detects a damage
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
-import os
 import platform
 import shlex
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
+from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, cast
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from attrs import evolve, frozen
 
 from graspsense import __version__
 from graspsense.core.conformal import PredictionSets, scores_of, sets_from
-from graspsense.core.errors import ConfigError, DataDamaged, UnknownName
-from graspsense.core.features import UNKNOWN, Features, FeatureTable, Prediction, table_of
+from graspsense.core.errors import ConfigError, DataDamaged, PluginUnavailable, UnknownName, named
+from graspsense.core.features import (
+    LARGEST_VALUE,
+    UNKNOWN,
+    Features,
+    FeatureTable,
+    Prediction,
+    table_of,
+)
 from graspsense.core.firstparty import MODELS
 from graspsense.core.json_values import json_ready, settings_from_json
+from graspsense.core.model_content import digest, parsed, sealed_content
 from graspsense.core.novelty import Novelty, novelty_from, novelty_of
 from graspsense.core.reasons import Reason
 from graspsense.core.setting import CHANGES_NO_RESULT, NAMES_INPUT, UNIT_OF_ENDING, settings_marked
+from graspsense.core.stored_values import StoredValueError, StoredValues
+from graspsense.core.temperature import RANGE as TEMPERATURES
 from graspsense.core.temperature import at_temperature
 from graspsense.core.units import display_unit, without_underscores
+from graspsense.core.whole_file import write_whole
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -86,7 +96,7 @@ class Model:
     def in_a_line(self) -> str:
         """The classifier and its training data, in one line."""
         kind = "simulated grasps" if self.simulated else f"trials of {self.provenance.get('source', '?')}"
-        settings = self.provenance.get("settings", {}).get("controller", {})
+        settings = self.provenance.get("settings", {}).get("controller") or {}
         at = [
             worded(key, settings[key])[1]
             for key in ("probing_force_n", "closing_speed_m_s")
@@ -111,7 +121,8 @@ class Model:
         """Return the prediction for one trial, with warnings about its validity.
 
         `settings` and `device` are those of the grasp, if there was one. A trial that lacks a feature of the model, or
-        has it in another unit, is unknown, with that as the reason.
+        has it in another unit, is unknown, with that as the reason. Raises DataDamaged if the classifier gives no
+        probabilities.
         """
         warnings = tuple(self._warnings(settings, device))
         probabilities: Mapping[str, float] = {}
@@ -121,9 +132,10 @@ class Model:
             because = (misfit,)
         else:
             chosen = _chosen(features, self.names)
-            explained = self.classifier.explain(chosen)
+            explained = self.classifier.explain(_bounded(chosen))
             classes = self.classifier.classes()
             shares = np.array([[explained.probabilities.get(name, 0.0) for name in classes]])
+            self._refuse_improbable(shares)
             (calibrated,) = at_temperature(shares, self.temperature).tolist()
             prediction = evolve(
                 explained,
@@ -158,13 +170,15 @@ class Model:
 
         The probabilities are not calibrated (`at_temperature` does that). Their shape is (trials, classes), in the
         order of the classes of the classifier; unknown trials have probabilities too. Raises ConfigError if the table
-        does not have the features of the model.
+        does not have the features of the model, DataDamaged if the classifier gives no probabilities.
         """
         misfit = self.misfit(table)
         if misfit:
             raise ConfigError(misfit)
         chosen = table.columns(self.names)
-        shares = self.classifier.probabilities(chosen)
+        bounded = evolve(chosen, values=np.clip(chosen.values, -LARGEST_VALUE, LARGEST_VALUE))
+        shares = self.classifier.probabilities(bounded)
+        self._refuse_improbable(shares)
         unlike = self.novelty.unlike_rows(chosen).tolist()
         classes = self.classifier.classes()
         # Probabilities that differ by rounding count as equal: the first of them is the answer.
@@ -201,6 +215,14 @@ class Model:
             if unit and units[name] and unit != units[name]:
                 return f"model {self.name!r} takes {name} in {unit}; here it is in {units[name]}"
         return ""
+
+    def _refuse_improbable(self, shares: NDArray[np.float64]) -> None:
+        try:
+            refuse_improbable(shares, len(shares), len(self.classifier.classes()))
+        except ValueError as error:
+            raise DataDamaged(
+                f"model {self.name!r} cannot be used: {error}. Train it again, with the defaults of {self.component}"
+            ) from error
 
     def _warnings(self, settings: Settings | None, device: DeviceInfo | None) -> Iterator[str]:
         kind = "simulated grasps" if self.simulated else "grasps"
@@ -277,30 +299,111 @@ def checkpoint_model(whole: Model, after_s: float, part: Model) -> Model:
     )
 
 
-def _part_from_json(whole: Model, component: Component, config: Any, kept: Mapping[str, Any]) -> Model:
-    """Return the model of a checkpoint. Raises KeyError, TypeError, ValueError or DataDamaged."""
-    classifier = component.create(config)
-    classifier.from_json(kept["model"])
-    sets = kept["sets"]
+def _part_from_json(whole: Model, component: Component, config: Any, kept: StoredValues) -> Model:
+    """Return the model of a checkpoint. Raises DataDamaged."""
+    classifier = _classifier_from(kept, component, config, whole.names, whole.units)
+    by_label = kept.table("by_label")
     part = evolve(
         whole,
         classifier=classifier,
-        novelty=novelty_from(whole.names, whole.units, kept["unknown"]),
-        sets=None if sets is None else sets_from(sets, classifier.classes()),
+        novelty=_novelty_from(kept, classifier, whole.names, whole.units),
+        sets=_sets_from(kept, classifier),
         temperature=_temperature_from(kept),
-        provenance={"trials": int(kept["trials"]), "by_label": dict(kept["by_label"])},
+        provenance={
+            "trials": kept.whole("trials"),
+            "by_label": {label: by_label.whole(label) for label in by_label},
+        },
     )
-    return checkpoint_model(whole, float(kept["after_contact_s"]), part)
+    return checkpoint_model(whole, kept.number("after_contact_s", least=0.0), part)
 
 
-def _temperature_from(kept: Mapping[str, Any]) -> float | None:
-    """Return the stored temperature; None in a model of an earlier version. Raises TypeError or ValueError."""
-    temperature = kept.get("temperature")
-    if temperature is None:
+def _checkpoints_from(
+    stored: StoredValues, whole: Model, component: Component, config: Any
+) -> tuple[tuple[float, Model], ...]:
+    """Return the models of the checkpoints, with their times. Raises DataDamaged."""
+    if "checkpoints" not in stored:
+        return ()
+    parts = [_part_from_json(whole, component, config, kept) for kept in stored.tables("checkpoints")]
+    times = [float(part.after_s or 0.0) for part in parts]
+    if any(later <= earlier for earlier, later in pairwise([0.0, *times])):
+        raise stored.refusal("checkpoints", "their times do not increase from above 0 s")
+    return tuple(zip(times, parts, strict=True))
+
+
+def _classifier_from(
+    stored: StoredValues, component: Component, config: Any, names: tuple[str, ...], units: tuple[str, ...]
+) -> Classifier[Any]:
+    """Return the classifier in `model`, which answers a trial with these features. Raises DataDamaged.
+
+    Whatever a classifier raises on values that it cannot read is an error of the file.
+    """
+    classifier: Classifier[Any] = component.create(config)
+    try:
+        classifier.from_json(stored.table("model").as_dict())
+        classes = classifier.classes()
+        if (
+            len(classes) < 1
+            or len(set(classes)) < len(classes)
+            or not all(type(one) is str for one in classes)
+        ):
+            raise ValueError("its labels are not different texts")
+        empty = FeatureTable(names=names, units=units, values=np.full((1, len(names)), np.nan))
+        refuse_improbable(classifier.probabilities(empty), 1, len(classes))
+    except PluginUnavailable:
+        raise
+    except DataDamaged as error:
+        raise StoredValueError(f"{stored.field('model')}.{error}") from error
+    except Exception as error:
+        raise stored.refusal("model", named(error)) from error
+    return classifier
+
+
+def _novelty_from(
+    stored: StoredValues, classifier: Classifier[Any], names: tuple[str, ...], units: tuple[str, ...]
+) -> Novelty:
+    """Return the ranges of the training trials, which have the labels of the classifier. Raises DataDamaged."""
+    novelty = novelty_from(names, units, stored.value("unknown"), stored.field("unknown"))
+    if sorted(novelty.classes) != sorted(classifier.classes()):
+        raise stored.refusal("unknown.ranges", "they are not those of the labels of the classifier")
+    return novelty
+
+
+def _sets_from(stored: StoredValues, classifier: Classifier[Any]) -> PredictionSets | None:
+    """Return the prediction sets, if there are any. Raises DataDamaged."""
+    if "sets" not in stored or stored.value("sets") is None:
         return None
-    if not 0.0 < float(temperature) < math.inf:
-        raise ValueError(f"its temperature is {temperature}, not a positive number")
-    return float(temperature)
+    return sets_from(stored.table("sets"), classifier.classes())
+
+
+def _temperature_from(stored: StoredValues) -> float | None:
+    """Return the stored temperature; None in a model of an earlier version. Raises DataDamaged."""
+    if "temperature" not in stored or stored.value("temperature") is None:
+        return None
+    least, most = TEMPERATURES
+    return stored.number("temperature", least * (1.0 - _EQUAL), most * (1.0 + _EQUAL))
+
+
+def _provenance_from(stored: StoredValues) -> dict[str, Any]:
+    """Return what is known of the training, of which predictions use a part. Raises DataDamaged."""
+    kept = stored.table("provenance")
+    if "simulated" in kept:
+        kept.flag("simulated")
+    if "settings" in kept:
+        tables = kept.table("settings")
+        for name in set(_COMPARED_TABLES) & set(tables):
+            if tables.value(name) is not None:
+                tables.table(name)
+    if "after_contact_s" in kept:
+        raise kept.refusal("after_contact_s", "only the model of a checkpoint has one")
+    return kept.as_dict()
+
+
+def refuse_improbable(shares: Any, trials: int, classes: int) -> None:
+    """Raise ValueError unless these are probabilities: shape (trials, classes), and each row sums to 1."""
+    if not isinstance(shares, np.ndarray) or shares.shape != (trials, classes) or shares.dtype != np.float64:
+        raise ValueError(f"its probabilities do not have the shape {(trials, classes)}")
+    if not ((shares >= 0.0).all() and (np.abs(shares.sum(axis=1) - 1.0) <= _EQUAL).all()):
+        raise ValueError("it gives no probabilities: they are not finite, are below 0, or do not sum to 1")
 
 
 def _not_compared(chosen: SelectedComponent) -> frozenset[str]:
@@ -367,9 +470,7 @@ def write_json_lines(path: Path, content: Mapping[str, Any]) -> None:
     """Write the content of a model atomically, one line for each key. Raises OSError."""
     # Readable, and much shorter than one line for each number.
     lines = (f"{json.dumps(key)}: {_json(value)}" for key, value in content.items())
-    part = path.with_name(path.name + ".part")
-    part.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="utf-8")
-    os.replace(part, path)
+    write_whole(path, ("{\n" + ",\n".join(lines) + "\n}\n").encode())
 
 
 def load_model(name: str, plugins: Plugins, component: Component | None = None) -> Model:
@@ -388,8 +489,15 @@ def _kept_model(text: bytes, name: str, plugins: Plugins, component: Component) 
 
 
 def _model_from(text: bytes, name: str, plugins: Plugins, component: Component | None) -> Model:
-    content = _content(name, text)
-    made_by = content["classifier"]
+    try:
+        return _restored(StoredValues(_content(name, text)), name, plugins, component)
+    except StoredValueError as error:
+        raise DataDamaged(f"model {name!r} is damaged: {error}") from error
+
+
+def _restored(stored: StoredValues, name: str, plugins: Plugins, component: Component | None) -> Model:
+    """Return the model with these values. Raises DataDamaged, and ConfigError for another classifier."""
+    made_by = stored.text("classifier")
     if component is None:
         component = plugins.find("classifier", made_by)
     elif component.qualified != made_by:
@@ -397,32 +505,39 @@ def _model_from(text: bytes, name: str, plugins: Plugins, component: Component |
             f"model {name!r} was made by {made_by}, but the classifier here is {component.qualified}. "
             f'Write classifier.type = "{made_by}", or train a model: graspsense train --help'
         )
-    from graspsense.core.config import build
+    settings, config = _settings_from(stored, component)
+    names, units = stored.features("features")
+    classifier = _classifier_from(stored, component, config, names, units)
+    model = Model(
+        name=name,
+        component=made_by,
+        settings=settings,
+        classifier=classifier,
+        names=names,
+        units=units,
+        target=stored.text("target"),
+        novelty=_novelty_from(stored, classifier, names, units),
+        provenance=_provenance_from(stored),
+        sets=_sets_from(stored, classifier),
+        temperature=_temperature_from(stored),
+    )
+    return evolve(model, checkpoints=_checkpoints_from(stored, model, component, config))
 
-    settings = settings_from_json(content["settings"], component.config_class())
-    config = build(component, settings)
-    classifier = component.create(config)
+
+def _settings_from(stored: StoredValues, component: Component) -> tuple[dict[str, Any], Any]:
+    """Return the settings that the classifier was fitted with, and its config. Raises DataDamaged."""
+    from graspsense.core.strict import ValidationFailed, structured
+
+    kept = stored.table("settings")
+    if "model" in kept:
+        raise kept.refusal("model", "the settings of a model do not name a model")
+    config_class = component.config_class()
+    settings = settings_from_json(kept.as_dict(), config_class)
     try:
-        names = tuple(str(one[0]) for one in content["features"])
-        units = tuple(str(one[1]) for one in content["features"])
-        classifier.from_json(content["model"])
-        model = Model(
-            name=name,
-            component=made_by,
-            settings=settings,
-            classifier=classifier,
-            names=names,
-            units=units,
-            target=str(content["target"]),
-            novelty=novelty_from(names, units, content["unknown"]),
-            provenance=content["provenance"],
-            sets=sets_from(content["sets"], classifier.classes()) if "sets" in content else None,
-            temperature=_temperature_from(content),
-        )
-        parts = [_part_from_json(model, component, config, kept) for kept in content.get("checkpoints", ())]
-        return evolve(model, checkpoints=tuple((float(part.after_s or 0.0), part) for part in parts))
-    except (KeyError, IndexError, TypeError, ValueError) as error:
-        raise DataDamaged(f"model {name!r} is damaged: {type(error).__name__}: {error}") from error
+        return settings, structured(settings, config_class, component.qualified)
+    except ValidationFailed as misfit:
+        problem = misfit.problems[0]
+        raise stored.refusal(".".join(map(str, ("settings", *problem.path))), problem.text) from None
 
 
 def model_for(settings: Settings, plugins: Plugins) -> Model | None:
@@ -482,38 +597,16 @@ def _text(name: str, plugins: Plugins) -> bytes:
 
 
 def _content(name: str, text: bytes) -> dict[str, Any]:
-    try:
-        content = json.loads(text)
-    except (UnicodeDecodeError, ValueError) as error:
-        raise DataDamaged(f"model {name!r} is not JSON: {error}") from error
+    content = parsed(name, text)
     if isinstance(content, dict) and content.get("format") == REGRESSION_FORMAT:
         raise ConfigError(
             f"model {name!r} predicts a number, not a label: use it with graspsense predict {name} SOURCE"
         )
-    if not isinstance(content, dict) or content.get("format") != FORMAT:
-        raise DataDamaged(f'{name!r} is not a model of graspsense: it lacks "format": "{FORMAT}"')
-    if content.get("version") != VERSION:
-        raise DataDamaged(
-            f"model {name!r} has version {content.get('version')!r}; this graspsense ({__version__}) reads {VERSION}"
-        )
-    rest = {key: value for key, value in content.items() if key != "sha256"}
-    if content.get("sha256") != digest(rest):
-        raise DataDamaged(f"model {name!r} was changed or damaged: its sha256 does not match")
-    expected = {"classifier": str, "settings": dict, "features": list, "provenance": dict, "unknown": dict}
-    for key, kind in expected.items():
-        if not isinstance(content.get(key), kind):
-            raise DataDamaged(f"model {name!r} is damaged: {key!r} is missing or not a {kind.__name__}")
-    return cast("dict[str, Any]", content)
+    return sealed_content(name, content, FORMAT, VERSION, "model of graspsense")
 
 
 def _json(value: Any) -> str:
     return json.dumps(value, ensure_ascii=False, allow_nan=False)
-
-
-def digest(content: Mapping[str, Any]) -> str:
-    """Return the hash of the content of a model."""
-    text = json.dumps(content, sort_keys=True, ensure_ascii=False, separators=(",", ":"))
-    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def _chosen(features: Features, names: Sequence[str]) -> Features:
@@ -526,6 +619,14 @@ def _chosen(features: Features, names: Sequence[str]) -> Features:
         units=tuple(features.units[i] for i in at),
         reasons={name: why for name, why in features.reasons.items() if name in names},
     )
+
+
+def _bounded(features: Features) -> Features:
+    """Return the features for a classifier: one that is too large to compute with is as large as can be."""
+    if all(not abs(value) > LARGEST_VALUE for value in features.values):
+        return features
+    values = tuple(min(max(value, -LARGEST_VALUE), LARGEST_VALUE) for value in features.values)
+    return evolve(features, values=values)
 
 
 def worded(key: str, value: Any) -> tuple[str, str]:

@@ -8,7 +8,7 @@ over the classes). It is *unknown* if it is unlike every class, or has no featur
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -16,6 +16,7 @@ from attrs import frozen
 
 from graspsense.core.features import Features, FeatureTable
 from graspsense.core.reasons import FeatureValue, Reason
+from graspsense.core.stored_values import StoredValues
 from graspsense.core.units import in_words
 
 if TYPE_CHECKING:
@@ -25,6 +26,8 @@ REACH: Final = 3.0
 """Distance from the range of a class, in standard deviations, up to which a trial is like the class."""
 _ROUNDING: Final = 1e-9
 """Relative difference allowed to a feature that was constant in training."""
+_FARTHEST: Final = float(np.finfo(np.float64).max)
+"""A distance that overflows counts as this one: infinite is that of a trial without any feature in common."""
 _ROWS_AT_ONCE: Final = 4096
 
 
@@ -99,17 +102,17 @@ class Novelty:
 
     def _outside(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the distance of each value from the range of each class, in standard deviations; NaN if unknown."""
-        with np.errstate(invalid="ignore"):
+        with np.errstate(invalid="ignore", over="ignore"):
             outside: NDArray[np.float64] = np.maximum(
                 np.maximum(self.lowest - values, values - self.highest), 0.0
             )
-            return outside / self._scale(values)
+            return np.minimum(outside / self._scale(values), _FARTHEST)
 
     def _from_middle(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the distance of each value from the middle of the range of each class, as `_outside` does."""
-        with np.errstate(invalid="ignore"):
+        with np.errstate(invalid="ignore", over="ignore"):
             away: NDArray[np.float64] = np.abs(values - 0.5 * (self.lowest + self.highest))
-            return away / self._scale(values)
+            return np.minimum(away / self._scale(values), _FARTHEST)
 
     def _scale(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the standard deviations; for a feature that was constant in training, what rounding may change."""
@@ -163,15 +166,24 @@ def novelty_of(table: FeatureTable, labels: Sequence[str]) -> Novelty:
     )
 
 
-def novelty_from(names: Sequence[str], units: Sequence[str], kept: Mapping[str, Any]) -> Novelty:
-    """Return the object that `to_json` described. Raises KeyError, TypeError or ValueError for other values."""
-    if kept["reach"] != REACH:
-        raise ValueError(f"the rule for unknown trials has reach {kept['reach']!r}, this version has {REACH}")
-    classes = tuple(kept["ranges"])
-    shape = (len(classes), len(names))
-    lowest = np.array([kept["ranges"][label][0] for label in classes], dtype=np.float64).reshape(shape)
-    highest = np.array([kept["ranges"][label][1] for label in classes], dtype=np.float64).reshape(shape)
-    spread = np.array(kept["spread"], dtype=np.float64).reshape(shape[1:])
+def novelty_from(
+    names: Sequence[str], units: Sequence[str], values: object, place: str = "unknown"
+) -> Novelty:
+    """Return the ranges that `to_json` described; `place` is their field in the file. Raises DataDamaged."""
+    kept = StoredValues(values, place)
+    if kept.number("reach") != REACH:
+        raise kept.refusal("reach", f"the rule for unknown trials has another one; this version has {REACH}")
+    ranges = kept.table("ranges")
+    classes = tuple(ranges)
+    ends = np.empty((2, len(classes), len(names)))
+    for k, label in enumerate(classes):
+        ends[:, k, :] = ranges.numbers(label, (2, len(names)), missing=True)
+    lowest, highest = ends
+    if (np.isnan(lowest) != np.isnan(highest)).any() or (lowest > highest).any():
+        raise kept.refusal("ranges", "a feature has one end only, or its highest value is below the lowest")
+    spread = kept.numbers("spread", (len(names),), missing=True, least=0.0)
+    if (np.isnan(spread) & ~np.isnan(lowest).all(axis=0)).any():
+        raise kept.refusal("spread", "it is missing for a feature that has a range")
     return Novelty(
         names=tuple(names),
         units=tuple(units),
@@ -179,7 +191,7 @@ def novelty_from(names: Sequence[str], units: Sequence[str], kept: Mapping[str, 
         lowest=lowest,
         highest=highest,
         spread=spread,
-        featureless=bool(kept["featureless"]),
+        featureless=kept.flag("featureless"),
     )
 
 

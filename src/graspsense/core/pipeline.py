@@ -11,7 +11,7 @@ from attrs import frozen
 
 from graspsense.core.anytime import Anytime, anytime_of
 from graspsense.core.config import Flag, Settings, resolve
-from graspsense.core.errors import named
+from graspsense.core.errors import FAILURES, named
 from graspsense.core.features import UNKNOWN, Features, Prediction, missing
 from graspsense.core.garbage_collection import no_collection
 from graspsense.core.model import Model, model_for
@@ -21,6 +21,14 @@ from graspsense.core.runner import Grasp, Sink, run_grasp
 from graspsense.core.signals import Outcome
 from graspsense.core.trial import GraspEvent, RunInfo, Trial
 from graspsense.core.wiring import check
+
+
+class GraspInterrupted(KeyboardInterrupt):
+    """The user asked for an end during a grasp. The gripper was released; `trial` is what was measured until then."""
+
+    def __init__(self, trial: Trial) -> None:
+        super().__init__()
+        self.trial = trial
 
 
 @frozen(eq=False, kw_only=True)
@@ -43,7 +51,8 @@ class Pipeline:
         """Run one grasp and return the trial, whatever its outcome.
 
         `object` and `seed` override `gripper.object` and `run.seed`. Raises ConfigError if the gripper has no setting
-        `object`, UnknownName for an unknown object, NoDevice if the gripper is not connected.
+        `object`, UnknownName for an unknown object, NoDevice if the gripper is not connected, and GraspInterrupted,
+        which has the trial, on Ctrl-C, so that a loop over grasps ends too.
         """
         if object is not None or seed is not None:
             flags = (Flag("object", "gripper.object", object), Flag("seed", "run.seed", seed))
@@ -87,7 +96,10 @@ def grasp_with(
     on_event: Callable[[GraspEvent], None] | None = None,
     on_open: Callable[[DeviceInfo], None] | None = None,
 ) -> Trial:
-    """Run one grasp with these settings: build the components, grasp, extract features, predict, notify observers."""
+    """Run one grasp with these settings: build the components, grasp, extract features, predict, notify observers.
+
+    Raises GraspInterrupted, which has the trial, if the user asked for an end; the gripper was then released.
+    """
     # The model is loaded first, because a missing model must be reported before the grasp.
     model = model_for(settings, plugins)
     backend, controller = settings.gripper.create(), settings.controller.create()
@@ -132,6 +144,8 @@ def grasp_with(
         warnings=grasp.warnings,
     )
     plugins.run_finished(run, trial)
+    if grasp.interrupted:
+        raise GraspInterrupted(trial)
     return trial
 
 
@@ -167,13 +181,13 @@ def _recognised(
     """Return the features and the prediction of a whole grasp; its trace is kept whatever fails here."""
     try:
         features = feature_set.extract(grasp.trace)
-    except Exception as error:
+    except FAILURES as error:
         features = _undefined(settings, f"{settings.features.component.qualified} failed: {named(error)}")
     if model is None:
         return features, None
     try:
         return features, model.predict(features, settings, grasp.device)
-    except Exception as error:
+    except FAILURES as error:
         why = f"{model.component} failed: {named(error)}"
         return features, Prediction(label=UNKNOWN, probabilities={}, because=(why,))
 

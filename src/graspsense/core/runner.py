@@ -19,11 +19,19 @@ from attrs import evolve, frozen
 from graspsense.core.binding import bind, maker
 from graspsense.core.contact import RestState, at_rest, update_rest
 from graspsense.core.entries import Channel
-from graspsense.core.errors import DeviceLost, GraspsenseError, RecordingEnded, TareRefused, named
+from graspsense.core.errors import (
+    FAILURES,
+    DeviceLost,
+    GraspsenseError,
+    RecordingEnded,
+    TareRefused,
+    named,
+)
 from graspsense.core.faults import Fault
 from graspsense.core.garbage_collection import no_collection
 from graspsense.core.guard import GuardParams, GuardState, guard
 from graspsense.core.interrupts import Interrupts
+from graspsense.core.plain_command import with_plain_commands
 from graspsense.core.protection.protection import Protection
 from graspsense.core.roles import Controller, DeviceInfo, SensorBackend
 from graspsense.core.run_config import RunConfig
@@ -89,6 +97,8 @@ class Grasp:
     seconds_simulated: float | None
     seconds_wall: float
     warnings: tuple[str, ...] = ()
+    interrupted: bool = False
+    """Whether the user asked for an end; a signal during the release leaves the outcome as it was."""
 
 
 def tick_params(info: DeviceInfo, controller: Controller[Any], run: RunConfig) -> TickParams:
@@ -153,7 +163,13 @@ def ended_by_itself(stopped: int, outcome: int) -> tuple[Outcome, str]:
     """
     if stopped:
         return Outcome.ABORTED, "the controller commanded NaN, so the guard stopped the grasp"
-    return Outcome(outcome), ""
+    try:
+        return Outcome(outcome), ""
+    except ValueError:
+        return (
+            Outcome.ABORTED,
+            f"the controller ended the grasp with the outcome {outcome!r}, which there is not",
+        )
 
 
 def run_grasp(
@@ -192,13 +208,13 @@ def run_grasp(
         # The trace must survive a backend that fails on closing.
         try:
             backend.close()
-        except Exception as error:
+        except FAILURES as error:
             reason = f"the gripper could not be closed: {named(error)} ({reason or outcome.words})"
             outcome = Outcome.ABORTED
         # After closing, so that the report covers it.
         try:
             report = dict(backend.report())
-        except Exception as error:
+        except FAILURES as error:
             report = {"report_failed": named(error)}
     frames = grasp.recorder.frames
     commands = backend.recorded_commands()
@@ -215,7 +231,26 @@ def run_grasp(
         seconds_simulated=grasp.seconds() if info.clock == "virtual" else None,
         seconds_wall=time.perf_counter() - began,
         warnings=() if grasp.protection is None else grasp.protection.warnings,
+        interrupted=grasp.interrupted or interrupts.count > 0,
     )
+
+
+def run_uninterrupted(
+    backend: SensorBackend[Any],
+    controller: Controller[Any],
+    run: RunConfig,
+    *,
+    on_event: Callable[[GraspEvent], None] | None = None,
+    on_open: Callable[[DeviceInfo], None] | None = None,
+) -> Grasp:
+    """Run one grasp as `run_grasp` does, for a caller that has no use for an interrupted one.
+
+    Raises KeyboardInterrupt, after the gripper was released, if the user asked for an end.
+    """
+    grasp = run_grasp(backend, controller, run, on_event=on_event, on_open=on_open)
+    if grasp.interrupted:
+        raise KeyboardInterrupt
+    return grasp
 
 
 def _opened(backend: SensorBackend[Any], seed: int) -> DeviceInfo:
@@ -225,6 +260,8 @@ def _opened(backend: SensorBackend[Any], seed: int) -> DeviceInfo:
         info = backend.open(seed)
     except GraspsenseError:
         raise
+    except SystemExit as error:
+        raise DeviceLost(f"`open` of the gripper {name} raised {named(error)}") from error
     except Exception as error:
         error.add_note(f"`open` of the gripper {name} raised it")
         raise
@@ -263,7 +300,7 @@ class _Grasp:
         self.backend, self.run, self.info, self.on_event = backend, run, info, on_event
         self.watcher: Watcher | None = None
         self.stop_reason = ""
-        self.sinks, self.interrupts = list(sinks), interrupts
+        self.sinks, self.interrupts, self.interrupted = list(sinks), interrupts, False
         self.step = type(controller).step
         self.event_names = type(controller).events
         self.params = tick_params(info, controller, run)
@@ -294,11 +331,13 @@ class _Grasp:
         except (TareRefused, _Overdue) as error:
             ending = Outcome.ABORTED, str(error)
         except KeyboardInterrupt:
+            self.interrupted = True
             ending = Outcome.ABORTED, "interrupted"
-        except Exception as error:
+        except FAILURES as error:
             # A controller can raise anything; the gripper must still be released and the trace kept.
             ending = Outcome.ABORTED, named(error)
         finally:
+            self.interrupts.deferred = True
             # A lost gripper may still receive commands, so it is commanded to relax.
             fault = self._fault()
             self._let_go(opens=not (lost or self.state.done or (fault is not None and fault.relaxes)))
@@ -310,10 +349,9 @@ class _Grasp:
         if self.stop_reason and not failed:
             return Outcome.RECOGNISED, self.stop_reason
         if self.state.law.outcome != RUNNING and failed:
-            ending = (
-                ending[0],
-                f"{ending[1]} (after the grasp had ended: {Outcome(self.state.law.outcome).words})",
-            )
+            before, unknown = ended_by_itself(0, self.state.law.outcome)
+            if not unknown:
+                ending = ending[0], f"{ending[1]} (after the grasp had ended: {before.words})"
         return ending
 
     def seconds(self) -> float:
@@ -322,7 +360,8 @@ class _Grasp:
 
     def _loop(self) -> None:
         read, apply, run = self.backend.read, self.backend.apply, self.run
-        advance = bind(tick, step=self.step, events_told=events_of(self.step), TickState=maker(TickState))
+        step = with_plain_commands(self.step)
+        advance = bind(tick, step=step, events_told=events_of(self.step), TickState=maker(TickState))
         params, record, protection = self.params, self.recorder.add, self.protection
         on_device_clock = self.info.clock == "device"
         late_s = run.late_periods / self.info.rate_hz if on_device_clock else float("inf")
@@ -415,7 +454,7 @@ class _Grasp:
         for sink in self.sinks:
             try:
                 sink.take(reading, phase, command)
-            except Exception as error:
+            except FAILURES as error:
                 self.sinks = [other for other in self.sinks if other is not sink]
                 self._event(reading.frame.t_s, Phase(phase), f"{type(sink).__name__} failed: {named(error)}")
 
@@ -458,7 +497,7 @@ class _Grasp:
             self.on_event(event)
         for sink in self.sinks:
             if isinstance(sink, EventSink):
-                with suppress(Exception):  # as with ticks, a failing sink must not change the outcome
+                with suppress(*FAILURES):  # as with ticks, a failing sink must not change the outcome
                     sink.event(event)
         return event
 
@@ -500,9 +539,9 @@ class _Grasp:
                         frame.t_s - began_s > run.opening_timeout_s
                     ):
                         break
-        except (KeyboardInterrupt, Exception):
+        except (KeyboardInterrupt, *FAILURES):
             pass
-        with suppress(KeyboardInterrupt, Exception):
+        with suppress(KeyboardInterrupt, *FAILURES):
             self.backend.apply(info.relaxed)
 
     def _recording_ended(self) -> tuple[Outcome, str]:

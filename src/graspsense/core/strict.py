@@ -18,13 +18,20 @@ import attrs
 import cattrs
 from attrs import frozen
 
-from graspsense.core.errors import suggestion
+from graspsense.core.errors import FAILURES, suggestion
 from graspsense.core.setting import declared, implausible
 from graspsense.core.toml_lines import KeyPath
+from graspsense.core.toml_text import LARGEST_INTEGER
 
 ConfigT = TypeVar("ConfigT")
 
 _NUMBER_WITH_UNIT: Final = re.compile(r"\s*([-+]?\d+(?:\.\d*)?(?:[eE][-+]?\d+)?)\s*[^\d\s]\S*\s*")
+
+
+LONGEST_SHOWN: Final = 200
+"""Limit on the characters of a text that an error repeats."""
+MOST_UNKNOWN: Final = 20
+"""Limit on the unknown keys of one table that an error lists."""
 
 
 @frozen
@@ -60,7 +67,11 @@ def structured(values: Mapping[str, Any], cls: type[ConfigT], called: str) -> Co
     """
     attrs.resolve_types(cls)  # type: ignore[type-var]
     fields = {one.alias: one for one in attrs.fields(cls) if one.init}  # type: ignore[arg-type]
-    problems = [InvalidValue((key,), _unknown(key, fields, called)) for key in values if key not in fields]
+    unknown = [key for key in values if key not in fields]
+    problems = [InvalidValue((key,), _unknown(key, fields, called)) for key in unknown[:MOST_UNKNOWN]]
+    if len(unknown) > MOST_UNKNOWN:
+        text = f"{called} has {len(unknown) - MOST_UNKNOWN} more keys that are not known"
+        problems.append(InvalidValue((unknown[MOST_UNKNOWN],), text))
     given: dict[str, Any] = {}
     for name, field in fields.items():
         if name not in values:
@@ -73,12 +84,12 @@ def structured(values: Mapping[str, Any], cls: type[ConfigT], called: str) -> Co
             )
         except ValidationFailed as misfit:
             problems += misfit.under(name)
-        except Exception as error:  # for a type without a rule below
+        except FAILURES as error:  # for a type without a rule below
             problems.append(InvalidValue((name,), f"cannot be read as {field.type}: {_words(error)}"))
     if not problems:
         try:
             return cls(**given)
-        except Exception as error:
+        except FAILURES as error:
             raise ValidationFailed(
                 _complaints(cls, fields, given) or [InvalidValue((), _words(error))]
             ) from error
@@ -164,7 +175,7 @@ def _complaints(
     try:
         with attrs.validators.disabled():
             instance = cls(**given)
-    except Exception:
+    except FAILURES:
         return []
     problems = []
     for name in given:
@@ -172,12 +183,12 @@ def _complaints(
         if field.validator is not None:
             try:
                 field.validator(instance, field, getattr(instance, field.name))
-            except Exception as error:
+            except FAILURES as error:
                 problems.append(InvalidValue((name,), _words(error)))
     return problems
 
 
-def _words(error: Exception) -> str:
+def _words(error: BaseException) -> str:
     """Return the text of an error, without the attribute and the value that errors of attrs append."""
     return (
         error.args[0] if error.args and isinstance(error.args[0], str) else f"{type(error).__name__}: {error}"
@@ -186,7 +197,7 @@ def _words(error: Exception) -> str:
 
 def _unknown(key: str, known: Iterable[str], called: str) -> str:
     names = sorted(known)
-    return f"{called} has no key {key!r}.{suggestion(key, names)} It has: {', '.join(names) or 'none'}"
+    return f"{called} has no key {key[:LONGEST_SHOWN]!r}.{suggestion(key, names)} It has: {', '.join(names) or 'none'}"
 
 
 def shown(value: object) -> str:
@@ -194,9 +205,12 @@ def shown(value: object) -> str:
     if isinstance(value, bool):
         return f"{str(value).lower()} (a boolean)"
     if isinstance(value, str):
-        return f"{value!r} (text)"
+        more = "..." if len(value) > LONGEST_SHOWN else ""
+        return f"{value[:LONGEST_SHOWN]!r}{more} (text)"
     if isinstance(value, int):
-        return f"{value} (a whole number)"
+        # Python refuses to write very long numbers in decimal digits.
+        digits = str(value) if value.bit_length() <= 1000 else f"a number of {value.bit_length()} bits"
+        return f"{digits} (a whole number)"
     if isinstance(value, float):
         return f"{value} (a number)"
     if isinstance(value, Mapping):
@@ -219,6 +233,8 @@ def _bool(value: object, _: object) -> bool:
 def _int(value: object, _: object) -> int:
     if isinstance(value, bool) or not isinstance(value, int):
         raise _expected("a whole number", value)
+    if not -LARGEST_INTEGER - 1 <= value <= LARGEST_INTEGER:
+        raise _expected(f"a whole number of at most {LARGEST_INTEGER}", value)
     return value
 
 
@@ -301,6 +317,8 @@ def _sequence(value: object, cls: Any) -> Any:
             items.append(_CONVERTER.structure(one, member))
         except ValidationFailed as misfit:
             problems += misfit.under(index)
+            if len(problems) >= MOST_UNKNOWN:
+                break
     if problems:
         raise ValidationFailed(problems)
     return items if kind is list else tuple(items)
@@ -317,6 +335,8 @@ def _mapping(value: object, cls: Any) -> Any:
             items[key] = _CONVERTER.structure(one, member)
         except ValidationFailed as misfit:
             problems += misfit.under(key)
+            if len(problems) >= MOST_UNKNOWN:
+                break
     if problems:
         raise ValidationFailed(problems)
     return items

@@ -6,7 +6,6 @@ A trial has such numbers among its labels, under a heading with the unit as in a
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping, Sequence
 from typing import Final
 
@@ -14,7 +13,6 @@ from attrs import frozen
 
 from graspsense.core.errors import ConfigError, suggestion
 
-_HEADING: Final = re.compile(r"(?P<name>.*?)\s*\[(?P<unit>[^\[\]]*)\]")
 RESERVED: Final = ("label", "instance", "order", "recorded_at", "operator")
 """Labels of a trial that are not numbers to predict."""
 
@@ -34,8 +32,8 @@ def name_and_unit(heading: str) -> tuple[str, str]:
     >>> name_and_unit("break_force [N]"), name_and_unit("ripeness")
     (('break_force', 'N'), ('ripeness', ''))
     """
-    match = _HEADING.fullmatch(heading)
-    return (match["name"], match["unit"].strip()) if match else (heading, "")
+    name, bracket, unit = heading[:-1].rpartition("[") if heading.endswith("]") else ("", "", "")
+    return (name.rstrip(), unit.strip()) if bracket and "]" not in unit else (heading, "")
 
 
 def value_label(text: str) -> tuple[str, str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
@@ -14,6 +15,7 @@ from graspsense.core.config import Settings, build, resolve
 from graspsense.core.entries import TABLE_OF_ROLE
 from graspsense.core.errors import ConfigError, GraspsenseError, UnknownName, suggestion
 from graspsense.core.layers import Layer, Merged, dotted, option_layers, read_toml
+from graspsense.core.limits import CASES
 from graspsense.core.model import worded
 from graspsense.core.plugins import installed
 from graspsense.core.strict import InvalidValue, ValidationFailed, plain, structured
@@ -28,6 +30,8 @@ SWEPT_TABLES: Final = (*PIPELINE_TABLES, "classifier", "data", "test", "judge")
 DEFAULT_CLASSIFIER: Final = "c45"
 MOST_SEEDS: Final = 10_000
 """Largest number of seeds; intervals hardly narrow with more."""
+LARGEST_SEED: Final = 2**32 - 1
+"""The largest seed; the trials of a seed have seeds of their own, up to a million times as large."""
 
 
 def _seeds(experiment: object, attribute: object, value: int | tuple[int, ...]) -> None:
@@ -36,6 +40,8 @@ def _seeds(experiment: object, attribute: object, value: int | tuple[int, ...]) 
     number = value if isinstance(value, int) else len(value)
     if number > MOST_SEEDS:
         raise ValueError(f"{number} seeds: give at most {MOST_SEEDS}; every case has one task for each seed")
+    if not isinstance(value, int) and value and max(value) > LARGEST_SEED:
+        raise ValueError(f"{max(value)} as a seed: give at most {LARGEST_SEED}")
     if not isinstance(value, int) and (not value or len(set(value)) < len(value) or min(value) < 0):
         raise ValueError("seeds: give their number, or a list of different integers from 0 on")
 
@@ -263,6 +269,7 @@ class _Plan:
         if not pipelines:
             raise ConfigError(f"{self.layer.where(('pipelines',))}: pipelines: name at least one")
         sweep = self._sweep()
+        self._check_cases(sweep, len(pipelines))
         cases = []
         for pipeline, settings in pipelines.items():
             for variant in one.variants or (Variant(name=""),):
@@ -277,6 +284,14 @@ class _Plan:
         if self.complaints:
             raise ConfigError("\n".join(dict.fromkeys(self.complaints)))
         return Planned(name=self.name, experiment=one, cases=tuple(cases), seeds=seeds, pipelines=pipelines)
+
+    def _check_cases(self, sweep: Mapping[tuple[str, ...], Sequence[Any]], pipelines: int) -> None:
+        """Raise ConfigError if there are too many cases, before any of them is made."""
+        one = self.experiment
+        cases = pipelines * max(len(one.variants), 1) * max(len(one.classifiers), 1)
+        cases *= math.prod(len(values) for values in sweep.values())
+        if too_many := CASES.exceeded(cases):
+            raise ConfigError(f"{self.layer.label}: {too_many}")
 
     def _sweep(self) -> dict[tuple[str, ...], Sequence[Any]]:
         """Return the values of each swept key, by its path."""

@@ -5,12 +5,12 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from html import escape
-from pathlib import Path
 from typing import Any, Final
 
 from attrs import field, frozen
 
 from graspsense.experiments.summary import ConditionResult
+from graspsense.recording.provenance import commit_text
 from graspsense.report.html import Section, bullets, paragraph, table
 
 MARKDOWN: Final = "report.md"
@@ -85,14 +85,12 @@ class Findings:
 
     def markdown(self, title: str, made: Mapping[str, Any], cpu_seconds: float) -> str:
         """Return the findings as Markdown, with the command, date and machine."""
-        git = (made.get("git") or {}).get("graspsense") or {}
-        commit = str(git.get("commit", "unknown"))[:12] + (" with changes" if git.get("dirty") else "")
         lines = [
             f"# {title}",
             "",
             "All grasps are simulated, with models of the gripper and of the objects.",
             f"Made by `{made.get('command', '')}`, begun {made.get('begun_at', '?')}, written "
-            f"{time.strftime('%Y-%m-%d', time.gmtime())}, on {made.get('system', '?')}, commit {commit}; "
+            f"{time.strftime('%Y-%m-%d', time.gmtime())}, on {made.get('system', '?')}, commit {commit_text(made)}; "
             f"{cpu_seconds:.0f} s of processor time in all tasks together.",
             "",
             self.answer,
@@ -103,11 +101,6 @@ class Findings:
         if self.notes:
             lines += ["## Notes", "", *(f"- {_cell(one)}" for one in self.notes), ""]
         return "\n".join(lines)
-
-
-def write_markdown(path: Path, text: str) -> None:
-    """Write the Markdown file."""
-    path.write_text(text, encoding="utf-8")
 
 
 def percent(rate: float) -> str:

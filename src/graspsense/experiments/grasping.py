@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from attrs import evolve, field, frozen
-from attrs.validators import ge
+from attrs.validators import ge, le
 
 from graspsense.core.config import settings_from
 from graspsense.core.contact import CONTACT_FORCE_N
@@ -17,7 +17,7 @@ from graspsense.core.errors import ConfigError
 from graspsense.core.roles import BatchBackend
 from graspsense.core.signals import Phase
 from graspsense.core.strict import structured
-from graspsense.experiments.task_results import GraspResult, GraspRow
+from graspsense.experiments.task_results import MOST_KEPT_GRASPS, GraspResult, GraspRow
 from graspsense.report.grasp_curve import GraspCurve, grasp_curve
 from graspsense.sources.simulated import plan_trials
 from graspsense.sources.trial_source import TrialSource, groups_of
@@ -35,7 +35,7 @@ BEFORE_CONTACT_S: Final = 0.1
 class GraspSettings:
     """The keys of `[judge]`."""
 
-    grasps: int = field(default=1, validator=ge(0))
+    grasps: int = field(default=1, validator=[ge(0), le(MOST_KEPT_GRASPS)])
     """Grasps of each object whose curve is kept, from the first seed."""
 
 

@@ -10,11 +10,13 @@ from typing import Final
 
 from graspsense.core.model import worded
 from graspsense.experiments.answer import answer, headline
-from graspsense.experiments.findings import MARKDOWN, Findings, write_markdown
+from graspsense.experiments.findings import MARKDOWN, Findings
 from graspsense.experiments.kinds import kind_of
 from graspsense.experiments.results import EXPERIMENT, Results
 from graspsense.experiments.summary import ConditionResult, Summary
 from graspsense.experiments.task_results import RecognitionResult
+from graspsense.recording.atomic_file import write_or_replace
+from graspsense.recording.provenance import commit_text
 from graspsense.report.evaluation_sections import code, confusion_section, controls_section, tree_section
 from graspsense.report.html import Page, Section, bullets, facts, folded, pair, paragraph, table
 from graspsense.report.rates import RateRow, rates_over, rates_picture, rates_table
@@ -40,7 +42,7 @@ def write_page(summary: Summary, results: Results) -> Path:
     found = findings_of(summary)
     if found is not None:
         text = found.markdown(summary.planned.experiment.title, results.provenance(), summary.cpu_seconds)
-        write_markdown(results.folder / MARKDOWN, text)
+        write_or_replace(results.folder / MARKDOWN, text.encode())
     return path
 
 
@@ -264,8 +266,6 @@ def measurement_sections(summary: Summary, best: ConditionResult) -> list[Sectio
 def _made_of(summary: Summary, results: Results) -> Section:
     made = results.provenance()
     one = summary.planned.experiment
-    git = (made.get("git") or {}).get("graspsense") or {}
-    commit = f"{git.get('commit')}{' (with changes)' if git.get('dirty') else ''}" if git else "unknown"
     result = next(iter(summary.results.values()), None)
     notes = result.notes if isinstance(result, RecognitionResult) else ()
     pairs = [
@@ -276,7 +276,7 @@ def _made_of(summary: Summary, results: Results) -> Section:
         ("cases, seeds", f"{len(summary.planned.cases)} cases, seeds {_ranges(summary.planned.seeds)}"),
         ("computing time", f"{summary.seconds:.0f} s, all tasks together"),
         ("machine", f"{made.get('host', '?')}, {made.get('system', '?')}"),
-        ("code", f"graspsense {made.get('graspsense', '?')}, commit {commit}"),
+        ("code", f"graspsense {made.get('graspsense', '?')}, commit {commit_text(made)}"),
         *((f"hash of {name}", value) for name, value in (made.get("files") or {}).items()),
     ]
     versions = sorted((str(k), str(v)) for k, v in (made.get("versions") or {}).items())

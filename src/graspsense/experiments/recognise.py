@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 from attrs import field, frozen
-from attrs.validators import ge
+from attrs.validators import ge, le
 
 from graspsense.core.config import SelectedComponent, build, settings_from
 from graspsense.core.errors import ConfigError
@@ -15,7 +15,12 @@ from graspsense.core.labelled import class_of
 from graspsense.core.plugins import installed
 from graspsense.core.strict import structured
 from graspsense.evaluation.evaluate import evaluate
-from graspsense.experiments.task_results import ClassifierResult, RecognitionResult, TrialValues
+from graspsense.experiments.task_results import (
+    MOST_KEPT_GRASPS,
+    ClassifierResult,
+    RecognitionResult,
+    TrialValues,
+)
 from graspsense.report.grasp_curve import GraspCurve, grasp_curve
 from graspsense.sources.trial_source import TrialSource, labelled_trials
 
@@ -44,7 +49,7 @@ class EvaluationSettings:
     controls: bool = True
     """Whether to measure the controls."""
     learning_curve: bool = False
-    grasps: int = field(default=3, validator=ge(0))
+    grasps: int = field(default=3, validator=[ge(0), le(MOST_KEPT_GRASPS)])
     """Simulated grasps of each label that are kept for the page, from the first seed."""
 
 

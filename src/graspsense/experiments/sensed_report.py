@@ -6,9 +6,10 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from graspsense.core.errors import ConfigError, PluginUnavailable
+from graspsense.core.errors import PluginUnavailable
 from graspsense.core.trace_plot import MATPLOTLIB_HINT
 from graspsense.report.simulation import axes_of, markdown_table
+from graspsense.report.write import write_picture
 
 if TYPE_CHECKING:
     from graspsense.experiments.sensed import SensedPoint, SensedTrade
@@ -118,10 +119,7 @@ def sensed_png(trade: SensedTrade, path: Path) -> None:
         f"Simulated grasps, sensor {trade.sensor}, {len(trade.seeds)} seeds of {trade.grasps} grasps",
         fontsize=10,
     )
-    try:
-        figure.savefig(path, format="png")
-    except OSError as error:
-        raise ConfigError(f"the picture cannot be written to {path}: {error.strerror}") from error
+    write_picture(path, figure)
 
 
 def _draw_rates(ax: Any, trade: SensedTrade) -> None:

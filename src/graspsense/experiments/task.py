@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from attrs import field, frozen
 
-from graspsense.core.errors import DataDamaged, GraspsenseError, named
+from graspsense.core.errors import FAILURES, DataDamaged, GraspsenseError, named
 from graspsense.core.json_values import json_text
 from graspsense.evaluation.json_codec import from_json, to_json
 from graspsense.experiments.kinds import kind_of
@@ -137,7 +137,7 @@ def run_task(text: str) -> str:
         result = json.loads(json_text(to_json(returned)))
     except GraspsenseError as error:
         reason = str(error)
-    except (Exception, SystemExit) as error:
+    except FAILURES as error:
         reason, where = named(error), "".join(traceback.format_exception(error)[-6:])
     made = {
         "at": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(begun)),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from attrs import field, frozen
 
@@ -17,6 +17,10 @@ from graspsense.report.grasp_curve import GraspCurve
 
 if TYPE_CHECKING:
     from graspsense.core.labelled import Labelled
+
+
+MOST_KEPT_GRASPS: Final = 1000
+"""Limit on the grasps of each label whose curves are kept with a result."""
 
 
 @frozen(kw_only=True)

@@ -1,11 +1,11 @@
-"""Writing a file completely or not at all."""
+"""Writing a file of the user's completely or not at all, with an error that says which file and why."""
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 from graspsense.core.errors import ConfigError, GraspsenseError
+from graspsense.core.whole_file import write_whole
 
 
 class SaveFailed(GraspsenseError):
@@ -16,9 +16,12 @@ class SaveFailed(GraspsenseError):
 
 def write_new(path: Path, data: bytes) -> None:
     """Write a new file. Raises ConfigError if it already exists, SaveFailed if it cannot be written."""
-    if path.exists():
-        raise ConfigError(f"{path} already exists: name another file, or move it away")
-    write_or_replace(path, data)
+    try:
+        write_whole(path, data, replace=False)
+    except FileExistsError:
+        raise ConfigError(f"{path} already exists: name another file, or move it away") from None
+    except OSError as error:
+        raise SaveFailed(f"{path} cannot be written: {error.strerror}") from error
 
 
 def write_or_replace(path: Path, data: bytes, *, make_folder: bool = False) -> None:
@@ -26,25 +29,9 @@ def write_or_replace(path: Path, data: bytes, *, make_folder: bool = False) -> N
 
     `make_folder` creates the folder of the file if it does not exist. Raises SaveFailed.
     """
-    part = path.with_name(path.name + ".part")
     try:
         if make_folder:
             path.parent.mkdir(parents=True, exist_ok=True)
-        with part.open("wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(part, path)
-        sync_folder(path.parent)
+        write_whole(path, data)
     except OSError as error:
-        part.unlink(missing_ok=True)
         raise SaveFailed(f"{path} cannot be written: {error.strerror}") from error
-
-
-def sync_folder(folder: Path) -> None:
-    """Wait until the disk has the folder's entries, so that a new name survives a loss of power. Raises OSError."""
-    fd = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(fd)
-    finally:
-        os.close(fd)

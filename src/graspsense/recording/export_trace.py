@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import csv
 import io
 import json
-import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -13,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from graspsense.core.channels import as_json
+from graspsense.core.csv_text import csv_text
 from graspsense.core.entries import FastChannel
 from graspsense.core.trace import PAD_COLUMNS, TICK_COLUMNS, ImageTrace
 from graspsense.recording.atomic_file import write_new
@@ -137,12 +136,7 @@ def _flat(rows: NDArray[np.void]) -> Table:
 
 
 def _csv(rows: Sequence[tuple[Any, ...]], fields: tuple[str, ...]) -> bytes:
-    out = io.StringIO(newline="")
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(fields)
-    for row in rows:
-        writer.writerow(["" if isinstance(cell, float) and math.isnan(cell) else repr(cell) for cell in row])
-    return out.getvalue().encode()
+    return csv_text([fields, *rows]).encode()
 
 
 def _declared(grasp: RecordedGrasp) -> dict[str, Any]:

@@ -120,7 +120,8 @@ def with_pictures(grasp: RecordedGrasp) -> bytes:
 def raw_image_message(time_ns: int, frame_id: str, picture: NDArray[np.uint8]) -> bytes:
     """Return a RawImage with the encoding `mono8` in CDR, given its pixels, shape (height, width)."""
     height, width = picture.shape
-    body = struct.pack("<iI", time_ns // NS, time_ns % NS) + _text(frame_id)
+    # The format ends in 2038; a viewer places the message by its own time, which does not.
+    body = struct.pack("<iI", min(time_ns // NS, 2**31 - 1), time_ns % NS) + _text(frame_id)
     body += struct.pack("<II", width, height) + _text("mono8")
     return CDR_HEADER + body + struct.pack("<II", width, picture.size) + picture.tobytes()
 

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-import os
 import platform
-import subprocess
 from collections.abc import Mapping
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
@@ -14,11 +12,11 @@ from typing import TYPE_CHECKING, Any, Final
 
 from graspsense import __version__
 from graspsense.core.json_values import json_text
+from graspsense.recording.checkout import checkout_state
 
 if TYPE_CHECKING:
     from graspsense.core.config import Settings
 
-GIT_S: Final = 2.0
 _WITH: Final = ("numpy", "scikit-learn", "mcap")
 
 
@@ -55,7 +53,7 @@ def recipe(values: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]
 @cache
 def process_provenance() -> Mapping[str, Any]:
     """Return library versions, the commits of the code and of the current folder, and the machine."""
-    code, work = _commit(Path(__file__).parent), _commit(Path.cwd())
+    code, work = checkout_state(Path(__file__).parent), checkout_state(Path.cwd())
     return {
         "graspsense": __version__,
         "python": platform.python_version(),
@@ -66,35 +64,18 @@ def process_provenance() -> Mapping[str, Any]:
     }
 
 
+def commit_text(made: Mapping[str, Any]) -> str:
+    """Return the commit of graspsense's code in a provenance, and whether its files had changes, as text."""
+    git = (made.get("git") or {}).get("graspsense") or {}
+    if not git.get("commit"):
+        return "unknown"
+    dirty = git.get("dirty")
+    changes = " (changes unknown)" if dirty is None else " (with changes)" if dirty else ""
+    return f"{str(git['commit'])[:12]}{changes}"
+
+
 def _version(name: str) -> str | None:
     try:
         return version(name)
     except PackageNotFoundError:
         return None
-
-
-def _commit(folder: Path) -> dict[str, Any] | None:
-    """Return commit and dirty flag of the checkout that contains this folder, or None."""
-    commit = _git(folder, "rev-parse", "HEAD")
-    if commit is None:
-        return None
-    # Ignored and untracked files are not part of the code that ran.
-    changed = _git(folder, "status", "--porcelain", "--untracked-files=no")
-    return {"commit": commit, "dirty": None if changed is None else bool(changed)}
-
-
-def _git(folder: Path, *arguments: str) -> str | None:
-    # The configuration of a checkout may name programs to run; disable those that `status` would run.
-    command = ["git", "-c", "core.fsmonitor=false", "-c", "core.hooksPath=/dev/null", "-C", str(folder)]
-    try:
-        done = subprocess.run(
-            [*command, *arguments],
-            capture_output=True,
-            text=True,
-            timeout=GIT_S,
-            env={**os.environ, "GIT_OPTIONAL_LOCKS": "0", "LC_ALL": "C"},
-            check=False,
-        )
-    except (OSError, subprocess.TimeoutExpired):
-        return None
-    return done.stdout.strip() if done.returncode == 0 else None

@@ -7,21 +7,19 @@ from __future__ import annotations
 
 import json
 import struct
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, BinaryIO, Final
 
 import numpy as np
-import zstandard
 from attrs import evolve, field, frozen
 from mcap.exceptions import McapError
 from mcap.records import Channel, Chunk, DataEnd, Footer, Header, McapRecord, Message, Metadata, Schema
-from mcap.stream_reader import StreamReader, breakup_chunk
 
 from graspsense.core.channels import declared_shape, further, no_signals, signal_type
 from graspsense.core.entries import Channel as DeclaredChannel
 from graspsense.core.entries import FastChannel, TactileArray
-from graspsense.core.errors import ConfigError, DataDamaged
+from graspsense.core.errors import ConfigError, DataDamaged, TooLarge, named
 from graspsense.core.signals import Frame, Image, Pads, Phase, Reading, Samples, no_pads
 from graspsense.core.trace import SI_UNITS, Trace, trace_of
 from graspsense.core.trial import GraspEvent, event_from_json
@@ -42,27 +40,17 @@ from graspsense.recording.layout import (
     Topic,
     pads_topic,
 )
+from graspsense.recording.mcap_records import records_in, records_of
+from graspsense.recording.readable import readable, refuse_devices
 from graspsense.recording.replayable import REPLAY_NOTE, Recording
 from graspsense.recording.trial_record import DeviceRecord, TrialRecord
+from graspsense.recording.unpacked import Unpacked
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 LARGEST_RECORD: Final = 1 << 26
 """Limit on the size of a record, compressed or not; 64 MB would be a chunk of more than five minutes."""
-
-_DAMAGE: Final = (
-    McapError,
-    struct.error,
-    ValueError,
-    KeyError,
-    TypeError,
-    IndexError,
-    EOFError,
-    ArithmeticError,
-    MemoryError,
-    RuntimeError,
-)
 
 
 @frozen(kw_only=True, eq=False)
@@ -152,13 +140,21 @@ class RecordedGrasp:
         return (*(channel for channel in self.device.channels if channel.name == "pads"), *kept)
 
     def events(self) -> tuple[GraspEvent, ...]:
-        """Return the events that the controller told, also of a grasp that was cut off."""
+        """Return the events that the controller told, also of a grasp that was cut off.
+
+        Those of a damaged recording, of which only a part was read, may be missing.
+        """
         try:
+            return self.told_events()
+        except DataDamaged:
+            return ()
+
+    def told_events(self) -> tuple[GraspEvent, ...]:
+        """Return the events that the controller told. Raises DataDamaged if they cannot be read."""
+        with readable(f"the list of events of the recording {self.path}"):
             result = self.record().result
             listed = self._events_as_told() if result is None else result.details.get("events", ())
             return tuple(event_from_json(one) for one in listed if one.get("source") == "controller")
-        except (DataDamaged, *_DAMAGE):
-            return ()
 
     def _events_as_told(self) -> list[Any]:
         """Return the events that were written when they happened."""
@@ -167,7 +163,11 @@ class RecordedGrasp:
         return [json.loads(self.metadata[name]["event"]) for name in names]
 
     def trace(self) -> Trace:
-        """Return the trace of the grasp."""
+        """Return the trace of the grasp. Raises DataDamaged if its messages do not fit each other."""
+        with readable(f"the recording {self.path}"):
+            return self._trace()
+
+    def _trace(self) -> Trace:
         phases, commands = self.ticks["phase"].tolist(), self.ticks["command"].tolist()
         readings = self.readings()
         trace = trace_of(
@@ -246,7 +246,11 @@ class RecordedGrasp:
         return (len(times) - 1) / elapsed if elapsed > 0.0 else 1000.0
 
     def recording(self) -> Recording:
-        """Return the grasp in the form that a gripper can replay."""
+        """Return the grasp in the form that a gripper can replay. Raises DataDamaged as `trace`."""
+        with readable(f"the recording {self.path}"):
+            return self._recording()
+
+    def _recording(self) -> Recording:
         units = {name: unit for name, unit in self.units.items() if SI_UNITS.get(name) != unit}
         # An imported recording has no commands, and ends where the imported file ends.
         known = not np.isnan(self.ticks["command"]).any()
@@ -266,37 +270,24 @@ def read_recorded(path: str | Path, *, salvage: bool = False) -> RecordedGrasp:
     """Return the grasp in a recording.
 
     With `salvage`, return what can be read of a file that is damaged or has no end. Without it, such a file raises
-    DataDamaged. Raises ConfigError if the file cannot be opened.
+    DataDamaged. Raises ConfigError if the file cannot be opened, TooLarge if it unpacks to more than is allowed.
     """
     path = Path(path).expanduser()
     reading = _PartialGrasp(path)
-    damage = ""
-    try:
+    with readable(f"the recording {path}"):
+        refuse_devices(path)
+        if not path.exists():
+            raise _missing(path)
         with path.open("rb") as file:
-            try:
-                for record in StreamReader(
-                    file, emit_chunks=True, validate_crcs=True, record_size_limit=LARGEST_RECORD
-                ).records:
-                    damage = reading.take(record) or damage
-                    if damage and not salvage:
-                        break
-                if not damage and file.read(1):
-                    damage = "there is data after its end"
-            except _DAMAGE as error:
-                damage = damage or f"{type(error).__name__}: {error}".removesuffix(": ")
-    except FileNotFoundError:
-        unfinished = path.with_name(path.name + PART)
-        hint = f"; {unfinished.name} was never finished: graspsense recover" if unfinished.is_file() else ""
-        raise ConfigError(f"there is no recording {path}{hint}") from None
-    except OSError as error:
-        raise ConfigError(f"the recording {path} cannot be read: {error.strerror}") from error
+            damage = reading.take_all(file, salvage)
     if not salvage:
         damage = damage or reading.shortfall()
         if damage:
-            raise DataDamaged(
-                f"the recording {path} is damaged: {damage}. `graspsense recover {path}` saves what can be read"
-            )
-    return reading.grasp(damage, salvage)
+            raise _damaged(path, damage)
+    grasp = reading.grasp(damage, salvage)
+    if not salvage:
+        grasp.told_events()
+    return grasp
 
 
 def read_first_frame(path: Path) -> Frame | None:
@@ -305,22 +296,29 @@ def read_first_frame(path: Path) -> Frame | None:
     Raises ConfigError if the file cannot be opened, DataDamaged if it cannot be read up to the first frame.
     """
     reading = _PartialGrasp(path)
-    try:
+    with readable(f"the recording {path}"):
+        refuse_devices(path)
         with path.open("rb") as file:
-            for record in StreamReader(
-                file, emit_chunks=True, validate_crcs=True, record_size_limit=LARGEST_RECORD
-            ).records:
+            for record in reading.records(file):
                 damage = reading.take(record)
                 ticks = reading.bodies[TICK_TOPIC]
                 if damage:
                     raise DataDamaged(f"the recording {path} is damaged: {damage}")
                 if ticks:
                     return Frame(*TICK.unpack(ticks[0])[: len(Frame._fields)])
-    except OSError as error:
-        raise ConfigError(f"the recording {path} cannot be read: {error.strerror}") from error
-    except _DAMAGE as error:
-        raise DataDamaged(f"the recording {path} is damaged: {error}") from error
     return None
+
+
+def _damaged(path: Path, problem: str) -> DataDamaged:
+    return DataDamaged(
+        f"the recording {path} is damaged: {problem}. `graspsense recover {path}` saves what can be read"
+    )
+
+
+def _missing(path: Path) -> ConfigError:
+    unfinished = path.with_name(path.name + PART)
+    hint = f"; {unfinished.name} was never finished: graspsense recover" if unfinished.is_file() else ""
+    return ConfigError(f"there is no recording {path}{hint}")
 
 
 class _PartialGrasp:
@@ -338,6 +336,27 @@ class _PartialGrasp:
         self.lost = 0
         self.base_ns: int | None = None
         self.ended = self.started = False
+        self._unpacked = Unpacked(f"the recording {path}")
+
+    def records(self, file: BinaryIO) -> Iterator[McapRecord]:
+        """Yield the records of the file. Raises TooLarge, and what the library raises on a damaged file."""
+        return records_of(file, self._unpacked, largest=LARGEST_RECORD, validate_crcs=True)
+
+    def take_all(self, file: BinaryIO, salvage: bool) -> str:
+        """Add all records of a file, with `salvage` also those behind a damaged chunk. Return its damage."""
+        damage = ""
+        try:
+            for record in self.records(file):
+                damage = self.take(record) or damage
+                if damage and not salvage:
+                    return damage
+            if not damage and file.read(1):
+                damage = "there is data after its end"
+        except (TooLarge, MemoryError, OSError):
+            raise
+        except Exception as error:
+            damage = damage or named(error).removesuffix(": ")
+        return damage
 
     def take(self, record: McapRecord) -> str:
         """Add one MCAP record. Return a description of its damage, or an empty text."""
@@ -345,10 +364,14 @@ class _PartialGrasp:
             self.started = True
         elif isinstance(record, Chunk):
             try:
-                for inner in _unpacked(record):
+                if record.compression not in ("", "zstd"):
+                    raise ValueError(f"its compression {record.compression[:20]!r} is not supported")
+                for inner in records_in(record, self._unpacked):
                     self._content(inner)
-            except _DAMAGE as error:
-                return f"a chunk cannot be read ({type(error).__name__}: {error})"
+            except (TooLarge, MemoryError):
+                raise
+            except Exception as error:
+                return f"a chunk cannot be read ({named(error)})"
         elif isinstance(record, Metadata):
             self.metadata[record.name] = dict(record.metadata)
         elif isinstance(record, Message):
@@ -375,7 +398,7 @@ class _PartialGrasp:
             )
         if not self.started and not salvage:
             raise DataDamaged(f"{self.path} is not an MCAP file: {damage or 'its header is missing'}")
-        try:
+        with readable(f"the recording {self.path}"):
             device = DeviceRecord.from_text(self.metadata.get(DEVICE, {}).get("device", "{}"))
             topics = {
                 name: TopicRows(
@@ -386,20 +409,21 @@ class _PartialGrasp:
                 for name, topic in self.layouts.items()
                 if self.bodies[name]
             }
-            grasp = RecordedGrasp(
-                path=self.path,
-                ticks=np.frombuffer(b"".join(self.bodies[TICK_TOPIC]), dtype=_TICK_ROW),
-                topics=topics,
-                metadata=self.metadata,
-                complete=self.ended and not damage and not self.lost,
-                damage=damage,
-                lost=self.lost,
-                base_ns=self.base_ns,
-                device=device,
-            )
-        except _DAMAGE as error:
-            raise DataDamaged(f"the recording {self.path} is damaged: {error}") from error
-        return grasp
+            ticks = np.frombuffer(b"".join(self.bodies[TICK_TOPIC]), dtype=_TICK_ROW)
+        problem = _impossible(ticks)
+        if problem:
+            raise DataDamaged(f"the recording {self.path} is damaged: {problem}")
+        return RecordedGrasp(
+            path=self.path,
+            ticks=ticks,
+            topics=topics,
+            metadata=self.metadata,
+            complete=self.ended and not damage and not self.lost,
+            damage=damage,
+            lost=self.lost,
+            base_ns=self.base_ns,
+            device=device,
+        )
 
     def _content(self, record: McapRecord) -> None:
         if isinstance(record, Schema):
@@ -467,15 +491,12 @@ _TICK_ROW: Final = np.dtype(
 )
 
 
-def _unpacked(chunk: Chunk) -> Sequence[McapRecord]:
-    """Return the records in a chunk. Raises ValueError before a false length can allocate much memory."""
-    if chunk.uncompressed_size > LARGEST_RECORD:
-        raise ValueError(f"it claims to unpack to {chunk.uncompressed_size} bytes")
-    if chunk.compression not in ("", "zstd"):
-        raise ValueError(f"its compression {chunk.compression[:20]!r} is not supported")
-    try:
-        if chunk.compression and zstandard.frame_content_size(chunk.data) > LARGEST_RECORD:
-            raise ValueError("it would unpack to more than the largest chunk")
-        return breakup_chunk(chunk, validate_crc=True)
-    except zstandard.ZstdError as error:
-        raise ValueError(f"it does not unpack: {error}") from error
+def _impossible(ticks: NDArray[np.void]) -> str:
+    """Return what no grasp can have in its ticks, or an empty text."""
+    unknown = np.flatnonzero(~np.isin(ticks["phase"], [int(phase) for phase in Phase]))
+    if len(unknown):
+        return f"tick {unknown[0] + 1} has the phase {ticks['phase'][unknown[0]]}, which there is not"
+    timeless = np.flatnonzero(~np.isfinite(ticks["t_s"]))
+    if len(timeless):
+        return f"tick {timeless[0] + 1} has the time {ticks['t_s'][timeless[0]]}"
+    return ""

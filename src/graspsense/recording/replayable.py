@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import struct
 from collections.abc import Mapping
 from typing import Final
@@ -10,6 +11,7 @@ from typing import Final
 from attrs import field, frozen
 
 from graspsense.core.entries import Channel
+from graspsense.core.errors import DataDamaged
 from graspsense.core.signals import Frame, Reading
 
 REPLAY_NOTE: Final = "a recording cannot react: the controller's commands have no effect on it"
@@ -33,6 +35,19 @@ class Recording:
     commands: tuple[float, ...] | None = None
     has_release: bool = False
     channels: tuple[Channel, ...] = ()
+
+
+def check_recording(recording: Recording) -> None:
+    """Raise DataDamaged if a recording has nothing to replay, or what no gripper can have measured."""
+    if not recording.readings:
+        raise DataDamaged(f"{recording.name} has no frames")
+    width = len(Frame._fields)
+    if any(len(reading.frame) != width for reading in recording.readings):
+        raise DataDamaged(f"{recording.name}: a frame has other fields than {', '.join(Frame._fields)}")
+    if not all(math.isfinite(reading.frame.t_s) for reading in recording.readings):
+        raise DataDamaged(f"{recording.name}: the time of a frame is not a number")
+    if not 0.0 < recording.rate_hz < math.inf:
+        raise DataDamaged(f"{recording.name}: its rate is {recording.rate_hz} frames a unit of time")
 
 
 _FRAME: Final = struct.Struct(f"<{len(Frame._fields)}d")

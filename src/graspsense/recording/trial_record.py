@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 import struct
-import tomllib
 from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
 from math import isnan, nan
@@ -23,6 +22,8 @@ from graspsense.core.config import toml_key, toml_value
 from graspsense.core.entries import Channel, TactileArray
 from graspsense.core.errors import DataDamaged
 from graspsense.core.json_values import json_text
+from graspsense.core.signals import Outcome
+from graspsense.core.toml_text import toml_values
 from graspsense.core.trial import trial_as_json
 from graspsense.recording.before_contact import before_contact, contact_force_of
 from graspsense.recording.layout import DEVICE, RESULT, START, VERSION
@@ -41,7 +42,7 @@ Metadata = Mapping[str, Mapping[str, str]]
 
 DETAILS: Final = ("prediction", "report", "counts", "events", "seconds_simulated", "seconds_wall")
 """Keys of `graspsense run --json` that `TrialResult.details` holds; the others have fields of their own."""
-_MALFORMED: Final = (KeyError, ValueError, TypeError, AttributeError, RecursionError, struct.error)
+_OUTCOMES: Final = frozenset(outcome.words for outcome in Outcome)
 
 
 @frozen(kw_only=True)
@@ -305,7 +306,7 @@ def _start(texts: Mapping[str, str]) -> TrialRecord:
     datetime.fromisoformat(texts["made_at"])
     if texts["origin"] not in get_args(Origin):
         raise ValueError(f"origin {texts['origin'][:20]!r}")
-    settings = tomllib.loads(texts["settings"])
+    settings = toml_values(texts["settings"])
     dict(settings["gripper"])  # every pipeline has this table
     return TrialRecord(
         made_at=texts["made_at"],
@@ -317,6 +318,8 @@ def _start(texts: Mapping[str, str]) -> TrialRecord:
 
 
 def _result(texts: Mapping[str, str]) -> TrialResult:
+    if texts["outcome"] not in _OUTCOMES:
+        raise ValueError(f"outcome {texts['outcome'][:20]!r}")
     return TrialResult(
         outcome=texts["outcome"],
         reason=texts["reason"],
@@ -329,7 +332,9 @@ def _result(texts: Mapping[str, str]) -> TrialResult:
 def _decoded(problem: str, decode: Callable[[], T]) -> T:
     try:
         return decode()
-    except _MALFORMED as error:
+    except MemoryError:
+        raise
+    except Exception as error:  # a text can hold any value in any place
         raise DataDamaged(f"{problem} ({type(error).__name__}: {error})") from error
 
 

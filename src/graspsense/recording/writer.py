@@ -6,6 +6,7 @@ survive a loss of power.
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import hashlib
 import os
@@ -18,7 +19,7 @@ from typing import Final
 from mcap.writer import CompressionType, Writer
 
 from graspsense import __version__
-from graspsense.recording.atomic_file import sync_folder
+from graspsense.core.whole_file import sync_folder
 from graspsense.recording.layout import CDR_HEADER, PADS_TOPIC, PART, TICK_SCHEMA, TICK_TOPIC, Topic
 from graspsense.recording.recording_info import RecordingInfo
 
@@ -36,9 +37,11 @@ class RecordingWriter:
 
     def __init__(self, path: Path, base_ns: int | None = None) -> None:
         self.path, self.part = path, path.with_name(path.name + PART)
+        self._out = _Hashed(os.open(self.part, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW, 0o644))
+        # Only now: another writer of the same recording may have finished until `part` was free.
         if path.exists():
-            raise FileExistsError(17, "the recording already exists", str(path))
-        self._out = _Hashed(os.open(self.part, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o644))
+            self.remove()
+            raise FileExistsError(errno.EEXIST, "the recording already exists", str(path))
         # A process that cannot get this lock leaves the file alone: it is being written.
         fcntl.flock(self._out.fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
         self._mcap = Writer(
@@ -117,7 +120,7 @@ class RecordingWriter:
         now_ns = time.time_ns()
         if self._base_ns is None:
             self._base_ns = now_ns - _ns(t_s)
-        log_ns = max(0, self._base_ns + _ns(t_s))
+        log_ns = min(max(0, self._base_ns + _ns(t_s)), _LAST_NS)
         if not self._open_chunk:
             self._open_chunk, self._chunk_log_ns, self._chunk_wall_ns = True, log_ns, now_ns
         number = self._counts[topic]
@@ -150,6 +153,10 @@ class _Hashed:
 
     def close(self) -> None:
         os.close(self.fd)
+
+
+_LAST_NS: Final = 2**64 - 1
+"""The last time that a message can have, in the year 2554."""
 
 
 def _ns(t_s: float) -> int:

@@ -12,11 +12,14 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from graspsense.core.errors import ConfigError, suggestion
+from graspsense.core.features import LARGEST_VALUE
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 DEFAULT_ESTIMATOR: Final = "forest"
+MOST_SCALED: Final = 1e30
+"""The largest scaled feature: trees compute with 32 bits, distances with squares."""
 
 
 def _forest(seed: int, trials: int) -> Any:
@@ -85,21 +88,22 @@ class FittedRegression:
         check_estimator(name)
         if len(values) < 2:
             raise ValueError(f"{len(values)} trials: an estimator needs at least two")
+        self._scaling = make_pipeline(
+            SimpleImputer(strategy="median", keep_empty_features=True), StandardScaler()
+        )
         self._estimator = TransformedTargetRegressor(
-            regressor=make_pipeline(
-                SimpleImputer(strategy="median", keep_empty_features=True),
-                StandardScaler(),
-                ESTIMATORS[name](seed, len(values)),
-            ),
-            transformer=StandardScaler(),
+            regressor=ESTIMATORS[name](seed, len(values)), transformer=StandardScaler()
         )
         # One thread: on small tables more threads cost time, and the order of sums would depend on the machine.
         with threadpool_limits(1):
-            self._estimator.fit(features, values)
+            self._estimator.fit(self._scaling.fit_transform(features), values)
 
     def predict(self, features: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the predicted values, shape (trials,)."""
-        return np.asarray(self._estimator.predict(features), dtype=np.float64).reshape(len(features))
+        """Return the predicted values, shape (trials,). A feature that is too far away counts as the farthest."""
+        with np.errstate(over="ignore"):
+            scaled = self._scaling.transform(np.clip(features, -LARGEST_VALUE, LARGEST_VALUE))
+        scaled = np.clip(scaled, -MOST_SCALED, MOST_SCALED)
+        return np.asarray(self._estimator.predict(scaled), dtype=np.float64).reshape(len(features))
 
 
 def check_estimator(name: str) -> None:

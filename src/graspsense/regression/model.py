@@ -6,7 +6,6 @@ loaded: nothing is imported, evaluated or unpickled. Its `sha256` is the hash of
 
 from __future__ import annotations
 
-import json
 import math
 import platform
 import warnings
@@ -22,8 +21,10 @@ from graspsense.core.conformal import COVERAGE
 from graspsense.core.errors import ConfigError, DataDamaged
 from graspsense.core.features import FeatureTable
 from graspsense.core.json_values import json_ready
-from graspsense.core.model import REGRESSION_FORMAT, digest, write_json_lines
+from graspsense.core.model import REGRESSION_FORMAT, write_json_lines
+from graspsense.core.model_content import digest, parsed, sealed_content
 from graspsense.core.novelty import Novelty, novelty_of
+from graspsense.core.stored_values import LARGEST_SEED, StoredValues
 from graspsense.core.target_value import TargetValue
 from graspsense.regression.estimators import ESTIMATORS, FittedRegression
 from graspsense.regression.evaluate import held_out_folds, held_out_predictions, interval_radius
@@ -184,8 +185,8 @@ def write_regression(path: Path, model: RegressionModel) -> None:
 def is_regression(name: str) -> bool:
     """Return whether this file is a model of a number."""
     try:
-        content = json.loads(Path(name).expanduser().read_bytes()) if name.endswith(".json") else None
-    except (OSError, ValueError):
+        content = parsed(name, Path(name).expanduser().read_bytes()) if name.endswith(".json") else None
+    except (OSError, DataDamaged):
         return False
     return isinstance(content, dict) and content.get("format") == REGRESSION_FORMAT
 
@@ -193,54 +194,43 @@ def is_regression(name: str) -> bool:
 def load_regression(name: str) -> RegressionModel:
     """Return the model in a file. Raises ConfigError if it cannot be read, DataDamaged if it is not such a model."""
     try:
-        content = json.loads(Path(name).expanduser().read_bytes())
+        text = Path(name).expanduser().read_bytes()
     except OSError as error:
         raise ConfigError(f"model {name} cannot be read: {error.strerror}") from error
-    except ValueError as error:
-        raise DataDamaged(f"model {name!r} is not JSON: {error}") from error
-    if not isinstance(content, dict) or content.get("format") != REGRESSION_FORMAT:
-        raise DataDamaged(f'{name!r} is not a model of a number: it lacks "format": "{REGRESSION_FORMAT}"')
-    if content.get("version") != VERSION:
-        raise DataDamaged(
-            f"model {name!r} has version {content.get('version')!r}; this graspsense ({__version__}) reads {VERSION}"
-        )
-    rest = {key: value for key, value in content.items() if key != "sha256"}
-    if content.get("sha256") != digest(rest):
-        raise DataDamaged(f"model {name!r} was changed or damaged: its sha256 does not match")
+    content = sealed_content(name, parsed(name, text), REGRESSION_FORMAT, VERSION, "model of a number")
     try:
-        return _restored(Path(name).stem, content)
-    except (KeyError, IndexError, TypeError, ValueError) as error:
-        raise DataDamaged(f"model {name!r} is damaged: {type(error).__name__}: {error}") from error
+        return _restored(Path(name).stem, StoredValues(content))
+    except ValueError as error:
+        raise DataDamaged(f"model {name!r} is damaged: {error}") from error
 
 
-def _restored(name: str, content: Mapping[str, Any]) -> RegressionModel:
-    """Return the model of the content of a file. Raises KeyError, IndexError, TypeError or ValueError."""
-    names, units = zip(*((str(one), str(unit)) for one, unit in content["features"]), strict=True)
-    values = tuple(float(value) for value in content["values"])
-    trials = np.array(content["trials"], dtype=np.float64)
-    if trials.shape != (len(values), len(names)) or np.isinf(trials).any() or not np.isfinite(values).all():
-        raise ValueError("its training trials do not fit its numbers and features")
-    if content["estimator"] not in ESTIMATORS:
-        raise ValueError(f"there is no estimator {content['estimator']!r}")
+def _restored(name: str, stored: StoredValues) -> RegressionModel:
+    """Return the model with these values. Raises ValueError, which names the field that is wrong."""
+    names, units = stored.features("features")
+    values = stored.numbers("values", (None,))
+    trials = stored.numbers("trials", (len(values), len(names)), missing=True)
     table = FeatureTable(names=names, units=units, values=trials)
-    half_width = content["interval"]["half_width"]
+    estimator, seed = stored.choice("estimator", tuple(ESTIMATORS)), stored.whole("seed", most=LARGEST_SEED)
+    target = stored.texts("target_value")
+    if len(target) != 2:
+        raise stored.refusal("target_value", "expected a name and a unit")
+    interval = stored.table("interval")
+    no_width = interval.value("half_width") is None
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # The training told of them.
-        fitted = FittedRegression(content["estimator"], trials, np.array(values), int(content["seed"]))
+        fitted = FittedRegression(estimator, trials, values, seed)
     return RegressionModel(
         name=name,
-        estimator=str(content["estimator"]),
+        estimator=estimator,
         fitted=fitted,
         table=table,
-        target=TargetValue(
-            name=str(content["target_value"][0]), unit=str(content["target_value"][1]), values=values
-        ),
-        seed=int(content["seed"]),
+        target=TargetValue(name=target[0], unit=target[1], values=tuple(values.tolist())),
+        seed=seed,
         novelty=_novelty(table),
-        half_width=None if half_width is None else float(half_width),
-        no_interval=str(content["interval"]["reason"]),
-        made_with=str(content["made_with"]),
-        provenance=dict(content["provenance"]),
+        half_width=None if no_width else interval.number("half_width", least=0.0),
+        no_interval=interval.text("reason"),
+        made_with=stored.text("made_with"),
+        provenance=stored.table("provenance").as_dict(),
     )
 
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from graspsense.core.errors import ConfigError, PluginUnavailable
+from graspsense.core.errors import PluginUnavailable
 from graspsense.core.trace_plot import MATPLOTLIB_HINT
+from graspsense.report.write import write_picture
 
 if TYPE_CHECKING:
     from graspsense.evaluation.confusion import Confusion
@@ -49,11 +50,8 @@ def confusion_png(confusion: Confusion, title: str, path: Path) -> None:
     axes.set_xlabel("answered")
     axes.set_ylabel("true")
     axes.set_title(title, fontsize=9)
-    try:
-        # The title may be wider than a small matrix: "tight" extends the picture to include it.
-        figure.savefig(path, format="png", bbox_inches="tight")
-    except OSError as error:
-        raise ConfigError(f"the picture cannot be written to {path}: {error.strerror}") from error
+    # The title may be wider than a small matrix: "tight" extends the picture to include it.
+    write_picture(path, figure, bbox_inches="tight")
 
 
 def _letter(k: int) -> str:

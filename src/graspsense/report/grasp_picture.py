@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 from graspsense.core.errors import ConfigError, PluginUnavailable
 from graspsense.core.trace_plot import MATPLOTLIB_HINT, draw_trace
 from graspsense.core.units import display_unit
+from graspsense.report.write import write_picture
 
 if TYPE_CHECKING:
     from graspsense.core.trial import Trial
@@ -57,10 +58,7 @@ def grasp_png(trial: Trial, path: Path) -> None:
     draw_trace(trial.trace, force, gap)
     words.set_axis_off()
     words.text(0.0, 1.0, "\n".join(lines), va="top", fontsize=8.5, linespacing=1.45)
-    try:
-        figure.savefig(path, format="png")
-    except OSError as error:
-        raise ConfigError(f"the picture cannot be written to {path}: {error.strerror}") from error
+    write_picture(path, figure)
 
 
 def _words(trial: Trial) -> list[str]:

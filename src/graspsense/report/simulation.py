@@ -9,8 +9,9 @@ from typing import Any, Final
 
 from attrs import asdict, frozen
 
-from graspsense.core.errors import ConfigError, PluginUnavailable
+from graspsense.core.errors import PluginUnavailable
 from graspsense.core.trace_plot import MATPLOTLIB_HINT
+from graspsense.report.write import write_picture
 
 HEADER: Final = ("METHOD", "FIDELITY", "STEP OR ACCURACY", "MS A GRASP", "SET-UP, S")
 PEAK: Final = "peak force"
@@ -132,10 +133,7 @@ def simulation_png(trade: SimulationTrade, path: Path) -> None:
         fontsize=10,
     )
     figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=3, fontsize=8)
-    try:
-        figure.savefig(path, format="png")
-    except OSError as error:
-        raise ConfigError(f"the picture cannot be written to {path}: {error.strerror}") from error
+    write_picture(path, figure)
 
 
 def _draw_curves(ax: Any, trade: SimulationTrade, quantity: str) -> dict[str, Any]:

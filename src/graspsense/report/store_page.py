@@ -11,6 +11,8 @@ from attrs import frozen
 from graspsense.core.config import SelectedComponent, select_component
 from graspsense.core.errors import ConfigError, DataDamaged
 from graspsense.evaluation.evaluate import evaluate
+from graspsense.recording.provenance import commit_text
+from graspsense.recording.readable import readable
 from graspsense.recording.reader import read_recorded
 from graspsense.report.evaluation_sections import (
     code,
@@ -72,12 +74,7 @@ def store_page(
         listed = store.page(set_aside=None, limit=LISTED)
         if not listed:
             raise ConfigError(f"the store in {folder} has no trials yet: graspsense collect --save {folder}")
-        if grasp is not None:
-            number = grasp
-        else:
-            usable = (one for one in listed if one.complete and one.set_aside is None)
-            number = next(usable, listed[0]).id
-        trial = store.trial(number)
+        trial = _newest_readable(store, listed) if grasp is None else store.trial(grasp)
         counts = _trial_counts(store)
         curves = _curves(store)
         changes = history(store)
@@ -115,6 +112,21 @@ def store_page(
     )
 
 
+def _newest_readable(store: Store, listed: Sequence[TrialSummary]) -> StoredTrial:
+    """Return the newest trial that is complete, not set aside, and readable; else another one.
+
+    Raises DataDamaged if none can be read.
+    """
+    damage: DataDamaged | None = None
+    for summary in sorted(listed, key=lambda one: not (one.complete and one.set_aside is None)):
+        try:
+            return store.trial(summary.id)
+        except DataDamaged as error:
+            damage = damage or error
+    assert damage is not None  # there is a trial
+    raise damage
+
+
 def _trial_counts(store: Store) -> list[_TrialCount]:
     rows = store.query(
         "SELECT label, outcome, set_aside IS NOT NULL, count(*) FROM trial GROUP BY 1, 2, 3 ORDER BY 1, 2"
@@ -134,7 +146,8 @@ def _curves(store: Store) -> list[GraspCurve]:
         if count[label] >= GRASPS:
             continue
         try:
-            trace = read_recorded(store.recording_path(recording)).trace()
+            with readable(f"trial {number} of {store.folder}"):
+                trace = read_recorded(store.recording_path(recording)).trace()
         except (ConfigError, DataDamaged):
             continue
         count[label] += 1
@@ -251,14 +264,13 @@ def _provenance(
 ) -> Section:
     total = sum(count.trials for count in counts)
     made = trial.record.provenance
-    git = (made.get("git") or {}).get("graspsense") or {}
     pairs = [
         ("store", folder),
         ("trials", f"{total}, the newest made {listed[0].made_at}"),
         ("grippers", ", ".join(sorted({one.device for one in listed}))),
         ("simulated", f"{sum(one.simulated for one in listed)} of the newest {len(listed)}"),
         ("machine", f"{made.get('host', '?')}, {made.get('system', '?')}"),
-        ("code", f"graspsense {made.get('graspsense', '?')}, commit {git.get('commit', 'unknown')}"),
+        ("code", f"graspsense {made.get('graspsense', '?')}, commit {commit_text(made)}"),
         *((f"component {name}", str(one)) for name, one in (made.get("components") or {}).items()),
     ]
     by_label = [

@@ -1,9 +1,13 @@
-"""Writing a page to a file."""
+"""Writing a page or a picture to a file."""
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
+from typing import Any
 
+from graspsense.core.errors import ConfigError
+from graspsense.core.whole_file import write_whole
 from graspsense.recording.atomic_file import write_or_replace
 from graspsense.report.html import Page
 
@@ -11,3 +15,13 @@ from graspsense.report.html import Page
 def write_html(path: Path, page: Page) -> None:
     """Write a page, replacing an older one. Raises SaveFailed."""
     write_or_replace(path, page.html().encode("utf-8"), make_folder=True)
+
+
+def write_picture(path: Path, figure: Any, **how: Any) -> None:
+    """Write a figure of matplotlib as a PNG file. Raises ConfigError if that is not possible."""
+    data = io.BytesIO()
+    figure.savefig(data, format="png", **how)
+    try:
+        write_whole(path, data.getvalue())
+    except OSError as error:
+        raise ConfigError(f"the picture cannot be written to {path}: {error.strerror}") from error

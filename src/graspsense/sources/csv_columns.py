@@ -18,10 +18,15 @@ from typing import Final
 
 import numpy as np
 
-from graspsense.core.errors import ConfigError, DataDamaged, suggestion
+from graspsense.core.csv_text import text_of_cell
+from graspsense.core.errors import ConfigError, DataDamaged, listed, suggestion
 from graspsense.core.features import FeatureTable
+from graspsense.core.limits import CELLS, COLUMNS, LINE_CHARACTERS, TEXT_BYTES
 from graspsense.core.target_value import name_and_unit
+from graspsense.recording.readable import not_opened, refuse_devices
 
+LONGEST_NAME: Final = 500
+"""Limit on the characters of the name of a column."""
 _MISSING: Final = frozenset({"", "nan", "na", "n/a", "null", "none", "?"})
 _DECIMAL_COMMA: Final = re.compile(r"[-+]?\d+,\d+")
 
@@ -55,7 +60,7 @@ class CsvColumns:
         """Return the text of a column; `what` says what it is used for. Raises ConfigError if it does not exist."""
         if name not in self.cells:
             raise ConfigError(
-                f"{self.path} has no column {name!r} ({what}). Its columns: {', '.join(self.names)}."
+                f"{self.path} has no column {name!r} ({what}). Its columns: {listed(self.names)}."
                 + suggestion(name, self.names)
             )
         return self.cells[name]
@@ -119,12 +124,13 @@ class CsvColumns:
 
 def is_missing(cell: str) -> bool:
     """Return whether the text of a cell stands for a missing value."""
-    return cell.lower() in _MISSING
+    return len(cell) <= 4 and cell.lower() in _MISSING
 
 
 def _rows(path: Path, text: str) -> tuple[list[str], list[int], list[list[str]]]:
     """Return the header, and the line number and the cells of each row that is not empty. Raises DataDamaged."""
-    header_line = text.lstrip("\r\n").splitlines()[0] if text.strip() else ""
+    check_lines(path, text)
+    header_line = text.lstrip()[: LINE_CHARACTERS.most].splitlines()[0] if text.strip() else ""
     if not header_line:
         raise DataDamaged(f"{path} is empty: it needs a header line and one line per trial")
     separator = max(",;\t", key=header_line.count)
@@ -132,18 +138,23 @@ def _rows(path: Path, text: str) -> tuple[list[str], list[int], list[list[str]]]
     header: list[str] = []
     lines: list[int] = []
     rows: list[list[str]] = []
+    most_rows = 0
     try:
         for row in reader:
             if not any(cell.strip() for cell in row):
                 continue
             if not header:
-                header = [cell.strip() for cell in row]
+                header = [text_of_cell(cell.strip()) for cell in row]
+                check_columns(path, header)
+                most_rows = CELLS.most // len(header)
                 continue
             if len(row) != len(header):
                 raise DataDamaged(
                     f"{path}, line {reader.line_num}: {len(row)} values, but the header names {len(header)} columns"
                 )
-            rows.append([cell.strip() for cell in row])
+            if len(rows) >= most_rows:
+                raise DataDamaged(f"{path}: {CELLS.exceeded((len(rows) + 1) * len(header))}")
+            rows.append([text_of_cell(cell.strip()) for cell in row])
             lines.append(reader.line_num)
     except csv.Error as error:
         raise DataDamaged(f"{path}, line {reader.line_num}: {error}") from None
@@ -152,12 +163,46 @@ def _rows(path: Path, text: str) -> tuple[list[str], list[int], list[list[str]]]
     return header, lines, rows
 
 
+def check_lines(path: Path, text: str) -> None:
+    """Raise DataDamaged if a line of the text is too long."""
+    most = LINE_CHARACTERS.most
+    if len(text) <= most:
+        return
+    start = number = 0
+    for number, end in enumerate((match.start() for match in re.finditer("\n", text)), 1):
+        if end - start > most:
+            raise DataDamaged(f"{path}, line {number}: {LINE_CHARACTERS.exceeded(end - start)}")
+        start = end + 1
+    if too_long := LINE_CHARACTERS.exceeded(len(text) - start):
+        raise DataDamaged(f"{path}, line {number + 1}: {too_long}")
+
+
+def check_columns(path: Path, names: Sequence[str]) -> None:
+    """Raise DataDamaged if a table has too many columns, or one with a name that is too long."""
+    if too_many := COLUMNS.exceeded(len(names)):
+        raise DataDamaged(f"{path}: {too_many}")
+    for number, name in enumerate(names, 1):
+        if len(name) > LONGEST_NAME:
+            raise DataDamaged(
+                f"{path}: the name of column {number} has {len(name)} characters, and at most {LONGEST_NAME} are "
+                f"accepted: {name[:40]!r}..."
+            )
+
+
 def text_of(path: Path) -> str:
     """Return the text of a file in UTF-8. Raises ConfigError if it cannot be read, DataDamaged if it is not text."""
+    refuse_devices(path)
+    most = TEXT_BYTES.most
     try:
-        data = path.read_bytes()
+        with path.open("rb") as file:
+            data = file.read(most + 1)
+            size = len(data) if len(data) <= most else max(path.stat().st_size, len(data))
     except OSError as error:
-        raise ConfigError(f"{path} cannot be read: {error.strerror}") from error
+        raise not_opened(path, error) from error
+    except ValueError as error:
+        raise ConfigError(f"{path} cannot be read: {error}") from error
+    if too_large := TEXT_BYTES.exceeded(size):
+        raise DataDamaged(f"{path}: {too_large}")
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         raise DataDamaged(f"{path} is UTF-16: save it as UTF-8")
     if b"\0" in data:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from contextlib import contextmanager
 from itertools import islice
 from typing import Final
 
 from graspsense.core.errors import ComponentFailed, ConfigError, GraspsenseError, PluginUnavailable, named
 from graspsense.core.plugins import installed
 from graspsense.recording.labelled_recording import LabelledRecording, UnreadableRecording
-from graspsense.recording.replayable import Recording
+from graspsense.recording.readable import readable
+from graspsense.recording.replayable import Recording, check_recording
 
 _NUMBERED: Final = re.compile(r"(?P<place>.+)#(?P<number>[1-9]\d{0,8})", re.DOTALL)
 
@@ -39,21 +41,53 @@ def recordings_of(kind: str, place: str) -> Iterator[LabelledRecording]:
 
 
 def readable_or_not(kind: str, place: str) -> Iterator[LabelledRecording | UnreadableRecording]:
-    """Yield every recording of a data set, also those that cannot be read. Raises as `recordings_of`."""
+    """Yield every recording of a data set, also those that cannot be read.
+
+    A reader that fails ends its data set: what it failed with comes last. Raises as `recordings_of` if it fails before
+    the first recording.
+    """
     dataset = installed().dataset(kind)
     read = dataset.recordings()
+    number = 0
     try:
-        for one in read(place):
-            if not isinstance(one, LabelledRecording | UnreadableRecording):
-                raise PluginUnavailable(
-                    f"data set {dataset.qualified} cannot be used here: its reader gave {type(one).__name__}, not "
-                    "LabelledRecording"
-                )
-            yield one
-    except GraspsenseError:
+        with readable(f"{kind}:{place}"), _failing_as(dataset.qualified):
+            for one in read(place):
+                if not isinstance(one, LabelledRecording | UnreadableRecording):
+                    raise PluginUnavailable(
+                        f"data set {dataset.qualified} cannot be used here: its reader gave {type(one).__name__}, not "
+                        "LabelledRecording"
+                    )
+                number += 1
+                yield _checked(one)
+    except PluginUnavailable:
+        raise
+    except GraspsenseError as error:
+        if not number:
+            raise
+        yield UnreadableRecording(source=f"{kind}:{place}, behind recording {number}", error=error)
+
+
+def _checked(one: LabelledRecording | UnreadableRecording) -> LabelledRecording | UnreadableRecording:
+    """Return the recording, or why it cannot be used."""
+    if isinstance(one, UnreadableRecording):
+        return one
+    try:
+        with readable(one.source):
+            check_recording(one.recording)
+    except GraspsenseError as error:
+        return UnreadableRecording(source=str(one.source), error=error)
+    return one
+
+
+@contextmanager
+def _failing_as(dataset: str) -> Iterator[None]:
+    """Turn what a reader of a plugin raises, beside errors of ours, into an error that names it."""
+    try:
+        yield
+    except (GraspsenseError, MemoryError, OSError):
         raise
     except Exception as error:
-        raise ComponentFailed(f"the reader of data set {dataset.qualified} failed: {named(error)}") from error
+        raise ComponentFailed(f"the reader of data set {dataset} failed: {named(error)}") from error
 
 
 def numbered_recording(kind: str, name: str) -> LabelledRecording:

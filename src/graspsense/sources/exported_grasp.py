@@ -7,7 +7,6 @@ a file; the recording itself (.mcap) keeps it.
 from __future__ import annotations
 
 import json
-import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -16,8 +15,8 @@ import numpy as np
 
 from graspsense.core.channels import from_json, further, signal_type
 from graspsense.core.entries import Channel, FastChannel, TactileArray
-from graspsense.core.errors import ConfigError, DataDamaged
 from graspsense.core.signals import Frame, Image, Pads, Reading, no_pads
+from graspsense.recording.readable import readable
 from graspsense.recording.replayable import REPLAY_NOTE, Recording
 from graspsense.sources.exported_grasp_tables import (
     TABLE_SUFFIXES,
@@ -25,6 +24,7 @@ from graspsense.sources.exported_grasp_tables import (
     refuse_table_of_store,
 )
 from graspsense.sources.fast_samples import sample_blocks
+from graspsense.sources.numpy_files import npz_arrays
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -45,10 +45,11 @@ def read_exported(name: str) -> Recording:
     if path.suffix.lower() in TABLE_SUFFIXES:
         arrays, declared = read_exported_tables(path)
     else:
-        arrays = _archive(path)
+        arrays = npz_arrays(path)
         refuse_table_of_store(path, arrays)
         declared = str(arrays.get(DECLARED, "no JSON"))
-    try:
+    foreign = ". If `graspsense export` did not write it, import its arrays by a manifest (docs/import.md)"
+    with readable(path, "a grasp of `graspsense export`", foreign):
         about = json.loads(declared)
         channels = tuple(from_json(one) for one in about["channels"])
         return Recording(
@@ -61,27 +62,6 @@ def read_exported(name: str) -> Recording:
             has_release=bool(about["has_release"]),
             channels=channels,
         )
-    except (KeyError, TypeError, ValueError, IndexError) as error:
-        raise DataDamaged(
-            f"{path} is not a grasp that this version of `graspsense export` wrote ({type(error).__name__}: {error}). "
-            "Arrays of other programs are imported by a manifest (docs/import.md)"
-        ) from error
-
-
-def _archive(path: Path) -> dict[str, NDArray[Any]]:
-    """Return the arrays of an NPZ file. Raises ConfigError, DataDamaged."""
-    try:
-        with np.load(path, allow_pickle=False) as archive:
-            return {key: archive[key] for key in archive.files}
-    except FileNotFoundError:
-        raise ConfigError(f"there is no file {path}") from None
-    except OSError as error:
-        raise DataDamaged(f"{path} cannot be read as an NPZ file: {error}") from error
-    except (ValueError, zipfile.BadZipFile, EOFError) as error:
-        # NumPy's own text would advise loading the file with pickle.
-        raise DataDamaged(
-            f"{path} cannot be read as an NPZ file: write one with graspsense export DIR#12 --to FILE.npz"
-        ) from error
 
 
 def _readings(arrays: Arrays, channels: tuple[Channel, ...]) -> list[Reading]:

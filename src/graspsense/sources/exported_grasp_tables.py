@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import json
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -11,10 +12,13 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from graspsense.core.channels import from_json, further
+from graspsense.core.csv_text import text_of_cell
 from graspsense.core.entries import Channel, FastChannel, TactileArray
 from graspsense.core.errors import ConfigError, DataDamaged
+from graspsense.core.limits import CELLS, CHANNEL_NUMBERS
 from graspsense.recording.export_trace import beside, declared_beside
 from graspsense.recording.layout import PADS_TOPIC, SCALARS_TOPIC, SIGNAL_TOPIC, TICK_FIELDS
+from graspsense.sources.csv_columns import check_columns, check_lines, text_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -37,21 +41,34 @@ def read_exported_tables(path: Path) -> tuple[Columns, str]:
             f"{declared.name} is missing beside {path}: `graspsense export` writes it together with the columns. For a "
             "file of another program name its columns, or write a manifest (docs/import.md)"
         )
+    try:
+        return _read(path, declared)
+    except (KeyError, TypeError, ValueError, OverflowError, RecursionError) as error:
+        raise DataDamaged(
+            f"{path} is not as `graspsense export` writes it: {type(error).__name__}: {error}"
+        ) from error
+
+
+def _read(path: Path, declared: Path) -> tuple[Columns, str]:
+    """Return the arrays, and the text that declares them. What does not fit ends in an error of Python."""
     ticks = _columns(path)
     missing = [name for name in TICK_FIELDS if name not in ticks]
     if missing:
         raise DataDamaged(f"{path} is not an exported grasp: it has no column {missing[0]!r}")
     try:
-        text = declared.read_text(encoding="utf-8")
+        text = text_of(declared)
         about = json.loads(text)
         channels = further(tuple(from_json(one) for one in about["channels"]))
         tables = frozenset(about["tables"])
-    except (OSError, ValueError, KeyError, TypeError) as error:
+        cells = int(about["cells"])
+    except (ConfigError, ValueError, KeyError, TypeError, OverflowError, RecursionError) as error:
         raise DataDamaged(f"{declared} is damaged: {type(error).__name__}: {error}") from error
+    if too_many := CHANNEL_NUMBERS.exceeded(cells):
+        raise DataDamaged(f"{declared} is damaged: the fingertips have {too_many}")
     pads = _columns(beside(path, PADS_TOPIC)) if PADS_TOPIC in tables else {"t_s": np.empty(0)}
     ticks["pad_t_s"] = pads["t_s"]
     for side in ("left", "right"):
-        ticks[f"pad_{side}"] = _numbered(pads, f"{side}_", int(about["cells"]))
+        ticks[f"pad_{side}"] = _numbered(pads, f"{side}_", cells)
     scalars = _columns(beside(path, SCALARS_TOPIC)) if SCALARS_TOPIC in tables else {}
     for channel in channels:
         _add_channel(ticks, path, channel, scalars, SIGNAL_TOPIC + channel.name in tables)
@@ -109,7 +126,7 @@ def header_of(path: Path) -> Sequence[str]:
     """Return the names in the first line of a CSV file; none if it cannot be read."""
     try:
         with path.open(newline="", encoding="utf-8") as file:
-            return next(csv.reader(file), ())
+            return [text_of_cell(cell) for cell in next(csv.reader(file), ())]
     except (OSError, ValueError, csv.Error):
         return ()
 
@@ -120,13 +137,16 @@ def _columns(path: Path) -> Columns:
         from graspsense.sources.manifest.parquet_format import read_parquet
 
         return dict(read_parquet(path)[0].numbers)
+    text = text_of(path)
+    check_lines(path, text)
     try:
-        with path.open(newline="", encoding="utf-8") as file:
-            names, *rows = csv.reader(file)
+        rows = csv.reader(io.StringIO(text, newline=""))
+        names = next(rows, [])
+        check_columns(path, names)
+        if too_many := CELLS.exceeded(text.count("\n") * len(names)):
+            raise DataDamaged(f"{path}: {too_many}")
         values = [[float(cell) if cell else float("nan") for cell in row] for row in rows]
-        table = np.array(values, dtype=np.float64).reshape(len(rows), len(names))
-    except OSError as error:
-        raise ConfigError(f"{path} cannot be read: {error.strerror}") from error
+        table = np.array(values, dtype=np.float64).reshape(len(values), len(names))
     except (ValueError, csv.Error) as error:
         raise DataDamaged(f"{path} is not as `graspsense export` writes it: {error}") from error
-    return {name: table[:, i] for i, name in enumerate(names)}
+    return {text_of_cell(name): table[:, i] for i, name in enumerate(names)}

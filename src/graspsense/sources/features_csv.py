@@ -6,18 +6,18 @@ describe a trial are never features, and every feature remains one even if no tr
 
 from __future__ import annotations
 
-import csv
 import math
-import os
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
-from graspsense.core.errors import ConfigError, DataDamaged
+from graspsense.core.csv_text import csv_text
+from graspsense.core.errors import ConfigError, DataDamaged, listed
 from graspsense.core.features import UNKNOWN, FeatureTable
 from graspsense.core.labelled import Labelled
 from graspsense.core.target_value import TargetValue
+from graspsense.recording.atomic_file import write_or_replace
 from graspsense.recording.controls import Controls, controls
 from graspsense.sources.csv_columns import CsvColumns, is_missing
 from graspsense.sources.exported_table import ExportedTable, exported
@@ -122,7 +122,7 @@ def read_table(path: Path, names: Sequence[str]) -> FeatureTable:
 
 
 def write_labelled(path: Path, labelled: Labelled) -> None:
-    """Write labels, instances, order and features; `read_labelled` returns the same table. Raises OSError."""
+    """Write labels, instances, order and features; `read_labelled` returns the same table. Raises SaveFailed."""
     table = labelled.table
     extra: dict[str, Sequence[object]] = {"label": labelled.labels}
     if labelled.instances is not None:
@@ -132,14 +132,8 @@ def write_labelled(path: Path, labelled: Labelled) -> None:
     headings = [
         f"{name} [{unit}]" if unit else name for name, unit in zip(table.names, table.units, strict=True)
     ]
-    part = path.with_name(path.name + ".part")
-    with part.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow([*extra, *headings])
-        for i, row in enumerate(table.values.tolist()):
-            cells = ["" if math.isnan(value) else repr(value) for value in row]
-            writer.writerow([*(column[i] for column in extra.values()), *cells])
-    os.replace(part, path)
+    rows = [[*(column[i] for column in extra.values()), *row] for i, row in enumerate(table.values.tolist())]
+    write_or_replace(path, csv_text([[*extra, *headings], *rows]).encode())
 
 
 def _labels(columns: CsvColumns, label: str | None) -> list[str]:
@@ -207,16 +201,16 @@ def _feature_names(columns: CsvColumns, reserved: set[str], notes: list[str]) ->
     if counters:
         notes.append(
             "not used, because they increase with every line as a counter or a time does: "
-            f"{', '.join(counters)} (use --features to include them)"
+            f"{listed(counters)} (use --features to include them)"
         )
     if blank:
         notes.append(
-            f"not used, because they have no values: {', '.join(blank)} (use --features to include them)"
+            f"not used, because they have no values: {listed(blank)} (use --features to include them)"
         )
     if texts:
-        notes.append(f"not used, because they have no numbers: {', '.join(texts)}")
+        notes.append(f"not used, because they have no numbers: {listed(texts)}")
     if blank and not names:
-        raise DataDamaged(f"no feature has any value: {', '.join(blank)}")
+        raise DataDamaged(f"no feature has any value: {listed(blank)}")
     if not names:
         raise ConfigError(f"{columns.path} has no column of numbers besides {', '.join(sorted(reserved))}")
     return names
@@ -224,15 +218,16 @@ def _feature_names(columns: CsvColumns, reserved: set[str], notes: list[str]) ->
 
 def _note_uninformative_columns(table: FeatureTable, notes: list[str]) -> None:
     """Note which features have no value or a single value. Raises DataDamaged if none has any."""
-    blank = [name for k, name in enumerate(table.names) if np.isnan(table.values[:, k]).all()]
-    columns = {name: table.columns([name]).values for name in table.names if name not in blank}
-    constant = [name for name, values in columns.items() if np.nanmin(values) == np.nanmax(values)]
+    named = list(zip(table.names, table.values.T, strict=True))
+    blank = [name for name, values in named if np.isnan(values).all()]
+    having = [(name, values[~np.isnan(values)]) for name, values in named]
+    constant = [name for name, values in having if len(values) and values.min() == values.max()]
     if blank:
-        notes.append(f"without any value: {', '.join(blank)}")
+        notes.append(f"without any value: {listed(blank)}")
     if constant:
-        notes.append(f"constant, and so without information: {', '.join(constant)}")
+        notes.append(f"constant, and so without information: {listed(constant)}")
     share = float(np.isnan(table.values).mean())
     if share > 0.0:
         notes.append(f"{share:.1%} of all values are missing")
     if len(blank) == len(table.names):
-        raise DataDamaged(f"no feature has any value: {', '.join(blank)}")
+        raise DataDamaged(f"no feature has any value: {listed(blank)}")

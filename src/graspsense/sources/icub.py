@@ -24,6 +24,7 @@ from attrs import frozen
 
 from graspsense.core.errors import ConfigError, DataDamaged, suggestion
 from graspsense.core.signals import NO_PADS, Frame, Reading
+from graspsense.recording.readable import not_opened
 from graspsense.recording.replayable import Recording
 
 if TYPE_CHECKING:
@@ -100,7 +101,7 @@ def read_grasp(path: Path) -> IcubGrasp:
     except UnicodeDecodeError:
         raise _damaged(path, 1, "it is not plain text") from None
     except OSError as error:
-        raise ConfigError(f"{path} cannot be read: {error.strerror}") from error
+        raise not_opened(path, error) from error
     lines = text.splitlines()
     if not lines:
         raise DataDamaged(f"{path} is empty: a grasp of the iCub data set starts with the line {FIRST_LINE}")

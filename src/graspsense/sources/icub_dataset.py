@@ -23,7 +23,8 @@ from graspsense.core.roles import FeatureSet
 from graspsense.core.signals import APPROACH
 from graspsense.core.trace import SI_UNITS, Trace, trace_of
 from graspsense.recording.controls import controls
-from graspsense.recording.labelled_recording import LabelledRecording
+from graspsense.recording.labelled_recording import LabelledRecording, UnreadableRecording
+from graspsense.recording.readable import each_readable, error_of_all, note_on
 from graspsense.sources.icub import (
     DATA_FOLDER,
     FINGER_FLEXION,
@@ -48,8 +49,8 @@ _SHIFTED_BY: Final = {"p_first": "gap", "p_steady": "gap", "f_steady": "force"}
 def read_dataset(folder: str, features: FeatureSet[Any], *, unreliable: bool = False) -> Labelled:
     """Return the grasps in this folder, or in its subfolder `iCubGraspDataset`.
 
-    With `unreliable`, the class that the author calls unreliable is included. Raises ConfigError if there are no
-    grasps, DataDamaged if a file is incomplete.
+    With `unreliable`, the class that the author calls unreliable is included. A file that cannot be read is left out,
+    with a note. Raises ConfigError if there are no grasps, DataDamaged if none can be read.
     """
     paths = _grasps(folder)
     left_out = [path for path, label, _ in paths if label == UNRELIABLE] if not unreliable else []
@@ -59,12 +60,16 @@ def read_dataset(folder: str, features: FeatureSet[Any], *, unreliable: bool = F
             f"all grasps in {folder} are of {UNRELIABLE}, which the author calls unreliable: include them with "
             "--unreliable"
         )
-    grasps = [read_grasp(path) for path, _, _ in paths]
+    total = len(paths)
+    paths, grasps, unreadable = _readable(paths)
+    if not grasps:
+        raise error_of_all(unreadable)
     table = table_of([features.extract(_trace(grasp)) for grasp in grasps])
     notes = [
         "the data of the iCub hand have no time stamps: times are frame numbers (delta_t is in frames)",
         "metres and newtons are nominal, and relative to the first frame (docs/icub.md)",
         "class, object and session are the same here: no rate tells whether the squeeze or the session is recognised",
+        *note_on(unreadable, total),
     ]
     if left_out:
         notes.append(
@@ -99,16 +104,35 @@ def read_dataset(folder: str, features: FeatureSet[Any], *, unreliable: bool = F
     )
 
 
-def read_recordings(folder: str) -> Iterator[LabelledRecording]:
+def read_recordings(folder: str) -> Iterator[LabelledRecording | UnreadableRecording]:
     """Yield the grasps in this folder, without those of the class that the author calls unreliable.
 
-    Raises as `read_dataset`.
+    Raises ConfigError if there are none.
     """
     for path, label, number in _grasps(folder):
         if label != UNRELIABLE:
-            yield LabelledRecording(
-                recording=read_recording(str(path)), source=path.name, label=label, order=float(number)
-            )
+            for recording in each_readable(path.name, lambda path=path: [read_recording(str(path))]):  # type: ignore[misc]
+                if isinstance(recording, UnreadableRecording):
+                    yield recording
+                else:
+                    yield LabelledRecording(
+                        recording=recording, source=path.name, label=label, order=float(number)
+                    )
+
+
+def _readable(
+    paths: list[tuple[Path, str, int]],
+) -> tuple[list[tuple[Path, str, int]], list[IcubGrasp], list[UnreadableRecording]]:
+    """Return the files that can be read, the grasps in them, and why the others cannot be."""
+    kept, grasps, unreadable = [], [], []
+    for one in paths:
+        for grasp in each_readable(one[0].name, lambda path=one[0]: [read_grasp(path)]):  # type: ignore[misc]
+            if isinstance(grasp, UnreadableRecording):
+                unreadable.append(grasp)
+            else:
+                grasps.append(grasp)
+                kept.append(one)
+    return kept, grasps, unreadable
 
 
 def _grasps(folder: str) -> list[tuple[Path, str, int]]:

@@ -5,7 +5,6 @@ Instances and placements are drawn from the identified spreads. The label of a t
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
@@ -13,7 +12,7 @@ from typing import Any, Final
 from attrs import frozen
 
 from graspsense.core.errors import ConfigError
-from graspsense.core.layers import Flag
+from graspsense.core.layers import Flag, read_toml
 
 IDENTIFIED: Final = "identified:"
 
@@ -61,12 +60,9 @@ def gripper_flags(source: str) -> list[Flag]:
 
 def _scene(name: str) -> IdentifiedScene:
     path = Path(name).expanduser()
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise ConfigError(f"there is no scene {name}") from None
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise ConfigError(f"{name} cannot be read as a scene: {error}") from error
+    if not path.exists():
+        raise ConfigError(f"there is no scene {name}")
+    table = read_toml(path, name, "scene").values
     identified: Any = table.get("identified")
     gripper = identified.get("gripper", {}) if isinstance(identified, dict) else None
     if not isinstance(gripper, dict):

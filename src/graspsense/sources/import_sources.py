@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 
 from attrs import evolve, frozen
 
-from graspsense.core.errors import ConfigError, DataDamaged
+from graspsense.core.errors import ConfigError
 from graspsense.recording.labelled_recording import LabelledRecording, UnreadableRecording
+from graspsense.recording.readable import each_readable, error_of_all
 from graspsense.sources.dataset_recordings import (
     datasets_with_recordings,
     is_recording_number,
@@ -43,25 +45,18 @@ def recordings_to_import(
 ) -> tuple[list[ImportedRecording], list[UnreadableRecording]]:
     """Return the recordings that these sources name, and those that cannot be read.
 
-    `columns` are those of a CSV, `label` is that of all recordings. Raises the first ConfigError or DataDamaged if none
-    can be read.
+    `columns` are those of a CSV, `label` is that of all recordings. Raises the first error if none can be read.
     """
     good: list[ImportedRecording] = []
     bad: list[UnreadableRecording] = []
     for source in sources:
-        try:
-            for one in _named_by(source, columns, label):
-                if isinstance(one, UnreadableRecording):
-                    bad.append(one)
-                else:
-                    good.append(one)
-        except (ConfigError, DataDamaged) as error:
-            bad.append(UnreadableRecording(source=source, error=error))
+        for one in each_readable(source, partial(_named_by, source, columns, label)):
+            if isinstance(one, UnreadableRecording):
+                bad.append(one)
+            else:
+                good.append(one)
     if bad and not good:
-        first = bad[0].error
-        if len(bad) > 1:
-            raise type(first)(f"none of {len(bad)} recordings can be read. The first: {first}")
-        raise first
+        raise error_of_all(bad)
     return good, bad
 
 

@@ -7,11 +7,12 @@ graspsense was involved.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from graspsense.core.errors import ConfigError
+from graspsense.core.errors import ComponentFailed, ConfigError, GraspsenseError, named
 from graspsense.core.features import Features, FeatureTable, table_of
 from graspsense.core.labelled import Labelled, class_of
 from graspsense.core.roles import FeatureSet
@@ -19,30 +20,43 @@ from graspsense.core.signals import APPROACH
 from graspsense.core.trace import SI_UNITS, Trace, trace_of
 from graspsense.recording.before_contact import before_contact
 from graspsense.recording.controls import controls
-from graspsense.recording.labelled_recording import LabelledRecording
+from graspsense.recording.labelled_recording import LabelledRecording, UnreadableRecording
+from graspsense.recording.readable import each_readable, error_of_all, note_on
 from graspsense.recording.replayable import Recording
-from graspsense.sources.dataset_recordings import recordings_of
+from graspsense.sources.dataset_recordings import readable_or_not
 from graspsense.store.first_line import NAMES, UNITS, numbers_of
 
 
 def labelled_recordings(kind: str, place: str, features: FeatureSet[Any]) -> Labelled:
-    """Return the labelled recordings of a data set. Raises ConfigError if there are none, DataDamaged."""
+    """Return the labelled recordings of a data set; a note counts those that cannot be read.
+
+    Raises ConfigError if there are none, and the first error if none can be read.
+    """
     facts: list[LabelledRecording] = []
     rows: list[Features] = []
     before: list[Features] = []
+    unreadable: list[UnreadableRecording] = []
     unlabelled = 0
-    for one in recordings_of(kind, place):
-        if not one.label:
+    for one in readable_or_not(kind, place):
+        if isinstance(one, UnreadableRecording):
+            unreadable.append(one)
+        elif not one.label:
             unlabelled += 1
-            continue
-        trace = trace_of_recording(one.recording)
-        rows.append(features.extract(trace))
-        before.append(before_contact(trace))
-        facts.append(one)
+        else:
+            for found in each_readable(one.source, partial(_features_of, one.recording, features)):
+                if isinstance(found, UnreadableRecording):
+                    unreadable.append(found)
+                    continue
+                rows.append(found[0])
+                before.append(found[1])
+                facts.append(one)
+    if unreadable and not facts:
+        raise error_of_all(unreadable)
     if not facts:
         raise ConfigError(f"{kind}:{place} has no recording with a label")
     table = table_of(rows)
-    notes = [f"{unlabelled} recordings without a label are left out"] if unlabelled else []
+    notes = note_on(unreadable, len(facts) + len(unreadable) + unlabelled)
+    notes += [f"{unlabelled} recordings without a label are left out"] if unlabelled else []
     notes += _counted(one.notices for one in facts)
     units = {unit for one in facts for unit in one.recording.units.values()}
     if units:
@@ -64,6 +78,18 @@ def labelled_recordings(kind: str, place: str, features: FeatureSet[Any]) -> Lab
         notes=tuple(notes),
         provenance={"simulated": False},
     )
+
+
+def _features_of(recording: Recording, features: FeatureSet[Any]) -> tuple[tuple[Features, Features]]:
+    """Return the features of a recording, and those from before contact."""
+    trace = trace_of_recording(recording)
+    try:
+        extracted = features.extract(trace)
+    except (GraspsenseError, MemoryError):
+        raise
+    except Exception as error:
+        raise ComponentFailed(f"the feature set {type(features).__name__} failed: {named(error)}") from error
+    return ((extracted, before_contact(trace)),)
 
 
 def trace_of_recording(recording: Recording) -> Trace:

@@ -17,7 +17,8 @@ from graspsense.core.errors import DeviceLost, GraspsenseError, RecordingEnded, 
 from graspsense.core.roles import DeviceInfo, SensorBackend
 from graspsense.core.setting import NAMES_INPUT, setting
 from graspsense.core.signals import CHANNELS, EFFORT, Command, Pads, Reading
-from graspsense.recording.replayable import Recording
+from graspsense.recording.readable import readable
+from graspsense.recording.replayable import Recording, check_recording
 from graspsense.sources.dataset_recordings import (
     datasets_with_recordings,
     handed_recording,
@@ -88,7 +89,10 @@ def read_named(kind: str, name: str) -> Recording:
     if handed is not None:
         return handed
     if kind in KINDS and not is_recording_number(kind, name):
-        return KINDS[kind](name)
+        with readable(f"{kind}:{name}"):
+            recording = KINDS[kind](name)
+            check_recording(recording)
+            return recording
     return numbered_recording(kind, name).recording
 
 

@@ -22,22 +22,21 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from graspsense.core.calibration import Cells, edge_force, masked, pad_force, tare, zero_of
 from graspsense.core.channels import signal_type
 from graspsense.core.entries import Channel, FastChannel
-from graspsense.core.errors import ConfigError, DataDamaged, PluginUnavailable, TareRefused
+from graspsense.core.errors import ConfigError, DataDamaged, TareRefused
 from graspsense.core.signals import Frame, Pads, Reading, no_pads
+from graspsense.recording.readable import readable
 from graspsense.recording.replayable import Recording
+from graspsense.recording.unpacked import Unpacked
 from graspsense.sources.fast_samples import sample_blocks
-
-if TYPE_CHECKING:
-    from rosbags.highlevel import AnyReader
+from graspsense.sources.ros_bags import opened_bag
 
 SIDES: Final = {"l": "left", "r": "right"}
 TIP_FIELDS: Final = (("l_finger_tip", "r_finger_tip"), ("data0", "data1"))
@@ -70,6 +69,8 @@ DEFINITIONS: Final[Mapping[str, str]] = {
 }
 """Definitions of the messages of the PR2, for bags that contain no definitions of their own."""
 
+_MESSAGE_BYTES: Final = 512
+"""Bytes of a message in memory, about."""
 _NAN: Final = float("nan")
 
 
@@ -109,12 +110,13 @@ def read_bag(name: str) -> Recording:
     images: list[_Image] = []
     motions: list[_Motion] = []
     samples: list[_Sampled] = []
-    with _bag(path) as reader:
-        topics = frozenset(reader.topics)
-        side = _side(path, side, topics)
-        pressure, source = PRESSURE.format(side), _source(path, side, topics)
+    kept = Unpacked(path)
+    with opened_bag(path, DEFINITIONS) as bag, readable(path):
+        side = _side(path, side, bag.topics)
+        pressure, source = PRESSURE.format(side), _source(path, side, bag.topics)
         acceleration = ACCELERATION.format(side)
-        for topic, t_ns, message in _messages(path, reader, (pressure, source, acceleration)):
+        for topic, t_ns, message in bag.messages({pressure, source, acceleration}.__contains__):
+            kept.add(_MESSAGE_BYTES)
             if topic == acceleration:
                 samples.append(_Sampled(t_ns, tuple((one.x, one.y, one.z) for one in message.samples)))
             elif topic == pressure:
@@ -146,46 +148,6 @@ def read_bag(name: str) -> Recording:
         rate_hz=(len(motions) - 1) / duration_s,
         notes=tuple(notes),
     )
-
-
-@contextmanager
-def _bag(path: Path) -> Iterator[AnyReader]:
-    try:
-        from rosbags.highlevel import AnyReader
-        from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-    except ImportError as error:
-        raise PluginUnavailable(
-            f'reading ROS bags needs rosbags: {error}\n  try: pip install "graspsense[ros]"'
-        ) from error
-
-    # Not every ROS 2 bag contains the definitions of its messages.
-    store = get_typestore(Stores.ROS2_HUMBLE)
-    for name, definition in DEFINITIONS.items():
-        store.register(get_types_from_msg(definition, name))
-    try:
-        reader = AnyReader([path], default_typestore=store)
-        reader.open()
-    except Exception as error:  # rosbags raises various exceptions on damaged files
-        raise DataDamaged(f"{path} cannot be read as a ROS bag: {error}") from error
-    try:
-        yield reader
-    finally:
-        reader.close()
-
-
-def _messages(path: Path, reader: AnyReader, topics: Sequence[str]) -> Iterator[tuple[str, int, Any]]:
-    """Yield topic, time and message. The time is that of the header, or that of the recording if it has none."""
-    connections = [one for one in reader.connections if one.topic in topics]
-    try:
-        for connection, recorded_ns, raw in reader.messages(connections=connections):
-            message = reader.deserialize(raw, connection.msgtype)
-            stamp = getattr(getattr(message, "header", None), "stamp", None)
-            stamp_ns = stamp.sec * 1_000_000_000 + stamp.nanosec if stamp is not None else 0
-            yield connection.topic, stamp_ns or recorded_ns, message
-    except DataDamaged:
-        raise
-    except Exception as error:  # as above
-        raise DataDamaged(f"{path} is damaged: {type(error).__name__}: {error}") from error
 
 
 def _side(path: Path, side: str, topics: Collection[str]) -> str:

@@ -21,8 +21,9 @@ from graspsense.core.compiled_features import CompiledExtraction, both, compiled
 from graspsense.core.errors import ComponentFailed, ConfigError, named
 from graspsense.core.features import FeatureRows, Features
 from graspsense.core.labelled import Labelled, class_of
+from graspsense.core.limits import CLASSES
 from graspsense.core.roles import BatchBackend, DeviceInfo, FeatureSet
-from graspsense.core.runner import run_grasp
+from graspsense.core.runner import run_uninterrupted
 from graspsense.core.strict import plain
 from graspsense.core.wiring import check
 from graspsense.recording.before_contact import (
@@ -61,6 +62,14 @@ def _check_trials(group: object, attribute: Attribute[Any], value: int | None) -
     if value is not None and value < 1:
         what = "per instance" if attribute.name == "trials" else "in total"
         raise ValueError(f"{value} trials {what}: give at least 1")
+    if value is not None and value > TRIALS_PER_SEED:
+        raise ValueError(f"{value} trials: give at most {TRIALS_PER_SEED}")
+
+
+def _check_total(trials: int) -> None:
+    """Raise ConfigError unless this is a number of trials that can be simulated for one seed."""
+    if not 1 <= trials <= TRIALS_PER_SEED:
+        raise ConfigError(f"{trials} trials: give at least 1 and at most {TRIALS_PER_SEED} in total")
 
 
 @frozen
@@ -103,8 +112,11 @@ class Group:
             )
         pairs = list(known.items())
         n = len(pairs)
+        if too_many := CLASSES.exceeded(n):
+            raise ConfigError(f"the objects to simulate: {too_many}")
         instances = [self._instances_of(k, pairs) for k in range(n)]
         if self.total is None:
+            _check_total(self.trials * sum(map(len, instances)))
             return [
                 PlannedTrial(label, name, i)
                 for k, (label, name) in enumerate(pairs)
@@ -149,9 +161,12 @@ def plan_trials(settings: Settings, groups: Sequence[Group], seed: int) -> Simul
     if kinds and not any(group.objects or group.named for group in groups):
         names = ", ".join(kind.name for kind in kinds)
         raise ConfigError(f"no kind of object of this gripper is a default: name --objects, any of {names}")
-    trials = [trial for group in groups for trial in group.planned(kinds)]
-    if not 1 <= len(trials) <= TRIALS_PER_SEED:
-        raise ConfigError(f"{len(trials)} trials: give at least 1 and at most a million in total")
+    trials: list[PlannedTrial] = []
+    for group in groups:
+        trials += group.planned(kinds)
+        if len(trials) > TRIALS_PER_SEED:
+            break
+    _check_total(len(trials))
     first = OBJECTS_PER_SEED * seed
     return SimulationPlan(
         groups=groups,
@@ -349,7 +364,7 @@ def _grasps(
         run = evolve(settings.run, seed=seed)
         gripper = backend.with_object(scene)
         gripper.expect_features(extract.feature_set)
-        grasp = run_grasp(gripper, controller, run, on_open=_refuse_real_device)
+        grasp = run_uninterrupted(gripper, controller, run, on_open=_refuse_real_device)
         yield *extract(grasp.trace), grasp.trace, grasp.report
         if progress is not None:
             progress(k + 1, total)

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import hashlib
-import tomllib
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from graspsense.core.errors import ConfigError, suggestion
 from graspsense.core.identification import RecordedSqueeze
 from graspsense.core.labelled import class_of
+from graspsense.core.layers import read_toml
 
 if TYPE_CHECKING:
     from graspsense.recording.reader import RecordedGrasp
@@ -68,11 +67,10 @@ def _refuse_scene(source: str) -> None:
     path = Path(source).expanduser()
     if path.suffix != ".toml":
         return
-    with suppress(OSError, UnicodeDecodeError, tomllib.TOMLDecodeError):
-        if tomllib.loads(path.read_text(encoding="utf-8")).keys() & {"width_m", "terms"}:
-            raise ConfigError(
-                f"{source} is a scene, not a recording: name the recordings, as in {STORE}DIR, and the scene with --out"
-            )
+    if read_toml(path, source, "manifest").values.keys() & {"width_m", "terms"}:
+        raise ConfigError(
+            f"{source} is a scene, not a recording: name the recordings, as in {STORE}DIR, and the scene with --out"
+        )
 
 
 def _of_store(folder: str) -> Iterator[RecordedSqueeze]:

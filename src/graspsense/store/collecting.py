@@ -18,9 +18,9 @@ from graspsense.core.signals import Outcome
 from graspsense.recording.atomic_file import SaveFailed
 from graspsense.store.changes import set_aside
 from graspsense.store.comparable import check_device, check_settings, newest_grasp
-from graspsense.store.labels import labels_of, word_of
+from graspsense.store.labels import labels_of
 from graspsense.store.record_grasp import RecordedTrial, record_grasp
-from graspsense.store.rows import StoredTrial, TrialSummary
+from graspsense.store.rows import StoredTrial
 from graspsense.store.store import Store
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 HELP: Final = (
     "keys: Enter grasps it, u undoes the last trial, r repeats the last trial, s skips this object, q stops, ? shows "
-    "this"
+    "this; Ctrl-C stops a grasp and the collection"
 )
 UNDONE: Final = "undone by the operator"
 RETAKEN: Final = "repeated by the operator"
@@ -79,10 +79,8 @@ class Collection:
     show: Callable[[str, Trial], None] = lambda word, trial: None
     changed: bool = False
     sinks: Sequence[Sink] = ()
-    stopping: bool = False
-    """Set to True to stop after the current grasp."""
-    numbers: list[int] = field(factory=list, init=False)
-    """Numbers of the trials collected so far."""
+    collected: dict[int, str] = field(factory=dict, init=False)
+    """The label of each trial that this collection has stored, by its number."""
     _skipped: set[str] = field(factory=set, init=False)
 
     def counts(self) -> dict[str, int]:
@@ -106,14 +104,12 @@ class Collection:
         """Collect until nothing is left or the operator stops.
 
         Raises ConfigError if the settings or the gripper differ from those of earlier trials, NoDevice if there is no
-        gripper at the first grasp, SaveFailed if a trial could not be saved.
+        gripper at the first grasp, SaveFailed if a trial could not be saved, and KeyboardInterrupt if the operator
+        interrupts it; a grasp that was interrupted is stored as aborted, and no further one begins.
         """
         self._check_settings()
         self.say(HELP)
-        while not self.stopping:
-            word = self.following()
-            if word is None:
-                break
+        while (word := self.following()) is not None:
             answer = self.ask(
                 f"next: {word}  ({self.counts()[word] + 1} of {self.wanted.each})  [Enter u r s q ?] "
             )
@@ -132,10 +128,13 @@ class Collection:
             else:
                 self.say(HELP)
 
-    def last(self) -> TrialSummary | None:
-        """Return the newest collected trial that is not set aside."""
-        newest = self.store.page(origin="collect", limit=1)
-        return newest[0] if newest else None
+    def last(self) -> int | None:
+        """Return the number of the newest trial of this collection that is not set aside.
+
+        Other operators may collect into the same store; their trials are not this operator's to undo.
+        """
+        newest_first = reversed(self.collected)
+        return next((one for one in newest_first if self.store.summary(one).set_aside is None), None)
 
     def _grasp(self, word: str) -> None:
         settings = self.settings_for(word, self.wanted.seed + self._number_of_trials())
@@ -150,16 +149,18 @@ class Collection:
                 on_open=self._check_device,
             )
         except NoDevice as error:
-            if not self.numbers:
+            if not self.collected:
                 raise
             self.say(str(error))
             return
         if grasp.number is None:
             raise SaveFailed(grasp.problem)
-        self.numbers.append(grasp.number)
+        self.collected[grasp.number] = word
         self.say(self._report(word, grasp))
         self.show(word, grasp.trial)
         self.say("  ".join(f"{label} {n}/{self.wanted.each}" for label, n in self.counts().items()))
+        if grasp.interrupted:
+            raise KeyboardInterrupt
 
     def _report(self, word: str, grasp: RecordedTrial) -> str:
         trial = grasp.trial
@@ -173,14 +174,17 @@ class Collection:
         return line
 
     def _undo(self, why: str) -> str | None:
-        """Set the last collected trial aside and return its label, or None if there is none."""
+        """Set the last trial of this collection aside and return its label, or None if there is none."""
         last = self.last()
         if last is None:
-            self.say("there is no trial to undo")
+            self.say(
+                "there is no trial to undo: these keys act on trials of this session. `graspsense trials aside "
+                f"{self.store.folder}#NUMBER` sets any other aside"
+            )
             return None
-        set_aside(self.store, [last.id], why)
-        word = word_of(last.label, last.instance) or "no label"
-        self.say(f"trial {last.id}, {word}: set aside ({why})")
+        set_aside(self.store, [last], why)
+        word = self.collected[last]
+        self.say(f"trial {last}, {word}: set aside ({why})")
         return word
 
     def _number_of_trials(self) -> int:

@@ -10,10 +10,11 @@ from __future__ import annotations
 import json
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from datetime import datetime
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from attrs import fields_dict, frozen
+from attrs import evolve, fields_dict, frozen
 
 from graspsense.core.config import Flag
 from graspsense.core.errors import ConfigError, DataDamaged
@@ -23,11 +24,13 @@ from graspsense.core.strict import plain
 from graspsense.core.target_value import TargetValue, values_of_labels
 from graspsense.recording.controls import controls
 from graspsense.recording.provenance import recipe
+from graspsense.recording.readable import note_on, readable
 from graspsense.recording.trial_record import FeatureValues
 from graspsense.store.changes import with_changed_numbers
-from graspsense.store.extract_again import ExtractedAgain, ExtractedTrials, extract_again
+from graspsense.store.extract_again import ExtractedTrials, extract_again
 from graspsense.store.first_line import first_lines
 from graspsense.store.opening import decoded
+from graspsense.store.rows import StoredTrial
 from graspsense.store.store import COUNTS, Store
 from graspsense.store.time_recorded import order_recorded
 
@@ -62,6 +65,7 @@ class _Rows:
     values: tuple[bytes, ...]
     before_contact: tuple[bytes, ...]
     before_set: tuple[int, ...]
+    feature_set: tuple[int, ...]
     simulated: tuple[int, ...]
     recipe: tuple[str, ...]
     made_at: tuple[str, ...]
@@ -99,15 +103,11 @@ def labelled_store(
     """
     wanted = COUNTS if value is not None else f"{COUNTS} AND label IS NOT NULL"
     with Store.read(folder) as store:
-        newest_number, feature_set = _newest(store, wanted)
-        newest = store.trial(newest_number)
-        changed = (
-            *options,
-            *(flag.key for flag in flags),
-            *(f"checkpoint {one:g} s" for one in checkpoints_s),
-        )
+        newest, feature_set = _newest(store, wanted)
+        changed = (*options, *(flag.key for flag in flags), *(f"checkpoint {t:g} s" for t in checkpoints_s))
         rows = _read_rows(store, wanted, None if changed else feature_set)
         target, notes = None, [] if changed else _of_recording(store, wanted, len(rows))
+        rows = _intact(store, rows, notes)
         if value is not None:
             rows, target = _with_value(store, rows, value, notes)
         settings, components = newest.recipe, newest.record.provenance.get("components", {})
@@ -115,7 +115,11 @@ def labelled_store(
             extracted = extract_again(
                 store, rows.id, options, flags=flags, checkpoints_s=checkpoints_s, progress=progress
             )
-            rows, tables = _tables_again(rows, extracted.trials, changed, notes)
+            before = rows.id
+            rows, tables = _tables_again(rows, extracted, changed, notes)
+            if target is not None:
+                known = dict(zip(before, target.values, strict=True))
+                target = evolve(target, values=tuple(known[number] for number in rows.id))
             settings, components = _with_gripper(extracted, settings, components)
         else:
             tables = _stored_tables(store, folder, rows, feature_set)
@@ -138,7 +142,7 @@ def labelled_store(
         ),
         value=target,
         notes=(*notes, *_notes(len(set(rows.recipe)), sum(rows.simulated), len(rows)), *unused),
-        provenance=_provenance(folder, rows, newest_number, settings, components),
+        provenance=_provenance(folder, rows, newest.summary.id, settings, components),
     )
 
 
@@ -164,16 +168,23 @@ def _with_gripper(
     )
 
 
-def _newest(store: Store, wanted: str) -> tuple[int, int]:
-    """Return the number of the newest wanted trial, and of its feature set. Raises ConfigError if there is none."""
-    rows = store.query(f"SELECT id, feature_set FROM trial WHERE {wanted} ORDER BY id DESC LIMIT 1")
-    if not rows:
-        raise ConfigError(
-            f"the store in {store.folder} has no labelled trial that ended by itself. Record some with `graspsense "
-            f"collect --save {store.folder} --labels ...`"
-        )
-    ((number, feature_set),) = rows
-    return int(number), int(feature_set)
+def _newest(store: Store, wanted: str) -> tuple[StoredTrial, int]:
+    """Return the newest wanted trial that can be read, and the number of its feature set.
+
+    Raises ConfigError if there is none, DataDamaged if none can be read.
+    """
+    damage = None
+    for number, feature_set in store.query(
+        f"SELECT id, feature_set FROM trial WHERE {wanted} ORDER BY id DESC"
+    ):
+        try:
+            return store.trial(number), int(feature_set)
+        except DataDamaged as error:
+            damage = damage or error
+    raise damage or ConfigError(
+        f"the store in {store.folder} has no labelled trial that ended by itself. Record some with `graspsense "
+        f"collect --save {store.folder} --labels ...`"
+    )
 
 
 @frozen(kw_only=True)
@@ -197,6 +208,31 @@ def _read_rows(store: Store, wanted: str, feature_set: int | None) -> _Rows:
         () if feature_set is None else (feature_set,),
     )
     return _Rows(**dict(zip(_COLUMNS, zip(*rows, strict=True), strict=True)))
+
+
+def _intact(store: Store, rows: _Rows, notes: list[str]) -> _Rows:
+    """Return the rows that can be read. Raises the error of the first if none can be."""
+    sets = dict(store.query("SELECT id, features FROM feature_set"))
+    intact, damage = [], None
+    for i, number in enumerate(rows.id):
+        try:
+            with readable(f"trial {number} of {store.folder}"):
+                _unpacked_table(str(store.folder), sets[rows.feature_set[i]], rows.values[i : i + 1])
+                _unpacked_table(str(store.folder), sets[rows.before_set[i]], rows.before_contact[i : i + 1])
+                for text in (rows.labels[i], rows.missing_before[i]):
+                    decoded(store.folder, text)
+                datetime.fromisoformat(rows.made_at[i])
+            intact.append(i)
+        except DataDamaged as error:
+            damage = damage or error
+    if damage is not None:
+        if not intact:
+            raise damage
+        notes.append(
+            f"{len(rows) - len(intact)} trials are left out, because their rows are damaged: {damage}"
+        )
+        return rows.picked(intact)
+    return rows
 
 
 def _with_value(store: Store, rows: _Rows, name: str, notes: list[str]) -> tuple[_Rows, TargetValue]:
@@ -227,9 +263,12 @@ def _stored_tables(store: Store, folder: str, rows: _Rows, feature_set: int) -> 
 
 
 def _tables_again(
-    rows: _Rows, trials: Sequence[ExtractedAgain], changed: Sequence[str], notes: list[str]
+    rows: _Rows, extracted: ExtractedTrials, changed: Sequence[str], notes: list[str]
 ) -> tuple[_Rows, _Tables]:
     """Return the rows and tables of trials that were extracted again, without those that have other features."""
+    notes += note_on(extracted.unreadable, len(rows))
+    read, trials = set(extracted.numbers), extracted.trials
+    rows = rows.picked([i for i, number in enumerate(rows.id) if number in read])
     names = trials[-1].features.features
     same = [i for i, trial in enumerate(trials) if trial.features.features == names]
     if len(same) < len(trials):

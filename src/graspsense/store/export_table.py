@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import io
 import json
 import math
@@ -13,6 +12,7 @@ from typing import Any, Final
 import numpy as np
 from attrs import frozen
 
+from graspsense.core.csv_text import csv_text
 from graspsense.core.errors import ConfigError
 from graspsense.core.features import FeatureTable
 from graspsense.core.target_value import RESERVED, name_and_unit, number_of
@@ -152,15 +152,11 @@ def write_csv(path: Path, table: TrialTable) -> None:
 
     The numbers of the controls follow the features, so that `evaluate` of the file is that of the store.
     """
-    out = io.StringIO(newline="")
-    writer = csv.writer(out, lineterminator="\n")
     features = _side_by_side([("", table.features), ("", table.further)])
     headings = [f"{name} [{unit}]" for name, unit in zip(features.names, features.units, strict=True)]
-    writer.writerow([*table.about, *headings])
-    for about, values in zip(zip(*table.about.values(), strict=True), features.values.tolist(), strict=True):
-        cells = ["" if math.isnan(value) else repr(value) for value in values]
-        writer.writerow([*("" if cell is None else cell for cell in about), *cells])
-    write_new(path, out.getvalue().encode())
+    about = zip(*table.about.values(), strict=True)
+    rows = [[*cells, *values] for cells, values in zip(about, features.values.tolist(), strict=True)]
+    write_new(path, csv_text([[*table.about, *headings], *rows]).encode())
 
 
 def write_arff(path: Path, table: TrialTable) -> None:

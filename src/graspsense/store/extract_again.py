@@ -15,11 +15,13 @@ from attrs import evolve, frozen
 
 from graspsense.core.checkpoints import with_checkpoints
 from graspsense.core.config import NONE, Flag, Settings, resolve, without_followers
-from graspsense.core.errors import ComponentFailed, ConfigError, named
+from graspsense.core.errors import ComponentFailed, ConfigError, DataDamaged, named
 from graspsense.core.layers import Layer
-from graspsense.core.runner import run_grasp
+from graspsense.core.runner import run_uninterrupted
 from graspsense.core.wiring import check
 from graspsense.recording.before_contact import before_contact, contact_force_of
+from graspsense.recording.labelled_recording import UnreadableRecording
+from graspsense.recording.readable import error_of_all, readable
 from graspsense.recording.trial_record import FeatureValues
 
 if TYPE_CHECKING:
@@ -42,9 +44,14 @@ class ExtractedAgain:
 
 @frozen(kw_only=True)
 class ExtractedTrials:
-    """Trials under other settings, with the settings and components of the last of them."""
+    """Trials under other settings, with the settings and components of the last of them.
+
+    `numbers` are those of the trials. `unreadable` are the others that were asked for, with what is wrong.
+    """
 
     trials: tuple[ExtractedAgain, ...]
+    numbers: tuple[int, ...]
+    unreadable: tuple[UnreadableRecording, ...]
     settings: Mapping[str, Mapping[str, Any]]
     components: Mapping[str, str]
 
@@ -61,28 +68,40 @@ def extract_again(
     """Return the features of these trials with changed settings; `options` are as typed after `-o`.
 
     `flags` are changes that did not come as text. With `checkpoints_s` (s after the contact), the features are those of
-    `CheckpointFeatures`. Raises ConfigError if a setting is not one of `CHANGEABLE` or wrong,
-    DataDamaged if a recording is lost or damaged, and ComponentFailed if a feature set fails.
+    `CheckpointFeatures`. A trial whose recording is lost or damaged does not stop the others. Raises ConfigError if a
+    setting is not one of `CHANGEABLE` or wrong, ComponentFailed if a feature set fails, and DataDamaged if no trial can
+    be read.
     """
     _refuse_other_tables(options)
     resolved: dict[str, Settings] = {}
-    trials = []
+    found: dict[int, ExtractedAgain] = {}
+    unreadable: list[UnreadableRecording] = []
     settings = None
     for done, number in enumerate(numbers):
-        recorded = store.trial(number).record.settings
-        own = {table: keys for table, keys in recorded.items() if table != "gripper"}
-        text = json.dumps(own, sort_keys=True)
         recording = f"store:{store.folder}#{number}"
-        if text not in resolved:
-            resolved[text] = _resolved(own, recording, options, flags)
-        settings = resolved[text]
-        trials.append(_extracted(settings, recording, checkpoints_s))
+        try:
+            with readable(recording):
+                recorded = store.trial(number).record.settings
+                own = {table: keys for table, keys in recorded.items() if table != "gripper"}
+                text = json.dumps(own, sort_keys=True)
+                if text not in resolved:
+                    resolved[text] = _resolved(own, recording, options, flags)
+                found[number] = _extracted(resolved[text], recording, checkpoints_s)
+                settings = resolved[text]
+        except DataDamaged as error:
+            unreadable.append(UnreadableRecording(source=recording, error=error))
         if progress is not None:
             progress(done + 1, len(numbers))
     if settings is None:
+        if unreadable:
+            raise error_of_all(unreadable)
         raise ConfigError(f"the store in {store.folder} has no trial to extract features from")
     return ExtractedTrials(
-        trials=tuple(trials), settings=dict(settings.values), components=dict(settings.components)
+        trials=tuple(found.values()),
+        numbers=tuple(found),
+        unreadable=tuple(unreadable),
+        settings=dict(settings.values),
+        components=dict(settings.components),
     )
 
 
@@ -116,7 +135,7 @@ def _resolved(
 def _extracted(settings: Settings, recording: str, checkpoints_s: Sequence[float]) -> ExtractedAgain:
     gripper = settings.gripper
     backend = gripper.component.create(evolve(gripper.config, recording=recording))
-    grasp = run_grasp(backend, settings.controller.create(), settings.run)
+    grasp = run_uninterrupted(backend, settings.controller.create(), settings.run)
     try:
         feature_set = with_checkpoints(settings.features.create(), checkpoints_s)
         features = feature_set.extract(grasp.trace)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import sqlite3
 import tempfile
@@ -139,6 +140,13 @@ def sqlite_errors(folder: Path) -> Iterator[None]:
         raise DataDamaged(
             f"the store in {folder} is damaged ({error}). {_REPAIR.format(folder=folder)}"
         ) from error
+
+
+def refuse_read_fault(folder: Path, problem: str) -> None:
+    """Raise SaveFailed if SQLite lists a page as a problem that the disk could not deliver."""
+    code = re.search(r"error code=(\d+)", problem)
+    if code is not None and int(code[1]) & 0xFF == sqlite3.SQLITE_IOERR:
+        raise SaveFailed(f"the store in {folder} {_REASONS[sqlite3.SQLITE_IOERR]} ({problem})")
 
 
 def _check_version(folder: Path, version: int, application: int) -> None:

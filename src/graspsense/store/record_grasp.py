@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING
 
-from attrs import frozen
+from attrs import evolve, frozen
 
-from graspsense.core.pipeline import grasp_with
+from graspsense.core.interrupts import Interrupts
+from graspsense.core.pipeline import GraspInterrupted, grasp_with
 from graspsense.recording.atomic_file import SaveFailed
 from graspsense.recording.layout import DEVICE, RESULT, START
 from graspsense.recording.recorder import Recorder
@@ -33,6 +34,8 @@ class RecordedTrial:
     number: int | None
     counts: Mapping[str, int]
     problem: str = ""
+    interrupted: bool = False
+    """Whether the user asked for an end, during the grasp or while it was saved."""
 
 
 def record_grasp(
@@ -47,23 +50,49 @@ def record_grasp(
 ) -> RecordedTrial:
     """Perform one grasp as `grasp_with` does, record it, and add it to the store.
 
-    A disk that fails during the grasp does not stop it: the trial is returned with the problem. Raises what
-    `grasp_with` raises, and SaveFailed if the recording cannot be started.
+    A disk that fails during the grasp does not stop it: the trial is returned with the problem. An interrupted grasp is
+    stored as well, and nothing interrupts its saving. Raises what else `grasp_with` raises, SaveFailed if the recording
+    cannot be started, and KeyboardInterrupt if the user asked for an end before the fingers moved.
     """
+    # The grasp itself ends at a signal; what comes before and after it does not.
+    with Interrupts(deferred=True) as interrupts:
+
+        def opened(device: DeviceInfo) -> None:
+            if interrupts.count:
+                raise KeyboardInterrupt
+            if on_open is not None:
+                on_open(device)
+
+        grasp = _recorded(store, settings, plugins, labels, origin, sinks, opened)
+        return evolve(grasp, interrupted=grasp.interrupted or interrupts.count > 0)
+
+
+def _recorded(
+    store: Store,
+    settings: Settings,
+    plugins: Plugins,
+    labels: Mapping[str, str],
+    origin: Origin,
+    sinks: Iterable[Sink],
+    on_open: Callable[[DeviceInfo], None],
+) -> RecordedTrial:
     record = TrialRecord.begin(settings, labels, origin)
     recorder = Recorder(store.new_recording(record.made_at))
 
     def opened(device: DeviceInfo) -> None:
         nonlocal record
-        if on_open is not None:
-            on_open(device)
+        on_open(device)
         record = record.with_device(device)
         recorder.metadata(DEVICE, record.section(DEVICE))
         recorder.wait_ready()
 
     try:
         recorder.metadata(START, record.section(START))
-        trial = grasp_with(settings, plugins, labels=labels, sinks=[*sinks, recorder], on_open=opened)
+        interrupted = False
+        try:
+            trial = grasp_with(settings, plugins, labels=labels, sinks=[*sinks, recorder], on_open=opened)
+        except GraspInterrupted as error:
+            trial, interrupted = error.trial, True
         record = record.with_result(trial)
     except BaseException:
         recorder.leave()
@@ -73,5 +102,5 @@ def record_grasp(
         recording = recorder.finish()
         number = store.add(record, recording, complete=not recording.dropped)
     except SaveFailed as error:
-        return RecordedTrial(trial=trial, number=None, counts={}, problem=str(error))
-    return RecordedTrial(trial=trial, number=number, counts=recording.counts)
+        return RecordedTrial(trial=trial, number=None, counts={}, problem=str(error), interrupted=interrupted)
+    return RecordedTrial(trial=trial, number=number, counts=recording.counts, interrupted=interrupted)

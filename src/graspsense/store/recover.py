@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 from attrs import asdict, evolve, frozen
 
 from graspsense.core.config import build
-from graspsense.core.errors import ConfigError, DataDamaged, GraspsenseError
+from graspsense.core.errors import FAILURES, ConfigError, DataDamaged, GraspsenseError
 from graspsense.core.features import Features
 from graspsense.core.plugins import installed
 from graspsense.recording.atomic_file import SaveFailed
@@ -25,7 +25,8 @@ from graspsense.recording.reader import RecordedGrasp, TopicRows, read_recorded
 from graspsense.recording.recording_info import RecordingInfo
 from graspsense.recording.trial_record import FeatureValues, TrialRecord, TrialResult
 from graspsense.recording.writer import RecordingWriter
-from graspsense.store.store import Store
+from graspsense.store.opening import damaged
+from graspsense.store.store import Store, integrity
 
 if TYPE_CHECKING:
     from graspsense.core.trace import Trace
@@ -60,19 +61,29 @@ class Recovered:
 
 
 def recover_store(store: Store) -> list[Recovered]:
-    """Complete every unfinished recording of a store, and add a row for each that has none. Raises SaveFailed."""
+    """Complete every unfinished recording of a store, and add a row for each that has none.
+
+    Raises DataDamaged, before anything is changed, if the database of the store is malformed; SaveFailed.
+    """
+    problems = integrity(store)
+    if problems:
+        raise damaged(store.folder, f"the database: {problems[0]}")
     results = []
     known = store.recording_names()
     folder = store.recordings
     for path in sorted(folder.glob(f"*{RECOVERED}{PART}")):
+        if not path.is_file():
+            continue
         with _locked(path) as mine:
             if mine:  # an unfinished copy, whose original still exists
                 path.unlink()
-    without_row = [path for path in folder.glob("*.mcap") if path.name not in known]
+    without_row = [path for path in folder.glob("*.mcap") if path.name not in known and path.is_file()]
     # With several of them the database is lost: their trials get their numbers in the order of recording.
     for path in sorted(without_row, key=_made_at) if len(without_row) > 1 else without_row:
         results.append(_add_row(store, path))
     for path in sorted(folder.glob(f"*.mcap{PART}")):
+        if not path.is_file():
+            continue  # `verify` names it
         with _locked(path) as mine:
             if not mine:
                 results.append(Recovered(file=path, what="busy", why="it is being written"))
@@ -203,7 +214,7 @@ def _features(trace: Trace, record: TrialRecord, why: str) -> FeatureValues:
         table = dict(record.settings["features"])
         component = installed().find("feature-set", table.pop("type"))
         extracted: Features = component.create(build(component, table)).extract(trace)
-    except (GraspsenseError, KeyError) as error:
+    except FAILURES as error:
         reason = f"{why}; its features cannot be extracted here: {error}"
         return FeatureValues(features=(), values=(), reasons={"": reason})
     return FeatureValues.of(extracted)
@@ -231,6 +242,8 @@ def is_being_written(path: Path) -> bool:
 def _locked(path: Path) -> Iterator[bool]:
     """Hold the lock that the writer of this file holds; yield False if a writer has it."""
     try:
+        if path.exists() and not path.is_file():
+            raise ConfigError(f"{path} is not a file")
         file = path.open("rb")
     except FileNotFoundError:
         raise ConfigError(f"there is no recording {path}") from None

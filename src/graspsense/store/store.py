@@ -13,14 +13,13 @@ import re
 import secrets
 import shutil
 import sqlite3
-import struct
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Final
 
-from graspsense.core.errors import ConfigError, DataDamaged
+from graspsense.core.errors import ConfigError, DataDamaged, named
 from graspsense.recording.atomic_file import SaveFailed
 from graspsense.recording.recording_info import RecordingInfo
 from graspsense.recording.trial_record import TrialRecord
@@ -33,6 +32,7 @@ from graspsense.store.opening import (
     damaged,
     is_new,
     make_safe,
+    refuse_read_fault,
     sqlite_errors,
 )
 from graspsense.store.rows import (
@@ -192,9 +192,10 @@ class Store:
             return decoded(summary, row, self.recording_path(summary.recording))
         except DataDamaged as error:
             raise damaged(self.folder, str(error)) from error
-        except (ValueError, TypeError, KeyError, AttributeError, RecursionError, struct.error) as error:
-            problem = f"trial {number} cannot be read ({type(error).__name__}: {error})"
-            raise damaged(self.folder, problem) from error
+        except MemoryError:
+            raise
+        except Exception as error:  # a row can hold any value in any place
+            raise damaged(self.folder, f"trial {number} cannot be read ({named(error)})") from error
 
     def encoded_row(self, number: int) -> tuple[str, EncodedRow]:
         """Return the stored hash and the columns of a trial. Raises DataDamaged if there are not all of them."""
@@ -281,8 +282,10 @@ def stored_rows(store: Store) -> Iterator[tuple[int, str, EncodedRow]]:
 
 
 def integrity(store: Store) -> list[str]:
-    """Return the problems that SQLite finds in the file."""
+    """Return the problems that SQLite finds in the file. Raises SaveFailed if the disk cannot be read."""
     problems = [str(line) for (line,) in store.query("PRAGMA integrity_check(20)") if line != "ok"]
+    for problem in problems:
+        refuse_read_fault(store.folder, problem)
     return problems + [
         f"{row[0]} row {row[1]} has no {row[2]}" for row in store.query("PRAGMA foreign_key_check")
     ]

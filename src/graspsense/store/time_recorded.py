@@ -66,10 +66,10 @@ def _labels(text: str) -> Mapping[str, str]:
 def _time(text: str) -> float | None:
     try:
         time = datetime.fromisoformat(text)
-    except (TypeError, ValueError):
+        # A time without a zone is taken as UTC: only the order matters.
+        return (time if time.tzinfo is not None else time.replace(tzinfo=UTC)).timestamp()
+    except (TypeError, ValueError, OverflowError):
         return None
-    # A time without a zone is taken as UTC: only the order matters.
-    return (time if time.tzinfo is not None else time.replace(tzinfo=UTC)).timestamp()
 
 
 def _number(text: str) -> float | None:

@@ -29,6 +29,8 @@ def stored_grasp(ref: str) -> RecordedGrasp:
     try:
         return read_recorded(path)
     except ConfigError as error:
+        if path.exists():
+            raise
         raise DataDamaged(f"the recording of trial {number} of {folder} is lost: {error}") from error
 
 

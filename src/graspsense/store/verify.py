@@ -27,15 +27,18 @@ class Verified:
     trials: int
     recordings: int
     problems: tuple[str, ...]
+    unread: tuple[str, ...] = ()
+    """What the machine could not read, so that nothing is known of it."""
     unfinished: tuple[str, ...]
 
     def as_json(self) -> dict[str, Any]:
         """Return the fields as JSON values."""
         return {
-            "intact": not self.problems,
+            "intact": not self.problems and not self.unread,
             "trials": self.trials,
             "recordings": self.recordings,
             "problems": list(self.problems),
+            **({"unread": list(self.unread)} if self.unread else {}),
             "unfinished": list(self.unfinished),
         }
 
@@ -47,6 +50,7 @@ def verify_store(folder: str | Path, progress: Progress | None = None) -> Verifi
     """
     with Store.read(folder) as store:
         problems = [f"the database: {problem}" for problem in integrity(store)]
+        unread = []
         rows = list(stored_rows(store))
         names, changed = set(), set()
         for done, (number, sha256, row) in enumerate(rows):
@@ -61,7 +65,11 @@ def verify_store(folder: str | Path, progress: Progress | None = None) -> Verifi
                 problems.append(f"trial {number}: {error}")
                 continue
             names.add(path.name)
-            problem = _problem_of(path, str(row.trial["recording_sha256"]), row.trial["recording_bytes"])
+            try:
+                problem = _problem_of(path, str(row.trial["recording_sha256"]), row.trial["recording_bytes"])
+            except OSError as error:
+                unread.append(f"trial {number}: its recording {path.name}: {error.strerror}")
+                continue
             if problem:
                 problems.append(f"trial {number}: {problem}")
         problems += [
@@ -71,7 +79,9 @@ def verify_store(folder: str | Path, progress: Progress | None = None) -> Verifi
         ]
         unfinished = []
         for path in sorted(store.recordings.iterdir() if store.recordings.is_dir() else ()):
-            if path.name.endswith(PART):
+            if not path.is_file():
+                unfinished.append(f"{path.name} is not a file")
+            elif path.name.endswith(PART):
                 if not is_being_written(path):
                     unfinished.append(f"{path.name} was never finished")
             elif path.suffix == ".mcap" and path.name not in names:
@@ -79,7 +89,11 @@ def verify_store(folder: str | Path, progress: Progress | None = None) -> Verifi
             elif not path.name.endswith((".mcap", CUT)):
                 unfinished.append(f"{path.name} is not a recording of the store")
     return Verified(
-        trials=len(rows), recordings=len(names), problems=tuple(problems), unfinished=tuple(unfinished)
+        trials=len(rows),
+        recordings=len(names),
+        problems=tuple(problems),
+        unread=tuple(unread),
+        unfinished=tuple(unfinished),
     )
 
 
@@ -95,6 +109,9 @@ def verify_file(path: str | Path) -> Verified:
 
 
 def _problem_of(path: Path, sha256: str, size: int) -> str:
+    """Return what is wrong with a recording, empty if nothing is. Raises OSError if the machine cannot read it."""
+    if path.exists() and not path.is_file():
+        return f"its recording {path.name} is not a file"
     try:
         with path.open("rb") as file:
             if hashlib.file_digest(file, "sha256").hexdigest() == sha256:
@@ -102,8 +119,6 @@ def _problem_of(path: Path, sha256: str, size: int) -> str:
         found = path.stat().st_size
     except FileNotFoundError:
         return f"its recording {path.name} is missing"
-    except OSError as error:
-        return f"its recording {path.name} cannot be read: {error.strerror}"
     if found != size:
         return f"its recording {path.name} has {found} bytes and had {size}"
     try:

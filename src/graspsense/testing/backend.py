@@ -17,7 +17,7 @@ from graspsense.core.errors import DeviceLost, NoDevice, RecordingEnded, TareRef
 from graspsense.core.guard import GuardState, guard
 from graspsense.core.roles import SensorBackend
 from graspsense.core.run_config import RunConfig
-from graspsense.core.runner import run_grasp
+from graspsense.core.runner import run_uninterrupted
 from graspsense.core.signals import (
     CHANNELS,
     EFFORT,
@@ -627,7 +627,7 @@ def objects_can_be_grasped(subject: Subject) -> None:
 def performs_a_whole_grasp(subject: Subject) -> None:
     """The runner can perform a whole grasp: open, tare, close, hold, open again, relax."""
     kind = kind_of(subject.entry.accepts)
-    grasp = run_grasp(subject.create(), GentleController(kind), RunConfig(hold_s=0.05))
+    grasp = run_uninterrupted(subject.create(), GentleController(kind), RunConfig(hold_s=0.05))
     demand(
         grasp.outcome not in (Outcome.ABORTED, Outcome.DEVICE_LOST, Outcome.RUNNING),
         f"a gentle grasp with {KINDS[kind]} commands ended as {grasp.outcome.words}: {grasp.reason}",
@@ -686,7 +686,7 @@ def reports_a_lost_device(subject: Subject) -> None:
     finally:
         backend.close()
     demand(len(text) > 10, f"DeviceLost says {text!r}: say which gripper, and what to look at")
-    grasp = run_grasp(
+    grasp = run_uninterrupted(
         subject.create(**subject.unplugged), GentleController(kind_of(subject.entry.accepts)), RunConfig()
     )
     demand(

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 from attrs import define, field, frozen
 
-from graspsense.core.errors import GraspsenseError, named
+from graspsense.core.errors import FAILURES, GraspsenseError, named
 
 if TYPE_CHECKING:
     from graspsense.testing.subject import Subject
@@ -83,7 +83,7 @@ def outcome_of(check: Check, subject: Subject, expected: Mapping[str, str]) -> R
         state, text = "failed", str(failed)
     except GraspsenseError as error:  # its message says what to do
         state, text = "failed", str(error)
-    except (Exception, SystemExit) as error:
+    except FAILURES as error:
         where = _place(error)
         state, text = "failed", f"it raised {named(error)}{where}: catch it there, or return what is required"
     if check.id in expected:

@@ -13,7 +13,7 @@ from graspsense.core.entries import KINDS, Channel
 from graspsense.core.errors import named
 from graspsense.core.free_motion import FreeMotion, free_motion_of
 from graspsense.core.run_config import RunConfig
-from graspsense.core.runner import run_grasp
+from graspsense.core.runner import run_uninterrupted
 from graspsense.core.signals import (
     APPROACH,
     EFFORT,
@@ -406,7 +406,7 @@ def ends_every_grasp(subject: Subject) -> None:
     for object_name in OBJECTS:
         gripper = model_gripper(_all_channels(subject), object_name)
         # If the controller does not end the grasp, the runner ends it after three more opening times.
-        grasp = run_grasp(gripper, subject.create(), RunConfig(grasp_timeout_s=LONGEST_S))
+        grasp = run_uninterrupted(gripper, subject.create(), RunConfig(grasp_timeout_s=LONGEST_S))
         demand(
             grasp.outcome not in (Outcome.ABORTED, Outcome.DEVICE_LOST, Outcome.RUNNING),
             f"with {object_name} between the fingers the grasp ended as {grasp.outcome.words}: "

@@ -171,9 +171,9 @@ def drive(controller: Controller[Any], gripper: SensorBackend[Any]) -> Grasp:
     'steady'
     """
     from graspsense.core.run_config import RunConfig
-    from graspsense.core.runner import run_grasp
+    from graspsense.core.runner import run_uninterrupted
 
-    return run_grasp(gripper, controller, RunConfig())
+    return run_uninterrupted(gripper, controller, RunConfig())
 
 
 OBJECTS: Final = {

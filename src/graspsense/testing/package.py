@@ -73,7 +73,7 @@ def plugin_modules_are_light(package: Package) -> None:
     environ |= {"GRASPSENSE_PLUGINS": package.distribution}
     environ.pop("GRASPSENSE_TRACE_PLUGINS", None)
     ran = subprocess.run(
-        [sys.executable, "-c", code, package.distribution],
+        [sys.executable, "-P", "-c", code, package.distribution],
         env=environ,
         capture_output=True,
         text=True,
@@ -281,8 +281,11 @@ def _built(folder: Path, scratch: Path) -> Path:
         str(project.get("build-system", {}).get("build-backend", "")).partition(":")[0].partition(".")[0]
     )
     here = bool(backend) and importlib.util.find_spec(backend) is not None
-    command = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--disable-pip-version-check"]
+    command = [sys.executable, "-P", "-m", "pip", "wheel"]
     command += [
+        "--quiet",
+        "--no-deps",
+        "--disable-pip-version-check",
         "--wheel-dir",
         str(scratch),
         *(["--no-build-isolation"] if here else []),

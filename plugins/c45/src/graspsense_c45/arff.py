@@ -6,7 +6,8 @@ Source: Weka manual, chapter "ARFF" (attribute declarations, sparse rows, instan
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -15,10 +16,21 @@ from graspsense_c45.schema import Attribute, Schema
 from graspsense_c45.table import MISSING_CLASS, Table, make_table
 
 _TOKEN = re.compile(r"""\s*(?:'((?:[^'\\]|\\.)*)'|"((?:[^"\\]|\\.)*)"|([^\s,{}'"%][^\s,{}]*))""")
+_SPACE = re.compile(r"\s*")
 _ESCAPE = re.compile(r"\\(.)")
 _ESCAPED = {"n": "\n", "t": "\t", "r": "\r"}
 _NUMERIC = ("numeric", "real", "integer")
 _MISSING = "?"
+MOST_BYTES = 2**28
+"""Limit on the size of a file."""
+MOST_ATTRIBUTES = 10_000
+"""Limit on the attributes, and on the values of one, of a file."""
+MOST_NAMED = 24
+"""Limit on the names that an error lists."""
+LONGEST_INDEX = 9
+"""Limit on the digits of the index in a sparse row."""
+LONGEST_SHOWN = 60
+"""Limit on the characters of a text that an error repeats."""
 
 
 class ArffError(ValueError):
@@ -35,9 +47,15 @@ def read_arff(path: str | Path, class_attribute: str | None = None) -> Table:
     """
     path = Path(path)
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        with path.open("rb") as file:
+            data = file.read(MOST_BYTES + 1)
+        text = data.decode("utf-8-sig")
+    except OSError as error:
+        raise ArffError(f"{path} cannot be read: {error.strerror}") from error
     except UnicodeDecodeError as error:
         raise ArffError(f"{path}: not UTF-8 text (byte {error.start}); save the file as UTF-8") from None
+    if len(data) > MOST_BYTES:
+        raise ArffError(f"{path}: a file has at most {MOST_BYTES} bytes, and this has more")
     return parse_arff(text, class_attribute, str(path))
 
 
@@ -83,7 +101,7 @@ class _Reader:
             raise ArffError(f"{self._source}: no rows after @data; there is nothing to learn")
         names = [attribute.name for attribute in self._attributes]
         if class_attribute is not None and class_attribute not in names:
-            raise ArffError(f"{self._source}: no attribute {class_attribute!r}; there are {', '.join(names)}")
+            raise ArffError(f"{self._source}: no attribute {class_attribute!r}; there are {_listed(names)}")
         at = len(names) - 1 if class_attribute is None else names.index(class_attribute)
         classes = self._attributes[at].values
         if classes is None:
@@ -105,12 +123,18 @@ class _Reader:
                 "@attribute without a name; write @attribute NAME numeric or @attribute NAME {a, b}"
             )
         name, kind = _text(match), rest[match.end() :].strip()
+        if len(self._attributes) >= MOST_ATTRIBUTES:
+            raise self._error(f"a table has at most {MOST_ATTRIBUTES} attributes, and this has more")
         if kind.startswith("{"):
             if not kind.endswith("}"):
                 raise self._error(f"the values of {name!r} do not end with }}")
-            values = tuple(self._tokens(kind[1:-1]))
+            values = tuple(islice(self._tokens(kind[1:-1]), MOST_ATTRIBUTES + 1))
+            if len(values) > MOST_ATTRIBUTES:
+                raise self._error(f"{name!r} has more than {MOST_ATTRIBUTES} values")
             if len(set(values)) != len(values) or not values:
-                raise self._error(f"the values of {name!r} are {values}; there must be some, each once")
+                raise self._error(
+                    f"the values of {name!r} are {_listed(values)}; there must be some, each once"
+                )
             self._attributes.append(Attribute(name, values=values))
             self._codes.append({value: code for code, value in enumerate(values)})
         elif kind.lower() in _NUMERIC:
@@ -146,7 +170,7 @@ class _Reader:
             if not pair.strip():
                 continue
             index, _, value = pair.strip().partition(" ")
-            if not index.isdigit() or int(index) >= len(cells):
+            if not (index.isdecimal() and len(index) <= LONGEST_INDEX) or int(index) >= len(cells):
                 raise self._error(f"sparse index {index!r}; allowed: 0..{len(cells) - 1}")
             match = _TOKEN.match(value)
             cells[int(index)] = _text(match) if match else ""
@@ -160,33 +184,47 @@ class _Reader:
             return self._number(cell, attribute.name)
         code = self._codes[column].get(cell)
         if code is None:
-            raise self._error(f"{attribute.name} is {cell!r}; declared: {', '.join(attribute.values)}")
+            raise self._error(
+                f"{attribute.name} is {cell[:LONGEST_SHOWN]!r}; declared: {_listed(attribute.values)}"
+            )
         return float(code)
 
     def _number(self, cell: str, name: str) -> float:
         try:
             return float(cell)
         except ValueError:
-            raise self._error(f"{name} is {cell!r}; it must be a number, or ? where missing") from None
+            raise self._error(
+                f"{name} is {cell[:LONGEST_SHOWN]!r}; it must be a number, or ? where missing"
+            ) from None
 
     def _tokens(self, text: str) -> Iterator[str]:
         at = 0
         while True:
             match = _TOKEN.match(text, at)
             if match is None:
-                raise self._error(
-                    f"cannot read {text[at:].strip()!r} as a value; quote it, or write ? where missing"
-                )
+                wrong = text[at : at + LONGEST_SHOWN].strip()
+                raise self._error(f"cannot read {wrong!r} as a value; quote it, or write ? where missing")
             yield _text(match)
-            rest = text[match.end() :].lstrip()
-            if not rest or rest.startswith("%"):
+            at = _after_space(text, match.end())
+            if text.startswith(",", at):
+                at = _after_space(text, at + 1)
+            elif text.startswith("%", at):
                 return
-            at = len(text) - len(rest) + (1 if rest.startswith(",") else 0)
-            if not text[at:].strip():
+            if at >= len(text):
                 return
 
     def _error(self, message: str) -> ArffError:
         return ArffError(f"{self._source}:{self._line}: {message}")
+
+
+def _listed(names: Sequence[str]) -> str:
+    more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
+    return ", ".join(name[:LONGEST_SHOWN] for name in names[:MOST_NAMED]) + more
+
+
+def _after_space(text: str, at: int) -> int:
+    found = _SPACE.match(text, at)
+    return at if found is None else found.end()
 
 
 def _text(match: re.Match[str]) -> str:

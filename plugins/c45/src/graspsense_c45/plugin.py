@@ -78,6 +78,7 @@ class C45Config(ClassifierConfig):
     rep_folds: int = setting(
         default=3,
         minimum=2,
+        plausible=(2, 100),
         meaning="reduced_error holds out one of this number of parts.",
     )
 
@@ -200,7 +201,10 @@ class C45(Classifier[C45Config]):
         """Load the tree that `to_json` returned. Raises ValueError if `model` is not a stored tree."""
         from graspsense_c45.stored import from_document
 
-        self._tree = from_document(dict(model))
+        tree = from_document(dict(model))
+        if any(attribute.is_nominal for attribute in tree.schema.attributes):
+            raise ValueError("attributes: a feature is a number, and has no list of values")
+        self._tree = tree
 
     def _fitted(self) -> Tree:
         if self._tree is None:

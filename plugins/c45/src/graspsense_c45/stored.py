@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from graspsense_c45.arrays import NodeColumn
+from graspsense_c45.arrays import NodeColumn, Reals
 from graspsense_c45.schema import Attribute, Schema
 from graspsense_c45.splits import ALL_VALUES, LEAF, Splits
 from graspsense_c45.tree import Tree, first_children
 
 FORMAT = "graspsense-c45-tree"
 VERSION = 1
+_MOST_NODES = 2**31
+_ROUNDING = 1e-5
 
 
 class StoredTreeError(ValueError):
@@ -69,74 +72,127 @@ def from_document(document: Any) -> Tree:
             f"version {document.get('version')!r} of a stored tree; this release reads {VERSION}"
         )
     try:
-        attributes = tuple(
-            Attribute(
-                str(a["name"]), str(a["unit"]), None if a["values"] is None else tuple(map(str, a["values"]))
-            )
-            for a in document["attributes"]
-        )
-        classes = tuple(document["classes"])
+        schema = _schema(document)
         nodes = document["nodes"]
-        threshold = np.array([np.nan if t is None else t for t in nodes["threshold"]], dtype=np.float64)
+        n_nodes = len(_list(nodes["feature"], "nodes.feature"))
         feature, category, n_children = (
-            _integers(nodes[key]) for key in ("feature", "category", "n_children")
+            _integers(nodes[key], n_nodes, f"nodes.{key}") for key in ("feature", "category", "n_children")
         )
-        class_weights = np.array(nodes["class_weights"], dtype=np.float64)
+        threshold = _reals(nodes["threshold"], n_nodes, "nodes.threshold", missing=True)
+        rows = _list(nodes["class_weights"], "nodes.class_weights", n_nodes)
+        class_weights = np.array(
+            [_reals(row, len(schema.classes), "nodes.class_weights") for row in rows], dtype=np.float64
+        )
         laplace = document["laplace"]
     except (KeyError, TypeError, ValueError, OverflowError) as error:
-        raise StoredTreeError(f"damaged stored tree: {type(error).__name__}: {error}") from None
-    tree = Tree(
-        Schema(attributes, classes),
-        Splits(feature, threshold, category, first_children(n_children), n_children),
-        class_weights,
-        laplace is True,
-    )
-    _check(tree)
-    return tree
+        raise StoredTreeError(f"damaged stored tree: {_words(error)}") from None
+    if not isinstance(laplace, bool):
+        raise StoredTreeError("damaged stored tree: laplace must be true or false")
+    if not n_nodes:
+        raise StoredTreeError("damaged stored tree: nodes.feature is empty")
+    splits = Splits(feature, threshold, category, first_children(n_children), n_children)
+    _check(splits, schema, class_weights)
+    return Tree(schema, splits, class_weights, laplace)
 
 
-def _integers(numbers: Any) -> NodeColumn:
-    array = np.array(numbers)
-    if array.dtype.kind != "i":
-        raise TypeError("node numbers must be integers")
-    return array.astype(np.int32)
+def _words(error: Exception) -> str:
+    return f"{error.args[0]} is missing" if isinstance(error, KeyError) else str(error)
 
 
-def _check(tree: Tree) -> None:
-    splits, n_nodes = tree.splits, len(tree.splits.feature)
-    shapes_fit = (
-        all(
-            column.shape == (n_nodes,)
-            for column in (splits.feature, splits.threshold, splits.category, splits.n_children)
+def _schema(document: dict[str, Any]) -> Schema:
+    """Return the attributes and classes. Raises KeyError, TypeError or ValueError."""
+    attributes = []
+    for k, kept in enumerate(_list(document["attributes"], "attributes")):
+        place = f"attributes.{k}"
+        name, unit, values = kept["name"], kept["unit"], kept["values"]
+        if values is not None:
+            values = _distinct(_list(values, f"{place}.values"), f"{place}.values", (str,))
+        if not isinstance(name, str) or not isinstance(unit, str):
+            raise TypeError(f"{place}: name and unit must be text")
+        attributes.append(Attribute(name, unit, values))
+    _distinct([attribute.name for attribute in attributes], "attributes", (str,))
+    classes = _list(document["classes"], "classes")
+    if not classes:
+        raise ValueError("classes is empty")
+    return Schema(tuple(attributes), _distinct(classes, "classes", (str, int, float, bool)))
+
+
+def _distinct(items: Sequence[Any], place: str, kinds: tuple[type, ...]) -> tuple[Any, ...]:
+    for item in items:
+        if type(item) not in kinds or (isinstance(item, float) and not np.isfinite(item)):
+            raise TypeError(
+                f"{place} holds {item!r:.40}; expected {' or '.join(kind.__name__ for kind in kinds)}"
+            )
+    if len(set(items)) < len(items):
+        raise ValueError(f"{place} holds a value twice")
+    return tuple(items)
+
+
+def _list(items: Any, place: str, length: int | None = None) -> list[Any]:
+    if not isinstance(items, list):
+        raise TypeError(f"{place} must be a list")
+    if length is not None and len(items) != length:
+        raise ValueError(f"{place} has the length {len(items)}; it must be {length}")
+    return items
+
+
+def _integers(numbers: Any, length: int, place: str) -> NodeColumn:
+    for number in _list(numbers, place, length):
+        if type(number) is not int or not -1 <= number < _MOST_NODES:
+            raise TypeError(f"{place} holds {number!r:.40}; expected integers from -1 on")
+    return np.array(numbers, dtype=np.int32)
+
+
+def _reals(numbers: Any, length: int, place: str, *, missing: bool = False) -> Reals:
+    for number in _list(numbers, place, length):
+        if type(number) not in (int, float) and not (missing and number is None):
+            raise TypeError(f"{place} holds {number!r:.40}; expected numbers")
+    array = np.array([np.nan if number is None else number for number in numbers], dtype=np.float64)
+    if not np.isfinite(array[[number is not None for number in numbers]]).all():
+        raise ValueError(f"{place} must be finite")
+    return array
+
+
+def _check(splits: Splits, schema: Schema, class_weights: Reals) -> None:
+    """Raise StoredTreeError unless these are the nodes of a tree with weights that add up."""
+    n_nodes = len(splits.feature)
+    if (class_weights < 0).any() or not np.isfinite(class_weights.sum()):
+        raise StoredTreeError(
+            "damaged stored tree: nodes.class_weights must not be negative, with a finite sum"
         )
-        and n_nodes > 0
-        and tree.class_weights.shape == (n_nodes, len(tree.schema.classes))
-    )
-    if not shapes_fit:
-        raise StoredTreeError("damaged stored tree: the node columns differ in length, or there is no node")
-    if not all(isinstance(label, str | int | float | bool) for label in tree.schema.classes):
-        raise StoredTreeError("damaged stored tree: a class label must be a string, a number or a boolean")
-    if not np.isfinite(tree.class_weights).all() or (tree.class_weights < 0).any():
-        raise StoredTreeError("damaged stored tree: weights must be finite and not negative")
     children = np.where(splits.n_children > 0, splits.first_child.astype(np.int64), n_nodes)
     upwards = (splits.n_children < 0).any() or (children <= np.arange(n_nodes)).any()
     if splits.n_children.sum() != n_nodes - 1 or upwards:
         raise StoredTreeError("damaged stored tree: the children do not form a tree")
     for node in range(n_nodes):
-        _check_node(tree, node)
+        _check_node(splits, schema, node)
+    _check_sums(splits, class_weights.sum(axis=1))
 
 
-def _check_node(tree: Tree, node: int) -> None:
-    splits = tree.splits
+def _check_sums(splits: Splits, weights: Reals) -> None:
+    """Raise StoredTreeError unless each node has the weight of its children together."""
+    inner = np.flatnonzero(splits.feature != LEAF)
+    parent = np.repeat(inner, splits.n_children[inner])
+    below = np.bincount(parent, weights=weights[splits.children(inner)], minlength=len(weights))[inner]
+    # Parts of rows with missing values are rounded, and the smallest are left out.
+    if not weights[0] > 0 or not (np.abs(below - weights[inner]) <= _ROUNDING * weights[inner]).all():
+        raise StoredTreeError(
+            "damaged stored tree: nodes.class_weights do not add up from the leaves to the root"
+        )
+    if (weights[inner] <= 0).any():
+        raise StoredTreeError("damaged stored tree: an inner node has no weight in nodes.class_weights")
+
+
+def _check_node(splits: Splits, schema: Schema, node: int) -> None:
     feature, category = int(splits.feature[node]), int(splits.category[node])
     numeric = not np.isnan(splits.threshold[node])
     n_children = int(splits.n_children[node])
     if feature == LEAF:
         fits = n_children == 0 and not numeric and category == ALL_VALUES
-    elif not 0 <= feature < len(tree.schema.attributes):
+    elif not 0 <= feature < len(schema.attributes):
         fits = False
     else:
-        values = tree.schema.attributes[feature].values
+        values = schema.attributes[feature].values
         if values is None:
             finite = bool(np.isfinite(splits.threshold[node]))
             fits = finite and n_children == 2 and category == ALL_VALUES

@@ -203,6 +203,8 @@ class Pr2Backend(SensorBackend[Pr2Config]):
         self._heard_us = 0
         notes = [f"calibration {kind} of {one.made} is in use" for kind, one in found.items()]
         friction_n = FRICTION_N
+        if config.calibration not in ("", UNCALIBRATED) and not found:
+            notes.append(f"{config.calibration} has no calibration of {identity.serial}: uncalibrated")
         if "friction" in found:
             _, closing, _ = stored_friction(found["friction"])
             friction_n = max(closing, default=FRICTION_N)

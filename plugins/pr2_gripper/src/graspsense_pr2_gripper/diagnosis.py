@@ -214,6 +214,8 @@ def _calibrations(config: Pr2Config, identity: Identity) -> Iterator[Finding]:
             )
             continue
         made = datetime.fromisoformat(stored[kind].made)
+        # A file that was not written by graspsense may have no time zone.
+        made = made if made.tzinfo is not None else made.replace(tzinfo=UTC)
         days = (datetime.now(UTC) - made).total_seconds() / 86400.0
         yield Finding(
             subject, "ok", f"of {identity.serial}, {days:.1f} days old ({stored[kind].made})",

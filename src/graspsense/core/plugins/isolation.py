@@ -18,7 +18,7 @@ import pluggy
 
 from graspsense import __version__
 from graspsense.core import hookspecs
-from graspsense.core.errors import suggestion
+from graspsense.core.errors import FAILURES, suggestion
 from graspsense.core.firstparty import DISTRIBUTION
 from graspsense.core.plugins.discovery import PluginSource
 from graspsense.core.plugins.parts import PluginStatus
@@ -103,7 +103,7 @@ class HookCalls:
         """Turn whatever a plugin raises in this hook into a warning, the first time that it does."""
         try:
             yield
-        except (Exception, SystemExit) as error:
+        except FAILURES as error:
             key = (f"{status.distribution}:{status.entry_point}", hook)
             if key not in self._warned:
                 self._warned.add(key)

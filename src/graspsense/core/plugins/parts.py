@@ -29,7 +29,7 @@ from graspsense.core.entries import (
     PipelineEntry,
     Role,
 )
-from graspsense.core.errors import PluginUnavailable
+from graspsense.core.errors import FAILURES, PluginUnavailable
 from graspsense.core.plugins.declaration import NotDeclared, completed, config_of, declared_by, left_out
 
 if TYPE_CHECKING:
@@ -109,7 +109,7 @@ class Declared(ABC, Generic[EntryT]):
         module, _, name = target.partition(":")
         try:
             return getattr(importlib.import_module(module), name)
-        except Exception as error:  # the import of a third party's module can raise anything
+        except FAILURES as error:  # the import of a third party's module can raise anything
             raise self._unavailable(f"{type(error).__name__}: {error}") from error
 
     def _unavailable(self, why: str) -> PluginUnavailable:
@@ -186,7 +186,7 @@ class Component(Declared[ComponentEntry]):
             return completed(self.entry, self.role, cls, self._base(), part)
         except NotDeclared as error:
             raise self._unavailable(str(error)) from error
-        except Exception as error:
+        except FAILURES as error:
             raise self._unavailable(f"its channels raised {type(error).__name__}: {error}") from error
 
     def channels_vary(self) -> bool:
@@ -247,7 +247,7 @@ class Resource(Declared[EntryT]):
         package, _, path = self.entry.resource.partition(":")
         try:
             file = files(package).joinpath(path)
-        except Exception as error:
+        except FAILURES as error:
             raise self._unavailable(f"{type(error).__name__}: {error}") from error
         if not file.is_file():
             raise self._unavailable(f"there is no file {path!r} in the package {package!r}")

@@ -31,7 +31,7 @@ from graspsense.core.entries import (
     PipelineEntry,
     Role,
 )
-from graspsense.core.errors import PluginUnavailable, UnknownName, suggestion
+from graspsense.core.errors import FAILURES, PluginUnavailable, UnknownName, suggestion
 from graspsense.core.firstparty import SHIPPED
 from graspsense.core.plugins.discovery import (
     PluginSource,
@@ -223,7 +223,7 @@ class Plugins:
             try:
                 devices = self._hooks.entries(plugin, hook, FoundDevice, timeout_s=timeout_s)
                 probes.append(Probe(status.distribution, tuple(devices)))
-            except Exception as error:
+            except FAILURES as error:
                 probes.append(Probe(status.distribution, error=error_text(error)))
         return tuple(probes)
 
@@ -237,7 +237,7 @@ class Plugins:
             try:
                 findings = self._hooks.entries(plugin, hook, Finding, config=config, timeout_s=timeout_s)
                 diagnoses.append(Diagnosis(status.distribution, tuple(findings)))
-            except Exception as error:
+            except FAILURES as error:
                 diagnoses.append(Diagnosis(status.distribution, error=error_text(error)))
         return tuple(diagnoses)
 
@@ -282,7 +282,7 @@ class Plugins:
                 plugin, cost = imported(source)
                 check_api(plugin, source)
                 status, components, resources = self._registered(plugin, source)
-        except (Exception, SystemExit) as error:
+        except FAILURES as error:
             if self._strict:
                 error.add_note(
                     f"while loading {source.entry_point} of {source.distribution} {source.version}"

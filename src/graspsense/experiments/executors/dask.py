@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import tempfile
 import time
 from collections import deque
 from collections.abc import Iterator, Sequence
@@ -15,6 +17,8 @@ from graspsense.experiments.task import Task, TaskResult, run_task
 from graspsense.experiments.versions import differences, versions
 
 HINT: Final = 'the executor dask needs Dask: pip install "graspsense[dask]", or pip install dask distributed'
+LOOPBACK: Final = "127.0.0.1"
+"""Where a cluster that was made for the run listens, dashboard included: no other machine can reach it."""
 CONNECTING_S: Final = 10.0
 WORKERS_COMING_S: Final = 30.0
 LOOKING_S: Final = 2.0
@@ -35,11 +39,14 @@ class DaskCluster:
         self._cluster: Any = None
         self._wanted = workers
         if address is None:
+            # Workers, and the process that tracks their resources, import nothing from the current folder.
+            os.environ["PYTHONSAFEPATH"] = "1"
+            # Dask imports from its folder for temporary files: with its default, other users could write there.
+            self._scratch = tempfile.TemporaryDirectory(prefix="graspsense-", ignore_cleanup_errors=True)
+            dask.config.set({"temporary-directory": self._scratch.name})
             # Dask retries a task once: its worker may have been dying because of another task.
             dask.config.set({"distributed.scheduler.allowed-failures": 1})
-            self._cluster = self._distributed.LocalCluster(
-                n_workers=workers, threads_per_worker=1, dashboard_address=":0", silence_logs=50
-            )
+            self._cluster = self._local_cluster(workers)
         try:
             self._client = self._distributed.Client(address or self._cluster, timeout=CONNECTING_S)
         except (OSError, TimeoutError, ValueError) as error:
@@ -49,6 +56,25 @@ class DaskCluster:
             ) from error
         self._futures: list[Any] = []
         self._seen = time.monotonic()
+
+    def _local_cluster(self, workers: int) -> Any:
+        """Return a cluster on this machine. Raises ConfigError if none can be started, as without shared memory."""
+        try:
+            return self._distributed.LocalCluster(
+                n_workers=workers,
+                threads_per_worker=1,
+                host=LOOPBACK,
+                dashboard_address=f"{LOOPBACK}:0",
+                silence_logs=50,
+            )
+        except Exception as error:  # Dask raises various exceptions, from several layers
+            cause: BaseException = error
+            while cause.__cause__ is not None:
+                cause = cause.__cause__
+            raise ConfigError(
+                f"no local Dask cluster can be started here: {named(error)} ({named(cause)}). Dask needs shared memory "
+                "(/dev/shm) and sockets of this machine. Use --executor processes, or name a running scheduler"
+            ) from error
 
     @property
     def workers(self) -> int:
@@ -164,6 +190,7 @@ class DaskCluster:
         if self._cluster is not None:
             with suppress(Exception):
                 self._cluster.close(timeout=5)
+            self._scratch.cleanup()
 
     def _compare(self) -> None:
         """Raise ConfigError if no worker appears, or if one has other versions than this process."""

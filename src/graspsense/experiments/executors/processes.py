@@ -95,7 +95,7 @@ class _Worker:
 
     def __init__(self) -> None:
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "graspsense.experiments.executors.worker"],
+            [sys.executable, "-P", "-m", "graspsense.experiments.executors.worker"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             env={**dict.fromkeys(ONE_THREAD, "1"), **os.environ},

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from attrs import field, frozen
+from attrs.validators import max_len
 
 from graspsense.core.checkpoints import contact_of, until_checkpoint
 from graspsense.core.features import Features, table_of
@@ -30,11 +31,17 @@ if TYPE_CHECKING:
     from graspsense.core.trace import Trace
 
 
+MOST_MOMENTS: Final = 100
+"""Limit on the moments at which a grasp is recognised."""
+
+
 @frozen(kw_only=True)
 class EarlySettings(CostSettings):
     """The keys of `[judge]`."""
 
-    moments_s: tuple[float, ...] = field(default=(0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.2))
+    moments_s: tuple[float, ...] = field(
+        default=(0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.2), validator=max_len(MOST_MOMENTS)
+    )
     """Seconds after the contact of both pads at which a prediction is made."""
 
 

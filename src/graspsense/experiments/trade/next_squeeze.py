@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from attrs import field, frozen
-from attrs.validators import ge
+from attrs.validators import ge, le
 
 from graspsense.core.config import settings_from
 from graspsense.core.strict import structured
@@ -22,6 +22,7 @@ from graspsense.evaluation.evaluate import INSTANCE_HELD_OUT
 from graspsense.evaluation.folds import instance_held_out
 from graspsense.experiments.task_results import ClassifierResult, RecognitionResult
 from graspsense.experiments.trade.costs import CostSettings
+from graspsense.experiments.trade.squeezes import MOST_SQUEEZES
 from graspsense.experiments.trade.trade_task import (
     classifiers_of,
     simulated_result,
@@ -56,7 +57,7 @@ class NextSqueezeSettings(CostSettings):
     """The force of the single squeeze that the sequential choice is compared with."""
     sure: tuple[float, ...] = (0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
     """Thresholds of the probability at which to stop. Each is a case."""
-    most: int = field(default=3, validator=ge(1))
+    most: int = field(default=3, validator=[ge(1), le(MOST_SQUEEZES)])
     """Largest number of squeezes."""
     folds: int = field(default=5, validator=ge(2))
 

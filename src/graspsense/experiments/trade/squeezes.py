@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 from attrs import field, frozen
-from attrs.validators import ge
+from attrs.validators import ge, le
 
 from graspsense.core.config import SelectedComponent
 from graspsense.core.errors import ConfigError
@@ -32,11 +32,15 @@ MIN_PROBABILITY: Final = 1e-3
 """Lower bound on a probability: a label that a tree gives no trial may still be correct."""
 
 
+MOST_SQUEEZES: Final = 100
+"""Limit on the squeezes of one object."""
+
+
 @frozen(kw_only=True)
 class RepeatSettings(CostSettings):
     """The keys of `[judge]`. `[data]` must give each object `most` trials, its squeezes."""
 
-    most: int = field(default=4, validator=ge(1))
+    most: int = field(default=4, validator=[ge(1), le(MOST_SQUEEZES)])
     """Largest number of squeezes."""
 
 

@@ -43,13 +43,13 @@ class BackpropConfig(ClassifierConfig):
     epochs: int = setting(
         default=500,
         minimum=1,
-        plausible=(1, 100_000),
+        maximum=100_000,
         meaning="Number of passes over the training trials.",
     )
     hidden: int = setting(
         default=0,
         minimum=0,
-        plausible=(0, 10_000),
+        maximum=10_000,
         meaning="Neurons of the hidden layer; 0: half the sum of the numbers of features and of labels.",
     )
 
@@ -64,6 +64,11 @@ class Backprop(ScikitClassifier[BackpropConfig]):
     def estimator(self, seed: int, trials: int) -> Any:
         """Return the untrained network."""
         return SigmoidNetwork(self.config, seed)
+
+    def training_steps(self, trials: int, features: int, labels: int) -> float:
+        """Return about how many steps of 10 ns the compiled training takes."""
+        units = hidden_units(self.config, features, labels)
+        return float(self.config.epochs) * trials * (200.0 + units * (features + labels) / 4.0)
 
     def reasons(
         self,
@@ -99,7 +104,7 @@ class SigmoidNetwork:
         order = rng.permutation(len(values))
         inputs = self._inputs(values)[order]
         wanted = np.eye(len(self.classes_))[numbers[order]]
-        units = config.hidden or (inputs.shape[1] - 1 + len(self.classes_)) // 2
+        units = hidden_units(config, inputs.shape[1] - 1, len(self.classes_))
         start = [
             rng.uniform(-WEIGHT, WEIGHT, shape)
             for shape in ((units, inputs.shape[1]), (len(self.classes_), units + 1))
@@ -114,7 +119,10 @@ class SigmoidNetwork:
 
         hidden = _sigmoid(self._inputs(values) @ self._hidden.T)
         outputs = _sigmoid(np.column_stack((hidden, np.ones(len(hidden)))) @ self._output.T)
-        return np.asarray(outputs / outputs.sum(axis=1, keepdims=True))
+        total = outputs.sum(axis=1, keepdims=True)
+        # No output is above 0 where the network is sure that it is none of the labels.
+        shares = np.where(total > 0.0, outputs / np.where(total > 0.0, total, 1.0), 1.0 / outputs.shape[1])
+        return np.asarray(shares)
 
     def _inputs(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the features in the range -1 to 1 of the training trials, and a column of ones for the bias."""
@@ -126,7 +134,13 @@ class SigmoidNetwork:
 def _sigmoid(x: Any) -> Any:
     import numpy as np
 
-    return 1.0 / (1.0 + np.exp(-x))
+    with np.errstate(over="ignore"):
+        return 1.0 / (1.0 + np.exp(-x))
+
+
+def hidden_units(config: BackpropConfig, features: int, labels: int) -> int:
+    """Return the number of neurons of the hidden layer."""
+    return config.hidden or (features + labels) // 2
 
 
 @cache

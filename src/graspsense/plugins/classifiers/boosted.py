@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -20,14 +21,14 @@ if TYPE_CHECKING:
 class BoostedConfig(ClassifierConfig):
     """Settings of the boosting."""
 
-    stages: int = setting(default=100, minimum=1, plausible=(1, 10_000), meaning="Trees of each label.")
+    stages: int = setting(default=100, minimum=1, maximum=10_000, meaning="Trees of each label.")
     learning_rate: float = setting(
-        default=0.1, above=0.0, plausible=(0.001, 1.0), meaning="Factor of each tree's output."
+        default=0.1, above=0.0, maximum=10.0, plausible=(0.001, 1.0), meaning="Factor of each tree's output."
     )
-    depth: int = setting(
-        default=3, minimum=1, plausible=(1, 30), meaning="Largest number of tests on a path."
+    depth: int = setting(default=3, minimum=1, maximum=30, meaning="Largest number of tests on a path.")
+    min_leaf: int = setting(
+        default=1, minimum=1, maximum=1_000_000_000, meaning="Smallest number of training trials at a leaf."
     )
-    min_leaf: int = setting(default=1, minimum=1, meaning="Smallest number of training trials at a leaf.")
     sample: float = setting(
         default=1.0, above=0.0, maximum=1.0, meaning="Share of the training trials, drawn anew for each tree."
     )
@@ -48,6 +49,11 @@ class Boosted(ScikitClassifier[BoostedConfig]):
             subsample=self.config.sample,
             random_state=seed,
         )
+
+    def training_steps(self, trials: int, features: int, labels: int) -> float:
+        """Return about how many steps of 10 ns the training takes."""
+        trees = self.config.stages * (labels if labels > 2 else 1)
+        return trees * (1e5 + trials * features * min(self.config.depth, math.log2(trials + 1.0)))
 
     def reasons(
         self,

@@ -22,6 +22,7 @@ from graspsense.plugin_api import (
     FeatureValue,
     PluginUnavailable,
     Prediction,
+    StoredValues,
     contribution_reasons,
     missing_feature,
     setting,
@@ -45,14 +46,22 @@ class EbmConfig(ClassifierConfig):
     """Settings of the boosting."""
 
     pairs: int = setting(
-        default=10, minimum=0, meaning="Largest number of pairs of features with a function."
+        default=10,
+        minimum=0,
+        plausible=(0, 1000),
+        meaning="Largest number of pairs of features with a function.",
     )
     bags: int = setting(
         default=8, minimum=1, plausible=(1, 1000), meaning="Number of fits, whose scores are averaged."
     )
-    bins: int = setting(default=64, minimum=4, meaning="Largest number of intervals of a feature.")
+    bins: int = setting(
+        default=64, minimum=4, plausible=(4, 4096), meaning="Largest number of intervals of a feature."
+    )
     pair_bins: int = setting(
-        default=16, minimum=4, meaning="Largest number of intervals of a feature in a pair."
+        default=16,
+        minimum=4,
+        plausible=(4, 256),
+        meaning="Largest number of intervals of a feature in a pair.",
     )
     learning_rate: float = setting(
         default=0.05, above=0.0, plausible=(0.001, 1.0), meaning="Factor of each boosting step."
@@ -210,15 +219,16 @@ class Ebm(Classifier[EbmConfig]):
         }
 
     def from_json(self, model: Mapping[str, Any]) -> None:
-        """Restore the model. Raises KeyError, TypeError or ValueError."""
-        import numpy as np
-
-        names, units = zip(*((str(name), str(unit)) for name, unit in model["features"]), strict=True)
-        labels = tuple(str(label) for label in model["labels"])
-        start = np.array(model["start"], dtype=np.float64)
-        if len(labels) < 2 or start.shape != (len(labels),) or not np.isfinite(start).all():
-            raise ValueError("its log-odds before any feature do not fit its labels")
-        terms = tuple(_term_from(one, len(names), len(labels)) for one in model["terms"])
+        """Restore the model. Raises DataDamaged."""
+        stored = StoredValues(model)
+        names, units = stored.features("features")
+        labels = stored.texts("labels", distinct=True)
+        if len(labels) < 2:
+            raise stored.refusal("labels", "at least two are needed")
+        start = stored.numbers("start", (len(labels),))
+        terms = tuple(_term_from(term, len(names), len(labels)) for term in stored.tables("terms"))
+        if len({term.features for term in terms}) < len(terms):
+            raise stored.refusal("terms", "two of them are functions of the same features")
         self._fitted = AdditiveModel(names, units, labels, start, terms)
 
     def _model(self) -> AdditiveModel:
@@ -257,18 +267,25 @@ def _model_of(boosting: Any, table: FeatureTable) -> AdditiveModel:
     )
 
 
-def _term_from(kept: Mapping[str, Any], features: int, labels: int) -> EbmTerm:
+def _term_from(kept: StoredValues, features: int, labels: int) -> EbmTerm:
     import numpy as np
 
-    of = tuple(int(k) for k in kept["features"])
-    cuts = tuple(np.array(one, dtype=np.float64) for one in kept["cuts"])
-    scores = np.array(kept["scores"], dtype=np.float64)
-    shape = (*(len(one) + 2 for one in cuts), labels)
-    if not of or len(cuts) != len(of) or not all(0 <= k < features for k in of) or scores.shape != shape:
-        raise ValueError("a function of it does not fit its features, bounds and labels")
-    if not np.isfinite(scores).all() or not all((np.diff(one) > 0).all() for one in cuts):
-        raise ValueError("a function of it has scores that are not finite, or bounds that do not increase")
-    return EbmTerm(of, cuts, scores)
+    tested = tuple(kept.wholes("features"))
+    if any(k >= features for k in tested):
+        raise kept.refusal("features", f"it does not fit: the model has {features} features")
+    if not 1 <= len(tested) <= 2 or len(set(tested)) < len(tested):
+        raise kept.refusal("features", "expected one feature, or two different ones")
+    given = kept.items("cuts")
+    if len(given) != len(tested):
+        raise kept.refusal(
+            "cuts", f"it does not fit: {len(given)} lists of bounds for {len(tested)} features"
+        )
+    each = StoredValues({str(k): cuts for k, cuts in enumerate(given)}, kept.field("cuts"))
+    cuts = tuple(each.numbers(key, (None,)) for key in each)
+    if not all((np.diff(bounds) > 0).all() for bounds in cuts):
+        raise kept.refusal("cuts", "they do not increase")
+    scores = kept.numbers("scores", (*(len(bounds) + 2 for bounds in cuts), labels))
+    return EbmTerm(tested, cuts, scores)
 
 
 def _interpret() -> Any:

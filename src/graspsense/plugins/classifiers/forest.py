@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -20,8 +21,10 @@ if TYPE_CHECKING:
 class ForestConfig(KeptConfig):
     """Settings of the forest."""
 
-    trees: int = setting(default=100, minimum=1, plausible=(1, 100_000), meaning="Number of trees.")
-    min_leaf: int = setting(default=1, minimum=1, meaning="Smallest number of training trials at a leaf.")
+    trees: int = setting(default=100, minimum=1, maximum=10_000, meaning="Number of trees.")
+    min_leaf: int = setting(
+        default=1, minimum=1, maximum=1_000_000_000, meaning="Smallest number of training trials at a leaf."
+    )
 
 
 class Forest(ScikitClassifier[ForestConfig]):
@@ -34,6 +37,10 @@ class Forest(ScikitClassifier[ForestConfig]):
         return RandomForestClassifier(
             n_estimators=self.config.trees, min_samples_leaf=self.config.min_leaf, random_state=seed
         )
+
+    def training_steps(self, trials: int, features: int, labels: int) -> float:
+        """Return about how many steps of 10 ns the training takes."""
+        return self.config.trees * (1e5 + trials * math.sqrt(features) * math.log2(trials + 1.0))
 
     def reasons(
         self,

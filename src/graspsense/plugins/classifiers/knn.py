@@ -22,6 +22,7 @@ class KnnConfig(ClassifierConfig):
     neighbours: int = setting(
         default=5,
         minimum=1,
+        plausible=(1, 10_000),
         meaning="Number of training trials that vote; fewer if there are fewer.",
     )
 

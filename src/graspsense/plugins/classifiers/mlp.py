@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from attrs import frozen
 
@@ -14,6 +14,9 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+MOST_ROUNDS: Final = 500
+"""Largest number of rounds of L-BFGS."""
+
 
 @frozen(kw_only=True)
 class MlpConfig(KeptConfig):
@@ -22,10 +25,12 @@ class MlpConfig(KeptConfig):
     hidden: int = setting(
         default=20,
         minimum=1,
-        plausible=(1, 10_000),
+        maximum=10_000,
         meaning="Neurons of the hidden layer.",
     )
-    weight_decay: float = setting(default=0.01, minimum=0.0, meaning="L2 penalty on the weights.")
+    weight_decay: float = setting(
+        default=0.01, minimum=0.0, maximum=1e6, meaning="L2 penalty on the weights."
+    )
 
 
 class Mlp(ScikitClassifier[MlpConfig]):
@@ -39,9 +44,13 @@ class Mlp(ScikitClassifier[MlpConfig]):
             hidden_layer_sizes=(self.config.hidden,),
             alpha=self.config.weight_decay,
             solver="lbfgs",
-            max_iter=500,
+            max_iter=MOST_ROUNDS,
             random_state=seed,
         )
+
+    def training_steps(self, trials: int, features: int, labels: int) -> float:
+        """Return about how many steps of 10 ns the training takes; of products of matrices, ten are one."""
+        return MOST_ROUNDS * (1e4 + trials * self.config.hidden * (features + labels) / 10.0)
 
     def reasons(
         self,

@@ -12,11 +12,12 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, Final, Literal, TypeVar
 
 from attrs import frozen
 
 from graspsense.plugin_api import (
+    LARGEST_SEED,
     Classifier,
     ClassifierConfig,
     Features,
@@ -24,6 +25,7 @@ from graspsense.plugin_api import (
     FeatureValue,
     Prediction,
     Reason,
+    StoredValues,
     contribution_reasons,
     in_words,
     missing_feature,
@@ -33,6 +35,11 @@ from graspsense.plugin_api import (
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
+
+MOST_SCALED: Final = 1e30
+"""The largest scaled feature; one that is farther away counts as this."""
+MOST_STEPS: Final = 3e9
+"""The most elementary steps of a training, each about 10 ns. A model that is kept as trials is trained when read."""
 
 ScikitConfigT = TypeVar("ScikitConfigT", bound=ClassifierConfig)
 
@@ -65,7 +72,10 @@ class FittedEstimator:
         import numpy as np
 
         filled: NDArray[np.float64] = np.where(np.isnan(values), self.fill, values)
-        return (filled - self.mean) / self.scale
+        with np.errstate(over="ignore"):
+            scaled = (filled - self.mean) / self.scale
+        # Trees compute with 32 bits, distances with squares.
+        return np.clip(scaled, -MOST_SCALED, MOST_SCALED)
 
 
 class ScikitClassifier(Classifier[ScikitConfigT]):
@@ -77,6 +87,10 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
     @abstractmethod
     def estimator(self, seed: int, trials: int) -> Any:
         """Return the unfitted estimator for this number of training trials."""
+
+    def training_steps(self, trials: int, features: int, labels: int) -> float:
+        """Return about how many elementary steps of 10 ns a training takes; 0 where settings cannot make it long."""
+        return 0.0
 
     @abstractmethod
     def reasons(
@@ -141,7 +155,10 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
         return values.mean(axis=0), values.std(axis=0)
 
     def fit(self, table: FeatureTable, labels: Sequence[str], seed: int) -> None:
-        """Fill missing values, scale, and fit. Raises ValueError for fewer than two labels."""
+        """Fill missing values, scale, and fit.
+
+        Raises ValueError for fewer than two labels, and for settings with which the training would not end soon.
+        """
         import warnings
 
         import numpy as np
@@ -149,6 +166,7 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
 
         if len(set(labels)) < 2:
             raise ValueError(f"all {len(labels)} trials have one label: there is nothing to tell apart")
+        self._refuse_endless(len(labels), len(table.names), len(set(labels)))
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)  # by numpy, for a column without values
             fill = np.nan_to_num(np.nanmedian(table.values, axis=0), nan=0.0)
@@ -166,7 +184,8 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
             scale=np.where(constant, 1.0, scale),
         )
         # One thread: on small tables more threads cost time, and the order of sums would depend on the machine.
-        with threadpool_limits(1):
+        # A training that diverges is told by what it gives, and not by warnings of numpy.
+        with threadpool_limits(1), np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             fitted.estimator.fit(fitted.ready(table.values), np.array(labels))
         self._fitted = fitted
 
@@ -236,47 +255,61 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
         }
 
     def from_json(self, model: Mapping[str, Any]) -> None:
-        """Restore the model. Raises KeyError, TypeError or ValueError."""
+        """Restore the model. Raises DataDamaged or ValueError."""
         import warnings
 
-        import numpy as np
         from sklearn.exceptions import ConvergenceWarning
 
-        names, units = zip(*((str(name), str(unit)) for name, unit in model["features"]), strict=True)
-        self._made_with = str(model["made_with"])
-        if "skops" in model:
-            self._fitted = self._from_skops(model, names, units)
+        stored = StoredValues(model)
+        names, units = stored.features("features")
+        self._made_with = stored.text("made_with")
+        if "skops" in stored:
+            self._fitted = self._from_skops(stored, names, units)
             return
-        labels = [str(label) for label in model["labels"]]
-        values = np.array(model["trials"], dtype=np.float64)
-        if values.shape != (len(labels), len(names)) or np.isinf(values).any():
-            raise ValueError("its training trials do not fit its labels and features")
+        labels = stored.texts("labels")
+        values = stored.numbers("trials", (len(labels), len(names)), missing=True)
         with warnings.catch_warnings():
             # The training told of a network that has not converged.
             warnings.simplefilter("ignore", ConvergenceWarning)
-            self.fit(FeatureTable(names=names, units=units, values=values), labels, int(model["seed"]))
+            self.fit(
+                FeatureTable(names=names, units=units, values=values),
+                labels,
+                stored.whole("seed", most=LARGEST_SEED),
+            )
 
     def _from_skops(
-        self, model: Mapping[str, Any], names: tuple[str, ...], units: tuple[str, ...]
+        self, stored: StoredValues, names: tuple[str, ...], units: tuple[str, ...]
     ) -> FittedEstimator:
         import numpy as np
 
         from graspsense.plugins.classifiers.skops_text import from_text
 
-        fill, mean, scale = (np.array(model[name], dtype=np.float64) for name in ("fill", "mean", "scale"))
-        for one in (fill, mean, scale):
-            if one.shape != (len(names),) or not np.isfinite(one).all():
-                raise ValueError("how its trials are made ready does not fit its features")
-        kind = type(self.estimator(int(model["seed"]), 2))
+        fill, mean, scale = (stored.numbers(name, (len(names),)) for name in ("fill", "mean", "scale"))
+        if not (scale > 0.0).all():
+            raise stored.refusal("scale", "a feature has the scale 0, or a negative one")
+        seed = stored.whole("seed", most=LARGEST_SEED)
+        try:
+            estimator = from_text(stored.text("skops"), self.estimator(seed, 2), len(names))
+        except ValueError as error:
+            raise stored.refusal("skops", str(error)) from error
         return FittedEstimator(
-            estimator=from_text(model["skops"], kind, len(names)),
+            estimator=estimator,
             table=FeatureTable(names=names, units=units, values=np.empty((0, len(names)))),
             labels=(),
-            seed=int(model["seed"]),
+            seed=seed,
             fill=fill,
             mean=mean,
             scale=scale,
         )
+
+    def _refuse_endless(self, trials: int, features: int, labels: int) -> None:
+        """Raise ValueError if the settings make a training too long for this number of trials, features and labels."""
+        steps = self.training_steps(trials, features, labels)
+        if steps > MOST_STEPS:
+            raise ValueError(
+                f"with these settings a training on {trials} trials takes {steps:.1g} steps, of at most "
+                f"{MOST_STEPS:.1g} (about half a minute): choose smaller ones (see graspsense config classifier)"
+            )
 
     def _model(self) -> FittedEstimator:
         if self._fitted is None:

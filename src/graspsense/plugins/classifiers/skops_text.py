@@ -8,9 +8,13 @@ from __future__ import annotations
 
 import base64
 import binascii
+import math
+from io import BytesIO
 from typing import Any, Final
+from zipfile import ZIP_STORED, BadZipFile, ZipFile
 
 from graspsense.plugin_api import PluginUnavailable
+from graspsense.plugins.classifiers.fitted_estimators import refuse_misfit
 
 TRUSTED: Final = ("sklearn.tree._tree.Tree",)
 """Types that the estimators need beyond those that skops regards as safe: the arrays of a decision tree."""
@@ -25,14 +29,16 @@ def as_text(estimator: Any) -> str:
     return base64.b64encode(_skops().dumps(estimator)).decode("ascii")
 
 
-def from_text(text: str, kind: type, features: int) -> Any:
-    """Return the fitted estimator, which must be of this class and have this number of features.
+def from_text(text: str, expected: Any, features: int) -> Any:
+    """Return the fitted estimator, of the class and with the settings of `expected`, for this number of features.
 
-    Raises PluginUnavailable without skops, ValueError for any other object or a type that is not listed.
+    Raises PluginUnavailable without skops, ValueError for any other object, for a type that is not listed, and for
+    arrays that do not fit each other.
     """
     skops = _skops()
     try:
         data = base64.b64decode(text, validate=True)
+        _refuse_unpacking(data)
         foreign = sorted(set(skops.get_untrusted_types(data=data)) - set(TRUSTED))
         if foreign:
             raise ValueError(f"it holds types that no model of ours needs: {', '.join(foreign)[:200]}")
@@ -41,23 +47,40 @@ def from_text(text: str, kind: type, features: int) -> Any:
         raise
     except Exception as error:  # skops can raise anything on a broken archive
         raise ValueError(f"it is not an estimator ({type(error).__name__}: {error})") from error
-    if type(estimator) is not kind or getattr(estimator, "n_features_in_", None) != features:
-        raise ValueError(f"it is no {kind.__name__} of {features} features")
-    for one in getattr(estimator, "estimators_", [estimator]):
-        if hasattr(one, "tree_"):
-            _check_tree(one.tree_, features)
+    if type(estimator) is not type(expected) or getattr(estimator, "n_features_in_", None) != features:
+        raise ValueError(f"it is no {type(expected).__name__} of {features} features")
+    refuse_misfit(estimator, expected)
     return estimator
 
 
-def _check_tree(tree: Any, features: int) -> None:
-    """Refuse a tree with indices outside its arrays, which compiled code does not check. Raises ValueError."""
-    n, left, right = tree.node_count, tree.children_left, tree.children_right
-    inner = left >= 0
-    for k, child in enumerate(zip(left.tolist(), right.tolist(), strict=True)):
-        if child != (-1, -1) and not all(k < one < n for one in child):
-            raise ValueError("a tree of it leads nowhere")
-    if ((tree.feature[inner] < 0) | (tree.feature[inner] >= features)).any():
-        raise ValueError("a tree of it asks for a feature that is not there")
+def _refuse_unpacking(data: bytes) -> None:
+    """Raise ValueError for an archive that takes more memory than its own size, in files or in arrays."""
+    try:
+        with ZipFile(BytesIO(data)) as archive:
+            parts = archive.infolist()
+            if any(part.compress_type != ZIP_STORED for part in parts):
+                raise ValueError("it is compressed")
+            if sum(part.file_size for part in parts) > len(data):
+                raise ValueError("its parts are larger than the whole")
+            for part in parts:
+                if part.filename.endswith(".npy"):
+                    _refuse_array(archive.read(part))
+    except BadZipFile as error:
+        raise ValueError(f"it is not an archive ({error})") from error
+
+
+def _refuse_array(data: bytes) -> None:
+    """Raise ValueError for an array whose declared size is not that of its data."""
+    import numpy as np
+
+    stream = BytesIO(data)
+    version = np.lib.format.read_magic(stream)
+    read_header = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
+    if version not in read_header:
+        raise ValueError(f"an array of it has the format {version}")
+    shape, _, kind = read_header[version](stream)
+    if kind.hasobject or math.prod(shape) * kind.itemsize != len(data) - stream.tell():
+        raise ValueError("an array of it is not as long as it says")
 
 
 def _skops() -> Any:

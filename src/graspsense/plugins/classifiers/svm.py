@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 from attrs import frozen
 
@@ -14,6 +14,9 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+MOST_ROUNDS: Final = 1_000_000
+"""Largest number of steps of the solver: a large penalty needs some thousands; with a larger one it would not end."""
+
 
 @frozen(kw_only=True)
 class SvmConfig(KeptConfig):
@@ -22,6 +25,7 @@ class SvmConfig(KeptConfig):
     c: float = setting(
         default=10.0,
         above=0.0,
+        maximum=1e9,
         meaning="Penalty of a training trial on the wrong side; a larger one fits the data more closely.",
     )
     kernel: Literal["rbf", "linear"] = setting(default="rbf", meaning="Radial or linear kernel.")
@@ -40,7 +44,11 @@ class Svm(ScikitClassifier[SvmConfig]):
         from sklearn.svm import SVC
 
         return SVC(
-            C=self.config.c, kernel=self.config.kernel, decision_function_shape="ovr", random_state=seed
+            C=self.config.c,
+            kernel=self.config.kernel,
+            decision_function_shape="ovr",
+            max_iter=MOST_ROUNDS,
+            random_state=seed,
         )
 
     def origin_and_scale(

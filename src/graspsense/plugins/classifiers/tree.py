@@ -23,7 +23,9 @@ class CartConfig(KeptConfig):
         default="entropy",
         meaning="The impurity by which splits are chosen.",
     )
-    min_leaf: int = setting(default=2, minimum=1, meaning="Smallest number of training trials at a leaf.")
+    min_leaf: int = setting(
+        default=2, minimum=1, maximum=1_000_000_000, meaning="Smallest number of training trials at a leaf."
+    )
 
 
 class Cart(ScikitClassifier[CartConfig]):

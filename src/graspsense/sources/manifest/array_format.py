@@ -1,25 +1,47 @@
-"""NPY, NPZ and MAT files as tables. Arrays of Python objects are never loaded, because that would run code in them."""
+"""NPY, NPZ and MAT files as tables."""
 
 from __future__ import annotations
 
-import zipfile
+import math
+import struct
 from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
-from graspsense.core.errors import ConfigError, DataDamaged, named
+from graspsense.core.errors import DataDamaged
+from graspsense.recording.readable import readable, refuse_devices
+from graspsense.recording.unpacked import Unpacked
 from graspsense.sources.manifest.table import ColumnTable, Numbers
+from graspsense.sources.numpy_files import npy_array, npz_arrays
+
+_MAT_HEADER_BYTES: Final = 128
+_COMPRESSED: Final = 15
+"""The type of a compressed element of a MAT file of version 7."""
+_LARGEST_ITEM: Final = 8
+"""Bytes of a number of the largest type."""
+_NUMERIC_CLASSES: Final = frozenset(
+    {
+        "double",
+        "single",
+        "logical",
+        "char",
+        *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)),
+    }
+)
+"""Classes of variables that are read. Others, such as cells and structures, are no columns."""
 
 
 def read_npy(path: Path) -> list[ColumnTable]:
     """Return the table in an NPY file: rows are times, columns are c1, c2 and so on.
 
-    An array of three dimensions has one grasp for each index of the first. Raises ConfigError, DataDamaged.
+    An array of three dimensions has one grasp for each index of the first. Raises ConfigError, TooLarge, DataDamaged.
     """
-    array = _loaded(path)
+    array = npy_array(path)
+    if not array.size:
+        raise DataDamaged(f"{path}: an array of the shape {array.shape} has no numbers")
     if array.dtype.names:
         return [_of_arrays(path, {name: _float(path, array[name]) for name in array.dtype.names})]
     values = _float(path, array)
@@ -34,51 +56,50 @@ def read_npy(path: Path) -> list[ColumnTable]:
 
 
 def read_npz(path: Path) -> list[ColumnTable]:
-    """Return the table in an NPZ file: each array is a column, or several. Raises ConfigError, DataDamaged."""
-    try:
-        with np.load(path, allow_pickle=False) as archive:
-            arrays = {name: archive[name] for name in archive.files}
-    except (OSError, ValueError, zipfile.BadZipFile, EOFError) as error:
-        raise _unreadable(path, error, "NPZ") from error
-    return [_of_arrays(path, arrays)]
+    """Return the table in an NPZ file: each array is a column, or several.
+
+    Raises ConfigError, TooLarge, DataDamaged.
+    """
+    return [_of_arrays(path, npz_arrays(path))]
 
 
 def read_mat(path: Path) -> list[ColumnTable]:
     """Return the table in a MAT file of version 4 to 7: each numeric variable is a column, or several.
 
-    Raises ConfigError, DataDamaged.
+    Raises ConfigError, TooLarge, DataDamaged.
     """
-    from scipy.io import loadmat
+    from scipy.io import loadmat, whosmat
 
-    try:
-        variables = loadmat(str(path), appendmat=False)
-    except NotImplementedError as error:
-        raise DataDamaged(
-            f"{path} is a MAT file of version 7.3, which is HDF5. Save it in MATLAB with: save(NAME, '-v7')"
-        ) from error
-    except FileNotFoundError as error:
-        raise ConfigError(f"{path} cannot be read: there is no such file") from error
-    except Exception as error:  # scipy raises various exceptions on damaged files
-        raise _unreadable(path, error, "MAT") from error
-    return [_of_arrays(path, {name: one for name, one in variables.items() if not name.startswith("__")})]
-
-
-def _loaded(path: Path) -> Any:
-    try:
-        return np.load(path, allow_pickle=False)
-    except (OSError, ValueError, EOFError) as error:
-        raise _unreadable(path, error, "NPY") from error
+    with readable(path):
+        refuse_devices(path)
+        _expect_variables(path, Unpacked(path))
+        try:
+            named = whosmat(str(path), appendmat=False)
+        except NotImplementedError as error:
+            raise DataDamaged(
+                f"{path} is a MAT file of version 7.3, which is HDF5. Save it in MATLAB with: save(NAME, '-v7')"
+            ) from error
+        unpacked = Unpacked(path)
+        numeric = [(name, shape) for name, shape, kind in named if kind in _NUMERIC_CLASSES]
+        for _, shape in numeric:
+            unpacked.add(_LARGEST_ITEM * math.prod(shape))
+        variables = loadmat(str(path), appendmat=False, variable_names=[name for name, _ in numeric])
+        return [_of_arrays(path, {name: one for name, one in variables.items() if not name.startswith("__")})]
 
 
-def _unreadable(path: Path, error: Exception, kind: str) -> Exception:
-    if isinstance(error, OSError) and error.strerror:
-        return ConfigError(f"{path} cannot be read: {error.strerror}")
-    if "pickle" in str(error).lower():
-        return DataDamaged(
-            f"{path} is not a {kind} file of numbers. Python objects in it are not loaded, because that can run any "
-            "code: save plain arrays of numbers"
-        )
-    return DataDamaged(f"{path} cannot be read as a {kind} file: {named(error)}")
+def _expect_variables(path: Path, unpacked: Unpacked) -> None:
+    """Raise TooLarge if the compressed variables of a MAT file of version 5 to 7 unpack to more than the limit."""
+    with path.open("rb") as file:
+        header = file.read(_MAT_HEADER_BYTES)
+        order = {b"IM": "<", b"MI": ">"}.get(header[-2:])
+        if order is None:
+            return  # version 4, which does not compress
+        tag = struct.Struct(f"{order}II")
+        while len(head := file.read(tag.size)) == tag.size:
+            kind, size = tag.unpack(head)
+            data = file.read(min(size, path.stat().st_size))
+            if kind == _COMPRESSED:
+                unpacked.count_zlib(data)
 
 
 def _of_arrays(path: Path, arrays: Mapping[str, Any]) -> ColumnTable:

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from graspsense.core.errors import ConfigError
+from graspsense.core.errors import ConfigError, listed
 from graspsense.sources.manifest.description import ReadManifest
 from graspsense.sources.manifest.expression import Expression, ExpressionError
 from graspsense.sources.manifest.table import ColumnTable, Numbers
@@ -57,7 +57,7 @@ class AvailableColumns(dict[str, Any]):
             texts = [name for name in self.table.texts if repr(name) in str(error)]
             lines = self.table.not_numbers
             words = [f"{name} ({lines[name]})" if name in lines else name for name in texts]
-            aside = f"\n    columns of text, which are not numbers: {', '.join(words)}" if texts else ""
+            aside = f"\n    columns of text, which are not numbers: {listed(words)}" if texts else ""
             raise ConfigError(
                 f"{self.manifest.place}: {key}, for {self.table.source}: {error}{aside}"
             ) from None

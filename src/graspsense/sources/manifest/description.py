@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Mapping
 from pathlib import Path
@@ -11,9 +12,11 @@ from attrs import Attribute, frozen
 
 from graspsense.core.errors import ConfigError
 from graspsense.core.layers import read_toml
+from graspsense.core.limits import ENTRIES
 from graspsense.core.setting import setting
 from graspsense.core.strict import ValidationFailed, structured
 from graspsense.sources.manifest.expression import Expression, ExpressionError, parse
+from graspsense.sources.manifest.patterns import regular_expression
 
 Text = str | tuple[str, ...]
 """An expression, or several of which the first is used whose columns exist."""
@@ -22,10 +25,7 @@ _AMOUNT: Final = re.compile(r"(?P<number>\d+(?:\.\d+)?)\s*(?P<unit>samples?|s|ms
 
 
 def _is_regex(_config: object, _attribute: Attribute[str], value: str) -> None:
-    try:
-        re.compile(value)
-    except re.error as error:
-        raise ValueError(f"{value!r} is not a regular expression: {error}") from None
+    regular_expression(value)
 
 
 def _is_amount(_config: object, _attribute: Attribute[str], value: str) -> None:
@@ -125,7 +125,9 @@ def read_manifest(place: Path) -> ReadManifest:
         keys = structured(layer.values, Manifest, "a manifest")
     except ValidationFailed as misfit:
         raise ConfigError("\n".join(layer.complain(one) for one in misfit.problems)) from None
-    problems: list[str] = []
+    problems = [f"{layer.where(path)}: {why}" for path, why in _too_many(keys)]
+    if problems:
+        raise ConfigError("\n".join(problems))
 
     def parsed(path: tuple[str | int, ...], text: str) -> Expression | None:
         try:
@@ -151,7 +153,8 @@ def read_manifest(place: Path) -> ReadManifest:
         raise ConfigError("\n".join(problems))
     return ReadManifest(
         place=place,
-        base=place.parent / Path(keys.folder).expanduser(),
+        base=place.parent
+        / os.path.expanduser(keys.folder),  # of pathlib, it raises where there is no such user
         keys=keys,
         expressions={name: tuple(parts) for name, parts in found.items()},
         channels=channels,  # type: ignore[arg-type]
@@ -159,6 +162,13 @@ def read_manifest(place: Path) -> ReadManifest:
         beside=beside,
         fast=frozenset(_texts(keys.fast)),
     )
+
+
+def _too_many(keys: Manifest) -> list[tuple[tuple[str, ...], str]]:
+    """Return which keys have more entries than are accepted, each with the reason."""
+    entries = {"files": _texts(keys.files), "channels": keys.channels, "values": keys.values}
+    entries |= {name: _texts(getattr(keys, name)) for name in QUANTITIES}
+    return [((name,), why) for name, found in entries.items() if (why := ENTRIES.exceeded(len(found)))]
 
 
 def _contradictions(keys: Manifest) -> list[tuple[tuple[str, ...], str]]:
@@ -205,6 +215,6 @@ def samples_of(amount: str, t_s: Any) -> int:
     assert match is not None
     number = float(match["number"])
     if match["unit"].startswith("sample"):
-        return max(1, min(int(number), len(t_s)))
+        return int(max(1.0, min(number, float(len(t_s)))))
     seconds = number * (1e-3 if match["unit"] == "ms" else 1.0)
     return max(1, int((t_s - t_s[0] < seconds).sum()))

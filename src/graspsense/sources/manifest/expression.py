@@ -11,23 +11,24 @@ matrix of a MAT file has, counts as several as well. `force[2]` is the component
 from __future__ import annotations
 
 import ast
-import re
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from fnmatch import fnmatchcase
 from typing import TYPE_CHECKING, Any, Final, NoReturn
 
 import numpy as np
 from attrs import frozen
 
-from graspsense.core.errors import ConfigError, suggestion
+from graspsense.core.errors import ConfigError, listed, suggestion
+from graspsense.core.limits import CELLS
+from graspsense.sources.manifest.patterns import PatternError, wildcard
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+LARGEST: Final = 1e300
+"""Limit on the magnitude of a number in an expression."""
 LONGEST: Final = 2000
 """Limit on the characters of an expression."""
-MOST_NAMED: Final = 24
-"""Limit on the columns that an error lists."""
 
 Values = Any
 """A float array of shape (n,) for one column, (n, k) for several."""
@@ -43,7 +44,7 @@ FOLDS: Final[Mapping[str, Callable[[Any], Any]]] = {
 OVER_TIME: Final[Mapping[str, Callable[[Any], Any]]] = {
     "first": lambda a: a[:1],
     "last": lambda a: a[-1:],
-    "peak": lambda a: np.nanmax(a, axis=0, keepdims=True),
+    "peak": lambda a: np.fmax.reduce(a, axis=0, keepdims=True),
 }
 """Functions of one column over the whole grasp: its first value, its last one, its largest one."""
 PLAIN: Final[Mapping[str, Callable[[Any], Any]]] = {"abs": np.abs, "sqrt": np.sqrt}
@@ -55,7 +56,6 @@ _OPERATORS: Final[Mapping[type[ast.operator], Callable[[Any, Any], Any]]] = {
     ast.Mult: np.multiply,
     ast.Div: np.divide,
 }
-_UNIT: Final = re.compile(r"(?P<text>.*\S)\s+\[(?P<unit>[^\[\]']*[^\[\]'\d\s][^\[\]']*)\]\s*", re.DOTALL)
 
 
 class ExpressionError(ConfigError):
@@ -120,7 +120,11 @@ class Expression:
             return value[:, index] if value.ndim == 2 else value
         assert isinstance(node, ast.Call)
         assert isinstance(node.func, ast.Name)
-        arguments = [self._value(one, columns) for one in node.args]
+        arguments: list[Values] = []
+        for argument in node.args:
+            arguments.append(self._value(argument, columns))
+            if too_many := CELLS.exceeded(sum(value.size for value in arguments)):
+                self._refuse(node, too_many)
         return self._called(node, node.func.id, arguments)
 
     def _called(self, node: ast.Call, name: str, arguments: list[Values]) -> Values:
@@ -150,16 +154,18 @@ class Expression:
         if name in known:
             return (name,)
         quoted = isinstance(node, ast.Constant)
-        found = (
-            tuple(one for one in known if fnmatchcase(one, name)) if quoted and set("*?") & set(name) else ()
-        )
+        found: tuple[str, ...] = ()
+        if quoted and set("*?") & set(name):
+            try:
+                pattern = wildcard(name)
+            except PatternError as error:
+                self._refuse(node, str(error))
+            found = tuple(column for column in known if pattern.fullmatch(column))
         if not found:
-            listed = ", ".join(map(_shown, known[:MOST_NAMED]))
-            more = f" and {len(known) - MOST_NAMED} more" if len(known) > MOST_NAMED else ""
             what = (
                 f"no column matches {name!r}" if quoted and set("*?") & set(name) else f"no column {name!r}"
             )
-            self._refuse(node, f"{what}. Columns: {listed or 'none'}{more}.{suggestion(name, known)}")
+            self._refuse(node, f"{what}. Columns: {_listed(known) or 'none'}.{suggestion(name, known)}")
         return found
 
     def _refuse(self, node: ast.expr, why: str) -> NoReturn:
@@ -168,8 +174,7 @@ class Expression:
 
 def parse(text: str) -> Expression:
     """Return the expression that this text is. Raises ExpressionError that shows the place of what is not allowed."""
-    match = _UNIT.fullmatch(text)
-    body, unit = (match["text"], match["unit"].strip()) if match else (text.strip(), "")
+    body, unit = _body_and_unit(text.strip())
     if not body:
         raise ExpressionError(
             f"{text!r} is empty: name a column, or compute with columns as in 0.06 - Pos*0.001"
@@ -180,7 +185,9 @@ def parse(text: str) -> Expression:
         raise ExpressionError("an expression is a single line")
     try:
         # Python counts columns in bytes of UTF-8, and reports no place after some errors.
-        tree = ast.parse(body, mode="eval").body
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of odd literals, which are refused or mean nothing here
+            tree = ast.parse(body, mode="eval").body
     except SyntaxError as error:
         raise _error(
             body,
@@ -194,6 +201,19 @@ def parse(text: str) -> Expression:
     return Expression(text=body, unit=unit, tree=tree)
 
 
+def _body_and_unit(text: str) -> tuple[str, str]:
+    """Return an expression and the unit in brackets behind it: `Pos [mm]`, but not an index as in `force[2]`."""
+    before, bracket, unit = text[:-1].rpartition("[") if text.endswith("]") else ("", "", "")
+    is_unit = (
+        bracket
+        and before.strip()
+        and before[-1].isspace()
+        and not set("]'") & set(unit)
+        and any(not (sign.isdecimal() or sign.isspace()) for sign in unit)
+    )
+    return (before.rstrip(), unit.strip()) if is_unit else (text, "")
+
+
 def _check(node: ast.AST, text: str, depth: int) -> None:
     """Raise ExpressionError at the first node that is not in the closed list."""
     at = getattr(node, "col_offset", 0)
@@ -203,6 +223,8 @@ def _check(node: ast.AST, text: str, depth: int) -> None:
     if isinstance(node, ast.Constant):
         if type(node.value) not in (int, float, str):
             raise _error(text, at, f"{node.value!r} is not a number")
+        if isinstance(node.value, int | float) and not abs(node.value) <= LARGEST:
+            raise _error(text, at, f"a number is at most {LARGEST:g}")
     elif isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.UAdd | ast.USub):
         inner = (node.operand,)
     elif isinstance(node, ast.BinOp):
@@ -272,6 +294,10 @@ def _aligned(left: Values, right: Values) -> tuple[Values, Values]:
 
 def _width(value: Values) -> tuple[int, ...]:
     return (value.shape[1] if value.ndim == 2 else 1,)
+
+
+def _listed(names: Sequence[str]) -> str:
+    return listed([_shown(name) for name in names])
 
 
 def _shown(name: str) -> str:

@@ -9,11 +9,13 @@ from typing import Final
 
 import numpy as np
 
-from graspsense.core.errors import ConfigError, DataDamaged
+from graspsense.core.errors import ConfigError, DataDamaged, listed
+from graspsense.recording.readable import readable
 from graspsense.sources.manifest.available import AvailableColumns, number_in
 from graspsense.sources.manifest.description import ReadManifest
 from graspsense.sources.manifest.files import NamedFile
 from graspsense.sources.manifest.table import ColumnTable
+from graspsense.sources.numpy_files import npy_array
 
 _FIELD: Final = re.compile(r"\{(\w+)\}")
 _NOT_IN_LABELS: Final = re.compile(r"[\s#,]+")
@@ -26,7 +28,7 @@ def _filled(manifest: ReadManifest, key: str, template: str, table: ColumnTable)
     def value(match: re.Match[str]) -> str:
         text = table.value(match[1])
         if text is None:
-            known = ", ".join((*table.fields, *table.texts, *table.numbers))
+            known = listed((*table.fields, *table.texts, *table.numbers))
             raise ConfigError(
                 f"{manifest.place}: {key}: {table.source} has no field or column {match[1]!r}. It has: {known}"
             )
@@ -109,10 +111,8 @@ def _number_beside(path: Path) -> float | None:
     if not path.is_file():
         return None
     if path.suffix == ".npy":
-        try:
-            return float(np.load(path, allow_pickle=False).reshape(()))
-        except (OSError, ValueError, TypeError) as error:
-            raise DataDamaged(f"{path} does not hold a single number: {error}") from None
+        with readable(path):
+            return float(npy_array(path).reshape(()))
     text = path.read_text(encoding="utf-8", errors="replace").strip()
     number = number_in(text)
     if number is None:

@@ -6,27 +6,28 @@ import os
 import re
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Final
 
 from attrs import frozen
 
 from graspsense.core.errors import ConfigError
 from graspsense.sources.csv_columns import CsvColumns, is_missing
 from graspsense.sources.manifest.description import ReadManifest
-
-_FIELD: Final = re.compile(r"\{(?P<name>\w+)(?P<digits>:d)?\}|(?P<deep>\*\*/)|(?P<any>\*)|(?P<one>\?)")
+from graspsense.sources.manifest.patterns import FileTemplate, PatternError, file_template
 
 
 @frozen(kw_only=True)
 class NamedFile:
     """A file with the facts that its path, or its row of a list, tells.
 
-    `rows` are the first and the last row that are used, counted from 1, if only a part of the file is.
+    `name` is its path from the folder of the manifest. `rows` are the first and the last row that are used, counted
+    from 1, if only a part of the file is. `problem` is why the row of a list cannot be used, empty if it can be.
     """
 
     path: Path
+    name: str
     fields: dict[str, str]
     rows: tuple[int, int] | None = None
+    problem: str = ""
 
 
 def files_of(manifest: ReadManifest) -> list[NamedFile]:
@@ -48,37 +49,26 @@ def files_of(manifest: ReadManifest) -> list[NamedFile]:
 
 
 def _matching(manifest: ReadManifest) -> Iterator[NamedFile]:
-    given = manifest.keys.files
-    patterns = [_pattern(manifest, one) for one in ((given,) if isinstance(given, str) else given)]
+    templates = _templates(manifest)
     for name, path in _tree(manifest.base):
         if path.name == manifest.place.name and path.resolve() == manifest.place.resolve():
             continue
-        match = next(filter(None, (pattern.fullmatch(name) for pattern in patterns)), None)
-        if match is not None:
-            yield NamedFile(path=path, fields=match.groupdict())
+        try:
+            found = (template.fields(name) for template in templates)
+            fields = next((one for one in found if one is not None), None)
+        except PatternError as error:
+            raise ConfigError(f"{manifest.place}: files: {error}") from None
+        if fields is not None:
+            yield NamedFile(path=path, name=name, fields=fields)
 
 
-def _pattern(manifest: ReadManifest, text: str) -> re.Pattern[str]:
-    """Return the regular expression of a pattern. Raises ConfigError."""
-    parts, end, names = [], 0, set()
-    for match in _FIELD.finditer(text):
-        parts.append(re.escape(text[end : match.start()]))
-        end = match.end()
-        if match["deep"]:
-            parts.append("(?:.+/)?")
-        elif match["one"]:
-            parts.append("[^/]")
-        elif match["any"]:
-            parts.append("[^/]*")
-        elif match["name"] in names:
-            parts.append(f"(?P={match['name']})")
-        else:
-            names.add(match["name"])
-            parts.append(f"(?P<{match['name']}>{r'[0-9]+' if match['digits'] else '[^/]+'})")
+def _templates(manifest: ReadManifest) -> list[FileTemplate]:
+    """Return the patterns of the files. Raises ConfigError."""
+    given = manifest.keys.files
     try:
-        return re.compile("".join([*parts, re.escape(text[end:])]))
-    except re.error as error:
-        raise ConfigError(f"{manifest.place}: files: {text!r} is not a pattern: {error}") from None
+        return [file_template(one) for one in ((given,) if isinstance(given, str) else given)]
+    except PatternError as error:
+        raise ConfigError(f"{manifest.place}: files: {error}") from None
 
 
 def _tree(base: Path) -> Iterator[tuple[str, Path]]:
@@ -110,19 +100,26 @@ def _listed(manifest: ReadManifest) -> Iterator[NamedFile]:
             for one, cells in columns.cells.items()
             if one != "file" and not is_missing(cells[k])
         }
-        path = manifest.base / name
-        if not path.exists():
-            raise ConfigError(f"{place}, line {columns.lines[k]}: there is no file {path}")
-        yield NamedFile(path=path, fields=row, rows=_rows(place, columns.lines[k], row))
+        path, where = manifest.base / name, f"{place}, line {columns.lines[k]}"
+        rows, problem = None, "" if path.exists() else f"{where}: there is no file {path}"
+        try:
+            rows = _rows(where, row)
+        except ConfigError as error:
+            problem = str(error)
+        yield NamedFile(path=path, name=name, fields=row, rows=rows, problem=problem)
 
 
-def _rows(place: Path, line: int, row: dict[str, str]) -> tuple[int, int] | None:
+def _rows(where: str, row: dict[str, str]) -> tuple[int, int] | None:
     given = [row.pop(name, "") for name in ("first_row", "last_row")]
     if not any(given):
         return None
-    if not all(one.isdecimal() for one in given) or not 1 <= int(given[0]) <= int(given[1]):
+    if not all(_is_row(one) for one in given) or not 1 <= int(given[0]) <= int(given[1]):
         raise ConfigError(
-            f"{place}, line {line}: first_row and last_row are {given[0]!r} and {given[1]!r}: give two numbers of "
+            f"{where}: first_row and last_row are {given[0]!r} and {given[1]!r}: give two numbers of "
             "rows, counted from 1, the first not behind the last"
         )
     return int(given[0]), int(given[1])
+
+
+def _is_row(text: str) -> bool:
+    return text.isdecimal() and len(text) < 16

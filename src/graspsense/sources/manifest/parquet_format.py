@@ -1,39 +1,143 @@
-"""Parquet files as tables, read by pyarrow."""
+"""Parquet files as tables, read by pyarrow within the limit on what a file may unpack to.
+
+Repeated values take almost no place in a Parquet file. So its numbers of rows and values count, not its bytes.
+"""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
-from graspsense.core.errors import ConfigError, DataDamaged, PluginUnavailable, named
+from graspsense.core.errors import DataDamaged, PluginUnavailable
 from graspsense.recording.parquet import PARQUET_HINT
+from graspsense.recording.readable import readable, refuse_devices
+from graspsense.recording.unpacked import Unpacked
 from graspsense.sources.manifest.table import ColumnTable, Numbers
+
+_BYTES_OF_A_NUMBER: Final = 8
+_BYTES_OF_A_TEXT: Final = 64
+_ROWS_AT_ONCE: Final = 65536
 
 
 def read_parquet(path: Path) -> list[ColumnTable]:
-    """Return the table in a Parquet file. Raises PluginUnavailable without pyarrow, ConfigError, DataDamaged."""
+    """Return the table in a Parquet file.
+
+    Raises PluginUnavailable without pyarrow, ConfigError, TooLarge, DataDamaged.
+    """
     try:
-        import pyarrow.parquet
+        import pyarrow.parquet  # noqa: F401
     except ImportError as error:
         raise PluginUnavailable(PARQUET_HINT) from error
+    with readable(path):
+        refuse_devices(path)
+        table = _table(path)
+        numbers: dict[str, Numbers] = {}
+        texts: dict[str, list[str]] = {}
+        for name, column in zip(table.column_names, table.columns, strict=True):
+            values = _numbers(column)
+            if values is not None:
+                numbers[name] = values
+            else:
+                texts[name] = _texts(path, column)
+        return [ColumnTable(source=path.name, numbers=numbers, texts=texts)]
+
+
+def _expect_columns(path: Path, metadata: Any) -> None:
+    """Raise TooLarge if the columns have more values, or unpack to more, than the limit allows."""
+    unpacked, values = Unpacked(path), Unpacked(path)
+    columns = metadata.num_columns
+    if metadata.num_rows < 0 or metadata.num_row_groups * columns > path.stat().st_size:
+        raise DataDamaged(
+            f"{path} is damaged: it has {metadata.num_rows} rows in {metadata.num_row_groups} groups"
+        )
+    values.expect(_BYTES_OF_A_NUMBER * metadata.num_rows * columns)
+    for i in range(metadata.num_row_groups):
+        group = metadata.row_group(i)
+        for k in range(columns):
+            column = group.column(k)
+            unpacked.add(max(column.total_uncompressed_size, 0))
+            values.add(_BYTES_OF_A_NUMBER * max(column.num_values, group.num_rows, 0))
+
+
+def _table(path: Path) -> Any:
+    """Return the columns, read in parts that are counted. Texts stay numbers of a dictionary."""
+    import pyarrow.parquet
+    from pyarrow import types
+
+    with pyarrow.parquet.ParquetFile(path) as file:
+        _expect_columns(path, file.metadata)
+        is_text = (types.is_string, types.is_large_string, types.is_binary)
+        texts = [field.name for field in file.schema_arrow if any(test(field.type) for test in is_text)]
+    unpacked = Unpacked(path)
+    parts = []
+    with pyarrow.parquet.ParquetFile(path, read_dictionary=texts, pre_buffer=False) as file:
+        for part in file.iter_batches(batch_size=_ROWS_AT_ONCE, use_threads=False):
+            unpacked.add(part.nbytes)
+            parts.append(part)
+        return pyarrow.Table.from_batches(parts, parts[0].schema if parts else file.schema_arrow)
+
+
+def _numbers(column: Any) -> Numbers | None:
+    """Return a column of numbers, or of equally many numbers in each row; None if it is another one."""
+    from pyarrow import ArrowException, float64, types
+
+    kind = column.type
+    if types.is_null(kind):
+        return np.full(len(column), np.nan)
+    if types.is_dictionary(kind):
+        return _numbers_of_texts(column)
     try:
-        table = pyarrow.parquet.read_table(path)
-    except FileNotFoundError as error:
-        raise ConfigError(f"{path} cannot be read: there is no such file") from error
-    except Exception as error:  # pyarrow has exceptions of its own for damaged files
-        raise DataDamaged(f"{path} cannot be read as a Parquet file: {named(error)}") from error
-    numbers: dict[str, Numbers] = {}
-    texts: dict[str, list[str]] = {}
-    for name, column in zip(table.column_names, table.columns, strict=True):
-        values: list[Any] = column.to_pylist()
-        try:
-            numbers[name] = np.array(
-                [[float("nan")] if one is None else np.atleast_1d(one) for one in values], dtype=np.float64
-            )
-            if numbers[name].shape[1] == 1:
-                numbers[name] = numbers[name][:, 0]
-        except (TypeError, ValueError):
-            texts[name] = ["" if one is None else str(one) for one in values]
-    return [ColumnTable(source=path.name, numbers=numbers, texts=texts)]
+        if types.is_boolean(kind):
+            return np.asarray(column.cast("int8").cast(float64()).to_numpy(), dtype=np.float64)
+        if types.is_integer(kind) or types.is_floating(kind) or types.is_decimal(kind):
+            return np.asarray(column.cast(float64(), safe=False).to_numpy(), dtype=np.float64)
+        if types.is_list(kind) or types.is_large_list(kind) or types.is_fixed_size_list(kind):
+            return _numbers_of_lists(column)
+    except (ArrowException, NotImplementedError):
+        pass
+    return None
+
+
+def _numbers_of_texts(column: Any) -> Numbers | None:
+    whole = column.unify_dictionaries().combine_chunks()
+    try:
+        known = np.array([float("nan"), *whole.dictionary.to_pylist()], dtype=np.float64)
+    except (TypeError, ValueError):
+        return None
+    places: Numbers = known[whole.indices.cast("int64").fill_null(-1).to_numpy(zero_copy_only=False) + 1]
+    return places
+
+
+def _numbers_of_lists(column: Any) -> Numbers | None:
+    whole = column.combine_chunks()
+    inner = whole.flatten()
+    width, rest = divmod(len(inner), len(whole)) if len(whole) else (0, 0)
+    lengths = whole.value_lengths() if hasattr(whole, "value_lengths") else None
+    if whole.null_count or inner.null_count or rest or not width:
+        return None
+    if lengths is not None and (lengths.to_numpy(zero_copy_only=False) != width).any():
+        return None
+    numbers = _numbers(_chunked(inner))
+    if numbers is None:
+        return None
+    values = numbers.reshape(len(whole), width, *numbers.shape[1:])
+    return values[:, 0] if width == 1 else values
+
+
+def _chunked(array: Any) -> Any:
+    import pyarrow
+
+    return pyarrow.chunked_array([array])
+
+
+def _texts(path: Path, column: Any) -> list[str]:
+    from pyarrow import types
+
+    if types.is_dictionary(column.type):
+        whole = column.unify_dictionaries().combine_chunks()
+        words = ["", *("" if one is None else str(one) for one in whole.dictionary.to_pylist())]
+        return [words[i + 1] for i in whole.indices.cast("int64").fill_null(-1).to_pylist()]
+    Unpacked(path).expect(_BYTES_OF_A_TEXT * len(column))
+    return ["" if one is None else str(one) for one in column.to_pylist()]

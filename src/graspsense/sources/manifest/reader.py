@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from graspsense.core.errors import ConfigError, DataDamaged
+from graspsense.core.errors import ConfigError, DataDamaged, listed
+from graspsense.core.limits import RECORDINGS
 from graspsense.recording.labelled_recording import LabelledRecording, UnreadableRecording
+from graspsense.recording.readable import each_readable, refuse_devices
 from graspsense.sources.grasp_columns import checked_recording
 from graspsense.sources.manifest.description import ReadManifest, read_manifest
 from graspsense.sources.manifest.facts import instance_of, label_of, order_of, recorded_at_of, values_of
@@ -28,21 +31,18 @@ def read_recordings(place: str) -> Iterator[LabelledRecording | UnreadableRecord
     """
     manifest = read_manifest(Path(place).expanduser())
     for file in files_of(manifest):
-        name = file.path.relative_to(manifest.base).as_posix()
-        try:
-            tables = tables_of(manifest, file)
-        except (ConfigError, DataDamaged) as error:
-            yield UnreadableRecording(source=name, error=error)
-            continue
-        for table in tables:
-            try:
-                yield from grasps_in(manifest, file, table)
-            except (ConfigError, DataDamaged) as error:
-                yield UnreadableRecording(source=table.source, error=error)
+        for table in each_readable(file.name, partial(tables_of, manifest, file)):
+            if isinstance(table, UnreadableRecording):
+                yield table
+            else:
+                yield from each_readable(table.source, partial(grasps_in, manifest, file, table))
 
 
 def tables_of(manifest: ReadManifest, file: NamedFile) -> list[ColumnTable]:
     """Return the tables of a file, each with the facts of its path. Raises ConfigError, DataDamaged."""
+    if file.problem:
+        raise ConfigError(file.problem)
+    refuse_devices(file.path)
     read = _format(manifest, file.path)
     tables = [table.with_fields(file.fields) for table in read(file.path)]
     if file.rows is not None:
@@ -52,6 +52,8 @@ def tables_of(manifest: ReadManifest, file: NamedFile) -> list[ColumnTable]:
         tables = [tables[0].rows(slice(first - 1, last), f"rows {first} to {last}")]
     split = manifest.keys.split
     if split == "rows":
+        if too_many := RECORDINGS.exceeded(sum(map(len, tables))):
+            raise DataDamaged(f"{file.path}: {too_many}")
         return [table.rows(slice(k, k + 1), f"row {k + 1}") for table in tables for k in range(len(table))]
     if split and split != "force":
         return [part for table in tables for part in _by_column(table, split)]
@@ -123,11 +125,13 @@ def _by_column(table: ColumnTable, column: str) -> list[ColumnTable]:
     elif column in table.numbers and table.numbers[column].ndim == 1:
         values = table.numbers[column].tolist()
     else:
-        known = ", ".join((*table.numbers, *table.texts))
+        known = listed((*table.numbers, *table.texts))
         raise ConfigError(f"split: {table.source} has no column {column!r}. Columns: {known}")
     rows: dict[Any, list[int]] = {}
     for k, value in enumerate(values):
         rows.setdefault(value, []).append(k)
+    if too_many := RECORDINGS.exceeded(len(rows)):
+        raise DataDamaged(f"{table.source}: {too_many}")
     return [
         table.rows(
             np.array(which), f"{column} {value:g}" if isinstance(value, float) else f"{column} {value}"

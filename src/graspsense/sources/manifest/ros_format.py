@@ -6,21 +6,27 @@ are the messages of the topic, among those that are used, that has the most; eac
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
+from mcap.records import Channel, Chunk, McapRecord, Message, Schema
+from numpy.typing import NDArray
 
-from graspsense.core.errors import ConfigError, DataDamaged, PluginUnavailable, named
+from graspsense.core.errors import ConfigError, DataDamaged, PluginUnavailable
+from graspsense.recording.mcap_records import records_in, records_of
+from graspsense.recording.readable import readable, refuse_devices
+from graspsense.recording.unpacked import Unpacked
 from graspsense.sources.manifest.table import ColumnTable, Numbers
-
-if TYPE_CHECKING:
-    from rosbags.interfaces import Connection
+from graspsense.sources.ros_bags import Definitions, opened_bag, stamp_ns
 
 MOST_COMPONENTS: Final = 4096
 """An array with more numbers is a picture, and is left out."""
-STAMP: Final = ("sec", "nanosec")
+_READ: Final = ("ros2msg", "cdr")
+"""The encodings of a schema and of its messages that are read."""
+_NUMBER_BYTES: Final = 100
+"""Bytes of a single number of a message in memory, with its name, about."""
 
 
 def read_bag(path: Path, topics: Collection[str] = ()) -> list[ColumnTable]:
@@ -31,19 +37,22 @@ def read_bag(path: Path, topics: Collection[str] = ()) -> list[ColumnTable]:
     if not path.exists():
         raise ConfigError(f"{path} cannot be read: there is no such file")
     messages: dict[str, list[tuple[int, dict[str, Any]]]] = {}
+    kept = Unpacked(path)
     for topic, t_ns, message in _messages(path, topics):
-        messages.setdefault(topic, []).append((t_ns, dict(_numbers_in(message, topic))))
+        numbers_in = dict(_numbers_in(message, topic))
+        kept.add(sum(_NUMBER_BYTES + 8 * np.size(one) for one in numbers_in.values()))
+        messages.setdefault(topic, []).append((t_ns, numbers_in))
     messages = {topic: found for topic, found in messages.items() if found[0][1]}
     if not messages:
         raise DataDamaged(f"{path} has no messages with numbers")
     clock = max(messages, key=lambda topic: len(messages[topic]))
-    times = np.array([t_ns for t_ns, _ in messages[clock]], dtype=np.int64)
-    order = np.argsort(times, kind="stable")
-    times = times[order]
-    numbers: dict[str, Numbers] = {}
     for found in messages.values():
         found.sort(key=lambda one: one[0])
-        last = np.searchsorted([t_ns for t_ns, _ in found], times, side="right") - 1
+    since_ns = _since_first(path, messages, clock)
+    t_s = np.array([t_ns for t_ns, _ in messages[clock]], dtype=np.float64) * 1e-9
+    numbers: dict[str, Numbers] = {}
+    for topic, found in messages.items():
+        last = np.searchsorted(since_ns[topic], since_ns[clock], side="right") - 1
         for name, example in found[0][1].items():
             width = np.size(example)
             rows = [one.get(name, np.full(width, np.nan)) for _, one in found]
@@ -52,55 +61,73 @@ def read_bag(path: Path, topics: Collection[str] = ()) -> list[ColumnTable]:
             values = np.array(rows, dtype=np.float64).reshape(len(rows), -1)[np.maximum(last, 0)]
             values[last < 0] = np.nan
             numbers[name] = values[:, 0] if values.shape[1] == 1 else values
-    return [ColumnTable(source=path.name, numbers=numbers, t_s=times.astype(np.float64) * 1e-9)]
+    return [ColumnTable(source=path.name, numbers=numbers, t_s=t_s)]
+
+
+def _since_first(
+    path: Path, messages: Mapping[str, Sequence[tuple[int, Any]]], clock: str
+) -> dict[str, NDArray[np.int64]]:
+    """Return the times of the messages (ns) since the first of this topic. Raises DataDamaged."""
+    # From 2262 on, nanoseconds since 1970 do not fit into an int64; their differences do.
+    began_ns = messages[clock][0][0]
+    try:
+        return {
+            topic: np.array([t_ns - began_ns for t_ns, _ in found], dtype=np.int64)
+            for topic, found in messages.items()
+        }
+    except OverflowError as error:
+        raise DataDamaged(f"{path} has messages that are more than 292 years apart") from error
 
 
 def _messages(path: Path, topics: Collection[str]) -> Iterator[tuple[str, int, Any]]:
     """Yield topic, time (ns) and message. The time is that of the header, or that of the recording if it has none."""
-    try:
-        from rosbags.typesys import Stores, get_typestore
-    except ImportError as error:
-        raise PluginUnavailable(
-            f'reading ROS bags and MCAP files needs rosbags: {error}\n  try: pip install "graspsense[ros]"'
-        ) from error
-    try:
-        if path.suffix == ".mcap":
+    if path.suffix == ".mcap":
+        with readable(path):
+            refuse_devices(path)
             yield from _mcap_messages(path, topics)
-            return
-        from rosbags.highlevel import AnyReader
-
-        with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
-            wanted: list[Connection] = [
-                one for one in reader.connections if not topics or one.topic in topics
-            ]
-            for connection, recorded_ns, raw in reader.messages(connections=wanted):
-                message = reader.deserialize(raw, connection.msgtype)
-                yield connection.topic, _stamp_ns(message) or recorded_ns, message
-    except (DataDamaged, PluginUnavailable):
-        raise
-    except Exception as error:  # rosbags raises various exceptions on damaged files
-        raise DataDamaged(f"{path} cannot be read as a ROS bag: {named(error)}") from error
+        return
+    with opened_bag(path) as bag:
+        yield from bag.messages(lambda topic: not topics or topic in topics)
 
 
 def _mcap_messages(path: Path, topics: Collection[str]) -> Iterator[tuple[str, int, Any]]:
     """Yield the messages of a single MCAP file, which rosbags reads only within the folder of a bag."""
-    from mcap.reader import make_reader
-    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+    try:
+        from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+    except ImportError as error:
+        raise PluginUnavailable(
+            f'reading MCAP files of ROS needs rosbags: {error}\n  try: pip install "graspsense[ros]"'
+        ) from error
 
     store = get_typestore(Stores.EMPTY)
+    definitions = Definitions(path, store.fielddefs)
+    schemas: dict[int, Schema] = {}
+    channels: dict[int, tuple[str, str]] = {}
+    for record in _mcap_records(path):
+        if isinstance(record, Schema):
+            schemas[record.id] = record
+        elif isinstance(record, Channel):
+            schema = schemas.get(record.schema_id)
+            wanted = not topics or record.topic in topics
+            if wanted and schema is not None and (schema.encoding, record.message_encoding) == _READ:
+                if schema.name not in store.fielddefs:
+                    store.register(get_types_from_msg(schema.data.decode(), schema.name))
+                channels[record.id] = record.topic, schema.name
+        elif isinstance(record, Message) and record.channel_id in channels:
+            topic, name = channels[record.channel_id]
+            definitions.check(name, len(record.data))
+            value = store.deserialize_cdr(record.data, name)
+            yield topic, stamp_ns(value) or record.log_time, value
+
+
+def _mcap_records(path: Path) -> Iterator[McapRecord]:
+    unpacked = Unpacked(path)
     with path.open("rb") as file:
-        for schema, channel, message in make_reader(file).iter_messages(topics=list(topics) or None):
-            if schema is None or schema.encoding != "ros2msg" or channel.message_encoding != "cdr":
-                continue
-            if schema.name not in store.fielddefs:
-                store.register(get_types_from_msg(schema.data.decode(), schema.name))
-            value = store.deserialize_cdr(message.data, schema.name)
-            yield channel.topic, _stamp_ns(value) or message.log_time, value
-
-
-def _stamp_ns(message: Any) -> int:
-    stamp = getattr(getattr(message, "header", None), "stamp", None)
-    return stamp.sec * 1_000_000_000 + stamp.nanosec if stamp is not None else 0
+        for record in records_of(file, unpacked):
+            if isinstance(record, Chunk):
+                yield from records_in(record, unpacked)
+            else:
+                yield record
 
 
 def _numbers_in(value: Any, name: str) -> Iterator[tuple[str, Any]]:

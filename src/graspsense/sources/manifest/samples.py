@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from graspsense.core.errors import ConfigError, DataDamaged
+from graspsense.core.errors import ConfigError, DataDamaged, listed
 from graspsense.core.signals import CHANNELS
 from graspsense.sources.grasp_columns import GraspColumns
 from graspsense.sources.manifest.available import AvailableColumns
@@ -108,7 +108,7 @@ def _times(manifest: ReadManifest, table: ColumnTable, found: AvailableColumns) 
         return np.arange(len(table)) / manifest.keys.rate_hz
     if len(table) == 1:
         return np.zeros(1)
-    columns = ", ".join(table.numbers)
+    columns = listed(tuple(table.numbers))
     raise ConfigError(
         f'{manifest.place}: {table.source} has no time: write time = "COLUMN [ms]", or rate_hz = 100 where there is no '
         f"such column. Columns: {columns}"

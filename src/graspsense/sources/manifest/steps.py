@@ -9,6 +9,7 @@ import numpy as np
 from attrs import evolve
 
 from graspsense.core.errors import DataDamaged
+from graspsense.core.limits import SAMPLES
 from graspsense.sources.grasp_columns import GraspColumns, check_increasing
 
 if TYPE_CHECKING:
@@ -100,7 +101,14 @@ def resampled(columns: GraspColumns, rate_hz: float) -> GraspColumns:
     """Return the columns at this rate, interpolated. Raises DataDamaged if the time does not increase."""
     t = columns.t_s
     check_increasing(columns)
-    times = t[0] + np.arange(int((t[-1] - t[0]) * rate_hz + 1e-9) + 1) / rate_hz
+    duration_s = float(t[-1] - t[0])
+    samples = duration_s * rate_hz + 1.0
+    if not samples <= SAMPLES.most:
+        many = int(min(samples, 1e18))
+        raise DataDamaged(
+            f"{columns.source}: {duration_s:g} s at resample_hz = {rate_hz:g} are {SAMPLES.exceeded(many)}"
+        )
+    times = t[0] + np.arange(int(duration_s * rate_hz + 1e-9) + 1) / rate_hz
 
     def along(values: NDArray[np.float64]) -> NDArray[np.float64]:
         if values.ndim == 1:

@@ -17,13 +17,15 @@ import numpy as np
 from attrs import define, field
 
 from graspsense.core.errors import DataDamaged
-from graspsense.sources.csv_columns import is_missing, text_of
+from graspsense.core.limits import CELLS
+from graspsense.sources.csv_columns import check_columns, check_lines, is_missing, text_of
+from graspsense.sources.manifest.patterns import regular_expression
 from graspsense.sources.manifest.table import ColumnTable, Numbers
 
 COMMENTS: Final = ("#", "%")
 _DECIMAL_COMMA: Final = re.compile(r"[-+]?\d*,\d+(?:[eE][-+]?\d+)?")
 _NUMBER: Final = re.compile(
-    r"[-+]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][-+]?\d+)?|[-+]?(?:nan|inf|infinity)", re.IGNORECASE
+    r"[-+]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eE][-+]?\d+)?|[-+]?(?:nan|inf|infinity)", re.IGNORECASE
 )
 
 
@@ -41,7 +43,9 @@ def read_text(path: Path, start: str = "") -> list[ColumnTable]:
     The named groups of `start` become fields of the table that begins there; lines before the first match are left out.
     Raises ConfigError if the file cannot be read, DataDamaged with the line that does not fit.
     """
-    parts = [part for part in _parts(text_of(path), start) if part.lines]
+    text = text_of(path)
+    check_lines(path, text)
+    parts = [part for part in _parts(text, start) if part.lines]
     if not parts:
         what = f"no line of it matches start = {start!r}" if start else "it has no line with columns"
         raise DataDamaged(f"{path} has no recording: {what}")
@@ -50,7 +54,7 @@ def read_text(path: Path, start: str = "") -> list[ColumnTable]:
 
 
 def _parts(text: str, start: str) -> Iterator[_Part]:
-    begins = re.compile(start) if start else None
+    begins = regular_expression(start) if start else None
     part = None if begins else _Part({})
     for number, line in enumerate(text.splitlines(), 1):
         match = begins.search(line) if begins else None
@@ -66,7 +70,7 @@ def _parts(text: str, start: str) -> Iterator[_Part]:
 
 def _table(path: Path, part: _Part, where: str) -> ColumnTable:
     separator = _separator([line for _, line in part.lines[:20]])
-    rows = [_cells(path, number, line, separator) for number, line in part.lines]
+    rows = _rows(path, part, separator)
     numbers = [number for number, _ in part.lines]
     if all(_is_number(cell) or is_missing(cell) for cell in rows[0]):
         names = [f"c{k}" for k in range(1, len(rows[0]) + 1)]
@@ -103,6 +107,15 @@ def _table(path: Path, part: _Part, where: str) -> ColumnTable:
     )
 
 
+def _rows(path: Path, part: _Part, separator: str) -> list[list[str]]:
+    """Return the cells of each line. Raises DataDamaged for too many of them."""
+    first = _cells(path, *part.lines[0], separator)
+    check_columns(path, first)
+    if too_many := CELLS.exceeded(len(part.lines) * len(first)):
+        raise DataDamaged(f"{path}: {too_many}")
+    return [first, *(_cells(path, number, line, separator) for number, line in part.lines[1:])]
+
+
 def _separator(lines: Sequence[str]) -> str:
     """Return the separator of these lines: a semicolon, a tab, a comma, or a space for any number of spaces."""
     for separator in ";\t":
@@ -131,14 +144,16 @@ def _cells(path: Path, number: int, line: str, separator: str) -> list[str]:
 
 def _names(cells: Sequence[str]) -> list[str]:
     """Return a name for each column: a second one of the same name gets `.1` behind it, as pandas writes it."""
-    names: list[str] = []
+    names: dict[str, None] = {}
+    repeats: dict[str, int] = {}
     for k, cell in enumerate(cells):
         name = cell or ("index" if k == 0 else f"c{k + 1}")
-        again = 0
+        again = repeats.get(name, 0)
         while (name if not again else f"{name}.{again}") in names:
             again += 1
-        names.append(f"{name}.{again}" if again else name)
-    return names
+        repeats[name] = again
+        names[f"{name}.{again}" if again else name] = None
+    return list(names)
 
 
 def _numbers(cells: Sequence[str]) -> Numbers | None:

@@ -36,6 +36,8 @@ from graspsense_sim_gripper.objects.spec import (
 
 CONTAINERS: Final = ("odwalla", "naked", "can", "water")
 """The containers of Chitta, Piccoli and Sturm (ICRA 2010), section III.E: trials are simulated with them by default."""
+LONGEST_SCENE: Final = 2**18
+"""Limit on the characters of a scene file; those that are shipped have some thousand."""
 SCENE_IN_MEMORY: Final = "scene in memory"
 """The name of an object that is given by the text of its scene."""
 FITTED_RESULTS: Final = frozenset(("table_2", "table_3", "authors_tree", "section_3f", "fig_6_contact"))
@@ -161,13 +163,16 @@ def kinds_in(scene: str) -> tuple[str, ...]:
 
 def _read_scene(path: Path) -> ObjectSpec:
     try:
-        text = path.read_text(encoding="utf-8")
+        with path.open(encoding="utf-8") as file:
+            text = file.read(LONGEST_SCENE + 1)
     except FileNotFoundError:
         raise ConfigError(f"no scene file {str(path)!r} (looked in {Path.cwd()})") from None
     except UnicodeDecodeError as error:
         raise ConfigError(f"{path}: is not UTF-8 text ({error})") from error
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read: {error.strerror}") from error
+    if len(text) > LONGEST_SCENE:
+        raise ConfigError(f"{path}: a scene has at most {LONGEST_SCENE} characters, and this has more")
     return parse_scene(text, path.stem, str(path))
 
 

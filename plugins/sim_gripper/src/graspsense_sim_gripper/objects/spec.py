@@ -6,7 +6,6 @@ An unknown key or a number out of range is an error that names the file or objec
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Callable, Mapping
 from functools import cached_property, lru_cache
 from typing import Any, Final, NamedTuple
@@ -14,7 +13,7 @@ from typing import Any, Final, NamedTuple
 from attrs import field, fields_dict, frozen
 from attrs.validators import ge, gt, in_, le
 
-from graspsense.plugin_api import ConfigError, UnknownName, gives, suggestion
+from graspsense.plugin_api import ConfigError, TomlError, UnknownName, gives, suggestion, toml_values
 from graspsense_sim_gripper.objects.identified import check_identified
 from graspsense_sim_gripper.terms.registry import find_term, in_order
 from graspsense_sim_gripper.terms.term import not_dented
@@ -193,9 +192,11 @@ def parse_scene(text: str, name: str, where: str) -> ObjectSpec:
     Raises ConfigError that lists all problems of the file.
     """
     try:
-        table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise ConfigError(f"{where}: is not valid TOML: {error}") from error
+        table = toml_values(text)
+    except TomlError as error:
+        line = f" in line {error.line}" if error.line else ""
+        why = str(error).removeprefix("not TOML: ")
+        raise ConfigError(f"{where}: is not valid TOML{line}: {why}") from error
     problems: list[str] = []
     values = {"name": name, "file": where, **_scene_values(table, problems)}
     terms = _scene_terms(table.get("terms", []), problems)

@@ -9,9 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import sys
-import tempfile
 import threading
 from collections import OrderedDict
 from contextlib import suppress
@@ -22,7 +20,15 @@ from typing import Any, Final, NamedTuple
 from attrs import asdict
 
 import graspsense.plugin_api as plugin_api
-from graspsense.plugin_api import FeatureSet, NotCompilable, cache_folder, fingerprint
+from graspsense.plugin_api import (
+    FeatureSet,
+    NotCompilable,
+    cache_folder,
+    fingerprint,
+    is_closed,
+    make_closed,
+    write_whole,
+)
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.problem import ControllerStep, GraspController, Problem
 from graspsense_sim_gripper.reduction.levels import Level
@@ -33,6 +39,7 @@ from graspsense_sim_gripper.terms.term import OnSum, WorkingPoint
 
 MAX_IN_MEMORY: Final = 512
 """Models in memory, of some 5 kB each; the least recently used is dropped first."""
+_CONTENT: Final = "files with choices of models"
 MAX_FILES: Final = 4000
 """Files on disk, of some 2 kB each; at that number the older half is deleted."""
 
@@ -160,9 +167,13 @@ def _stamp(source: Path) -> str:
 
 def _read(name: str) -> Reduction | None:
     folder = _folder()
-    if folder is not None:
-        with suppress(OSError, ValueError, TypeError, KeyError):
-            return restored(json.loads((folder / name).read_text(encoding="utf-8")))
+    if folder is None or not (folder / name).is_file() or not is_closed(folder / name, _CONTENT):
+        return None
+    with suppress(OSError, ValueError, TypeError, KeyError):
+        kept = json.loads((folder / name).read_text(encoding="utf-8"))
+        # A choice that was edited would change what is simulated, and nothing else would tell.
+        if kept["sha256"] == _digest(kept["model"]):
+            return restored(kept["model"])
     return None
 
 
@@ -172,22 +183,27 @@ def _write(name: str, model: Reduction) -> None:
     if folder is None:
         return
     with suppress(OSError):
-        folder.mkdir(parents=True, exist_ok=True)
         _delete_old_files(folder)
-        # A rename is atomic: another process that reads or writes the same file never sees half of it.
-        with tempfile.NamedTemporaryFile("w", dir=folder, suffix=".part", delete=False) as part:
-            try:
-                json.dump(stored(model), part)
-                part.close()
-                os.replace(part.name, folder / name)
-            except BaseException:
-                os.unlink(part.name)
-                raise
+        values = json.loads(json.dumps(stored(model)))
+        content = json.dumps({"model": values, "sha256": _digest(values)})
+        write_whole(folder / name, content.encode(), mode=0o600)
+
+
+def _digest(values: Json) -> str:
+    return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()
 
 
 def _folder() -> Path | None:
+    """Return the folder for models, or None where there is none that is closed to other users."""
     parent = cache_folder()
-    return None if parent is None else parent / "reductions"
+    if parent is None:
+        return None
+    folder = parent / "reductions"
+    try:
+        make_closed(folder)
+    except OSError:
+        return None
+    return folder if is_closed(folder, _CONTENT) else None
 
 
 def _delete_old_files(folder: Path) -> None:

@@ -1,0 +1,109 @@
+"""Writing a file completely or not at all, whatever other programs write to the same name or to its folder.
+
+The data goes to a new file `NAME.<16 hexadecimal digits>.part` in the same folder, which takes the name when it is
+complete and on the disk. Its writer holds a lock on it: one without a lock was left by a program that was killed, and
+is deleted when the next file is written to that folder.
+"""
+
+from __future__ import annotations
+
+import errno
+import fcntl
+import os
+import re
+import secrets
+import stat
+from contextlib import suppress
+from pathlib import Path
+from typing import Final
+
+_LEFTOVER: Final = re.compile(r".+\.[0-9a-f]{16}\.part")
+_SWEPT: Final[set[str]] = set()
+"""Folders in which this process has deleted what killed programs left: once is enough."""
+
+
+def write_whole(path: Path, data: bytes, *, replace: bool = True, mode: int = 0o666) -> None:
+    """Write a file; when this returns, the data and the name are on the disk.
+
+    `mode` is that of a new file, less the user's mask. Raises FileExistsError if `replace` is false and the file
+    exists, and OSError, also if `path` is something else than a file, such as a device.
+    """
+    with suppress(FileNotFoundError):
+        if not stat.S_ISREG(path.stat().st_mode):
+            raise OSError(errno.EINVAL, "it is not a regular file", str(path))
+    _delete_leftovers(path.parent)
+    part, fd = _new_part(path, mode)
+    try:
+        with os.fdopen(fd, "wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+            # Named before it is closed, which ends the lock.
+            if replace:
+                os.replace(part, path)
+            else:
+                _link(part, path)
+    except BaseException:
+        part.unlink(missing_ok=True)
+        raise
+    sync_folder(path.parent)
+
+
+def sync_folder(folder: Path) -> None:
+    """Wait until the disk has the folder's entries, so that a new name survives a loss of power. Raises OSError."""
+    fd = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(fd)
+    finally:
+        os.close(fd)
+
+
+def _new_part(path: Path, mode: int) -> tuple[Path, int]:
+    """Return a new, locked file in the folder of `path`, which no other program writes to."""
+    while True:
+        part = path.with_name(f"{path.name}.{secrets.token_hex(8)}.part")
+        # Exclusive: a link or a pipe of this name, planted by somebody, is an error and is not followed.
+        fd = os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC | os.O_NOFOLLOW, mode)
+        with suppress(OSError):  # some network disks have no locks
+            fcntl.flock(fd, fcntl.LOCK_EX)
+        if os.fstat(fd).st_nlink:
+            return part, fd
+        os.close(fd)  # another program took it for a leftover before it was locked
+
+
+def _link(part: Path, path: Path) -> None:
+    """Give the file its name if the name is free. Raises FileExistsError."""
+    try:
+        os.link(part, path)
+    except FileExistsError:
+        raise
+    except OSError:
+        # Some disks have no hard links.
+        if path.exists():
+            raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(path)) from None
+        os.replace(part, path)
+        return
+    part.unlink()
+
+
+def _delete_leftovers(folder: Path) -> None:
+    """Delete the unfinished files of killed programs in a folder, once in this process."""
+    key = os.path.abspath(folder)
+    if key in _SWEPT:
+        return
+    _SWEPT.add(key)
+    with suppress(OSError):
+        for entry in os.scandir(folder):
+            if _LEFTOVER.fullmatch(entry.name):
+                _delete_leftover(Path(entry.path))
+
+
+def _delete_leftover(path: Path) -> None:
+    with suppress(OSError):
+        fd = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
+        try:
+            if stat.S_ISREG(os.fstat(fd).st_mode):
+                fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                path.unlink()
+        finally:
+            os.close(fd)

@@ -1,0 +1,113 @@
+"""The limit on what a file may unpack to, and unpacking that ends there.
+
+A small file can unpack to many gigabytes. What it says of its size is compared with the limit before anything is
+unpacked, and what really comes out is counted, because a file can say anything.
+"""
+
+from __future__ import annotations
+
+import bz2
+import os
+import zlib
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any, Final
+
+import lz4.frame
+import zstandard
+from attrs import define, field
+
+from graspsense.core.errors import ConfigError, TooLarge
+
+LIMIT_VARIABLE: Final = "GRASPSENSE_MAX_UNPACKED_MB"
+"""If this environment variable is set, it is the limit in megabytes."""
+DEFAULT_LIMIT_MB: Final = 512
+"""An hour of a gripper at 1 kHz, or 60 million numbers of another program."""
+_MB: Final = 1_000_000
+_PIECE: Final = 1 << 20
+
+
+def limit_mb() -> int:
+    """Return the limit on what a file may unpack to, in megabytes. Raises ConfigError."""
+    given = os.environ.get(LIMIT_VARIABLE, "").strip()
+    if not given:
+        return DEFAULT_LIMIT_MB
+    if not given.isdecimal() or not 0 < len(given) < 10 or int(given) == 0:
+        raise ConfigError(f"{LIMIT_VARIABLE} is {given[:20]!r}: give a number of megabytes, such as 4000")
+    return int(given)
+
+
+def limit_words() -> str:
+    """Return the limit, and how it is raised, in words."""
+    return f"the limit is {limit_mb()} MB. If you trust the file, raise it: {LIMIT_VARIABLE}=MEGABYTES"
+
+
+@define
+class Unpacked:
+    """What has been unpacked of one file, in bytes. Raises TooLarge when that passes the limit."""
+
+    source: str | Path
+    allowance: int = 0
+    """Bytes beside the limit, such as those of the file itself."""
+    total: int = field(default=0, init=False)
+    _limit: int = field(factory=lambda: limit_mb() * _MB, init=False)
+
+    def expect(self, size: int) -> None:
+        """Raise TooLarge if so many bytes more would pass the limit."""
+        if self.total + size > self._limit + self.allowance:
+            found = f"{(self.total + size) / _MB:,.0f} MB".replace(",", " ")
+            raise TooLarge(f"{self.source} unpacks to {found} or more; {limit_words()}")
+
+    def add(self, size: int) -> None:
+        """Count so many bytes. Raises TooLarge."""
+        self.expect(size)
+        self.total += size
+
+    def unpack(self, compression: str, data: bytes) -> bytes:
+        """Return what compressed data holds; `compression` is `zstd`, `lz4`, `bz2` or empty.
+
+        Raises TooLarge, ValueError, and what the library raises on damaged data.
+        """
+        if compression == "":
+            return data
+        if compression not in _PIECES:
+            raise ValueError(f"the compression {compression[:20]!r} is not supported")
+        parts = []
+        for part in _PIECES[compression](data):
+            self.add(len(part))
+            parts.append(part)
+        return b"".join(parts)
+
+    def count_zlib(self, data: bytes) -> None:
+        """Count what zlib makes of this, without keeping it. Raises TooLarge, zlib.error."""
+        stream = zlib.decompressobj()
+        while data and not stream.eof:
+            self.add(len(stream.decompress(data, _PIECE)))
+            data = stream.unconsumed_tail
+
+
+def _pieces_of(decompressor: Any, data: bytes) -> Iterator[bytes]:
+    """Yield what a decompressor of the kind of the module bz2 makes of the data."""
+    while not decompressor.eof:
+        part = decompressor.decompress(data, _PIECE)
+        if not part and not data and decompressor.needs_input:
+            raise ValueError("the compressed data ends early")
+        data = b""
+        yield part
+
+
+def _pieces_of_zstd(data: bytes) -> Iterator[bytes]:
+    size, done = zstandard.frame_content_size(data), 0
+    with zstandard.ZstdDecompressor().stream_reader(data) as stream:
+        while part := stream.read(_PIECE):
+            done += len(part)
+            yield part
+    if size >= 0 and done != size:
+        raise ValueError(f"the compressed data ends after {done} of {size} bytes")
+
+
+_PIECES: Final[Mapping[str, Callable[[bytes], Iterator[bytes]]]] = {
+    "zstd": _pieces_of_zstd,
+    "lz4": lambda data: _pieces_of(lz4.frame.LZ4FrameDecompressor(), data),
+    "bz2": lambda data: _pieces_of(bz2.BZ2Decompressor(), data),
+}

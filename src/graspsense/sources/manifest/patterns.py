@@ -1,0 +1,202 @@
+"""Patterns that a manifest gives: regular expressions, wildcards of column names, and templates of file names.
+
+All of them run in RE2, whose time grows in proportion to the text that is searched, whatever the pattern. Python's own
+`re` can need years for a short one. RE2 has no backreferences and no lookaround, so a pattern with one is refused.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from typing import Final, Protocol
+
+import re2
+from attrs import frozen
+
+LONGEST_PATTERN: Final = 1000
+"""Limit on the characters of a pattern."""
+LONGEST_PATH: Final = 500
+"""Limit on the characters of a path for a template that names a field twice."""
+MOST_TRIES: Final = 1000
+"""Limit on the values that are tried for a field that a template names twice."""
+
+_TEMPLATE: Final = re.compile(r"\{(?P<name>\w+)(?P<digits>:d)?\}|(?P<deep>\*\*/)|(?P<any>\*)|(?P<single>\?)")
+_UNSUPPORTED: Final = re.compile(r"\\[1-9]|\(\?P=|\(\?<?[=!]|\(\?>|[*+?}]\+")
+
+
+class PatternError(ValueError):
+    """A pattern that cannot be used, with the reason."""
+
+
+class Match(Protocol):
+    """Where a pattern matches a text, as of `re.Match`."""
+
+    def groupdict(self, default: str | None = None) -> dict[str, str]:
+        """Return the text of each named group."""
+        ...
+
+
+class RegularExpression(Protocol):
+    """A compiled regular expression, as of `re.Pattern`."""
+
+    def search(self, text: str) -> Match | None:
+        """Return the first match anywhere in a text."""
+        ...
+
+    def fullmatch(self, text: str) -> Match | None:
+        """Return the match of a whole text."""
+        ...
+
+
+def regular_expression(text: str) -> RegularExpression:
+    r"""Return the compiled regular expression. Raises PatternError that says why it cannot be used.
+
+    >>> regular_expression(r"begin (?P<label>\w+)").search("begin jar").groupdict()
+    {'label': 'jar'}
+    """
+    _check_length(text)
+    return _compiled(text)
+
+
+def _check_length(text: str) -> None:
+    if len(text) > LONGEST_PATTERN:
+        raise PatternError(f"a pattern has at most {LONGEST_PATTERN} characters, and this has {len(text)}")
+
+
+def _compiled(text: str) -> RegularExpression:
+    try:
+        compiled: RegularExpression = re2.compile(text, _options())
+    except (re2.error, UnicodeEncodeError) as error:
+        said = error.args[0] if error.args else ""
+        words = said.decode(errors="replace") if isinstance(said, bytes) else str(error)
+        if _UNSUPPORTED.search(text):
+            words += (
+                ". Backreferences, lookaround, atomic groups and possessive quantifiers are not supported, because "
+                "patterns are matched in a time in proportion to the text (by RE2)"
+            )
+        raise PatternError(f"{text!r} is not a regular expression that can be used: {words}") from None
+    return compiled
+
+
+def wildcard(text: str) -> RegularExpression:
+    """Return the pattern of names in which `*` stands for any text, `?` for any character and `[ab]` for a choice.
+
+    Raises PatternError.
+    """
+    _check_length(text)
+    parts = []
+    position = 0
+    while position < len(text):
+        sign = text[position]
+        closing = text.find("]", position + 2) if sign == "[" else -1
+        if closing > 0:
+            inside = text[position + 1 : closing]
+            negated = inside.startswith("!")
+            parts.append(f"[{'^' * negated}{_escaped_choice(inside[negated:])}]")
+            position = closing
+        else:
+            parts.append({"*": ".*", "?": "."}.get(sign) or re2.escape(sign))
+        position += 1
+    return _compiled(f"(?s:{''.join(parts)})")
+
+
+@frozen
+class FileTemplate:
+    """A pattern of paths such as `{label}/**/{label}_{order:d}.csv`, whose fields are read from a path."""
+
+    text: str
+    pieces: tuple[tuple[str, str], ...]
+    """The regular expression of each piece, with the name of its field, empty if it is none."""
+    whole: RegularExpression
+    """The pieces in a row, in which a field that is named again may have any value."""
+
+    def fields(self, path: str) -> dict[str, str] | None:
+        """Return the fields of a path, None if the path does not match. Raises PatternError for too many tries."""
+        readable = path.encode("utf-8", "replace").decode()
+        match = self.whole.fullmatch(readable)
+        if match is None:
+            return None
+        names = self._names()
+        if len(set(names)) == len(names):
+            return {name: match.groupdict()[name] for name in names}
+        if len(readable) > LONGEST_PATH:
+            raise PatternError(
+                f"{self.text!r} names a field twice: a path has at most {LONGEST_PATH} characters then, and "
+                f"{path[:80]!r}... has {len(path)}"
+            )
+        return self._solved(readable, {}, [MOST_TRIES])
+
+    def _solved(self, path: str, known: Mapping[str, str], tries: list[int]) -> dict[str, str] | None:
+        """Return the fields if those in `known` have these values; `tries` holds how many are left."""
+        tries[0] -= 1
+        if tries[0] < 0:
+            raise PatternError(f"{self.text!r} names a field twice, and {path[:80]!r} fits in too many ways")
+        match = _compiled(_joined(self.pieces, known)).fullmatch(path)
+        if match is None:
+            return None
+        found = match.groupdict()
+        names = self._names()
+        open_name = next((name for name in names if names.count(name) > 1 and name not in known), None)
+        if open_name is None:
+            return {name: known[name] if name in known else found[name] for name in dict.fromkeys(names)}
+        for value in (found[open_name], *_repeated(path, names.count(open_name))):
+            solved = self._solved(path, {**known, open_name: value}, tries)
+            if solved is not None:
+                return solved
+        return None
+
+    def _names(self) -> list[str]:
+        return [name for name, _ in self.pieces if name]
+
+
+def file_template(text: str) -> FileTemplate:
+    """Return the template: `*` any text in a name, `**/` any folders, `{name}` any text, `{name:d}` digits.
+
+    Raises PatternError.
+    """
+    _check_length(text)
+    pieces, end = [], 0
+    for match in _TEMPLATE.finditer(text):
+        pieces.append(("", re2.escape(text[end : match.start()])))
+        end = match.end()
+        if match["name"]:
+            pieces.append((match["name"], "[0-9]+" if match["digits"] else "[^/]+"))
+        else:
+            pieces.append(("", "(?:.+/)?" if match["deep"] else "[^/]*" if match["any"] else "[^/]"))
+    pieces.append(("", re2.escape(text[end:])))
+    return FileTemplate(text, tuple(pieces), _compiled(_joined(pieces, {})))
+
+
+def _options() -> re2.Options:
+    options = re2.Options()
+    options.log_errors = False
+    return options
+
+
+def _escaped_choice(signs: str) -> str:
+    return re.sub(r"([\\\]\[^])", r"\\\1", signs)
+
+
+def _joined(pieces: list[tuple[str, str]] | tuple[tuple[str, str], ...], known: Mapping[str, str]) -> str:
+    """Return one regular expression; a field of `known` stands as its value, and others as named groups, each once."""
+    parts, named = [], set()
+    for name, piece in pieces:
+        if name in known:
+            parts.append(re2.escape(known[name]))
+        elif name and name not in named:
+            named.add(name)
+            parts.append(f"(?P<{name}>{piece})")
+        else:
+            parts.append(piece)
+    return "(?s:" + "".join(parts) + ")"
+
+
+def _repeated(path: str, times: int) -> Iterator[str]:
+    """Yield each text without a slash that occurs so often in a path, the longest first."""
+    for length in range(len(path) // times, 0, -1):
+        seen = set()
+        for start in range(len(path) - length + 1):
+            text = path[start : start + length]
+            if "/" not in text and text not in seen and path.count(text) >= times:
+                seen.add(text)
+                yield text

@@ -1,0 +1,95 @@
+"""NPY and NPZ files, read within the limit on what a file may unpack to.
+
+A file states the shape of each array, and an archive the size of each member. Both are compared with the bytes that are
+there before anything is allocated. Arrays of Python objects are never loaded, because that would run code in them.
+"""
+
+from __future__ import annotations
+
+import math
+import zipfile
+from pathlib import Path
+from typing import IO, TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.lib import format as npy
+
+from graspsense.core.errors import DataDamaged
+from graspsense.recording.readable import readable, refuse_devices
+from graspsense.recording.unpacked import Unpacked
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+_COMPRESSIONS: Final = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
+"""Those that NumPy writes. Others allocate what the file asks for."""
+_MEMBER: Final = ".npy"
+_END_BYTES: Final = 66_000
+"""The largest end of an archive."""
+_PIECE: Final = 1 << 20
+
+
+def npy_array(path: Path) -> NDArray[Any]:
+    """Return the array in an NPY file. Raises ConfigError, TooLarge, DataDamaged."""
+    with readable(path):
+        refuse_devices(path)
+        with path.open("rb") as file:
+            return _array(file, path.stat().st_size, str(path), Unpacked(path))
+
+
+def npz_arrays(path: Path) -> dict[str, NDArray[Any]]:
+    """Return the arrays in an NPZ file by their names. Raises ConfigError, TooLarge, DataDamaged."""
+    unpacked = Unpacked(path)
+    with readable(path):
+        refuse_devices(path)
+        with path.open("rb") as opened:
+            opened.seek(max(0, path.stat().st_size - _END_BYTES))
+            opened.read(_END_BYTES)  # an error of the disk there would be told as a damaged archive
+            archive = zipfile.ZipFile(opened)
+            members = [one for one in archive.infolist() if one.filename.endswith(_MEMBER)]
+            unpacked.expect(sum(one.file_size for one in members))
+            arrays = {}
+            for member in members:
+                if member.compress_type not in _COMPRESSIONS:
+                    raise DataDamaged(
+                        f"{path}: {member.filename} has a compression that NumPy does not write"
+                    )
+                name = member.filename.removesuffix(_MEMBER)
+                with archive.open(member) as file:
+                    arrays[name] = _array(file, member.file_size, f"{path}: {name}", unpacked)
+            return arrays
+
+
+def _array(file: IO[bytes], size: int, source: str, unpacked: Unpacked) -> NDArray[Any]:
+    """Return the array in a file of so many bytes, or in a member of an archive."""
+    version = npy.read_magic(file)
+    if version == (1, 0):
+        shape, fortran, dtype = npy.read_array_header_1_0(file)
+    elif version in ((2, 0), (3, 0)):
+        # Version 3 differs in the encoding of the names of fields only, and numbers have none.
+        shape, fortran, dtype = npy.read_array_header_2_0(file)
+    else:
+        raise DataDamaged(f"{source} has version {version} of the NPY format, which is not known")
+    if dtype.hasobject:
+        raise DataDamaged(
+            f"{source} is not an array of numbers. Python objects in it are not loaded, because that can run any code: "
+            "save plain arrays of numbers"
+        )
+    unpacked.expect(size)
+    if dtype.itemsize == 0 or any(length < 0 for length in shape) or (0 in shape and max(shape) > size):
+        raise DataDamaged(
+            f"{source} has the shape {shape} of values of {dtype.itemsize} bytes, which cannot be"
+        )
+    expected, there = math.prod(shape) * dtype.itemsize, size - file.tell()
+    if expected != there:
+        raise DataDamaged(f"{source} has {there} bytes of numbers, but its shape {shape} has {expected}")
+    unpacked.add(expected)
+    data = np.empty(expected, dtype=np.uint8)
+    done = 0
+    while done < expected:
+        read = file.readinto(data[done : done + _PIECE])  # type: ignore[attr-defined]
+        if not read:
+            raise DataDamaged(f"{source} ends after {done} of {expected} bytes")
+        done += read
+    values: NDArray[Any] = data.view(dtype).reshape(shape, order="F" if fortran else "C")
+    return values

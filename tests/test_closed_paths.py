@@ -1,0 +1,330 @@
+"""What another user could have changed is not loaded. What a run starts is reached from this machine alone."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import textwrap
+from pathlib import Path
+
+import pytest
+
+from graspsense.core import closed_paths
+from graspsense.core.calibration_files import (
+    Calibration,
+    calibration_path,
+    calibrations_of,
+    write_calibration,
+)
+from graspsense.core.closed_paths import is_closed, make_closed, why_open
+from graspsense.core.errors import ConfigError
+
+STRANGER = 4711
+"""The number of a user whom nobody is."""
+IS_ROOT = os.geteuid() == 0
+needs_root = pytest.mark.skipif(
+    not IS_ROOT, reason="only root can act as a second user; test_a_path_is_open_* have a variant for others"
+)
+
+
+@pytest.fixture
+def to_stranger(monkeypatch):
+    """Return a function that makes a path another user's: really for root, and else by the eyes of another user."""
+
+    def give(path):
+        if IS_ROOT:
+            os.lchown(path, STRANGER, STRANGER)
+        else:
+            monkeypatch.setattr(closed_paths.os, "geteuid", lambda: STRANGER)
+
+    return give
+
+
+@pytest.fixture
+def file(tmp_path):
+    path = tmp_path / "cache" / "below" / "file"
+    path.parent.mkdir(parents=True, mode=0o755)
+    path.write_text("x")
+    path.chmod(0o644)
+    return path
+
+
+def test_a_path_of_the_users_own_is_closed(file):
+    assert why_open(file) == why_open(file.parent) == ""
+    assert why_open(file.with_name("missing")) == why_open(file.parent / "no" / "folder") == ""
+    assert why_open(Path("/usr/bin")) == ""
+
+
+@pytest.mark.parametrize("place", [".", "..", "../.."])
+def test_a_path_is_open_if_another_user_owns_it_or_a_folder_above(file, to_stranger, place):
+    changed = (file / place).resolve() if place != "." else file
+    to_stranger(changed)
+    assert f"belongs to user {STRANGER if IS_ROOT else os.getuid()}" in why_open(file)
+
+
+@pytest.mark.parametrize("place", [".", "..", "../.."])
+@pytest.mark.parametrize("mode", [0o777, 0o757, 0o702])
+def test_a_path_is_open_if_others_may_write_to_it_or_to_a_folder_above(file, place, mode):
+    changed = (file / place).resolve() if place != "." else file
+    changed.chmod(mode)
+    assert f"mode {mode:o}" in why_open(file)
+    assert str(changed) in why_open(file)
+
+
+def test_a_folder_with_the_sticky_bit_protects_what_is_in_it(file):
+    file.parent.chmod(0o1777)
+    assert why_open(file) == ""
+    file.chmod(0o1666)  # on a file the bit protects nothing
+    assert why_open(file)
+
+
+@pytest.mark.parametrize("members", [["ada"], [], ["ada", "bob"], ["bob"]])
+@pytest.mark.parametrize("name", ["ada", "users"])
+def test_a_folder_that_its_group_may_write_to_is_closed_if_the_group_is_the_users_alone(
+    file, monkeypatch, members, name
+):
+    import grp
+    import pwd
+
+    monkeypatch.setattr(grp, "getgrgid", lambda gid: grp.struct_group((name, "x", gid, members)))
+    monkeypatch.setattr(
+        pwd, "getpwuid", lambda uid: pwd.struct_passwd(("ada", "x", uid, 1000, "", "/home/ada", "/bin/sh"))
+    )
+    file.parent.chmod(0o775)
+    assert (why_open(file) == "") == (name == "ada" and "bob" not in members)
+
+
+def test_links_are_followed_and_their_places_count(file, tmp_path, to_stranger):
+    link = tmp_path / "link"
+    link.symlink_to(file.parent)
+    assert why_open(link / "file") == ""
+    file.parent.chmod(0o777)
+    assert why_open(link / "file")
+    file.parent.chmod(0o755)
+    to_stranger(link)
+    assert why_open(link / "file")
+
+
+def test_links_in_a_circle_are_open(tmp_path):
+    (tmp_path / "a").symlink_to(tmp_path / "b")
+    (tmp_path / "b").symlink_to(tmp_path / "a")
+    assert why_open(tmp_path / "a" / "file")
+
+
+def test_folders_are_made_closed_whatever_the_mask_of_the_user_is(tmp_path):
+    mask = os.umask(0)
+    try:
+        make_closed(tmp_path / "a" / "b" / "c")
+    finally:
+        os.umask(mask)
+    assert why_open(tmp_path / "a" / "b" / "c") == ""
+
+
+def test_there_is_one_warning_for_each_reason(file):
+    file.chmod(0o666)
+    with pytest.warns(UserWarning, match="things in .* are not used: .*mode 666") as told:
+        assert [is_closed(file, "things") for _ in range(3)] == [False] * 3
+    assert len(told) == 1
+
+
+CALIBRATION = Calibration(
+    kind="tare",
+    serial="L7",
+    device={},
+    made="2026-11-01T10:00:00+00:00",
+    data={"left": [1.0], "right": [1.0]},
+)
+
+
+@pytest.mark.parametrize("change", ["file", "folder", "owner"])
+@pytest.mark.parametrize("named", [True, False])
+def test_a_calibration_that_another_user_could_have_changed_is_refused(
+    tmp_path, monkeypatch, to_stranger, change, named
+):
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
+    folder = str(tmp_path / "lab") if named else ""
+    path = calibration_path(folder, "L7", "tare")
+    mask = os.umask(0)
+    try:
+        write_calibration(path, CALIBRATION)
+    finally:
+        os.umask(mask)
+    assert list(calibrations_of(folder, "L7", {})) == ["tare"]
+    if change == "owner":
+        to_stranger(path)
+    else:
+        (path if change == "file" else path.parent).chmod(0o777)
+    with pytest.raises(ConfigError) as raised:
+        calibrations_of(folder, "L7", {})
+    assert str(path) in str(raised.value)
+    assert "gripper.calibration=none" in str(raised.value)
+    assert calibrations_of("none", "L7", {}) == {}
+
+
+PROGRAM = """
+    import os
+    os.umask(int(os.environ["MASK"], 8))
+    from graspsense.plugin_api import compile_function, is_on_disk
+
+    def law(x):
+        return 2.0 * x
+
+    kept = is_on_disk(law)
+    compiled = compile_function(law)
+    print(compiled(21.0), kept, sum(compiled.stats.cache_hits.values()))
+"""
+
+
+class Lab:
+    """A program that compiles a function, the folders of its user, and a file that hostile code writes."""
+
+    def __init__(self, folder):
+        self.folder, self.mark = folder, folder / "hostile code ran"
+        self.program = folder / "own" / "law.py"
+        self.program.parent.mkdir()
+        self.program.write_text(textwrap.dedent(PROGRAM))
+
+    def run(self, mask="022", cwd=None, **environ):
+        done = subprocess.run(
+            [sys.executable, "-P", str(self.program)],
+            env={**os.environ, "XDG_CACHE_HOME": str(self.folder / "mine"), "MASK": mask, **environ},
+            cwd=cwd or self.program.parent,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.returncode == 0, done.stderr
+        return done.stdout.strip(), done.stderr
+
+    def poison(self, cache):
+        """Put code in place of the index of each compiled function, which numba reads with pickle."""
+        payload = f"cposix\nsystem\n(S'touch \"{self.mark}\"'\ntR.".encode()
+        files = list(cache.rglob("*.nbi"))
+        assert files
+        for path in files:
+            path.write_bytes(payload)
+
+
+@pytest.fixture
+def lab(tmp_path):
+    pytest.importorskip("numba", reason="numba is not installed")
+    return Lab(tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("variable", ["NUMBA_CACHE_DIR", "XDG_CACHE_HOME"])
+def test_compiled_code_of_the_users_own_is_used_whatever_the_mask(lab, variable):
+    environ = {variable: str(lab.folder / "cache")}
+    assert lab.run("000", **environ) == ("42.0 False 0", "")
+    assert lab.run("000", **environ) == ("42.0 True 1", "")
+    # The trap of the other tests is a trap: code in the user's own cache runs.
+    lab.poison(lab.folder / "cache")
+    lab.run(**environ)
+    assert lab.mark.exists()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("variable", ["NUMBA_CACHE_DIR", "XDG_CACHE_HOME"])
+@pytest.mark.parametrize("change", ["top", "sources", "files", "owner of a file", "owner of all"])
+def test_compiled_code_that_another_user_could_have_put_there_is_not_run(lab, variable, change):
+    if change.startswith("owner") and not IS_ROOT:
+        pytest.skip("only root can give a file away; the variants with modes run for everybody")
+    cache = lab.folder / "cache"
+    environ = {variable: str(cache)}
+    lab.run(**environ)
+    lab.poison(cache)
+    (index,) = cache.rglob("*.nbi")
+    changed = {"top": [cache], "sources": [index.parent], "files": [index], "owner of a file": [index]}
+    for path in changed.get(change, [cache, *cache.rglob("*")]):
+        if change.startswith("owner"):
+            os.chown(path, STRANGER, STRANGER)
+        else:
+            path.chmod(0o777)
+    printed, warned = lab.run(**environ)
+    assert printed == "42.0 False 0"
+    assert "compiled code" in warned
+    assert "not used" in warned
+    assert not lab.mark.exists()
+
+
+@pytest.mark.slow
+def test_without_a_closed_cache_of_numba_the_users_own_is_used(lab):
+    shared = lab.folder / "shared"
+    shared.mkdir()
+    shared.chmod(0o777)
+    assert lab.run(NUMBA_CACHE_DIR=str(shared))[0] == "42.0 False 0"
+    assert lab.run(NUMBA_CACHE_DIR=str(shared))[0] == "42.0 True 1"
+    assert list(shared.rglob("*")) == []
+
+
+@pytest.mark.slow
+@needs_root
+def test_what_a_second_user_planted_in_a_shared_folder_is_not_run(lab):
+    """A real second user, who makes the folder of the cache in a folder like /tmp before anybody else."""
+    shared = Path(tempfile.mkdtemp(prefix="graspsense-shared-"))
+    try:
+        shared.chmod(0o1777)
+        lab.run(XDG_CACHE_HOME=str(lab.folder / "cache"))
+        lab.poison(lab.folder / "cache")
+        (index,) = (lab.folder / "cache").rglob("*.nbi")
+        below = index.relative_to(lab.folder / "cache")
+        planted = shared / "cache" / below
+        script = f"umask 000; mkdir -p '{planted.parent}' && cat > '{planted}'"
+        subprocess.run(
+            ["sh", "-c", script], user=STRANGER, group=STRANGER, input=index.read_bytes(), check=True
+        )
+        assert planted.stat().st_uid == STRANGER
+        printed, warned = lab.run(XDG_CACHE_HOME=str(shared / "cache"))
+        assert printed == "42.0 False 0"
+        assert f"belongs to user {STRANGER}" in warned
+        assert not lab.mark.exists()
+    finally:
+        shutil.rmtree(shared)
+
+
+@pytest.mark.slow
+def test_a_file_of_the_current_folder_does_not_choose_where_compiled_code_is(lab):
+    data = lab.folder / "data"
+    data.mkdir()
+    lab.run(NUMBA_CACHE_DIR=str(data / "cache"))
+    lab.poison(data / "cache")
+    (data / ".numba_config.yaml").write_text(f"cache_dir: {data / 'cache'}\n")
+    assert lab.run(cwd=data) == ("42.0 False 0", "")
+    assert not lab.mark.exists()
+
+
+DASK = """
+import os
+import psutil
+from graspsense.experiments.executors.dask import DaskCluster
+
+if __name__ == "__main__":
+    cluster = DaskCluster(None, 2)
+    cluster._client.wait_for_workers(2, timeout=60)
+    mine = psutil.Process()
+    for process in (mine, *mine.children(recursive=True)):
+        for socket in process.net_connections("inet"):
+            if socket.status == psutil.CONN_LISTEN:
+                print(process.pid == os.getpid(), socket.laddr.ip)
+    cluster.close()
+"""
+
+
+@pytest.mark.slow
+def test_a_dask_cluster_of_a_run_is_reached_from_this_machine_alone(tmp_path):
+    pytest.importorskip("distributed", reason="Dask is not installed")
+    (tmp_path / "program.py").write_text(DASK)
+    done = subprocess.run(
+        [sys.executable, str(tmp_path / "program.py")],
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    listening = [line.split() for line in done.stdout.splitlines()]
+    assert {own for own, _ in listening} == {"True", "False"}
+    assert {address for _, address in listening} <= {"127.0.0.1", "::1"}

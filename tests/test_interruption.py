@@ -1,0 +1,331 @@
+"""Ctrl-C, SIGTERM and SIGHUP: the gripper lets go, no further squeeze begins, and nothing aborted counts."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+
+import pytest
+from attrs import evolve
+from grippers import Scripted, bottle, squeezing
+
+from graspsense import GraspInterrupted, load_pipeline
+from graspsense.cli.main import main
+from graspsense.core.config import resolve
+from graspsense.core.pipeline import grasp_with
+from graspsense.core.plugins import installed
+from graspsense.core.run_config import RunConfig
+from graspsense.core.runner import run_uninterrupted
+from graspsense.core.signals import Outcome
+from graspsense.plugins.controllers.hybrid import HybridConfig, HybridController
+from graspsense.store.changes import relabel
+from graspsense.store.collecting import Collection, Wanted
+from graspsense.store.store import Store
+
+ENDS = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
+IN_THE_SQUEEZE = 1200
+COMMAND = [sys.executable, "-m", "graspsense"]
+
+
+class Signalled(Scripted):
+    """A gripper during whose squeeze a signal arrives; it counts the grasps that begin."""
+
+    begun = 0
+    number = signal.SIGINT
+    at_release = False
+    commanded = ()
+
+    def __init__(self):
+        super().__init__(squeezing, bottle)
+
+    def open(self, seed):
+        type(self).begun += 1
+        return super().open(seed)
+
+    def read(self, timeout_s):
+        if self.k == IN_THE_SQUEEZE and not self.at_release:
+            signal.raise_signal(self.number)
+        return super().read(timeout_s)
+
+    def close(self):
+        if self.at_release:
+            signal.raise_signal(self.number)
+        type(self).commanded = self.commands
+        super().close()
+
+
+@pytest.fixture
+def signalled(monkeypatch):
+    """Return settings of a gripper that is interrupted, and the class of this gripper."""
+    number = signal.SIGINT
+
+    class Gripper(Signalled):
+        pass
+
+    settings = resolve("default", plugins=installed(), options=["classifier.type=none"])
+
+    class Choice(type(settings.gripper)):
+        def create(self):
+            return Gripper()
+
+    Gripper.number = number
+    return evolve(settings, gripper=Choice(settings.gripper.component, settings.gripper.config)), Gripper
+
+
+@pytest.fixture(autouse=True)
+def listening():
+    """Handle SIGTERM and SIGHUP as the command line does, whatever the tests were started with."""
+    before = {one: signal.signal(one, signal.default_int_handler) for one in ENDS}
+    yield
+    for one, handler in before.items():
+        signal.signal(one, handler)
+
+
+def collection_of(store, settings, answers):
+    return Collection(
+        store=store,
+        wanted=Wanted(words=("jar:full",), each=9),
+        plugins=installed(),
+        settings_for=lambda word, seed: settings,
+        ask=lambda question: next(answers),
+        say=lambda text: None,
+    )
+
+
+@pytest.mark.parametrize("number", ENDS)
+def test_a_signal_in_a_squeeze_stops_the_collection_with_the_grasp_stored_as_aborted(
+    signalled, tmp_path, number
+):
+    settings, gripper = signalled
+    gripper.number = number
+    with Store.open(tmp_path / "t") as store:
+        with pytest.raises(KeyboardInterrupt):
+            collection_of(store, settings, iter([""] * 9)).run()
+        (only,) = store.page()
+        assert (only.outcome, only.complete) == ("aborted", True)
+        assert len(store.counts("collect")) == 0
+    assert gripper.begun == 1
+    assert gripper.commanded[-1].value == 0.0
+    assert any(one.value == -20.0 for one in gripper.commanded[IN_THE_SQUEEZE:])
+
+
+def test_a_signal_while_the_gripper_is_let_go_stores_the_finished_grasp_and_stops(signalled, tmp_path):
+    settings, gripper = signalled
+    gripper.at_release = True
+    with Store.open(tmp_path / "t") as store:
+        collection = collection_of(store, settings, iter([""] * 9))
+        with pytest.raises(KeyboardInterrupt):
+            collection.run()
+        assert store.counts("collect") == {("jar:full", None): 1}
+        assert list(collection.collected.values()) == ["jar:full"]
+        assert list(store.recordings.glob("*.part")) == []
+    assert gripper.begun == 1
+
+
+def test_a_signal_while_a_trial_is_saved_loses_nothing(signalled, tmp_path):
+    settings, gripper = signalled
+    gripper.number = signal.SIGWINCH  # ignored: this grasp ends by itself
+
+    class Interrupting(Store):
+        def add(self, *arguments, **named):
+            signal.raise_signal(signal.SIGINT)
+            return super().add(*arguments, **named)
+
+    with Interrupting.open(tmp_path / "t") as store:
+        with pytest.raises(KeyboardInterrupt):
+            collection_of(store, settings, iter([""] * 9)).run()
+        assert store.counts("collect") == {("jar:full", None): 1}
+    assert gripper.begun == 1
+
+
+def test_a_repeated_trial_keeps_the_label_of_the_session_whatever_became_of_the_first(signalled, tmp_path):
+    settings, gripper = signalled
+    gripper.number = signal.SIGWINCH  # ignored: these grasps end by themselves
+    with Store.open(tmp_path / "t") as store:
+        collection = collection_of(store, settings, iter(["", "r", "q"]))
+        show, collection.show = collection.show, lambda word, trial: relabel_first()
+
+        def relabel_first():
+            collection.show = show
+            relabel(store, [1], {"label": "cup:empty"}, "by another operator")
+
+        collection.run()
+        assert [(one.id, one.label, one.set_aside) for one in store.page(set_aside=None)] == [
+            (2, "jar:full", None),
+            (1, "cup:empty", "repeated by the operator"),
+        ]
+
+
+def test_an_interrupted_grasp_raises_so_that_a_loop_over_grasps_ends_and_keeps_its_trial(signalled):
+    settings, gripper = signalled
+    pipeline = evolve(load_pipeline(options=["classifier.type=none"]), settings=settings)
+    with pytest.raises(GraspInterrupted) as ended:
+        pipeline.grasp()
+    assert gripper.begun == 1
+    assert ended.value.trial.outcome is Outcome.ABORTED
+    assert len(ended.value.trial.trace) > 900
+    with pytest.raises(KeyboardInterrupt):
+        grasp_with(settings, installed())
+
+
+def test_a_grasp_of_many_raises_after_the_release():
+    gripper = Signalled()
+    with pytest.raises(KeyboardInterrupt):
+        run_uninterrupted(gripper, HybridController(HybridConfig()), RunConfig())
+    assert gripper.closed == 1
+    assert gripper.commands[-1].value == 0.0
+
+
+def interrupting(monkeypatch, after):
+    """Let Ctrl-C arrive in the replay of the recording number `after`."""
+    from graspsense.sources.replay import ReplayBackend as Replay
+
+    begun = []
+    read, opened = Replay.read, Replay.open
+
+    def reading(self, timeout_s):
+        if len(begun) == after:
+            signal.raise_signal(signal.SIGINT)
+        return read(self, timeout_s)
+
+    def opening(self, seed):
+        begun.append(seed)
+        return opened(self, seed)
+
+    monkeypatch.setattr(Replay, "read", reading)
+    monkeypatch.setattr(Replay, "open", opening)
+    return begun
+
+
+def exit_code(*arguments):
+    with pytest.raises(SystemExit) as ended:
+        main(arguments)
+    return ended.value.code
+
+
+@pytest.fixture
+def recordings(tmp_path):
+    """Return the folder of a store with three trials, and CSV files of the same grasps."""
+    store = tmp_path / "t"
+    for seed in ("1", "2", "3"):
+        assert exit_code("run", "--label", "block", "--seed", seed, "-o", "classifier.type=none", "--save",
+                         str(store)) == 0  # fmt: skip
+        assert exit_code("export", f"{store}#{seed}", "--to", str(tmp_path / f"{seed}.csv")) == 0
+    return store
+
+
+def test_ctrl_c_in_an_import_stores_no_aborted_grasp_and_is_told(recordings, tmp_path, monkeypatch, capsys):
+    begun = interrupting(monkeypatch, after=2)
+    files = [str(tmp_path / f"{k}.csv") for k in (1, 2, 3)]
+    codes = [
+        exit_code("import", file, "--label", "block", "--save", str(tmp_path / "i")) for file in files[:2]
+    ]
+    assert codes == [0, 130]
+    assert len(begun) == 2
+    with Store.read(tmp_path / "i") as store:
+        assert [one.outcome for one in store.page()] == ["steady"]
+    assert "interrupted" in capsys.readouterr().err
+
+
+def test_ctrl_c_in_features_writes_no_table_of_aborted_grasps(recordings, tmp_path, monkeypatch):
+    begun = interrupting(monkeypatch, after=2)
+    out = tmp_path / "features.csv"
+    options = ("-o", "controller.contact_force_n=0.1", "--keep", str(out))
+    assert exit_code("features", f"store:{recordings}", *options) == 130
+    assert len(begun) == 2
+    assert not out.exists()
+
+
+def collecting(folder, labels):
+    return "collect", "--labels", labels, "--each", "9", "--save", str(folder), "--json"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", ENDS)
+def test_a_process_that_collects_with_piped_answers_stops_at_the_first_signal(tmp_path, number):
+    # 1e5 ticks a second make a grasp long enough to be interrupted.
+    options = ("-o", "classifier.type=none", "-o", "gripper.rate_hz=100000")
+    process = subprocess.Popen(
+        [*COMMAND, *collecting(tmp_path / "t", "block,toy"), *options],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    process.stdin.write("\n" * 20)
+    process.stdin.flush()
+    line = ""
+    while "next: " not in line:
+        line = process.stderr.readline()
+        assert line, "it ended by itself"
+    process.send_signal(number)
+    out, err = process.communicate(timeout=300)
+    assert process.returncode == 130, err
+    assert "next: " not in err
+    assert err.splitlines()[-1] == "interrupted"
+    result = json.loads(out)
+    assert sum(result["counts"].values()) == 0
+    with Store.open(tmp_path / "t") as store:
+        assert {one.outcome for one in store.page()} <= {"aborted"}
+        assert result["trials"] == [one.id for one in store.page()]
+
+
+def operator(folder, labels):
+    process = subprocess.Popen(
+        [*COMMAND, *collecting(folder, labels), "-o", "classifier.type=none"],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONUNBUFFERED": "1"},
+    )
+
+    def answer(key, until):
+        """Give an answer and return the lines up to one with this text."""
+        process.stdin.write(f"{key}\n")
+        process.stdin.flush()
+        lines = []
+        while not any(until in line for line in lines):
+            lines.append(process.stderr.readline())
+            assert lines[-1], "it ended by itself"
+        return "".join(lines)
+
+    return process, answer
+
+
+@pytest.mark.slow
+def test_two_operators_on_a_store_undo_and_repeat_only_what_each_has_grasped(tmp_path):
+    folder = tmp_path / "t"
+    Store.open(folder).close()
+    first, says_first = operator(folder, "block")
+    second, says_second = operator(folder, "toy")
+    says_first("", "trial 1, block")
+    says_second("", "trial 2, toy")
+    says_second("", "trial 3, toy")
+
+    assert "trial 1, block" in says_first("u", "set aside")
+    assert "no trial to undo" in says_first("u", "no trial")
+    assert "no trial to undo" in says_first("r", "no trial")
+    retaken = says_second("r", "trial 4, toy")
+    assert "trial 3, toy: set aside" in retaken
+    for process in (first, second):
+        _, err = process.communicate("q\n", timeout=300)
+        assert process.returncode == 0, err
+    with Store.read(folder) as store:
+        kept = {one.id: (one.label, one.set_aside is None) for one in store.page(set_aside=None)}
+    assert kept == {1: ("block", False), 2: ("toy", True), 3: ("toy", False), 4: ("toy", True)}
+
+
+@pytest.mark.slow
+def test_a_second_session_leaves_the_trials_of_an_earlier_one_alone(tmp_path, monkeypatch, capsys):
+    import io
+
+    folder = str(tmp_path / "t")
+    for answers in ("\nq\n", "u\nr\nq\n"):
+        monkeypatch.setattr(sys, "stdin", io.StringIO(answers))
+        command = ("collect", "--labels", "block", "--save", folder, "-o", "classifier.type=none")
+        assert exit_code(*command) == 0
+    assert capsys.readouterr().err.count("no trial to undo") == 2
+    with Store.read(folder) as store:
+        assert [one.set_aside for one in store.page(set_aside=None)] == [None]

@@ -1,0 +1,251 @@
+"""SystemExit and KeyboardInterrupt in the code of a plugin: no trace is lost, and nothing ends in silence."""
+
+import math
+
+import numpy as np
+import pytest
+from attrs import evolve, field, frozen
+from grippers import Scripted, bottle, squeezing
+
+from graspsense.cli.main import main
+from graspsense.core.config import resolve
+from graspsense.core.errors import DeviceLost
+from graspsense.core.pipeline import GraspInterrupted, grasp_with
+from graspsense.core.plugins import installed
+from graspsense.core.run_config import RunConfig
+from graspsense.core.runner import ended_by_itself, run_grasp
+from graspsense.core.signals import EFFORT, Command, Outcome
+from graspsense.core.strict import ValidationFailed, structured
+from graspsense.plugins.controllers.hybrid import HybridConfig, HybridController
+
+RUN = RunConfig()
+HYBRID = HybridController(HybridConfig())
+
+
+def leaving(*arguments, **named):
+    raise SystemExit(3)
+
+
+def law(act, after=1100):
+    """The hybrid law, whose result is changed by `act` from the step `after` on."""
+    calls = [0]
+
+    def step(params, state, reading):
+        calls[0] += 1
+        command, state = HybridController.step(params, state, reading)
+        return act(command, state) if calls[0] >= after else (command, state)
+
+    class Changed(HybridController):
+        pass
+
+    Changed.step = staticmethod(step)
+    return Changed(HybridConfig())
+
+
+def released(gripper):
+    return gripper.closed == 1 and gripper.commands[-1].value == 0.0
+
+
+@pytest.mark.parametrize("method", ["read", "apply", "tare", "close", "report"])
+def test_a_gripper_that_ends_the_program_ends_the_grasp_and_keeps_the_trace(method):
+    class Leaving(Scripted):
+        pass
+
+    usual = getattr(Leaving, method)
+
+    def method_of(self, *arguments):
+        if self.k >= 1200:
+            raise SystemExit(0)
+        return usual(self, *arguments)
+
+    setattr(Leaving, method, method_of)
+    grasp = run_grasp(Leaving(squeezing, bottle), HYBRID, RUN)
+    if method != "tare":
+        assert len(grasp.trace) > 900
+    if method == "report":
+        assert "SystemExit" in grasp.report["report_failed"]
+    elif method != "tare":
+        assert (grasp.outcome, "SystemExit" in grasp.reason) == (Outcome.ABORTED, True)
+
+
+def test_a_gripper_that_ends_the_program_on_opening_is_named():
+    class Leaving(Scripted):
+        open = leaving
+
+    gripper = Leaving(squeezing, bottle)
+    with pytest.raises(DeviceLost, match=r"Leaving raised SystemExit"):
+        run_grasp(gripper, HYBRID, RUN)
+    assert gripper.closed == 1
+
+
+def test_a_controller_that_ends_the_program_is_aborted_with_the_fingers_open():
+    gripper = Scripted(squeezing, bottle)
+    grasp = run_grasp(gripper, law(leaving), RUN)
+    assert grasp.outcome is Outcome.ABORTED
+    assert "SystemExit: 3" in grasp.reason
+    assert len(grasp.trace) > 900
+    assert released(gripper)
+
+
+def test_a_sink_that_ends_the_program_is_dropped():
+    class Leaving:
+        take = leaving
+
+    grasp = run_grasp(Scripted(squeezing, bottle), HYBRID, RUN, sinks=[Leaving()])
+    assert grasp.outcome is Outcome.STEADY
+    assert any("SystemExit" in event.what for event in grasp.events)
+
+
+@pytest.mark.parametrize("outcome", [99, -1, None, "steady"])
+def test_an_outcome_that_there_is_not_aborts_the_grasp_and_keeps_the_trace(outcome):
+    gripper = Scripted(squeezing, bottle)
+    grasp = run_grasp(gripper, law(lambda command, state: (command, state._replace(outcome=outcome))), RUN)
+    assert grasp.outcome is Outcome.ABORTED
+    assert repr(outcome) in grasp.reason
+    assert len(grasp.trace) > 800
+    assert released(gripper)
+    assert ended_by_itself(0, outcome)[0] is Outcome.ABORTED
+
+
+@pytest.fixture
+def scripted():
+    """Return the settings of a scripted gripper, with a feature set that `extract` replaces."""
+
+    def settings(extract=None):
+        settings = resolve("default", plugins=installed(), options=["classifier.type=none"])
+
+        class Gripper(type(settings.gripper)):
+            def create(self):
+                return Scripted(squeezing, bottle)
+
+        class Features(type(settings.features)):
+            def create(self):
+                features = super().create()
+                features.extract = extract or features.extract
+                return features
+
+        gripper, features = settings.gripper, settings.features
+        return evolve(
+            settings,
+            gripper=Gripper(gripper.component, gripper.config),
+            features=Features(features.component, features.config),
+        )
+
+    return settings
+
+
+def test_a_feature_set_that_ends_the_program_loses_no_trace(scripted):
+    trial = grasp_with(scripted(leaving), installed())
+    assert trial.outcome is Outcome.STEADY
+    assert len(trial.trace) > 900
+    assert "SystemExit: 3" in next(iter(trial.features.reasons.values()))
+
+
+def test_ctrl_c_that_a_plugin_raises_is_not_swallowed(scripted):
+    def interrupt(*arguments):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        grasp_with(scripted(interrupt), installed())
+
+    class Interrupting(Scripted):
+        def read(self, timeout_s):
+            if self.k == 1200:
+                self.k += 1
+                interrupt()
+            return super().read(timeout_s)
+
+    settings = scripted()
+
+    class Choice(type(settings.gripper)):
+        def create(self):
+            return Interrupting(squeezing, bottle)
+
+    gripper = Choice(settings.gripper.component, settings.gripper.config)
+    with pytest.raises(GraspInterrupted) as ended:
+        grasp_with(evolve(settings, gripper=gripper), installed())
+    assert len(ended.value.trial.trace) > 900
+
+
+def test_settings_whose_class_ends_the_program_are_wrong_settings():
+    @frozen
+    class Leaving:
+        key: int = field(default=1, validator=leaving)
+
+    with pytest.raises(ValidationFailed) as ended:
+        structured({"key": 2}, Leaving, "the test")
+    assert [one.path for one in ended.value.problems] == [("key",)]
+
+
+def test_a_plugin_that_ends_one_of_our_commands_is_told_with_its_place(monkeypatch, capsys, tmp_path):
+    from graspsense.plugins.classifiers.knn import Knn
+
+    monkeypatch.setattr(Knn, "fit", leaving)
+    table = tmp_path / "table.csv"
+    table.write_text("kind,p_first\n" + "".join(f"{'ab'[k % 2]},{7 * k % 5}.5\n" for k in range(20)))
+    with pytest.raises(SystemExit) as ended:
+        main(
+            ["train", str(table), "--label", "kind", "--classifier", "knn", "--out", str(tmp_path / "m.json")]
+        )
+    assert ended.value.code == 2
+    said = capsys.readouterr().err
+    assert "SystemExit: 3 in leaving" in " ".join(said.split())
+    assert "internal error" not in said
+
+
+class Deceitful(float):
+    """A number that says that it is within every limit."""
+
+    def __lt__(self, other):
+        return False
+
+    __gt__ = __ne__ = __lt__
+
+    def __le__(self, other):
+        return True
+
+    __ge__ = __eq__ = __le__
+
+    def __neg__(self):
+        return self
+
+    def __float__(self):
+        return 0.0
+
+    __hash__ = float.__hash__
+
+
+class TwoFaced(Command):
+    """A command that has another value by its name than by its place."""
+
+    __slots__ = ()
+    value = 1e6
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        Command(EFFORT, Deceitful(1e6), math.inf, math.inf),
+        Command(EFFORT, 1e6, Deceitful(1e6), Deceitful(1e6)),
+        Command(EFFORT, np.float64(1e6), np.float64(math.inf), np.float32(math.inf)),
+        Command(np.int64(EFFORT), 10**6, math.inf, math.inf),
+        TwoFaced(EFFORT, 5.0, math.inf, math.inf),
+    ],
+    ids=["value", "limits", "numpy", "integer", "by name"],
+)
+def test_no_number_of_a_controller_passes_the_limits(command):
+    gripper = Scripted(squeezing, bottle)
+    run_grasp(gripper, law(lambda usual, state: (command, state), after=900), RUN)
+    squeezed = gripper.commands[1000:]
+    assert all(type(one) is Command for one in squeezed)
+    assert {type(number) for one in squeezed for number in one} <= {int, float}
+    assert max(float.__float__(one.value) for one in squeezed) <= 100.0
+
+
+@pytest.mark.parametrize("value", ["20", None, [20.0]])
+def test_a_command_that_is_not_made_of_numbers_aborts_the_grasp(value):
+    gripper = Scripted(squeezing, bottle)
+    broken = Command(EFFORT, value, math.inf, math.inf) if value != "20" else "20"
+    grasp = run_grasp(gripper, law(lambda usual, state: (broken, state)), RUN)
+    assert grasp.outcome is Outcome.ABORTED
+    assert released(gripper)

@@ -1,0 +1,412 @@
+"""Small files that unpack to a lot: refused with the name of the limit, in a process that has little memory."""
+
+from __future__ import annotations
+
+import bz2
+import io
+import os
+import sqlite3
+import struct
+import subprocess
+import sys
+import zipfile
+
+import lz4.frame
+import numpy as np
+import pytest
+import zstandard
+from kept import ended, write_recording
+from mcap.writer import CompressionType
+from mcap.writer import Writer as McapWriter
+
+from graspsense.core.errors import ConfigError, DataDamaged, TooLarge
+from graspsense.recording.reader import read_recorded
+from graspsense.recording.unpacked import LIMIT_VARIABLE, Unpacked, limit_mb
+from graspsense.sources.manifest.array_format import read_mat, read_npy, read_npz
+from graspsense.sources.numpy_files import npy_array, npz_arrays
+
+MB = 1_000_000
+BOMB = 700 * MB
+"""More than a file may unpack to without the setting, and than the process below can have."""
+MEMORY = 900 * MB
+"""Address space that a process which reads a bomb may have beside what it has after its imports."""
+
+READ = """
+import resource, sys
+from pathlib import Path
+import scipy.io
+from graspsense.recording.reader import read_recorded
+from graspsense.sources.exported_grasp import read_exported
+from graspsense.sources.manifest.array_format import read_npz
+from graspsense.sources.manifest.parquet_format import read_parquet
+from graspsense.sources.manifest.ros_format import read_bag
+try:
+    import pyarrow.parquet
+    import rosbags.highlevel
+except ImportError:
+    pass
+used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+resource.setrlimit(resource.RLIMIT_AS, (used + {memory}, used + {memory}))
+from graspsense.core.errors import GraspsenseError
+try:
+    {call}
+except GraspsenseError as error:
+    print(type(error).__name__, error)
+"""
+
+
+def read_with_little_memory(call, memory=MEMORY):
+    """Run a statement in a process with so much memory; return what it prints of an error of ours."""
+    script = READ.format(call=call, memory=memory)
+    ran = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert ran.returncode == 0, ran.stderr[-2000:]
+    return ran.stdout
+
+
+def assert_refused(told, path):
+    assert told.startswith("TooLarge"), told
+    assert str(path) in told
+    assert LIMIT_VARIABLE in told
+    assert "512 MB" in told
+
+
+def zeros(size):
+    """Yield so many zero bytes in pieces."""
+    piece = bytes(MB)
+    for _ in range(size // MB):
+        yield piece
+
+
+def deflated_npz(path, size, shape=None):
+    header = io.BytesIO()
+    np.lib.format.write_array_header_1_0(
+        header, {"descr": "<f8", "fortran_order": False, "shape": shape or (size // 8,)}
+    )
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive, archive.open("a.npy", "w") as member:
+        member.write(header.getvalue())
+        for piece in zeros(size):
+            member.write(piece)
+
+
+def chunked_mcap(path, compression, chunk, declared=None):
+    """Write an MCAP file whose one chunk is this compressed data, with a profile of ROS 2."""
+    with path.open("wb") as file:
+        writer = McapWriter(file, compression=CompressionType.NONE)
+        writer.start(profile="ros2")
+        writer.finish()
+    whole = path.read_bytes()
+    body = struct.pack("<QQQI", 0, 0, declared if declared is not None else BOMB, 0)
+    body += struct.pack("<I", len(compression)) + compression.encode() + struct.pack("<Q", len(chunk)) + chunk
+    after_header = 8 + 9 + struct.unpack("<Q", whole[9:17])[0]
+    record = struct.pack("<BQ", 6, len(body)) + body
+    path.write_bytes(whole[:after_header] + record + whole[after_header:])
+
+
+def compressed(kind, size):
+    if kind == "zstd":
+        writer = zstandard.ZstdCompressor().compressobj(size=size)
+        return b"".join([*map(writer.compress, zeros(size)), writer.flush()])
+    if kind == "bz2":
+        packer = bz2.BZ2Compressor()
+        return b"".join([*map(packer.compress, zeros(size)), packer.flush()])
+    out = io.BytesIO()
+    with lz4.frame.open(out, "wb") as file:
+        for piece in zeros(size):
+            file.write(piece)
+    return out.getvalue()
+
+
+def test_the_limit_is_a_setting(monkeypatch):
+    assert limit_mb() == 512
+    monkeypatch.setenv(LIMIT_VARIABLE, "3")
+    unpacked = Unpacked("some.file")
+    unpacked.add(2 * MB)
+    unpacked.expect(MB)
+    with pytest.raises(TooLarge, match=rf"some\.file.*4 MB.*3 MB.*{LIMIT_VARIABLE}"):
+        unpacked.add(2 * MB)
+    for wrong in ("0", "many", "-1", "1e3", "9" * 40):
+        monkeypatch.setenv(LIMIT_VARIABLE, wrong)
+        with pytest.raises(ConfigError, match=LIMIT_VARIABLE):
+            limit_mb()
+
+
+@pytest.mark.parametrize("kind", ["zstd", "lz4", "bz2"])
+def test_what_is_unpacked_is_what_was_packed_and_is_counted(kind, monkeypatch):
+    data = os.urandom(1000) * 3000
+    packed = {"zstd": zstandard.compress, "lz4": lz4.frame.compress, "bz2": bz2.compress}[kind](data)
+    unpacked = Unpacked("f")
+    assert unpacked.unpack(kind, packed) == data
+    assert unpacked.total == len(data)
+    with pytest.raises((ValueError, zstandard.ZstdError, RuntimeError)):
+        Unpacked("f").unpack(kind, packed[:-9])
+    monkeypatch.setenv(LIMIT_VARIABLE, "2")
+    with pytest.raises(TooLarge):
+        Unpacked("f").unpack(kind, packed)
+
+
+def test_a_raised_limit_reads_the_file(tmp_path, monkeypatch):
+    path = tmp_path / "a.npz"
+    deflated_npz(path, 8 * MB)
+    monkeypatch.setenv(LIMIT_VARIABLE, "7")
+    with pytest.raises(TooLarge, match=r"a\.npz"):
+        npz_arrays(path)
+    monkeypatch.setenv(LIMIT_VARIABLE, "9")
+    assert npz_arrays(path)["a"].shape == (MB,)
+
+
+@pytest.mark.slow
+def test_npz(tmp_path):
+    path = tmp_path / "bomb.npz"
+    deflated_npz(path, BOMB)
+    assert path.stat().st_size < MB
+    assert_refused(read_with_little_memory(f"read_exported({str(path)!r})"), path)
+    assert_refused(read_with_little_memory(f"read_npz(Path({str(path)!r}))"), path)
+
+
+@pytest.mark.parametrize(
+    "shape", [(10**15,), (2**62, 4), (-5,), (10**9, 0, 0), (0, 10**12), (3.5,), (2**70,), (True,)]
+)
+@pytest.mark.parametrize("read", [read_npy, read_npz])
+def test_an_array_that_says_more_than_there_is(tmp_path, read, shape):
+    path = tmp_path / "a.npy"
+    header = f"{{'descr': '<f8', 'fortran_order': False, 'shape': {shape!r}, }}".encode().ljust(117) + b"\n"
+    content = b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header)) + header + bytes(80)
+    if read is read_npz:
+        path = tmp_path / "a.npz"
+        with zipfile.ZipFile(path, "w") as archive:
+            archive.writestr("a.npy", content)
+    else:
+        path.write_bytes(content)
+    with pytest.raises(DataDamaged, match=r"a\.np[yz]"):
+        read(path)
+
+
+@pytest.mark.parametrize("descr", ["|O", "|V0", "<U0", "|S0", [("a", "|O")]])
+def test_an_array_of_what_is_no_number_is_refused(tmp_path, descr):
+    path = tmp_path / "a.npy"
+    header = (
+        f"{{'descr': {descr!r}, 'fortran_order': False, 'shape': (1000000000,), }}".encode().ljust(117)
+        + b"\n"
+    )
+    path.write_bytes(b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header)) + header)
+    with pytest.raises(DataDamaged, match=r"a\.npy"):
+        npy_array(path)
+
+
+def test_arrays_come_back_as_numpy_wrote_them(tmp_path):
+    arrays = {
+        "rows": np.arange(6.0).reshape(2, 3),
+        "columns": np.asfortranarray(np.arange(24.0).reshape(2, 3, 4)),
+        "big": np.arange(5, dtype=">i4"),
+        "none": np.zeros((0, 4)),
+        "one": np.array(2.5),
+        "text": np.array("declared"),
+        "fields": np.zeros(3, dtype=[("a", "<f8"), ("b", "<i4")]),
+    }
+    for save in (np.savez, np.savez_compressed):
+        save(tmp_path / "a.npz", **arrays)
+        for name, array in npz_arrays(tmp_path / "a.npz").items():
+            assert array.dtype == arrays[name].dtype
+            assert array.shape == arrays[name].shape
+            assert (array == arrays[name]).all()
+            np.save(tmp_path / "b.npy", arrays[name])
+            assert (npy_array(tmp_path / "b.npy") == array).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["zstd", "lz4"])
+@pytest.mark.parametrize("declared", [None, 1000])
+def test_mcap_of_ros(tmp_path, kind, declared):
+    path = tmp_path / "bomb.mcap"
+    chunked_mcap(path, kind, compressed(kind, BOMB), declared)
+    told = read_with_little_memory(f"read_bag(Path({str(path)!r}))")
+    assert_refused(told, path)
+
+
+@pytest.mark.parametrize("declared", [None, 1000])
+def test_our_mcap(tmp_path, declared, monkeypatch):
+    monkeypatch.setenv(LIMIT_VARIABLE, "20")
+    path = tmp_path / "bomb.mcap"
+    chunked_mcap(path, "zstd", compressed("zstd", 30 * MB), declared if declared else 30 * MB)
+    for salvage in (False, True):
+        with pytest.raises(TooLarge, match=rf"bomb\.mcap.*20 MB.*{LIMIT_VARIABLE}"):
+            read_recorded(path, salvage=salvage)
+
+
+def test_many_chunks_count_together(tmp_path, monkeypatch):
+    path = tmp_path / "g.mcap"
+    write_recording(path, 20_000, ended())
+    read_recorded(path)
+    monkeypatch.setenv(LIMIT_VARIABLE, "2")  # 20 000 ticks of 155 bytes are 3.1 MB
+    with pytest.raises(TooLarge, match=r"3 MB"):
+        read_recorded(path)
+
+
+def test_lengths_behind_the_end_of_an_mcap_allocate_nothing(tmp_path):
+    path = tmp_path / "g.mcap"
+    write_recording(path, 20, ended())
+    data = path.read_bytes()
+    for opcode in (1, 6, 9, 12):  # header, chunk, attachment, metadata
+        body = struct.pack("<QQIQ", 2**60, 2**60, 2**32 - 1, 2**60)
+        path.write_bytes(data[:8] + struct.pack("<BQ", opcode, len(body)) + body + data[8:])
+        told = read_with_little_memory(f"read_recorded({str(path)!r})", 60 * MB)
+        assert told.startswith("TooLarge" if opcode == 6 else "DataDamaged"), told
+
+
+@pytest.mark.slow
+def test_parquet(tmp_path):
+    pyarrow = pytest.importorskip("pyarrow")
+    import pyarrow.parquet as pq
+
+    path = tmp_path / "bomb.parquet"
+    column = pyarrow.array(np.zeros(10 * MB))
+    with pq.ParquetWriter(path, pyarrow.schema([("a", pyarrow.float64())])) as writer:
+        for _ in range(9):
+            writer.write_table(pyarrow.table({"a": column}))
+    assert path.stat().st_size < MB
+    assert_refused(read_with_little_memory(f"read_parquet(Path({str(path)!r}))"), path)
+
+
+def test_a_long_text_that_is_repeated_takes_its_place_once(tmp_path):
+    pyarrow = pytest.importorskip("pyarrow")
+    import pyarrow.parquet as pq
+
+    from graspsense.sources.manifest.parquet_format import read_parquet
+
+    path = tmp_path / "texts.parquet"
+    rows = 3000
+    indices = pyarrow.array(np.zeros(rows, np.int32))
+    column = pyarrow.DictionaryArray.from_arrays(indices, pyarrow.array(["x" * MB]))
+    pq.write_table(pyarrow.table({"t": column, "a": np.arange(float(rows))}), path, store_schema=False)
+    (table,) = read_parquet(path)  # 3 GB if each row had its own
+    assert len(table) == rows
+    assert table.texts["t"][0] is table.texts["t"][-1]
+
+
+def test_mat(tmp_path, monkeypatch):
+    from scipy.io import savemat
+
+    path = tmp_path / "a.mat"
+    savemat(
+        path, {"t": np.arange(MB / 1.0), "cells": np.array([[1, "a"]], dtype=object)}, do_compression=True
+    )
+    assert read_mat(path)[0].numbers["t"].shape == (MB,)
+    monkeypatch.setenv(LIMIT_VARIABLE, "5")
+    with pytest.raises(TooLarge, match=r"a\.mat"):
+        read_mat(path)
+    monkeypatch.setenv(LIMIT_VARIABLE, "100")
+    # A variable of version 4 that says 10^9 rows.
+    path.write_bytes(struct.pack("<IIIII", 0, 10**9, 1, 0, 2) + b"t\0" + bytes(80))
+    with pytest.raises(TooLarge, match=r"a\.mat"):
+        read_mat(path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["lz4", "bz2"])
+def test_ros1_bag(tmp_path, kind):
+    rosbag1 = pytest.importorskip("rosbags.rosbag1")
+    from rosbags.typesys import Stores, get_typestore
+
+    path = tmp_path / "bomb.bag"
+    store = get_typestore(Stores.ROS1_NOETIC)
+    name = "std_msgs/msg/Float64MultiArray"
+    layout = store.types["std_msgs/msg/MultiArrayLayout"]([], 0)
+    message = store.serialize_ros1(store.types[name](layout, np.zeros(BOMB // 8)), name)
+    writer = rosbag1.Writer(path)
+    writer.set_compression(getattr(rosbag1.Writer.CompressionFormat, kind.upper()))
+    with writer:
+        connection = writer.add_connection("/a", name, typestore=store)
+        writer.write(connection, 1, message)
+    del message
+    assert path.stat().st_size < 4 * MB
+    told = read_with_little_memory(f"read_bag(Path({str(path)!r}))")
+    assert_refused(told, path)
+
+
+def ros2_bag(path, **options):
+    rosbag2 = pytest.importorskip("rosbags.rosbag2")
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    name = "std_msgs/msg/Float64MultiArray"
+    layout = store.types["std_msgs/msg/MultiArrayLayout"]([], 0)
+    message = store.serialize_cdr(store.types[name](layout, np.zeros(3 * MB // 8)), name)
+    writer = rosbag2.Writer(path, version=9, **options.pop("writer", {}))
+    if "compression" in options:
+        mode = getattr(rosbag2.CompressionMode, options["compression"])
+        writer.set_compression(mode, rosbag2.CompressionFormat.ZSTD)
+    with writer:
+        connection = writer.add_connection("/a", name, typestore=store)
+        for t in range(1, 4):
+            writer.write(connection, t, message)
+
+
+@pytest.mark.parametrize("compression", ["FILE", "MESSAGE", "STORAGE"])
+def test_ros2_bags(tmp_path, compression, monkeypatch):
+    rosbag2 = pytest.importorskip("rosbags.rosbag2")
+    from graspsense.sources.manifest.ros_format import read_bag
+
+    plugin = rosbag2.StoragePlugin.MCAP if compression == "STORAGE" else rosbag2.StoragePlugin.SQLITE3
+    ros2_bag(tmp_path / "bag", compression=compression, writer={"storage_plugin": plugin})
+    monkeypatch.setenv(LIMIT_VARIABLE, "120")
+    assert len(read_bag(tmp_path / "bag")[0]) == 3  # three messages of 3 MB
+    monkeypatch.setenv(LIMIT_VARIABLE, "7")
+    with pytest.raises(TooLarge, match=rf"bag.*7 MB.*{LIMIT_VARIABLE}"):
+        read_bag(tmp_path / "bag")
+
+
+ENDLESS = "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n)"
+
+
+@pytest.mark.parametrize(
+    "statement",
+    [
+        f"DROP TABLE schema; CREATE VIEW schema AS {ENDLESS} SELECT count(*) AS schema_version FROM n",
+        f"DROP TABLE message_definitions; CREATE VIEW message_definitions AS {ENDLESS} SELECT i AS id, "
+        "'a' AS topic_type, '' AS encoding, '' AS encoded_message_definition, '' AS type_description_hash FROM n",
+        "CREATE TRIGGER t AFTER INSERT ON topics BEGIN SELECT 1; END",
+        "CREATE TABLE g(a INTEGER, b AS (zeroblob(1000000000)))",
+    ],
+)
+def test_a_ros2_bag_that_computes_is_refused(tmp_path, statement):
+    ros2_bag(tmp_path / "bag")
+    from graspsense.sources.manifest.ros_format import read_bag
+
+    (path,) = (tmp_path / "bag").glob("*.db3")
+    connection = sqlite3.connect(path)
+    connection.executescript(statement)
+    connection.close()
+    before = path.read_bytes()
+    with pytest.raises(DataDamaged, match="is computed"):
+        read_bag(tmp_path / "bag")
+    assert path.read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("definition", "more", "says"),
+    [
+        ("geometry_msgs/Vector3[900000000] x\n", "geometry_msgs/Vector3:float64 x", "900000000"),
+        ("string[900000000] x\n", "", "900000000"),
+        ("lab/Nothing[] x\n", "lab/Nothing:", "without fields"),
+        ("lab/B x\n", "lab/B:lab/A x", "contains itself"),
+    ],
+)
+def test_definitions_of_messages_that_cannot_be_built(definition, more, says, tmp_path):
+    """An array of four thousand million messages without fields takes four bytes."""
+    pytest.importorskip("rosbags")
+    from mcap.writer import Writer
+
+    from graspsense.sources.manifest.ros_format import read_bag
+
+    path = tmp_path / "a.mcap"
+    name, _, fields = more.partition(":")
+    text = definition + (f"{'=' * 80}\nMSG: {name}\n{fields}\n" if name else "")
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start(profile="ros2")
+        schema = writer.register_schema("lab/msg/A", "ros2msg", text.encode())
+        channel = writer.register_channel("/a", "cdr", schema)
+        writer.add_message(channel, 1, b"\0\1\0\0" + struct.pack("<I", 2**32 - 1) + bytes(64), 1)
+        writer.finish()
+    with pytest.raises(DataDamaged, match=says):
+        read_bag(path)

@@ -1,0 +1,281 @@
+"""One recording that cannot be read does not stop the others of its set, whatever its reader raises."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import re
+import struct
+import zipfile
+
+import numpy as np
+import pytest
+from kept import ended, frame, keep
+
+from graspsense.cli.main import main
+from graspsense.core.errors import ConfigError, DataDamaged, TooLarge
+from graspsense.core.signals import EFFORT
+from graspsense.recording.labelled_recording import UnreadableRecording
+from graspsense.recording.layout import RESULT, START, TICK
+from graspsense.recording.readable import each_readable, readable
+from graspsense.recording.reader import read_recorded
+from graspsense.recording.writer import RecordingWriter
+from graspsense.sources.dataset_recordings import readable_or_not
+from graspsense.sources.replay import read_named
+from graspsense.sources.trial_source import load_trials
+from graspsense.store.store import Store
+from graspsense.store.verify import verify_store
+
+N = 60
+T_S = np.arange(N) * 0.01
+GAP_MM = 60.0 - 10.0 * np.minimum(T_S, 0.4) / 0.4
+FORCE_N = np.where(GAP_MM < 55.0, 55.0 - GAP_MM, 0.0)
+MANIFEST = 'files = "{label}_{order:d}.npz"\ntime = "t"\ngap = "gap [mm]"\nforce = "f"\n'
+
+
+def squeeze(path, scale=1.0):
+    np.savez_compressed(path, t=T_S, gap=GAP_MM, f=scale * FORCE_N)
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A set of six squeezes of two labels in NPZ files, with its manifest."""
+    for k in range(6):
+        squeeze(tmp_path / f"{'can' if k % 2 else 'jar'}_{k + 1}.npz", 1.0 + 0.1 * k)
+    (tmp_path / "manifest.toml").write_text(MANIFEST)
+    return tmp_path
+
+
+def run(capsys, *arguments):
+    with pytest.raises(SystemExit) as ended:
+        main([str(one) for one in arguments])
+    out, err = capsys.readouterr()
+    return ended.value.code, out, err
+
+
+def flipped_in_the_middle(path):
+    data = bytearray(path.read_bytes())
+    with zipfile.ZipFile(path) as archive:
+        info = archive.infolist()[0]
+    at = info.header_offset + 30 + len(info.filename) + 60
+    data[at : at + 8] = b"\xff" * 8
+    path.write_bytes(data)
+
+
+def with_header(path, header):
+    """Give the first array of an NPZ file this header."""
+    with zipfile.ZipFile(path) as archive:
+        members = {name: archive.read(name) for name in archive.namelist()}
+    text = header.encode().ljust(117) + b"\n"
+    first = next(iter(members))
+    members[first] = b"\x93NUMPY\x01\x00" + struct.pack("<H", len(text)) + text + members[first][128:]
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, content in members.items():
+            archive.writestr(name, content)
+
+
+def from_a_bad_disk(path):
+    """Reading the memory of a process at the address 0 gives the error of a bad sector."""
+    path.unlink()
+    path.symlink_to("/proc/self/mem")
+
+
+def as_a_pipe(path):
+    path.unlink()
+    os.mkfifo(path)
+
+
+SPOIL = {
+    "zlib": flipped_in_the_middle,
+    "tokenizer": lambda path: with_header(path, "{'descr': '<f8', 'shape': ((((((60,)"),
+    "overflow": lambda path: with_header(
+        path, f"{{'descr': '<f8', 'fortran_order': False, 'shape': ({10**40},), }}"
+    ),
+    "recursion": lambda path: with_header(path, "(" * 100 + ")" * 100),
+    "empty": lambda path: path.write_bytes(b""),
+    "huge": lambda path: np.savez_compressed(path, t=T_S, gap=GAP_MM, f=FORCE_N * 1e306),
+    "nothing": lambda path: np.savez_compressed(path, t=T_S[:0], gap=GAP_MM[:0], f=FORCE_N[:0]),
+    "texts": lambda path: np.savez_compressed(path, t=T_S.astype(str), gap=GAP_MM, f=FORCE_N),
+    "complex": lambda path: np.savez_compressed(path, t=T_S * 1j, gap=GAP_MM, f=FORCE_N),
+    "disk": from_a_bad_disk,
+    "pipe": as_a_pipe,
+}
+
+
+@pytest.mark.parametrize("kind", SPOIL)
+def test_of_a_manifest(folder, kind, capsys):
+    spoilt = folder / "can_2.npz"
+    SPOIL[kind](spoilt)
+    one = list(readable_or_not("manifest", str(folder / "manifest.toml")))
+    (bad,) = (found for found in one if isinstance(found, UnreadableRecording))
+    assert len(one) == 6
+    assert "can_2.npz" in bad.line
+    if kind == "disk":
+        assert "disk" in bad.line
+        assert not isinstance(bad.error, DataDamaged)
+
+    code, out, err = run(capsys, "import", folder / "manifest.toml", "--save", folder / "trials", "--json")
+    assert code == 5, err
+    told = json.loads(out)
+    assert len(told["trials"]) == 5
+    assert [line for line in told["unreadable"] if "can_2.npz" in line] == told["unreadable"]
+    assert len(told["unreadable"]) == 1
+
+    found = load_trials(f"manifest:{folder / 'manifest.toml'}")
+    assert len(found) == 5
+    assert any(re.search(r"1 of 6 recordings cannot be read.*can_2\.npz", note) for note in found.notes)
+
+
+def test_an_absolute_path_and_one_outside_are_read_and_a_wrong_row_is_of_its_own(folder):
+    (folder / "set").mkdir()
+    (folder / "set" / "here.npz").write_bytes((folder / "can_2.npz").read_bytes())
+    rows = [
+        f"{folder / 'can_2.npz'},a,,",
+        "../can_4.npz,b,,",
+        "here.npz,c,,",
+        "missing.npz,d,,",
+        "/dev/zero,e,,",
+        "here.npz,f,2,1",
+        f"here.npz,g,1,{10**30}",
+        "here.npz,h,1,50",
+    ]
+    (folder / "set" / "list.csv").write_text("file,label,first_row,last_row\n" + "\n".join(rows) + "\n")
+    manifest = folder / "set" / "m.toml"
+    manifest.write_text('list = "list.csv"\ntime = "t"\ngap = "gap [mm]"\nforce = "f"\n')
+    found = list(readable_or_not("manifest", str(manifest)))
+    assert [getattr(one, "label", "") for one in found] == ["a", "b", "c", "", "", "", "", "h"]
+    lines = [one.line for one in found if isinstance(one, UnreadableRecording)]
+    for line, words in zip(
+        lines, ("line 5: there is no file", "/dev/zero", "first_row", "first_row"), strict=True
+    ):
+        assert words in line
+
+
+def test_where_none_can_be_read_the_first_is_told(folder):
+    for path in folder.glob("*.npz"):
+        flipped_in_the_middle(path)
+    with pytest.raises(DataDamaged, match=r"none of 6 recordings.*can_2\.npz"):
+        load_trials(f"manifest:{folder / 'manifest.toml'}")
+
+
+# Recordings of our own with contents that no grasp has. Their checksums are right.
+
+
+def crafted(path, ticks=(), result=None, **sections):
+    file = RecordingWriter(path)
+    record = ended()
+    file.metadata(START, {**record.section(START), **sections})
+    for tick in ticks:
+        file.tick(10.0, TICK.pack(*tick))
+    file.metadata(RESULT, {**record.section(RESULT), **(result or {})})
+    file.finish()
+
+
+def tick(k=0, phase=3, **values):
+    return (*frame(k)._replace(**values), phase, EFFORT, 1.0, 2.0, 3.0)
+
+
+CRAFTED = {
+    "phase 100": {"ticks": [tick(0), tick(1, phase=100)]},
+    "phase -1": {"ticks": [tick(0, phase=-1)]},
+    "time NaN": {"ticks": [tick(0), tick(1, t_s=float("nan"))]},
+    "time inf": {"ticks": [tick(0), tick(1, t_s=float("inf"))]},
+    "outcome 99": {"ticks": [tick()], "result": {"outcome": "99"}},
+    "events no table": {"ticks": [tick()], "result": {"details": '{"events": [1, "a", null]}'}},
+    "events a number": {"ticks": [tick()], "result": {"details": '{"events": 7}'}},
+    "event of no phase": {
+        "ticks": [tick()],
+        "result": {
+            "details": '{"events": [{"t_s": 1, "phase": "flight", "what": "x", "source": "controller"}]}'
+        },
+    },
+    "event at no time": {
+        "ticks": [tick()],
+        "result": {
+            "details": '{"events": [{"t_s": [], "phase": "hold", "what": "x", "source": "controller"}]}'
+        },
+    },
+    "overflow": {
+        "ticks": [tick()],
+        "result": {"features": f'{{"features": [["a", "m"]], "values": [1{"0" * 400}], "reasons": {{}}}}'},
+    },
+    "deep": {"ticks": [tick()], "provenance": "[" * 100_000},
+    "labels a list": {"ticks": [tick()], "labels": "[1]"},
+    "settings no table": {"ticks": [tick()], "settings": "gripper = 1"},
+}
+
+
+@pytest.mark.parametrize("kind", CRAFTED)
+def test_impossible_contents_are_damage_of_this_recording(tmp_path, kind):
+    path = tmp_path / "g.mcap"
+    crafted(path, **CRAFTED[kind])
+    with pytest.raises(DataDamaged, match=r"g\.mcap"):
+        read_recorded(path).record()
+
+
+def test_no_ticks_is_no_recording_to_replay(tmp_path):
+    path = tmp_path / "g.mcap"
+    crafted(path)
+    with pytest.raises(DataDamaged, match=r"g\.mcap.* has no frames"):
+        read_named("mcap", str(path))
+
+
+def test_of_a_store(tmp_path, capsys):
+    folder = tmp_path / "trials"
+    with Store.open(folder) as store:
+        for k in range(6):
+            label = "can:full" if k % 2 else "can:empty"
+            keep(store, label, f"can#{k % 3}", values=(0.06 + k / 1000, 5.0), ticks=30)
+        names = [store.summary(k + 1).recording for k in range(6)]
+        with store.transaction() as connection:
+            connection.execute("UPDATE trial SET \"values\" = x'00' WHERE id = 2")
+            connection.execute("UPDATE detail SET labels = '[' WHERE trial = 3")
+            connection.execute("UPDATE trial SET made_at = 'then' WHERE id = 6")
+    crafted(folder / "recordings" / "phase.mcap", ticks=[tick(phase=100)])
+    (folder / "recordings" / names[3]).write_bytes((folder / "recordings" / "phase.mcap").read_bytes())
+
+    found = load_trials(f"store:{folder}")
+    assert len(found) == 3
+    assert any("3 trials are left out, because their rows are damaged" in note for note in found.notes)
+
+    found = load_trials(f"store:{folder}", options=["features.force=left"])
+    assert len(found) == 2
+    assert any("1 of 3 recordings cannot be read" in note and "phase" in note for note in found.notes)
+
+    problems = verify_store(folder).problems
+    for number in (2, 3, 4, 6):
+        assert any(one.startswith(f"trial {number}:") for one in problems)
+    code, _, err = run(capsys, "report", folder, "--out", tmp_path / "page.html")
+    assert code == 0, err
+
+
+def test_of_icub(tmp_path, capsys):
+    encoders = " ".join(["10"] * 9)
+    frames = [encoders, " ".join(["20"] * 5), *[" ".join(["200"] * 12)] * 5]
+    for k in range(1, 5):
+        (tmp_path / f"can_{k}.txt").write_text("\n".join(["-10000", *frames * 5]) + "\n")
+    (tmp_path / "can_2.txt").write_bytes(b"\xff\x00")
+    found = list(readable_or_not("icub", str(tmp_path)))
+    assert [isinstance(one, UnreadableRecording) for one in found] == [False, True, False, False]
+
+
+def test_what_is_ours_passes_through_and_what_is_not_is_named():
+    for error, expected in (
+        (KeyError("x"), DataDamaged),
+        (RecursionError("deep"), DataDamaged),
+        (MemoryError(), TooLarge),
+        (OSError("no number"), DataDamaged),
+        (OSError(errno.EINVAL, "Invalid argument"), DataDamaged),
+        (PermissionError(errno.EACCES, "Permission denied"), ConfigError),
+    ):
+        with pytest.raises(expected) as told, readable("a.file"):
+            raise error
+        assert "a.file" in str(told.value)
+        assert told.value.__cause__ is error
+    for error in (ConfigError("ours"), KeyboardInterrupt()):
+        with pytest.raises(type(error)) as told, readable("a.file"):
+            raise error
+        assert told.value is error
+    with pytest.raises(KeyboardInterrupt):
+        list(each_readable("a.file", lambda: (_ for _ in ()).throw(KeyboardInterrupt)))
