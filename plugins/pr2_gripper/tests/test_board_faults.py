@@ -61,7 +61,7 @@ def healthy_and_faulty(board: Any, **faults: Any) -> tuple[list[InputReport], li
 
 
 @pytest.mark.parametrize("side", SIDES)
-@pytest.mark.parametrize("kind", ["stuck", "zero"])
+@pytest.mark.parametrize("kind", ["stuck", "numb", "zero"])
 def test_cells_of_a_fingertip_go_wrong_from_a_time_on(board: Any, kind: Any, side: Any) -> None:
     healthy, faulty = healthy_and_faulty(board, pad_fault=kind, pad_side=side, pad_at_s=AT_S)
     good, bad = by_cell(healthy), by_cell(faulty)
@@ -74,6 +74,9 @@ def test_cells_of_a_fingertip_go_wrong_from_a_time_on(board: Any, kind: Any, sid
             assert bad[cell] == good[cell]
         elif kind == "zero":
             assert set(after) == {0}
+        elif kind == "numb":
+            assert 5 <= len(set(after)) <= 7
+            assert max(after) - min(after) <= 6
         else:
             assert len(set(after)) == 1
             assert after[0] > 0

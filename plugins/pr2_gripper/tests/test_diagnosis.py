@@ -146,6 +146,17 @@ def test_lost_and_damaged_reports_are_a_problem_with_a_remedy(
     assert "firmware is faulty" in found["advice"]
 
 
+def test_board_with_implausible_numbers_is_a_problem_with_each_of_them(
+    doctor: Doctor, machine: Any, board: Any
+) -> None:
+    machine.plug("/dev/hidraw3", board(watchdog_ms=65535, effort_limit_un=2_147_000_000))
+    code, said = doctor("--gripper", "pr2")
+    found = said["transport hidraw"]
+    assert (code, found["state"]) == (1, "problem")
+    assert "watchdog_ms is 65535 ms, allowed are 5 to 100 ms" in found["advice"]
+    assert "effort_limit_un is 2147000000" in found["advice"]
+
+
 def test_a_silent_gripper_is_a_problem(doctor: Doctor, machine: Any, board: Any) -> None:
     machine.plug("/dev/hidraw3", board())
     code, said = doctor("--gripper", "pr2")

@@ -11,9 +11,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from graspsense.plugin_api import Pads
+from graspsense.plugin_api import Pads, revolutions_at
 from graspsense_pr2_gripper.backend import Pr2Backend
 from graspsense_pr2_gripper.config import FaultConfig, Pr2Config
+from graspsense_pr2_gripper.linkage import LINKAGES
 from graspsense_pr2_gripper.measure import Measure
 from graspsense_pr2_gripper.protocol import (
     CLAMPED,
@@ -27,6 +28,7 @@ from graspsense_pr2_gripper.status import (
     BAD_CELL,
     COMMAND_CLAMPED,
     COMMAND_REFUSED,
+    ENCODER_WRONG,
     LEFT_DEAD,
     OLD_IMAGE,
     RIGHT_DEAD,
@@ -88,6 +90,9 @@ def test_opened_gripper_declares_the_bits_and_the_friction_of_its_drive() -> Non
         status=st.integers(0, 0xFFFF),
         command_result=st.integers(0, 3),
         image_age_us=st.integers(0, 0xFFFF),
+        encoder_ticks=st.integers(-(2**31), 2**31 - 1),
+        velocity_mtick_s=st.integers(-(2**31), 2**31 - 1),
+        effort_un=st.integers(-(2**31), 2**31 - 1),
     ),
     image=st.builds(dead, st.integers(0, 22), st.integers(0, 22)),
     swap=st.booleans(),
@@ -97,6 +102,9 @@ def test_no_frame_has_a_bit_that_is_not_declared(reported: InputReport, image: R
     declared = sum(one.mask for one in status_bits(swap))
     assert frame.status & ~declared == 0
     assert frame.status & 0xFFFF == reported.status
+    assert frame.effort_n == reported.effort_un / 1e6, (
+        "what the board says that it applies, clipped by nobody"
+    )
 
 
 @pytest.mark.parametrize(
@@ -131,6 +139,35 @@ def test_pad_with_more_than_a_third_of_its_cells_dead_is_dead() -> None:
 def test_dead_pad_shows_before_the_tare() -> None:
     frame = Measure(IDENTITY, Pr2Config(), None, None).reading(report(), dead(left=15)).frame
     assert frame.status == BAD_CELL | LEFT_DEAD
+
+
+@pytest.mark.parametrize("transmission", sorted(LINKAGES))
+def test_angle_outside_of_the_stroke_is_implausible_though_it_has_a_gap(transmission: str) -> None:
+    """The map to the gap repeats itself: 2147483647 ticks are 69 mm."""
+    identity = IDENTITY._replace(transmission=transmission)
+    for gap_m, wrong in ((-0.011, True), (-0.009, False), (0.0, False), (0.09, False), (0.101, True)):
+        ticks = round(revolutions_at(LINKAGES[transmission], gap_m) * 1200)
+        frame = measure(identity).reading(report(encoder_ticks=ticks), None).frame
+        assert frame.status == (ENCODER_WRONG if wrong else 0)
+    for ticks in (-(2**31), 2**31 - 1):
+        frame = measure(identity).reading(report(encoder_ticks=ticks), None).frame
+        assert frame.status == ENCODER_WRONG
+        assert math.isfinite(frame.gap_m)
+
+
+@pytest.mark.parametrize(
+    ("step_m", "time_us", "wrong"), [(-1e-3, 1000, True), (-1e-3, 3000, False), (-4e-4, 1, False)]
+)
+def test_gap_that_jumps_is_implausible_in_that_frame(step_m: float, time_us: int, wrong: bool) -> None:
+    """A millimetre in a millisecond is 1 m/s; over two lost reports it is 0.33 m/s."""
+    made = measure(IDENTITY)
+    ticks = [round(revolutions_at(LINKAGES["pr2"], 0.05 + gap_m) * 1200) for gap_m in (0.0, step_m, step_m)]
+    times = (0, time_us, time_us + 1000)
+    statuses = [
+        made.reading(report(encoder_ticks=one, time_us=at_us), None).frame.status
+        for one, at_us in zip(ticks, times, strict=True)
+    ]
+    assert statuses == [0, ENCODER_WRONG if wrong else 0, 0]
 
 
 @pytest.mark.parametrize("swap", [False, True])

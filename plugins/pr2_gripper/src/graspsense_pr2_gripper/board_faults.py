@@ -72,8 +72,10 @@ class BoardFaults:
             if cell in pad:
                 cells[i] = min(max(cells[i] + drift, 0), 0xFFFF)
             frozen = cell == faults.freeze_cell and now_us >= faults.freeze_at_s * 1e6
-            if frozen or (faults.pad_fault == "stuck" and cell in pad):
+            if frozen or (faults.pad_fault in ("stuck", "numb") and cell in pad):
                 cells[i] = self._kept.setdefault(cell, cells[i])
+                if faults.pad_fault == "numb" and not frozen:
+                    cells[i] = min(max(cells[i] + _noise(report.image, cell), 1), 0xFFFE)
             if faults.pad_fault == "zero" and cell in pad:
                 cells[i] = 0
         return cells[0], cells[1], cells[2], cells[3]
@@ -86,3 +88,8 @@ class BoardFaults:
         if self._faults.image_fault == "stale":
             age_us = min(now_us - taken_us, 0xFFFF)
         return report._replace(image=number, image_age_us=age_us)
+
+
+def _noise(image: int, cell: int) -> int:
+    """Return -3 to 3 counts, the same in each slice of an image."""
+    return (image * 7919 + cell * 104729) % 7 - 3

@@ -20,6 +20,9 @@ gripper_defs.urdf.xacro, August 2009)."""
 SPEED_CEILING_M_S: Final = 0.2
 """Largest speed limit that the driver commands: the limit of the same file."""
 
+GAPS_M: Final = (-0.010, 0.100)
+"""Gaps that an encoder can tell: the lower soft limit, and the stroke of 90 mm with a margin (pr2_common,
+urdf/gripper_v0/gripper.urdf.xacro)."""
 MOTOR_N: Final = 200.0
 """Grip of the motor at its largest continuous current, without losses: 169 N closed, 203 N at 60 mm (Maxon 222057,
 61.3 mN m/A and 0.204 A in pr2_ethercat_drivers, actuators.conf, through the linkage pr2)."""

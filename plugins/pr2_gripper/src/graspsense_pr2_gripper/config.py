@@ -102,9 +102,10 @@ class FaultConfig:
         unit="counts/s",
         meaning="Drift of the raw cells of pad_side from pad_at_s on.",
     )
-    pad_fault: Literal["none", "absent", "stuck", "zero"] = setting(
+    pad_fault: Literal["none", "absent", "stuck", "numb", "zero"] = setting(
         default="none",
-        meaning="absent: the status bit of a fingertip is set. stuck: its cells keep their values. zero: they read 0.",
+        meaning="absent: the status bit of a fingertip is set. stuck: its cells keep their values. numb: they do so "
+        "but for noise. zero: they read 0.",
     )
     pad_side: Literal["left", "right", "both"] = setting(
         default="both",

@@ -18,9 +18,11 @@ from graspsense.plugin_api import (
     masked,
     no_pads,
     pad_force,
+    revolutions_at,
     tare,
 )
 from graspsense_pr2_gripper.accelerometer import Accelerometer
+from graspsense_pr2_gripper.ceilings import GAPS_M, SENSOR_SPEED_M_S
 from graspsense_pr2_gripper.config import Pr2Config
 from graspsense_pr2_gripper.fingertip import CELLS, FIRST_PAD_CELL
 from graspsense_pr2_gripper.linkage import LINKAGES, edge_scale
@@ -28,6 +30,7 @@ from graspsense_pr2_gripper.protocol import LEFT_ABSENT, RIGHT_ABSENT, SLICES, I
 from graspsense_pr2_gripper.status import (
     BAD_CELL,
     BEYOND_TABLE,
+    ENCODER_WRONG,
     ENDURED_CELLS,
     LEFT_DEAD,
     OLD_IMAGE,
@@ -39,6 +42,8 @@ from graspsense_pr2_gripper.stream import RawImage
 UNLOADED_COUNTS: Final = 4500.0
 """Without a stored tare, a pad whose cells read more than this in the mean counts as loaded: users report
 2900 to 3800 without a load (public PressureListener scripts for the PR2, differing by finger and run)."""
+STEP_M: Final = 0.5e-3
+"""Change of the gap beyond which two reports are compared with the largest speed; a tick is at most 0.0016 mm."""
 
 Tips = tuple[tuple[float, ...], tuple[float, ...]]
 
@@ -95,6 +100,8 @@ class Measure:
         self._accelerometer = Accelerometer(identity.accelerometer_g) if config.accelerometer else None
         self._pads = no_pads(CELLS)
         self._forces = _NO_FORCES
+        self._ticks = tuple(revolutions_at(self._link, gap_m) * self._ticks_rev for gap_m in GAPS_M)
+        self._gap_m = math.nan
         self._first_us: int | None = None
         self._last_us = 0
         self.bad_cells = 0
@@ -110,7 +117,7 @@ class Measure:
         if image is not None and image.counter != self._pads.counter:
             self._take(image)
         gap, rate = gap_and_rate(self._link, report.encoder_ticks / self._ticks_rev)
-        forces, status = self._forces, report.status
+        forces, status = self._forces, report.status | self._encoder_status(report, gap)
         if report.command_result in RESULT_BITS:
             status |= RESULT_BITS[report.command_result]
         if report.image_age_us > self._oldest_us and report.image:
@@ -136,6 +143,17 @@ class Measure:
         if self._accelerometer is None:
             return Reading(frame, self._pads)
         return Reading(frame, self._pads, self._accelerometer.signals(frame.t_s, words, sampled))
+
+    def _encoder_status(self, report: InputReport, gap_m: float) -> int:
+        """Return the bit of an implausible encoder, or 0.
+
+        The angle itself is held against the stroke, since the map to the gap gives one for any angle.
+        """
+        step_m, self._gap_m = abs(gap_m - self._gap_m), gap_m
+        jumped = step_m > STEP_M and step_m > SENSOR_SPEED_M_S * 1e-6 * (report.time_us - self._last_us)
+        if jumped or not self._ticks[0] <= report.encoder_ticks <= self._ticks[1]:
+            return ENCODER_WRONG
+        return 0
 
     def tare(self, images: Sequence[Pads]) -> None:
         """Set the zero from these images. Raises TareRefused."""

@@ -33,6 +33,8 @@ LEFT_DEAD: Final = 1 << 21
 """More than `ENDURED_CELLS` cells on the face of the left pad do not answer."""
 RIGHT_DEAD: Final = 1 << 22
 """The same of the right pad. Left and right are those of the frames, after `swap_fingers`."""
+ENCODER_WRONG: Final = 1 << 23
+"""The motor angle lies outside of the stroke, or moved faster than the fingers can."""
 
 ENDURED_CELLS: Final = 5
 """Number of cells on the face of a pad that may be dead: with a third of them, a force is up to a third too small."""
@@ -102,6 +104,12 @@ _COMMON: Final = (
         name="old cell image",
         meaning="the forces are those of an earlier time, so a contact cannot be seen",
         limit_s=OLD_IMAGE_S,
+    ),
+    StatusBit(
+        mask=ENCODER_WRONG,
+        name="encoder implausible",
+        meaning="the motor angle is outside of the stroke or jumped, so gap and velocity are wrong",
+        limit_s=BLIND_S,
     ),
 )
 _ABSENT_MEANING: Final = (
