@@ -10,6 +10,8 @@ from typing import Final
 
 import click
 
+from graspsense.cli.terminal import echo_as_it_is
+
 _PROBE_BYTES: Final = 1 << 16
 """Size of the file by which is tested whether a folder can be written; more than the smallest model."""
 
@@ -22,7 +24,9 @@ def echo_json(value: object, long: bool = False) -> None:
     # Imported here: what is imported above is loaded by `graspsense --help`.
     from graspsense.core.json_values import json_ready
 
-    click.echo(json.dumps(json_ready(value), indent=None if long else 2, ensure_ascii=False, allow_nan=False))
+    echo_as_it_is(
+        json.dumps(json_ready(value), indent=None if long else 2, ensure_ascii=False, allow_nan=False)
+    )
 
 
 def file_to_write(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:

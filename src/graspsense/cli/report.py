@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from graspsense.cli.output import echo_json
-from graspsense.cli.terminal import Style, echo
+from graspsense.cli.terminal import Style, echo, echo_as_it_is
 
 
 @click.command(short_help="Write the report page of a store or an experiment.")
@@ -84,4 +84,4 @@ def report(
         echo_json({"page": str(path), "answer": page.answer})
     else:
         echo(page.answer, Style.HEADING)
-        click.echo(f"page        {path}")
+        echo_as_it_is(f"page        {path}")

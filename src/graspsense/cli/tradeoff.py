@@ -162,12 +162,12 @@ def simulation(
         echo_json(found.as_json() if sensed is None else {**found.as_json(), "recognition": asdict(sensed)})
     else:
         made = ", ".join(f"{key} {value}" for key, value in found.made.items())
-        echo(
-            f"{found.gripper}, simulated: {', '.join(found.scenes)}, {len(found.seeds)} seeds each\n{made}\n"
-        )
+        echo(f"{found.gripper}, simulated: {', '.join(found.scenes)}, {len(found.seeds)} seeds each")
+        echo(f"{made}\n")
         echo_table(*simulation_rows(found))
         if sensed is not None:
-            echo(f"\n{about(sensed)}\n{conclusion(sensed)}\n")
+            echo(f"\n{about(sensed)}")
+            echo(f"{conclusion(sensed)}\n")
             echo_table(*sensed_rows(sensed))
     _write_files(png, markdown, found, sensed)
 

@@ -17,7 +17,7 @@ from graspsense.cli.sources import (
     source_options,
     trials_of,
 )
-from graspsense.cli.terminal import echo, echo_entry, talk
+from graspsense.cli.terminal import echo, echo_as_it_is, echo_entry, talk
 
 if TYPE_CHECKING:
     from graspsense.core.labelled import Labelled
@@ -154,7 +154,7 @@ def _say_trained(out: str, model: Model) -> None:
         sets = "" if part.sets is None else f", sets {part.sets.in_words}"
         echo_entry(f"{after_s:g} s", f"after the contact: {part.provenance['trials']} grasps{sets}")
     # In one line, so that it can be copied.
-    click.echo(f"how good    {command_line(('out', 'keep', 'overwrite', 'as_json'), 'evaluate')}")
+    echo_as_it_is(f"how good    {command_line(('out', 'keep', 'overwrite', 'as_json'), 'evaluate')}")
 
 
 def _refuse_single_scene(source: str) -> None:
