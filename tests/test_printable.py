@@ -168,3 +168,63 @@ def test_all_that_is_printed_passes_through_the_terminal_module():
         for node in ast.walk(ast.parse(path.read_text())):
             name = ast.unparse(node.func) if isinstance(node, ast.Call) else ""
             assert name not in ("print", "click.echo", "click.secho"), f"{path.name}:{node.lineno}"
+
+
+def test_what_an_interpreter_shows_of_a_trial_is_one_harmless_line():
+    from attrs import evolve
+
+    from graspsense import load_pipeline
+
+    pipeline = load_pipeline(options=["gripper.object=block"])
+    trial = pipeline.grasp(labels={"label": HOSTILE + "\n"})
+    prediction = evolve(trial.prediction, label=HOSTILE + "\n")
+    features = evolve(
+        trial.features,
+        names=(FORGED, *trial.features.names[1:]),
+        reasons={FORGED: "x", **trial.features.reasons},
+    )
+    for shown in map(repr, (trial, evolve(trial, prediction=prediction), prediction, features)):
+        assert acts(shown) == []
+        assert "\n" not in shown
+
+
+MATHEMATICS = ["$x^2$", "$\\frac$", "a$b$c", "$", "\\$x$"]
+"""Labels that matplotlib would typeset as formulas, or refuse."""
+
+
+def test_pictures_show_a_dollar_as_it_is(tmp_path):
+    pytest.importorskip("matplotlib", reason="drawing needs the extra `plot`")
+    from matplotlib.figure import Figure
+
+    from graspsense.core.literal_text import show_literally
+    from graspsense.evaluation.confusion import Confusion
+    from graspsense.report.confusion import confusion_png
+
+    labels = tuple(MATHEMATICS)
+    counts = tuple(tuple(3 * (i == k) for k in range(len(labels))) for i in range(len(labels)))
+    confusion_png(Confusion(labels, counts), "$\\frac$", tmp_path / "matrix.png")
+    assert (tmp_path / "matrix.png").stat().st_size > 1000
+
+    figure = Figure()
+    axes = figure.add_subplot()
+    axes.set_yscale("log")
+    axes.plot([1, 2], [1, 100], label="$\\frac$")
+    axes.legend()
+    show_literally(figure)
+    figure.canvas.draw()
+    (text,) = axes.get_legend().get_texts()
+    assert (text.get_text(), text.get_parse_math()) == ("$\\frac$", False)
+    assert all(label.get_parse_math() for label in axes.yaxis.get_ticklabels())
+
+
+def test_the_picture_of_a_grasp_shows_any_label(tmp_path):
+    pytest.importorskip("matplotlib", reason="drawing needs the extra `plot`")
+    from attrs import evolve
+
+    from graspsense import load_pipeline
+    from graspsense.report.grasp_picture import grasp_png
+
+    trial = load_pipeline(options=["gripper.object=block"]).grasp()
+    for label in MATHEMATICS:
+        grasp_png(evolve(trial, prediction=evolve(trial.prediction, label=label)), tmp_path / "grasp.png")
+        assert (tmp_path / "grasp.png").stat().st_size > 1000

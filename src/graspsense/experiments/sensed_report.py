@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from graspsense.core.errors import ConfigError, PluginUnavailable
+from graspsense.core.literal_text import show_literally
 from graspsense.core.trace_plot import MATPLOTLIB_HINT
 from graspsense.report.simulation import axes_of, markdown_table
 
@@ -118,6 +119,7 @@ def sensed_png(trade: SensedTrade, path: Path) -> None:
         f"Simulated grasps, sensor {trade.sensor}, {len(trade.seeds)} seeds of {trade.grasps} grasps",
         fontsize=10,
     )
+    show_literally(figure)
     try:
         figure.savefig(path, format="png")
     except OSError as error:

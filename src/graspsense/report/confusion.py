@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from graspsense.core.errors import ConfigError, PluginUnavailable
+from graspsense.core.literal_text import show_literally
 from graspsense.core.trace_plot import MATPLOTLIB_HINT
 
 if TYPE_CHECKING:
@@ -49,6 +50,7 @@ def confusion_png(confusion: Confusion, title: str, path: Path) -> None:
     axes.set_xlabel("answered")
     axes.set_ylabel("true")
     axes.set_title(title, fontsize=9)
+    show_literally(figure)
     try:
         # The title may be wider than a small matrix: "tight" extends the picture to include it.
         figure.savefig(path, format="png", bbox_inches="tight")

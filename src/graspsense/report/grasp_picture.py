@@ -7,6 +7,7 @@ from textwrap import wrap
 from typing import TYPE_CHECKING, Any, Final
 
 from graspsense.core.errors import ConfigError, PluginUnavailable
+from graspsense.core.literal_text import show_literally
 from graspsense.core.trace_plot import MATPLOTLIB_HINT, draw_trace
 from graspsense.core.units import display_unit
 
@@ -57,6 +58,7 @@ def grasp_png(trial: Trial, path: Path) -> None:
     draw_trace(trial.trace, force, gap)
     words.set_axis_off()
     words.text(0.0, 1.0, "\n".join(lines), va="top", fontsize=8.5, linespacing=1.45)
+    show_literally(figure)
     try:
         figure.savefig(path, format="png")
     except OSError as error:

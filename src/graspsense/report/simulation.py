@@ -10,6 +10,7 @@ from typing import Any, Final
 from attrs import asdict, frozen
 
 from graspsense.core.errors import ConfigError, PluginUnavailable
+from graspsense.core.literal_text import show_literally
 from graspsense.core.trace_plot import MATPLOTLIB_HINT
 
 HEADER: Final = ("METHOD", "FIDELITY", "STEP OR ACCURACY", "MS A GRASP", "SET-UP, S")
@@ -132,6 +133,7 @@ def simulation_png(trade: SimulationTrade, path: Path) -> None:
         fontsize=10,
     )
     figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=3, fontsize=8)
+    show_literally(figure)
     try:
         figure.savefig(path, format="png")
     except OSError as error:
