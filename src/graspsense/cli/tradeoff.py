@@ -10,7 +10,7 @@ import click
 from attrs import asdict
 
 from graspsense.cli.options import pipeline_options, settings_of
-from graspsense.cli.output import echo_json, file_to_write
+from graspsense.cli.output import echo_json, file_to_write_as
 from graspsense.cli.terminal import echo, echo_table, talk
 from graspsense.cli.tradeoff_recognition import commands
 
@@ -44,7 +44,10 @@ scenes_option = click.option(
     "--seeds", type=click.IntRange(min=1), default=10, show_default=True, help="Grasps of each scene."
 )
 @click.option(
-    "--markdown", metavar="FILE", callback=file_to_write, help="Write the tables as a Markdown page."
+    "--markdown",
+    metavar="FILE.md",
+    callback=file_to_write_as(".md"),
+    help="Write the tables as a Markdown page.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def condition(
@@ -110,12 +113,15 @@ def condition(
 )
 @click.option(
     "--png",
-    metavar="FILE",
-    callback=file_to_write,
+    metavar="FILE.png",
+    callback=file_to_write_as(".png"),
     help="Draw the result; recognition in FILE_recognition.png.",
 )
 @click.option(
-    "--markdown", metavar="FILE", callback=file_to_write, help="Write the tables as a Markdown page."
+    "--markdown",
+    metavar="FILE.md",
+    callback=file_to_write_as(".md"),
+    help="Write the tables as a Markdown page.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def simulation(

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from graspsense.cli.output import echo_json, file_to_write, file_to_write_as, refuse_existing
+from graspsense.cli.output import check_outputs, echo_json, file_to_write, file_to_write_as
 from graspsense.cli.sources import (
     SOURCES,
     checkpoints_option,
@@ -74,7 +74,8 @@ def train(
     from graspsense.evaluation.doubt import calibrated
     from graspsense.evaluation.gathered_warnings import gathered_warnings
 
-    path = _path_of_model(out, keep, overwrite)
+    check_outputs(out, keep, overwrite=overwrite, sources=[source])
+    path = Path(out)
     times = checkpoints_of(checkpoints)
     if given["target_value"]:
         from graspsense.cli.target_value import train_value
@@ -112,13 +113,6 @@ def train(
         echo_json({"model": out, **_as_values(model), "trials": len(labelled)})
     else:
         _say_trained(out, model)
-
-
-def _path_of_model(out: str, keep: str | None, overwrite: bool) -> Path:
-    """Return the path of the model. Raises ConfigError for a file that must not be replaced."""
-    if not overwrite:
-        refuse_existing(out, keep)
-    return Path(out)
 
 
 def _as_values(model: Model) -> dict[str, Any]:
