@@ -15,7 +15,7 @@ from graspsense.cli.options import (
     settings_of,
 )
 from graspsense.cli.output import echo_json
-from graspsense.cli.terminal import Style, echo_entry, talk
+from graspsense.cli.terminal import Style, echo_as_it_is, echo_entry, talk
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -225,8 +225,8 @@ def _ask(question: str) -> str | None:
 
     Without a terminal, the next line of the standard input is the answer.
     """
-    click.echo(question, err=True, nl=False)
+    echo_as_it_is(question, err=True, end="")
     line = "" if sys.stdin is None else sys.stdin.readline()
     if not line or not sys.stdin.isatty():
-        click.echo(line.rstrip("\n"), err=True)
+        echo_as_it_is(line.rstrip("\n"), err=True)
     return line.strip().lower() if line else None

@@ -9,7 +9,7 @@ import click
 
 from graspsense.cli.options import pipeline_options, settings_of
 from graspsense.cli.output import echo_json
-from graspsense.cli.terminal import Style, echo
+from graspsense.cli.terminal import Style, echo, echo_as_it_is
 
 if TYPE_CHECKING:
     from graspsense.core.config import Settings
@@ -43,7 +43,7 @@ def show(name: str | None, as_json: bool, **asked: Any) -> None:
         return
     from graspsense.core.config import to_toml
 
-    click.echo(to_toml(settings, origins=True), nl=False)
+    echo_as_it_is(to_toml(settings, origins=True), end="")
 
 
 @config.command()

@@ -9,7 +9,7 @@ import click
 
 from graspsense.cli.options import GRIPPER_ALONE, pipeline_options, settings_of
 from graspsense.cli.output import echo_json
-from graspsense.cli.terminal import Style, echo, echo_entry, state_style
+from graspsense.cli.terminal import Style, echo, echo_as_it_is, echo_entry, state_style
 
 if TYPE_CHECKING:
     from graspsense.core.entries import Finding
@@ -116,6 +116,6 @@ def _print(diagnosis: Diagnosis) -> None:
             if "\n" in one.advice:
                 for line in filter(None, one.advice.split("\n")):
                     # Not wrapped: lines of a file, or commands, are copied.
-                    click.echo(f"             {line}")
+                    echo_as_it_is(f"             {line}")
             else:
                 echo(f"             {one.advice}")

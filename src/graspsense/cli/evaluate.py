@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from graspsense.cli.output import echo_json, file_to_write
+from graspsense.cli.output import check_outputs, echo_json, file_to_write, file_to_write_as
 from graspsense.cli.sources import (
     SOURCES,
     checkpoints_option,
@@ -45,10 +45,13 @@ if TYPE_CHECKING:
     help="What is recognised: whole labels, classes, or the states within each class.",
 )
 @click.option("--folds", type=int, default=10, show_default=True, help="Number of folds.")
-@click.option("--png", metavar="FILE", callback=file_to_write, help="Draw the confusion matrix.")
+@click.option(
+    "--png", metavar="FILE.png", callback=file_to_write_as(".png"), help="Draw the confusion matrix."
+)
 @click.option(
     "--keep", metavar="FILE", callback=file_to_write, help="Write the features of all trials as a CSV file."
 )
+@click.option("--overwrite", is_flag=True, help="Replace the file of --keep if it exists.")
 @checkpoints_option
 @classifier_option
 @source_options
@@ -59,6 +62,7 @@ def evaluate(
     folds: int,
     png: str | None,
     keep: str | None,
+    overwrite: bool,
     checkpoints: str | None,
     classifier: str | None,
     as_json: bool,
@@ -71,6 +75,7 @@ def evaluate(
     from graspsense.evaluation.checkpoints import early_recognition
     from graspsense.evaluation.evaluate import evaluate as measure
 
+    check_outputs(keep, overwrite=overwrite, sources=[source])
     times = checkpoints_of(checkpoints)
     if given["target_value"]:
         from graspsense.cli.target_value import evaluate_value

@@ -118,9 +118,9 @@ def experiment(
     else:
         _print(found, more, account, f"none: {problem}" if problem else str(page), saved)
     if account.stopped == "interrupted":
-        sys.exit(EXIT_INTERRUPTED)
+        raise click.exceptions.Exit(EXIT_INTERRUPTED)
     if problem or not account.complete:
-        sys.exit(EXIT_INCOMPLETE)
+        raise click.exceptions.Exit(EXIT_INCOMPLETE)
 
 
 def _written_page(found: Summary, results: Results) -> tuple[Path | None, str]:
@@ -164,9 +164,11 @@ def _list(known: dict[str, object], as_json: bool) -> None:
         for name, one in planned.items()
     ]
     echo_table(("EXPERIMENT", "TIME", "TASKS", "WHAT"), rows)
+    echo(f"\nTIME is for {cores} cores, {measured_on()}.")
     echo(
-        f"\nTIME is for {cores} cores, {measured_on()}.\n"
-        "The first experiment after an installation compiles the simulator as well, about a minute in each process.\n"
+        "The first experiment after an installation compiles the simulator as well, about a minute in each process."
+    )
+    echo(
         "`graspsense experiment NAME --dry-run` says what an experiment consists of; -o seeds=2 makes it shorter."
     )
 

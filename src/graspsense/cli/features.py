@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from graspsense.cli.output import echo_json, file_to_write, refuse_existing
+from graspsense.cli.output import check_outputs, echo_json, file_to_write
 from graspsense.cli.terminal import echo, echo_entry, echo_table
 
 if TYPE_CHECKING:
@@ -47,8 +47,7 @@ def features(source: str, options: tuple[str, ...], keep: str | None, overwrite:
         raise ConfigError(
             f"{source!r} is not a store: write store:DIR. For one recording there is `graspsense replay`"
         )
-    if not overwrite:
-        refuse_existing(keep)
+    check_outputs(keep, overwrite=overwrite)
     folder = source.removeprefix(STORE)
     before = labelled_store(folder)
     with ProgressLine() as progress:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from graspsense.cli.options import force_option
-from graspsense.cli.output import echo_json, file_to_write_as, refuse_existing
+from graspsense.cli.output import check_outputs, echo_json, file_to_write_as
 from graspsense.cli.terminal import Style, echo, echo_entry, echo_table, talk
 
 if TYPE_CHECKING:
@@ -81,8 +81,7 @@ def identify(
     from graspsense.recording.atomic_file import write_or_replace
     from graspsense.sources.squeezes import recorded_squeezes
 
-    if not overwrite:
-        refuse_existing(out, page)
+    check_outputs(out, page, overwrite=overwrite, sources=sources)
     flags = [Flag("--gripper", "gripper.type", gripper)] if gripper else []
     settings = resolve(pipeline, options=options, flags=flags, force=force)
     backend = settings.gripper.create()

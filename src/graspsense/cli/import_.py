@@ -10,7 +10,7 @@ import click
 from attrs import frozen
 
 from graspsense.cli.output import echo_json
-from graspsense.cli.terminal import Style, echo, echo_entry, echo_table
+from graspsense.cli.terminal import Style, echo, echo_as_it_is, echo_entry, echo_table
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -264,7 +264,7 @@ def _echo_unreadable(unreadable: Sequence[UnreadableRecording]) -> None:
     word = "recording" if len(unreadable) == 1 else "recordings"
     echo(f"{len(unreadable)} {word} cannot be read:", Style.CAUTION, err=True)
     for one in unreadable[:LISTED]:
-        click.echo(f"  {one.line}", err=True)  # not wrapped, so that a program can take it line by line
+        echo_as_it_is(f"  {one.line}", err=True)  # not wrapped, so that a program can take it line by line
     if len(unreadable) > LISTED:
         echo(f"and {len(unreadable) - LISTED} more; --json lists all", indent=2, err=True)
     echo(

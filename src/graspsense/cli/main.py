@@ -16,7 +16,7 @@ from typing import Any, Final, NoReturn
 import click
 
 from graspsense import __version__
-from graspsense.cli.terminal import Style, echo, has_colour
+from graspsense.cli.terminal import Style, echo, echo_as_it_is, has_colour
 from graspsense.core.errors import GraspsenseError, PluginUnavailable, UnknownName, suggestion
 from graspsense.core.interrupts import ended_like_ctrl_c
 
@@ -125,7 +125,7 @@ def _plugin_command(name: str) -> click.Command:
 def cli(ctx: click.Context) -> None:
     """Recognise grasped objects and their state by touch."""
     if ctx.invoked_subcommand is None:
-        click.echo(ctx.get_help())
+        echo_as_it_is(ctx.get_help())
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
@@ -147,7 +147,7 @@ def _exit_code(arguments: list[str]) -> int:
                 ctx.color = False  # for the commands of plugins, which print through click
             cli.invoke(ctx)
         if sys.stdout is None:
-            click.echo(
+            echo_as_it_is(
                 f"{PROGRAM}: standard output is closed, so nothing that was to be printed came out", err=True
             )
             return EXIT_USAGE
@@ -158,10 +158,10 @@ def _exit_code(arguments: list[str]) -> int:
     except (
         click.exceptions.NoArgsIsHelpError
     ) as error:  # a group without a subcommand: the message is its help
-        click.echo(error.format_message(), err=True)
+        echo_as_it_is(error.format_message(), err=True)
         return EXIT_USAGE
     except (click.Abort, KeyboardInterrupt):
-        click.echo("interrupted", err=True)
+        echo_as_it_is("interrupted", err=True)
         return EXIT_INTERRUPTED
     except BrokenPipeError:
         _give_up_stdout()  # the reader of the pipe has gone
@@ -206,7 +206,7 @@ def _report(error: Exception, as_json: bool) -> int:
     if os.environ.get(TRACEBACK_VARIABLE) == "1":
         talk = "".join(traceback.format_exception(error)) + talk
     if talk.startswith("Traceback"):
-        click.echo(talk, err=True)
+        echo_as_it_is(talk, err=True)
     else:
         echo(f"{PROGRAM}: {talk}", Style.BAD, indent=2, err=True)
     if as_json:

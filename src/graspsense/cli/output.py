@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Final
 
 import click
+
+from graspsense.cli.terminal import echo_as_it_is
 
 _PROBE_BYTES: Final = 1 << 16
 """Size of the file by which is tested whether a folder can be written; more than the smallest model."""
@@ -22,11 +24,18 @@ def echo_json(value: object, long: bool = False) -> None:
     # Imported here: what is imported above is loaded by `graspsense --help`.
     from graspsense.core.json_values import json_ready
 
-    click.echo(json.dumps(json_ready(value), indent=None if long else 2, ensure_ascii=False, allow_nan=False))
+    echo_as_it_is(
+        json.dumps(json_ready(value), indent=None if long else 2, ensure_ascii=False, allow_nan=False)
+    )
 
 
 def file_to_write(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
-    """Callback of an option that names a file: refuse a file that cannot be written, before the work and not after."""
+    """Callback of an option that names a file: refuse a file that cannot be written, before the work and not after.
+
+    A pipe or a device is refused as well: the file that is written takes its place, also where root could replace it.
+    """
+    if value is not None and Path(value).exists() and not (Path(value).is_file() or Path(value).is_dir()):
+        raise click.BadParameter(f"{value} is a pipe or a device: name a file", ctx, param)
     if value is not None and Path(value).is_dir():
         raise click.BadParameter(f"{value} is a folder: name a file in it", ctx, param)
     if value is not None and Path(value).exists() and not Path(value).is_file():
@@ -55,10 +64,20 @@ def file_to_write_as(ending: str) -> Callable[[click.Context, click.Parameter, s
     return checked
 
 
-def refuse_existing(*paths: str | None) -> None:
-    """Raise ConfigError if one of these files exists already."""
+def check_outputs(*paths: str | None, overwrite: bool, sources: Sequence[str] = ()) -> None:
+    """Raise ConfigError if these files cannot be the outputs of a command.
+
+    Two of them must not be the same file, none may be a file that the command reads, and without `overwrite` none may
+    exist.
+    """
     from graspsense.core.errors import ConfigError
 
-    for path in paths:
-        if path is not None and Path(path).exists():
+    outputs: list[Path] = []
+    for path in (Path(one) for one in paths if one is not None):
+        if path.resolve() in (other.resolve() for other in outputs):
+            raise ConfigError(f"two options name the same file {path}: name another for one of them")
+        if any(Path(source).is_file() and path.resolve() == Path(source).resolve() for source in sources):
+            raise ConfigError(f"{path} is what is read here: name another file")
+        if path.exists() and not overwrite:
             raise ConfigError(f"{path} already exists: name another file, or add --overwrite to replace it")
+        outputs.append(path)

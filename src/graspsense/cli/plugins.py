@@ -73,7 +73,8 @@ def show(name: str, as_json: bool) -> None:
         )
         return
     texts = [_status_text(status) for status in statuses] + [_component_text(one) for one in components]
-    echo("\n\n".join(texts), indent=4)
+    for number, text in enumerate(texts):
+        echo(f"\n{text}" if number else text, indent=4)
 
 
 @plugins.command()

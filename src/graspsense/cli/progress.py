@@ -7,9 +7,8 @@ import time
 from types import TracebackType
 from typing import Final
 
-import click
-
-from graspsense.cli.terminal import can_redraw, terminal_width
+from graspsense.cli.terminal import can_redraw, echo_as_it_is, echo_in_place, terminal_width
+from graspsense.core.printable import in_one_line
 
 FIRST_S: Final = 2.0
 AGAIN_S: Final = 0.2
@@ -36,10 +35,10 @@ class ProgressLine:
             bar = "█" * round(BAR * done / max(total, 1))
             line = f"{bar:<{BAR}} {done} of {total}  {what}"
             # A line that fills the terminal would go on in the next one, which is not erased.
-            click.echo(f"\r\033[K{line[: self._width - 1]}", err=True, nl=False)
+            echo_in_place(in_one_line(line)[: self._width - 1])
             self._shown = True
         else:
-            click.echo(f"{what}: {done} of {total}", err=True)
+            echo_as_it_is(in_one_line(f"{what}: {done} of {total}"), err=True)
 
     def __enter__(self) -> ProgressLine:
         return self
@@ -48,4 +47,4 @@ class ProgressLine:
         self, kind: type[BaseException] | None, error: BaseException | None, tb: TracebackType | None
     ) -> None:
         if self._shown:
-            click.echo("\r\033[K", err=True, nl=False)
+            echo_in_place("")

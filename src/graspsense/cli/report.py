@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from graspsense.cli.output import echo_json
-from graspsense.cli.terminal import Style, echo
+from graspsense.cli.terminal import Style, echo, echo_as_it_is, warn
 
 
 @click.command(short_help="Write the report page of a store or an experiment.")
@@ -24,7 +24,9 @@ from graspsense.cli.terminal import Style, echo
     help="Store: what is recognised, as in `evaluate`.",
 )
 @click.option("--folds", type=int, default=10, show_default=True, help="Store: number of folds.")
-@click.option("--seed", type=int, default=0, show_default=True, help="Store: seed of the folds.")
+@click.option(
+    "--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Store: seed of the folds."
+)
 @click.option(
     "--grasp", type=int, metavar="NUMBER", help="Store: trial to plot over time.  [default: the newest]"
 )
@@ -60,12 +62,15 @@ def report(
 
     path = Path(out or folder) / NAME
     if (Path(folder) / EXPERIMENT).is_file():
-        from graspsense.experiments.summary import summary_of
+        from graspsense.experiments.summary import summary_of, unreadable_lines
 
         if values:
             raise click.UsageError("--target-value is for the page of a store; this folder has an experiment")
         results = Results(Path(folder))
-        page = experiment_page(summary_of(results), results)
+        summary = summary_of(results)
+        for line in unreadable_lines(summary):
+            warn(line)
+        page = experiment_page(summary, results)
     else:
         with ProgressLine() as progress:
             numbers = number_sections(folder, values, folds, seed, progress)
@@ -84,4 +89,4 @@ def report(
         echo_json({"page": str(path), "answer": page.answer})
     else:
         echo(page.answer, Style.HEADING)
-        click.echo(f"page        {path}")
+        echo_as_it_is(f"page        {path}")

@@ -87,7 +87,9 @@ _OPTIONS: Final = (
         multiple=True,
         help="Set a key of a component: -o controller.probing_force_n=17. Can be repeated.",
     ),
-    click.option("--seed", type=int, default=0, show_default=True, help="Seed of all random numbers."),
+    click.option(
+        "--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of all random numbers."
+    ),
     force_option,
 )
 

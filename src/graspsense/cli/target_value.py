@@ -9,7 +9,7 @@ import click
 
 from graspsense.cli.output import echo_json
 from graspsense.cli.sources import command_line, is_csv, trials_of
-from graspsense.cli.terminal import Style, echo, echo_entry, echo_table, talk
+from graspsense.cli.terminal import Style, echo, echo_as_it_is, echo_entry, echo_table, talk
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -99,7 +99,7 @@ def train_value(
         else f"{100 * COVERAGE:.0f} %, prediction plus or minus {_with_unit(model.half_width, unit)}",
     )
     # In one line, so that it can be copied.
-    click.echo(f"how good    {command_line(('out', 'keep', 'overwrite', 'as_json'), 'evaluate')}")
+    echo_as_it_is(f"how good    {command_line(('out', 'keep', 'overwrite', 'as_json'), 'evaluate')}")
 
 
 def predict_value(model_name: str, source: str, as_json: bool, given: Mapping[str, Any]) -> None:

@@ -1,5 +1,8 @@
 """Text for people: tables, paragraphs and colour, fitted to the terminal that they are printed on.
 
+Everything that a command prints passes through here, and no character of it acts on the terminal: labels, notes and
+names of files come from data (`core/printable.py`). No text can look like several: its further lines are indented.
+
 Where the output is not a terminal (a pipe, a file), nothing is coloured, wrapped or cut, so that programs can read it.
 `NO_COLOR` and `TERM=dumb` switch the colour off, and `COLUMNS` overrides the width of the terminal.
 """
@@ -15,6 +18,8 @@ from enum import Enum
 from typing import IO, Any, Final
 
 import click
+
+from graspsense.core.printable import in_one_line, printable
 
 
 class Style(Enum):
@@ -82,7 +87,7 @@ def echo(text: str = "", style: Style | None = None, *, indent: int = 0, err: bo
     """
     stream = sys.stderr if err else sys.stdout
     width = terminal_width(stream)
-    lines = text.split("\n")
+    lines = _lines(text)
     if width is not None:
         lines = [part for line in lines for part in _wrapped(line, width, indent)]
     _write(lines, style, err)
@@ -94,14 +99,25 @@ def echo_entry(
     """Print a label and its text, as in `outcome     steady`; lines that follow stand below the text."""
     stream = sys.stderr if err else sys.stdout
     columns = terminal_width(stream)
+    label = in_one_line(label)
     head = f"{label:<{width}}" if len(label) < width else f"{label} "
-    lines = text.split("\n")
+    lines = printable(text).split("\n")
     if columns is not None:
         room = max(columns - len(head), 20)
         lines = [part for line in lines for part in _wrapped(line, room, 0)]
     if style is not None and has_colour(stream):
         lines = [_coloured(line, style) for line in lines]
     _write([head + lines[0], *(" " * len(head) + line for line in lines[1:])], None, err)
+
+
+def echo_as_it_is(text: str, *, err: bool = False, end: str = "\n") -> None:
+    """Print text that is neither wrapped nor coloured, such as a path, a command or a file that the output is."""
+    click.echo(printable(text) + end, err=err, nl=False)
+
+
+def echo_in_place(line: str) -> None:
+    """Replace the current line of stderr, a terminal that `can_redraw`, by this one."""
+    click.echo(f"\r\033[K{in_one_line(line)}", err=True, nl=False)
 
 
 def talk(text: str) -> None:
@@ -125,6 +141,7 @@ def echo_table(
     """
     if not rows:
         return
+    header, *rows = [[in_one_line(cell) for cell in row] for row in (header, *rows)]
     columns = terminal_width(sys.stdout)
     right = [_all_numbers([row[k] for row in rows]) for k in range(len(header))]
     natural = [max(len(row[k]) for row in (header, *rows)) for k in range(len(header))]
@@ -145,6 +162,17 @@ def echo_table(
         _echo_text_below(header, rows, natural, right, styles, columns)
     else:
         _echo_blocks(header, rows, styles)
+
+
+def _lines(text: str) -> list[str]:
+    """Return the lines of one text: those after the first are indented deeper, so that none looks like another text."""
+    lines = printable(text).split("\n")
+    first = next((k for k, line in enumerate(lines) if line.strip()), 0)
+    margin = len(lines[first]) - len(lines[first].lstrip(" ")) + 1
+    return lines[: first + 1] + [
+        " " * (margin + 1) + line.lstrip(" ") if line and not line.startswith(" " * margin) else line
+        for line in lines[first + 1 :]
+    ]
 
 
 def _wrapped(line: str, width: int, indent: int) -> list[str]:

@@ -10,7 +10,7 @@ import click
 from attrs import asdict
 
 from graspsense.cli.options import pipeline_options, settings_of
-from graspsense.cli.output import echo_json, file_to_write
+from graspsense.cli.output import echo_json, file_to_write_as
 from graspsense.cli.terminal import echo, echo_table, talk
 from graspsense.cli.tradeoff_recognition import commands
 
@@ -44,7 +44,10 @@ scenes_option = click.option(
     "--seeds", type=click.IntRange(min=1), default=10, show_default=True, help="Grasps of each scene."
 )
 @click.option(
-    "--markdown", metavar="FILE", callback=file_to_write, help="Write the tables as a Markdown page."
+    "--markdown",
+    metavar="FILE.md",
+    callback=file_to_write_as(".md"),
+    help="Write the tables as a Markdown page.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def condition(
@@ -110,12 +113,15 @@ def condition(
 )
 @click.option(
     "--png",
-    metavar="FILE",
-    callback=file_to_write,
+    metavar="FILE.png",
+    callback=file_to_write_as(".png"),
     help="Draw the result; recognition in FILE_recognition.png.",
 )
 @click.option(
-    "--markdown", metavar="FILE", callback=file_to_write, help="Write the tables as a Markdown page."
+    "--markdown",
+    metavar="FILE.md",
+    callback=file_to_write_as(".md"),
+    help="Write the tables as a Markdown page.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def simulation(
@@ -162,12 +168,12 @@ def simulation(
         echo_json(found.as_json() if sensed is None else {**found.as_json(), "recognition": asdict(sensed)})
     else:
         made = ", ".join(f"{key} {value}" for key, value in found.made.items())
-        echo(
-            f"{found.gripper}, simulated: {', '.join(found.scenes)}, {len(found.seeds)} seeds each\n{made}\n"
-        )
+        echo(f"{found.gripper}, simulated: {', '.join(found.scenes)}, {len(found.seeds)} seeds each")
+        echo(f"{made}\n")
         echo_table(*simulation_rows(found))
         if sensed is not None:
-            echo(f"\n{about(sensed)}\n{conclusion(sensed)}\n")
+            echo(f"\n{about(sensed)}")
+            echo(f"{conclusion(sensed)}\n")
             echo_table(*sensed_rows(sensed))
     _write_files(png, markdown, found, sensed)
 

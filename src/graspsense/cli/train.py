@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from graspsense.cli.output import echo_json, file_to_write, file_to_write_as, refuse_existing
+from graspsense.cli.output import check_outputs, echo_json, file_to_write, file_to_write_as
 from graspsense.cli.sources import (
     SOURCES,
     checkpoints_option,
@@ -17,7 +17,7 @@ from graspsense.cli.sources import (
     source_options,
     trials_of,
 )
-from graspsense.cli.terminal import echo, echo_entry, talk
+from graspsense.cli.terminal import echo, echo_as_it_is, echo_entry, talk
 
 if TYPE_CHECKING:
     from graspsense.core.labelled import Labelled
@@ -74,7 +74,8 @@ def train(
     from graspsense.evaluation.doubt import calibrated
     from graspsense.evaluation.gathered_warnings import gathered_warnings
 
-    path = _path_of_model(out, keep, overwrite)
+    check_outputs(out, keep, overwrite=overwrite, sources=[source])
+    path = Path(out)
     times = checkpoints_of(checkpoints)
     if given["target_value"]:
         from graspsense.cli.target_value import train_value
@@ -114,13 +115,6 @@ def train(
         _say_trained(out, model)
 
 
-def _path_of_model(out: str, keep: str | None, overwrite: bool) -> Path:
-    """Return the path of the model. Raises ConfigError for a file that must not be replaced."""
-    if not overwrite:
-        refuse_existing(out, keep)
-    return Path(out)
-
-
 def _as_values(model: Model) -> dict[str, Any]:
     """Return what was trained as plain values."""
     return {
@@ -154,7 +148,7 @@ def _say_trained(out: str, model: Model) -> None:
         sets = "" if part.sets is None else f", sets {part.sets.in_words}"
         echo_entry(f"{after_s:g} s", f"after the contact: {part.provenance['trials']} grasps{sets}")
     # In one line, so that it can be copied.
-    click.echo(f"how good    {command_line(('out', 'keep', 'overwrite', 'as_json'), 'evaluate')}")
+    echo_as_it_is(f"how good    {command_line(('out', 'keep', 'overwrite', 'as_json'), 'evaluate')}")
 
 
 def _refuse_single_scene(source: str) -> None:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 from attrs import field, frozen
 
 from graspsense.core.errors import listed
+from graspsense.core.printable import in_one_line
 from graspsense.core.reasons import Reason
 
 if TYPE_CHECKING:
@@ -53,7 +54,8 @@ class Features:
         from graspsense.core.notebook import quantity
 
         each = zip(self.names, self.values, self.units, strict=True)
-        return f"<Features: {', '.join(f'{name} {quantity(value, unit)}' for name, value, unit in each) or 'none'}>"
+        words = ", ".join(f"{name} {quantity(value, unit)}" for name, value, unit in each)
+        return in_one_line(f"<Features: {words or 'none'}>")
 
     def _repr_html_(self) -> str:
         from graspsense.core.notebook import features_html
@@ -225,7 +227,7 @@ class Prediction:
 
     def __repr__(self) -> str:
         certainty = f", {self.certainty_in_words}" if self.certainty_in_words else ""
-        return f"<Prediction: {self.label}{certainty}>"
+        return in_one_line(f"<Prediction: {self.label}{certainty}>")
 
     def _repr_html_(self) -> str:
         from graspsense.core.notebook import prediction_html

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from graspsense.core.errors import PluginUnavailable
+from graspsense.core.literal_text import show_literally
 from graspsense.core.signals import Phase
 from graspsense.core.trace import SampleTrace
 from graspsense.core.units import display_unit, without_underscores
@@ -52,6 +53,7 @@ def plot(trace: Trace) -> tuple[Any, Any]:
         _draw_samples(trace, axes, name, signal)
     for axes, (name, images) in zip(others[len(fast) :], arrays.items(), strict=True):
         figure.colorbar(_draw_array(trace, axes, name, images), ax=axes)
+    show_literally(figure)
     return force, gap
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from attrs import field, frozen
 
+from graspsense.core.printable import in_one_line
 from graspsense.core.signals import Outcome, Phase
 
 if TYPE_CHECKING:
@@ -80,7 +81,7 @@ class Trial:
         parts = [self.outcome.words, *self.run.labels.values(), f"{len(self.trace)} ticks"]
         if self.prediction is not None:
             parts.append(f"predicted {self.prediction.label}")
-        return f"<Trial: {', '.join(parts)}>"
+        return in_one_line(f"<Trial: {', '.join(parts)}>")
 
     def _repr_html_(self) -> str:
         from graspsense.core.notebook import trial_html

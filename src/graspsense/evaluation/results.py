@@ -9,6 +9,7 @@ from attrs import field, frozen
 
 from graspsense.core.labelled import Target
 from graspsense.core.notebook import sentence, table
+from graspsense.core.printable import in_one_line
 from graspsense.evaluation.confusion import Confusion
 from graspsense.evaluation.doubt import Reliability, SetCoverage
 from graspsense.evaluation.intervals import Difference, RecognitionRate
@@ -81,7 +82,7 @@ class Evaluation:
     """How well the probabilities of the headline agree with the rate."""
 
     def __repr__(self) -> str:
-        return f"<Evaluation: {self._words()}>"
+        return in_one_line(f"<Evaluation: {self._words()}>")
 
     def _repr_html_(self) -> str:
         rows = [

@@ -7,6 +7,7 @@ from html import escape
 from graspsense.experiments.answer import answer
 from graspsense.experiments.comparison import ExperimentComparison, condition_name
 from graspsense.experiments.page import SIMULATED
+from graspsense.experiments.summary import unreadable_lines
 from graspsense.report.html import Page, Section, bullets, facts, pair, paragraph, table
 from graspsense.report.rates import RateRow, rates_picture
 from graspsense.report.wording import TARGETS, protocol_words
@@ -39,11 +40,14 @@ def comparison_page(comparison: ExperimentComparison) -> Page:
 
 def failure_lines(comparison: ExperimentComparison) -> list[str]:
     """Return a sentence for each experiment of which tasks failed or are missing."""
-    return [
+    failed = [
         f"{one.name}: {len(one.summary.failed)} tasks failed and {one.summary.missing} have no result; they are not "
         "included"
         for one in comparison.experiments
         if one.summary.failed or one.summary.missing
+    ]
+    return failed + [
+        f"{one.name}: {line}" for one in comparison.experiments for line in unreadable_lines(one.summary)
     ]
 
 

@@ -13,7 +13,7 @@ from graspsense.experiments.answer import answer, headline
 from graspsense.experiments.findings import MARKDOWN, Findings
 from graspsense.experiments.kinds import kind_of
 from graspsense.experiments.results import EXPERIMENT, Results
-from graspsense.experiments.summary import ConditionResult, Summary
+from graspsense.experiments.summary import ConditionResult, Summary, unreadable_lines
 from graspsense.experiments.task_results import RecognitionResult
 from graspsense.recording.atomic_file import write_or_replace
 from graspsense.recording.provenance import commit_text
@@ -139,6 +139,7 @@ def _failures(summary: Summary) -> str:
     if summary.failed:
         reasons = list(dict.fromkeys(one.reason for one in summary.failed))
         lines.append(f"{len(summary.failed)} tasks failed and are not included: {'; '.join(reasons[:5])}")
+    lines += unreadable_lines(summary)
     if summary.missing:
         lines.append(f"{summary.missing} tasks have no result yet and are not included")
     return bullets(lines, "warning")

@@ -23,7 +23,7 @@ from typing import Any, Final
 from attrs import evolve, frozen
 
 from graspsense.core.config import to_toml, toml_key, toml_value, without_followers
-from graspsense.core.errors import ConfigError
+from graspsense.core.errors import ConfigError, named
 from graspsense.core.strict import plain
 from graspsense.experiments.experiment import PipelineOf, Planned, read_experiment
 from graspsense.experiments.task import TaskResult
@@ -54,12 +54,29 @@ class Results:
         _write(self.path(done.key), done.to_text() + "\n")
 
     def get(self, key: str) -> TaskResult | None:
-        """Return the result of a task; None if there is none or its file is incomplete."""
+        """Return the result of a task; None if there is none or its file cannot be read (see `problem`)."""
         try:
-            done = TaskResult.from_text(self.path(key).read_text(encoding="utf-8"))
+            return self._read(key)
         except (OSError, ValueError, KeyError, TypeError):
             return None
-        return done if done.key == key else None
+
+    def problem(self, key: str) -> str:
+        """Return why the file of a result cannot be read; empty if it can be, or if there is no such file."""
+        try:
+            self._read(key)
+        except FileNotFoundError:
+            return ""
+        except OSError as error:
+            return f"{self.path(key)}: {error.strerror}"
+        except (ValueError, KeyError, TypeError) as error:
+            return f"{self.path(key)} is damaged: {named(error)}"
+        return ""
+
+    def _read(self, key: str) -> TaskResult:
+        done = TaskResult.from_text(self.path(key).read_text(encoding="utf-8"))
+        if done.key != key:
+            raise ValueError("it is the result of another task")
+        return done
 
     def of(self, keys: Sequence[str]) -> dict[str, TaskResult]:
         """Return the results of those of these tasks that have one, in their order."""

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from functools import cached_property
 from typing import Any
 
-from attrs import frozen
+from attrs import field, frozen
 
 from graspsense.core.errors import ConfigError
 from graspsense.core.labelled import Target
@@ -135,6 +135,8 @@ class Summary:
     failed: tuple[TaskResult, ...]
     missing: int
     """Tasks without a result."""
+    unreadable: tuple[str, ...] = field(default=())
+    """The files of results that cannot be read, each with the reason."""
     seconds: float
     """Total time of all tasks."""
     cpu_seconds: float = 0.0
@@ -190,6 +192,7 @@ class Summary:
             ],
             "failed": [{"task": one.name, "reason": one.reason} for one in self.failed],
             "missing": self.missing,
+            **({"unreadable": list(self.unreadable)} if self.unreadable else {}),
             "seconds": self.seconds,
         }
 
@@ -199,12 +202,15 @@ def summarise(planned: Planned, results: Results) -> Summary:
     by_condition: dict[tuple[str, str, Target], dict[int, ClassifierResult]] = {}
     simulated: dict[str, bool] = {}
     decoded: dict[tuple[str, int], AnyTaskResult] = {}
-    failed, missing, seconds, cpu_seconds = [], 0, 0.0, 0.0
+    failed, unreadable, missing, seconds, cpu_seconds = [], [], 0, 0.0, 0.0
     for case in planned.cases:
         for seed in planned.seeds:
-            task_result = results.get(planned.task(case, seed).key)
+            key = planned.task(case, seed).key
+            task_result = results.get(key)
             if task_result is None:
-                missing += 1
+                problem = results.problem(key)
+                unreadable += [problem] if problem else []
+                missing += not problem
                 continue
             seconds += task_result.seconds
             cpu_seconds += task_result.cpu_seconds
@@ -233,6 +239,7 @@ def summarise(planned: Planned, results: Results) -> Summary:
         results=decoded,
         failed=tuple(failed),
         missing=missing,
+        unreadable=tuple(unreadable),
         seconds=seconds,
         cpu_seconds=cpu_seconds,
     )
@@ -245,10 +252,21 @@ def summary_of(results: Results) -> Summary:
     DataDamaged if a result cannot be read.
     """
     summary = summarise(results.experiment(), results)
-    if not summary.results and not summary.failed and results.any():
+    if not summary.results and not summary.failed and not summary.unreadable and results.any():
         raise ConfigError(
             f"{results.folder} has results, but none for the settings that it has now: {EXPERIMENT}, {PIPELINES}/ or "
             "graspsense itself was changed after the run. Restore the files, or run the changed experiment into "
             f"another folder: graspsense experiment {results.folder / EXPERIMENT} --out FOLDER"
         )
     return summary
+
+
+def unreadable_lines(summary: Summary) -> list[str]:
+    """Return a sentence on the results that cannot be read, which is empty if all can be."""
+    if not summary.unreadable:
+        return []
+    shown = "; ".join(summary.unreadable[:5])
+    return [
+        f"{len(summary.unreadable)} results cannot be read and are not included: {shown}. The same experiment with "
+        "--resume computes them again"
+    ]

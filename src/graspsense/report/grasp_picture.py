@@ -33,6 +33,10 @@ def require_picture(path: Path) -> None:
         import matplotlib  # noqa: F401
     except ImportError as error:
         raise PluginUnavailable(f"{MATPLOTLIB_HINT} ({error})") from error
+    if not path.name or (path.exists() and not path.is_file()):
+        raise ConfigError(
+            f"the picture cannot be written to {path}, which is not a file: name a file FILE.png"
+        )
     if path.suffix.lower() != ".png":
         raise ConfigError(f"the picture is a PNG file: name it {path.with_suffix('.png')}, not {path}")
     if not path.parent.is_dir():

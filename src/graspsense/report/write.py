@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from graspsense.core.errors import ConfigError
+from graspsense.core.literal_text import show_literally
 from graspsense.core.whole_file import write_whole
 from graspsense.recording.atomic_file import write_or_replace
 from graspsense.report.html import Page
@@ -18,7 +19,8 @@ def write_html(path: Path, page: Page) -> None:
 
 
 def write_picture(path: Path, figure: Any, **how: Any) -> None:
-    """Write a figure of matplotlib as a PNG file. Raises ConfigError if that is not possible."""
+    """Write a figure of matplotlib as a PNG file, with its texts as they are. Raises ConfigError if it cannot."""
+    show_literally(figure)
     data = io.BytesIO()
     figure.savefig(data, format="png", **how)
     try:

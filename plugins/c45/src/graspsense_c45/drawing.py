@@ -27,7 +27,9 @@ def draw(tree: Tree, axes: Any = None) -> Any:
             axes.plot([x[node], x[child]], [y[node], y[child]], color="0.6", linewidth=1, zorder=1)
             words = branch(tree, node, slot).removeprefix(tree.attribute(node).name).strip()
             middle = (x[node] + x[child]) / 2, (y[node] + y[child]) / 2
-            axes.text(*middle, words, ha="center", va="center", fontsize=7, color="0.25", zorder=2)
+            axes.text(
+                *middle, words, ha="center", va="center", fontsize=7, color="0.25", zorder=2, parse_math=False
+            )
         majority = int(tree.majority_class[node])
         if tree.is_leaf(node):
             words, face = (
@@ -37,7 +39,17 @@ def draw(tree: Tree, axes: Any = None) -> Any:
         else:
             words, face = tree.attribute(node).name, "white"
         box = {"boxstyle": "round", "facecolor": face, "edgecolor": "0.3", "alpha": 0.95}
-        axes.text(x[node], y[node], words, ha="center", va="center", fontsize=8, bbox=box, zorder=3)
+        axes.text(
+            x[node],
+            y[node],
+            words,
+            ha="center",
+            va="center",
+            fontsize=8,
+            bbox=box,
+            zorder=3,
+            parse_math=False,
+        )
     return axes
 
 

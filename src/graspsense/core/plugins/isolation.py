@@ -22,6 +22,7 @@ from graspsense.core.errors import FAILURES, suggestion
 from graspsense.core.firstparty import DISTRIBUTION
 from graspsense.core.plugins.discovery import PluginSource
 from graspsense.core.plugins.parts import PluginStatus
+from graspsense.core.printable import printable
 
 TRACE_VARIABLE: Final = "GRASPSENSE_TRACE_PLUGINS"
 """If this environment variable is 1, each call of a hook is printed with the time that it took."""
@@ -112,7 +113,7 @@ class HookCalls:
                     status.distribution,
                     status.version,
                     hook,
-                    error_text(error),
+                    printable(error_text(error)),
                 )
 
     def _hooks_of(self, plugin: object) -> tuple[str, ...]:
@@ -160,9 +161,8 @@ class HookCalls:
             took_ms = (time.perf_counter() - started.pop()) * 1e3
             names = ", ".join(implementation.plugin_name for implementation in implementations)
             ended = f"raised {error_text(outcome.exception)}" if outcome.exception else "returned"
-            print(  # noqa: T201 (the user asked for it, on stderr)
-                f"hook {hook}({', '.join(arguments)}) of {names} {ended} in {took_ms:.2f} ms", file=sys.stderr
-            )
+            line = f"hook {hook}({', '.join(arguments)}) of {names} {ended} in {took_ms:.2f} ms"
+            print(printable(line), file=sys.stderr)  # noqa: T201 (the user asked for it, on stderr)
 
         self._manager.add_hookcall_monitoring(before, after)
 

@@ -1,0 +1,143 @@
+"""Files that commands write: none replaces what was not meant, and none that cannot be read is left out in silence."""
+
+import json
+import os
+import shutil
+
+import pytest
+
+from graspsense.cli.main import main
+from graspsense.experiments.results import Results
+
+
+def run(*arguments):
+    with pytest.raises(SystemExit) as ended:
+        main([str(one) for one in arguments])
+    return ended.value.code
+
+
+@pytest.fixture
+def table(tmp_path):
+    path = tmp_path / "mine.csv"
+    rows = [f"{'ab'[k % 2]},{k % 2 + 0.1 * (7 * k % 5)},{3 * k % 7}.5\n" for k in range(24)]
+    path.write_text("kind,width,force\n" + "".join(rows))
+    return path
+
+
+EVALUATE = ("--label", "kind", "--folds", "2", "--classifier", "knn")
+TRAIN = ("--label", "kind", "--classifier", "knn")
+
+
+def test_evaluate_replaces_no_file_without_being_asked(table, tmp_path, capsys):
+    kept = tmp_path / "kept.csv"
+    kept.write_text("precious")
+    assert run("evaluate", table, *EVALUATE, "--keep", kept) == 2
+    assert "--overwrite" in capsys.readouterr().err
+    assert kept.read_text() == "precious"
+    assert run("evaluate", table, *EVALUATE, "--keep", kept, "--overwrite") == 0
+    assert kept.read_text().startswith("label,")
+
+
+@pytest.mark.parametrize("command", ["evaluate", "train"])
+def test_no_command_replaces_its_own_source(table, tmp_path, command, capsys, monkeypatch):
+    before = table.read_text()
+    monkeypatch.chdir(tmp_path)
+    more = EVALUATE if command == "evaluate" else (*TRAIN, "--out", tmp_path / "m.json")
+    (tmp_path / "link.csv").symlink_to(table)
+    for name in (table, "mine.csv", tmp_path / "sub" / ".." / "mine.csv", "link.csv"):
+        (tmp_path / "sub").mkdir(exist_ok=True)
+        assert run(command, table, *more, "--keep", name, "--overwrite") == 2
+        assert "what is read" in capsys.readouterr().err
+    assert table.read_text() == before
+    assert not (tmp_path / "m.json").exists()
+
+
+def test_two_outputs_are_two_files(table, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert run("train", table, *TRAIN, "--out", "m.json", "--keep", tmp_path / "m.json") == 2
+    assert "the same file" in capsys.readouterr().err
+    assert not (tmp_path / "m.json").exists()
+    assert run("train", table, *TRAIN, "--out", "m.json", "--keep", "k.csv") == 0
+    assert json.loads((tmp_path / "m.json").read_text())["format"]
+
+
+@pytest.mark.parametrize("option", ["--keep", "--out"])
+def test_a_pipe_or_a_device_is_not_replaced(table, tmp_path, option, capsys):
+    pipe = tmp_path / "pipe.json"
+    os.mkfifo(pipe)
+    for name in (pipe, "/dev/full"):
+        if option == "--out" and name != pipe:
+            continue
+        outputs = {"--out": tmp_path / "m.json", "--keep": tmp_path / "k.csv", option: name}
+        more = [word for pair in outputs.items() for word in pair]
+        assert run("train", table, *TRAIN, *more, "--overwrite") == 2
+        assert "pipe or a device" in capsys.readouterr().err
+    assert pipe.is_fifo()
+
+
+@pytest.mark.parametrize("command", ["evaluate", "compare", "train"])
+def test_a_negative_seed_is_refused(table, tmp_path, command, capsys):
+    more = {
+        "train": ("--out", tmp_path / "m.json"),
+        "evaluate": ("--folds", "2"),
+        "compare": ("--classifiers", "knn"),
+    }
+    assert run(command, table, "--label", "kind", *more[command], "--seed", "-1") == 2
+    assert "--seed" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", [".", "..", "/", "sub", "pipe.png"])
+def test_a_picture_that_is_no_file_is_refused_before_the_grasp(tmp_path, monkeypatch, name, capsys):
+    pytest.importorskip("matplotlib", reason="drawing needs the extra `plot`")
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "sub").mkdir()
+    os.mkfifo(tmp_path / "pipe.png")
+    assert run("run", "--plot", name) == 2
+    said = capsys.readouterr().err
+    assert "picture" in said
+    assert "approach" not in said
+
+
+def test_a_matrix_is_drawn_into_pictures_only(table, capsys):
+    before = table.read_text()
+    assert run("evaluate", table, *EVALUATE, "--png", table) == 2
+    assert ".png" in capsys.readouterr().err
+    assert table.read_text() == before
+
+
+@pytest.fixture
+def experiment(table, tmp_path):
+    """Return the folder of an experiment, one of whose results is damaged and one of which is on a disk that fails."""
+    (tmp_path / "mine.toml").write_text(
+        'title = "mine"\nseeds = [0, 1, 2, 3]\n[judge]\nfolds = 2\n[data]\n'
+        f'source = "{table}"\nlabel = "kind"\n'
+    )
+    assert run("experiment", tmp_path / "mine.toml", "--executor", "serial", "--out", tmp_path / "out") == 0
+    shutil.copytree(tmp_path / "out", tmp_path / "whole")
+    first, second, *_ = sorted((tmp_path / "out" / "results").glob("*.json"))
+    first.write_text("{")
+    second.unlink()
+    second.mkdir()
+    return tmp_path / "out"
+
+
+def test_a_result_that_cannot_be_read_is_told(experiment, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    first, second, *_ = sorted((experiment / "results").glob("*.json"))
+    capsys.readouterr()
+    assert run("report", experiment) == 0
+    said = "".join(capsys.readouterr())
+    assert "2 results cannot be read" in said
+    assert first.name in said
+    assert second.name in said
+    assert "2 results cannot be read" in (experiment / "report.html").read_text()
+    assert run("experiment", "compare", experiment, tmp_path / "whole") == 0
+    said = capsys.readouterr().out
+    assert "2 results cannot be read" in " ".join(said.split())
+    assert "2 results cannot be read" in (tmp_path / "comparison.html").read_text()
+
+
+def test_a_missing_result_is_no_unreadable_one(experiment):
+    results = Results(experiment)
+    assert results.problem("0" * 32) == ""
+    assert "damaged" in results.problem(sorted(experiment.glob("results/*.json"))[0].stem)

@@ -1,0 +1,230 @@
+"""No text of data acts on a terminal: labels, notes and names of files are printed without what would."""
+
+import ast
+import json
+import re
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from kept import BENCH, keep
+
+import graspsense.cli
+from graspsense.cli.main import main
+from graspsense.cli.terminal import echo, echo_as_it_is, echo_entry, echo_table, talk, warn
+from graspsense.core.printable import in_one_line, printable
+from graspsense.store.changes import relabel, set_aside
+from graspsense.store.store import Store
+
+HOSTILE = "can\x1b]0;owned\x07\x1b[2J\x9b31m\u202egnp.\u2066\x7f\u2028\r:full"
+"""Sets the title, clears the screen, colours by a C1 code, and turns the direction of writing."""
+FORGED = "can\n  9  2026-11-26  block  steady  \x1b[32mforged"
+
+
+def acts(text):
+    """Return the characters that act on a terminal, apart from line feeds."""
+    kinds = "[\x00-\x09\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]"
+    return re.findall(kinds, text)
+
+
+@given(st.text())
+def test_nothing_that_acts_is_printed_and_the_rest_stays(text):
+    assert acts(printable(text)) == []
+    assert "\n" not in in_one_line(text)
+    if not acts(text):
+        kept = [c for c in text if c not in "\u200b\ufeff" and not "\u2060" <= c <= "\u206f"]
+        assert [c for c in printable(text) if c in set(kept)] != [] or not kept
+    assert printable(printable(text)) == printable(text)
+
+
+@given(st.text())
+def test_json_stays_the_same_json(text):
+    written = json.dumps({text: [text]}, ensure_ascii=False)
+    assert json.loads(printable(written)) == {text: [text]}
+    assert acts(printable(written)) == []
+
+
+@pytest.mark.parametrize("stream", ["terminal", "pipe"])
+def test_whatever_prints_a_text_prints_it_harmlessly(capsys, monkeypatch, stream):
+    monkeypatch.setenv("NO_COLOR", "1")
+    monkeypatch.setenv("COLUMNS", "60")
+    if stream == "terminal":
+        from graspsense.cli import terminal
+
+        monkeypatch.setattr(terminal, "terminal_width", lambda stream: 60)
+    for text in (HOSTILE, FORGED):
+        echo(text)
+        echo_entry(text, text)
+        talk(text)
+        warn(text)
+        echo_as_it_is(text)
+        echo_table(("LABEL", text), [(text, "1"), (text * 9, "2.0")])
+    out, err = capsys.readouterr()
+    assert acts(out + err) == []
+    assert "\\u001b" in out
+
+
+def test_a_text_of_several_lines_looks_like_no_other_text(capsys):
+    echo(f"  note {FORGED}")
+    echo_entry("label", FORGED)
+    echo("first\n  try: this\nfirst again")
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[1].startswith("    9  2026")
+    assert lines[3].startswith(" " * 12)
+    assert lines[4:] == ["first", "  try: this", "  first again"]
+
+
+def test_a_row_of_a_table_is_one_line_whatever_is_in_it(capsys):
+    echo_table(("LABEL", "N"), [(FORGED, "1"), ("block", "2")])
+    assert len(capsys.readouterr().out.splitlines()) == 3
+
+
+def run(*arguments):
+    with pytest.raises(SystemExit) as ended:
+        main(arguments)
+    return ended.value.code
+
+
+@pytest.fixture
+def store(tmp_path):
+    """Return a store whose labels, reasons and gripper an attacker has chosen, as in a store from elsewhere."""
+    from attrs import evolve
+
+    with Store.open(tmp_path / "t") as store:
+        for label in (HOSTILE, FORGED):
+            for value in (0.06, 0.07, 0.065):
+                keep(store, label, f"{label}#1", values=(value, 5.5), device=evolve(BENCH, name=HOSTILE))
+        set_aside(store, [1], HOSTILE)
+        relabel(store, [2], {"label": FORGED + "2"}, FORGED)
+    return tmp_path / "t"
+
+
+COMMANDS = [
+    ("trials", "list", "{}"),
+    ("trials", "history", "{}"),
+    ("trials", "aside", "{}#3", "--why", HOSTILE),
+    ("replay", "{}#4"),
+    ("verify", "{}"),
+    ("recover", "{}"),
+    ("evaluate", "store:{}", "--folds", "2"),
+    ("train", "store:{}", "--classifier", "knn", "--out", "{}.json"),
+    ("features", "store:{}", "-o", "controller.contact_force_n=0.1"),
+    ("export", "{}", "--to", "{}.csv"),
+    ("report", "{}", "--folds", "2"),
+    ("trials", "list", f"{{}}{HOSTILE}"),
+    ("run", "--object", HOSTILE),
+    ("run", "-o", HOSTILE),
+    ("config", "show", "-o", f"gripper.object={HOSTILE}"),
+    ("import", f"{{}}{HOSTILE}.csv", "--label", HOSTILE, "--save", "{}"),
+    (HOSTILE,),
+    ("plugins", "show", HOSTILE),
+]
+
+
+@pytest.mark.parametrize(
+    "command", COMMANDS, ids=lambda command: " ".join(command[:2]).encode("unicode_escape").decode()
+)
+def test_no_command_prints_what_acts(store, command, capsys):
+    code = run(*[word.format(store) for word in command])
+    out, err = capsys.readouterr()
+    assert acts(out + err) == []
+    assert code in (0, 1, 2), err
+    assert not any(line.startswith("  9  2026") for line in (out + err).splitlines())
+
+
+@pytest.mark.parametrize(
+    "command", [("trials", "list", "{}"), ("trials", "history", "{}"), ("predict", "{}.json", "store:{}")]
+)
+def test_json_has_the_text_as_it_is(store, command, capsys):
+    assert run("train", f"store:{store}", "--classifier", "knn", "--out", f"{store}.json") == 0
+    capsys.readouterr()
+    assert run(*[word.format(store) for word in command], "--json") == 0
+    out = capsys.readouterr().out
+    assert acts(out) == []
+    assert HOSTILE in set(strings(json.loads(out)))
+
+
+def strings(value):
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, dict):
+        for key, inner in value.items():
+            yield key
+            yield from strings(inner)
+    elif isinstance(value, list):
+        for inner in value:
+            yield from strings(inner)
+
+
+def test_all_that_is_printed_passes_through_the_terminal_module():
+    owners = {
+        "terminal.py",
+        "completion.py",
+    }  # the script for the shell is a program, with its own tabulators
+    for path in Path(graspsense.cli.__file__).parent.glob("*.py"):
+        if path.name in owners:
+            continue
+        for node in ast.walk(ast.parse(path.read_text())):
+            name = ast.unparse(node.func) if isinstance(node, ast.Call) else ""
+            assert name not in ("print", "click.echo", "click.secho"), f"{path.name}:{node.lineno}"
+
+
+def test_what_an_interpreter_shows_of_a_trial_is_one_harmless_line():
+    from attrs import evolve
+
+    from graspsense import load_pipeline
+
+    pipeline = load_pipeline(options=["gripper.object=block"])
+    trial = pipeline.grasp(labels={"label": HOSTILE + "\n"})
+    prediction = evolve(trial.prediction, label=HOSTILE + "\n")
+    features = evolve(
+        trial.features,
+        names=(FORGED, *trial.features.names[1:]),
+        reasons={FORGED: "x", **trial.features.reasons},
+    )
+    for shown in map(repr, (trial, evolve(trial, prediction=prediction), prediction, features)):
+        assert acts(shown) == []
+        assert "\n" not in shown
+
+
+MATHEMATICS = ["$x^2$", "$\\frac$", "a$b$c", "$", "\\$x$"]
+"""Labels that matplotlib would typeset as formulas, or refuse."""
+
+
+def test_pictures_show_a_dollar_as_it_is(tmp_path):
+    pytest.importorskip("matplotlib", reason="drawing needs the extra `plot`")
+    from matplotlib.figure import Figure
+
+    from graspsense.core.literal_text import show_literally
+    from graspsense.evaluation.confusion import Confusion
+    from graspsense.report.confusion import confusion_png
+
+    labels = tuple(MATHEMATICS)
+    counts = tuple(tuple(3 * (i == k) for k in range(len(labels))) for i in range(len(labels)))
+    confusion_png(Confusion(labels, counts), "$\\frac$", tmp_path / "matrix.png")
+    assert (tmp_path / "matrix.png").stat().st_size > 1000
+
+    figure = Figure()
+    axes = figure.add_subplot()
+    axes.set_yscale("log")
+    axes.plot([1, 2], [1, 100], label="$\\frac$")
+    axes.legend()
+    show_literally(figure)
+    figure.canvas.draw()
+    (text,) = axes.get_legend().get_texts()
+    assert (text.get_text(), text.get_parse_math()) == ("$\\frac$", False)
+    assert all(label.get_parse_math() for label in axes.yaxis.get_ticklabels())
+
+
+def test_the_picture_of_a_grasp_shows_any_label(tmp_path):
+    pytest.importorskip("matplotlib", reason="drawing needs the extra `plot`")
+    from attrs import evolve
+
+    from graspsense import load_pipeline
+    from graspsense.report.grasp_picture import grasp_png
+
+    trial = load_pipeline(options=["gripper.object=block"]).grasp()
+    for label in MATHEMATICS:
+        grasp_png(evolve(trial, prediction=evolve(trial.prediction, label=label)), tmp_path / "grasp.png")
+        assert (tmp_path / "grasp.png").stat().st_size > 1000
