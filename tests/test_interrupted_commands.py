@@ -61,33 +61,35 @@ REAL = evolve(BENCH, simulated=False)
 class Lab:
     """A folder with a store and with the inputs and outputs of the commands, and what must be true of it."""
 
-    def __init__(self, folder):
-        self.folder = folder
+    def __init__(self, folder, commands=None):
+        self.folder, self.commands = folder, commands
         folder.mkdir(parents=True, exist_ok=True)
         self.store = filled(folder / "trials")
-        self.finished = self.commands = 0
-        self.whole = {}
+        self.finished = self.made = 0
 
     def command(self, kind):
         """Return the words of a command that writes, made ready to run once more."""
         out = self.folder / "out"
         out.mkdir(exist_ok=True)
-        self.commands += 1
+        self.made += 1
         if kind == "run":
             return ["run", "--save", self.store, "--label", "block", "--changed", *BARE]
         if kind == "import":
             # Another grasp each time: none is imported twice.
             rows = (f"{k / 1000},{squeezing(k / 1000)},{bottle(k / 1000)[0]}" for k in range(2200))
-            text = "\n".join(["t,g,f", *rows, f"2.3,0.054,{8 + self.commands / 1000}"])
+            text = "\n".join(["t,g,f", *rows, f"2.3,0.054,{8 + self.made / 1000}"])
             (self.folder / "grasp.csv").write_text(text)
             return ["import", self.folder / "grasp.csv", *COLUMNS, "--save", self.store, *BARE]
         if kind == "export":
-            (out / "table.csv").unlink(missing_ok=True)
+            for name in ("table.csv", "whole.csv"):
+                (out / name).unlink(missing_ok=True)
+            if self.commands is not None:
+                assert self.commands.run("export", self.store, "--to", out / "whole.csv").code == 0
             return ["export", self.store, "--to", out / "table.csv"]
         if kind == "train":
             return ["train", f"store:{self.store}", "--out", out / "model.json", "--overwrite"]
         if kind == "change":
-            label = ("can:full_open", "can:half_open")[self.commands % 2]
+            label = ("can:full_open", "can:half_open")[self.made % 2]
             return [
                 "trials",
                 "relabel",
@@ -127,12 +129,11 @@ class Lab:
     def check_outputs(self):
         out = self.folder / "out"
         if (out / "table.csv").exists():
-            data = (out / "table.csv").read_bytes()
-            assert self.whole.setdefault("table.csv", data) == data
+            assert (out / "table.csv").read_bytes() == (out / "whole.csv").read_bytes()
         if (out / "model.json").exists():
             load_model(str(out / "model.json"), installed())
         names = {path.name for path in out.iterdir() if not path.name.endswith(".part")}
-        assert names <= {"table.csv", "model.json"}
+        assert names <= {"table.csv", "whole.csv", "model.json"}
 
 
 KINDS = tuple(INJECTED)
@@ -149,7 +150,7 @@ def commands(tmp_path_factory):
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_command_that_is_killed_at_a_random_moment(commands, tmp_path, kind):
     rng = random.Random(kind)
-    lab = Lab(tmp_path)
+    lab = Lab(tmp_path, commands)
     done = commands.run(*lab.command(kind))
     assert done.code == 0, done.said
     lab.check(kind, done)
@@ -172,7 +173,7 @@ def test_a_disk_that_is_full_wherever_it_becomes_so(commands, tmp_path):
     """No file may become longer than so many bytes, which every user can have: what the disk says is the same."""
     rng = random.Random(2)
     refused = 0
-    lab = Lab(tmp_path)
+    lab = Lab(tmp_path, commands)
     for k in range(10 * FULL_DISKS):
         kind = KINDS[k % len(KINDS)]
         done = commands.run(*lab.command(kind), longest_file=int(10 ** rng.uniform(0.0, 5.0)))
@@ -185,7 +186,7 @@ def test_a_disk_that_is_full_wherever_it_becomes_so(commands, tmp_path):
 
 def test_a_real_disk_that_is_full(commands, tmp_path, mounted):
     rng = random.Random(3)
-    lab = Lab(mounted("size=8m") / "lab")
+    lab = Lab(mounted("size=8m") / "lab", commands)
     refused = 0
     for k in range(10 * FULL_DISKS):
         kind = KINDS[k % len(KINDS)]
@@ -204,7 +205,7 @@ def test_a_real_disk_that_is_full(commands, tmp_path, mounted):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_an_error_of_the_disk_at_each_write(commands, tmp_path, kind):
-    lab = Lab(tmp_path)
+    lab = Lab(tmp_path, commands)
     injected = 0
     k = 0
     while True:
