@@ -33,7 +33,7 @@ def is_closed(path: Path, content: str) -> bool:
     if reason and reason not in _WARNED:
         _WARNED.add(reason)
         warnings.warn(
-            f"{content} ({path}) are not used: {reason}. Nobody but this user and root may own it, or write to it or to a "
+            f"{content} ({path}) are not used: {reason}. Only this user and root may own it, or write to it or to a "
             "folder above it",
             stacklevel=2,
         )
