@@ -14,6 +14,7 @@ from grippers import bottle, squeezing
 from wayward import CSV
 
 from graspsense.recording.checkout import checkout_state
+from graspsense.recording.provenance import commit_text
 
 PROGRAM = Path(sys.executable).parent / "graspsense"
 REPOSITORY = Path(__file__).parent.parent
@@ -115,6 +116,15 @@ def test_every_python_process_is_started_without_the_current_folder():
                 found.append((str(path), words[:2]))
     assert len(found) >= 5
     assert [place for place, words in found if words != ["sys.executable", "'-P'"]] == []
+
+
+@pytest.mark.parametrize(
+    ("dirty", "told"), [(True, " (with changes)"), (False, ""), (None, " (changes unknown)")]
+)
+def test_a_report_says_whether_the_files_had_changes_or_that_nobody_knows(dirty, told):
+    made = {"git": {"graspsense": {"commit": "0123456789abcdef" * 2, "dirty": dirty}}}
+    assert commit_text(made) == "0123456789ab" + told
+    assert commit_text({"git": {"graspsense": None}}) == commit_text({}) == "unknown"
 
 
 needs_git = pytest.mark.skipif(shutil.which("git") is None, reason="needs git")

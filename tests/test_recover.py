@@ -107,6 +107,17 @@ def test_a_recording_that_is_being_written_is_left_alone(store):
     assert [one.what for one in recover_store(store)] == ["added"]
 
 
+def test_a_recording_is_not_replaced_by_an_unfinished_one_of_its_name(store):
+    keep(store)
+    path = store.trial(1).recording
+    before = path.read_bytes()
+    write_recording(store.recordings / "b.mcap", 100, ended(), finish=False).leave()
+    (store.recordings / "b.mcap.part").rename(path.with_name(f"{path.name}.part"))
+    (found,) = recover_store(store)
+    assert (found.what, path.read_bytes()) == ("failed", before)
+    assert verify_store(store.folder).problems == ()
+
+
 @pytest.mark.parametrize("bytes_written", [None, 0, 5, 60])
 def test_a_file_without_a_tick_makes_no_trial(store, bytes_written):
     path = part(store, ticks=0)

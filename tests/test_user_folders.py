@@ -65,6 +65,9 @@ def test_folders_are_where_the_variables_say_and_else_in_the_home(monkeypatch, t
     assert (config_folder(), data_folder(), cache_folder()) == tuple(
         Path(one) / "graspsense" for one in ("/c", "/d", "/e")
     )
+    # In a folder of somebody else's data, a relative one would name a part of that data.
+    monkeypatch.setenv("XDG_CACHE_HOME", "e")
+    assert cache_folder() == Path("/home/ada/.cache/graspsense")
 
 
 @pytest.mark.usefixtures("homeless")

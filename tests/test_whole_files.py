@@ -285,3 +285,14 @@ def test_all_of_the_code_replaces_files_in_one_place():
     }
     assert len(sources) > 200
     assert found == {"src/graspsense/core/whole_file.py", "src/graspsense/recording/writer.py"}
+
+
+def test_a_link_in_place_of_the_lock_of_an_experiment_is_not_followed(tmp_path):
+    from graspsense.experiments.results import LOCK, Results
+
+    results = Results(tmp_path / "out")
+    results.folder.mkdir()
+    (results.folder / LOCK).symlink_to(tmp_path / "made elsewhere")
+    with pytest.raises(SaveFailed), results.alone():
+        pass
+    assert not (tmp_path / "made elsewhere").exists()

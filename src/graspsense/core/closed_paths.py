@@ -32,7 +32,11 @@ def is_closed(path: Path, content: str) -> bool:
     reason = why_open(path)
     if reason and reason not in _WARNED:
         _WARNED.add(reason)
-        warnings.warn(f"{content} in {path.parent} are not used: {reason}", stacklevel=2)
+        warnings.warn(
+            f"{content} ({path}) are not used: {reason}. Only this user and root may own it, or write to it or to a "
+            "folder above it",
+            stacklevel=2,
+        )
     return not reason
 
 

@@ -27,7 +27,8 @@ def cache_folder() -> Path | None:
 
 def _folder(variable: str, *beside: str) -> Path | None:
     given = os.environ.get(variable)
-    if given:
+    # A relative one counts as not set, as the standard says: it would be another folder wherever the user stands.
+    if given and os.path.isabs(given):
         return Path(given) / "graspsense"
     try:
         return Path.home().joinpath(*beside, "graspsense")

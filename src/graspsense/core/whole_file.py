@@ -8,7 +8,6 @@ is deleted when the next file is written to that folder.
 from __future__ import annotations
 
 import errno
-import fcntl
 import os
 import re
 import secrets
@@ -65,7 +64,7 @@ def _new_part(path: Path, mode: int) -> tuple[Path, int]:
         # Exclusive: a link or a pipe of this name, planted by somebody, is an error and is not followed.
         fd = os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC | os.O_NOFOLLOW, mode)
         with suppress(OSError):  # some network disks have no locks
-            fcntl.flock(fd, fcntl.LOCK_EX)
+            _lock(fd)
         if os.fstat(fd).st_nlink:
             return part, fd
         os.close(fd)  # another program took it for a leftover before it was locked
@@ -103,7 +102,14 @@ def _delete_leftover(path: Path) -> None:
         fd = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
         try:
             if stat.S_ISREG(os.fstat(fd).st_mode):
-                fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                _lock(fd, waits=False)
                 path.unlink()
         finally:
             os.close(fd)
+
+
+def _lock(fd: int, *, waits: bool = True) -> None:
+    # Imported here: a system without it has no locks, and can still read.
+    import fcntl
+
+    fcntl.flock(fd, fcntl.LOCK_EX if waits else fcntl.LOCK_EX | fcntl.LOCK_NB)

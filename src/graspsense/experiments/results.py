@@ -130,7 +130,7 @@ class Results:
         try:
             (self.folder / RESULTS).mkdir(parents=True, exist_ok=True)
             (self.folder / PIPELINES).mkdir(exist_ok=True)
-            lock = os.open(self.folder / LOCK, os.O_RDWR | os.O_CREAT, 0o644)
+            lock = os.open(self.folder / LOCK, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o644)
         except OSError as error:
             raise SaveFailed(
                 f"cannot write to {self.folder}: {error.strerror}. Name another --out"

@@ -155,6 +155,10 @@ def _complete(store: Store, part: Path) -> Recovered:
         if not len(grasp):
             part.rename(part.with_name(path.name + CUT))
             return Recovered(file=part, what="empty", why=grasp.damage or "it has no tick")
+        if grasp.complete and path.exists():
+            return Recovered(
+                file=part, what="failed", why=f"there is a {path.name} too: move one of them away"
+            )
         if grasp.complete:
             with part.open("rb") as file:
                 os.fsync(file.fileno())

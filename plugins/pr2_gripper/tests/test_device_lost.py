@@ -1,0 +1,87 @@
+"""The device is lost at a random moment of a grasp: the motor is off within 0.1 s of the device's time, every time."""
+
+from __future__ import annotations
+
+import math
+import os
+import random
+from collections import Counter
+from typing import Any
+
+import pytest
+
+from graspsense.core.runner import run_grasp
+from graspsense.plugin_api import Outcome, Phase, RunConfig, create
+from graspsense_pr2_gripper.backend import Pr2Backend
+from graspsense_pr2_gripper.config import FaultConfig, Pr2Config
+from graspsense_pr2_gripper.faults import Wire
+
+FAULTS = int(os.environ.get("GRASPSENSE_DEVICE_FAULTS", "240"))
+CONTROLLERS = ("hybrid", "force", "velocity")
+NEAR: dict[str, Any] = {"object": "can:empty_open", "body_config": {"open_gap_m": 0.075}}
+OFF_WITHIN_S = 0.1
+PHASES = (Phase.OPENING, Phase.TARING, Phase.APPROACH, Phase.SQUEEZE, Phase.HOLD, Phase.RELEASE)
+
+
+class Witness(Wire):
+    """A wire that notes, by the clock of the device, when it was lost and when the motor had an effort last."""
+
+    lost_s = driven_s = math.nan
+
+    def step(self) -> list[bytes]:
+        arriving = super().step()
+        now_us = self.firmware.time_us
+        if (self.unplugged or self._stalled(now_us)) and math.isnan(self.lost_s):
+            self.lost_s = now_us / 1e6
+        if self.firmware.effort_un:
+            self.driven_s = now_us / 1e6
+        return arriving
+
+
+@pytest.fixture
+def witnesses(monkeypatch: pytest.MonkeyPatch) -> list[Witness]:
+    """The wires of the grasps so far, the newest last."""
+    made: list[Witness] = []
+
+    def wire(*given: Any) -> Witness:
+        made.append(Witness(*given))
+        return made[-1]
+
+    monkeypatch.setattr("graspsense_pr2_gripper.emulation.Wire", wire)
+    return made
+
+
+def grasp(controller: str, faults: FaultConfig) -> Any:
+    backend = Pr2Backend(Pr2Config(transport="emulated", faults=faults, **NEAR))
+    return run_grasp(backend, create("controller", controller), RunConfig(seed=1))
+
+
+@pytest.mark.slow
+def test_the_motor_is_off_within_a_tenth_of_a_second_of_losing_the_device(witnesses: list[Witness]) -> None:
+    """Pulled or stalled for good, in every phase, under each controller; as many faults as are asked for."""
+    chance = random.Random(5)
+    lost: Counter[Phase] = Counter()
+    driven = 0
+    last_s = {}
+    for controller in CONTROLLERS:
+        grasp(controller, FaultConfig())
+        last_s[controller] = witnesses[-1].firmware.time_us / 1e6
+    for _ in range(2 * FAULTS):
+        controller = chance.choice(CONTROLLERS)
+        at_s = chance.uniform(0.001, last_s[controller])
+        pulled = chance.random() < 0.5
+        faults = FaultConfig(unplug_at_s=at_s) if pulled else FaultConfig(stall_at_s=at_s, stall_s=1e6)
+        ended = grasp(controller, faults)
+        witness = witnesses[-1]
+        assert witness.firmware.effort_un == 0
+        if math.isnan(witness.lost_s):
+            continue  # the grasp was over before
+        assert ended.outcome is Outcome.DEVICE_LOST, (controller, at_s)
+        assert not witness.driven_s - witness.lost_s > OFF_WITHIN_S, (controller, at_s)
+        driven += witness.driven_s >= witness.lost_s
+        lost[ended.events[-1].phase if ended.events else Phase.OPENING] += 1
+        if lost.total() == FAULTS:
+            break
+    assert lost.total() == FAULTS
+    assert driven >= FAULTS // 4, "it was driven when it was lost"
+    assert all(lost[phase] >= FAULTS // 100 for phase in PHASES), lost
