@@ -1000,4 +1000,12 @@ class Crashing(Nearest):
         super().from_json(model)
 
 
+@mutant("classifier", "a-damaged-model-raises-a-documented-error", "on a model that was changed at")
+class Trusting(Nearest):
+    def from_json(self, model):
+        super().from_json(model)
+        if not all(isinstance(number, float) for number in self._model["mean"]):
+            raise ZeroDivisionError("mean")
+
+
 __all__ = ["MUTANTS", "STEADY", "ClassifierConfig", "Features", "LawConfig", "Mutant", "PeakConfig"]

@@ -301,7 +301,7 @@ def checkpoint_model(whole: Model, after_s: float, part: Model) -> Model:
 
 def _part_from_json(whole: Model, component: Component, config: Any, kept: StoredValues) -> Model:
     """Return the model of a checkpoint. Raises DataDamaged."""
-    classifier = _classifier_from(kept, component, config, whole.names, whole.units)
+    classifier = classifier_from(kept, component, config, whole.names, whole.units)
     by_label = kept.table("by_label")
     part = evolve(
         whole,
@@ -330,7 +330,7 @@ def _checkpoints_from(
     return tuple(zip(times, parts, strict=True))
 
 
-def _classifier_from(
+def classifier_from(
     stored: StoredValues, component: Component, config: Any, names: tuple[str, ...], units: tuple[str, ...]
 ) -> Classifier[Any]:
     """Return the classifier in `model`, which answers a trial with these features. Raises DataDamaged.
@@ -507,7 +507,7 @@ def _restored(stored: StoredValues, name: str, plugins: Plugins, component: Comp
         )
     settings, config = _settings_from(stored, component)
     names, units = stored.features("features")
-    classifier = _classifier_from(stored, component, config, names, units)
+    classifier = classifier_from(stored, component, config, names, units)
     model = Model(
         name=name,
         component=made_by,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import random
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
@@ -14,11 +15,15 @@ from graspsense.core.errors import DataDamaged, named
 from graspsense.core.features import FeatureTable, Prediction
 from graspsense.testing import component
 from graspsense.testing.checks import CheckFailed, checks_of, demand
+from graspsense.testing.damage import damaged_at, paths
 from graspsense.testing.samples import sample_table
 from graspsense.testing.subject import Subject
 
 SEED: Final = 11
 LEAST_RIGHT: Final = 0.9
+MOST_PLACES: Final = 40
+"""Number of values of a model that are changed, chosen at random."""
+DAMAGES_EACH: Final = 4
 
 
 def _fitted(subject: Subject, table: FeatureTable, labels: Sequence[str]) -> Any:
@@ -271,6 +276,27 @@ def refuses_an_invalid_model(subject: Subject) -> None:
         )
 
 
+def a_damaged_model_raises_a_documented_error(subject: Subject) -> None:
+    """`from_json` raises nothing but KeyError, TypeError, ValueError or DataDamaged on values that were changed."""
+    good = _json(_learned(subject)[0])
+    rng = random.Random(SEED)
+    places = list(paths(good))
+    for place in rng.sample(places, min(len(places), MOST_PLACES)):
+        for damaged in rng.sample(list(damaged_at(good, place)), DAMAGES_EACH):
+            if not isinstance(damaged, dict):
+                continue
+            try:
+                subject.create().from_json(damaged)
+            except (KeyError, TypeError, ValueError, DataDamaged):
+                continue
+            except Exception as error:
+                raise CheckFailed(
+                    f"from_json raised {named(error)} on a model that was changed at "
+                    f"{'.'.join(map(str, place))}: read it by graspsense.plugin_api.StoredValues, which checks types, "
+                    "ranges and sizes before anything is made of them"
+                ) from error
+
+
 def _vital(subject: Subject, good: Mapping[str, Any]) -> list[str]:
     """Return the key with the largest content, without which a model is invalid."""
     del subject
@@ -293,5 +319,6 @@ CHECKS: Final = (
         explains_its_predictions,
         does_not_change_the_table,
         refuses_an_invalid_model,
+        a_damaged_model_raises_a_documented_error,
     ),
 )

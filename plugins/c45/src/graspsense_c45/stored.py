@@ -106,25 +106,24 @@ def _schema(document: dict[str, Any]) -> Schema:
         place = f"attributes.{k}"
         name, unit, values = kept["name"], kept["unit"], kept["values"]
         if values is not None:
-            values = _distinct(_list(values, f"{place}.values"), f"{place}.values", (str,))
+            values = _distinct(_list(values, f"{place}.values"), f"{place}.values: a value", (str,))
         if not isinstance(name, str) or not isinstance(unit, str):
             raise TypeError(f"{place}: name and unit must be text")
         attributes.append(Attribute(name, unit, values))
-    _distinct([attribute.name for attribute in attributes], "attributes", (str,))
+    _distinct([attribute.name for attribute in attributes], "attributes: a name", (str,))
     classes = _list(document["classes"], "classes")
     if not classes:
         raise ValueError("classes is empty")
-    return Schema(tuple(attributes), _distinct(classes, "classes", (str, int, float, bool)))
+    return Schema(tuple(attributes), _distinct(classes, "classes: a class label", (str, int, float, bool)))
 
 
 def _distinct(items: Sequence[Any], place: str, kinds: tuple[type, ...]) -> tuple[Any, ...]:
     for item in items:
         if type(item) not in kinds or (isinstance(item, float) and not np.isfinite(item)):
-            raise TypeError(
-                f"{place} holds {item!r:.40}; expected {' or '.join(kind.__name__ for kind in kinds)}"
-            )
+            allowed = " or ".join(kind.__name__ for kind in kinds)
+            raise TypeError(f"{place} is {item!r:.40}; it must be {allowed}")
     if len(set(items)) < len(items):
-        raise ValueError(f"{place} holds a value twice")
+        raise ValueError(f"{place} is there twice")
     return tuple(items)
 
 
@@ -132,7 +131,7 @@ def _list(items: Any, place: str, length: int | None = None) -> list[Any]:
     if not isinstance(items, list):
         raise TypeError(f"{place} must be a list")
     if length is not None and len(items) != length:
-        raise ValueError(f"{place} has the length {len(items)}; it must be {length}")
+        raise ValueError(f"{place} differ in length: {len(items)} entries, and {length} are needed")
     return items
 
 

@@ -1,0 +1,316 @@
+"""Models are data: whatever a model file says, it is refused as damaged, or answers, in bounded time and memory."""
+
+from __future__ import annotations
+
+import base64
+import copy
+import json
+import math
+import subprocess
+import sys
+from io import BytesIO
+from pathlib import Path
+from zipfile import ZIP_DEFLATED, ZIP_STORED, ZipFile
+
+import numpy as np
+import parts
+import pytest
+from attrs import evolve
+from parts import Nearest
+from test_classifiers import trials
+
+from graspsense.core.conformal import LabelThreshold, PredictionSets
+from graspsense.core.errors import DataDamaged
+from graspsense.core.labelled import Labelled
+from graspsense.core.model import checkpoint_model, classifier_from, load_model, train, write_model
+from graspsense.core.model_content import digest
+from graspsense.core.plugins import Component, installed
+from graspsense.core.stored_values import StoredValues
+from graspsense.plugin_api import create
+from graspsense.regression.model import is_regression
+
+SMALL = {
+    "forest": {"trees": 3},
+    "boosted": {"stages": 3},
+    "mlp": {"hidden": 3},
+    "backprop": {"epochs": 5},
+    "ebm": {"bags": 1, "pairs": 1},
+}
+KINDS = ["c45", "svm", "mlp", "backprop", "forest", "boosted", "ebm", "knn", "tree"]
+KEPT_AS_SKOPS = ["svm", "mlp", "forest", "tree"]
+
+
+def labelled(n=5):
+    table, labels = trials(n=n)
+    return Labelled(source="a test", table=table, labels=tuple(labels), provenance={"simulated": True})
+
+
+def trained(name, **config):
+    """A model with everything that a file can have: prediction sets, a temperature and a checkpoint."""
+    component = installed().find("classifier", name)
+    settings = create("classifier", name, **{**SMALL.get(name, {}), **config}).config
+    provenance = {"settings": {"controller": {"type": "hybrid", "probing_force_n": 20.0}}}
+    model = train(component, settings, labelled(), name="m", seed=4, provenance=provenance)
+    thresholds = {label: LabelThreshold(score=0.1, units=9, own=True) for label in model.classifier.classes()}
+    sets = PredictionSets(coverage=0.9, unit="trials", thresholds=thresholds, unknown=1, trials=15)
+    model = evolve(model, sets=sets, temperature=1.5)
+    return evolve(model, checkpoints=((0.2, checkpoint_model(model, 0.2, model)),))
+
+
+def read_damaged(seed, places, damages, *files):
+    """Run `damaged_models.py` on these files, and return how many damages it read."""
+    script = Path(__file__).with_name("damaged_models.py")
+    done = subprocess.run(
+        [sys.executable, script, str(seed), str(places), str(damages), *map(str, files)],
+        capture_output=True,
+        text=True,
+    )
+    assert done.stdout.startswith("ok "), done.stderr[-3000:]
+    return int(done.stdout.split()[1])
+
+
+def resealed(path, change):
+    """Change the content of a model, and give it the hash of the changed one."""
+    content = json.loads(path.read_text())
+    change(content)
+    content.pop("sha256")
+    path.write_text(json.dumps({**content, "sha256": digest(content)}))
+
+
+def test_a_damaged_model_is_refused_or_answers(tmp_path):
+    files = [tmp_path / f"{name}.json" for name in KINDS]
+    for name, file in zip(KINDS, files, strict=True):
+        write_model(file, trained(name))
+    assert read_damaged(1, 3, 8, *files) == 9 * 3 * 8
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", KINDS)
+def test_every_damage_of_a_model_is_refused_or_answers(tmp_path, name):
+    write_model(tmp_path / "m.json", trained(name))
+    assert read_damaged(0, 0, 0, tmp_path / "m.json") > 2000
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", KEPT_AS_SKOPS)
+def test_every_damage_of_a_model_kept_as_skops_is_refused_or_answers(tmp_path, name):
+    pytest.importorskip("skops", reason="the extra 'skops' is not installed")
+    write_model(tmp_path / "m.json", trained(name, kept_as="skops"))
+    assert read_damaged(0, 0, 0, tmp_path / "m.json") > 1000
+
+
+@pytest.mark.parametrize(
+    ("name", "setting", "value"),
+    [
+        ("mlp", "hidden", 10**9),
+        ("backprop", "hidden", 10**9),
+        ("backprop", "epochs", 10**12),
+        ("backprop", "epochs", 10**5),
+        ("forest", "trees", 10**9),
+        ("boosted", "stages", 10**9),
+        ("boosted", "stages", 10**4),
+        ("boosted", "depth", 10**6),
+        ("knn", "neighbours", 0),
+        ("svm", "c", 1e300),
+        ("tree", "min_leaf", 10**30),
+        ("c45", "rep_folds", -1),
+        ("c45", "further", 1),
+    ],
+)
+def test_settings_that_would_take_all_memory_or_time_are_refused(tmp_path, name, setting, value):
+    if (name, setting, value) == ("backprop", "epochs", 10**5):
+        changes = {"epochs": 10**5, "hidden": 10**4}
+    else:
+        changes = {setting: value}
+    path = tmp_path / "m.json"
+    write_model(path, trained(name))
+    resealed(path, lambda content: content["settings"].update(changes))
+    with pytest.raises(DataDamaged, match=r"is damaged: (settings\.|model: .*with these settings)"):
+        load_model(str(path), installed())
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("[" * 100_000 + "]" * 100_000, "nested too deeply"),
+        ('{"format": "graspsense model", "a": ' + "[" * 400 + "]" * 400 + "}", "nested too deeply"),
+        ('{"format": "graspsense model", "format": "graspsense model"}', "is there twice"),
+        ('{"a": NaN}', "not a finite number"),
+        ('{"a": 1e400}', "not a finite number"),
+        ('{"a": ' + "9" * 200 + "}", "200 digits"),
+        ('{"a": "\\ud800"}', "is not JSON"),
+    ],
+)
+def test_what_is_no_strict_json_is_refused(tmp_path, text, says):
+    (tmp_path / "m.json").write_text(text)
+    with pytest.raises(DataDamaged, match=says):
+        load_model(str(tmp_path / "m.json"), installed())
+    assert not is_regression(str(tmp_path / "m.json"))
+
+
+@pytest.mark.parametrize(
+    ("place", "value"),
+    [
+        ("provenance.simulated", 1),
+        ("provenance.settings.controller", [1]),
+        ("provenance.after_contact_s", 0.1),
+        ("sets.coverage", 0.999_999_999),
+        ("sets.thresholds.bottle:empty", [0.1, 9]),
+        ("sets.thresholds.bottle:empty", [0.1, 9, 1]),
+        ("sets.unknown", 16),
+        ("temperature", 1e-300),
+        ("unknown.spread", [1.0, 1.0]),
+        ("unknown.spread", [1.0, -1.0, 1.0]),
+        ("unknown.ranges.bottle:empty", [[1.0, 1.0, 1.0], [0.0, 2.0, 2.0]]),
+        ("features", [["p_first", "m"], ["p_first", "m"], ["noise", ""]]),
+        ("model.nodes.n_children", [4_294_967_298] + [0] * 4),
+        ("checkpoints.0.after_contact_s", -1.0),
+        ("checkpoints.0.trials", 1.5),
+        ("checkpoints.0.model", {}),
+    ],
+)
+def test_a_value_that_does_not_fit_is_refused_by_the_name_of_its_field(tmp_path, place, value):
+    path = tmp_path / "m.json"
+    write_model(path, trained("c45"))
+
+    def change(content):
+        *tables, key = place.split(".")
+        for step in tables:
+            content = content[int(step) if step.isdigit() else step]
+        content[key] = value
+
+    resealed(path, change)
+    with pytest.raises(DataDamaged) as refused:
+        load_model(str(path), installed())
+    assert place.removesuffix(".bottle:empty") in str(refused.value).replace(": nodes", ".nodes").replace(
+        "model: StoredTreeError: damaged stored tree", "model"
+    )
+
+
+class Wayward(Nearest):
+    """Raises what its contract does not allow, and then gives what is no probability."""
+
+    def from_json(self, model):
+        super().from_json(model)
+        if model["mean"][0] == "raise":
+            raise ZeroDivisionError("mean")
+
+
+@pytest.mark.parametrize("mean", [["raise", 0.0, 0.0], ["x", 0.0, 0.0], [0.0, 0.0]])
+def test_whatever_a_classifier_raises_on_a_file_is_damage_of_the_file(mean):
+    entry = evolve(parts.ENTRIES["classifier"], target="test_damaged_models:Wayward")
+    component = Component(entry, "graspsense-test", "0.1", "classifier")
+    model = train(component, component.config_class()(), labelled(), name="m")
+    kept = model.as_json()
+    kept["model"] = {**kept["model"], "mean": mean}
+    with pytest.raises(DataDamaged):
+        classifier_from(StoredValues(kept), component, component.config_class()(), model.names, model.units)
+
+
+class TestKeptAsSkops:
+    """The compiled code of scikit-learn trusts its arrays; each that does not fit is refused before it is used."""
+
+    @pytest.fixture(autouse=True)
+    def _skops(self):
+        pytest.importorskip("skops", reason="the extra 'skops' is not installed")
+
+    @staticmethod
+    def refused(tmp_path, name, change):
+        from graspsense.plugins.classifiers.skops_text import as_text
+
+        path = tmp_path / "m.json"
+        model = trained(name, kept_as="skops")
+        write_model(path, model)
+        estimator = copy.deepcopy(model.classifier._fitted.estimator)
+        change(estimator)
+        resealed(path, lambda content: content["model"].update(skops=as_text(estimator)))
+        with pytest.raises(DataDamaged, match=r"model\.skops"):
+            load_model(str(path), installed())
+
+    @pytest.mark.parametrize(
+        ("attribute", "change"),
+        [
+            ("support_vectors_", lambda values: values[:-1]),
+            ("support_vectors_", lambda values: values[:, :2].copy()),
+            ("support_vectors_", lambda values: np.full_like(values, np.nan)),
+            ("support_", lambda values: values[:-1]),
+            ("support_", lambda values: values.astype(np.int64)),
+            ("_n_support", lambda values: values + 1000),
+            ("_n_support", lambda values: values - 2),
+            ("_n_support", lambda values: np.concatenate((values, [0])).astype(np.int32)),
+            ("_dual_coef_", lambda values: values[:, :-1].copy()),
+            ("_dual_coef_", lambda values: np.full_like(values, np.inf)),
+            ("dual_coef_", lambda values: values[:1]),
+            ("_intercept_", lambda values: values[:1]),
+            ("_probA", lambda values: np.ones(3)),
+            ("classes_", lambda values: values[:2]),
+            ("classes_", lambda values: np.array(["a", "a", "a"])),
+            ("_gamma", lambda value: math.nan),
+            ("kernel", lambda value: "poly"),
+            ("decision_function_shape", lambda value: "ovo"),
+            ("shape_fit_", lambda value: (3, 10**9)),
+        ],
+    )
+    def test_a_machine(self, tmp_path, attribute, change):
+        def damage(estimator):
+            setattr(estimator, attribute, change(getattr(estimator, attribute)))
+
+        self.refused(tmp_path, "svm", damage)
+
+    @pytest.mark.parametrize(
+        "change",
+        [
+            lambda network: network.coefs_.pop(),
+            lambda network: network.coefs_.__setitem__(0, network.coefs_[0][:1]),
+            lambda network: network.intercepts_.__setitem__(1, network.intercepts_[1][:1]),
+            lambda network: network.coefs_.__setitem__(0, np.full_like(network.coefs_[0], 1e308)),
+            lambda network: setattr(network, "n_layers_", 10**9),
+            lambda network: setattr(network, "out_activation_", "identity"),
+            lambda network: setattr(network, "hidden_layer_sizes", (10**9,)),
+        ],
+    )
+    def test_a_network(self, tmp_path, change):
+        self.refused(tmp_path, "mlp", change)
+
+    @pytest.mark.parametrize(
+        ("column", "row", "value"),
+        [
+            ("left_child", 0, 10**6),
+            ("left_child", 1, 0),
+            ("right_child", 0, 1),
+            ("feature", 0, 3),
+            ("feature", 0, -7),
+            ("threshold", 0, math.nan),
+            ("n_node_samples", 0, 0),
+        ],
+    )
+    @pytest.mark.parametrize("name", ["tree", "forest"])
+    def test_a_tree(self, tmp_path, name, column, row, value):
+        def damage(estimator):
+            tree = estimator.estimators_[1].tree_ if name == "forest" else estimator.tree_
+            state = tree.__getstate__()
+            state["nodes"][column][row] = value
+            tree.__setstate__(state)
+
+        self.refused(tmp_path, name, damage)
+
+    def test_a_forest_of_other_trees(self, tmp_path):
+        self.refused(tmp_path, "forest", lambda forest: forest.estimators_.pop())
+        self.refused(tmp_path, "forest", lambda forest: setattr(forest, "n_jobs", 10**6))
+
+    def test_an_archive_that_is_larger_than_it_looks(self, tmp_path):
+        model = trained("tree", kept_as="skops")
+        path = tmp_path / "m.json"
+        for compression, name in ((ZIP_DEFLATED, "x.npy"), (ZIP_STORED, "x.npy")):
+            data = BytesIO()
+            with ZipFile(data, "w", compression) as archive:
+                header = BytesIO()
+                np.lib.format.write_array_header_1_0(
+                    header, {"descr": "<f8", "fortran_order": False, "shape": (10**12,)}
+                )
+                archive.writestr(name, header.getvalue())
+            write_model(path, model)
+            text = base64.b64encode(data.getvalue()).decode()
+            resealed(path, lambda content, text=text: content["model"].update(skops=text))
+            with pytest.raises(DataDamaged, match=r"compressed|not as long as it says"):
+                load_model(str(path), installed())
