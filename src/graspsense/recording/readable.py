@@ -60,6 +60,8 @@ def is_mistake(error: Exception) -> bool:
 
 def not_opened(source: str | Path, error: OSError) -> ConfigError:
     """Return the error for a file that the operating system does not let us read."""
+    if error.errno == errno.ENOENT:
+        return ConfigError(f"{source} cannot be read: there is no file of this name")
     if error.errno in _OF_THE_DISK:
         return ConfigError(
             f"{source} cannot be read: the disk or its connection reports an error ({error.strerror}). The file itself "
