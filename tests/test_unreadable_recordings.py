@@ -249,8 +249,10 @@ def test_of_a_store(tmp_path, capsys):
     problems = verify_store(folder).problems
     for number in (2, 3, 4, 6):
         assert any(one.startswith(f"trial {number}:") for one in problems)
-    code, _, err = run(capsys, "report", folder, "--out", tmp_path / "page.html")
+    code, _, err = run(capsys, "report", folder, "--out", tmp_path / "page")
     assert code == 0, err
+    (page,) = (tmp_path / "page").glob("*.html")
+    assert "recordings cannot be read and are left out" in page.read_text()
 
 
 def test_of_icub(tmp_path, capsys):
