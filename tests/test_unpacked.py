@@ -306,7 +306,7 @@ def test_mat(tmp_path, monkeypatch):
     monkeypatch.setenv(LIMIT_VARIABLE, "100")
     # A variable of version 4 that says 10^9 rows.
     path.write_bytes(struct.pack("<IIIII", 0, 10**9, 1, 0, 2) + b"t\0" + bytes(80))
-    with pytest.raises(TooLarge, match=r"a\.mat"):
+    with pytest.raises(DataDamaged, match=r"a\.mat"):
         read_mat(path)
 
 
