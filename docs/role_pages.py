@@ -147,6 +147,11 @@ def dataset_page() -> str:
             "`graspsense plugins new NAME --role dataset` creates a package to start from: the example below. The hook "
             f"[graspsense_datasets](../hooks.md{_dataset_anchor()}) declares readers.",
             "",
+            "A reader that raises an exception ends its data set: the recordings before are used, and the error is "
+            "told. `each_readable` reads one file, and yields an `UnreadableRecording` in its place if that fails, so "
+            "that the reader goes on with the next one. Whatever the file makes a library raise becomes an error that "
+            "names the file.",
+            "",
             "## LabelledRecording",
             "",
             f"    {_fields_signature(LabelledRecording)}",

@@ -11,15 +11,18 @@ import zipfile
 
 import numpy as np
 import pytest
+from attrs import evolve
 from kept import ended, frame, keep
 
 from graspsense.cli.main import main
-from graspsense.core.errors import ConfigError, DataDamaged, TooLarge
-from graspsense.core.signals import EFFORT
-from graspsense.recording.labelled_recording import UnreadableRecording
+from graspsense.core.errors import ComponentFailed, ConfigError, DataDamaged, TooLarge
+from graspsense.core.plugins.registry import STRICT_VARIABLE
+from graspsense.core.signals import EFFORT, NO_PADS, Reading
+from graspsense.recording.labelled_recording import LabelledRecording, UnreadableRecording
 from graspsense.recording.layout import RESULT, START, TICK
 from graspsense.recording.readable import each_readable, readable
 from graspsense.recording.reader import read_recorded
+from graspsense.recording.replayable import Recording
 from graspsense.recording.writer import RecordingWriter
 from graspsense.sources.dataset_recordings import readable_or_not
 from graspsense.sources.replay import read_named
@@ -246,8 +249,10 @@ def test_of_a_store(tmp_path, capsys):
     problems = verify_store(folder).problems
     for number in (2, 3, 4, 6):
         assert any(one.startswith(f"trial {number}:") for one in problems)
-    code, _, err = run(capsys, "report", folder, "--out", tmp_path / "page.html")
+    code, _, err = run(capsys, "report", folder, "--out", tmp_path / "page")
     assert code == 0, err
+    (page,) = (tmp_path / "page").glob("*.html")
+    assert "recordings cannot be read and are left out" in page.read_text()
 
 
 def test_of_icub(tmp_path, capsys):
@@ -279,3 +284,63 @@ def test_what_is_ours_passes_through_and_what_is_not_is_named():
         assert told.value is error
     with pytest.raises(KeyboardInterrupt):
         list(each_readable("a.file", lambda: (_ for _ in ()).throw(KeyboardInterrupt)))
+
+
+def dataset_of(reader, monkeypatch):
+    """Install a data set `lab` whose reader is this function."""
+
+    class Dataset:
+        qualified = "lab-data/lab"
+
+        def recordings(self):
+            return reader
+
+    class Plugins:
+        def dataset(self, name):
+            assert name == "lab"
+            return Dataset()
+
+    monkeypatch.setattr("graspsense.sources.dataset_recordings.installed", Plugins)
+
+
+def grasps(number):
+    """Return recordings with a frame each; the third has none, the fourth has a time that is no number."""
+    recording = Recording(name="r", readings=(Reading(frame(0), NO_PADS, ()),), rate_hz=10.0)
+    for k in range(number):
+        readings = recording.readings if k != 2 else ()
+        if k == 3:
+            readings = (Reading(frame(0)._replace(t_s=float("nan")), NO_PADS, ()),)
+        yield LabelledRecording(recording=evolve(recording, readings=readings), source=f"r{k}", label="can")
+
+
+def test_of_a_plugin(monkeypatch):
+    def fails_after_five(place):
+        yield from grasps(5)
+        raise ZeroDivisionError("no scale")
+
+    dataset_of(fails_after_five, monkeypatch)
+    found = list(readable_or_not("lab", "place"))
+    assert [isinstance(one, UnreadableRecording) for one in found] == [False, False, True, True, False, True]
+    assert "no frames" in found[2].line
+    assert "time" in found[3].line
+    assert re.search(r"behind recording 5.*lab-data/lab failed.*ZeroDivisionError: no scale", found[5].line)
+
+    def fails_at_once(place):
+        raise ZeroDivisionError("no scale")
+        yield
+
+    dataset_of(fails_at_once, monkeypatch)
+    with pytest.raises(ComponentFailed, match="ZeroDivisionError"):
+        list(readable_or_not("lab", "place"))
+
+
+def test_a_mistake_in_a_reader_is_raised_where_plugins_are_strict(monkeypatch):
+    def wrong(place):
+        yield from each_readable("a.file", lambda: [undefined])  # noqa: F821
+
+    dataset_of(wrong, monkeypatch)
+    (found,) = readable_or_not("lab", "place")
+    assert "NameError" in found.line
+    monkeypatch.setenv(STRICT_VARIABLE, "1")
+    with pytest.raises(NameError):
+        list(readable_or_not("lab", "place"))

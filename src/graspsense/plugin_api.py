@@ -156,7 +156,8 @@ _TABLE: Final[Table] = {
     },
     "Data sets": {
         "labelled": ("ControlFeatures", "Labelled"),
-        "recording.labelled_recording": ("LabelledRecording",),
+        "recording.labelled_recording": ("LabelledRecording", "UnreadableRecording"),
+        "recording.readable": ("each_readable",),
         "recording.replayable": ("Recording",),
         "sources.grasp_columns": ("GraspColumns", "checked_recording"),
     },

@@ -169,6 +169,8 @@ from graspsense.core.tree import TreeNode as TreeNode
 from graspsense.core.labelled import ControlFeatures as ControlFeatures
 from graspsense.core.labelled import Labelled as Labelled
 from graspsense.recording.labelled_recording import LabelledRecording as LabelledRecording
+from graspsense.recording.labelled_recording import UnreadableRecording as UnreadableRecording
+from graspsense.recording.readable import each_readable as each_readable
 from graspsense.recording.replayable import Recording as Recording
 from graspsense.sources.grasp_columns import GraspColumns as GraspColumns
 from graspsense.sources.grasp_columns import checked_recording as checked_recording

@@ -7,16 +7,20 @@ key. This is the one place where such an exception gets its meaning.
 from __future__ import annotations
 
 import errno
+import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Final, TypeVar
 
 from graspsense.core.errors import ConfigError, DataDamaged, GraspsenseError, TooLarge, named
+from graspsense.core.plugins.registry import STRICT_VARIABLE
 from graspsense.recording.labelled_recording import UnreadableRecording
 from graspsense.recording.unpacked import limit_words
 
 T = TypeVar("T")
+_OF_A_PROGRAM: Final = (NameError, AttributeError, AssertionError, ImportError, NotImplementedError)
+"""What is more often a mistake in a reader than in a file."""
 _OF_THE_DISK: Final = frozenset(
     {errno.EIO, errno.ENXIO, errno.ENODEV, errno.ESTALE, errno.ETIMEDOUT, errno.EREMOTEIO}
 )
@@ -30,7 +34,7 @@ def readable(source: str | Path, kind: str = "", advice: str = "") -> Iterator[N
 
     `kind` is what it should be, as in `a ROS bag`, and `advice` what to do if it is not. Raises ConfigError if the file
     cannot be opened or its disk fails, TooLarge if the memory does not suffice, and DataDamaged for everything else.
-    Errors of ours, and Ctrl-C, pass through.
+    Errors of ours, Ctrl-C, and what `is_mistake` pass through.
     """
     damage = f"{source} cannot be read{f' as {kind}' if kind else ''}"
     try:
@@ -44,11 +48,20 @@ def readable(source: str | Path, kind: str = "", advice: str = "") -> Iterator[N
             raise DataDamaged(f"{damage}: {named(error)}{advice}") from error
         raise not_opened(source, error) from error
     except Exception as error:
+        if is_mistake(error):
+            raise
         raise DataDamaged(f"{damage}: {named(error)}{advice}") from error
+
+
+def is_mistake(error: Exception) -> bool:
+    """Return whether an error is that of a reader in development: a mistake in a program, where plugins are strict."""
+    return isinstance(error, _OF_A_PROGRAM) and os.environ.get(STRICT_VARIABLE) == "1"
 
 
 def not_opened(source: str | Path, error: OSError) -> ConfigError:
     """Return the error for a file that the operating system does not let us read."""
+    if error.errno == errno.ENOENT:
+        return ConfigError(f"{source} cannot be read: there is no file of this name")
     if error.errno in _OF_THE_DISK:
         return ConfigError(
             f"{source} cannot be read: the disk or its connection reports an error ({error.strerror}). The file itself "

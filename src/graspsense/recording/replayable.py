@@ -10,6 +10,7 @@ from typing import Final
 
 from attrs import field, frozen
 
+from graspsense.core.channels import declared_shape, further, shape_of
 from graspsense.core.entries import Channel
 from graspsense.core.errors import DataDamaged
 from graspsense.core.signals import Frame, Reading
@@ -41,9 +42,20 @@ def check_recording(recording: Recording) -> None:
     """Raise DataDamaged if a recording has nothing to replay, or what no gripper can have measured."""
     if not recording.readings:
         raise DataDamaged(f"{recording.name} has no frames")
-    width = len(Frame._fields)
-    if any(len(reading.frame) != width for reading in recording.readings):
-        raise DataDamaged(f"{recording.name}: a frame has other fields than {', '.join(Frame._fields)}")
+    cells = len(recording.readings[0].pads.left)
+    further_channels = further(recording.channels)
+    shapes = [declared_shape(channel) for channel in further_channels]
+    pads, signals = struct.Struct(f"<{2 * cells}d"), None
+    for k, (frame, image, values) in enumerate(recording.readings, 1):
+        try:
+            _FRAME.pack(*frame)
+            pads.pack(*image.left, *image.right)
+        except (struct.error, TypeError, OverflowError) as error:
+            raise DataDamaged(f"{recording.name}: frame {k} is not one of a gripper: {error}") from None
+        if values is not signals and [shape_of(value) for value in values] != shapes:
+            names = ", ".join(channel.name for channel in further_channels) or "none"
+            raise DataDamaged(f"{recording.name}: frame {k} has other values than its channels ({names})")
+        signals = values
     if not all(math.isfinite(reading.frame.t_s) for reading in recording.readings):
         raise DataDamaged(f"{recording.name}: the time of a frame is not a number")
     if not 0.0 < recording.rate_hz < math.inf:

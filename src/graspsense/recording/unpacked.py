@@ -64,7 +64,7 @@ class Unpacked:
         self.total += size
 
     def unpack(self, compression: str, data: bytes) -> bytes:
-        """Return what compressed data holds; `compression` is `zstd`, `lz4`, `bz2` or empty.
+        """Return what compressed data holds; `compression` is `zstd`, `lz4`, `bz2`, `zlib` or empty.
 
         Raises TooLarge, ValueError, and what the library raises on damaged data.
         """
@@ -78,13 +78,6 @@ class Unpacked:
             parts.append(part)
         return b"".join(parts)
 
-    def count_zlib(self, data: bytes) -> None:
-        """Count what zlib makes of this, without keeping it. Raises TooLarge, zlib.error."""
-        stream = zlib.decompressobj()
-        while data and not stream.eof:
-            self.add(len(stream.decompress(data, _PIECE)))
-            data = stream.unconsumed_tail
-
 
 def _pieces_of(decompressor: Any, data: bytes) -> Iterator[bytes]:
     """Yield what a decompressor of the kind of the module bz2 makes of the data."""
@@ -93,6 +86,16 @@ def _pieces_of(decompressor: Any, data: bytes) -> Iterator[bytes]:
         if not part and not data and decompressor.needs_input:
             raise ValueError("the compressed data ends early")
         data = b""
+        yield part
+
+
+def _pieces_of_zlib(data: bytes) -> Iterator[bytes]:
+    stream = zlib.decompressobj()
+    while not stream.eof:
+        part = stream.decompress(data, _PIECE)
+        data = stream.unconsumed_tail
+        if not part and not data:
+            raise ValueError("the compressed data ends early")
         yield part
 
 
@@ -107,6 +110,7 @@ def _pieces_of_zstd(data: bytes) -> Iterator[bytes]:
 
 
 _PIECES: Final[Mapping[str, Callable[[bytes], Iterator[bytes]]]] = {
+    "zlib": _pieces_of_zlib,
     "zstd": _pieces_of_zstd,
     "lz4": lambda data: _pieces_of(lz4.frame.LZ4FrameDecompressor(), data),
     "bz2": lambda data: _pieces_of(bz2.BZ2Decompressor(), data),

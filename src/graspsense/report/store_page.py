@@ -11,8 +11,9 @@ from attrs import frozen
 from graspsense.core.config import SelectedComponent, select_component
 from graspsense.core.errors import ConfigError, DataDamaged
 from graspsense.evaluation.evaluate import evaluate
+from graspsense.recording.labelled_recording import UnreadableRecording
 from graspsense.recording.provenance import commit_text
-from graspsense.recording.readable import readable
+from graspsense.recording.readable import note_on, readable
 from graspsense.recording.reader import read_recorded
 from graspsense.report.evaluation_sections import (
     code,
@@ -76,7 +77,7 @@ def store_page(
             raise ConfigError(f"the store in {folder} has no trials yet: graspsense collect --save {folder}")
         trial = _newest_readable(store, listed) if grasp is None else store.trial(grasp)
         counts = _trial_counts(store)
-        curves = _curves(store)
+        curves, unreadable = _curves(store)
         changes = history(store)
     learner = select_component("classifier", classifier)
     labelled, evaluation, problem = None, None, ""
@@ -97,7 +98,7 @@ def store_page(
     sections: list[Section] = []
     if evaluation is not None and labelled is not None:
         sections += _evaluation_sections(evaluation, learner, labelled, classifier, seed)
-    sections += _measurement_sections(trial, curves)
+    sections += _measurement_sections(trial, curves, unreadable)
     if labelled is not None:
         sections.append(_features_section(labelled))
     sections.append(_provenance(folder, listed, trial, counts, changes))
@@ -134,25 +135,27 @@ def _trial_counts(store: Store) -> list[_TrialCount]:
     return [_TrialCount(label, outcome, bool(aside), n) for label, outcome, aside, n in rows]
 
 
-def _curves(store: Store) -> list[GraspCurve]:
-    """Return the newest complete grasps of each label, except those whose recordings cannot be read."""
+def _curves(store: Store) -> tuple[list[GraspCurve], list[UnreadableRecording]]:
+    """Return the newest complete grasps of each label, and those among them whose recordings cannot be read."""
     rows = store.query(
         """SELECT label, id, recording FROM trial
         WHERE complete = 1 AND set_aside IS NULL AND label IS NOT NULL ORDER BY label, id DESC"""
     )
     count: Counter[str] = Counter()
-    curves = []
+    curves: list[GraspCurve] = []
+    unreadable: list[UnreadableRecording] = []
     for label, number, recording in rows:
         if count[label] >= GRASPS:
             continue
         try:
             with readable(f"trial {number} of {store.folder}"):
                 trace = read_recorded(store.recording_path(recording)).trace()
-        except (ConfigError, DataDamaged):
+        except (ConfigError, DataDamaged) as error:
+            unreadable.append(UnreadableRecording(source=f"trial {number}", error=error))
             continue
         count[label] += 1
         curves.append(grasp_curve(trace, label, number))
-    return curves
+    return curves, unreadable
 
 
 def _answer(evaluation: Evaluation | None, total: int, problem: str) -> str:
@@ -214,7 +217,9 @@ def _evaluation_sections(
     return sections
 
 
-def _measurement_sections(trial: StoredTrial, curves: Sequence[GraspCurve]) -> list[Section]:
+def _measurement_sections(
+    trial: StoredTrial, curves: Sequence[GraspCurve], unreadable: Sequence[UnreadableRecording]
+) -> list[Section]:
     """Return one grasp over time with its features, and some grasps of each label drawn over each other."""
     summary = trial.summary
     label = summary.label or "no label"
@@ -238,7 +243,8 @@ def _measurement_sections(trial: StoredTrial, curves: Sequence[GraspCurve]) -> l
         )
     if curves:
         text = f"The newest grasps of each label, at most {GRASPS}, drawn over each other."
-        body = paragraph(text) + traces_by_class(curves)
+        notes = note_on(unreadable, len(curves) + len(unreadable))
+        body = paragraph(text) + traces_by_class(curves) + bullets(notes, "warning")
         sections.append(Section(id="traces", title="Force and gap over time", body=body))
     return sections
 

@@ -11,7 +11,7 @@ from typing import Final
 from graspsense.core.errors import ComponentFailed, ConfigError, GraspsenseError, PluginUnavailable, named
 from graspsense.core.plugins import installed
 from graspsense.recording.labelled_recording import LabelledRecording, UnreadableRecording
-from graspsense.recording.readable import readable
+from graspsense.recording.readable import is_mistake, readable
 from graspsense.recording.replayable import Recording, check_recording
 
 _NUMBERED: Final = re.compile(r"(?P<place>.+)#(?P<number>[1-9]\d{0,8})", re.DOTALL)
@@ -87,6 +87,8 @@ def _failing_as(dataset: str) -> Iterator[None]:
     except (GraspsenseError, MemoryError, OSError):
         raise
     except Exception as error:
+        if is_mistake(error):
+            raise
         raise ComponentFailed(f"the reader of data set {dataset} failed: {named(error)}") from error
 
 

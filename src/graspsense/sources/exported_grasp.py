@@ -48,7 +48,7 @@ def read_exported(name: str) -> Recording:
         arrays = npz_arrays(path)
         refuse_table_of_store(path, arrays)
         declared = str(arrays.get(DECLARED, "no JSON"))
-    foreign = ". If `graspsense export` did not write it, import its arrays by a manifest (docs/import.md)"
+    foreign = ". Arrays of other programs are imported by a manifest (docs/import.md)"
     with readable(path, "a grasp of `graspsense export`", foreign):
         about = json.loads(declared)
         channels = tuple(from_json(one) for one in about["channels"])

@@ -31,7 +31,7 @@ _PIECE: Final = 1 << 20
 
 def npy_array(path: Path) -> NDArray[Any]:
     """Return the array in an NPY file. Raises ConfigError, TooLarge, DataDamaged."""
-    with readable(path):
+    with readable(path, "an NPY file"):
         refuse_devices(path)
         with path.open("rb") as file:
             return _array(file, path.stat().st_size, str(path), Unpacked(path))
@@ -40,7 +40,7 @@ def npy_array(path: Path) -> NDArray[Any]:
 def npz_arrays(path: Path) -> dict[str, NDArray[Any]]:
     """Return the arrays in an NPZ file by their names. Raises ConfigError, TooLarge, DataDamaged."""
     unpacked = Unpacked(path)
-    with readable(path):
+    with readable(path, "an NPZ file"):
         refuse_devices(path)
         with path.open("rb") as opened:
             opened.seek(max(0, path.stat().st_size - _END_BYTES))

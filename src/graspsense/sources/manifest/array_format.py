@@ -2,36 +2,17 @@
 
 from __future__ import annotations
 
-import math
-import struct
 from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
 from graspsense.core.errors import DataDamaged
-from graspsense.recording.readable import readable, refuse_devices
-from graspsense.recording.unpacked import Unpacked
+from graspsense.sources.manifest.mat_file import mat_variables
 from graspsense.sources.manifest.table import ColumnTable, Numbers
 from graspsense.sources.numpy_files import npy_array, npz_arrays
-
-_MAT_HEADER_BYTES: Final = 128
-_COMPRESSED: Final = 15
-"""The type of a compressed element of a MAT file of version 7."""
-_LARGEST_ITEM: Final = 8
-"""Bytes of a number of the largest type."""
-_NUMERIC_CLASSES: Final = frozenset(
-    {
-        "double",
-        "single",
-        "logical",
-        "char",
-        *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)),
-    }
-)
-"""Classes of variables that are read. Others, such as cells and structures, are no columns."""
 
 
 def read_npy(path: Path) -> list[ColumnTable]:
@@ -68,38 +49,7 @@ def read_mat(path: Path) -> list[ColumnTable]:
 
     Raises ConfigError, TooLarge, DataDamaged.
     """
-    from scipy.io import loadmat, whosmat
-
-    with readable(path):
-        refuse_devices(path)
-        _expect_variables(path, Unpacked(path))
-        try:
-            named = whosmat(str(path), appendmat=False)
-        except NotImplementedError as error:
-            raise DataDamaged(
-                f"{path} is a MAT file of version 7.3, which is HDF5. Save it in MATLAB with: save(NAME, '-v7')"
-            ) from error
-        unpacked = Unpacked(path)
-        numeric = [(name, shape) for name, shape, kind in named if kind in _NUMERIC_CLASSES]
-        for _, shape in numeric:
-            unpacked.add(_LARGEST_ITEM * math.prod(shape))
-        variables = loadmat(str(path), appendmat=False, variable_names=[name for name, _ in numeric])
-        return [_of_arrays(path, {name: one for name, one in variables.items() if not name.startswith("__")})]
-
-
-def _expect_variables(path: Path, unpacked: Unpacked) -> None:
-    """Raise TooLarge if the compressed variables of a MAT file of version 5 to 7 unpack to more than the limit."""
-    with path.open("rb") as file:
-        header = file.read(_MAT_HEADER_BYTES)
-        order = {b"IM": "<", b"MI": ">"}.get(header[-2:])
-        if order is None:
-            return  # version 4, which does not compress
-        tag = struct.Struct(f"{order}II")
-        while len(head := file.read(tag.size)) == tag.size:
-            kind, size = tag.unpack(head)
-            data = file.read(min(size, path.stat().st_size))
-            if kind == _COMPRESSED:
-                unpacked.count_zlib(data)
+    return [_of_arrays(path, mat_variables(path))]
 
 
 def _of_arrays(path: Path, arrays: Mapping[str, Any]) -> ColumnTable:

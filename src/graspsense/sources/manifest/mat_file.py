@@ -1,0 +1,129 @@
+"""MAT files of version 4 to 7: their variables that are full arrays of numbers or one line of text.
+
+The reader of scipy ends the process on some damaged files, so this is one of our own. Nothing is allocated before its
+size was compared with the bytes that are there and with the limit. The format is that of MathWorks, "MAT-File Format".
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from attrs import frozen
+from numpy.typing import NDArray
+
+from graspsense.core.errors import DataDamaged
+from graspsense.recording.readable import readable, refuse_devices
+from graspsense.recording.unpacked import Unpacked
+
+_HEADER_BYTES: Final = 128
+_MATRIX: Final = 14
+_COMPRESSED: Final = 15
+_STORED: Final[Mapping[int, str]] = {
+    1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8",
+}  # fmt: skip
+"""Type of an element to the numbers in it."""
+_CHARACTERS: Final[Mapping[int, str]] = {
+    1: "latin-1", 2: "latin-1", 4: "utf-16", 16: "utf-8", 17: "utf-16", 18: "utf-32",
+}  # fmt: skip
+_CHAR: Final = 4
+_NUMERIC: Final[Mapping[int, str]] = {
+    6: "f8", 7: "f4", 8: "i1", 9: "u1", 10: "i2", 11: "u2", 12: "i4", 13: "u4", 14: "i8", 15: "u8",
+}  # fmt: skip
+"""Class of a variable to its numbers. Cells, structures, objects and sparse matrices have other classes."""
+_COMPLEX: Final = 0x0800
+_STORED_BY_4: Final = ("f8", "f4", "i4", "i2", "u2", "u1")
+
+
+@frozen
+class _Element:
+    kind: int
+    data: bytes
+
+
+def mat_variables(path: Path) -> dict[str, NDArray[Any]]:
+    """Return the variables in a MAT file by their names. Raises ConfigError, TooLarge, DataDamaged."""
+    unpacked = Unpacked(path)
+    with readable(path, "a MAT file"):
+        refuse_devices(path)
+        data = path.read_bytes()
+        if len(data) >= 4 and 0 in data[:4]:
+            return dict(_of_version_4(data))
+        order = {b"IM": "<", b"MI": ">"}.get(data[_HEADER_BYTES - 2 : _HEADER_BYTES])
+        if order is None:
+            raise ValueError("it has no header")
+        (version,) = struct.unpack_from(f"{order}H", data, _HEADER_BYTES - 4)
+        if version >> 8 == 2:
+            raise DataDamaged(
+                f"{path} is a MAT file of version 7.3, which is HDF5. Save it in MATLAB with: save(NAME, '-v7')"
+            )
+        found = {}
+        for element in _elements(data[_HEADER_BYTES:], order):
+            if element.kind == _COMPRESSED:
+                (element,) = _elements(unpacked.unpack("zlib", element.data), order)
+            if element.kind == _MATRIX and (variable := _variable(element.data, order)) is not None:
+                found[variable[0]] = variable[1]
+        return found
+
+
+def _elements(data: bytes, order: str) -> Iterator[_Element]:
+    """Yield the elements that follow each other in the data. Raises ValueError if one ends behind it."""
+    at = 0
+    while at + 8 <= len(data):
+        kind, size = struct.unpack_from(f"{order}II", data, at)
+        begin = at + 8
+        if kind >> 16:  # a small element has its size and its data in the tag
+            kind, size, begin = kind & 0xFFFF, kind >> 16, at + 4
+        if begin + size > len(data):
+            raise ValueError(f"an element of {size} bytes ends behind the file")
+        yield _Element(kind, data[begin : begin + size])
+        at = begin + size
+        if kind != _COMPRESSED:
+            at += -at % 8
+
+
+def _variable(data: bytes, order: str) -> tuple[str, NDArray[Any]] | None:
+    """Return name and value of a variable, None if it is of another class than those that are read."""
+    flags, dimensions, name, *values = _elements(data, order)
+    (word,) = struct.unpack_from(f"{order}I", flags.data)
+    shape = np.frombuffer(dimensions.data, dtype=f"{order}i4").tolist()
+    if not values or word & _COMPLEX or (word & 0xFF) not in (*_NUMERIC, _CHAR):
+        return None
+    if word & 0xFF == _CHAR:
+        text = _text(values[0], order)
+        return (name.data.decode("latin-1"), np.array([text])) if shape[:1] == [1] and text else None
+    numbers = np.frombuffer(values[0].data, dtype=f"{order}{_STORED[values[0].kind]}")
+    if min(shape, default=0) < 0 or math.prod(shape) != len(numbers):
+        raise ValueError(f"a variable of the shape {tuple(shape)} has {len(numbers)} numbers")
+    return name.data.decode("latin-1"), numbers.astype(_NUMERIC[word & 0xFF]).reshape(shape, order="F")
+
+
+def _text(element: _Element, order: str) -> str:
+    encoding = _CHARACTERS[element.kind]
+    if encoding in ("utf-16", "utf-32"):
+        encoding += "-le" if order == "<" else "-be"
+    return element.data.decode(encoding)
+
+
+def _of_version_4(data: bytes) -> Iterator[tuple[str, NDArray[Any]]]:
+    """Yield the variables of a file of version 4, each a matrix behind a header of five numbers."""
+    at = 0
+    while at < len(data):
+        order = "<" if struct.unpack_from("<I", data, at)[0] < 5000 else ">"
+        kind, rows, columns, imaginary, length = struct.unpack_from(f"{order}5I", data, at)
+        number = np.dtype(f"{order}{_STORED_BY_4[kind // 10 % 10]}")
+        begin = at + 20 + length
+        size = rows * columns * number.itemsize
+        if kind // 1000 > 1 or begin + size * (2 if imaginary else 1) > len(data):
+            raise ValueError(f"a matrix of {rows} rows and {columns} columns ends behind the file")
+        name = data[at + 20 : begin].rstrip(b"\0").decode("latin-1")
+        values = np.frombuffer(data, dtype=number, count=rows * columns, offset=begin)
+        if kind % 10 == 0 and not imaginary:
+            yield name, values.astype(number.newbyteorder("=")).reshape((rows, columns), order="F")
+        elif kind % 10 == 1 and rows == 1:
+            yield name, np.array(["".join(map(chr, values.astype(np.int64) & 0xFF))])
+        at = begin + size * (2 if imaginary else 1)

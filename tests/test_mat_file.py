@@ -1,0 +1,99 @@
+"""MAT files: our reader against that of scipy, on what scipy writes."""
+
+from __future__ import annotations
+
+import struct
+
+import numpy as np
+import pytest
+from scipy.io import loadmat, savemat
+
+from graspsense.core.errors import ConfigError, DataDamaged
+from graspsense.sources.manifest.mat_file import mat_variables
+
+VARIABLES = {
+    "matrix": np.arange(6.0).reshape(2, 3),
+    "images": np.arange(24.0).reshape(2, 3, 4),
+    "single": np.float32([1.5, 2.5, -3.5]),
+    "small": np.int8([1, -2]),
+    "large": np.uint64([2**63]),
+    "negative": np.int64([[-5]]),
+    "logical": np.array([True, False]),
+    "text": "glass:f\u00fcll",
+    "nothing": np.zeros((0, 3)),
+    "one": 3.0,
+    "long": np.arange(5000) % 7,
+    "a_name_that_is_longer_than_eight": 1.0,
+}
+OTHERS = {"waves": np.array([1j]), "cells": np.array([[1, "a"]], dtype=object), "table": {"a": 1.0}}
+
+
+def assert_same(found, expected):
+    assert list(found) == list(expected)
+    for name, array in expected.items():
+        assert found[name].shape == array.shape
+        assert found[name].dtype.kind == array.dtype.kind
+        assert (found[name] == array).all()
+
+
+@pytest.mark.parametrize("compressed", [False, True])
+def test_numbers_and_texts_are_what_scipy_reads_and_the_rest_is_left_out(compressed, tmp_path):
+    path = tmp_path / "a.mat"
+    savemat(path, VARIABLES | OTHERS, do_compression=compressed)
+    expected = {name: value for name, value in loadmat(path).items() if name in VARIABLES}
+    assert len(expected) == len(VARIABLES)
+    assert_same(mat_variables(path), expected)
+
+
+def test_version_4(tmp_path):
+    path = tmp_path / "a.mat"
+    savemat(
+        path, {name: VARIABLES[name] for name in ("matrix", "single", "one")} | {"text": "jar"}, format="4"
+    )
+    expected = {name: value for name, value in loadmat(path).items() if not name.startswith("__")}
+    assert_same(mat_variables(path), expected)
+    data = path.read_bytes()
+    with path.open("ab") as file:
+        file.write(data[:30])
+    with pytest.raises(DataDamaged, match=r"a\.mat"):
+        mat_variables(path)
+
+
+def test_the_other_order_of_bytes(tmp_path):
+    def element(kind, data):
+        return struct.pack(">II", kind, len(data)) + data + bytes(-len(data) % 8)
+
+    body = element(6, struct.pack(">II", 6, 0)) + element(5, struct.pack(">ii", 2, 1)) + element(1, b"t")
+    body += element(9, struct.pack(">dd", 1.5, -2.0))
+    path = tmp_path / "a.mat"
+    path.write_bytes(b"MATLAB 5.0".ljust(124) + struct.pack(">H", 0x0100) + b"MI" + element(14, body))
+    assert mat_variables(path)["t"].tolist() == [[1.5], [-2.0]]
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [
+        (b"", "header"),
+        (b"no such file at all".ljust(200), "header"),
+        (b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM", "-v7"),
+        (b"MATLAB 5.0".ljust(124) + b"\x00\x01IM" + struct.pack("<II", 14, 2**31), "behind"),
+    ],
+)
+def test_what_is_no_mat_file_is_refused(content, says, tmp_path):
+    path = tmp_path / "a.mat"
+    path.write_bytes(content)
+    with pytest.raises(DataDamaged, match=says):
+        mat_variables(path)
+    with pytest.raises(ConfigError, match="no file"):
+        mat_variables(tmp_path / "none.mat")
+
+
+def test_a_shape_without_its_numbers_allocates_nothing(tmp_path):
+    path = tmp_path / "a.mat"
+    savemat(path, {"t": np.arange(7.0)})
+    data = path.read_bytes()
+    at = data.index(struct.pack("<ii", 1, 7))
+    for shape in ((2**31 - 1, 2**31 - 1), (-1, -7), (0, 7)):
+        path.write_bytes(data[:at] + struct.pack("<ii", *shape) + data[at + 8 :])
+        with pytest.raises(DataDamaged, match="shape"):
+            mat_variables(path)
