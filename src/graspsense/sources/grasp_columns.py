@@ -63,7 +63,8 @@ class GraspColumns:
     @property
     def force_n(self) -> Numbers:
         """The mean force of both pads."""
-        mean: Numbers = (self.left_n + self.right_n) / 2.0
+        with np.errstate(over="ignore"):  # infinite where the forces are too large to be added
+            mean: Numbers = (self.left_n + self.right_n) / 2.0
         return mean
 
     def place(self, k: int) -> str:
