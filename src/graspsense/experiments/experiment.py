@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
@@ -534,10 +535,10 @@ def _located(values: Mapping[str, Any], base: Path | None) -> dict[str, Any]:
     def path(text: Any) -> Any:
         if not isinstance(text, str):
             return text
-        if text.endswith((".toml", ".csv", ".tsv", ".txt")) and (base / text).exists():
+        if text.endswith((".toml", ".csv", ".tsv", ".txt")) and os.path.exists(base / text):
             return str((base / text).absolute())
         name, colon, folder = text.partition(":")
-        if colon and folder and (base / folder).is_dir():
+        if colon and folder and os.path.isdir(base / folder):
             return f"{name}:{(base / folder).absolute()}"
         return text
 

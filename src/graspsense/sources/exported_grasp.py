@@ -61,7 +61,7 @@ def read_exported(name: str) -> Recording:
             has_release=bool(about["has_release"]),
             channels=channels,
         )
-    except (KeyError, TypeError, ValueError, IndexError) as error:
+    except (KeyError, TypeError, ValueError, IndexError, OverflowError, RecursionError) as error:
         raise DataDamaged(
             f"{path} is not a grasp that this version of `graspsense export` wrote ({type(error).__name__}: {error}). "
             "Arrays of other programs are imported by a manifest (docs/import.md)"
