@@ -13,6 +13,8 @@ if TYPE_CHECKING:
 CommandT = TypeVar("CommandT", bound=Callable[..., Any])
 
 DEFAULT_PIPELINE: Final = "default"
+SEED: Final = click.IntRange(0, 2**32 - 1)
+"""The seeds of trials and folds; simulated trials have seeds of their own, up to a million times as large."""
 GRIPPER_ALONE: Final = ("classifier.type=none",)
 """Before the options of a command that is about the gripper: a classifier that is missing must not stop it."""
 

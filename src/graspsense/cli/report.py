@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from graspsense.cli.options import SEED
 from graspsense.cli.output import echo_json
 from graspsense.cli.terminal import Style, echo, echo_as_it_is, warn
 
@@ -24,9 +25,7 @@ from graspsense.cli.terminal import Style, echo, echo_as_it_is, warn
     help="Store: what is recognised, as in `evaluate`.",
 )
 @click.option("--folds", type=int, default=10, show_default=True, help="Store: number of folds.")
-@click.option(
-    "--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Store: seed of the folds."
-)
+@click.option("--seed", type=SEED, default=0, show_default=True, help="Store: seed of the folds.")
 @click.option(
     "--grasp", type=int, metavar="NUMBER", help="Store: trial to plot over time.  [default: the newest]"
 )

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import click
 
-from graspsense.cli.options import force_option
+from graspsense.cli.options import SEED, force_option
 
 if TYPE_CHECKING:
     from graspsense.cli.progress import ProgressLine
@@ -87,9 +87,7 @@ _OPTIONS: Final = (
         multiple=True,
         help="Set a key of a component: -o controller.probing_force_n=17. Can be repeated.",
     ),
-    click.option(
-        "--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of all random numbers."
-    ),
+    click.option("--seed", type=SEED, default=0, show_default=True, help="Seed of all random numbers."),
     force_option,
 )
 
@@ -248,7 +246,7 @@ def _settings(source: str, given: Mapping[str, Any], classifier: str | None) -> 
 
 def _alone(table: str, name: str, given: Mapping[str, Any], source: str) -> SelectedComponent:
     """Return a component outside of any pipeline, with the keys that options give it."""
-    from graspsense.core.config import SelectedComponent, build
+    from graspsense.core.config import SelectedComponent, build_plausible
     from graspsense.core.entries import TABLE_OF_ROLE
     from graspsense.core.errors import ConfigError
     from graspsense.core.layers import Merged, option_layers
@@ -271,7 +269,7 @@ def _alone(table: str, name: str, given: Mapping[str, Any], source: str) -> Sele
     role = next(role for role, one in TABLE_OF_ROLE.items() if one == table)
     values = merged.values
     component = installed().find(role, str(values.pop("type", name)))
-    return SelectedComponent(component, build(component, values))
+    return SelectedComponent(component, build_plausible(component, values, force=given["force"]))
 
 
 def _names(text: str | None) -> tuple[str, ...]:

@@ -303,6 +303,19 @@ def build(component: Component, values: Mapping[str, Any]) -> Any:
         raise ConfigError(_listed(lines)) from None
 
 
+def build_plausible(component: Component, values: Mapping[str, Any], *, force: bool) -> Any:
+    """Return the config of a component like `build`, and refuse values out of their plausible ranges unless `force`.
+
+    Raises ConfigError, of which ImplausibleSettings is one, and PluginUnavailable.
+    """
+    config = build(component, values)
+    doubts = [] if force else implausible_values(config)
+    if doubts:
+        lines = [f"{dotted((component.table, *one.path))}: {one.text}" for one in doubts]
+        raise ImplausibleSettings(_listed(lines))
+    return config
+
+
 def create(role: Role, name: str, /, **config: Any) -> Any:
     """Return a component by role and name. Its config is checked as strictly as one from a file.
 

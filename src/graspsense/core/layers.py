@@ -88,13 +88,12 @@ class Merged:
                     inner = into[key] = {}
                 self._add(inner, here, value, layer)
             else:
-                table = isinstance(into.get(key), dict)
+                was_table = isinstance(into.get(key), dict)
                 into[key] = value
                 self.owner[here] = layer
-                for below in [
-                    one for one in self.owner if table and one[: len(here)] == here and one != here
-                ]:
-                    del self.owner[below]
+                if was_table:
+                    for below in [one for one in self.owner if one[: len(here)] == here and one != here]:
+                        del self.owner[below]
 
     def owner_of(self, path: KeyPath) -> Layer | None:
         """Return the layer that set this key, or the table that contains it; None for a default."""
@@ -148,9 +147,9 @@ def _located(asked: str, base: Path, asker: str, plugins: Plugins) -> tuple[Trav
         shipped = plugins.pipeline(asked)
     except UnknownName as error:
         hint = "\n  A file is given with its ending .toml"
-        if (base / asked).is_file():
+        if os.path.isfile(base / asked):  # of pathlib, it raises for a name that is too long
             hint += f"; there is a file {str(base / asked)!r} without it: rename it"
-        elif (base / f"{asked}.toml").is_file():
+        elif os.path.isfile(base / f"{asked}.toml"):
             hint += f": {base / asked}.toml"
         raise UnknownName(f"{asker}{error}{hint}") from None
     resource = shipped.file()

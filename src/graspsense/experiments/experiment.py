@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
@@ -11,7 +12,7 @@ from typing import Any, Final
 
 from attrs import evolve, field, frozen
 
-from graspsense.core.config import Settings, build, resolve
+from graspsense.core.config import Settings, build_plausible, resolve
 from graspsense.core.entries import TABLE_OF_ROLE
 from graspsense.core.errors import ConfigError, GraspsenseError, UnknownName, suggestion
 from graspsense.core.layers import Layer, Merged, dotted, option_layers, read_toml
@@ -22,7 +23,8 @@ from graspsense.core.strict import InvalidValue, ValidationFailed, plain, struct
 from graspsense.experiments.kinds import kind_of
 from graspsense.experiments.task import Task
 from graspsense.sources.identified import IDENTIFIED, identified_scenes
-from graspsense.sources.simulated import plan_trials, simulated_objects
+from graspsense.sources.simulated import LARGEST_SEED, simulated_objects
+from graspsense.sources.simulated import number_of_trials as number_of_simulated_trials
 from graspsense.sources.trial_source import SIMULATED, TrialSource, groups_of, labelled_trials
 
 PIPELINE_TABLES: Final = (*(one for one in TABLE_OF_ROLE.values() if one != "classifier"), "run")
@@ -30,8 +32,6 @@ SWEPT_TABLES: Final = (*PIPELINE_TABLES, "classifier", "data", "test", "judge")
 DEFAULT_CLASSIFIER: Final = "c45"
 MOST_SEEDS: Final = 10_000
 """Largest number of seeds; intervals hardly narrow with more."""
-LARGEST_SEED: Final = 2**32 - 1
-"""The largest seed; the trials of a seed have seeds of their own, up to a million times as large."""
 
 
 def _seeds(experiment: object, attribute: object, value: int | tuple[int, ...]) -> None:
@@ -211,10 +211,14 @@ def _of_parts(
 ) -> Planned:
     """Return the experiment with the cases of all parts; the name of a case starts with that of its part."""
     kind_of(experiment.kind)
+    if len(set(experiment.parts)) < len(experiment.parts):
+        raise ConfigError(f"{layer.where(('parts',))}: a part is named twice")
     seeds = _listed(experiment.seeds)
-    parts = [
-        read_experiment(part, [f"seeds={list(seeds)}"], within, force=force) for part in experiment.parts
-    ]
+    parts: list[Planned] = []
+    for asked in experiment.parts:
+        parts.append(read_experiment(asked, [f"seeds={list(seeds)}"], within, force=force))
+        if too_many := CASES.exceeded(sum(len(part.cases) for part in parts)):
+            raise ConfigError(f"{layer.where(('parts',))}: {too_many}")
     pipelines: dict[str, Settings] = {}
     cases: list[ExperimentCase] = []
     for part in parts:
@@ -433,7 +437,7 @@ class _Plan:
                     _put(keys, path[1:], value)
                 try:
                     component = installed().find("classifier", str(keys.pop("type")))
-                    config = _fresh(build(component, keys))
+                    config = _fresh(build_plausible(component, keys, force=self.force))
                 except KeyError:
                     self.complaints.append(
                         self.layer.complain(
@@ -457,7 +461,7 @@ class _Plan:
 def number_of_trials(settings: Settings, data: TrialSource) -> int | None:
     """Return the number of trials of a source, None for a data set, which would have to be read."""
     if data.kind == SIMULATED:
-        return len(plan_trials(settings, groups_of(data), 0).labels)
+        return number_of_simulated_trials(settings, groups_of(data))
     if data.kind == "CSV":
         return len(labelled_trials(data, settings=lambda: settings, features=settings.features.create))
     return None
@@ -531,10 +535,10 @@ def _located(values: Mapping[str, Any], base: Path | None) -> dict[str, Any]:
     def path(text: Any) -> Any:
         if not isinstance(text, str):
             return text
-        if text.endswith((".toml", ".csv", ".tsv", ".txt")) and (base / text).exists():
+        if text.endswith((".toml", ".csv", ".tsv", ".txt")) and os.path.exists(base / text):
             return str((base / text).absolute())
         name, colon, folder = text.partition(":")
-        if colon and folder and (base / folder).is_dir():
+        if colon and folder and os.path.isdir(base / folder):
             return f"{name}:{(base / folder).absolute()}"
         return text
 

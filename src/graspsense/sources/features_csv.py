@@ -180,7 +180,7 @@ def _feature_table(
         if name in reserved:
             raise ConfigError(f"{name!r} cannot be a feature: it is the label, the instance or the order")
     table = columns.table(names)
-    _note_uninformative_columns(table, notes)
+    _note_uninformative_columns(columns.path, table, notes)
     return table
 
 
@@ -210,13 +210,13 @@ def _feature_names(columns: CsvColumns, reserved: set[str], notes: list[str]) ->
     if texts:
         notes.append(f"not used, because they have no numbers: {listed(texts)}")
     if blank and not names:
-        raise DataDamaged(f"no feature has any value: {listed(blank)}")
+        raise DataDamaged(f"{columns.path}: no feature has any value: {listed(blank)}")
     if not names:
         raise ConfigError(f"{columns.path} has no column of numbers besides {', '.join(sorted(reserved))}")
     return names
 
 
-def _note_uninformative_columns(table: FeatureTable, notes: list[str]) -> None:
+def _note_uninformative_columns(path: Path, table: FeatureTable, notes: list[str]) -> None:
     """Note which features have no value or a single value. Raises DataDamaged if none has any."""
     named = list(zip(table.names, table.values.T, strict=True))
     blank = [name for name, values in named if np.isnan(values).all()]
@@ -230,4 +230,4 @@ def _note_uninformative_columns(table: FeatureTable, notes: list[str]) -> None:
     if share > 0.0:
         notes.append(f"{share:.1%} of all values are missing")
     if len(blank) == len(table.names):
-        raise DataDamaged(f"no feature has any value: {listed(blank)}")
+        raise DataDamaged(f"{path}: no feature has any value: {listed(blank)}")

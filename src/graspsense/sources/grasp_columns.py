@@ -63,7 +63,8 @@ class GraspColumns:
     @property
     def force_n(self) -> Numbers:
         """The mean force of both pads."""
-        mean: Numbers = (self.left_n + self.right_n) / 2.0
+        with np.errstate(over="ignore", invalid="ignore"):  # where a force is infinite, or nearly
+            mean: Numbers = (self.left_n + self.right_n) / 2.0
         return mean
 
     def place(self, k: int) -> str:
@@ -87,6 +88,7 @@ class GraspColumns:
         )
 
 
+@np.errstate(all="ignore")  # what is infinite, or too large, is refused in words
 def checked_recording(columns: GraspColumns, *, rate_hz: float | None = None) -> Recording:
     """Return the recording that these columns are; `rate_hz` is that of a single sample.
 

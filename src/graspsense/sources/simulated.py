@@ -40,6 +40,8 @@ if TYPE_CHECKING:
 
 OBJECTS_PER_SEED: Final = 1000
 TRIALS_PER_SEED: Final = 1_000_000
+LARGEST_SEED: Final = 2**32 - 1
+"""The largest seed that a user can give; the trials of a seed have seeds up to a million times as large."""
 BATCH: Final = 500
 """Most grasps per call if their traces are wanted: enough to be worth compiling for, at most 250 MB."""
 BATCH_WITHOUT_TRACES: Final = 20_000
@@ -64,12 +66,6 @@ def _check_trials(group: object, attribute: Attribute[Any], value: int | None) -
         raise ValueError(f"{value} trials {what}: give at least 1")
     if value is not None and value > TRIALS_PER_SEED:
         raise ValueError(f"{value} trials: give at most {TRIALS_PER_SEED}")
-
-
-def _check_total(trials: int) -> None:
-    """Raise ConfigError unless this is a number of trials that can be simulated for one seed."""
-    if not 1 <= trials <= TRIALS_PER_SEED:
-        raise ConfigError(f"{trials} trials: give at least 1 and at most {TRIALS_PER_SEED} in total")
 
 
 @frozen
@@ -103,20 +99,17 @@ class Group:
             return self
         return evolve(self, objects=tuple(name for kind in kinds if kind.default for name in kind.full_names))
 
+    def number(self, kinds: Sequence[ObjectKind]) -> int:
+        """Return the number of its trials. Raises ConfigError."""
+        if self.total is not None:
+            return self.total
+        return self.trials * sum(map(len, self._instances(self._pairs(kinds))))
+
     def planned(self, kinds: Sequence[ObjectKind]) -> list[PlannedTrial]:
         """Return the trials of the group; `kinds` are those that the gripper can simulate. Raises ConfigError."""
-        known = {**{name: name for name in _full_names(self.objects, kinds)}, **self.named}
-        if any("#" in name for name in (*known, *known.values())):
-            raise ConfigError(
-                "name objects without an instance (#3) here: --instances is the number of instances"
-            )
-        pairs = list(known.items())
-        n = len(pairs)
-        if too_many := CLASSES.exceeded(n):
-            raise ConfigError(f"the objects to simulate: {too_many}")
-        instances = [self._instances_of(k, pairs) for k in range(n)]
+        pairs = self._pairs(kinds)
+        n, instances = len(pairs), self._instances(pairs)
         if self.total is None:
-            _check_total(self.trials * sum(map(len, instances)))
             return [
                 PlannedTrial(label, name, i)
                 for k, (label, name) in enumerate(pairs)
@@ -127,6 +120,21 @@ class Group:
             (k % n, instances[k % n][(k // n) % len(instances[k % n])]) for k in range(self.total)
         )
         return [PlannedTrial(*pairs[k], i) for k, i in places]
+
+    def _pairs(self, kinds: Sequence[ObjectKind]) -> list[tuple[str, str]]:
+        """Return each label with the object that it stands for. Raises ConfigError."""
+        known = {**{name: name for name in _full_names(self.objects, kinds)}, **self.named}
+        if any("#" in name for name in (*known, *known.values())):
+            raise ConfigError(
+                "name objects without an instance (#3) here: --instances is the number of instances"
+            )
+        if too_many := CLASSES.exceeded(len(known)):
+            raise ConfigError(f"the objects to simulate: {too_many}")
+        return list(known.items())
+
+    def _instances(self, pairs: Sequence[tuple[str, str]]) -> list[range]:
+        """Return the instances that each label is grasped of. Raises ConfigError if there are none."""
+        return [self._instances_of(k, pairs) for k in range(len(pairs))]
 
     def _instances_of(self, k: int, pairs: Sequence[tuple[str, str]]) -> range:
         """Return the instances that label number `k` of these is grasped of. Raises ConfigError if there are none."""
@@ -154,19 +162,31 @@ class SimulationPlan:
     seeds: tuple[int, ...]
 
 
-def plan_trials(settings: Settings, groups: Sequence[Group], seed: int) -> SimulationPlan:
-    """Return the trials to simulate. Raises ConfigError if the gripper is not simulated or there are no trials."""
+def number_of_trials(settings: Settings, groups: Sequence[Group]) -> int:
+    """Return the number of trials of a seed, without planning them. Raises ConfigError like `plan_trials`."""
+    kinds, groups = _checked_groups(settings, groups)
+    return sum(group.number(kinds) for group in groups)
+
+
+def _checked_groups(
+    settings: Settings, groups: Sequence[Group]
+) -> tuple[Sequence[ObjectKind], tuple[Group, ...]]:
+    """Return the kinds of object, and the groups with their default objects. Raises ConfigError."""
     kinds = simulated_objects(settings)
     groups = tuple(group.with_defaults(kinds) for group in groups)
     if kinds and not any(group.objects or group.named for group in groups):
         names = ", ".join(kind.name for kind in kinds)
         raise ConfigError(f"no kind of object of this gripper is a default: name --objects, any of {names}")
-    trials: list[PlannedTrial] = []
-    for group in groups:
-        trials += group.planned(kinds)
-        if len(trials) > TRIALS_PER_SEED:
-            break
-    _check_total(len(trials))
+    trials = sum(group.number(kinds) for group in groups)
+    if not 1 <= trials <= TRIALS_PER_SEED:
+        raise ConfigError(f"{trials} trials: give at least 1 and at most {TRIALS_PER_SEED} in total")
+    return kinds, groups
+
+
+def plan_trials(settings: Settings, groups: Sequence[Group], seed: int) -> SimulationPlan:
+    """Return the trials to simulate. Raises ConfigError if the gripper is not simulated or there are no trials."""
+    kinds, groups = _checked_groups(settings, groups)
+    trials = [trial for group in groups for trial in group.planned(kinds)]
     first = OBJECTS_PER_SEED * seed
     return SimulationPlan(
         groups=groups,

@@ -171,7 +171,7 @@ class _Reader:
                 continue
             index, _, value = pair.strip().partition(" ")
             if not (index.isdecimal() and len(index) <= LONGEST_INDEX) or int(index) >= len(cells):
-                raise self._error(f"sparse index {index!r}; allowed: 0..{len(cells) - 1}")
+                raise self._error(f"sparse index {index[:LONGEST_SHOWN]!r}; allowed: 0..{len(cells) - 1}")
             match = _TOKEN.match(value)
             cells[int(index)] = _text(match) if match else ""
         return cells

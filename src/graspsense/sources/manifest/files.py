@@ -32,7 +32,7 @@ class NamedFile:
 
 def files_of(manifest: ReadManifest) -> list[NamedFile]:
     """Return the files in the order of their names, with numbers in them ordered as numbers. Raises ConfigError."""
-    if not manifest.base.is_dir():
+    if not os.path.isdir(manifest.base):  # of pathlib, it raises for a name that is too long
         raise ConfigError(
             f"{manifest.place}: there is no folder {manifest.base}. The key folder is relative to the manifest"
         )

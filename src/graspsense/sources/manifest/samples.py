@@ -22,6 +22,7 @@ _NAME: Final = re.compile(r"[a-z][a-z0-9_]*")
 _TAKEN: Final = frozenset({*CHANNELS, "force", "t"})
 
 
+@np.errstate(all="ignore")  # what is infinite, or too large, is refused by `checked_recording`
 def samples(manifest: ReadManifest, table: ColumnTable) -> GraspColumns:
     """Return the samples of a table as the manifest describes them. Raises ConfigError, DataDamaged."""
     keys, found = manifest.keys, AvailableColumns(manifest, table)

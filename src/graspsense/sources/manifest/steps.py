@@ -37,6 +37,7 @@ def without_duplicates(columns: GraspColumns) -> GraspColumns:
     )
 
 
+@np.errstate(all="ignore")
 def squeezes(columns: GraspColumns) -> list[GraspColumns]:
     """Return each squeeze of a recording, with the approach before it. Raises DataDamaged if there is none.
 
@@ -65,6 +66,7 @@ def squeezes(columns: GraspColumns) -> list[GraspColumns]:
     ]
 
 
+@np.errstate(all="ignore")
 def cut_at(columns: GraspColumns, where: str) -> GraspColumns:
     """Return the samples up to the rupture or the release of the object; all of them if there is none.
 
@@ -97,6 +99,7 @@ def _release(force: NDArray[np.float64]) -> int | None:
     return peak + int(released[0]) if len(released) else None
 
 
+@np.errstate(all="ignore")
 def resampled(columns: GraspColumns, rate_hz: float) -> GraspColumns:
     """Return the columns at this rate, interpolated. Raises DataDamaged if the time does not increase."""
     t = columns.t_s

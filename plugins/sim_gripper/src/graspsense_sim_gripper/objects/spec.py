@@ -23,6 +23,8 @@ PATCHES: Final = ("line", "face", "point")
 LARGEST: Final = 1e20
 SMALLEST: Final = 1e-30
 """The largest and the smallest magnitude of a number of a scene; products of a few of them stay finite."""
+MOST_TERMS: Final = 40
+"""The largest number of terms of an object, whose code is compiled together."""
 MOST_SPREAD: Final = 3.0
 """The largest standard deviation of the logarithm of a parameter: instances then differ by a factor of 20 and more."""
 
@@ -232,6 +234,9 @@ def _scene_values(table: TomlTable, problems: list[str]) -> dict[str, TomlValue]
 def _scene_terms(tables: TomlValue, problems: list[str]) -> list[ParsedTerm]:
     if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
         problems.append("terms: write a table [[terms]] for each")
+        return []
+    if len(tables) > MOST_TERMS:
+        problems.append(f"terms: {len(tables)} terms, and an object has at most {MOST_TERMS}")
         return []
 
     def number(where: str, entry: TomlValue, signed: bool) -> float:

@@ -1,0 +1,524 @@
+"""Tables, manifests and settings that were made to do harm: each is answered at once, in words that name the file."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from graspsense.cli.main import main
+from graspsense.core import limits
+from graspsense.core.channels import from_json
+from graspsense.core.errors import ConfigError, DataDamaged, suggestion
+from graspsense.core.features import FeatureTable
+from graspsense.core.labelled import Labelled
+from graspsense.core.layers import Layer, Merged, option_layers, read_layer
+from graspsense.core.target_value import name_and_unit
+from graspsense.core.toml_text import MOST_NESTED, TomlError, toml_values
+from graspsense.experiments.experiment import read_experiment
+from graspsense.recording.labelled_recording import UnreadableRecording
+from graspsense.sources.csv_columns import CsvColumns
+from graspsense.sources.features_csv import read_labelled
+from graspsense.sources.manifest.description import read_manifest
+from graspsense.sources.manifest.expression import ExpressionError, parse
+from graspsense.sources.manifest.patterns import PatternError, file_template, regular_expression, wildcard
+from graspsense.sources.manifest.reader import read_recordings
+from graspsense.sources.manifest.text_format import read_text
+from graspsense_c45.arff import ArffError, parse_arff
+from graspsense_sim_gripper.objects.library import find
+
+HERE = Path(__file__).parent
+MANIFEST = 'files = "*.csv"\ntime = "t"\ngap = "g [mm]"\nforce = "F"\nlabel = "jar"\n'
+GRASP = "t,g,F\n" + "".join(f"{k * 0.01:.2f},{60 - k},{max(0, k - 20)}\n" for k in range(50))
+
+
+def run(*arguments):
+    """Return the exit code of the command line."""
+    with pytest.raises(SystemExit) as ended:
+        main([str(argument) for argument in arguments])
+    return ended.value.code
+
+
+def manifest(folder, text, csv=GRASP):
+    (folder / "grasp.csv").write_text(csv)
+    path = folder / "manifest.toml"
+    path.write_text(text)
+    return path
+
+
+def table(path, labels, features=1):
+    """Write a table of features with these labels."""
+    header = ",".join(["label", *(f"x{k}" for k in range(features))])
+    rows = (f"{label}{f',{i % 7}' * features}" for i, label in enumerate(labels))
+    path.write_text("\n".join([header, *rows]) + "\n")
+    return path
+
+
+# Patterns
+
+
+def test_a_pattern_that_backtracks_is_matched_in_linear_time():
+    # Python's `re` would try 2^5000 ways.
+    line = "a" * 5000 + "!"
+    assert regular_expression("(a+)+$").search(line) is None
+    assert regular_expression("((((a*)*)*)*)*$").search(line) is not None
+    assert file_template("*a*a*a*a*a*a*a*a*a*a*.csv").fields("a" * 400) is None
+    assert wildcard("*a*a*a*a*a*a*a*a*a*a*b").fullmatch("a" * 400) is None
+
+
+@pytest.mark.parametrize("pattern", [r"(\w)\1", "(?=x)y", "(?<!x)y", "(?P<a>x)(?P=a)", "(?>a)b", "a++"])
+def test_what_needs_backtracking_is_refused_with_the_reason(tmp_path, pattern):
+    path = manifest(tmp_path, MANIFEST + f"start = '{pattern}'\n")
+    with pytest.raises(ConfigError, match=r"manifest\.toml:6: start.*not supported.*RE2"):
+        read_manifest(path)
+
+
+@pytest.mark.parametrize("pattern", ["a{1000}{1000}", "x" * 1001, "(", "[z-a]"])
+def test_a_pattern_that_is_too_large_or_malformed_is_refused(pattern):
+    with pytest.raises(PatternError):
+        regular_expression(pattern)
+
+
+def test_named_groups_are_fields(tmp_path):
+    started = f"grasp jar 7\n{GRASP}grasp can 8\n{GRASP}"
+    text = MANIFEST.replace('label = "jar"\n', r"start = 'grasp (?P<label>\w+) (?P<order>\d+)'")
+    found = list(read_recordings(str(manifest(tmp_path, text, started))))
+    assert [(one.label, one.order) for one in found] == [("jar", 7.0), ("can", 8.0)]
+
+
+@pytest.mark.parametrize(
+    ("template", "path", "fields"),
+    [
+        ("{label}/{label}_{order:d}.csv", "jar/jar_3.csv", {"label": "jar", "order": "3"}),
+        ("{label}/{label}_{order:d}.csv", "jar/can_3.csv", None),
+        ("{a}_{a}.csv", "x_y_x_y.csv", {"a": "x_y"}),  # the longest first text alone does not fit twice
+        ("{label}/**/{label}_{rest}.csv", "jar/a/b/jar_1_2.csv", {"label": "jar", "rest": "1_2"}),
+        ("**/{name}.c?v", "a/b/x.csv", {"name": "x"}),
+        ("{name}.csv", "a/x.csv", None),
+    ],
+)
+def test_a_template_reads_fields_from_a_path(template, path, fields):
+    assert file_template(template).fields(path) == fields
+
+
+def test_a_template_with_repeated_fields_tries_a_limited_number_of_values():
+    with pytest.raises(PatternError, match="twice"):
+        file_template("{a}{a}{b}{b}").fields("ab" * 60 + "c")
+    with pytest.raises(PatternError, match="characters"):
+        file_template("{a}{a}").fields("ab" * 300)
+
+
+def test_wildcards_of_column_names():
+    names = ["f1", "f2", "f12", "g1", "f*"]
+    assert [name for name in names if wildcard("f?").fullmatch(name)] == ["f1", "f2", "f*"]
+    assert [name for name in names if wildcard("f[12]*").fullmatch(name)] == ["f1", "f2", "f12"]
+    assert [name for name in names if wildcard("[!f]*").fullmatch(name)] == ["g1"]
+
+
+# Tables
+
+
+def test_thousands_of_equal_column_names_are_numbered(tmp_path):
+    path = tmp_path / "equal.csv"
+    path.write_text("t," + ",".join(["x"] * 4000 + ["x.1"]) + "\n" + "1," * 4001 + "1\n")
+    names = list(read_text(path)[0].numbers)
+    assert len(names) == 4002
+    assert names[1:4] == ["x", "x.1", "x.2"]
+
+
+@pytest.mark.parametrize("read", [CsvColumns, read_text])
+@pytest.mark.parametrize(
+    ("limit", "text"),
+    [
+        (limits.TEXT_BYTES, "a,b,c\n" + "1,2,3\n" * 20),
+        (limits.LINE_CHARACTERS, "a,b,c\n1,2,333333333333333333333\n1,2,3\n"),
+        (limits.COLUMNS, ",".join("abcdefghijklm") + "\n" + ",".join("1234567890123") + "\n"),
+        (limits.CELLS, "a,b,c\n" + "1,2,3\n" * 20),
+    ],
+)
+def test_a_table_beyond_a_limit_is_damaged_and_the_limit_can_be_raised(
+    tmp_path, monkeypatch, read, limit, text
+):
+    path = tmp_path / "table.csv"
+    path.write_text(text)
+    read(path)
+    monkeypatch.setenv(limit.variable, "12")
+    with pytest.raises(DataDamaged, match=rf"table\.csv.*{limit.what}.*{limit.variable}"):
+        read(path)
+    monkeypatch.setenv(limit.variable, "1000")
+    read(path)
+
+
+@pytest.mark.parametrize("given", ["0", "-1", "1e6", "lots", "9" * 40, "٣"])
+def test_a_limit_that_is_not_a_number_is_refused_by_its_name(monkeypatch, given):
+    monkeypatch.setenv(limits.COLUMNS.variable, given)
+    with pytest.raises(ConfigError, match=limits.COLUMNS.variable):
+        limits.COLUMNS.exceeded(1)
+
+
+def test_every_limit_is_documented():
+    page = (HERE.parent / "docs" / "import.md").read_text()
+    for limit in limits.LIMITS:
+        assert f"`{limit.variable}`" in page
+        assert f"{limit.default:,}".replace(",", " ") in page
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"label,x\na,\x001\n",
+        "label,x\na,1\n".encode("utf-16"),
+        "label,x\nä,1\n".encode("latin-1"),
+        b'label,x\na,"1\nb,2\n' * 3,
+        b'label,x\na,"' + b"1" * 200_000 + b'"\n',
+        b"",
+        b"label,x\n",
+        b"label,x\na,1e400\nb,2\na,3\nb,4\n",
+        b"label," + b"x" * 600 + b"\na,1\n",
+    ],
+    ids=["zero", "utf16", "latin1", "quote", "long cell", "empty", "header", "1e400", "long name"],
+)
+def test_a_table_that_is_none_names_the_file(tmp_path, data):
+    path = tmp_path / "table.csv"
+    path.write_bytes(data)
+    with pytest.raises((DataDamaged, ConfigError), match=r"table\.csv") as refused:
+        read_labelled(path, "label")
+    assert len(str(refused.value)) < 1000
+    assert run("evaluate", path, "--label", "label") in (2, 5)
+    assert run("train", path, "--label", "label", "--out", tmp_path / "model.json") in (2, 5)
+
+
+def test_a_cell_of_many_digits_takes_linear_time(tmp_path):
+    path = tmp_path / "digits.csv"
+    path.write_text(f"a b c\n{'1' * 1_000_000}x 1 1\n0 1 2\n")
+    assert "a" in read_text(path)[0].texts
+
+
+def test_errors_list_a_few_of_many_columns(tmp_path):
+    path = tmp_path / "wide.csv"
+    path.write_text(",".join(f"column{k}" for k in range(5000)) + "\n" + ",".join(["1"] * 5000) + "\n")
+    with pytest.raises(ConfigError, match="and 4976 more") as refused:
+        CsvColumns(path).column("colunm1", "the label")
+    assert len(str(refused.value)) < 1000
+
+
+def test_no_suggestion_is_sought_for_a_text_that_is_no_name():
+    assert suggestion("x" * 100_000, ["x" * 99_999]) == ""
+    assert "'width'" in suggestion("widht", ["width", "y" * 100_000])
+
+
+def test_headings_with_many_brackets_take_linear_time():
+    assert name_and_unit("[" * 100_000 + "x]")[1] == "x"
+    assert name_and_unit(" " * 100_000 + "x")[1] == ""
+    assert name_and_unit("a [b] c [N]") == ("a [b] c", "N")
+    assert name_and_unit("a]b]") == ("a]b]", "")
+
+
+# Classes and features
+
+
+@pytest.mark.parametrize("classifier", ["c45", "ebm", "forest", "svm", "knn", "mlp", "boosted", "tree"])
+def test_as_many_labels_as_half_of_the_trials_are_refused_by_every_command(tmp_path, capsys, classifier):
+    path = table(tmp_path / "table.csv", [f"c{i // 2}" for i in range(40_000)])
+    chosen = ("--label", "label", "--classifier", classifier)
+    assert run("evaluate", path, *chosen) == 2
+    assert run("train", path, *chosen, "--out", tmp_path / "model.json") == 2
+    assert run("compare", path, "--label", "label", "--classifiers", classifier) == 2
+    told = capsys.readouterr().err
+    assert told.count("20000 different labels") == told.count(limits.CLASSES.variable) == 3
+
+
+def test_too_many_labels_and_features_of_trials_of_any_source_are_refused(monkeypatch):
+    def trials(labels, features):
+        names = tuple(f"x{k}" for k in range(features))
+        return Labelled(
+            source="trials",
+            table=FeatureTable(names=names, units=("",) * features, values=np.zeros((labels, features))),
+            labels=tuple(f"c{k}" for k in range(labels)),
+        )
+
+    with pytest.raises(ConfigError, match=limits.CLASSES.variable):
+        trials(20_000, 1)
+    with pytest.raises(ConfigError, match=limits.FEATURES.variable):
+        trials(2, 20_000)
+    monkeypatch.setenv(limits.CLASSES.variable, "300")
+    assert len(trials(300, 1).classes) == 300
+
+
+def test_a_table_with_thousands_of_features_is_refused(tmp_path, capsys):
+    path = table(tmp_path / "table.csv", ["a", "b"] * 4, features=6000)
+    assert run("evaluate", path, "--label", "label", "--classifier", "ebm") == 2
+    assert limits.FEATURES.variable in capsys.readouterr().err
+
+
+def test_thousands_of_checkpoints_are_refused(tmp_path):
+    path = table(tmp_path / "table.csv", ["a", "b"] * 4)
+    times = ",".join(map(str, range(1, 9000)))
+    assert run("evaluate", path, "--label", "label", "--checkpoints", times) == 2
+
+
+@pytest.mark.parametrize("seed", ["-1", str(2**63), "9" * 30])
+def test_a_seed_out_of_range_is_wrong_use(tmp_path, seed):
+    path = table(tmp_path / "table.csv", ["a", "b"] * 20)
+    assert run("evaluate", path, "--label", "label", "--seed", seed) == 2
+
+
+# TOML
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "x = " + "[" * 5000 + "]" * 5000,
+        "x = " + "[" * (MOST_NESTED + 1) + "]" * (MOST_NESTED + 1),
+        "a." * 100_000 + "a = 1",
+        '"a".' * 60 + "a = 1",
+        "[" + "a." * 5000 + "a]",
+        "x = " + "{a = " * 3000 + "1" + "}" * 3000,
+        "x = 9223372036854775808",
+        "x = [1, -9223372036854775809]",
+        "x = 0x" + "f" * 100_000,
+        "x = " + "9" * 5000,
+        "x = 1\nx = 2",
+        "#" * (limits.SETTINGS_BYTES.default + 1),
+    ],
+)
+def test_toml_out_of_bounds_is_refused_at_once(tmp_path, text):
+    with pytest.raises(TomlError):
+        toml_values(text)
+    path = tmp_path / "settings.toml"
+    path.write_text(text)
+    with pytest.raises(ConfigError, match=r"settings\.toml"):
+        read_layer(path)
+    assert run("run", "--pipeline", path) == 2
+    assert run("experiment", path) == 2
+    assert run("import", path, "--check") == 2
+    assert run("run", "--object", path) == 2
+    assert run("identify", path, "--out", tmp_path / "out.toml") == 2
+    assert run("evaluate", f"identified:{path}") == 2
+
+
+def test_toml_within_the_bounds_is_read():
+    nested = "x = " + "[" * (MOST_NESTED - 1) + "1" + "]" * (MOST_NESTED - 1)
+    assert toml_values(nested)
+    assert toml_values("x = 9223372036854775807\ny = -9223372036854775808")["x"] == 2**63 - 1
+    assert toml_values("x = [" + "1.5, " * 1000 + "1.5]")
+    assert toml_values("x = '" + "a." * 1000 + "'")
+
+
+def test_thousands_of_unknown_keys_are_told_in_a_few_lines(tmp_path):
+    path = manifest(tmp_path, "".join(f"k{i} = 1\n" for i in range(20_000)))
+    with pytest.raises(ConfigError, match="19980 more") as refused:
+        read_manifest(path)
+    assert len(str(refused.value).splitlines()) < 30
+
+
+def test_merging_many_keys_takes_linear_time():
+    merged = Merged()
+    layer = Layer.of({"table": {f"k{i}": i for i in range(20_000)}}, "file")
+    merged.add((), layer.values, layer)
+    assert merged.owner_of(("table", "k7")) is layer
+    merged.add((), {"table": 3}, layer)
+    assert merged.owner.keys() == {(), ("table",)}
+
+
+@pytest.mark.parametrize("value", ["0x" + "f" * 9999, "9" * 5000, str(2**63), "[" * 3000, "a." * 3000])
+def test_an_option_out_of_bounds_is_wrong_use(value):
+    option_layers([f"run.seed={value}"])
+    assert run("run", "-o", f"run.seed={value}") == 2
+
+
+@pytest.mark.parametrize(
+    "key",
+    [
+        'zero = "99999999999999999999999999 samples"',
+        f'zero = "{"9" * 5000} samples"',
+        f'zero = "{"9" * 400} s"',
+        "rate_hz = 1e308",
+        "channels = {" + ", ".join(f'k{i} = "F"' for i in range(501)) + "}",
+        "values = {" + ", ".join(f'k{i} = "F"' for i in range(501)) + "}",
+        'folder = "~nobody_of_this_name/x"',
+        'folder = "a\\u0000b"',
+        'recorded = "1e308"',
+        'order = "1e308"',
+    ],
+)
+def test_a_key_of_a_manifest_out_of_bounds_is_answered(tmp_path, key):
+    path = manifest(tmp_path, MANIFEST + key + "\n")
+    try:
+        found = list(read_recordings(str(path)))
+    except ConfigError as error:
+        found = [error]
+    assert len(found) == 1
+    assert not isinstance(found[0], ConfigError) or "manifest.toml" in str(found[0])
+
+
+@pytest.mark.parametrize("rate_hz", ["1e9", "1e300", "9223372036854775807"])
+def test_resampling_to_more_samples_than_the_limit_is_refused(tmp_path, rate_hz):
+    (found,) = read_recordings(str(manifest(tmp_path, MANIFEST + f"resample_hz = {rate_hz}\n")))
+    assert isinstance(found, UnreadableRecording)
+    assert limits.SAMPLES.variable in str(found.error)
+
+
+@pytest.mark.parametrize("split", ["rows", "t"])
+def test_a_file_that_is_split_into_too_many_grasps_is_refused(tmp_path, split):
+    rows = "".join(f"{k},60,1\n" for k in range(limits.RECORDINGS.default + 1))
+    (found,) = read_recordings(str(manifest(tmp_path, MANIFEST + f'split = "{split}"\n', "t,g,F\n" + rows)))
+    assert isinstance(found, UnreadableRecording)
+    assert limits.RECORDINGS.variable in str(found.error)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "[data]\ntotal = 9223372036854775808",
+        "[data]\ntotal = 9223372036854775807",
+        "[data]\ntrials = 9223372036854775807",
+        "[data]\ninstances = 9223372036854775807",
+        "[data]\ninstances = 1000\ntrials = 1000000",
+        "[[data.groups]]\ntotal = 1000000\n" * 3000,
+        "[data.named]\n" + "".join(f'k{i} = "can:full_open"\n' for i in range(20_000)),
+        "[data]\ncheckpoints_s = [" + ", ".join(str(k) for k in range(1, 2000)) + "]\n[judge]\nfolds = 1",
+        "seeds = 9223372036854775807",
+        "seeds = [9223372036854775807]",
+        "[sweep]\n" + "".join(f'"controller.k{i}" = [1, 2, 3, 4, 5, 6, 7, 8]\n' for i in range(40)),
+        "".join(f'[[variants]]\nname = "v{i}"\n' for i in range(1001)),
+        "pipelines = [" + '"default", ' * 1001 + "]",
+        "classifiers = [" + '"tree", ' * 1001 + "]",
+        "parts = [" + '"probing_force", ' * 3000 + "]",
+        "[judge]\nfolds = 9223372036854775807",
+        "[judge]\ngrasps = 9223372036854775807",
+        'classifiers = [{ type = "forest", trees = 9223372036854775807 }]',
+        'classifiers = [{ type = "mlp", hidden = 9223372036854775807 }]',
+        'classifiers = [{ type = "ebm", bins = 9223372036854775807 }]',
+        'classifiers = [{ type = "knn", neighbours = 9223372036854775807 }]',
+        'classifiers = [{ type = "c45", rep_folds = 9223372036854775807 }]',
+        "[gripper]\npad_cells = 9223372036854775807",
+    ],
+)
+def test_a_count_of_an_experiment_out_of_bounds_is_refused_before_anything_is_made(tmp_path, text):
+    path = tmp_path / "experiment.toml"
+    path.write_text(f'title = "x"\n{text}\n')
+    with pytest.raises(ConfigError):
+        read_experiment(str(path))
+
+
+def test_a_scene_with_thousands_of_terms_is_refused(tmp_path):
+    path = tmp_path / "scene.toml"
+    path.write_text("width_m = 0.05\n" + "[[terms]]\ntype = 'maxwell'\nk_n_m = 1\ntau_s = 1\n" * 2000)
+    with pytest.raises(ConfigError, match=r"scene\.toml.*2000 terms"):
+        find(str(path))
+
+
+@pytest.mark.parametrize(
+    "channel",
+    [
+        {"kind": "array", "name": "a", "unit": "N", "finger": "x", "rows": 10**9, "columns": 10**9},
+        {"kind": "fast", "name": "a", "unit": "N", "rate_hz": 1.0, "samples": 10**12, "axes": ["x"]},
+    ],
+)
+def test_a_channel_of_a_file_has_a_bounded_size(channel):
+    with pytest.raises(ValueError, match=limits.CHANNEL_NUMBERS.variable):
+        from_json(channel)
+
+
+# Expressions
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "9**9**9", "F**2", "1<<9999999", "9" * 1000, "0x" + "f" * 1900, "1e999*F", "1j*F", "(" * 900 + "F" + ")" * 900,
+        "-" * 1900 + "F", "F" + "*1" * 200, "F.__class__", "lambda: 0", "f'{F}'", "[x for x in F]", "F\0", "x" * 2001,
+        "F or F", "(F := 1)", "print(F)", "max(*F)", "max(F, key=F)", "F[-1]", "F[0:9]", "F['a']", "a" + " [" * 900,
+    ],
+)  # fmt: skip
+def test_an_expression_that_is_out_of_bounds_is_refused(text):
+    with pytest.raises(ExpressionError):
+        parse(text)
+
+
+def test_division_by_zero_gives_a_missing_force_and_not_an_error(tmp_path):
+    (found,) = read_recordings(str(manifest(tmp_path, MANIFEST.replace('"F"', '"F/0"'))))
+    assert isinstance(found, UnreadableRecording)
+    assert "no number" in str(found.error)
+
+
+def test_an_expression_over_more_cells_than_the_limit_is_refused(monkeypatch):
+    monkeypatch.setenv(limits.CELLS.variable, "100")
+    columns = {f"f{k}": np.zeros(10) for k in range(9)}
+    assert parse("sum('*')").numbers(columns, 10).shape == (10,)
+    with pytest.raises(ExpressionError, match=limits.CELLS.variable):
+        parse("sum('*', '*')").numbers(columns, 10)
+
+
+@pytest.mark.parametrize(
+    ("text", "body", "unit"),
+    [
+        ("Pos [mm]", "Pos", "mm"),
+        ("60 - Pos  [mm] ", "60 - Pos", "mm"),
+        ("force[2]", "force[2]", ""),
+        ("force [2]", "force [2]", ""),
+        ("'a [b]'", "'a [b]'", ""),
+        ("F [m/s]", "F", "m/s"),
+    ],
+)
+def test_the_unit_behind_an_expression(text, body, unit):
+    parsed = parse(text)
+    assert (parsed.text, parsed.unit) == (body, unit)
+
+
+# ARFF
+
+
+def test_a_long_row_of_arff_takes_linear_time():
+    values = ", ".join(f"v{k}" for k in range(9000))
+    head = f"@relation r\n@attribute a {{{values}}}\n@attribute label {{x, y}}\n@data\n"
+    assert len(parse_arff(head + "v1, x\nv8999, y\n").labels) == 2
+    with pytest.raises(ArffError, match="values"):
+        parse_arff(head + "v1, " * 100_000 + "x\n")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "@attribute a {" + ", ".join(f"v{k}" for k in range(20_000)) + "}\n@data\nv1\n",
+        "".join(f"@attribute a{k} numeric\n" for k in range(20_000)),
+        "@attribute a numeric\n@attribute l {x}\n@data\n{" + "9" * 5000 + " 1}\n",
+        "@attribute a numeric\n@attribute l {x}\n@data\n{² 1}\n",
+        "@attribute a numeric\n@attribute l {x}\n@data\n" + "y" * 100_000 + ", x\n",
+    ],
+)
+def test_arff_out_of_bounds_is_told_with_its_line(text):
+    with pytest.raises(ArffError, match=r"<text>:\d+") as refused:
+        parse_arff(text)
+    assert len(str(refused.value)) < 2000
+
+
+# Fuzzing
+
+
+def fuzzed(seed, number):
+    """Return what a program says that reads so many changed texts of each format, with a limit on its memory."""
+    command = [sys.executable, str(HERE / "hostile_tables.py"), str(seed), str(number)]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr[-2000:]
+    return json.loads(done.stdout)
+
+
+def test_changed_texts_are_answered_by_a_result_or_an_error_that_names_the_file():
+    found = fuzzed(seed=57, number=25)
+    assert found["read"] == 250
+    assert found["bad"] == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_many_changed_texts_are_answered_by_a_result_or_an_error_that_names_the_file(seed):
+    found = fuzzed(seed, number=400)
+    assert found["read"] == 4000
+    assert found["bad"] == []
