@@ -13,7 +13,7 @@ from graspsense.core.protection.drift import PadDrift
 from graspsense.core.protection.effort_ceiling import effort_ceiling_n, limited
 from graspsense.core.protection.motor import Motor
 from graspsense.core.protection.reports import Reports
-from graspsense.core.protection.status import Status
+from graspsense.core.protection.status import StatusWatch
 from graspsense.core.protection.stuck_force import StuckForce
 from graspsense.core.protection.touch import Touch
 from graspsense.core.roles import DeviceInfo
@@ -249,20 +249,20 @@ BROKEN = StatusBit(mask=4, name="encoder fault", meaning="the gap is not known",
 
 
 def test_a_bit_without_a_limit_warns_and_one_beyond_its_limit_ends_the_grasp():
-    status = Status((HOT, BROKEN))
+    status = StatusWatch((HOT, BROKEN))
     faults = [status.see(frame(0.001 * k, status=5), SQUEEZE) for k in range(20)]
     assert [(fault.name, fault.ends) for fault in faults[0]] == [("hot", False), ("encoder fault", False)]
     assert [(fault.name, fault.ends) for fault in faults[-1]] == [("hot", False), ("encoder fault", True)]
 
 
 def test_only_a_bit_with_a_limit_refuses_the_grasp():
-    status = Status((HOT, BROKEN))
+    status = StatusWatch((HOT, BROKEN))
     assert [fault.name for fault in status.before_closing(frame(0.0, status=5))] == ["encoder fault"]
     assert status.before_closing(frame(0.0, status=1)) == []
 
 
 def test_a_bit_that_nobody_declared_is_told():
-    assert Status((HOT,)).see(frame(0.0, status=8), SQUEEZE)[0].name == "status 0x8"
+    assert StatusWatch((HOT,)).see(frame(0.0, status=8), SQUEEZE)[0].name == "status 0x8"
 
 
 # ------------------------------------------------------------------------------------------- frames, images and cells

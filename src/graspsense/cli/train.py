@@ -103,16 +103,21 @@ def train(
         model = calibrated(model, learner, labelled, given["seed"])
         model = evolve(model, checkpoints=checkpoint_models(model, learner, parts[:-1], given["seed"]))
     write_model(path, model)
-    if keep:
-        from graspsense.sources.features_csv import write_labelled
-
-        write_labelled(Path(keep), labelled)
+    _keep(keep, labelled)
     for note in notes:
         talk(f"note: {note}")
     if as_json:
         echo_json({"model": out, **_as_values(model), "trials": len(labelled)})
     else:
         _say_trained(out, model)
+
+
+def _keep(keep: str | None, labelled: Labelled) -> None:
+    """Write the trials as a table of features, if a file is named."""
+    if keep:
+        from graspsense.sources.features_csv import write_labelled
+
+        write_labelled(Path(keep), labelled)
 
 
 def _as_values(model: Model) -> dict[str, Any]:

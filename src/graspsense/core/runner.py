@@ -212,10 +212,7 @@ def run_grasp(
             reason = f"the gripper could not be closed: {named(error)} ({reason or outcome.words})"
             outcome = Outcome.ABORTED
         # After closing, so that the report covers it.
-        try:
-            report = dict(backend.report())
-        except FAILURES as error:
-            report = {"report_failed": named(error)}
+        report = _report_of(backend)
     frames = grasp.recorder.frames
     commands = backend.recorded_commands()
     if commands is not None:
@@ -233,6 +230,14 @@ def run_grasp(
         warnings=() if grasp.protection is None else grasp.protection.warnings,
         interrupted=grasp.interrupted or interrupts.count > 0,
     )
+
+
+def _report_of(backend: SensorBackend[Any]) -> dict[str, Any]:
+    """Return the report of a gripper, or why it has none."""
+    try:
+        return dict(backend.report())
+    except FAILURES as error:
+        return {"report_failed": named(error)}
 
 
 def run_uninterrupted(
@@ -392,8 +397,7 @@ class _Grasp:
                 phase, newest = state.phase, pads.counter
                 self._event(frame.t_s, Phase(phase), Phase(phase).name.lower())
             if state.guard is not watcher:
-                self._guard_event(frame, watcher, state.guard)
-                watcher = state.guard
+                watcher = self._guard_event(frame, watcher, state.guard)
             command = command if protection is None else protection.limit(reading, phase, command)
             # The frame that ended the taring still has forces relative to the old zero.
             recorded = phase >= APPROACH and stepped
@@ -477,11 +481,13 @@ class _Grasp:
         phase = Phase(max(self.state.phase, Phase.OPENING))
         self._event(t_s, phase, f"{'fault' if fault.ends else 'warning'}: {fault.told}")
 
-    def _guard_event(self, frame: Frame, before: GuardState, now: GuardState) -> None:
+    def _guard_event(self, frame: Frame, before: GuardState, now: GuardState) -> GuardState:
+        """Log an action of the guard at its first time, and return its state."""
         if now.stopped and not before.stopped:
             self._event(frame.t_s, Phase(self.state.phase), "guard: the controller commanded NaN")
         elif now.acted and not before.acted:
             self._event(frame.t_s, Phase(self.state.phase), "guard: a command was limited")
+        return now
 
     def _told(self, frame: Frame, phase: int, events: int) -> None:
         """Log the events that the controller told in this tick, one for each bit that is set."""

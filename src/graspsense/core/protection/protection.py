@@ -15,7 +15,7 @@ from graspsense.core.protection.drift import Drift
 from graspsense.core.protection.effort_ceiling import effort_ceiling_n, limited
 from graspsense.core.protection.motor import Motor
 from graspsense.core.protection.reports import Reports
-from graspsense.core.protection.status import Status
+from graspsense.core.protection.status import StatusWatch
 from graspsense.core.protection.stuck_force import StuckForce
 from graspsense.core.protection.touch import Touch
 from graspsense.core.roles import Controller, DeviceInfo
@@ -57,7 +57,7 @@ class Protection:
         self._stuck = StuckForce()
         self._fingertips = Fingertips()
         self._motor = Motor("effort" in rates)
-        self._status = Status(info.status_bits)
+        self._status = StatusWatch(info.status_bits)
         self._reports = Reports(info.rate_hz, rates.get("pads", 0.0))
 
     @property

@@ -9,7 +9,7 @@ from graspsense.core.faults import Fault, StatusBit
 from graspsense.core.signals import APPROACH, HOLD, SQUEEZE, Frame
 
 
-class Status:
+class StatusWatch:
     """Watches the status of each frame for the bits that the gripper has declared, and for others."""
 
     def __init__(self, bits: Sequence[StatusBit]) -> None:

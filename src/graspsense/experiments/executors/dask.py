@@ -68,6 +68,7 @@ class DaskCluster:
                 silence_logs=50,
             )
         except Exception as error:  # Dask raises various exceptions, from several layers
+            self._scratch.cleanup()
             cause: BaseException = error
             while cause.__cause__ is not None:
                 cause = cause.__cause__
