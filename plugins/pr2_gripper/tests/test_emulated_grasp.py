@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import random
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -147,10 +148,36 @@ def random_faults(chance: random.Random) -> FaultConfig:
     )  # fmt: skip
 
 
+def random_board_faults(chance: random.Random) -> FaultConfig:
+    """One to three faults of the board itself, at any time of a grasp, and some lost reports."""
+
+    def at_s() -> float:
+        return 4.0 * chance.random()
+
+    kinds: list[dict[str, Any]] = [
+        {"pad_fault": chance.choice(["absent", "stuck", "numb", "zero"]), "pad_at_s": at_s(),
+         "pad_side": chance.choice(["left", "right", "both"])},
+        {"image_fault": chance.choice(["frozen", "stale"]), "image_at_s": at_s()},
+        {"status_bits": 1 << chance.randrange(16), "status_at_s": at_s()},
+        {"motor_gain": chance.choice([-1.0, 0.0, 0.3, 2.0, 5.0]), "motor_at_s": at_s()},
+        {"effort_report_gain": chance.choice([-1.0, 0.0, 5.0]), "effort_report_at_s": at_s()},
+        {"clock_rate": chance.choice([0.0, 0.5, 1.01, 3.0]), "clock_at_s": at_s()},
+    ]  # fmt: skip
+    keys: dict[str, Any] = {"drop": 0.02}
+    for kind in chance.sample(kinds, chance.randint(1, 3)):
+        keys |= kind
+    return FaultConfig(**keys)
+
+
 OBJECTS = ("odwalla:full_closed", "odwalla:empty_open", "can:empty_open", "naked:full_open", "block", "none")
 
 
-def commanded_safely(monkeypatch: pytest.MonkeyPatch, grasps: int, seed: int) -> dict[str, int]:
+def commanded_safely(
+    monkeypatch: pytest.MonkeyPatch,
+    grasps: int,
+    seed: int,
+    faults: Callable[[random.Random], FaultConfig] = random_faults,
+) -> dict[str, int]:
     """Do grasps with random faults and hold every command against the limit; return the outcomes' counts."""
     chance = random.Random(seed)
     wires: list[Watched] = []
@@ -170,7 +197,7 @@ def commanded_safely(monkeypatch: pytest.MonkeyPatch, grasps: int, seed: int) ->
             transport="emulated",
             object=chance.choice(OBJECTS),
             body_config={"open_gap_m": 0.07},
-            faults=random_faults(chance),
+            faults=faults(chance),
         )
         ended = driven(Pr2Backend(config), RunConfig(seed=i), controller)
         outcomes[ended.outcome.name] = outcomes.get(ended.outcome.name, 0) + 1
@@ -189,6 +216,13 @@ def commanded_safely(monkeypatch: pytest.MonkeyPatch, grasps: int, seed: int) ->
 def test_commands_stay_within_limits_whatever_the_wire_does(monkeypatch: pytest.MonkeyPatch) -> None:
     outcomes = commanded_safely(monkeypatch, 8, seed=11)
     assert outcomes["STEADY"] >= 2
+    assert outcomes["DEVICE_LOST"] >= 1
+
+
+@pytest.mark.slow
+def test_commands_stay_within_limits_whatever_the_board_does(monkeypatch: pytest.MonkeyPatch) -> None:
+    outcomes = commanded_safely(monkeypatch, 12, seed=13, faults=random_board_faults)
+    assert outcomes["ABORTED"] >= 2
     assert outcomes["DEVICE_LOST"] >= 1
 
 
