@@ -121,3 +121,15 @@ def test_an_exported_store_is_harmless_and_evaluates_as_the_store(store, tmp_pat
     assert back.labels == own.labels
     assert back.instances == own.instances
     assert (back.table.values == own.table.values).all()
+
+
+def test_a_label_forges_no_line_of_an_arff_file(tmp_path):
+    with Store.open(tmp_path / "t") as store:
+        for label in ("can\n1.0,2.0,forged", "a\r\n@data", "plain"):
+            keep(store, label)
+    out = tmp_path / "table.arff"
+    assert exit_code("export", str(tmp_path / "t"), "--to", str(out)) == 0
+    data = out.read_bytes().split(b"@data\n")[-1].splitlines()
+    assert len(data) == 3
+    assert all(line.count(b",") >= 2 for line in data)
+    assert out.read_bytes().count(b"\n@data") == 1

@@ -2,6 +2,7 @@
 
 import json
 import os
+import pty
 import signal
 import subprocess
 import sys
@@ -329,3 +330,26 @@ def test_a_second_session_leaves_the_trials_of_an_earlier_one_alone(tmp_path, mo
     assert capsys.readouterr().err.count("no trial to undo") == 2
     with Store.read(folder) as store:
         assert [one.set_aside for one in store.page(set_aside=None)] == [None]
+
+
+@pytest.mark.slow
+def test_a_terminal_that_goes_ends_the_collection_though_nothing_can_be_printed(tmp_path):
+    master, slave = pty.openpty()
+    options = ("-o", "classifier.type=none", "-o", "gripper.rate_hz=100000")
+    process = subprocess.Popen(
+        [*COMMAND, *collecting(tmp_path / "t", "block,toy")[:-1], *options],
+        stdin=slave,
+        stdout=slave,
+        stderr=slave,
+        start_new_session=True,
+    )
+    os.close(slave)
+    said = b""
+    while b"next: " not in said:
+        said += os.read(master, 4096)
+    os.write(master, b"\n")
+    os.close(master)
+    process.send_signal(signal.SIGHUP)
+    assert process.wait(timeout=300) == 130
+    with Store.open(tmp_path / "t") as store:
+        assert {one.outcome for one in store.page()} <= {"aborted"}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 import click
@@ -114,7 +115,8 @@ def _run(collection: Collection, save: str, as_json: bool) -> None:
     try:
         collection.run()
     except KeyboardInterrupt:
-        _print_counts(save, collection, as_json)
+        with suppress(OSError):  # the terminal may have gone
+            _print_counts(save, collection, as_json)
         raise
     _print_counts(save, collection, as_json)
 

@@ -161,7 +161,9 @@ def _exit_code(arguments: list[str]) -> int:
         echo_as_it_is(error.format_message(), err=True)
         return EXIT_USAGE
     except (click.Abort, KeyboardInterrupt):
-        echo_as_it_is("interrupted", err=True)
+        with suppress(OSError):  # the terminal may have gone
+            echo_as_it_is("interrupted", err=True)
+        _flush_stdout()
         return EXIT_INTERRUPTED
     except BrokenPipeError:
         _give_up_stdout()  # the reader of the pipe has gone
@@ -205,21 +207,26 @@ def _report(error: Exception, as_json: bool) -> int:
             talk += f" Run it again with {TRACEBACK_VARIABLE}=1 to see where it happened."
     if os.environ.get(TRACEBACK_VARIABLE) == "1":
         talk = "".join(traceback.format_exception(error)) + talk
-    if talk.startswith("Traceback"):
-        echo_as_it_is(talk, err=True)
-    else:
-        echo(f"{PROGRAM}: {talk}", Style.BAD, indent=2, err=True)
+    with suppress(OSError):  # the terminal may have gone
+        if talk.startswith("Traceback"):
+            echo_as_it_is(talk, err=True)
+        else:
+            echo(f"{PROGRAM}: {talk}", Style.BAD, indent=2, err=True)
     if as_json:
         from graspsense.cli.output import echo_json
 
         with suppress(OSError):  # it may be what the error is about
             echo_json({"error": {"kind": type(error).__name__, "message": message, "exit_code": code}})
+    _flush_stdout()
+    return code
+
+
+def _flush_stdout() -> None:
     try:
         if sys.stdout is not None:
             sys.stdout.flush()
     except OSError:
         _give_up_stdout()
-    return code
 
 
 def _give_up_stdout() -> None:

@@ -75,7 +75,6 @@ def train(
     from graspsense.evaluation.gathered_warnings import gathered_warnings
 
     check_outputs(out, keep, overwrite=overwrite, sources=[source])
-    path = Path(out)
     times = checkpoints_of(checkpoints)
     if given["target_value"]:
         from graspsense.cli.target_value import train_value
@@ -95,14 +94,14 @@ def train(
             learner.component,
             learner.config,
             labelled,
-            name=path.stem,
+            name=Path(out).stem,
             seed=given["seed"],
             target=target,
             provenance={"command": command_line(("keep", "overwrite", "as_json"))},
         )
         model = calibrated(model, learner, labelled, given["seed"])
         model = evolve(model, checkpoints=checkpoint_models(model, learner, parts[:-1], given["seed"]))
-    write_model(path, model)
+    write_model(Path(out), model)
     _keep(keep, labelled)
     for note in notes:
         talk(f"note: {note}")

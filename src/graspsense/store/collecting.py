@@ -156,11 +156,13 @@ class Collection:
         if grasp.number is None:
             raise SaveFailed(grasp.problem)
         self.collected[grasp.number] = word
-        self.say(self._report(word, grasp))
-        self.show(word, grasp.trial)
-        self.say("  ".join(f"{label} {n}/{self.wanted.each}" for label, n in self.counts().items()))
-        if grasp.interrupted:
-            raise KeyboardInterrupt
+        try:
+            self.say(self._report(word, grasp))
+            self.show(word, grasp.trial)
+            self.say("  ".join(f"{label} {n}/{self.wanted.each}" for label, n in self.counts().items()))
+        finally:
+            if grasp.interrupted:  # perhaps because the terminal has gone, so that nothing can be said
+                raise KeyboardInterrupt
 
     def _report(self, word: str, grasp: RecordedTrial) -> str:
         trial = grasp.trial

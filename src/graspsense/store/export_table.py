@@ -15,6 +15,7 @@ from attrs import frozen
 from graspsense.core.csv_text import csv_text
 from graspsense.core.errors import ConfigError
 from graspsense.core.features import FeatureTable
+from graspsense.core.printable import in_one_line
 from graspsense.core.target_value import RESERVED, name_and_unit, number_of
 from graspsense.recording.atomic_file import write_new
 from graspsense.recording.parquet import parquet
@@ -168,7 +169,7 @@ def write_arff(path: Path, table: TrialTable) -> None:
     lines = ["@relation graspsense", ""]
     features = table.features
     for name, unit in zip(features.names, features.units, strict=True):
-        lines.append(f"% {name} in {unit}" if unit else f"% {name}")
+        lines.append(in_one_line(f"% {name} in {unit}" if unit else f"% {name}"))
         lines.append(f"@attribute {_arff_word(name)} numeric")
     lines.append(f"@attribute label {{{','.join(map(_arff_word, classes))}}}")
     lines += ["", "@data"]
@@ -219,4 +220,6 @@ WRITERS: Final[Mapping[str, Callable[[Path, TrialTable], None]]] = {
 def _arff_word(text: str) -> str:
     if text.isascii() and text.replace("_", "a").isalnum():
         return text
-    return "'" + text.replace("\\", "\\\\").replace("'", "\\'") + "'"
+    escaped = text.replace("\\", "\\\\").replace("'", "\\'")
+    # A line of an ARFF file ends at a line feed, also within quotes.
+    return "'" + escaped.replace("\n", "\\n").replace("\r", "\\r").replace("\t", "\\t") + "'"
