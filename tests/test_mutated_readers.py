@@ -28,7 +28,9 @@ from graspsense.core.plugins import installed
 from graspsense.recording.atomic_file import SaveFailed
 from graspsense.sources.dataset_recordings import handed_over
 from graspsense.sources.import_sources import recordings_to_import
+from graspsense.sources.import_summary import summary_of
 from graspsense.sources.importing import import_recording
+from graspsense.sources.noise_thresholds import thresholds_for
 from graspsense.sources.trial_source import load_trials
 from graspsense.store.imported_contents import AlreadyImported, ImportedContents
 from graspsense.store.store import Store
@@ -123,6 +125,8 @@ def copied(source, target):
 
 def import_into(folder, recordings):
     """Import recordings as the command does; each is a trial, or an error of ours."""
+    summary_of([one.labelled for one in recordings])
+    thresholds_for([one.labelled.recording for one in recordings], {})
     with Store.open(folder) as store:
         contents = ImportedContents(store)
         for one in recordings:

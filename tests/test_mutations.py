@@ -13,6 +13,7 @@ from contextlib import suppress
 import numpy as np
 import pytest
 from kept import SETTINGS, ended, keep, write_recording
+from mutated_files import bytes_of
 
 from graspsense.core.config import resolve
 from graspsense.core.errors import GraspsenseError
@@ -28,28 +29,6 @@ from graspsense.store.verify import verify_store
 
 MUTATIONS = int(os.environ.get("GRASPSENSE_MUTATIONS", "0"))
 NUMBER = MUTATIONS or 150
-
-
-def mutated(data, rng):
-    """Return the bytes cut short, with some changed, a piece missing, twice there, or zeroed."""
-    data = bytearray(data)
-    at = rng.randrange(len(data))
-    length = min(rng.choice([1, 4, 64, 4096]), len(data) - at)
-    match rng.randrange(6):
-        case 0:
-            del data[at:]
-        case 1:
-            for _ in range(rng.choice([1, 1, 4, 40])):
-                data[rng.randrange(len(data))] = rng.randrange(256)
-        case 2:
-            del data[at : at + length]
-        case 3:
-            data[at:at] = data[at : at + length]
-        case 4:
-            data[at : at + length] = bytes(length)
-        case _:
-            data[at] ^= 1 << rng.randrange(8)
-    return bytes(data)
 
 
 def digests(folder):
@@ -68,7 +47,7 @@ def test_recordings(tmp_path):
     rng = random.Random(1)
     told = 0
     for _ in range(NUMBER):
-        bad = mutated(good, rng)
+        bad = bytes_of(good, rng)
         path.write_bytes(bad)
         try:
             found = read_recorded(path)
@@ -104,7 +83,7 @@ def test_stores(tmp_path):
     for _ in range(NUMBER):
         for one in folder.glob("store.sqlite*"):
             one.unlink()
-        (folder / "store.sqlite").write_bytes(mutated(good, rng))
+        (folder / "store.sqlite").write_bytes(bytes_of(good, rng))
         before = digests(folder)
         try:
             problems = verify_store(folder).problems
@@ -149,7 +128,7 @@ def test_models(tmp_path):
         rng = random.Random(3)
         told = 0
         for _ in range(NUMBER):
-            bad = mutated(good, rng)
+            bad = bytes_of(good, rng)
             path.write_bytes(bad)
             try:
                 load_model(str(path), plugins)
@@ -167,7 +146,7 @@ def test_settings(tmp_path):
     rng = random.Random(4)
     told = 0
     for _ in range(NUMBER):
-        bad = mutated(good, rng)
+        bad = bytes_of(good, rng)
         path.write_bytes(bad)
         try:
             resolve(str(path))

@@ -12,12 +12,13 @@ import zipfile
 import numpy as np
 import pytest
 from attrs import evolve
-from kept import ended, frame, keep
+from kept import ended, frame, keep, write_recording
 
 from graspsense.cli.main import main
 from graspsense.core.errors import ComponentFailed, ConfigError, DataDamaged, TooLarge
 from graspsense.core.plugins.registry import STRICT_VARIABLE
 from graspsense.core.signals import EFFORT, NO_PADS, Reading
+from graspsense.recording.export_trace import write_npz
 from graspsense.recording.labelled_recording import LabelledRecording, UnreadableRecording
 from graspsense.recording.layout import RESULT, START, TICK
 from graspsense.recording.readable import each_readable, readable
@@ -215,6 +216,32 @@ def test_impossible_contents_are_damage_of_this_recording(tmp_path, kind):
     crafted(path, **CRAFTED[kind])
     with pytest.raises(DataDamaged, match=r"g\.mcap"):
         read_recorded(path).record()
+
+
+@pytest.mark.parametrize(
+    ("name", "array"),
+    [
+        ("gap_m", np.zeros((30, 2))),
+        ("gap_m", np.array([f"{k} m" for k in range(30)])),
+        ("gap_m", np.zeros(29)),
+        ("t_s", np.full(30, np.nan)),
+        ("pad_left", np.zeros((0, 3))),
+        ("pad_left", np.zeros((2, 22, 2))),
+        (
+            "declared",
+            np.array('{"channels": [], "device": 1, "rate_hz": 1e999, "units": {}, "has_release": 0}'),
+        ),
+        ("declared", np.array('{"channels": 7}')),
+    ],
+)
+def test_an_exported_grasp_of_other_shapes_is_damage_of_this_file(name, array, tmp_path):
+    write_recording(tmp_path / "g.mcap", 30, ended())
+    write_npz(tmp_path / "g.npz", read_recorded(tmp_path / "g.mcap"))
+    assert len(read_named("npz", str(tmp_path / "g.npz")).readings) == 30
+    with np.load(tmp_path / "g.npz", allow_pickle=False) as arrays:
+        np.savez(tmp_path / "bad.npz", **{**arrays, name: array})
+    with pytest.raises(DataDamaged, match=r"bad\.npz"):
+        read_named("npz", str(tmp_path / "bad.npz"))
 
 
 def test_no_ticks_is_no_recording_to_replay(tmp_path):

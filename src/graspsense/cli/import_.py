@@ -285,9 +285,10 @@ def _show(
     from attrs import asdict
 
     from graspsense.cli.run import draw_grasp
-    from graspsense.core.errors import PluginUnavailable
+    from graspsense.core.errors import DataDamaged, PluginUnavailable
     from graspsense.core.pipeline import grasp_with
     from graspsense.core.plugins import installed
+    from graspsense.recording.readable import readable
     from graspsense.sources.dataset_recordings import handed_over
 
     summary = _summary(recordings)
@@ -299,11 +300,11 @@ def _show(
         echo_entry("thresholds", chosen.words.partition(": ")[2])
         _echo_notices(summary, err=False)
     middle = recordings[len(recordings) // 2]
-    with handed_over(middle.name, middle.labelled.recording):
-        trial = grasp_with(chosen.settings(middle), installed(), labels={"label": middle.labelled.label})
     try:
+        with readable(middle.labelled.source), handed_over(middle.name, middle.labelled.recording):
+            trial = grasp_with(chosen.settings(middle), installed(), labels={"label": middle.labelled.label})
         draw_grasp(trial, picture)
-    except PluginUnavailable as error:
+    except (DataDamaged, PluginUnavailable) as error:
         echo(f"no picture: {error}", Style.CAUTION, err=True)
 
 

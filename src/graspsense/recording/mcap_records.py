@@ -19,6 +19,8 @@ from mcap.stream_reader import StreamReader, breakup_chunk
 from graspsense.recording.unpacked import Unpacked
 
 _MAGIC_BYTES: Final = 8
+_SMALL: Final = 1 << 16
+"""Bytes that can be allocated for nothing."""
 _RECORD: Final = struct.Struct("<BQ")
 _CHUNK: Final = struct.Struct("<QQQII")
 """Begin, end, unpacked size and checksum of a chunk, and the length of the name of its compression."""
@@ -32,7 +34,9 @@ class _WithinFile:
     size: int
 
     def read(self, length: int) -> bytes:
-        return self.file.read(min(length, max(0, self.size - self.file.tell())))
+        if length > _SMALL:
+            length = min(length, max(0, self.size - self.file.tell()))
+        return self.file.read(length)
 
 
 def records_of(
