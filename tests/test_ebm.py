@@ -97,3 +97,12 @@ def test_without_pairs_each_reason_is_about_one_feature():
     assert any(
         one.words.startswith("p_first = ") and "odds of can:full to" in one.words for one in said.because
     )
+
+
+def test_no_pairs_are_sought_among_very_many_features(monkeypatch):
+    monkeypatch.setattr(ebm, "MOST_PAIRED", 2)
+    table, labels = trials()
+    assert len(table.names) > 2
+    assert all(
+        len(term.features) == 1 for term in fitted("ebm", table, labels, pairs=2, bags=2)._model().terms
+    )

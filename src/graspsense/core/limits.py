@@ -54,15 +54,15 @@ LINE_CHARACTERS: Final = SizeLimit("GRASPSENSE_MAX_LINE_CHARACTERS", 2_000_000, 
 COLUMNS: Final = SizeLimit("GRASPSENSE_MAX_COLUMNS", 10_000, "columns of a table")
 CELLS: Final = SizeLimit("GRASPSENSE_MAX_CELLS", 10_000_000, "cells of a table")
 SAMPLES: Final = SizeLimit("GRASPSENSE_MAX_SAMPLES", 5_000_000, "samples of a grasp")
-SETTINGS_BYTES: Final = SizeLimit("GRASPSENSE_MAX_SETTINGS_BYTES", 2**20, "bytes of a file of settings")
+SETTINGS_BYTES: Final = SizeLimit("GRASPSENSE_MAX_SETTINGS_BYTES", 2**19, "bytes of a file of settings")
 CHANNEL_NUMBERS: Final = SizeLimit(
     "GRASPSENSE_MAX_CHANNEL_NUMBERS", 65_536, "numbers of a channel in one sample"
 )
 ENTRIES: Final = SizeLimit("GRASPSENSE_MAX_ENTRIES", 500, "entries of a key of a manifest")
 CASES: Final = SizeLimit("GRASPSENSE_MAX_CASES", 1000, "cases of an experiment")
 RECORDINGS: Final = SizeLimit("GRASPSENSE_MAX_RECORDINGS", 20_000, "recordings of a data set")
-CLASSES: Final = SizeLimit("GRASPSENSE_MAX_CLASSES", 200, "different labels")
-FEATURES: Final = SizeLimit("GRASPSENSE_MAX_FEATURES", 5_000, "features of a trial")
+CLASSES: Final = SizeLimit("GRASPSENSE_MAX_CLASSES", 100, "different labels")
+FEATURES: Final = SizeLimit("GRASPSENSE_MAX_FEATURES", 1000, "features of a trial")
 CHECKPOINTS: Final = SizeLimit("GRASPSENSE_MAX_CHECKPOINTS", 100, "checkpoints of a grasp")
 
 LIMITS: Final = (

@@ -37,6 +37,8 @@ HINT: Final = (
     'pip install "graspsense[ebm]"'
 )
 
+MOST_PAIRED: Final = 200
+"""With more features no pairs are sought: their number grows with the square, and a fit would take minutes."""
 MAX_ROUNDS: Final = 500
 """Largest number of steps of each function. Held-out trials end the boosting earlier, unless these are too few."""
 
@@ -49,7 +51,7 @@ class EbmConfig(ClassifierConfig):
         default=10,
         minimum=0,
         plausible=(0, 1000),
-        meaning="Largest number of pairs of features with a function.",
+        meaning=f"Largest number of pairs of features with a function; none with more than {MOST_PAIRED} features.",
     )
     bags: int = setting(
         default=8, minimum=1, plausible=(1, 1000), meaning="Number of fits, whose scores are averaged."
@@ -69,6 +71,11 @@ class EbmConfig(ClassifierConfig):
     min_leaf: int = setting(
         default=4, minimum=1, meaning="Smallest number of training trials on a side of a boosting step."
     )
+
+
+def _pairs_of(config: EbmConfig, features: int) -> int:
+    """Return how many pairs of so many features get a function."""
+    return min(config.pairs, math.comb(features, 2)) if features <= MOST_PAIRED else 0
 
 
 @frozen(eq=False)
@@ -131,7 +138,7 @@ class Ebm(Classifier[EbmConfig]):
         boosting = _interpret().ExplainableBoostingClassifier(
             feature_names=list(table.names),
             feature_types=["continuous"] * len(table.names),
-            interactions=min(self.config.pairs, math.comb(len(table.names), 2)),
+            interactions=_pairs_of(self.config, len(table.names)),
             outer_bags=self.config.bags,
             max_bins=self.config.bins,
             max_interaction_bins=self.config.pair_bins,

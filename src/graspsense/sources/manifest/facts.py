@@ -87,6 +87,7 @@ def recorded_at_of(manifest: ReadManifest, table: ColumnTable) -> str:
         ) from None
 
 
+@np.errstate(all="ignore")  # of infinite values
 def values_of(manifest: ReadManifest, file: NamedFile, table: ColumnTable) -> dict[str, float]:
     """Return the properties of a grasp, under their names with units. Raises ConfigError, DataDamaged."""
     found = AvailableColumns(manifest, table)

@@ -66,7 +66,8 @@ def grasps_in(manifest: ReadManifest, file: NamedFile, table: ColumnTable) -> It
     columns = samples(manifest, table)
     for part in squeezes(columns) if keys.split == "force" else [columns]:
         cut = cut_at(part, keys.cut) if keys.cut else part
-        notices = tuple(notices_of(cut, zeroed=bool(keys.zero)))
+        with np.errstate(all="ignore"):  # what is infinite is refused by `checked_recording`
+            notices = tuple(notices_of(cut, zeroed=bool(keys.zero)))
         yield LabelledRecording(
             recording=checked_recording(
                 resampled(cut, keys.resample_hz) if keys.resample_hz else cut, rate_hz=keys.rate_hz or 1.0
