@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from attrs import evolve
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from graspsense.core.signals import Frame, Phase
@@ -93,25 +93,65 @@ def test_curvature_and_stiffness_agree_on_what_stiffens(exponent, stiffens):
     assert f["stiffness_50"] == pytest.approx(expected, rel=0.05)
 
 
-@settings(max_examples=40, deadline=None)
-@given(st.integers(0, 2**32 - 1), st.sampled_from([400, 800, 1500]), st.sampled_from([0.7, 1.0, 1.8]))
-def test_uneven_samples_of_the_same_curve_give_the_same_features(seed, n, exponent):
-    """The density of the samples varies by a factor of ten along the grasp, and gives no stretch more weight."""
+def uneven_times(seed, n):
+    """Return about n times of a grasp, whose density varies by a factor of ten."""
     rng = np.random.default_rng(seed)
     density = np.interp(EVEN, np.linspace(0.0, 2.2, 8), rng.uniform(0.1, 1.0, 8))
     share = np.cumsum(density) / density.sum()
     uneven = np.interp((np.arange(n) + rng.uniform(0.0, 1.0, n)) / n, share, EVEN)
+    return np.unique(np.concatenate(([0.0], uneven, [EVEN[-1]])))
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.sampled_from([800, 1500]), st.sampled_from([0.7, 1.0, 1.8]))
+def test_uneven_samples_of_the_same_curve_give_the_same_features(seed, n, exponent):
+    """With samples closer than the window of the mean force, what they leave out of the curve is small."""
     even = FEATURES.extract(grasp(EVEN, exponent=exponent))
-    other = FEATURES.extract(grasp(np.unique(np.concatenate(([0.0], uneven, [EVEN[-1]]))), exponent=exponent))
+    other = FEATURES.extract(grasp(uneven_times(seed, n), exponent=exponent))
     assert defined(other) == defined(even) == set(NAMES)
-    # 400 samples are up to 40 ms apart: the begin and the end of the hold lie anywhere between two of them.
-    factor = 2.0 if n == 400 else 1.0
+    scale = {"curvature": 1.0, "residual_compression": 0.004, "creep": 0.004, "hysteresis": 1.0}
     for name in NAMES:
-        scale = {"curvature": 1.0, "residual_compression": 0.004, "creep": 0.004, "hysteresis": 1.0}
-        rel = factor * (0.15 if name == "relaxation_time" else 0.06)
-        assert other[name] == pytest.approx(even[name], rel=rel, abs=0.02 * factor * scale.get(name, 0.0)), (
-            name
-        )
+        rel = 0.15 if name == "relaxation_time" else 0.06
+        assert other[name] == pytest.approx(even[name], rel=rel, abs=0.02 * scale.get(name, 0.0)), name
+
+
+def with_samples_between(trace, t_s):
+    """Return the trace with samples at further times, on the straight lines between its own."""
+    inner = t_s[(t_s > trace.t_s[0]) & (t_s < trace.t_s[-1])]
+    t_s = np.union1d(trace.t_s, inner)
+    later = np.searchsorted(trace.t_s, t_s)
+    columns = [
+        np.interp(t_s, trace.t_s, column) for column in (trace.gap_m, trace.force_left_n, trace.force_right_n)
+    ]
+    rows = zip(*(a.tolist() for a in (t_s, np.diff(t_s, prepend=t_s[:1]), *columns)), strict=True)
+    frames = [
+        Frame(t, dt, gap, 0.0, 0.0, left, right, math.nan, math.nan, 0) for t, dt, gap, left, right in rows
+    ]
+    return trace_of(frames, trace.phase[later].tolist(), [0.0] * len(frames), [], trace.units)
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.sampled_from([0.7, 1.0, 1.8]))
+@example(956894, 1.8)
+@example(332562459, 0.7)
+def test_samples_on_the_lines_between_sparse_ones_change_little(seed, exponent):
+    """Force and gap are linear between samples, so no stretch has more weight because it has more samples.
+
+    The curve itself is no reference for 400 samples. They are up to 40 ms apart, and no feature can know a peak that
+    lies between two of them: the one of the first example is 1.2 % lower, which is 7 % of the relaxation.
+    """
+    trace = grasp(uneven_times(seed, 400), exponent=exponent)
+    sparse = FEATURES.extract(trace)
+    dense = FEATURES.extract(with_samples_between(trace, EVEN))
+    assert defined(dense) == defined(sparse)
+    # The largest mean force is taken at a sample: its time, and with it the loading, is known to their distance.
+    step_s = float(np.diff(trace.t_s).max())
+    scale = {
+        "curvature": 1.0, "residual_compression": 0.004, "creep": 0.004, "hysteresis": 1.0, "relaxation": 1.0
+    }  # fmt: skip
+    for name in defined(sparse):
+        allowed = step_s if name == "relaxation_time" else 0.02 * scale.get(name, abs(sparse[name]))
+        assert dense[name] == pytest.approx(sparse[name], rel=0.0, abs=allowed), name
 
 
 def test_repeated_forces_between_cell_images_do_not_shift_the_curve():

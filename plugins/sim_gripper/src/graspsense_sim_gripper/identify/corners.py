@@ -2,15 +2,15 @@
 
 Between its corners a snap-through is a straight line. For given corners its force is linear in the two stiffnesses, the
 drop, and the product of stiffness and an error of the width. So the corners are tried on a grid, and the other numbers
-follow from linear least squares (separable least squares: Golub and Pereyra, SIAM J. Numer. Anal. 10, 1973). A fit that
-starts between two corners of which there is no sample often ends in another minimum.
+follow from linear least squares (separable least squares: Golub and Pereyra, SIAM J. Numer. Anal. 10, 1973). The grid
+is then made finer around its minima. The derivatives of a fit jump where a corner passes a sample, so the minimum that
+it reaches from coarse corners can depend on rounding.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from attrs import evolve
@@ -24,71 +24,145 @@ Floats = NDArray[np.float64]
 
 CRITICAL: Final = np.linspace(0.04, 0.96, 47)
 """Critical compressions that are tried, over the largest compression."""
-FALL: Final = np.geomspace(0.01, 0.8, 12)
+FALL: Final = np.geomspace(0.01, 0.8, 18)
 """Lengths of the fall that are tried, over the largest compression."""
+TRIED: Final = 12
+"""Minima of the grid that are refined."""
 BEST: Final = 4
-"""Minima over the critical compression from which a fit starts."""
+"""Refined minima from which a fit starts."""
+FINER: Final = np.array([(i, j) for i in range(-2, 3) for j in range(-2, 3)]) / 2.0
+"""Corners that are tried around a minimum, in units of the reach of a step."""
+REACH: Final = (0.02, 0.26)
+"""First reach: of the critical compression over the largest one, and of the logarithm of the length of the fall."""
+STEPS: Final = 12
+"""Times that a minimum is refined; the reach is reduced by `SHRINK` each time."""
+SHRINK: Final = 0.6
 LEAST_SAMPLES: Final = 6
 """Of a squeeze during the compression; four numbers follow from them."""
+WIDTH_WEIGHT: Final = 0.01
+"""Weight of a force at the contact in the least squares. Where a single sample precedes the critical compression, it
+does not determine both stiffness and width: then the width is the first estimate."""
+
+RIDGE: Final = np.diag([WIDTH_WEIGHT**2, 1e-12, 1e-12, 1e-12])
+"""Added to the normal equations; the others only keep them solvable where no sample shows a number."""
+LEAST_NUMBER: Final = 1e-6
+"""Stiffness and drop that no sample shows are smaller."""
+
+
+class _Load(NamedTuple):
+    """The compression of an object over the largest one, and the force over its peak, at the samples."""
+
+    compression: Floats
+    force: Floats
+
+
+class _Tried(NamedTuple):
+    """What follows from corners: arrays with one entry, or one row of numbers, for each pair."""
+
+    critical: Floats
+    fall: Floats
+    cost: Floats
+    """The sum of the squared residuals; infinite if the numbers are not those of a snap-through."""
+    numbers: Floats
+    """The force at the contact, k1, the drop, and k2, shape (n, 4)."""
 
 
 def with_corners(model: ForwardModel, law: CandidateLaw, squeezes: Sequence[Squeeze]) -> CandidateLaw:
     """Return the law with further starts at the corners that the squeezes show, if it is a snap-through alone."""
     if law.slots != (SNAP,):
         return law
-    loads = [
-        one for one in (_loading(model, squeeze) for squeeze in squeezes) if len(one[0]) >= LEAST_SAMPLES
-    ]
-    if not loads:
+    parts = [_loading(model, squeeze) for squeeze in squeezes]
+    parts = [one for one in parts if len(one.force) >= LEAST_SAMPLES]
+    if not parts:
         return law
-    depth = float(np.median([compression[-1] for compression, _ in loads]))
-    best: list[tuple[float, FitStart]] = []
-    for critical in CRITICAL * depth:
-        tried = [_at_corners(loads, float(critical), float(fall)) for fall in FALL * depth]
-        best.append(min(tried, key=lambda one: one[0]))
-    costs = np.array([np.inf, *(cost for cost, _ in best), np.inf])
-    minima = np.flatnonzero((costs[1:-1] <= costs[:-2]) & (costs[1:-1] < costs[2:]))
-    order = sorted(minima.tolist(), key=lambda k: best[k][0])[:BEST]
+    depth = float(np.median([one.compression[-1] for one in parts]))
+    loads = [one._replace(compression=one.compression / depth) for one in parts]
     peak_n = float(np.median([one.peak_n for one in squeezes]))
-    units = [peak_n if one.is_force else 1.0 for one in law.free]
-    starts = [best[k][1] for k in order if math.isfinite(best[k][0])]
-    scaled = [FitStart(tuple(np.multiply(one.values, units).tolist()), one.wider_m) for one in starts]
+    starts = [_start(law, one, depth, peak_n) for one in _minima(loads)]
     # The error of the width by the force at the contact is itself in error by noise.
-    return evolve(law, more_starts=(*scaled, *(one._replace(wider_m=0.0) for one in scaled)))
+    return evolve(law, more_starts=(*starts, *(one._replace(wider_m=0.0) for one in starts)))
 
 
-def _loading(model: ForwardModel, squeeze: Squeeze) -> tuple[Floats, Floats]:
-    """Return the compression of the object and the force over its peak, from the contact to the deepest sample."""
+def _loading(model: ForwardModel, squeeze: Squeeze) -> _Load:
+    """Return the compression of the object (m) and the force over its peak, from the contact to the deepest sample."""
     compression = squeeze.width_m - squeeze.gap_m[squeeze.sample] - model.compressed_m(squeeze.force_n)
     force = squeeze.force_n / squeeze.peak_n
     first, deepest = int(np.argmax(force > CONTACT_SHARE)), int(np.argmax(compression))
     part = slice(first, deepest + 1)
-    return compression[part], force[part]
+    return _Load(compression[part], force[part])
 
 
-def _at_corners(
-    loads: Sequence[tuple[Floats, Floats]], critical: float, fall: float
-) -> tuple[float, FitStart]:
-    """Return the sum of the squared residuals, and the start for a peak of 1 N, for given corners.
+def _minima(loads: Sequence[_Load]) -> list[_Tried]:
+    """Return the best minima over the corners, the best one first, each with a single pair of corners."""
+    critical, fall = (one.ravel() for one in np.meshgrid(CRITICAL, FALL, indexing="ij"))
+    tried = _at_corners(loads, critical, fall)
+    cost = tried.cost.reshape(len(CRITICAL), len(FALL))
+    bordered = np.pad(cost, 1, constant_values=np.inf)
+    neighbours = np.lib.stride_tricks.sliding_window_view(bordered, (3, 3)).min(axis=(2, 3))
+    minima = np.flatnonzero((cost <= neighbours) & np.isfinite(cost))
+    minima = minima[np.argsort(tried.cost[minima], kind="stable")][:TRIED]
+    found = sorted((_refined(loads, _row(tried, k)) for k in minima.tolist()), key=lambda one: one.cost[0])
+    # Corners between the same samples often explain them equally well, so only the best of these is kept.
+    of_parts: dict[tuple[int, ...], _Tried] = {}
+    for one in found:
+        of_parts.setdefault(_parts(loads, one), one)
+    return list(of_parts.values())[:BEST]
 
-    The sum is infinite if the numbers are not those of a snap-through.
-    """
-    cost, numbers = 0.0, []
+
+def _parts(loads: Sequence[_Load], corners: _Tried) -> tuple[int, ...]:
+    """Return the numbers of samples before each corner."""
+    ends = (corners.critical, corners.critical + corners.fall)
+    return tuple(int(np.count_nonzero(one.compression < end)) for one in loads for end in ends)
+
+
+def _refined(loads: Sequence[_Load], best: _Tried) -> _Tried:
+    """Return the minimum near these corners, by a grid that becomes finer."""
+    for step in range(STEPS):
+        moves = FINER * REACH * SHRINK**step
+        critical = np.maximum(best.critical + moves[:, 0], 0.5 * CRITICAL[0])
+        tried = _at_corners(loads, critical, best.fall * np.exp(moves[:, 1]))
+        k = int(np.argmin(tried.cost))
+        if tried.cost[k] < best.cost[0]:
+            best = _row(tried, k)
+    return best
+
+
+def _row(tried: _Tried, k: int) -> _Tried:
+    return _Tried(*(one[k : k + 1] for one in tried))
+
+
+def _at_corners(loads: Sequence[_Load], critical: Floats, fall: Floats) -> _Tried:
+    """Return what follows from each of these pairs of corners, over the largest compression."""
+    cost, numbers = np.zeros(len(critical)), []
+    begin, length = critical[:, np.newaxis], fall[:, np.newaxis]
     for compression, force in loads:
-        columns = np.column_stack(
+        beyond = compression - begin
+        columns = np.stack(
             [
-                np.ones(len(compression)),
-                np.minimum(compression, critical),
-                -np.clip((compression - critical) / fall, 0.0, 1.0),
-                np.maximum(compression - critical - fall, 0.0),
-            ]
+                np.ones_like(beyond),
+                np.minimum(compression, begin),
+                -np.clip(beyond / length, 0.0, 1.0),
+                np.maximum(beyond - length, 0.0),
+            ],
+            axis=1,
         )
-        solution, *_ = np.linalg.lstsq(columns, force, rcond=None)
-        cost += float(np.sum((columns @ solution - force) ** 2))
-        numbers.append(solution)
-    offset, k1, drop, k2 = np.median(numbers, axis=0).tolist()
-    if min(k1, drop, k2) <= 0.0 or critical + offset / k1 <= 0.0:
-        return math.inf, FitStart((), 0.0)
+        normal = columns @ columns.transpose(0, 2, 1) + RIDGE
+        solution = np.linalg.solve(normal, columns @ force[:, np.newaxis])
+        residuals = (solution.transpose(0, 2, 1) @ columns)[:, 0] - force
+        cost += np.sum(residuals**2, axis=1)
+        numbers.append(solution[..., 0])
+    median = np.median(numbers, axis=0)
+    offset, k1 = median[:, 0], median[:, 1]
+    snaps = (median[:, 1:].min(axis=1) > LEAST_NUMBER) & (critical * k1 + offset > 0.0)
+    return _Tried(critical, fall, np.where(snaps, cost, np.inf), median)
+
+
+def _start(law: CandidateLaw, tried: _Tried, depth: float, peak_n: float) -> FitStart:
+    """Return the start at a pair of corners."""
+    offset, k1, drop, k2 = tried.numbers[0].tolist()
     # A force at the contact is that of a wider object, whose compression is larger by as much.
     wider = offset / k1
-    return cost, FitStart((k1, critical + wider, drop, fall, k2), wider)
+    shares = (k1, float(tried.critical[0]) + wider, drop, float(tried.fall[0]), k2)
+    stiffness = peak_n / depth
+    units = (stiffness, depth, peak_n, depth, stiffness)
+    return FitStart(tuple(np.multiply(shares, units).tolist()), wider * depth)
