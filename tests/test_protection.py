@@ -150,7 +150,10 @@ def test_a_pad_that_falls_silent_in_the_squeeze_ends_it():
 
 
 def test_a_contact_in_free_air_is_not_squeezed():
+    # The force of both pads rises with the drift of their zeros: over 6 mm.
     approach = Approach()
+    for force in (0.2, 0.3, 0.4, 0.5, 0.6):
+        approach.go(0.12, left=force, right=force)
     fault, after_s = approach.go(1.0, left=0.7, right=0.7, phase=SQUEEZE)
     assert fault.name == "contact in free air"
     assert after_s == pytest.approx(0.3, abs=0.02)
@@ -163,7 +166,16 @@ def test_a_contact_in_free_air_is_not_squeezed():
 )
 def test_a_contact_with_a_witness_is_squeezed(felt):
     approach = Approach()
+    for force in (0.2, 0.3, 0.4, 0.5, 0.6):
+        approach.go(0.12, left=force, right=force)
     assert approach.go(0.5, **felt, phase=SQUEEZE)[0] is None
+    assert approach.touch.closing_limit_n() == inf
+
+
+def test_a_contact_that_rises_within_a_millimetre_is_squeezed_at_once():
+    approach = Approach()
+    approach.go(0.04, left=0.3, right=0.3)
+    assert approach.go(0.001, left=0.7, right=0.7, phase=SQUEEZE)[0] is None
     assert approach.touch.closing_limit_n() == inf
 
 

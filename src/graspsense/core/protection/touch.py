@@ -45,6 +45,10 @@ STALL_M: Final = 0.0005
 """Travel within which a stalled motor is searched for."""
 STALL_SHARE: Final = 0.2
 """Share of the approach speed below which the motor counts as stalled."""
+SHARP_M: Final = 0.0015
+"""Travel within which the force of a pad rises to the contact force where an object is touched."""
+FREE_SHARE: Final = 0.3
+"""Share of the contact force below which a pad is free."""
 SLOWED_SHARE: Final = 0.7
 """Share of the approach speed below which the fingers have met a resistance."""
 SMOOTHING_S: Final = 0.2
@@ -81,9 +85,16 @@ class Pad:
         self._contact_n = contact_force_n
         self.felt = False
         self.force_n = nan
+        self._free_gap_m = nan
+        self.sharp = False
+        """Whether the force rose to that of the contact within a short travel."""
 
-    def see(self, force_n: float) -> None:
-        """Take the force (N) of this tick; NaN is not felt."""
+    def see(self, force_n: float, gap_m: float) -> None:
+        """Take the force (N) and the gap of this tick; a force of NaN is not felt."""
+        if force_n < FREE_SHARE * self._contact_n:
+            self._free_gap_m = gap_m
+        if not self.felt and force_n >= self._contact_n:
+            self.sharp = self._free_gap_m - gap_m <= SHARP_M
         self.force_n = force_n
         self.felt = force_n >= (0.5 * self._contact_n if self.felt else self._contact_n)
 
@@ -114,8 +125,8 @@ class Touch:
         if self._start_gap_m != self._start_gap_m:
             self._start_gap_m = frame.gap_m
             self._moved_t_s, self._moved_gap_m = frame.t_s, frame.gap_m
-        self._left.see(frame.force_left_n)
-        self._right.see(frame.force_right_n)
+        self._left.see(frame.force_left_n, frame.gap_m)
+        self._right.see(frame.force_right_n, frame.gap_m)
         self._speed_m_s.add(-frame.velocity_m_s, frame.dt_s)
         self._approached(frame, asked)
         return self._alone(frame) or self._free_air(frame, asked) or self._stalled(frame, phase, asked)
@@ -187,17 +198,20 @@ class Touch:
         return slow or force_n >= PUSHED_SHARE * self._contact_n
 
     def _free_air(self, frame: Frame, asked: Command) -> Fault | None:
-        """A contact that both pads claim has a witness: the fingers slow down, or the force goes on rising."""
+        """A contact that both pads claim has a witness: the force rose in a short travel, the fingers slow down, or the
+        force goes on rising.
+        """
         if self._witnessed or not (self._left.felt and self._right.felt):
             return None
         if self._claimed_t_s != self._claimed_t_s:
             self._claimed_t_s, self._claimed_gap_m = frame.t_s, frame.gap_m
         mean_m_s = self._approach_m_s.value
         needed_n = self._needed_n.value
+        sharp = self._left.sharp or self._right.sharp
         slowed = not self._speed_m_s.value >= SLOWED_SHARE * mean_m_s
         risen = max(self._left.force_n, self._right.force_n) >= 2.0 * self._contact_n
         pressed = asked.kind == EFFORT and frame.effort_n > NEEDED_MARGIN * needed_n + 2.0 * self._contact_n
-        if mean_m_s != mean_m_s or slowed or risen or pressed:
+        if mean_m_s != mean_m_s or sharp or slowed or risen or pressed:
             self._witnessed = True
             self._claimed_t_s = nan
             return None
