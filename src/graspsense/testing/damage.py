@@ -26,7 +26,21 @@ NUMBERS: Final = (
     1e308,
     -1e308,
 )
-OTHERS: Final = (None, True, "", "x", "1", [], {}, [[]], [1], {"a": 1}, "\x1b[2J", math.nan, math.inf)
+OTHERS: Final[tuple[Any, ...]] = (
+    None,
+    True,
+    "",
+    "x",
+    "1",
+    [],
+    {},
+    [[]],
+    [1],
+    {"a": 1},
+    "\x1b[2J",
+    math.nan,
+    math.inf,
+)
 _DEEP: Final = 500
 
 Path = tuple[str | int, ...]
