@@ -2,9 +2,9 @@
 
     python damaged_models.py SEED PLACES DAMAGES FILE.json ...
 
-The damages are those of `graspsense.testing.damage` at PLACES values of each file, and DAMAGES of each value,
-chosen by SEED (all of them for 0). Each has a hash that fits. Prints `ok COUNT`, or the first damage that was neither
-refused as damaged nor answered.
+The damages are those of `graspsense.testing.damage` at PLACES values of each file, and DAMAGES of each value, chosen by
+SEED (all of them for 0). Each has a hash that fits. Prints `ok COUNT`, or the first damage that was neither refused as
+damaged nor answered.
 """
 
 from __future__ import annotations

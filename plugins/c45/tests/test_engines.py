@@ -72,6 +72,16 @@ def test_same_tree_where_branches_are_raised_and_pruned_again() -> None:
     assert raised > 10
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("factor", [1e-300, 1e-12, 1e-10, 1e-9, 1e-7, 1e-3, 0.1, 1e9, 1e140])
+def test_same_tree_for_weights_of_any_size(factor: float) -> None:
+    table = grasps(3, 60, 1, "any")
+    weighted = make_table(table.schema, table.values, table.labels, table.weights * factor)
+    for options in ({}, {"min_objects": 1}, {"criterion": "info_gain", "pruning": "reduced_error"}):
+        trees = [fit(weighted, Options(**options), engine=engine) for engine in ("numpy", "fast")]
+        assert trees[0] == trees[1], options
+
+
 def oracle_tables() -> list[Path]:
     return sorted((Path(__file__).parent / "weka" / "data").glob("*.csv"))
 

@@ -10,7 +10,7 @@ import pytest
 from graspsense_c45 import JavaRandom, criteria
 from graspsense_c45.arithmetic import ln, one_minus_exp, x_ln_x
 from graspsense_c45.estimates import estimated_errors, prepare_confidence
-from graspsense_c45.levelwise.best_cuts import NOT_ADMISSIBLE, best_cuts
+from graspsense_c45.nodewise.cuts import NOT_ADMISSIBLE, Limits, scan
 
 
 def test_logarithm_is_right_to_the_last_bits() -> None:
@@ -54,11 +54,11 @@ def test_least_side_weight_is_a_tenth_of_the_mean_class_within_bounds() -> None:
     assert criteria.min_side_weight(5_000.0, 4, 200.0) == 200.0
 
 
-def scan(scores: list[int], offset: int, tolerance: int, zero: int) -> int:
+def scanned(numerators: list[int], tolerance: int, least: int) -> int:
     best, taken = 0, -1
-    for i, score in enumerate(scores):
-        if score != NOT_ADMISSIBLE and score + offset - best > tolerance and score + offset >= zero:
-            best, taken = score + offset, i
+    for i, numerator in enumerate(numerators):
+        if numerator != NOT_ADMISSIBLE and numerator - best > tolerance and numerator >= least:
+            best, taken = numerator, i
     return taken
 
 
@@ -66,18 +66,16 @@ def test_best_cut_is_the_one_the_scan_ends_on() -> None:
     # Values close to each other compared with the tolerance, so that the first of several near-ties decides.
     rng = np.random.default_rng(3)
     for _ in range(300):
-        lengths = rng.integers(1, 30, rng.integers(1, 6))
-        starts = np.cumsum(lengths) - lengths
-        scores = np.cumsum(rng.integers(-3, 4, lengths.sum())) - 20
-        scores[rng.random(len(scores)) < 0.2] = NOT_ADMISSIBLE
-        offset, tolerance, zero = rng.integers(0, 40, (3, len(starts)))
-        tolerance, zero = tolerance // 6, zero // 6
-        found = best_cuts(scores, starts, lengths, offset, tolerance, zero)
-        for i, (start, length) in enumerate(zip(starts, lengths, strict=True)):
-            own = scan(
-                scores[start : start + length].tolist(), int(offset[i]), int(tolerance[i]), int(zero[i])
-            )
-            assert found[i] == (start + own if own >= 0 else -1)
+        shape = (int(rng.integers(1, 6)), int(rng.integers(1, 30)))
+        numerators = np.cumsum(rng.integers(-3, 4, shape), axis=1) + rng.integers(-20, 20)
+        numerators[rng.random(shape) < 0.2] = NOT_ADMISSIBLE
+        tolerance, least = int(rng.integers(0, 7)), rng.integers(0, 7, shape[0])
+        limits = Limits(np.zeros((shape[0], 1), np.int64), least, least, tolerance)
+        best, place = np.zeros(shape[0], np.int64), np.full(shape[0], -1)
+        scan(numerators, limits, best, place)
+        for a, own in enumerate(numerators.tolist()):
+            assert place[a] == scanned(own, tolerance, int(least[a]))
+            assert best[a] == (own[place[a]] if place[a] >= 0 else 0)
 
 
 def test_java_random_is_javas() -> None:

@@ -286,3 +286,23 @@ def test_a_deep_tree_is_no_trouble() -> None:
     tree = fit(table(values, labels), options)
     assert tree.node_count > 100
     assert from_json(to_json(tree)) == tree
+
+
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+@pytest.mark.parametrize("factor", [5e-324, 1e-300, 1e-12, 1e-10, 1e-9, 1e-6, 1e-3, 1.0, 1e9, 1e140])
+@pytest.mark.parametrize("missing", [False, True])
+def test_weights_of_any_size_give_a_tree(factor: float, missing: bool) -> None:
+    values = [[float(i)] for i in range(12)]
+    if missing:
+        values[5] = [float("nan")]
+    weighted = table(values, [0] * 6 + [1] * 6, [factor] * 12)
+    tree = fit(weighted)
+    assert distributions(tree, values).sum(axis=1) == pytest.approx(np.ones(12))
+    if factor < 1:  # J48 splits only nodes of at least twice min_objects
+        assert tree.node_count == 1
+    assert from_json(to_json(tree)) == tree
+
+
+def test_weights_that_overflow_are_refused() -> None:
+    with pytest.raises(ValueError, match="weights add up to more than 1e"):
+        table([[0.0], [1.0]], [0, 1], [1e308, 1e308])

@@ -1,7 +1,8 @@
 """The rules by which C4.5 splits and prunes: gain, gain ratio, least weights, tolerances.
 
-All functions are elementwise, on numbers and on arrays, and both engines call them. W is the weight at a node, T the
-weight of its rows that know the value of the attribute, L(x) = x ln x. Gains are in bits.
+All functions but `choose_attribute` are elementwise, on numbers and on arrays. Both forms of the builder call them. W is
+the weight at a node, T the weight of its rows that know the value of the attribute, and L(x) = x ln x. Gains are in
+bits.
 
 Source: Quinlan, C4.5: Programs for Machine Learning (1993), sections 2.2 to 2.4 (gain, gain ratio, tests on numbers)
 and 4 (pruning); Quinlan, Improved use of continuous attributes in C4.5, JAIR 4 (1996) (the cost of a threshold). The
@@ -10,9 +11,11 @@ tolerances are those of weka.classifiers.trees.j48 3.9.6, in the class that each
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from graspsense_c45.arithmetic import LN2, TOLERANCE, Scale, ln, real_term, real_weight, select, term
+from graspsense_c45.arithmetic import LN2, TOLERANCE, Scale, ln, real_term, real_weight, select
 from graspsense_c45.arrays import Elementwise, Mask, Real, Reals, Truth, Whole
 
 GAP = 1e-5
@@ -140,38 +143,39 @@ def gain_of_cut(
     return value
 
 
-def ratio_of_cut(gain_value: Real, left: Whole, known: Whole, weight: Whole, scale: Scale) -> Real:
-    """Return the gain ratio of a numeric test; `left`, `known` and `weight` are fixed-point weights."""
-    split = term(weight, scale) - term(left, scale) - term(known - left, scale) - term(weight - known, scale)
+def ratio_of_cut(gain_value: Real, split: Whole, weight: Whole, scale: Scale) -> Real:
+    """Return the gain ratio of a numeric test.
+
+    split: L(W) - L(left) - L(T - left) - L(W - T) in fixed point. weight: W in fixed point.
+    """
     return gain_ratio(gain_value, real_term(split, scale.term_bits), real_weight(weight, scale.weight_bits))
 
 
 def choose_attribute(
-    usable: Mask, gains: Reals, ratios: Reals, averaged: Mask, by_ratio: bool
-) -> Elementwise:
+    usable: Sequence[bool] | Mask,
+    gains: Sequence[float] | Reals,
+    ratios: Sequence[float] | Reals,
+    averaged: Sequence[bool] | Mask,
+    by_ratio: bool,
+) -> int:
     """Return the attribute to split on, -1 where none is eligible (C45ModelSelection).
 
-    The first axis of `usable`, `gains` and `ratios` is the attribute. The chosen attribute is the first one whose
-    score is not exceeded by more than the tolerance. The score is the gain, or with `by_ratio` the gain ratio of the
-    attributes that have at least the average gain of the `averaged` ones.
+    The chosen attribute is the first one whose score is not exceeded by more than the tolerance. The score is the gain,
+    or with `by_ratio` the gain ratio of the attributes that have at least the average gain of the `averaged` ones.
     """
-    average: Real = -np.inf
+    average = -np.inf
     if by_ratio:
-        total: Real = 0.0
-        number: Real = 0.0
+        total, number = 0.0, 0
         for a in range(len(gains)):
-            counted = usable[a] & averaged[a]
-            total = total + select(counted, gains[a], 0.0)
-            number = number + counted
-        average = select(number > 0.0, total / np.maximum(number, 1.0), np.inf)
-    scores = ratios if by_ratio else gains
-    best: Real = 0.0
-    chosen: Whole = -1
+            if usable[a] and averaged[a]:
+                total += gains[a]
+                number += 1
+        average = total / number if number > 0 else np.inf
+    best, chosen = 0.0, -1
     for a in range(len(gains)):
-        eligible = usable[a] & (gains[a] >= average - AVERAGE_SLACK)
-        better = eligible & (scores[a] - best > TOLERANCE)
-        best = select(better, scores[a], best)
-        chosen = select(better, a, chosen)
+        score = ratios[a] if by_ratio else gains[a]
+        if usable[a] and gains[a] >= average - AVERAGE_SLACK and score - best > TOLERANCE:
+            best, chosen = score, a
     return chosen
 
 

@@ -1,4 +1,4 @@
-"""Which engine grows a tree and predicts; the results are the same."""
+"""Whether a tree is grown by compiled code (`depthfirst`) or by numpy (`nodewise`); the results are the same."""
 
 from __future__ import annotations
 

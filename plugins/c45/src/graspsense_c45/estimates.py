@@ -55,7 +55,8 @@ def prepare_confidence(factor: float) -> Confidence:
 def prepare_estimation(factor: float, total_weight: float, weight_bits: int) -> Estimation:
     """Return how errors are estimated for a confidence factor and a training weight (in rows)."""
     bits = bits_below(2.0 * total_weight, WEIGHT_BITS)
-    limit = int(np.ceil(np.ldexp(PRUNING_SLACK + TOLERANCE, bits)))
+    # Weights so small that the slack exceeds all integers are within the tolerance of none: there is nothing to prune.
+    limit = int(np.ceil(np.ldexp(PRUNING_SLACK + TOLERANCE, min(bits, 62))))
     return Estimation(prepare_confidence(factor), weight_bits, bits, limit)
 
 

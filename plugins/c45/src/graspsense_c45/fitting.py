@@ -8,8 +8,8 @@ import numpy as np
 
 from graspsense_c45.arrays import Indices, Reals
 from graspsense_c45.engines import Fits
-from graspsense_c45.levelwise.builder import LevelwiseTreeBuilder
-from graspsense_c45.levelwise.reduced_error import prune_reduced_error
+from graspsense_c45.nodewise.builder import NodewiseTreeBuilder
+from graspsense_c45.nodewise.reduced_error import prune_reduced_error
 from graspsense_c45.options import J48, Engine, Options
 from graspsense_c45.splits import LEAF, GrowingTree
 from graspsense_c45.table import MISSING_CLASS, Table
@@ -21,7 +21,7 @@ _FITS = Fits()
 
 
 class TreeBuilder(Protocol):
-    """What an engine does: it grows a tree when it is made, and prunes it on request."""
+    """What a form of the builder does: it grows a tree when it is made, and prunes it on request."""
 
     tree: GrowingTree
 
@@ -35,7 +35,7 @@ class TreeBuilder(Protocol):
 def fit(
     table: Table, options: Options = J48, held_out: Indices | None = None, engine: Engine = "auto"
 ) -> Tree:
-    """Return a tree that is grown and pruned; both engines return the same tree, to the bit.
+    """Return a tree that is grown and pruned; compiled or not, it is the same tree, to the bit.
 
     held_out: rows of the table for reduced-error pruning; by default those that J48 would hold out.
 
@@ -75,13 +75,13 @@ def _fit_held_out(table: Table, options: Options, held_out: Indices | None, engi
 
 
 def _builder(training: TrainingSet, engine: Engine) -> TreeBuilder:
-    """Return the builder of the compiled engine where it is wanted and can build this tree, else that of numpy."""
+    """Return the compiled builder where it is wanted and can build this tree, else the plain one."""
     if _FITS.choose_fast(engine, training.values.size):
         from graspsense_c45.depthfirst.builder import DepthFirstTreeBuilder
 
         if DepthFirstTreeBuilder.can_build(training):
             return DepthFirstTreeBuilder(training)
-    return LevelwiseTreeBuilder(training)
+    return NodewiseTreeBuilder(training)
 
 
 def _use_actual_values(tree: GrowingTree, values: Reals) -> None:

@@ -9,6 +9,8 @@ from numpy.typing import ArrayLike
 from graspsense_c45.arrays import Indices, Reals
 from graspsense_c45.schema import Schema
 
+LARGEST_WEIGHT = 1e150
+"""The largest sum of the weights: four times its square is still finite."""
 MISSING_CLASS = -1
 """The label of a row without a class."""
 
@@ -35,8 +37,8 @@ def make_table(
     """Return a table; every row has weight 1 by default.
 
     Raises ValueError for shapes that do not fit, infinite values, nominal columns that hold anything but indices of
-    declared values, labels outside the declared classes, weights that are negative, not finite or all 0, and where no
-    row has a class.
+    declared values, labels outside the declared classes, weights that are negative, not finite, all 0 or above
+    `LARGEST_WEIGHT` together, and where no row has a class.
     """
     x = np.asarray(values, dtype=np.float64)
     y = np.asarray(labels, dtype=np.int64)
@@ -57,6 +59,10 @@ def make_table(
         raise ValueError("no row has a class; there is nothing to learn")
     if not w[known].any():
         raise ValueError("all rows with a class have the weight 0; there is nothing to learn")
+    if not float(np.abs(w / LARGEST_WEIGHT).sum()) <= 1.0:
+        raise ValueError(
+            f"the weights add up to more than {LARGEST_WEIGHT:g}; divide them all by the same number"
+        )
     return Table(schema, x, y, w)
 
 

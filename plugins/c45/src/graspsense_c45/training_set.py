@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 from attrs import frozen
 
@@ -18,12 +20,15 @@ from graspsense_c45.arithmetic import (
     term,
     x_ln_x,
 )
-from graspsense_c45.arrays import AnyArray, FixedPoint, Indices, Mask, Real, Reals, SmallLabels
+from graspsense_c45.arrays import AnyArray, FixedPoint, Indices, Integer, Mask, Real, Reals, SmallLabels
 from graspsense_c45.options import Options
 from graspsense_c45.table import MISSING_CLASS, Table
 
+_MOST_TABULATED = 4
+"""Weight of a row, on average, up to which the terms are tabulated."""
 
-@frozen(eq=False)
+
+@frozen(eq=False, slots=False)
 class TrainingSet:
     """The rows with a class, and the constants that follow from them.
 
@@ -31,7 +36,7 @@ class TrainingSet:
     n_classes: declared classes. value_counts: declared values of a nominal attribute, 0 for a numeric one.
     averaged: whether an attribute enters the average gain.
     scale: the units of weights and terms. unit: whether every row weighs 1 and no value is missing.
-    complete: whether no value is missing.
+    complete: whether no value is missing. term_table: the terms of 0, 1, ... rows where weights are whole, else empty.
     """
 
     values: Reals
@@ -44,16 +49,19 @@ class TrainingSet:
     unit: bool
     complete: bool
     options: Options
+    term_table: FixedPoint
 
-    def terms(self, weights: AnyArray) -> FixedPoint:
+    def terms(self, weights: AnyArray | Integer) -> FixedPoint:
         """Return ``x ln x`` of fixed-point weights, as fixed-point terms."""
+        if self.term_table.size:
+            return np.asarray(self.term_table[weights])
         return np.asarray(term(weights, self.scale))
 
-    def real_weights(self, weights: AnyArray) -> Reals:
+    def real_weights(self, weights: AnyArray | Integer) -> Reals:
         """Return fixed-point weights as numbers of rows (exact)."""
         return np.asarray(real_weight(weights, self.scale.weight_bits))
 
-    def real_terms(self, terms: AnyArray) -> Reals:
+    def real_terms(self, terms: AnyArray | Integer) -> Reals:
         """Return fixed-point terms as numbers."""
         return np.asarray(real_term(terms, self.scale.term_bits))
 
@@ -62,10 +70,17 @@ class TrainingSet:
         """The weight of all rows, in rows."""
         return float(self.real_weights(self.weights.sum()))
 
-    @property
+    @cached_property
     def weight_margin(self) -> int:
         """The largest difference of two fixed-point weights that are equal within the tolerance."""
-        return int(np.floor(np.ldexp(TOLERANCE, self.scale.weight_bits)))
+        # All weights together are below 2**WEIGHT_BITS.
+        margin = int(np.floor(np.ldexp(TOLERANCE, min(self.scale.weight_bits, 80))))
+        return min(margin, 1 << WEIGHT_BITS)
+
+    @property
+    def collapse_slack(self) -> float:
+        """The training errors that a subtree may save without being kept, in fixed-point weight."""
+        return float(np.ldexp(criteria.COLLAPSE_SLACK, min(self.scale.weight_bits, 80)))
 
     def gain_tolerance(self, weight: Real) -> FixedPoint:
         """Return the tolerance of a gain, as a difference of numerators at nodes of this weight (in rows)."""
@@ -91,6 +106,14 @@ class TrainingSet:
             # The margin is 0, and this is several times faster than the scan.
             return np.asarray(np.argmax(counts, axis=1))
         return np.asarray(first_maximum(counts.T, 0, self.weight_margin), dtype=np.int64)
+
+    def majority_of(self, counts: FixedPoint) -> int:
+        """Return the first class of one node that no other exceeds by more than the margin."""
+        best, chosen, margin = 0, 0, self.weight_margin
+        for k, weight in enumerate(counts.tolist()):
+            if weight - best > margin:
+                best, chosen = weight, k
+        return chosen
 
     def training_errors(self, counts: FixedPoint) -> FixedPoint:
         """Return the fixed-point weight outside the majority class, for each row of counts."""
@@ -119,6 +142,8 @@ def make_training_set(table: Table, rows: Indices | None, options: Options) -> T
         [0 if attribute.values is None else len(attribute.values) for attribute in table.schema.attributes],
         dtype=np.int64,
     )
+    scale = Scale(weight_bits, bits_below(float(x_ln_x(total)) + 1.0, TERM_BITS))
+    tabulated = weight_bits == 0 and total <= _MOST_TABULATED * len(labels)
     return TrainingSet(
         values=values,
         labels=labels,
@@ -126,10 +151,11 @@ def make_training_set(table: Table, rows: Indices | None, options: Options) -> T
         n_classes=len(table.schema.classes),
         value_counts=value_counts,
         averaged=_averaged(value_counts, len(table.labels)),
-        scale=Scale(weight_bits, bits_below(float(x_ln_x(total)) + 1.0, TERM_BITS)),
+        scale=scale,
         unit=unit_weights and complete,
         complete=complete,
         options=options,
+        term_table=np.asarray(term(np.arange(int(total) + 1 if tabulated else 0), scale)),
     )
 
 

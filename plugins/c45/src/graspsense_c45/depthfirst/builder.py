@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from graspsense_c45.criteria import COLLAPSE_SLACK
 from graspsense_c45.depthfirst import compiled
 from graspsense_c45.depthfirst.growing import Columns, Rules
 from graspsense_c45.depthfirst.nodes import Nodes, Rows
@@ -31,8 +30,7 @@ class DepthFirstTreeBuilder:
 
     def collapse(self) -> None:
         """Make leaves of subtrees that hardly save training errors."""
-        slack = float(np.ldexp(COLLAPSE_SLACK, self._training.scale.weight_bits))
-        compiled.collapse(self._nodes, self._training.weight_margin, slack)
+        compiled.collapse(self._nodes, self._training.weight_margin, self._training.collapse_slack)
         self._mark_leaves()
 
     def prune_pessimistic(self) -> None:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from graspsense_c45.arithmetic import TOLERANCE, Scale, first_maximum, real_weight
+from graspsense_c45.arithmetic import TOLERANCE, Scale, first_maximum, real_weight, term
 from graspsense_c45.arrays import FixedPoint, Indices, Integer, Mask, Reals, SmallLabels
 from graspsense_c45.criteria import (
     choose_attribute,
@@ -80,7 +80,7 @@ class Workspace(NamedTuple):
 def grow(columns: Columns, averaged: Mask, rules: Rules) -> Nodes:
     """Return the nodes of the unpruned tree, whose thresholds are midpoints; sorts `columns` by leaf.
 
-    `levelwise.growing.grow` grows the same tree; `tests/test_engines.py` checks that both agree to the bit.
+    `nodewise.growing.grow` grows the same tree; `tests/test_engines.py` checks that both agree to the bit.
     """
     n_attributes, n_rows = columns.rows.shape
     nodes = empty_nodes(FIRST_CAPACITY, rules.n_classes)
@@ -144,7 +144,9 @@ def best_split(
         gain = gain_of_cut(cut.numerator, cut.n_cuts, total, total, rules.scale, rules.mdl_correction)
         candidates.usable[a] = gain >= TOLERANCE
         candidates.gain[a] = gain
-        candidates.ratio[a] = ratio_of_cut(gain, cut.left, total, total, rules.scale)
+        sides = term(cut.left, rules.scale) + term(total - cut.left, rules.scale)
+        split_numerator = term(total, rules.scale) - sides
+        candidates.ratio[a] = ratio_of_cut(gain, split_numerator, total, rules.scale)
         candidates.place[a] = cut.place
     chosen: Integer = choose_attribute(
         candidates.usable, candidates.gain, candidates.ratio, candidates.averaged, rules.by_ratio

@@ -43,7 +43,7 @@ class Pruning(NamedTuple):
 def collapse(nodes: Nodes, margin: Integer, slack: float) -> None:
     """Make a leaf of every node whose subtree makes hardly fewer training errors than the node as a leaf.
 
-    `levelwise.collapsing.collapse` does the same; `tests/test_engines.py` checks that both agree to the bit.
+    `nodewise.collapsing.collapse` does the same; `tests/test_engines.py` checks that both agree to the bit.
     """
     # Every node has a lower index than its children. Nodes below a new leaf are no longer reached.
     errors = np.zeros(len(nodes.feature), dtype=np.int64)
@@ -60,7 +60,7 @@ def collapse(nodes: Nodes, margin: Integer, slack: float) -> None:
 def prune(nodes: Nodes, rows: Rows, pruning: Pruning) -> None:
     """Replace subtrees by leaves or by their heaviest branch where the estimated errors grow by no more than 0.1.
 
-    `levelwise.pessimistic.prune_pessimistic` does the same; `tests/test_engines.py` checks that both agree to the bit.
+    `nodewise.pruning.prune_pessimistic` does the same; `tests/test_engines.py` checks that both agree to the bit.
     """
     n_nodes, n_classes = nodes.counts.shape
     errors = Errors(

@@ -1,6 +1,6 @@
 """The best cut of one attribute at one node, by a scan over its sorted rows.
 
-`levelwise.best_cuts` finds the same cut for many nodes without scanning; `tests/test_engines.py` compares the two.
+`nodewise.cuts` finds the same cut with whole arrays; `tests/test_engines.py` compares the two.
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ import numpy as np
 
 from graspsense_c45.arithmetic import TOLERANCE, WEIGHT_BITS, bits_below
 from graspsense_c45.arrays import FixedPoint, Indices, Reals
-from graspsense_c45.levelwise.collapsing import sum_in_runs
+from graspsense_c45.nodewise.collapsing import sum_in_runs
 from graspsense_c45.routing import to_children
 from graspsense_c45.splits import LEAF, ROOT, GrowingTree
 from graspsense_c45.table import Table
@@ -28,7 +28,7 @@ def prune_reduced_error(tree: GrowingTree, training: TrainingSet, table: Table, 
     as_leaf = held.sum(axis=1) - held[np.arange(len(held)), majority]
     as_tree = as_leaf.copy()
     empty = training.real_weights(grown_weight) < TOLERANCE
-    limit = np.ldexp(TOLERANCE, bits)
+    limit = np.ldexp(TOLERANCE, min(bits, 80))
     for level in reversed(tree.levels(ROOT)):
         inner = tree.inner(level)
         if not inner.size:

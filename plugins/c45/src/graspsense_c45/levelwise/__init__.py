@@ -1,1 +1,0 @@
-"""The numpy engine: all nodes of a depth are grown, and pruned, together."""
