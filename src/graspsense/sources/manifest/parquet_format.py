@@ -34,14 +34,17 @@ def read_parquet(path: Path) -> list[ColumnTable]:
         refuse_devices(path)
         table = _table(path)
         numbers: dict[str, Numbers] = {}
+        shapes: dict[str, tuple[int, int]] = {}
         texts: dict[str, list[str]] = {}
         for name, column in zip(table.column_names, table.columns, strict=True):
             values = _numbers(column)
-            if values is not None:
-                numbers[name] = values
-            else:
+            if values is None:
                 texts[name] = _texts(path, column)
-        return [ColumnTable(source=path.name, numbers=numbers, texts=texts)]
+                continue
+            if values.ndim == 3:
+                shapes[name] = (values.shape[1], values.shape[2])
+            numbers[name] = values.reshape(len(values), -1) if values.ndim > 2 else values
+        return [ColumnTable(source=path.name, numbers=numbers, shapes=shapes, texts=texts)]
 
 
 def _expect_columns(path: Path, metadata: Any) -> None:
@@ -90,9 +93,9 @@ def _numbers(column: Any) -> Numbers | None:
         return _numbers_of_texts(column)
     try:
         if types.is_boolean(kind):
-            return np.asarray(column.cast("int8").cast(float64()).to_numpy(), dtype=np.float64)
+            return np.array(column.cast("int8").cast(float64()).to_numpy(), dtype=np.float64)
         if types.is_integer(kind) or types.is_floating(kind) or types.is_decimal(kind):
-            return np.asarray(column.cast(float64(), safe=False).to_numpy(), dtype=np.float64)
+            return np.array(column.cast(float64(), safe=False).to_numpy(), dtype=np.float64)
         if types.is_list(kind) or types.is_large_list(kind) or types.is_fixed_size_list(kind):
             return _numbers_of_lists(column)
     except (ArrowException, NotImplementedError):
@@ -111,18 +114,26 @@ def _numbers_of_texts(column: Any) -> Numbers | None:
 
 
 def _numbers_of_lists(column: Any) -> Numbers | None:
+    """Return equally many numbers of each row; a missing row is NaN where the others have one number."""
     whole = column.combine_chunks()
+    if whole.null_count:
+        known = _numbers_of_lists(_chunked(whole.drop_null()))
+        if known is None or known.ndim > 1:
+            return None
+        numbers = np.full(len(whole), np.nan)
+        numbers[whole.is_valid().to_numpy(zero_copy_only=False)] = known
+        return numbers
     inner = whole.flatten()
     width, rest = divmod(len(inner), len(whole)) if len(whole) else (0, 0)
     lengths = whole.value_lengths() if hasattr(whole, "value_lengths") else None
-    if whole.null_count or inner.null_count or rest or not width:
+    if inner.null_count or rest or not width:
         return None
     if lengths is not None and (lengths.to_numpy(zero_copy_only=False) != width).any():
         return None
-    numbers = _numbers(_chunked(inner))
-    if numbers is None:
+    flat = _numbers(_chunked(inner))
+    if flat is None:
         return None
-    values = numbers.reshape(len(whole), width, *numbers.shape[1:])
+    values = flat.reshape(len(whole), width, *flat.shape[1:])
     return values[:, 0] if width == 1 else values
 
 
