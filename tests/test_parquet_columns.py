@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+from contextlib import suppress
 
 import numpy as np
 import pytest
@@ -10,6 +11,8 @@ import pytest
 pyarrow = pytest.importorskip("pyarrow", reason="needs the extra parquet")
 pq = pytest.importorskip("pyarrow.parquet", reason="needs the extra parquet")
 
+from graspsense.core.errors import DataDamaged  # noqa: E402
+from graspsense.sources.manifest.parquet_footer import parquet_size  # noqa: E402
 from graspsense.sources.manifest.parquet_format import read_parquet  # noqa: E402
 
 NAN = float("nan")
@@ -50,3 +53,31 @@ def test_columns(tmp_path, rows_of_a_group):
         else:
             np.testing.assert_array_equal(found.numbers[name], expected)
     assert found.shapes == {"image": (2, 2)}
+
+
+def test_the_footer_is_what_pyarrow_says(tmp_path):
+    path = tmp_path / "a.parquet"
+    table = pyarrow.table({name: column for name, (column, _) in COLUMNS.items()})
+    pq.write_table(table, path, row_group_size=2)
+    metadata = pq.read_metadata(path)
+    columns = [
+        metadata.row_group(i).column(k)
+        for i in range(metadata.num_row_groups)
+        for k in range(metadata.num_columns)
+    ]
+    size = parquet_size(path)
+    assert size.rows == 3
+    assert size.values == sum(column.num_values for column in columns)
+    assert size.unpacked_bytes == sum(column.total_uncompressed_size for column in columns)
+
+
+@pytest.mark.parametrize("at", range(20, 400, 7))
+def test_a_damaged_footer_is_told_and_never_ends_the_process(at, tmp_path):
+    """pyarrow calls abort for some of these when it is asked for a column of its metadata."""
+    path = tmp_path / "a.parquet"
+    pq.write_table(pyarrow.table({"a": [[1.0, 2.0], [3.0, 4.0]], "b": ["x", "y"]}), path)
+    data = bytearray(path.read_bytes())
+    data[-at] ^= 0x15
+    path.write_bytes(data)
+    with suppress(DataDamaged):
+        assert len(read_parquet(path)[0]) <= 2

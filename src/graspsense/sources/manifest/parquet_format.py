@@ -10,10 +10,11 @@ from typing import Any, Final
 
 import numpy as np
 
-from graspsense.core.errors import DataDamaged, PluginUnavailable
+from graspsense.core.errors import PluginUnavailable
 from graspsense.recording.parquet import PARQUET_HINT
 from graspsense.recording.readable import readable, refuse_devices
 from graspsense.recording.unpacked import Unpacked
+from graspsense.sources.manifest.parquet_footer import parquet_size
 from graspsense.sources.manifest.table import ColumnTable, Numbers
 
 _BYTES_OF_A_NUMBER: Final = 8
@@ -47,21 +48,11 @@ def read_parquet(path: Path) -> list[ColumnTable]:
         return [ColumnTable(source=path.name, numbers=numbers, shapes=shapes, texts=texts)]
 
 
-def _expect_columns(path: Path, metadata: Any) -> None:
+def _expect_columns(path: Path, columns: int) -> None:
     """Raise TooLarge if the columns have more values, or unpack to more, than the limit allows."""
-    unpacked, values = Unpacked(path), Unpacked(path)
-    columns = metadata.num_columns
-    if metadata.num_rows < 0 or metadata.num_row_groups * columns > path.stat().st_size:
-        raise DataDamaged(
-            f"{path} is damaged: it has {metadata.num_rows} rows in {metadata.num_row_groups} groups"
-        )
-    values.expect(_BYTES_OF_A_NUMBER * metadata.num_rows * columns)
-    for i in range(metadata.num_row_groups):
-        group = metadata.row_group(i)
-        for k in range(columns):
-            column = group.column(k)
-            unpacked.add(max(column.total_uncompressed_size, 0))
-            values.add(_BYTES_OF_A_NUMBER * max(column.num_values, group.num_rows, 0))
+    size = parquet_size(path)
+    Unpacked(path).expect(size.unpacked_bytes)
+    Unpacked(path).expect(_BYTES_OF_A_NUMBER * max(size.values, size.rows * columns))
 
 
 def _table(path: Path) -> Any:
@@ -70,7 +61,7 @@ def _table(path: Path) -> Any:
     from pyarrow import types
 
     with pyarrow.parquet.ParquetFile(path) as file:
-        _expect_columns(path, file.metadata)
+        _expect_columns(path, len(file.schema_arrow))
         is_text = (types.is_string, types.is_large_string, types.is_binary)
         texts = [field.name for field in file.schema_arrow if any(test(field.type) for test in is_text)]
     unpacked = Unpacked(path)
