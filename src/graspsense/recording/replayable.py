@@ -51,6 +51,7 @@ def check_recording(recording: Recording) -> None:
     for k, (frame, image, values) in enumerate(recording.readings, 1):
         try:
             _FRAME.pack(*frame)
+            _STATUS.pack(frame.status)
             pads.pack(*image.left, *image.right)
         except (struct.error, TypeError, OverflowError) as error:
             raise DataDamaged(f"{recording.name}: frame {k} is not one of a gripper: {error}") from None
@@ -83,6 +84,7 @@ def _fits(values: Iterable[Any], shapes: Sequence[tuple[int, ...]]) -> bool:
 
 
 _FRAME: Final = struct.Struct(f"<{len(Frame._fields)}d")
+_STATUS: Final = struct.Struct("<q")
 
 
 def content_sha256(recording: Recording) -> str:
