@@ -225,6 +225,7 @@ def test_impossible_contents_are_damage_of_this_recording(tmp_path, kind):
         ("gap_m", np.array([f"{k} m" for k in range(30)])),
         ("gap_m", np.zeros(29)),
         ("t_s", np.full(30, np.nan)),
+        ("status", np.full(30, 1e300)),
         ("pad_left", np.zeros((0, 3))),
         ("pad_left", np.zeros((2, 22, 2))),
         (

@@ -5,15 +5,17 @@ from __future__ import annotations
 import hashlib
 import math
 import struct
-from collections.abc import Mapping
-from typing import Final
+from array import array
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import chain
+from typing import Any, Final
 
 from attrs import field, frozen
 
 from graspsense.core.channels import declared_shape, further, shape_of
 from graspsense.core.entries import Channel
 from graspsense.core.errors import DataDamaged
-from graspsense.core.signals import Frame, Reading
+from graspsense.core.signals import Frame, Image, Reading, Samples
 
 REPLAY_NOTE: Final = "a recording cannot react: the controller's commands have no effect on it"
 
@@ -49,10 +51,11 @@ def check_recording(recording: Recording) -> None:
     for k, (frame, image, values) in enumerate(recording.readings, 1):
         try:
             _FRAME.pack(*frame)
+            _STATUS.pack(frame.status)
             pads.pack(*image.left, *image.right)
         except (struct.error, TypeError, OverflowError) as error:
             raise DataDamaged(f"{recording.name}: frame {k} is not one of a gripper: {error}") from None
-        if values is not signals and [shape_of(value) for value in values] != shapes:
+        if values is not signals and not _fits(values, shapes):
             names = ", ".join(channel.name for channel in further_channels) or "none"
             raise DataDamaged(f"{recording.name}: frame {k} has other values than its channels ({names})")
         signals = values
@@ -62,7 +65,26 @@ def check_recording(recording: Recording) -> None:
         raise DataDamaged(f"{recording.name}: its rate is {recording.rate_hz} frames a unit of time")
 
 
+def _fits(values: Iterable[Any], shapes: Sequence[tuple[int, ...]]) -> bool:
+    """Return whether these are the values of channels of these shapes: numbers, images and blocks of samples."""
+    if [shape_of(value) for value in values] != shapes:
+        return False
+    for value in values:
+        if isinstance(value, Image):
+            numbers: Iterable[float] = value.cells
+        elif isinstance(value, Samples):
+            numbers = chain.from_iterable(value.values)
+        else:
+            numbers = (value,)
+        try:
+            array("d", numbers)
+        except TypeError:
+            return False
+    return True
+
+
 _FRAME: Final = struct.Struct(f"<{len(Frame._fields)}d")
+_STATUS: Final = struct.Struct("<q")
 
 
 def content_sha256(recording: Recording) -> str:

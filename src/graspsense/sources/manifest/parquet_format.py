@@ -10,10 +10,11 @@ from typing import Any, Final
 
 import numpy as np
 
-from graspsense.core.errors import DataDamaged, PluginUnavailable
+from graspsense.core.errors import PluginUnavailable
 from graspsense.recording.parquet import PARQUET_HINT
 from graspsense.recording.readable import readable, refuse_devices
 from graspsense.recording.unpacked import Unpacked
+from graspsense.sources.manifest.parquet_footer import parquet_size
 from graspsense.sources.manifest.table import ColumnTable, Numbers
 
 _BYTES_OF_A_NUMBER: Final = 8
@@ -34,31 +35,24 @@ def read_parquet(path: Path) -> list[ColumnTable]:
         refuse_devices(path)
         table = _table(path)
         numbers: dict[str, Numbers] = {}
+        shapes: dict[str, tuple[int, int]] = {}
         texts: dict[str, list[str]] = {}
         for name, column in zip(table.column_names, table.columns, strict=True):
             values = _numbers(column)
-            if values is not None:
-                numbers[name] = values
-            else:
+            if values is None:
                 texts[name] = _texts(path, column)
-        return [ColumnTable(source=path.name, numbers=numbers, texts=texts)]
+                continue
+            if values.ndim == 3:
+                shapes[name] = (values.shape[1], values.shape[2])
+            numbers[name] = values.reshape(len(values), -1) if values.ndim > 2 else values
+        return [ColumnTable(source=path.name, numbers=numbers, shapes=shapes, texts=texts)]
 
 
-def _expect_columns(path: Path, metadata: Any) -> None:
+def _expect_columns(path: Path, columns: int) -> None:
     """Raise TooLarge if the columns have more values, or unpack to more, than the limit allows."""
-    unpacked, values = Unpacked(path), Unpacked(path)
-    columns = metadata.num_columns
-    if metadata.num_rows < 0 or metadata.num_row_groups * columns > path.stat().st_size:
-        raise DataDamaged(
-            f"{path} is damaged: it has {metadata.num_rows} rows in {metadata.num_row_groups} groups"
-        )
-    values.expect(_BYTES_OF_A_NUMBER * metadata.num_rows * columns)
-    for i in range(metadata.num_row_groups):
-        group = metadata.row_group(i)
-        for k in range(columns):
-            column = group.column(k)
-            unpacked.add(max(column.total_uncompressed_size, 0))
-            values.add(_BYTES_OF_A_NUMBER * max(column.num_values, group.num_rows, 0))
+    size = parquet_size(path)
+    Unpacked(path).expect(size.unpacked_bytes)
+    Unpacked(path).expect(_BYTES_OF_A_NUMBER * max(size.values, size.rows * columns))
 
 
 def _table(path: Path) -> Any:
@@ -67,7 +61,7 @@ def _table(path: Path) -> Any:
     from pyarrow import types
 
     with pyarrow.parquet.ParquetFile(path) as file:
-        _expect_columns(path, file.metadata)
+        _expect_columns(path, len(file.schema_arrow))
         is_text = (types.is_string, types.is_large_string, types.is_binary)
         texts = [field.name for field in file.schema_arrow if any(test(field.type) for test in is_text)]
     unpacked = Unpacked(path)
@@ -90,9 +84,9 @@ def _numbers(column: Any) -> Numbers | None:
         return _numbers_of_texts(column)
     try:
         if types.is_boolean(kind):
-            return np.asarray(column.cast("int8").cast(float64()).to_numpy(), dtype=np.float64)
+            return np.array(column.cast("int8").cast(float64()).to_numpy(), dtype=np.float64)
         if types.is_integer(kind) or types.is_floating(kind) or types.is_decimal(kind):
-            return np.asarray(column.cast(float64(), safe=False).to_numpy(), dtype=np.float64)
+            return np.array(column.cast(float64(), safe=False).to_numpy(), dtype=np.float64)
         if types.is_list(kind) or types.is_large_list(kind) or types.is_fixed_size_list(kind):
             return _numbers_of_lists(column)
     except (ArrowException, NotImplementedError):
@@ -111,18 +105,26 @@ def _numbers_of_texts(column: Any) -> Numbers | None:
 
 
 def _numbers_of_lists(column: Any) -> Numbers | None:
+    """Return equally many numbers of each row; a missing row is NaN where the others have one number."""
     whole = column.combine_chunks()
+    if whole.null_count:
+        known = _numbers_of_lists(_chunked(whole.drop_null()))
+        if known is None or known.ndim > 1:
+            return None
+        numbers = np.full(len(whole), np.nan)
+        numbers[whole.is_valid().to_numpy(zero_copy_only=False)] = known
+        return numbers
     inner = whole.flatten()
     width, rest = divmod(len(inner), len(whole)) if len(whole) else (0, 0)
     lengths = whole.value_lengths() if hasattr(whole, "value_lengths") else None
-    if whole.null_count or inner.null_count or rest or not width:
+    if inner.null_count or rest or not width:
         return None
     if lengths is not None and (lengths.to_numpy(zero_copy_only=False) != width).any():
         return None
-    numbers = _numbers(_chunked(inner))
-    if numbers is None:
+    flat = _numbers(_chunked(inner))
+    if flat is None:
         return None
-    values = numbers.reshape(len(whole), width, *numbers.shape[1:])
+    values = flat.reshape(len(whole), width, *flat.shape[1:])
     return values[:, 0] if width == 1 else values
 
 

@@ -1,0 +1,83 @@
+"""What becomes of each type of column of a Parquet file: numbers, several numbers a row, an image a row, or texts."""
+
+from __future__ import annotations
+
+import datetime
+from contextlib import suppress
+
+import numpy as np
+import pytest
+
+pyarrow = pytest.importorskip("pyarrow", reason="needs the extra parquet")
+pq = pytest.importorskip("pyarrow.parquet", reason="needs the extra parquet")
+
+from graspsense.core.errors import DataDamaged  # noqa: E402
+from graspsense.sources.manifest.parquet_footer import parquet_size  # noqa: E402
+from graspsense.sources.manifest.parquet_format import read_parquet  # noqa: E402
+
+NAN = float("nan")
+COLUMNS = {
+    "double": (pyarrow.array([1.5, None, 2.5]), [1.5, NAN, 2.5]),
+    "integer": (pyarrow.array([1, None, 3], pyarrow.int16()), [1.0, NAN, 3.0]),
+    "unsigned": (pyarrow.array([2**63, 0, 1], pyarrow.uint64()), [2.0**63, 0.0, 1.0]),
+    "half": (pyarrow.array(np.float16([0.5, 1.5, 2.5])), [0.5, 1.5, 2.5]),
+    "logical": (pyarrow.array([True, None, False]), [1.0, NAN, 0.0]),
+    "nothing": (pyarrow.nulls(3), [NAN, NAN, NAN]),
+    "written": (pyarrow.array(["1.5", None, "-2"]), [1.5, NAN, -2.0]),
+    "pairs": (pyarrow.array([[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]]), [[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]]),
+    "single": (pyarrow.array([[1.0], [2.0], [3.0]]), [1.0, 2.0, 3.0]),
+    "fixed": (
+        pyarrow.FixedSizeListArray.from_arrays(pyarrow.array(np.arange(6.0)), 2),
+        [[0.0, 1.0], [2.0, 3.0], [4.0, 5.0]],
+    ),
+    "image": (pyarrow.array([[[1.0, 2.0], [3.0, 4.0]]] * 3), [[1.0, 2.0, 3.0, 4.0]] * 3),
+    "text": (pyarrow.array(["jar", None, "can"]), ["jar", "", "can"]),
+    "category": (pyarrow.array(["a", "b", "a"]).dictionary_encode(), ["a", "b", "a"]),
+    "ragged": (pyarrow.array([[1.0], [1.0, 2.0], []]), ["[1.0]", "[1.0, 2.0]", "[]"]),
+    "missing": (pyarrow.array([[1.0], None, [2.0]]), [1.0, NAN, 2.0]),
+    "table": (pyarrow.array([{"a": 1}] * 3), ["{'a': 1}"] * 3),
+    "day": (pyarrow.array([datetime.date(2024, 11, 24)] * 3), ["2024-11-24"] * 3),
+}
+
+
+@pytest.mark.parametrize("rows_of_a_group", [1, 3])
+def test_columns(tmp_path, rows_of_a_group):
+    path = tmp_path / "a.parquet"
+    table = pyarrow.table({name: column for name, (column, _) in COLUMNS.items()})
+    pq.write_table(table, path, row_group_size=rows_of_a_group)
+    (found,) = read_parquet(path)
+    assert len(found) == 3
+    for name, (_, expected) in COLUMNS.items():
+        if isinstance(expected[0], str):
+            assert list(found.texts[name]) == expected
+        else:
+            np.testing.assert_array_equal(found.numbers[name], expected)
+    assert found.shapes == {"image": (2, 2)}
+
+
+def test_the_footer_is_what_pyarrow_says(tmp_path):
+    path = tmp_path / "a.parquet"
+    table = pyarrow.table({name: column for name, (column, _) in COLUMNS.items()})
+    pq.write_table(table, path, row_group_size=2)
+    metadata = pq.read_metadata(path)
+    columns = [
+        metadata.row_group(i).column(k)
+        for i in range(metadata.num_row_groups)
+        for k in range(metadata.num_columns)
+    ]
+    size = parquet_size(path)
+    assert size.rows == 3
+    assert size.values == sum(column.num_values for column in columns)
+    assert size.unpacked_bytes == sum(column.total_uncompressed_size for column in columns)
+
+
+@pytest.mark.parametrize("at", range(20, 400, 7))
+def test_a_damaged_footer_is_told_and_never_ends_the_process(at, tmp_path):
+    """pyarrow calls abort for some of these when it is asked for a column of its metadata."""
+    path = tmp_path / "a.parquet"
+    pq.write_table(pyarrow.table({"a": [[1.0, 2.0], [3.0, 4.0]], "b": ["x", "y"]}), path)
+    data = bytearray(path.read_bytes())
+    data[-at] ^= 0x15
+    path.write_bytes(data)
+    with suppress(DataDamaged):
+        assert len(read_parquet(path)[0]) <= 2
