@@ -138,6 +138,7 @@ def test_thousands_of_equal_column_names_are_numbered(tmp_path):
         (limits.LINE_CHARACTERS, "a,b,c\n1,2,333333333333333333333\n1,2,3\n"),
         (limits.COLUMNS, ",".join("abcdefghijklm") + "\n" + ",".join("1234567890123") + "\n"),
         (limits.CELLS, "a,b,c\n" + "1,2,3\n" * 20),
+        (limits.CELLS, "a\n" + "1\n" * 3 + "\n" * 50),
     ],
 )
 def test_a_table_beyond_a_limit_is_damaged_and_the_limit_can_be_raised(
@@ -196,6 +197,17 @@ def test_a_cell_of_many_digits_takes_linear_time(tmp_path):
     path = tmp_path / "digits.csv"
     path.write_text(f"a b c\n{'1' * 1_000_000}x 1 1\n0 1 2\n")
     assert "a" in read_text(path)[0].texts
+
+
+@pytest.mark.parametrize("end", ["\n", "\r", "\r\n"])
+def test_a_long_text_of_short_lines_is_read(tmp_path, monkeypatch, end):
+    monkeypatch.setenv(limits.LINE_CHARACTERS.variable, "10")
+    path = tmp_path / "lines.csv"
+    path.write_bytes(f"t g F{end}".encode() + f"1 2 3{end}".encode() * 50)
+    assert len(read_text(path)[0]) == 50
+    path.write_bytes(path.read_bytes() + f"{'1' * 20} 2 3{end}".encode())
+    with pytest.raises(DataDamaged, match="line 52"):
+        read_text(path)
 
 
 def test_errors_list_a_few_of_many_columns(tmp_path):

@@ -49,7 +49,7 @@ class SizeLimit:
         )
 
 
-TEXT_BYTES: Final = SizeLimit("GRASPSENSE_MAX_TEXT_BYTES", 256 * 2**20, "bytes of a text file")
+TEXT_BYTES: Final = SizeLimit("GRASPSENSE_MAX_TEXT_BYTES", 128 * 2**20, "bytes of a text file")
 LINE_CHARACTERS: Final = SizeLimit("GRASPSENSE_MAX_LINE_CHARACTERS", 2_000_000, "characters of a line")
 COLUMNS: Final = SizeLimit("GRASPSENSE_MAX_COLUMNS", 10_000, "columns of a table")
 CELLS: Final = SizeLimit("GRASPSENSE_MAX_CELLS", 10_000_000, "cells of a table")

@@ -27,6 +27,8 @@ from graspsense.recording.readable import not_opened, refuse_devices
 
 LONGEST_NAME: Final = 500
 """Limit on the characters of the name of a column."""
+_LINE_ENDS: Final = "\n\r\v\f\x1c\x1d\x1e\x85\u2028\u2029"
+"""The characters at which `str.splitlines` divides a text."""
 _MISSING: Final = frozenset({"", "nan", "na", "n/a", "null", "none", "?"})
 _DECIMAL_COMMA: Final = re.compile(r"[-+]?\d+,\d+")
 
@@ -164,15 +166,17 @@ def _rows(path: Path, text: str) -> tuple[list[str], list[int], list[list[str]]]
 
 
 def check_lines(path: Path, text: str) -> None:
-    """Raise DataDamaged if a line of the text is too long."""
+    """Raise DataDamaged if a line of the text is too long, or if there are too many of them."""
+    if too_many := CELLS.exceeded(sum(map(text.count, _LINE_ENDS))):
+        raise DataDamaged(f"{path}: {too_many}")
     most = LINE_CHARACTERS.most
     if len(text) <= most:
         return
     start = number = 0
-    for number, end in enumerate((match.start() for match in re.finditer("\n", text)), 1):
-        if end - start > most:
-            raise DataDamaged(f"{path}, line {number}: {LINE_CHARACTERS.exceeded(end - start)}")
-        start = end + 1
+    for number, match in enumerate(re.finditer("\r\n|[\r\n]", text), 1):
+        if match.start() - start > most:
+            raise DataDamaged(f"{path}, line {number}: {LINE_CHARACTERS.exceeded(match.start() - start)}")
+        start = match.end()
     if too_long := LINE_CHARACTERS.exceeded(len(text) - start):
         raise DataDamaged(f"{path}, line {number + 1}: {too_long}")
 
