@@ -67,7 +67,7 @@ def _our_engine(config: SimConfig, setting: str) -> Engine:
     scenes = Scenes(job)
     scenes.add(config.object, compiled=True)
     setup = scenes.setup(config.object, 0)
-    composition = composition_of(config, setup)
+    composition = composition_of(setup)
     loop = CompiledLoops(Law.step).of(composition)
     storage = Storage()
     grasp_compiled(job, setup, loop, storage)

@@ -224,7 +224,7 @@ class Bench:
 
     def loop_of(self, config: SimConfig, setup: GraspSetup, step: Any) -> Any:
         """Return the compiled loop of a padded setup."""
-        composition = composition_of(config, setup, pad=False)
+        composition = composition_of(setup, pad=False)
         if composition not in self.compiled:
             began = time.process_time()
             loop = CompiledLoops(step).of(composition)

@@ -86,9 +86,7 @@ CONFIGS = {
     "ideal": SimConfig(sensor="ideal"),
     "no spread": SimConfig(spread=False),
     "few cells": SimConfig(pad_cells=5, pad_period_s=0.0161, transmission="pr2_paper"),
-    "straight": SimConfig(
-        spread=False, transmission="straight", load_friction_coefficient=0.0, breakaway_n=3.0
-    ),
+    "straight": SimConfig(transmission="straight", load_friction_coefficient=0.0, breakaway_n=3.0),
     "dropped": SimConfig(sensor="ideal", accuracy=0.5),
 }
 SEEDS = st.one_of(st.integers(0, 500), st.integers(0, 2**64 - 1))
@@ -173,13 +171,12 @@ def test_a_scene_is_drawn_of_which_one_grasp_does_not_fit():
 @pytest.mark.parametrize(
     ("config", "name"),
     [
-        (SimConfig(transmission="straight"), "toy"),
         (SimConfig(acceleration=True), "toy"),
         (SimConfig(), "none"),
     ],
 )
 def test_grasps_that_need_more_than_their_numbers_are_not_drawn(config, name):
-    """A straight drive may be discretised exactly, and an accelerometer draws noise of its own."""
+    """An accelerometer draws noise of its own."""
     assert scenes_of(config).drawn(name) is None
 
 

@@ -32,7 +32,7 @@ class Plant:
 
     def __init__(self, scene):
         setup = unverified_setup(CONFIG, scene, 0)
-        composed = composition_of(CONFIG, setup, pad=False)
+        composed = composition_of(setup, pad=False)
         self.params = setup.plant._replace(steps=MACRO)
         self._macro_step = bind_reachable(macro_step, step_parts(composed))
         self._move = plant_move(laws_of(setup.kinds), converges=False, lags=False)

@@ -344,12 +344,6 @@ def test_a_step_per_tick_is_of_third_order_where_the_object_is_stiffer():
     assert higher.verification.error <= 0.8e-4
 
 
-def test_a_linear_scene_is_discretised_exactly_and_takes_no_steps():
-    linear = evolve(CONFIG, transmission="straight", breakaway_n=CONFIG.coulomb_n)
-    model = selected(linear, thing(("elastic", {"k1_n_m": 2000.0})), hybrid())
-    assert (model.level.plain, model.steps.longest_s) == (0, math.inf)
-
-
 def test_forced_steps_and_contacts_beyond_the_tick_are_not_verified():
     for config in (evolve(CONFIG, step_s=1e-4), evolve(CONFIG, scheme="implicit")):
         assert selected(config, thing(SHELL), hybrid()).verification is None

@@ -39,7 +39,7 @@ def pressed(terms, config=None, seconds=0.1, effort_n=60.0, held=False, **steps)
     spec = ObjectSpec(name="object", width_m=0.05, terms=tuple(terms.items()), held=held)
     setup = unverified_setup(config, spec, 0)
     plant, state = setup.plant._replace(steps=setup.plant.steps._replace(**steps)), setup.state
-    move, forces = composed_move(composition_of(config, setup, pad=False)), []
+    move, forces = composed_move(composition_of(setup, pad=False)), []
     for _ in range(round(seconds / 1e-3)):
         state = move(plant, state, effort_n, 1e-3)
         forces.append(state.contact.left_n)
@@ -142,7 +142,7 @@ def test_steps_of_a_tick_keep_their_order_through_an_event(scheme, order, event)
     }[event]
     spec = ObjectSpec(name="object", width_m=0.05, terms=tuple(terms.items()))
     setup = unverified_setup(config, spec, 0)
-    move = composed_move(composition_of(config, setup, pad=False))
+    move = composed_move(composition_of(setup, pad=False))
 
     def end(n):
         state = setup.state
@@ -325,7 +325,7 @@ def test_an_object_that_is_too_heavy_to_push_stops_the_finger_and_does_not_throw
         name="anvil", width_m=0.05, offset_m=0.005, mass_kg=300.0, terms=(("elastic", {"k1_n_m": 2e3}),)
     )
     setup = unverified_setup(config, spec, 0)
-    move, state, gaps = composed_move(composition_of(config, setup, pad=False)), setup.state, []
+    move, state, gaps = composed_move(composition_of(setup, pad=False)), setup.state, []
     for _ in range(300):
         state = move(setup.plant, state, 23.0, 1e-3)
         gaps.append(state.motion.gap_m)

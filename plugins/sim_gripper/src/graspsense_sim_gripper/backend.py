@@ -38,8 +38,6 @@ from graspsense_sim_gripper.build import EFFORT_LIMIT_N, build, device_info, ins
 from graspsense_sim_gripper.compiled.compose import INTERPRETED, composed_move, composition, free_motion
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.dynamics.state import PlantReadings, PlantState, is_finite, right_of
-from graspsense_sim_gripper.exact.discretise import discretise
-from graspsense_sim_gripper.exact.propagate import ExactPlant
 from graspsense_sim_gripper.explain import explain
 from graspsense_sim_gripper.fingertip import CELL_OFFSET, CELLS, FIRST_PAD_CELL, fingertips
 from graspsense_sim_gripper.loop import COLUMNS, GraspParams, LoopProgress
@@ -59,7 +57,6 @@ from graspsense_sim_gripper.sensing import (
     sense,
     with_listed_cells,
 )
-from graspsense_sim_gripper.stepping.scheme import PlantParams
 from graspsense_sim_gripper.term_failure import TermFailed, not_finite_in_tick, raised_in_term
 from graspsense_sim_gripper.terms.term import LAW_ERRORS
 
@@ -148,10 +145,7 @@ class SimBackend(BatchBackend[SimConfig]):
             self._reduction = select(problem, self._controller or default_controller(self.config))
         setup = instantiate(problem, self._reduction, seed)
         self._setup = setup = evolve(setup, sensor=with_listed_cells(setup.sensor))
-        exact = discretise(self.config, setup)
-        self._plant: PlantParams | ExactPlant = setup.plant if exact is None else exact[0]
-        shape = None if exact is None else exact[1]
-        composed = composition(setup.kinds, setup.plant, shape, has_palm=setup.has_palm)
+        composed = composition(setup.kinds, setup.plant, has_palm=setup.has_palm)
         self._move = composed_move(composed)
         self._free_ticks = None if self._controller is None else free_motion(composed, self._controller.step)
         self._table = [[0.0] * MOST_FREE_TICKS for _ in COLUMNS]
@@ -218,7 +212,7 @@ class SimBackend(BatchBackend[SimConfig]):
         self._moved_on = True
         setup, table, first = self._setup, self._table, self._ticks
         most = min(most, MOST_FREE_TICKS)
-        constants = GraspParams(self._plant, setup.sensor, params, setup.dt_s, first + most)
+        constants = GraspParams(setup.plant, setup.sensor, params, setup.dt_s, first + most)
         at = LoopProgress(first, 0, effort, self._state, self._sensor, state)
         at = self._free_ticks(constants, at, frame, table, self._phases)
         if at.ticks == first:
@@ -243,7 +237,7 @@ class SimBackend(BatchBackend[SimConfig]):
         """Return the plant after a tick. Raises TermFailed."""
         setup, before = self._setup, self._state
         try:
-            after = self._move(self._plant, before, effort_n, setup.dt_s)
+            after = self._move(setup.plant, before, effort_n, setup.dt_s)
         except LAW_ERRORS as error:
             raise TermFailed(raised_in_term(error, setup.kinds) or str(error)) from error
         if not is_finite(after):
@@ -274,8 +268,6 @@ class SimBackend(BatchBackend[SimConfig]):
         setup, reduction = self._setup, self._reduction
         report = model_report(self._state, setup.kinds)
         if reduction is not None:
-            if isinstance(self._plant, ExactPlant):
-                reduction = reduction.with_exact_discretisation()
             report["selection"] = {
                 "fidelity": self.config.fidelity,
                 **reduction.as_values(),

@@ -15,10 +15,8 @@ from typing import Final, NamedTuple
 from attrs import frozen
 
 from graspsense_sim_gripper.compiled.compose import Composition, composition
-from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.dynamics.contact import ObjectModel
 from graspsense_sim_gripper.dynamics.state import Contact, ContactState, PlantState
-from graspsense_sim_gripper.exact.discretise import discretise
 from graspsense_sim_gripper.objects.library import catalogue
 from graspsense_sim_gripper.problem import GraspSetup
 from graspsense_sim_gripper.stepping.scheme import PlantParams
@@ -80,11 +78,10 @@ def compiled_kinds(kinds: tuple[str, ...]) -> tuple[str, ...]:
     return common_kinds() if is_common(kinds) else kinds
 
 
-def composition_of(config: SimConfig, setup: GraspSetup, *, pad: bool = True) -> Composition:
+def composition_of(setup: GraspSetup, *, pad: bool = True) -> Composition:
     """Return the composition in which a grasp is compiled; not `pad`: with the object's own terms."""
-    exact = discretise(config, setup, on_arrays=True)
     kinds = layout_of(setup).kinds if pad else setup.kinds
-    return composition(kinds, setup.plant, None if exact is None else exact[1], has_palm=setup.has_palm)
+    return composition(kinds, setup.plant, has_palm=setup.has_palm)
 
 
 def padded(setup: GraspSetup, kinds: tuple[str, ...] | None = None) -> GraspSetup:

@@ -101,7 +101,7 @@ def scales_for(
 ) -> tuple[LevelScale, ...]:
     """Return the scales to try, in order. `spread`: whether instances differ from the nominal object.
 
-    `explicit`: whether explicit schemes suit the scene: it is neither stiff nor discretised exactly.
+    `explicit`: whether explicit schemes suit the scene: it is not stiff.
     """
     own: tuple[LevelScale, ...] = FULL_SCALES
     if fidelity == "scene":

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any, Final
 
-from attrs import asdict, evolve, field, frozen
+from attrs import asdict, field, frozen
 
 from graspsense_sim_gripper.reduction.levels import Level
 from graspsense_sim_gripper.stepping.scheme import Steps
@@ -101,12 +101,6 @@ class Reduction:
         A reduction without error keeps every term. It is valid for every force if the error of its steps is controlled.
         """
         return peak_n <= self.max_force_n or (self.error == 0.0 and self.level.plain == 0)
-
-    def with_exact_discretisation(self) -> Reduction:
-        """Return the same reduction for a scene that is discretised exactly, without time steps."""
-        what = "linear between changes of contact"
-        scheme = TermDecision(term="steps", decision="exact discretisation", what=what, number=0.0, error=0.0)
-        return evolve(self, scheme=scheme)
 
     def as_values(self) -> dict[str, Any]:
         """Return the reduction as a dictionary of plain values, for a report."""

@@ -35,7 +35,7 @@ from graspsense_sim_gripper.reduction.model import DROPPED, KEPT, Reduction, Ter
 from graspsense_sim_gripper.reduction.probe import Grip, damping, stiffness
 from graspsense_sim_gripper.stepping.scheme import BOGACKI_SHAMPINE, MEAN_FORCE, TR_BDF2, VERLET, Steps
 from graspsense_sim_gripper.terms.registry import find_term
-from graspsense_sim_gripper.terms.term import NO_STATE, OwnContact, Term, WorkingPoint, no_rates
+from graspsense_sim_gripper.terms.term import NO_STATE, Term, WorkingPoint, no_rates
 
 FORCE_N: Final = 20.0
 SPEED_M_S: Final = 0.01
@@ -232,12 +232,12 @@ def _swings(grip: Grip, model: ObjectModel) -> dict[int, float]:
 def _frequencies(kinds: Sequence[str], model: ObjectModel, point: WorkingPoint) -> dict[int, float]:
     """Return the angular frequency (rad/s) of each term by its index, 0 if it does not oscillate.
 
-    A term with a contact of its own divides its steps itself, and is left out.
+    A term that divides its steps by itself is left out.
     """
     swings = {}
     for i, kind in enumerate(kinds):
         term, params = find_term(kind)[1], model.terms[i + 1].params
-        if not isinstance(term.linear(params), OwnContact):
+        if not term.divides_steps:
             swings[i] = max((r.per_s for r in term.rates(params, point) if r.what == "swings"), default=0.0)
     return swings
 

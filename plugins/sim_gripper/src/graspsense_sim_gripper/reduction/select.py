@@ -24,11 +24,9 @@ from attrs import evolve
 
 from graspsense.plugin_api import ConfigError
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.exact.discretise import why_not_exact
 from graspsense_sim_gripper.objects.spec import ObjectSpec
 from graspsense_sim_gripper.problem import GraspController, Problem
 from graspsense_sim_gripper.reduction.cache import ReductionCache
-from graspsense_sim_gripper.reduction.candidates import reduced
 from graspsense_sim_gripper.reduction.error import deviation
 from graspsense_sim_gripper.reduction.levels import FULL_SCALES, REFERENCE_SCALES, LevelScale, scales_for
 from graspsense_sim_gripper.reduction.model import DROPPED, Reduction, TermDecision, Verification
@@ -299,11 +297,8 @@ def _accepted_for_instances(
 
 
 def _suits_explicit(problem: Problem, grip: Grip) -> bool:
-    """Return whether explicit steps suit the full model: it is neither stiff nor linear (which takes no steps)."""
-    full = propose(problem, grip, FULL_SCALES[0])
-    if full.steps.scheme == TR_BDF2 or problem.nominal is None:
-        return False
-    return bool(why_not_exact(problem.model_config, reduced(problem.nominal, full)))
+    """Return whether explicit steps suit the full model: it is not stiff."""
+    return propose(problem, grip, FULL_SCALES[0]).steps.scheme != TR_BDF2
 
 
 def _reference_scale(config: SimConfig, scale: LevelScale) -> LevelScale:

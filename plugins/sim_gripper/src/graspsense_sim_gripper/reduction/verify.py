@@ -33,7 +33,6 @@ from graspsense_sim_gripper.compiled.loop_code import CompiledLoops
 from graspsense_sim_gripper.compiled.padding import padded
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.dynamics.state import Motion, PlantState
-from graspsense_sim_gripper.exact.discretise import discretise
 from graspsense_sim_gripper.fingertip import CELLS
 from graspsense_sim_gripper.loop import (
     COLUMNS,
@@ -42,7 +41,6 @@ from graspsense_sim_gripper.loop import (
     ROWS_AT_ONCE,
     Buffers,
     GraspParams,
-    PlantModel,
     SimulationState,
     before_failure,
     has_ended,
@@ -259,7 +257,7 @@ class TrialGrasps:
 
     def _runner(self, setup: GraspSetup, from_open: bool) -> Callable[[Steps, _Stage, int], _Stage]:
         """Return a function `run(steps, stage, until)` that continues a grasp of this model up to the tick `until`."""
-        on_arrays, loop, made, exact = self._loop(setup)
+        on_arrays, loop, made = self._loop(setup)
         buffers = _ideal_buffers(on_arrays)
         params = self.params if from_open else self.params_near
 
@@ -270,7 +268,7 @@ class TrialGrasps:
                 fresh = made.state.contact
                 contact = progress.plant.contact._replace(left=fresh.left, right=fresh.right)
                 progress = progress._replace(plant=progress.plant._replace(contact=contact))
-            plant = made.plant._replace(steps=steps) if exact is None else exact
+            plant = made.plant._replace(steps=steps)
             grasp_params = GraspParams(
                 plant,
                 made.sensor,
@@ -278,7 +276,7 @@ class TrialGrasps:
                 setup.dt_s,
                 until,
                 made.palm,
-                macro_steps=uses_macro_steps(exact, steps),
+                macro_steps=uses_macro_steps(steps),
             )
             while not has_ended(progress.controller) and progress.loop.ticks < until:
                 n_rows = min(until - progress.loop.ticks, CAPACITY) + ROWS_AT_ONCE
@@ -324,22 +322,14 @@ class TrialGrasps:
             )
             self._reported_s = time.monotonic()
 
-    def _loop(
-        self, setup: GraspSetup
-    ) -> tuple[bool, Callable[..., SimulationState], GraspSetup, PlantModel | None]:
-        """Return whether the loop is compiled, the loop, its setup, and the exactly discretised plant or None.
-
-        Raises NotCompilable.
-        """
+    def _loop(self, setup: GraspSetup) -> tuple[bool, Callable[..., SimulationState], GraspSetup]:
+        """Return whether the loop is compiled, the loop, and its setup. Raises NotCompilable."""
         on_arrays = self.compiled
         made = padded(setup, self.padding) if on_arrays else setup
-        exact = discretise(self.config, made, on_arrays=on_arrays)
-        shape = None if exact is None else exact[1]
-        composed = composition(made.kinds, made.plant, shape, has_palm=made.has_palm)
-        model = None if exact is None else exact[0]
+        composed = composition(made.kinds, made.plant, has_palm=made.has_palm)
         if not on_arrays:
-            return False, grasp_loop(composed, self.controller.step), made, model
-        return True, self._loops.of(composed), made, model
+            return False, grasp_loop(composed, self.controller.step), made
+        return True, self._loops.of(composed), made
 
 
 def trial_grasps(

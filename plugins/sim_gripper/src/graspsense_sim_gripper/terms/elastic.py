@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final, NamedTuple
 
-from graspsense_sim_gripper.terms.term import Limit, LinearForm, NoState, Term, WorkingPoint
+from graspsense_sim_gripper.terms.term import Limit, NoState, Term, WorkingPoint
 
 LEAST_SLOPE: Final = 0.05
 """A shell softens until its slope is this share of k1, and keeps that slope from there on."""
@@ -72,11 +72,6 @@ def limits(params: Elastic, at: WorkingPoint) -> tuple[Limit, ...]:
     return (Limit("spring", spring_n_m=params.k1_n_m),)
 
 
-def linear(params: Elastic) -> LinearForm | None:
-    """Return the spring k1; None if the shell stiffens or softens."""
-    return LinearForm(params.k1_n_m) if params.k3_n_m3 == 0.0 else None
-
-
 def refusal(params: Elastic) -> str:
     """Return why the shell has no stable law."""
     return unstable(params.k1_n_m, params.k3_n_m3)
@@ -88,7 +83,6 @@ TERM = Term(
     params=Elastic,
     law=elastic,
     limits=limits,
-    linear=linear,
     signed=("k3_n_m3",),
     refusal=refusal,
     stiffnesses=("k1_n_m", "k3_n_m3"),

@@ -6,7 +6,7 @@ import math
 from typing import Final, NamedTuple
 
 from graspsense_sim_gripper.terms.oscillator import Forcing, OscillatorState, moved
-from graspsense_sim_gripper.terms.term import Limit, LinearForm, Rate, Term, WorkingPoint
+from graspsense_sim_gripper.terms.term import Limit, Rate, Term, WorkingPoint
 
 GRAVITY_M_S2: Final = 9.80665
 
@@ -73,18 +73,6 @@ def limits(params: Liquid, at: WorkingPoint) -> tuple[Limit, ...]:
     )
 
 
-def linear(params: Liquid) -> LinearForm:
-    """Return the motion of the column behind the wall."""
-    mass, k, damping, wall = _seen(params)
-    return LinearForm(
-        spring_n_m=wall,
-        rates=((0.0, 1.0), (-(k + wall) / mass, -damping / mass)),
-        by_compression=(0.0, wall / mass),
-        by_speed=(0.0, 0.0),
-        force=(-wall, 0.0),
-    )
-
-
 TERM = Term(
     name="liquid",
     summary="liquid pressed up a neck: weight, viscosity and inertia, in series with the bulge of the wall",
@@ -93,6 +81,5 @@ TERM = Term(
     at_rest=OscillatorState(0.0, 0.0),
     rates=rates,
     limits=limits,
-    linear=linear,
     positive=("area_m2", "neck_m2", "column_m", "bulge_m3_pa", "density_kg_m3"),
 )

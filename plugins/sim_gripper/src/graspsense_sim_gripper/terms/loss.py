@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from graspsense_sim_gripper.terms.term import Limit, LinearForm, NoState, Term, WorkingPoint
+from graspsense_sim_gripper.terms.term import Limit, NoState, Term, WorkingPoint
 
 
 class Loss(NamedTuple):
@@ -23,16 +23,10 @@ def limits(params: Loss, at: WorkingPoint) -> tuple[Limit, ...]:
     return (Limit("damper", damper_n_s_m=params.damping_n_s_m),)
 
 
-def linear(params: Loss) -> LinearForm:
-    """Return the damper, which is exact."""
-    return LinearForm(0.0, params.damping_n_s_m)
-
-
 TERM = Term(
     name="loss",
     summary="damper on the compression; fitted where it is used",
     params=Loss,
     law=loss,
     limits=limits,
-    linear=linear,
 )

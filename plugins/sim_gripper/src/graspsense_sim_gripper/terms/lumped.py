@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from graspsense_sim_gripper.terms.term import LinearForm, NoState
+from graspsense_sim_gripper.terms.term import NoState
 
 
 class LumpedSpringDamper(NamedTuple):
@@ -19,8 +19,3 @@ def lumped(
 ) -> tuple[float, NoState]:
     """Return the force of the spring and the damper."""
     return params.spring_n_m * d1 + params.damper_n_s_m * v1, state
-
-
-def linear(params: LumpedSpringDamper) -> LinearForm:
-    """Return the linear form, which is exact."""
-    return LinearForm(params.spring_n_m, params.damper_n_s_m)

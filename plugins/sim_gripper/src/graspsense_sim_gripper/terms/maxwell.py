@@ -6,7 +6,7 @@ import math
 from typing import NamedTuple
 
 from graspsense_sim_gripper.terms.phi import phi1, phi_ramp
-from graspsense_sim_gripper.terms.term import Limit, LinearForm, Rate, Term, WorkingPoint
+from graspsense_sim_gripper.terms.term import Limit, Rate, Term, WorkingPoint
 
 
 class Maxwell(NamedTuple):
@@ -46,13 +46,6 @@ def limits(params: Maxwell, at: WorkingPoint) -> tuple[Limit, ...]:
     )
 
 
-def linear(params: Maxwell) -> LinearForm:
-    """Return the linear form q' = k d' - q / tau with the force q."""
-    return LinearForm(
-        rates=((-1.0 / params.tau_s,),), by_compression=(0.0,), by_speed=(params.k_n_m,), force=(1.0,)
-    )
-
-
 TERM = Term(
     name="maxwell",
     summary="viscoelastic branch, q' = k d' - q / tau",
@@ -61,7 +54,6 @@ TERM = Term(
     at_rest=MaxwellState(0.0),
     rates=rates,
     limits=limits,
-    linear=linear,
     positive=("tau_s",),
     stiffnesses=("k_n_m",),
 )
