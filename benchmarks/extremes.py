@@ -20,11 +20,10 @@ import math
 import os
 import platform
 import subprocess
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from datetime import date
 from functools import cache
 from importlib.metadata import version
-from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final
 
@@ -163,8 +162,7 @@ def compared(forces: FloatArray, peak_n: float, expected: FloatArray, expected_p
 
 def is_flagged(plant: Ready, state: PlantState) -> bool:
     """Return whether the report of this grasp says that its trace is not verified, or that it is not resolved."""
-    not_verified = plant.reduction.contact.decision == NOT_VERIFIED
-    return not_verified or state.step.unresolved + state.contact.unbalanced > 0
+    return bool(plant.reduction.unresolved) or state.step.unresolved + state.contact.unbalanced > 0
 
 
 def light_surface(stiffness: float, ratio: float, mass_kg: float = 1.0) -> ObjectSpec:
@@ -232,7 +230,7 @@ def thin_object(short: bool) -> Iterator[Row]:
 SHELL: Final = ("elastic", {"k1_n_m": 2000.0})
 GAS: Final = {"area_m2": 1e-3, "area_slope_m": 0.0, "pressure_pa": 101325.0, "exponent": 1.4}
 BULGE: Final = 1e-10
-CLOSE: Final = evolve(BASE, accuracy=1e-4, fidelity="full")
+CLOSE: Final = evolve(BASE, accuracy=1e-4, fidelity="scene")
 """Settings for the comparison with a limit, with negligible errors of the steps."""
 
 
@@ -259,33 +257,6 @@ def tends(case: str, of: Callable[[float], ObjectSpec], limit: ObjectSpec, at: f
     }
 
 
-def across(case: str, of: Callable[[float], ObjectSpec], values: Sequence[float]) -> Iterator[Row]:
-    """Yield a row for each value at which the reduced model changes: the result may not jump beyond the accuracy."""
-
-    def made(value: float) -> tuple[str, ...]:
-        return press(BASE, of(value), seconds=1e-3)[2].reduction.treatment
-
-    for least, most in pairwise(values):
-        if made(least) == made(most):
-            continue
-        before = made(least)
-        while most / least > 1.0 + 1e-6:
-            middle = math.sqrt(least * most)
-            if made(middle) == before:
-                least = middle
-            else:
-                most = middle
-        one, other = press(BASE, of(least))[0], press(BASE, of(most))[0]
-        jump = rms_of(one, other)
-        yield {
-            "case": f"{case}, where the model changes",
-            "value": most,
-            "rms_error": jump,
-            "finite": math.isfinite(jump),
-            "holds": jump <= BASE.accuracy,
-        }
-
-
 def head_space(short: bool) -> Iterator[Row]:
     """A fraction of air in half a litre: little air tends to the wall's A^2 / C, much air to the empty bottle."""
     for share in (1e-3, 1e-2, 1e-1, 0.5, 1.0):
@@ -304,7 +275,6 @@ def vents(short: bool) -> Iterator[Row]:
         yield {"case": "vent", "value": area, **row, "holds": row["rms_error"] <= 0.01}
     yield tends("vent", lambda area: gas(5e-5, vent_m2=area), gas(5e-5), 1e-9, 1.0)
     yield tends("vent", lambda area: gas(5e-5, vent_m2=area), object_of(SHELL), 2e-4, -1.0)
-    yield from across("vent", lambda area: gas(5e-5, vent_m2=area), areas[1:])
 
 
 def branch(tau_s: float) -> ObjectSpec:
@@ -329,7 +299,6 @@ def relaxation(short: bool) -> Iterator[Row]:
             "finite": math.isfinite(error),
             "holds": error <= 0.01,
         }
-    yield from across("relaxation time", branch, times)
 
 
 def energy(short: bool) -> Iterator[Row]:
@@ -652,7 +621,7 @@ def whole_grasp(
     said = [] if reduction.verification is not None else ["not verified"]
     if state.step.unresolved + state.contact.unbalanced > 0:
         said.append("not resolved")
-    if reduction.contact.decision == NOT_VERIFIED:
+    if reduction.unresolved:
         said.append(NOT_VERIFIED)
     return done, ", ".join(said)
 

@@ -1,4 +1,4 @@
-"""A map of regimes: which scheme and which terms a scene needs, and where fixed steps of 1 ms fail. Simulated.
+"""A map of regimes: which scheme a scene needs, and where fixed steps of 1 ms fail. Simulated.
 
     python benchmarks/regimes.py [--scenes 1500] [--rows FILE] [--markdown docs/regimes.md] [--first N] [--short]
 
@@ -195,7 +195,7 @@ def _case(
     error, of = deviation(record_of(done, dt_s), record_of(reference, dt_s))
     state = done.state
     flags = []
-    if reduction.contact.decision == NOT_VERIFIED:
+    if reduction.unresolved:
         flags.append(NOT_VERIFIED)
     if state.step.unresolved + state.contact.unbalanced > 0:
         flags.append("not resolved")
@@ -205,8 +205,7 @@ def _case(
         "error": error,
         "of": of,
         "flags": flags,
-        "scheme": reduction.scheme.decision,
-        "terms": {one.term: one.decision for one in reduction.decisions if one.term in KINDS},
+        "scheme": reduction.decisions[0].decision,
         "steps": state.step.n_steps,
         "ms": 1e3 * seconds_of(bench, job, setup),
         "selection_ms": 1e3 * bench.selection_s,
@@ -281,7 +280,7 @@ def page(rows: Sequence[Row], picture: str | None) -> str:
         ("Unstable loop", unstable),
     ):
         lines += ["", f"## {title}", "", *_within(some)]
-    lines += ["", "## Schemes and terms", "", *_needed(stable + pads)]
+    lines += ["", "## Schemes", "", *_needed(stable + pads)]
     lines += ["", "## Where fixed steps of 1 ms fail", "", *_fixed(stable)]
     lines += ["", "## Largest errors without a flag", "", *_misses(stable)]
     return "\n".join(lines) + "\n"
@@ -351,19 +350,12 @@ def _median(values: Sequence[float]) -> float:
 
 
 def _needed(rows: Sequence[Row]) -> Iterator[str]:
-    yield "| accuracy | schemes | terms: kept as they are, of the scenes that have them |"
-    yield "|---|---|---|"
+    yield "| accuracy | schemes |"
+    yield "|---|---|"
     for accuracy in ACCURACIES:
         mine = [row[f"{accuracy:g}"] for row in rows if "refused" not in row[f"{accuracy:g}"]]
         schemes = ", ".join(f"{name} {n}" for name, n in Counter(one["scheme"] for one in mine).most_common())
-        kept: Counter[str] = Counter()
-        of: Counter[str] = Counter()
-        for one in mine:
-            for term, decision in one["terms"].items():
-                of[term] += 1
-                kept[term] += decision == "kept"
-        terms = ", ".join(f"{term} {kept[term]} of {n}" for term, n in of.most_common())
-        yield f"| {accuracy:.1%} | {schemes} | {terms} |"
+        yield f"| {accuracy:.1%} | {schemes} |"
 
 
 BINS: Final[Sequence[tuple[str, str, Sequence[float]]]] = (

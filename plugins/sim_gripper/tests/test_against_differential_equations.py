@@ -849,4 +849,4 @@ def test_the_reference_is_the_solution_of_the_equations_for_every_term(name, pla
 )
 @pytest.mark.parametrize(("name", "place", "gripper"), marked(2, 1))
 def test_steps_for_an_accuracy_have_it(name, place, gripper, accuracy, most):
-    assert max(errors(name, place, gripper, fidelity="full", accuracy=accuracy)) <= most
+    assert max(errors(name, place, gripper, fidelity="scene", accuracy=accuracy)) <= most

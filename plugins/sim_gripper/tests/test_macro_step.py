@@ -261,7 +261,7 @@ def test_a_command_within_a_step_takes_effect_in_its_tick(compiled):
             compiled=compiled,
             run=run,
         )[0]
-        for fidelity in ({"fidelity": "full"}, {"fidelity": "fixed", "scheme": "explicit"})
+        for fidelity in ({"fidelity": "scene"}, {"fidelity": "fixed", "scheme": "explicit"})
     )
     assert many.model.reduction.steps.macro_tolerance > 0.0
     first = int(np.argmax(many.trace.force_left_n > 3.0))

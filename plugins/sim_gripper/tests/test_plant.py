@@ -16,7 +16,7 @@ from graspsense_sim_gripper.drive_models import LINKAGES, STRAIGHT
 from graspsense_sim_gripper.dynamics.contact import ObjectModel, PadCompliance, solve_contact
 from graspsense_sim_gripper.dynamics.drive import Drive, Friction, sliding_friction, stribeck_excess
 from graspsense_sim_gripper.dynamics.state import Contact, ContactState, Motion, PlantState
-from graspsense_sim_gripper.reduction.levels import LevelScale, steps_for
+from graspsense_sim_gripper.reduction.levels import PLAIN, steps_for
 from graspsense_sim_gripper.stepping.scheme import (
     BOGACKI_SHAMPINE,
     MEAN_FORCE,
@@ -553,7 +553,7 @@ def test_a_stuck_gripper_does_not_creep_whatever_it_holds(name, params):
 
 
 def a_step_per_tick(scheme=VERLET):
-    return steps_for(LevelScale(0.0, scheme=scheme, plain=1).at(0.01), scheme, TICK)
+    return steps_for(PLAIN.at(0.01), VERLET, TICK)._replace(scheme=scheme, macro_tolerance=0.0)
 
 
 @cache

@@ -14,7 +14,7 @@ from graspsense.cli.main import cli
 from graspsense.plugin_api import ConfigError, create
 from graspsense_sim_gripper.batch import run_many
 from graspsense_sim_gripper.build import unverified_setup
-from graspsense_sim_gripper.compiled.compose import composed_move
+from graspsense_sim_gripper.compiled.compose import composed_move, contact_solver, grasp_loop
 from graspsense_sim_gripper.compiled.padding import composition_of
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.objects.spec import ObjectSpec
@@ -87,7 +87,7 @@ def test_an_object_breaks_at_a_compression(scheme):
 
 
 @pytest.mark.slow
-def test_a_fracture_is_the_same_compiled_and_plain_and_in_a_reduced_model():
+def test_a_fracture_is_the_same_compiled_and_plain_and_as_the_reference():
     scene = """width_m = 0.05
 [[terms]]
 type = "fracture"
@@ -239,6 +239,9 @@ def stuff(tmp_path, monkeypatch):
 
     def scene(law):
         monkeypatch.setitem(TERMS, "stuff", Term(name="stuff", summary="", params=Stuff, law=law))
+        # They are found by the names of terms, and another test gave this name to another law.
+        for cached in (contact_solver, grasp_loop, composed_move):
+            cached.cache_clear()
         file = tmp_path / "stuff.toml"
         file.write_text(STUFF)
         return str(file)
@@ -307,15 +310,15 @@ def test_steps_resolve_a_fast_oscillation_in_the_grasp_and_after_the_release(tmp
         assert done.report["resolved"]
 
 
-def test_an_oscillation_that_is_too_fast_is_left_out_and_reported(tmp_path):
+def test_an_oscillation_that_is_too_fast_is_reported(tmp_path):
     file = tmp_path / "slosh.toml"
     file.write_text(SLOSH.format(mass=0.1, frequency=1e6))
     gripper = create("sensor-backend", "sim", sensor="ideal", spread=False, object=str(file))
     gripper.open(0)
     selection = gripper.report()["selection"]
-    slosh, contact = selection["decisions"][-3], selection["decisions"][-1]
-    assert (slosh["term"], slosh["decision"]) == ("slosh", "dropped")
-    assert contact["decision"] == "trace not verified"
+    decisions = {row["subject"]: row["decision"] for row in selection["decisions"]}
+    assert decisions["slosh"] == "its oscillation is not resolved"
+    assert decisions["contact"] == "trace not verified"
     assert selection["verified"] is None
 
 

@@ -46,13 +46,12 @@ def print_not_verified(report: Mapping[str, Any]) -> None:
 
 
 def print_selection(selection: Mapping[str, Any]) -> None:
-    """Print what a simulated gripper reports as `selection`: what became of each term, why, and the error of that."""
+    """Print what a simulated gripper reports as `selection`: the steps of the grasp, and what verified them."""
     echo()
     level, verified = selection["level"], selection["verified"]
     echo_entry(
         "accuracy",
-        f"{selection['accuracy']:.3g} required, {selection['error']:.2g} estimated for what is left out "
-        f"(tolerance {level['model_tol']:.2g}); {selection['steps']} steps (tolerance {level['step_tol']:.2g})",
+        f"{selection['accuracy']:.3g} required; {selection['steps']} steps (tolerance {level['step_tol']:.2g})",
     )
     echo_entry(
         "verified",
@@ -62,10 +61,10 @@ def print_selection(selection: Mapping[str, Any]) -> None:
         f"{selection['expected_force_n']:.3g} N and {selection['expected_speed_m_s'] * 1e3:.3g} mm/s",
     )
     rows = [
-        (row["term"], row["decision"], f"{row['error']:.2g}", f"{row['what']} = {row['number']:.3g}")
+        (row["subject"], row["decision"], f"{row['what']} = {row['number']:.3g}")
         for row in selection["decisions"]
     ]
-    echo_table(("TERM", "DECISION", "ERROR", "REASON"), rows)
+    echo_table(("SUBJECT", "DECISION", "REASON"), rows)
 
 
 def _times(rates: Iterable[Mapping[str, Any]]) -> str:

@@ -312,15 +312,6 @@ class SimBackend(BatchBackend[SimConfig]):
             changed[name]._scaled = one.scaled
         return changed
 
-    def savings(
-        self, controller: Controller[Any], scenes: Sequence[str], seeds: Sequence[int], run: RunConfig
-    ) -> str:
-        """Return what the chosen models save, see `batch.savings`. Raises ConfigError."""
-        from graspsense_sim_gripper.batch.savings import savings
-        from graspsense_sim_gripper.batch.threads import job_of
-
-        return savings(job_of(self.config, controller, {"run": run}, features=self._features), scenes, seeds)
-
     def run_many(
         self,
         controller: Controller[Any],

@@ -1,6 +1,6 @@
 """Building the parameters and initial states of a grasp from a config, the name of an object, and a seed.
 
-This takes three steps: `build` gives the problem, `reduction.select` its reduced model, and `instantiate` one grasp.
+This takes three steps: `build` gives the problem, `reduction.select` its steps, and `instantiate` one grasp.
 """
 
 from __future__ import annotations
@@ -36,7 +36,6 @@ from graspsense_sim_gripper.objects.spec import PATCHES, ObjectSpec
 from graspsense_sim_gripper.palm import AT_REST, palm_params
 from graspsense_sim_gripper.problem import GraspSetup, Problem
 from graspsense_sim_gripper.random_numbers import Generator, GeneratorOf, NumpyGenerator
-from graspsense_sim_gripper.reduction.candidates import reduce_plant
 from graspsense_sim_gripper.reduction.levels import step_tolerance
 from graspsense_sim_gripper.reduction.model import Reduction
 from graspsense_sim_gripper.reduction.propose import grip_of, propose
@@ -187,7 +186,7 @@ def _setup(
     """Return the grasp of an instance in its reduced model; `reduction` None: with all its terms."""
     plant, state = _plant(config, instance, rng)
     if instance is not None and reduction is not None:
-        plant = reduce_plant(plant, instance.kinds, reduction)
+        plant = reduction.applied_to(plant)
     sensor = _sensor(config, instance, rng)
     palm: dict[str, Any] = {}
     if config.acceleration:

@@ -79,18 +79,18 @@ class StoredReport(NamedTuple):
 def stored_report(plant: TupleType, layout: PaddedLayout, kinds: tuple[str, ...]) -> StoredReport:
     """Return what makes the reports of states of the plant of this type, padded in this layout.
 
-    `kinds`: those of the object's own terms. Terms that are not in the layout stay at rest, and are not looked at.
+    `kinds`: those of the object's own terms.
     """
     padded = plant.filled([0.0] * plant.count)
     at = with_places(padded)
     states = zip(
         (padded.contact.left, *padded.contact.right), (at.contact.left, *at.contact.right), strict=True
     )
+    of_kinds = [(kind, check, layout.places[i]) for i, kind, check in _checked(kinds)]
     checked = tuple(
         _CheckedTerm(kind, check, TupleType.of(half.states[place]), first_place(places.states[place]))
         for half, places in states
-        for i, kind, check in _checked(kinds)
-        if (place := layout.places[i][0]) >= 0
+        for kind, check, place in of_kinds
     )
     broken = tuple(state.broken for state in at.contact.left.states if hasattr(state, "broken"))
     places = at.peak_n, at.step.unresolved, at.contact.unbalanced, *broken

@@ -45,7 +45,7 @@ def growth_per_tick(setup: GraspSetup, controller: GraspController, reduction: R
         return None
     drive, dt = setup.plant.drive, setup.dt_s
     mass = drive.inertia / setup.state.motion.jacobian_m_rev**2
-    stiffest = mass * (reduction.contact.number / dt) ** 2
+    stiffest = mass * (reduction.frequency / dt) ** 2
     rows = tuple(map(tuple, law.tolist()))
     return _growth(rows, mass, drive.friction.damping_n_s_m, stiffest, drive.lag_s, dt)
 

@@ -16,7 +16,6 @@ from graspsense_sim_gripper.build import check_fit, friction_spread
 from graspsense_sim_gripper.compiled.compose import Composition
 from graspsense_sim_gripper.compiled.drawing import (
     NO_NUMBER,
-    NO_PLACE,
     DrawBuffers,
     Drawing,
     Places,
@@ -43,7 +42,7 @@ from graspsense_sim_gripper.objects.instance import (
 )
 from graspsense_sim_gripper.objects.spec import PATCHES, NominalParams, ObjectSpec
 from graspsense_sim_gripper.problem import GraspSetup, Problem
-from graspsense_sim_gripper.reduction.model import DROPPED, KEPT, Reduction
+from graspsense_sim_gripper.reduction.model import Reduction
 from graspsense_sim_gripper.sensing import PadCells
 
 
@@ -156,9 +155,6 @@ def drawn_scene(
     spec, sensor = problem.spec, example.sensor
     if spec is None or reduction is None or example.has_palm:
         return None
-    # The limits of a term depend on the instance.
-    if not set(reduction.treatment[:-1]) <= {KEPT, DROPPED}:
-        return None
     layout, config = layout_of(example), problem.config
     composition = composition_of(example)
     if composition not in layouts:
@@ -198,9 +194,8 @@ def _places(at: Any, layout: PaddedLayout, spec: ObjectSpec) -> Places:
     params, state = at
     friction, model = params.plant.drive.friction, params.plant.object
     of_params: list[int] = []
-    for (position, _), (_, begin, end) in zip(layout.places[1:], spec.params_of_terms, strict=True):
-        # A term that the model drops may not be in the composition.
-        of_params += model.terms[position].params if position >= 0 else (NO_PLACE,) * (end - begin)
+    for position in layout.places[1:]:
+        of_params += model.terms[position].params
     return Places(
         coulomb_n=friction.coulomb_n,
         breakaway_n=friction.breakaway_n,

@@ -48,13 +48,13 @@ from graspsense_sim_gripper.loop import (
 )
 from graspsense_sim_gripper.palm import NUMBERS, PalmBuffers
 from graspsense_sim_gripper.problem import GraspController, GraspSetup, Problem
-from graspsense_sim_gripper.reduction.candidates import reduced
 from graspsense_sim_gripper.reduction.error import GraspRecord, deviation
 from graspsense_sim_gripper.reduction.model import Reduction
 from graspsense_sim_gripper.reduction.own_features import OwnFeatures, beyond, own_features
 from graspsense_sim_gripper.sensing import Bias, PadBuffers
 from graspsense_sim_gripper.stepping.scheme import Steps
 from graspsense_sim_gripper.term_failure import TermFailed, not_finite_in_tick
+from graspsense_sim_gripper.terms.switchable import Switchable
 
 _LOG: Final = logging.getLogger(__name__)
 MAX_SECONDS: Final = 40.0
@@ -156,7 +156,7 @@ class TrialGrasps:
 
     def record(self, reduction: Reduction, force_n: float = 0.0, travel: float = 0.0) -> GraspRecord:
         """Return the grasp in this model; the controller reads values with these errors (see `Sensitivity`)."""
-        key = (reduction.treatment, reduction.steps, force_n, travel)
+        key = (reduction.steps, force_n, travel)
         if key not in self._records:
             try:
                 self._records[key] = self._grasp(reduction, force_n, travel)
@@ -174,7 +174,7 @@ class TrialGrasps:
             return ()
         self.record(reduction)
         self.record(full)
-        grasp, expected = (self._features[one.treatment, one.steps] for one in (reduction, full))
+        grasp, expected = (self._features[one.steps] for one in (reduction, full))
         return beyond(grasp, expected, self.config.accuracy)
 
     def sensitivity(self, reduction: Reduction, expected: GraspRecord) -> Sensitivity:
@@ -192,7 +192,7 @@ class TrialGrasps:
 
     def _grasp(self, reduction: Reduction, force_n: float, travel: float) -> GraspRecord:
         """Simulate what `record` returns. Raises NotCompilable."""
-        setup = reduced(self.setup, reduction)
+        setup = evolve(self.setup, plant=reduction.applied_to(self.setup.plant))
         steps = None if self.only_near else _approach_steps(setup)
         if steps not in self._starts:
             self._starts[steps] = self._approach(setup)
@@ -203,7 +203,7 @@ class TrialGrasps:
         end = self._runner(setup, start.from_open)(setup.plant.steps, start, until)
         rows = np.concatenate(end.rows, axis=1)
         if self.features is not None and force_n == 0.0:
-            self._features[reduction.treatment, reduction.steps] = own_features(
+            self._features[reduction.steps] = own_features(
                 self.features, rows[:-1], rows[-1], compiled=self.compiled
             )
         return _record(end, rows, bias, setup.dt_s)
@@ -410,3 +410,11 @@ def _force_difference_n(grasp: GraspRecord, expected: GraspRecord) -> float:
     i = min(int(np.argmax(force >= CONTACT_FORCE_N)) for force in (forces, others))
     there = slice(max(i - 1, 0), i + 1)
     return float(np.max(np.abs(forces[there] - others[there])))
+
+
+def without_term(setup: GraspSetup, i: int) -> GraspSetup:
+    """Return the same grasp of the object without its term `i`."""
+    model = setup.plant.object
+    off = Switchable(0, model.terms[i + 1].params)
+    terms = (*model.terms[: i + 1], off, *model.terms[i + 2 :])
+    return evolve(setup, plant=setup.plant._replace(object=model._replace(terms=terms)))

@@ -6,7 +6,7 @@ import math
 from typing import Final, NamedTuple
 
 from graspsense_sim_gripper.terms.oscillator import Forcing, OscillatorState, moved
-from graspsense_sim_gripper.terms.term import Limit, Rate, Term, WorkingPoint
+from graspsense_sim_gripper.terms.term import Rate, Term, WorkingPoint
 
 GRAVITY_M_S2: Final = 9.80665
 
@@ -64,15 +64,6 @@ def rates(params: Liquid, at: WorkingPoint) -> tuple[Rate, ...]:
     return (Rate("swings", math.sqrt((k + wall) / mass)), Rate("relaxes", 0.5 * damping / mass))
 
 
-def limits(params: Liquid, at: WorkingPoint) -> tuple[Limit, ...]:
-    """Return the limits of a column that follows immediately, and of one that does not move."""
-    _, k, damping, wall = _seen(params)
-    return (
-        Limit("column that follows", None, k * wall / (k + wall), damping),
-        Limit("column that stands", None, wall),
-    )
-
-
 TERM = Term(
     name="liquid",
     summary="liquid pressed up a neck: weight, viscosity and inertia, in series with the bulge of the wall",
@@ -80,6 +71,5 @@ TERM = Term(
     law=liquid,
     at_rest=OscillatorState(0.0, 0.0),
     rates=rates,
-    limits=limits,
     positive=("area_m2", "neck_m2", "column_m", "bulge_m3_pa", "density_kg_m3"),
 )

@@ -6,7 +6,7 @@ import math
 from typing import NamedTuple
 
 from graspsense_sim_gripper.terms.phi import phi1, phi_ramp
-from graspsense_sim_gripper.terms.term import Limit, Rate, Term, WorkingPoint
+from graspsense_sim_gripper.terms.term import Rate, Term, WorkingPoint
 
 
 class Maxwell(NamedTuple):
@@ -38,14 +38,6 @@ def rates(params: Maxwell, at: WorkingPoint) -> tuple[Rate, ...]:
     return (Rate("relaxes", 1.0 / params.tau_s),)
 
 
-def limits(params: Maxwell, at: WorkingPoint) -> tuple[Limit, ...]:
-    """Return the damper of a branch that relaxes immediately, and the spring of one that does not relax."""
-    return (
-        Limit("damper", damper_n_s_m=params.k_n_m * params.tau_s),
-        Limit("spring", spring_n_m=params.k_n_m),
-    )
-
-
 TERM = Term(
     name="maxwell",
     summary="viscoelastic branch, q' = k d' - q / tau",
@@ -53,7 +45,6 @@ TERM = Term(
     law=maxwell,
     at_rest=MaxwellState(0.0),
     rates=rates,
-    limits=limits,
     positive=("tau_s",),
     stiffnesses=("k_n_m",),
 )

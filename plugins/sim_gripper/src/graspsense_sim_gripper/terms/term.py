@@ -52,22 +52,6 @@ class Rate(NamedTuple):
     per_s: float
 
 
-class Limit(NamedTuple):
-    """A limit of a term for fast or slow states: a spring and a damper, or the term with other parameters."""
-
-    name: str
-    params: TermParams = None
-    """The parameters of the term in this limit; None if only the spring and the damper remain."""
-    spring_n_m: float = 0.0
-    damper_n_s_m: float = 0.0
-
-
-def no_limits(params: TermParams, at: WorkingPoint) -> tuple[Limit, ...]:
-    """Return no limits: the term is either kept or dropped."""
-    del params, at
-    return ()
-
-
 def no_rates(params: TermParams, at: WorkingPoint) -> tuple[Rate, ...]:
     """Return the rates of a term that declares none: unknown if it has a state."""
     del params, at
@@ -130,8 +114,6 @@ class Term:
     law: Law
     at_rest: TermState = NO_STATE
     rates: Callable[[TermParams, WorkingPoint], tuple[Rate, ...]] = no_rates
-    limits: Callable[[TermParams, WorkingPoint], tuple[Limit, ...]] = no_limits
-    """The limits that can replace the term, the cheapest first; the simulator compares the resulting forces."""
     divides_steps: bool = False
     """Whether the law divides a step by itself to resolve the oscillation that its rates give, as a contact inside of
     the term needs it. For any other term the simulator takes steps that are short enough."""
