@@ -262,8 +262,8 @@ class SimBackend(BatchBackend[SimConfig]):
     def report(self) -> Mapping[str, Any]:
         """Return what only the model knows, such as the true peak force on the pads and whether something broke.
 
-        `selection` describes the reduced model. With `explain` in the settings, `model` gives the contribution of each
-        term.
+        `selection` describes the steps. With `explain` in the settings, `model` gives the contribution of each term,
+        and what each feature would lose without it.
         """
         setup, reduction = self._setup, self._reduction
         report = model_report(self._state, setup.kinds)
@@ -277,8 +277,18 @@ class SimBackend(BatchBackend[SimConfig]):
             controller = self._controller or default_controller(self.config)
             report |= accuracy_report(report, reduction, instability(setup, controller, reduction))
         if self.config.explain:
-            report["model"] = explain(setup, self._compressions)
+            report["model"] = explain(setup, self._compressions) | {"without": self._without()}
         return report
+
+    def _without(self) -> list[dict[str, Any]]:
+        """Return what each feature would lose without each term, see `reduction.without`."""
+        # Imported here, since only `explain` needs it.
+        from graspsense_sim_gripper.reduction.without import without_each_term
+
+        if self._reduction is None:
+            return []
+        controller = self._controller or default_controller(self.config)
+        return without_each_term(build(self.config, self.config.object), controller, self._reduction)
 
     def _draw_noise(self) -> None:
         """Draw the noise of the next images, and extend the buffer of images by as many."""

@@ -234,7 +234,8 @@ class SimConfig:
     explain: bool = setting(
         default=False,
         effect=CHANGES_NO_RESULT,
-        meaning="Whether the report lists the contribution of each term of the object (--explain-model).",
+        meaning="Whether the report lists what each term contributes, and what features lose without it "
+        "(--explain-model).",
     )
     noise_counts: float = setting(
         default=15.0,

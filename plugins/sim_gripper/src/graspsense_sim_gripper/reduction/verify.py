@@ -48,7 +48,7 @@ from graspsense_sim_gripper.loop import (
 )
 from graspsense_sim_gripper.palm import NUMBERS, PalmBuffers
 from graspsense_sim_gripper.problem import GraspController, GraspSetup, Problem
-from graspsense_sim_gripper.reduction.error import GraspRecord, deviation
+from graspsense_sim_gripper.reduction.error import SCALES, UNIT_SCALES, GraspRecord, deviation
 from graspsense_sim_gripper.reduction.model import Reduction
 from graspsense_sim_gripper.reduction.own_features import OwnFeatures, beyond, own_features
 from graspsense_sim_gripper.sensing import Bias, PadBuffers
@@ -176,6 +176,21 @@ class TrialGrasps:
         self.record(full)
         grasp, expected = (self._features[one.steps] for one in (reduction, full))
         return beyond(grasp, expected, self.config.accuracy)
+
+    def values(self, reduction: Reduction) -> dict[str, tuple[float, float]]:
+        """Return the features of the pipeline and the peak force in these steps, each with the scale of its unit.
+
+        The features of the paper, if the pipeline has none or ideal sensors do not suffice for them.
+        """
+        record = self.record(reduction)
+        own = self._features.get(reduction.steps)
+        if own is None:
+            return {name: (value, SCALES[name]) for name, value in record.quantities.items()}
+        names, values, units = own.features.names, own.features.values, own.features.units
+        scales = [UNIT_SCALES.get(unit, 0.0) for unit in units]
+        return dict(zip(names, zip(values, scales, strict=True), strict=True)) | {
+            "peak": (record.peak_n, SCALES["peak"])
+        }
 
     def sensitivity(self, reduction: Reduction, expected: GraspRecord) -> Sensitivity:
         """Return the change of the grasp if the controller reads values that are as wrong as the model may be.
