@@ -100,7 +100,7 @@ def stored_report(plant: TupleType, layout: PaddedLayout, kinds: tuple[str, ...]
 @lru_cache(maxsize=256)
 def _checked(kinds: tuple[str, ...]) -> list[tuple[int, str, Callable[[TermState], str]]]:
     """Return place and kind of each term whose law may be used beyond its validity, with what says so."""
-    terms = [(i, kind, find_term(kind)[1].beyond) for i, kind in enumerate(kinds, 1)]
+    terms = [(i, kind, find_term(kind)[1].beyond) for i, kind in enumerate(kinds)]
     return [term for term in terms if term[2] is not never_beyond]
 
 

@@ -194,7 +194,7 @@ def _places(at: Any, layout: PaddedLayout, spec: ObjectSpec) -> Places:
     params, state = at
     friction, model = params.plant.drive.friction, params.plant.object
     of_params: list[int] = []
-    for position in layout.places[1:]:
+    for position in layout.places:
         of_params += model.terms[position].params
     return Places(
         coulomb_n=friction.coulomb_n,

@@ -36,10 +36,9 @@ from graspsense_sim_gripper.stepping.converge import refine_until_converged
 from graspsense_sim_gripper.stepping.implicit import SpeedSearch
 from graspsense_sim_gripper.stepping.scheme import Attempt, PlantParams, Start
 from graspsense_sim_gripper.stepping.tr_bdf2 import Stage
-from graspsense_sim_gripper.terms.lumped import LumpedSpringDamper
 from graspsense_sim_gripper.terms.registry import active_laws, find_term, laws_of, moving_of, phases_of
 from graspsense_sim_gripper.terms.switchable import Switchable, switched_on_sum
-from graspsense_sim_gripper.terms.term import LAW_ERRORS, NO_STATE, Law, Moves, OnSum, Phase, SumLaw
+from graspsense_sim_gripper.terms.term import LAW_ERRORS, Law, Moves, OnSum, Phase, SumLaw
 
 TermsStates = Any
 """A tuple with a state of its own type for each term."""
@@ -229,17 +228,14 @@ def any_moves(moving: Sequence[tuple[int, Moves]]) -> Moves:
     return combined
 
 
-NOTHING_LUMPED: Final = Switchable(0, LumpedSpringDamper(0.0, 0.0))
-
-
 def all_active(terms: Sequence[Any]) -> tuple[Switchable, ...]:
-    """Return the parameters of these terms as the sum of `laws_of` takes them: all kept, and nothing lumped."""
-    return (NOTHING_LUMPED, *[Switchable(1, params) for params in terms])
+    """Return the parameters of these terms as the sum of `laws_of` takes them: all active."""
+    return tuple([Switchable(1, params) for params in terms])
 
 
 def uncompressed(kinds: Sequence[str]) -> ContactState:
     """Return the state of an object of these terms that nothing has pressed yet."""
-    states = (NO_STATE, *(find_term(kind)[1].at_rest for kind in kinds))
+    states = tuple([find_term(kind)[1].at_rest for kind in kinds])
     return ContactState(0.0, 0.0, 0.0, states, 0.0, 0.0, Past(0.0, 0.0, math.inf, math.inf))
 
 

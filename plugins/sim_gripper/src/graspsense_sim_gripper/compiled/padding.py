@@ -39,10 +39,7 @@ NOTHING: Final = Filler(Switchable(0, None), None)
 
 @frozen(eq=False)
 class PaddedLayout:
-    """The terms of a composition, and the positions of an object's own terms in it.
-
-    In `sources` and `places`, though not in `kinds`, the lumped spring and damper is at position 0.
-    """
+    """The terms of a composition, and the positions of an object's own terms in it."""
 
     kinds: tuple[str, ...]
     sources: tuple[tuple[int, Filler], ...]
@@ -130,14 +127,14 @@ def _with_term_states(state: PlantState, of: Callable[[TermStates], TermStates])
 
 @lru_cache(maxsize=256)
 def _with_kinds(own: tuple[str, ...], kinds: tuple[str, ...]) -> PaddedLayout:
-    sources = tuple((own.index(kind) + 1 if kind in own else -1, _filler(kind)) for kind in kinds)
-    return PaddedLayout(kinds, ((0, NOTHING), *sources), (0, *(kinds.index(kind) + 1 for kind in own)))
+    sources = tuple((own.index(kind) if kind in own else -1, _filler(kind)) for kind in kinds)
+    return PaddedLayout(kinds, sources, tuple(kinds.index(kind) for kind in own))
 
 
 @lru_cache(maxsize=256)
 def _own_kinds(own: tuple[str, ...]) -> PaddedLayout:
     """Return the layout of an object with its own terms only. A kind may occur more than once."""
-    places = range(len(own) + 1)
+    places = range(len(own))
     return PaddedLayout(own, tuple((i, NOTHING) for i in places), tuple(places))
 
 

@@ -125,7 +125,7 @@ def propose(problem: Problem, grip: Grip, scale: LevelScale = CONTROLLED[0]) -> 
         ),
         frequency=frequency,
         unresolved=QUANTITIES if too_fast else () if resolved else QUANTITIES[1:],
-        oscillates=_any_oscillates(grip.kinds, [term.params for term in grip.model.terms[1:]], grip.point),
+        oscillates=_any_oscillates(grip.kinds, [term.params for term in grip.model.terms], grip.point),
         level=level,
     )
 
@@ -233,7 +233,7 @@ def _frequencies(kinds: Sequence[str], model: ObjectModel, point: WorkingPoint) 
     """
     swings = {}
     for i, kind in enumerate(kinds):
-        term, params = find_term(kind)[1], model.terms[i + 1].params
+        term, params = find_term(kind)[1], model.terms[i].params
         if not term.divides_steps:
             swings[i] = max((r.per_s for r in term.rates(params, point) if r.what == "swings"), default=0.0)
     return swings

@@ -430,6 +430,6 @@ def _force_difference_n(grasp: GraspRecord, expected: GraspRecord) -> float:
 def without_term(setup: GraspSetup, i: int) -> GraspSetup:
     """Return the same grasp of the object without its term `i`."""
     model = setup.plant.object
-    off = Switchable(0, model.terms[i + 1].params)
-    terms = (*model.terms[: i + 1], off, *model.terms[i + 2 :])
+    off = Switchable(0, model.terms[i].params)
+    terms = (*model.terms[:i], off, *model.terms[i + 1 :])
     return evolve(setup, plant=setup.plant._replace(object=model._replace(terms=terms)))
