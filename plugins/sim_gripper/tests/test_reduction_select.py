@@ -195,7 +195,7 @@ def test_selecting_that_takes_long_reports_how_far_it_is(monkeypatch, caplog):
     assert caplog.messages == []
     monkeypatch.setattr(verify, "PROGRESS_S", 0.0)
     selected(CONFIG, thing(SHELL, ("loss", {"damping_n_s_m": 1.0})), hybrid())
-    assert "selecting the model of the object: 1 % of the allowed ticks and steps used" in caplog.messages
+    assert "selecting the steps for the object: 1 % of the allowed ticks and steps used" in caplog.messages
 
 
 class Ragged(NamedTuple):

@@ -61,7 +61,7 @@ _NOT_OF_THE_MODEL: Final[dict[str, Any]] = {
     for field in fields(SimConfig)
     if field.name in ("object", "explain", "compile", *_SENSOR_SETTINGS)
 } | {"sensor": "ideal"}
-"""The settings that a reduced model does not depend on, with the values that they have in its trial grasps."""
+"""The settings that the choice of steps does not depend on, with the values that they have in its trial grasps."""
 
 
 def device_info(config: SimConfig) -> DeviceInfo:
@@ -116,7 +116,7 @@ def problem_of(config: SimConfig, spec: ObjectSpec | None, number: int | None = 
 
 @lru_cache(maxsize=64)
 def _model_config(config: SimConfig, spread: bool) -> SimConfig:
-    """Return the settings that a reduced model depends on, with this `spread`; the objects of a batch share them."""
+    """Return the settings that the choice of steps depends on, with this `spread`. A batch shares them."""
     return evolve(config, **_NOT_OF_THE_MODEL, spread=spread)
 
 
@@ -140,7 +140,7 @@ def instantiate(
     seed: int,
     generator_of: GeneratorOf = NumpyGenerator,
 ) -> GraspSetup:
-    """Return the grasp with this seed, of an instance in its reduced model; `reduction` None: with all its terms.
+    """Return the grasp with this seed, of an instance; `reduction` None: in steps that are not chosen for it.
 
     `generator_of`: draws all that the seed gives.
 
@@ -183,7 +183,7 @@ def _setup(
     rng: Generator,
     reduction: Reduction | None = None,
 ) -> GraspSetup:
-    """Return the grasp of an instance in its reduced model; `reduction` None: with all its terms."""
+    """Return the grasp of an instance; `reduction` None: in steps that are not chosen for it."""
     plant, state = _plant(config, instance, rng)
     if instance is not None and reduction is not None:
         plant = reduction.applied_to(plant)

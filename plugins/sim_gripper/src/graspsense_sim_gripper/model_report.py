@@ -110,7 +110,7 @@ class GraspModel(NamedTuple):
     kinds: tuple[str, ...]
     """Those of the object's own terms."""
     reduction: Reduction | None
-    """The reduced model; None without an object."""
+    """Its steps; None without an object."""
     unstable_loop: str
     """The text of `sampled_loop.instability` for the scene."""
 
@@ -119,7 +119,7 @@ NO_MODEL: Final = GraspModel((), None, "")
 
 
 def accuracy_report(report: Mapping[str, Any], reduction: Reduction, unstable_loop: str) -> dict[str, Any]:
-    """Return which quantities are not verified in a grasp with this report and reduced model, and the unstable loop.
+    """Return which quantities are not verified in a grasp with this report and these steps, and the unstable loop.
 
     `unstable_loop` is as in `GraspModel`.
     """

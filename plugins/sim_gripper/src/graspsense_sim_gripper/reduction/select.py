@@ -155,7 +155,7 @@ def _select(problem: Problem, trial: TrialGrasps) -> Reduction:
 
 
 def _gripped(trial: TrialGrasps, reduction: Reduction) -> tuple[float | None, float | None]:
-    """Return the peak force and the speed at the contact of a trial grasp in this model, to two digits.
+    """Return the peak force and the speed at the contact of a trial grasp in these steps, to two digits.
 
     They suffice: similar grasps then get the same proposals. `_UNKNOWN` if the grasp fails; a controller that raises
     does so in the grasp of the run as well, and is reported there. Raises TooMuchWork, and what a term raises.
@@ -231,7 +231,7 @@ def _accepted(problem: Problem, grip: Grip, trial: TrialGrasps) -> Iterator[Redu
 def _is_confirmed(
     problem: Problem, grip: Grip, trial: TrialGrasps, reduction: Reduction, scale: LevelScale
 ) -> bool:
-    """Return whether the model also agrees with the full model in still smaller steps.
+    """Return whether the grasp also agrees with one in still smaller steps.
 
     A grasp that meets a threshold closely may be on one side of it in both grasps that were compared, and on the other
     in the exact grasp.
@@ -299,7 +299,7 @@ def _suits_explicit(problem: Problem, grip: Grip) -> bool:
 
 
 def _reference_scale(config: SimConfig, scale: LevelScale) -> LevelScale:
-    """Return the scale of the full model that a candidate of this scale is compared with."""
+    """Return the scale of the steps that a candidate of this scale is compared with."""
     reference = REFERENCE_SCALES[scale.refinement]
     factor = 2 if config.accuracy <= FINE else 1
     return reference._replace(min_steps=factor * reference.min_steps)

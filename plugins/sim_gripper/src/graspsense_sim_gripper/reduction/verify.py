@@ -1,7 +1,7 @@
-"""Trial grasps of the nominal object, in one reduced model after another.
+"""Trial grasps of the nominal object, in the steps of one level after another.
 
 A trial grasp uses ideal sensors and the controller of the run. It begins with open fingers and ends with the release.
-The approach depends on the steps, but not on the reduced model. It is therefore simulated once for each set of steps.
+The approach is simulated once for each set of steps.
 """
 
 from __future__ import annotations
@@ -155,7 +155,7 @@ class TrialGrasps:
         return CompiledLoops(self.controller.step)
 
     def record(self, reduction: Reduction, force_n: float = 0.0, travel: float = 0.0) -> GraspRecord:
-        """Return the grasp in this model; the controller reads values with these errors (see `Sensitivity`)."""
+        """Return the grasp in these steps; the controller reads values with these errors (see `Sensitivity`)."""
         key = (reduction.steps, force_n, travel)
         if key not in self._records:
             try:
@@ -166,7 +166,7 @@ class TrialGrasps:
         return self._records[key]
 
     def features_beyond(self, reduction: Reduction, full: Reduction) -> tuple[str, ...]:
-        """Return the features of the pipeline that differ in this model from the full one by more than the accuracy.
+        """Return the features of the pipeline that differ from those in finer steps by more than the accuracy.
 
         Empty without a feature set, `own_features.NOT_READ` for one that ideal sensors do not suffice for.
         """
@@ -195,7 +195,7 @@ class TrialGrasps:
     def sensitivity(self, reduction: Reduction, expected: GraspRecord) -> Sensitivity:
         """Return the change of the grasp if the controller reads values that are as wrong as the model may be.
 
-        `expected` is the grasp in the full model. The grasp is simulated twice, with errors of either sign.
+        `expected` is the grasp in finer steps. The grasp is simulated twice, with errors of either sign.
         """
         exact, scale = self.record(reduction), reduction.level.step_tol
         difference_n = _force_difference_n(exact, expected)
@@ -333,7 +333,7 @@ class TrialGrasps:
         # Compiling takes seconds too, but no work.
         if percent > 0 and time.monotonic() - self._reported_s > PROGRESS_S:
             _LOG.warning(
-                "selecting the model of the object: %d %% of the allowed ticks and steps used", percent
+                "selecting the steps for the object: %d %% of the allowed ticks and steps used", percent
             )
             self._reported_s = time.monotonic()
 
