@@ -84,7 +84,7 @@ def batch_of(
 
 
 def selection_s(objects: tuple[str, ...], settings: dict[str, Any], repeats: int, *, compiled: bool) -> float:
-    """Return the processor time of selecting the model of an object, with nothing cached; the median of all."""
+    """Return the processor time of selecting the steps of an object, with nothing cached; the median of all."""
     controller = GraspController(create("controller", "hybrid"), RunConfig(), create("feature-set", "chitta"))
     spent = []
     for name in objects * repeats:
