@@ -290,7 +290,7 @@ def _run(
         scenes += [f"{one.object_name}#{OBJECTS_PER_SEED * seed + one.instance}" for one in dealt]
         numbers += [TRIALS_PER_SEED * seed + first + k for k in range(len(dealt))]
     controller = create("controller", "hybrid", probing_force_n=force_n)
-    config = SimConfig(fidelity="full")
+    config = SimConfig(fidelity="scene")
     done = run_many(config, controller, scenes, numbers, extract=extract, traces=False, compiled=True)
     extracted = [one.extracted for one in done]
     n = len(dealt)

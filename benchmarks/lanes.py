@@ -243,7 +243,7 @@ def in_contact() -> dict[str, Way]:
     """Return the ways in contact: two plants one after the other, and in turn."""
     config = SimConfig(sensor="ideal")
     setups = [padded(setup, setup.kinds) for setup in (unverified_setup(config, OBJECT, k) for k in (1, 2))]
-    composition = composition_of(config, setups[0], pad=False)
+    composition = composition_of(setups[0], pad=False)
     plant_move = composed_move(composition, interpreted=False)
 
     def way(function: Callable[..., Any]) -> Way:

@@ -552,7 +552,7 @@ def _figures(values: Values, seed: int) -> dict[str, float]:
     }
     for name, (controller, force_n) in cases.items():
         (done,) = run_many(
-            evolve(config_of(values), fidelity="full", scheme="auto"),
+            evolve(config_of(values), fidelity="scene", scheme="auto"),
             create("controller", controller, probing_force_n=force_n),
             ["block"],
             [TRIALS_PER_SEED * seed + 900],

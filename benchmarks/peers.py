@@ -47,6 +47,7 @@ SHOWS = (
     "- The loops show what a user's own code for one known scene costs, written in an hour and compiled. They "
     "have none of the parts that make a simulator usable: other terms, sensors, features, an error that is "
     "controlled. The one by hand is for linear contact alone; the others are general in the scene.",
+    "- graspsense integrates linear contact by steps, as any other scene. It has no method for linear scenes alone.",
     "- CVODE and Radau show what error control costs if a solver starts anew at each tick and event. Their "
     "right-hand sides are compiled; the calls from Python are a part of their time that a program in C would not have.",
     "- MuJoCo is called from C with its profiling clock removed. Its rows show the cost of its steps. In linear "

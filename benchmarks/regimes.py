@@ -1,15 +1,15 @@
-"""A map of regimes: which scheme and which terms a scene needs, and where fixed steps of 1 ms fail. Simulated.
+"""A map of regimes: which scheme a scene needs, and where fixed steps of 1 ms fail. Simulated.
 
     python benchmarks/regimes.py [--scenes 1500] [--rows FILE] [--markdown docs/regimes.md] [--first N] [--short]
 
 The scenes are drawn from the ranges that gripper, object and controller may physically have, not from those in which
 the simulator works, and apart from those of `benchmarks/selection.py`. Their seeds are fresh unless `--first` names the
-first. Each is grasped by the hybrid controller in the model that is selected for 10, 1 and 0.1 %, with every term in
+first. Each is grasped by the hybrid controller in the steps that are selected for 10, 1 and 0.1 %, in
 fixed steps of 1 ms (explicit and implicit), and in the reference. The error is that of
 `graspsense_sim_gripper.reduction.error`; a different outcome is an infinite error. A reference that has not settled in
-some tick, or that a selected model differs from, is compared with even explicit steps of 10 us. Finished scenes are
+some tick, or that a selected grasp differs from, is compared with even explicit steps of 10 us. Finished scenes are
 appended to the file of `--rows`, and are not run again if the program is started again with the same file. Times are
-processor times of the compiled loop that holds all kinds of terms; selecting the model is measured apart.
+processor times of the compiled loop that holds all kinds of terms; selecting the steps is measured apart.
 """
 
 from __future__ import annotations
@@ -173,13 +173,12 @@ def measured(bench: Bench, number: int) -> Row:
     row["reference_resolved"] = reference.state.step.unresolved + reference.state.contact.unbalanced == 0
     for accuracy in ACCURACIES:
         row[f"{accuracy:g}"] = _case(bench, scene, accuracy, "scene", reference, dt)
-    row["full"] = _case(bench, scene, 0.01, "full", reference, dt)
     for scheme in FIXED:
         fixed = evolve(scene, config=evolve(scene.config, scheme=scheme, step_s=1e-3))
-        row[scheme] = _case(bench, fixed, 0.01, "full", reference, dt)
+        row[scheme] = _case(bench, fixed, 0.01, "scene", reference, dt)
     if not row["reference_resolved"] or any(row[f"{a:g}"]["error"] > a for a in ACCURACIES):
         even = evolve(scene, config=evolve(scene.config, scheme="explicit", step_s=EVEN_S))
-        row["even"] = _case(bench, even, 0.01, "full", reference, dt)["error"]
+        row["even"] = _case(bench, even, 0.01, "scene", reference, dt)["error"]
     return row
 
 
@@ -195,7 +194,7 @@ def _case(
     error, of = deviation(record_of(done, dt_s), record_of(reference, dt_s))
     state = done.state
     flags = []
-    if reduction.contact.decision == NOT_VERIFIED:
+    if reduction.unresolved:
         flags.append(NOT_VERIFIED)
     if state.step.unresolved + state.contact.unbalanced > 0:
         flags.append("not resolved")
@@ -205,8 +204,7 @@ def _case(
         "error": error,
         "of": of,
         "flags": flags,
-        "scheme": reduction.scheme.decision,
-        "terms": {one.term: one.decision for one in reduction.decisions if one.term in KINDS},
+        "scheme": reduction.decisions[0].decision,
         "steps": state.step.n_steps,
         "ms": 1e3 * seconds_of(bench, job, setup),
         "selection_ms": 1e3 * bench.selection_s,
@@ -281,7 +279,7 @@ def page(rows: Sequence[Row], picture: str | None) -> str:
         ("Unstable loop", unstable),
     ):
         lines += ["", f"## {title}", "", *_within(some)]
-    lines += ["", "## Schemes and terms", "", *_needed(stable + pads)]
+    lines += ["", "## Schemes", "", *_needed(stable + pads)]
     lines += ["", "## Where fixed steps of 1 ms fail", "", *_fixed(stable)]
     lines += ["", "## Largest errors without a flag", "", *_misses(stable)]
     return "\n".join(lines) + "\n"
@@ -325,10 +323,7 @@ def _within(rows: Sequence[Row]) -> Iterator[str]:
     )
     yield "|---|---|---|---|---|---|---|---|"
     cases = [(f"{a:g}", a, f"selected for {a:.1%}") for a in ACCURACIES]
-    cases += [
-        ("full", 0.01, "every term, 1 %"),
-        *((s, 0.01, f"fixed steps of 1 ms, {s}, against 1 %") for s in FIXED),
-    ]
+    cases += [(s, 0.01, f"fixed steps of 1 ms, {s}, against 1 %") for s in FIXED]
     for name, accuracy, what in cases:
         mine = [row[name] for row in rows]
         if not mine:
@@ -351,19 +346,12 @@ def _median(values: Sequence[float]) -> float:
 
 
 def _needed(rows: Sequence[Row]) -> Iterator[str]:
-    yield "| accuracy | schemes | terms: kept as they are, of the scenes that have them |"
-    yield "|---|---|---|"
+    yield "| accuracy | schemes |"
+    yield "|---|---|"
     for accuracy in ACCURACIES:
         mine = [row[f"{accuracy:g}"] for row in rows if "refused" not in row[f"{accuracy:g}"]]
         schemes = ", ".join(f"{name} {n}" for name, n in Counter(one["scheme"] for one in mine).most_common())
-        kept: Counter[str] = Counter()
-        of: Counter[str] = Counter()
-        for one in mine:
-            for term, decision in one["terms"].items():
-                of[term] += 1
-                kept[term] += decision == "kept"
-        terms = ", ".join(f"{term} {kept[term]} of {n}" for term, n in of.most_common())
-        yield f"| {accuracy:.1%} | {schemes} | {terms} |"
+        yield f"| {accuracy:.1%} | {schemes} |"
 
 
 BINS: Final[Sequence[tuple[str, str, Sequence[float]]]] = (

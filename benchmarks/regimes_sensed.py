@@ -54,7 +54,7 @@ ACCURACY: Final = 0.01
 REFERENCE_SHARE: Final = 4
 AGAIN: Final = 4
 """Multiple of the instances with which a scene beyond the accuracy is measured again."""
-FINEST: Final = ({"accuracy": 1e-4, "fidelity": "full"}, {"accuracy": ACCURACY, "fidelity": "reference"})
+FINEST: Final = ({"accuracy": 1e-4, "fidelity": "scene"}, {"accuracy": ACCURACY, "fidelity": "reference"})
 """The settings of what the models are compared with, the first that is verified."""
 RESAMPLES: Final = 400
 LEAST_PAIRS: Final = 5
@@ -62,7 +62,7 @@ DIFFERS: Final = 0.05
 """Probability below which two distributions are taken as different."""
 WAYS: Final = {
     "selected": {"accuracy": ACCURACY},
-    "fixed": {"fidelity": "full", "scheme": "explicit", "step_s": 1e-3},
+    "fixed": {"fidelity": "scene", "scheme": "explicit", "step_s": 1e-3},
 }
 
 

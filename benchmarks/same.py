@@ -333,8 +333,6 @@ def main() -> int:
             "c45": str(ROOT / "plugins" / "c45" / "tests" / "weka"),
             "folder": str(folder),
             "scenes": scene_files(given.scenes, folder) if "random scenes" in given.only else [],
-            "spring": str((ROOT / "benchmarks" / "peer_objects" / "spring.toml").resolve(strict=True)),
-            "linear": {"transmission": "straight", "breakaway_n": 7.0},
         }
         probes = [
             stack.enter_context(Probe(version, folder / f"cache{k}"))

@@ -254,10 +254,6 @@ class Timings:
         ideal = sim({"sensor": "ideal", "compile": "always"})
         pads = sim({"sensor": "pads", "compile": "always"})
         table = dict(c45_tables(Path(request["c45"])))["grasp_11c_1100"]
-        # A spring on a straight drive is linear throughout, so that the matrix exponential advances it.
-        linear = {**request["linear"], "sensor": "ideal", "spread": False, "compile": "always"}
-        spring_scene = sim(linear)
-        spring = request["spring"]
         self.of: dict[str, Callable[[], object]] = {
             "catalogue, plain": lambda: [plain.grasp(object=name, seed=0) for name in objects],
             "catalogue, plain, no classifier": lambda: [
@@ -265,9 +261,6 @@ class Timings:
             ],
             "batch, ideal sensors": lambda: ideal.run_many(hybrid, objects * 20, [*seeds] * 20, workers=1),
             "batch, pads": lambda: pads.run_many(hybrid, objects * 20, [*seeds] * 20, workers=1),
-            "batch, linear scene": lambda: spring_scene.run_many(
-                hybrid, [spring] * 500, range(500), workers=1
-            ),
             "C4.5, numpy": lambda: fit(table, Options(), engine="numpy"),
             "C4.5, compiled": lambda: fit(table, Options(), engine="fast"),
         }

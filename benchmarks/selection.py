@@ -1,14 +1,11 @@
-"""Whether reduced models have the accuracy asked for, and what they save, on random scenes. Simulated.
+"""Whether grasps have the accuracy that is asked for, on random scenes. Simulated.
 
-    python benchmarks/selection.py [--scenes 500] [--first 0] [--costs 100] [--json | --table] [--short]
+    python benchmarks/selection.py [--scenes 500] [--first 0] [--json | --table] [--short]
 
 A scene is drawn from the distribution below by its number. It is grasped by the hybrid controller, with ideal sensors,
-in the reduced model for an error of 10 %, 1 % and 0.1 %, once more at 1 % with every term, and in the reference: every
-term, and the steps of each tick halved until the result no longer changes, starting from an accuracy of 0.01 %. The
-error is that of `graspsense_sim_gripper.reduction.error`; a different outcome is an infinite error, and a refusal is a
-miss. `cost_ratio` is the median time of the compiled loop at 1 % over that of the full model, compiled and stepped by
-the same rule. Selecting the model, compiling and computing matrix exponentials count in neither. It is measured on the
-first scenes only, since each model is compiled for the terms that it keeps, which takes seconds.
+in the steps that are chosen for an error of 10 %, 1 % and 0.1 %, and in the reference, in which the steps of each tick
+are halved until the result no longer changes, starting from an accuracy of 0.01 %. The error is that of
+`graspsense_sim_gripper.reduction.error`; a different outcome is an infinite error, and a refusal is a miss.
 """
 
 from __future__ import annotations
@@ -20,16 +17,12 @@ import platform
 import sys
 import time
 from collections import Counter
-from collections.abc import Sequence
-from concurrent.futures import Executor, ProcessPoolExecutor
 from datetime import date
 from importlib.metadata import version
-from multiprocessing import get_context
 from typing import Any, Final
 
 import numpy as np
 from attrs import evolve, frozen
-from timed_loop import TimedLoop
 
 from graspsense.plugin_api import HOLD, ConfigError, RunConfig, create
 from graspsense_sim_gripper.batch.job import FinishedGrasp, Job, Storage, grasp_once
@@ -47,15 +40,9 @@ from graspsense_sim_gripper.sampled_loop import instability
 from graspsense_sim_gripper.terms.registry import in_order
 
 ACCURACIES: Final = (0.1, 0.01, 0.001)
-CASES: Final = (*((f"{accuracy:g}", accuracy, "scene") for accuracy in ACCURACIES), ("full", 0.01, "full"))
-"""Name, accuracy and fidelity of each model that a scene is grasped in."""
 REFERENCE: Final = 1e-4
-COSTS_AT: Final = 0.01
-REPEATS: Final = 7
-SCENES_PER_PROCESS: Final = 4
 KINDS: Final = ("elastic", "rigid", "maxwell", "gas", "loss", "foam", "surface", "liquid", "slosh")
-"""Every scene is compiled with all of these kinds, of which it keeps its own, so that there are few compositions. Its
-cost is measured in a loop that is compiled for the terms that its model keeps."""
+"""Every scene is compiled with all of these kinds, of which it keeps its own, so that there are few compositions."""
 
 
 @frozen(kw_only=True)
@@ -160,29 +147,6 @@ def error_of(grasp: FinishedGrasp, reference: FinishedGrasp) -> tuple[float, str
     return deviation(record_of(grasp, dt), record_of(reference, dt))
 
 
-@frozen
-class Costs:
-    """What a scene costs."""
-
-    seconds: dict[str, float]
-    """Those of a grasp in the compiled loop, by the name of the case."""
-    compile_s: float
-    compiled: int
-    """The number of loops that were compiled for it."""
-
-
-def costs_of(number: int) -> Costs:
-    """Return the costs of the cases of `COSTS_AT`, measured in turn."""
-    bench, scene = Bench(), scene_of(number)
-    grasps = {}
-    for name, accuracy, fidelity in CASES:
-        if accuracy == COSTS_AT:
-            _, setup, _, job = bench.grasp(scene, accuracy, fidelity)
-            grasps[name] = setup, job
-    seconds = bench.costs_s(list(grasps.values()))
-    return Costs(dict(zip(grasps, seconds, strict=True)), bench.compile_s, len(bench.compiled))
-
-
 class Bench:
     """The compiled loops, and what runs scenes in them."""
 
@@ -208,23 +172,9 @@ class Bench:
         loop = self.loop_of(config, full, type(controller).step)
         return grasp_once(job, full, loop, self.storage), setup, reduction, job
 
-    def costs_s(self, grasps: Sequence[tuple[GraspSetup, Job]]) -> list[float]:
-        """Return the seconds that each takes in the loop that is compiled for its model, measured in turn."""
-        best = [math.inf] * len(grasps)
-        for _ in range(REPEATS):
-            for i, (setup, job) in enumerate(grasps):
-                best[i] = min(best[i], self._cost_s(padded(setup), job))
-        return best
-
-    def _cost_s(self, setup: GraspSetup, job: Job) -> float:
-        loop = self.loop_of(job.config, setup, type(job.controller).step)
-        timed = TimedLoop(loop)
-        grasp_once(job, setup, timed, self.storage)
-        return timed.spent_s
-
     def loop_of(self, config: SimConfig, setup: GraspSetup, step: Any) -> Any:
         """Return the compiled loop of a padded setup."""
-        composition = composition_of(config, setup, pad=False)
+        composition = composition_of(setup, pad=False)
         if composition not in self.compiled:
             began = time.process_time()
             loop = CompiledLoops(step).of(composition)
@@ -237,18 +187,10 @@ class Bench:
         return self.compiled[composition]
 
 
-def measure(bench: Bench, numbers: range, costs: int = 0) -> dict[str, Any]:
-    """Return the errors of these scenes, and for the first `costs` of them also the times."""
-    # A compiled loop takes some 60 MB, which only the end of its process gives back.
-    with ProcessPoolExecutor(
-        max_workers=1, mp_context=get_context("spawn"), max_tasks_per_child=SCENES_PER_PROCESS
-    ) as other_process:
-        return _measure(bench, numbers, costs, other_process)
-
-
-def _measure(bench: Bench, numbers: range, costs: int, other_process: Executor) -> dict[str, Any]:
+def measure(bench: Bench, numbers: range) -> dict[str, Any]:
+    """Return the errors of these scenes."""
     rows: list[dict[str, Any]] = []
-    unstable = compiled = 0
+    unstable = 0
     for number in numbers:
         scene = scene_of(number)
         reference, setup, reduction, _ = bench.grasp(scene, REFERENCE, "reference")
@@ -256,36 +198,27 @@ def _measure(bench: Bench, numbers: range, costs: int, other_process: Executor) 
             unstable += 1
             continue
         row: dict[str, Any] = {"scene": number, "outcome": reference.outcome.name}
-        n_costs = 0
-        for name, accuracy, fidelity in CASES:
+        for accuracy in ACCURACIES:
             case: dict[str, Any] = {"error": math.inf}
-            row[name] = case
+            row[f"{accuracy:g}"] = case
             try:
-                done, _, reduction, _ = bench.grasp(scene, accuracy, fidelity)
+                done, _, reduction, _ = bench.grasp(scene, accuracy, "scene")
             except ConfigError as error:
                 case["refused"] = str(error)
                 continue
             case["error"], case["quantity"] = error_of(done, reference)
             case["steps"], case["selection_s"] = done.state.step.n_steps, bench.selection_s
-            n_costs += accuracy == COSTS_AT
             level = reduction.level
-            case["level"] = f"{level.model_tol / accuracy:.3g}/{level.step_tol / accuracy:.3g}"
-            case["decisions"] = {decision.term: decision.decision for decision in reduction.decisions}
+            case["level"] = "a step per tick" if level.plain == 1 else f"{level.step_tol / accuracy:.3g}"
             verification = reduction.verification
             case["verified"] = None if verification is None else verification.error
-        if len(rows) < costs and n_costs == 2:
-            spent = other_process.submit(costs_of, number).result()
-            for name, seconds in spent.seconds.items():
-                row[name]["s"] = seconds
-            bench.compile_s += spent.compile_s
-            compiled += spent.compiled
         rows.append(row)
         print(f"\r{len(rows)} scenes", end="", file=sys.stderr, flush=True)
     print(file=sys.stderr)
     return {
         **summary(rows),
         "left_out_unstable": unstable,
-        "compiled": compiled + len(bench.compiled),
+        "compiled": len(bench.compiled),
         "rows": rows,
     }
 
@@ -293,10 +226,8 @@ def _measure(bench: Bench, numbers: range, costs: int, other_process: Executor) 
 def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
     """Return the figures of these scenes, by accuracy where they have one."""
     within, worst, middle, refused, levels, selection = {}, {}, {}, {}, {}, {}
-    for name, accuracy, fidelity in CASES:
-        if fidelity != "scene":
-            continue
-        cases = [row[name] for row in rows]
+    for accuracy in ACCURACIES:
+        cases = [row[f"{accuracy:g}"] for row in rows]
         run = [case["error"] / accuracy for case in cases if "refused" not in case]
         within[accuracy] = sum(case["error"] <= accuracy for case in cases) / len(rows)
         worst[accuracy] = max(run, default=math.inf)
@@ -305,11 +236,6 @@ def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
         levels[accuracy] = dict(Counter(case.get("level", "refused") for case in cases))
         seconds = [case["selection_s"] for case in cases if "selection_s" in case]
         selection[accuracy] = float(np.median(seconds) * 1e3)
-    both = [(row["0.01"], row["full"]) for row in rows if "s" in row["0.01"] and "s" in row["full"]]
-    costs = np.array([[case["s"] for case in pair] for pair in both]).reshape(-1, 2)
-    steps = np.array([[case["steps"] for case in pair] for pair in both]).reshape(-1, 2)
-    cost, full_cost = np.median(costs, axis=0) if both else (math.nan, math.nan)
-    taken, full_taken = np.median(steps, axis=0) if both else (math.nan, math.nan)
     return {
         "scenes": len(rows),
         "within": within,
@@ -318,13 +244,6 @@ def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
         "refused": refused,
         "levels": levels,
         "selection_ms": selection,
-        "costs_of": len(both),
-        "cost_ratio": float(cost / full_cost),
-        "cost_ratio_a_scene": float(np.median(costs[:, 0] / costs[:, 1])) if both else math.nan,
-        "cost_ms": float(cost * 1e3),
-        "full_cost_ms": float(full_cost * 1e3),
-        "steps": float(taken),
-        "full_steps": float(full_taken),
     }
 
 
@@ -347,11 +266,7 @@ def table(result: dict[str, Any]) -> str:
         )
     lines += [
         "",
-        f"At 1 % a grasp in the reduced model takes {result['cost_ms']:.2f} ms of the compiled loop "
-        f"({result['steps']:.0f} steps), in the full model {result['full_cost_ms']:.2f} ms "
-        f"({result['full_steps']:.0f} steps): {result['cost_ratio']:.0%} (medians of {result['costs_of']} scenes; "
-        f"{result['cost_ratio_a_scene']:.0%} scene by scene). "
-        f"Selecting took {result['selection_ms'][0.01]:.0f} ms.",
+        f"Selecting took {result['selection_ms'][0.01]:.0f} ms at 1 %.",
     ]
     return "\n".join(lines)
 
@@ -362,14 +277,13 @@ def main() -> None:
     )
     parser.add_argument("--scenes", type=int, default=500)
     parser.add_argument("--first", type=int, default=0)
-    parser.add_argument("--costs", type=int, default=100, help="number of scenes whose times are measured")
     form = parser.add_mutually_exclusive_group()
     form.add_argument("--json", action="store_true")
     form.add_argument("--table", action="store_true", help="Markdown, as in docs/simulator.md")
     parser.add_argument("--short", action="store_true", help="least work, only to show that it runs")
     given = parser.parse_args()
     if given.short:
-        given.scenes, given.costs = 1, 0
+        given.scenes = 1
     bench = Bench()
     result = {
         "date": date.today().isoformat(),
@@ -377,7 +291,7 @@ def main() -> None:
         "python": platform.python_version(),
         "graspsense-sim-gripper": version("graspsense-sim-gripper"),
         "seeds": [given.first, given.first + given.scenes - 1],
-        **measure(bench, range(given.first, given.first + given.scenes), given.costs),
+        **measure(bench, range(given.first, given.first + given.scenes)),
         "compile_s": bench.compile_s,
     }
     if given.json:
@@ -391,14 +305,13 @@ def main() -> None:
         print(f"{key:<28}{value}")
     print("\nmisses")
     for row in rows:
-        for name, accuracy, _ in CASES:
-            case = row[name]
+        for accuracy in ACCURACIES:
+            case = row[f"{accuracy:g}"]
             if case["error"] > accuracy:
                 what = case.get("refused") or (
-                    f"{case['error']:<10.3g} {case['quantity']:<10} {case['verified']} {case['level']} "
-                    f"{case['decisions']}"
+                    f"{case['error']:<10.3g} {case['quantity']:<10} {case['verified']} {case['level']}"
                 )
-                print(f"{row['scene']:>6} {name:<8}{what}")
+                print(f"{row['scene']:>6} {accuracy:<8g}{what}")
 
 
 if __name__ == "__main__":

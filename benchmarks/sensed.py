@@ -77,9 +77,9 @@ def main() -> None:
         # The reference takes a second a grasp in the interpreter.
         reference = SimulationVariant(
             method="fixed steps",
-            fidelity="full",
+            fidelity="scene",
             step="1 ms",
-            settings={"fidelity": "full", "step_s": 1e-3, "compile": compiled},
+            settings={"fidelity": "scene", "step_s": 1e-3, "compile": compiled},
             role="reference",
         )
     chosen = SimulationVariant(

@@ -41,11 +41,9 @@ from graspsense_sim_gripper.batch.scenes import Scenes
 from graspsense_sim_gripper.batch.threads import SLICE, WORTH_A_PROCESS, run_many, slices_of
 from graspsense_sim_gripper.batch.worker import NotHandedOver, PlainProcess
 from graspsense_sim_gripper.compiled import loop_code
-from graspsense_sim_gripper.compiled.padding import composition_of
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.model_report import model_report
 from graspsense_sim_gripper.objects.library import catalogue, kinds_in, shipped_scenes
-from graspsense_sim_gripper.reduction import levels
 from graspsense_sim_gripper.terms.registry import TERMS
 from graspsense_sim_gripper.terms.term import Term
 
@@ -278,7 +276,7 @@ k_n_m = 2000.0
 
 def test_the_state_before_a_failure_is_computed_once_before_its_buffers_are_used_again(monkeypatch):
     monkeypatch.setitem(TERMS, "failing", Term(name="failing", summary="", params=Failing, law=no_number))
-    config = SimConfig(sensor="ideal", fidelity="full")
+    config = SimConfig(sensor="ideal", fidelity="scene")
     (grasp,) = run_many(config, HYBRID, [FAILS], [0], compiled=False, traces=False)
     assert grasp.outcome == Outcome.ABORTED
     assert grasp.end() is grasp.end()
@@ -342,7 +340,7 @@ from graspsense_sim_gripper.batch.threads import run_many
 from graspsense_sim_gripper.config import SimConfig
 with warnings.catch_warnings(record=True) as told:
     warnings.simplefilter("always")
-    run_many(SimConfig(fidelity="full"), create("controller", "hybrid"), ["toy"], [0], compiled=True, traces=False)
+    run_many(SimConfig(fidelity="scene"), create("controller", "hybrid"), ["toy"], [0], compiled=True, traces=False)
 print([str(one.message).partition(":")[0] for one in told])
 """
     environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
@@ -651,28 +649,6 @@ damping_ratio = 0.1
 type = "loss"
 damping_n_s_m = 500.0
 """
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("spread", [False, True])
-def test_a_dropped_term_is_not_compiled_and_changes_no_bit(tmp_path, spread, monkeypatch):
-    pytest.importorskip("numba", reason="the compiled loop needs the extra `fast`")
-    path = tmp_path / "thinned.toml"
-    path.write_text(THINNED)
-    config = SimConfig(object=str(path), spread=spread, sensor="ideal")
-    job = Job(config=config, controller=HYBRID, run=RunConfig(), extract=None, traces=True)
-    with monkeypatch.context() as patch:
-        # A step per tick with every term suffices here, so that nothing would be dropped. The model stays in memory.
-        patch.setattr(levels, "PLAIN_SCALES", ())
-        patch.setenv("XDG_CACHE_HOME", str(tmp_path))
-        setup = Scenes(job).setup(str(path), 1)
-    assert setup.kinds == ("elastic", "loss", "slosh")
-    assert "slosh" not in composition_of(config, setup).kinds
-    plain, fast = (
-        run_many(config, HYBRID, [str(path)], [1], compiled=compiled)[0] for compiled in (False, True)
-    )
-    assert fast.state == plain.state
-    assert np.array_equal(fast.trace.force_left_n, plain.trace.force_left_n)
 
 
 class PressState(NamedTuple):

@@ -57,7 +57,7 @@ def test_a_part_that_nothing_reads_is_refused():
 
 
 def test_the_loop_of_a_composition_is_made_once_for_a_controller():
-    composition = Composition(("elastic",), None, False)
-    assert composed_move(composition) is composed_move(Composition(("elastic",), None, False))
+    composition = Composition(("elastic",), False)
+    assert composed_move(composition) is composed_move(Composition(("elastic",), False))
     assert grasp_loop(composition, elastic) is grasp_loop(composition, elastic)
     assert grasp_loop(composition, elastic) is not grasp_loop(composition, twice)

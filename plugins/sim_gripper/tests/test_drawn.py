@@ -4,7 +4,6 @@ import re
 from functools import cache
 
 import pytest
-from attrs import evolve
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -19,7 +18,6 @@ from graspsense_sim_gripper.compiled.loop_code import loop_start
 from graspsense_sim_gripper.compiled.padding import padded
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.objects.library import catalogue
-from graspsense_sim_gripper.reduction.model import DROPPED, KEPT
 from graspsense_sim_gripper.reduction.propose import grip_of, propose
 
 pytest.importorskip("numba", reason="grasps are drawn in compiled code with the extra `fast`")
@@ -57,23 +55,7 @@ type = "elastic"
 k1_n_m = 900.0
 k3_n_m3 = 0.0
 """
-DROPS = """
-width_m = 0.05
-stiffness_spread = 0.2
-
-[[terms]]
-type = "elastic"
-k1_n_m = 900.0
-k3_n_m3 = 0.0
-
-[[terms]]
-type = "slosh"
-mass_kg = 1e-3
-frequency_hz = 1e7
-damping_ratio = 0.1
-"""
 NAMES = [
-    DROPS,
     *sorted(catalogue()),
     "odwalla:full_open#3",
     "odwalla_worn:empty_open#7",
@@ -86,16 +68,13 @@ CONFIGS = {
     "ideal": SimConfig(sensor="ideal"),
     "no spread": SimConfig(spread=False),
     "few cells": SimConfig(pad_cells=5, pad_period_s=0.0161, transmission="pr2_paper"),
-    "straight": SimConfig(
-        spread=False, transmission="straight", load_friction_coefficient=0.0, breakaway_n=3.0
-    ),
-    "dropped": SimConfig(sensor="ideal", accuracy=0.5),
+    "straight": SimConfig(transmission="straight", load_friction_coefficient=0.0, breakaway_n=3.0),
 }
 SEEDS = st.one_of(st.integers(0, 500), st.integers(0, 2**64 - 1))
 
 
-def scenes_of(config, last=KEPT):
-    """Return the scenes with models that no trial grasp verifies, which treat the last term like this."""
+def scenes_of(config):
+    """Return the scenes with steps that no trial grasp verifies."""
     job = Job(
         config=config,
         controller=create("controller", "hybrid"),
@@ -106,17 +85,13 @@ def scenes_of(config, last=KEPT):
     models = {}
     for name in NAMES:
         problem = build(config, name)
-        proposed = propose(problem, grip_of(problem))
-        *terms, pads = proposed.treatment
-        models[scene_key(name)] = evolve(
-            proposed, treatment=(*[one if one == DROPPED else KEPT for one in terms[:-1]], last, pads)
-        )
+        models[scene_key(name)] = propose(problem, grip_of(problem))
     return Scenes(job, models)
 
 
 @cache
 def scenes_with(name):
-    return scenes_of(CONFIGS[name], DROPPED if name == "dropped" else KEPT)
+    return scenes_of(CONFIGS[name])
 
 
 @pytest.mark.parametrize("config", CONFIGS)
@@ -173,18 +148,13 @@ def test_a_scene_is_drawn_of_which_one_grasp_does_not_fit():
 @pytest.mark.parametrize(
     ("config", "name"),
     [
-        (SimConfig(transmission="straight"), "toy"),
         (SimConfig(acceleration=True), "toy"),
         (SimConfig(), "none"),
     ],
 )
 def test_grasps_that_need_more_than_their_numbers_are_not_drawn(config, name):
-    """A straight drive may be discretised exactly, and an accelerometer draws noise of its own."""
+    """An accelerometer draws noise of its own."""
     assert scenes_of(config).drawn(name) is None
-
-
-def test_a_limit_of_a_term_depends_on_the_instance_and_is_not_drawn():
-    assert scenes_of(SimConfig(), last="damper").drawn("toy") is None
 
 
 def test_only_seeds_that_compiled_code_hashes_are_drawn():

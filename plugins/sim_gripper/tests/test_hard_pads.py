@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 
 from graspsense.plugin_api import create
-from graspsense_sim_gripper.build import unverified_setup
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.driven import RecordedPath, follow_many
 from graspsense_sim_gripper.dynamics.contact import PadCompliance, pad_compression
-from graspsense_sim_gripper.exact.discretise import why_not_exact
 
 STIFF = """width_m = 0.06
 [[terms]]
@@ -65,10 +63,3 @@ def test_compiled_and_plain_grasps_are_equal():
         for how in ("never", "always")
     )
     np.testing.assert_allclose(compiled.trace.force_left_n, plain.trace.force_left_n, atol=1e-9)
-
-
-def test_hard_pads_are_not_solved_as_linear_ones():
-    linear = {"transmission": "straight", "breakaway_n": 0.0, "coulomb_n": 0.0, "coulomb_spread_n": 0.0}
-    for pads, reason in (({"pad_stiffness_n_m": 2e4}, ""), (PADS, "the pads are not linear")):
-        config = SimConfig(spread=False, sensor="ideal", fidelity="full", **linear, **pads)
-        assert why_not_exact(config, unverified_setup(config, SPRING, 0)) == reason

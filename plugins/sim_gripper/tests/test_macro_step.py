@@ -32,7 +32,7 @@ class Plant:
 
     def __init__(self, scene):
         setup = unverified_setup(CONFIG, scene, 0)
-        composed = composition_of(CONFIG, setup, pad=False)
+        composed = composition_of(setup, pad=False)
         self.params = setup.plant._replace(steps=MACRO)
         self._macro_step = bind_reachable(macro_step, step_parts(composed))
         self._move = plant_move(laws_of(setup.kinds), converges=False, lags=False)
@@ -261,7 +261,7 @@ def test_a_command_within_a_step_takes_effect_in_its_tick(compiled):
             compiled=compiled,
             run=run,
         )[0]
-        for fidelity in ({"fidelity": "full"}, {"fidelity": "fixed", "scheme": "explicit"})
+        for fidelity in ({"fidelity": "scene"}, {"fidelity": "fixed", "scheme": "explicit"})
     )
     assert many.model.reduction.steps.macro_tolerance > 0.0
     first = int(np.argmax(many.trace.force_left_n > 3.0))

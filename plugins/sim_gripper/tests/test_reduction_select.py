@@ -29,13 +29,13 @@ from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.objects.library import catalogue, find
 from graspsense_sim_gripper.objects.spec import ObjectSpec
 from graspsense_sim_gripper.problem import GraspController
-from graspsense_sim_gripper.reduction import levels, verify
+from graspsense_sim_gripper.reduction import select as selection
+from graspsense_sim_gripper.reduction import verify
 from graspsense_sim_gripper.reduction.error import GraspRecord, deviation
-from graspsense_sim_gripper.reduction.levels import PLAIN_SCALES, SCENE_SCALES, UNVERIFIED, LevelScale
+from graspsense_sim_gripper.reduction.levels import CONTROLLED, PLAIN
 from graspsense_sim_gripper.reduction.propose import grip_of, propose
 from graspsense_sim_gripper.reduction.select import select
 from graspsense_sim_gripper.sampled_loop import instability
-from graspsense_sim_gripper.stepping.scheme import BOGACKI_SHAMPINE, VERLET
 from graspsense_sim_gripper.terms import Term
 from graspsense_sim_gripper.terms.registry import TERMS
 
@@ -168,19 +168,6 @@ def test_the_model_of_a_single_instance_is_as_accurate_as_requested(name):
     assert error <= config.accuracy, quantity
 
 
-def test_what_the_paths_say_too_boldly_the_trial_grasp_takes_back(monkeypatch):
-    # Without its creep the shell is at rest much sooner.
-    spec, config = thing(SHELL, ("maxwell", {"k_n_m": 2000.0, "tau_s": 0.2})), evolve(CONFIG, accuracy=0.1)
-    rash = LevelScale(5.0)
-    monkeypatch.setattr(levels, "SCENE_SCALES", (rash, UNVERIFIED))
-    monkeypatch.setattr(levels, "PLAIN_SCALES", ())
-    problem = problem_of(config, spec)
-    assert propose(problem, grip_of(problem), rash).decisions[-1].decision != "kept"
-    model = selected(config, spec, hybrid())
-    # The first one, one in each of the two, and two more in the accepted one.
-    assert (model.level, model.verification.grasps) == (UNVERIFIED.at(0.1), 5)
-
-
 @pytest.mark.slow
 def test_force_and_speed_are_those_of_the_controller_unless_the_settings_say_others():
     spec = thing(SHELL)
@@ -208,7 +195,7 @@ def test_selecting_that_takes_long_reports_how_far_it_is(monkeypatch, caplog):
     assert caplog.messages == []
     monkeypatch.setattr(verify, "PROGRESS_S", 0.0)
     selected(CONFIG, thing(SHELL, ("loss", {"damping_n_s_m": 1.0})), hybrid())
-    assert "selecting the model of the object: 1 % of the allowed ticks and steps used" in caplog.messages
+    assert "selecting the steps for the object: 1 % of the allowed ticks and steps used" in caplog.messages
 
 
 class Ragged(NamedTuple):
@@ -225,8 +212,7 @@ def test_a_law_that_hangs_on_its_steps_is_refused_by_name(monkeypatch):
     monkeypatch.setitem(TERMS, "ragged", term)
     spec = thing(SHELL, ("ragged", {"k_n_m": 1000.0}))
     # The finest levels would find the same, and take seconds in the interpreter.
-    monkeypatch.setattr(levels, "SCENE_SCALES", (UNVERIFIED,))
-    monkeypatch.setattr(levels, "PLAIN_SCALES", ())
+    monkeypatch.setattr(selection, "CONTROLLED", CONTROLLED[:2])
     with pytest.raises(ConfigError) as refused:
         selected(CONFIG, spec, hybrid())
     said = str(refused.value)
@@ -305,29 +291,26 @@ def test_every_object_of_the_catalogue_has_a_model_of_ordinary_steps():
         for config in (CONFIG, evolve(CONFIG, spread=True)):
             model = selected(config, spec, hybrid())
             assert model.verification is not None, spec.name
-            scales = (*PLAIN_SCALES, *SCENE_SCALES)
-            ordinary = [scale.at(config.accuracy) for scale in scales if scale.refinement == 1.0]
+            ordinary = [scale.at(config.accuracy) for scale in (PLAIN, CONTROLLED[0])]
             # The nominal one comes to rest so near to a tick that a tenth of the step tolerance has to tell which.
             near_a_tick = spec.name == "odwalla_worn:full_open" and not config.spread
             assert (model.level in ordinary) != near_a_tick, spec.name
 
 
-@pytest.mark.parametrize(("stiffness_spread", "scheme"), [(0.0, VERLET), (1.0, BOGACKI_SHAMPINE)])
-def test_with_spread_a_step_per_tick_is_chosen_if_it_suffices_for_several_instances(stiffness_spread, scheme):
+@pytest.mark.parametrize("stiffness_spread", [0.0, 1.0])
+def test_with_spread_a_step_per_tick_is_chosen_if_it_suffices_for_several_instances(stiffness_spread):
     spec = evolve(thing(("elastic", {"k1_n_m": 1e5})), stiffness_spread=stiffness_spread)
     config = evolve(CONFIG, spread=True, accuracy=1e-3, pad_stiffness_n_m=math.inf)
     model = selected(config, spec, hybrid())
-    # The nominal object passes with the cheaper scheme; with a wide spread, an instance does not.
-    assert (model.level.plain, model.steps.scheme) == (1, scheme)
+    # The nominal object passes; with a wide spread, an instance does not.
+    assert model.level == (PLAIN if stiffness_spread == 0.0 else CONTROLLED[0]).at(1e-3)
     assert model.verification.error <= 0.5e-3
-    # The expected force is the largest of the nominal object and the instances.
-    assert (model.point.force_n > 50.0) == (stiffness_spread > 0.0)
 
 
 def test_a_step_per_tick_is_chosen_where_it_is_accurate_enough_and_not_where_it_is_not():
     stiff = thing(("elastic", {"k1_n_m": 5e5}), ("maxwell", {"k_n_m": 2e5, "tau_s": 0.01}))
     tight = selected(evolve(CONFIG, accuracy=1e-4), thing(SHELL), hybrid())
-    assert tight.level == PLAIN_SCALES[0].at(1e-4)
+    assert tight.level == PLAIN.at(1e-4)
     assert tight.verification.error <= 0.8e-4
     controlled = selected(evolve(CONFIG, accuracy=1e-4, pad_stiffness_n_m=math.inf), stiff, hybrid())
     assert controlled.steps.tolerance < math.inf
@@ -336,25 +319,11 @@ def test_a_step_per_tick_is_chosen_where_it_is_accurate_enough_and_not_where_it_
     assert not tight.valid_for(10.0 * tight.point.force_n)
 
 
-@pytest.mark.slow
-def test_a_step_per_tick_is_of_third_order_where_the_object_is_stiffer():
-    rigid = evolve(CONFIG, accuracy=1e-4, pad_stiffness_n_m=math.inf)
-    higher = selected(rigid, thing(("elastic", {"k1_n_m": 2e5})), hybrid())
-    assert higher.steps.scheme == BOGACKI_SHAMPINE
-    assert higher.verification.error <= 0.8e-4
-
-
-def test_a_linear_scene_is_discretised_exactly_and_takes_no_steps():
-    linear = evolve(CONFIG, transmission="straight", breakaway_n=CONFIG.coulomb_n)
-    model = selected(linear, thing(("elastic", {"k1_n_m": 2000.0})), hybrid())
-    assert (model.level.plain, model.steps.longest_s) == (0, math.inf)
-
-
 def test_forced_steps_and_contacts_beyond_the_tick_are_not_verified():
     for config in (evolve(CONFIG, step_s=1e-4), evolve(CONFIG, scheme="implicit")):
         assert selected(config, thing(SHELL), hybrid()).verification is None
     hard = selected(evolve(CONFIG, pad_stiffness_n_m=math.inf), thing(("elastic", {"k1_n_m": 1e9})), hybrid())
-    assert (hard.contact.decision, hard.verification) == ("trace not verified", None)
+    assert (hard.unresolved, hard.verification) == (("trace", "features"), None)
 
 
 def failing(params, state, reading):
@@ -393,13 +362,13 @@ def test_gas_that_is_spent_is_reported(tmp_path):
     assert found[1].startswith("gas: more than its volume was displaced")
 
 
-def test_trial_grasps_end_at_a_limit_of_work_and_the_full_model_runs(monkeypatch):
+def test_trial_grasps_end_at_a_limit_of_work_and_the_grasp_runs(monkeypatch):
     monkeypatch.setattr(verify, "MOST_WORK", 2000)
     problem = problem_of(CONFIG, ObjectSpec(name="shell", width_m=0.05, terms=(SHELL,)))
     reduction = select(problem, hybrid(closing_speed_m_s=0.0117))
     assert reduction.verification is None
-    assert set(reduction.treatment) == {"kept"}
-    told = next(d for d in reduction.decisions if d.term == "trial grasps")
+    assert reduction.not_verified == ("peak", "trace", "features")
+    told = next(d for d in reduction.decisions if d.subject == "trial grasps")
     assert "limit" in told.decision
 
 

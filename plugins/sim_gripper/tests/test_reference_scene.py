@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
-from simulation_scene import CONFIG, OPEN_M, TICK, exact
+from simulation_scene import CONFIG, OPEN_M, TICK, Law, exact, exact_closed
 
+from graspsense.plugin_api import RunConfig
+from graspsense_sim_gripper.batch import run_many
 from graspsense_sim_gripper.build import unverified_setup
 from graspsense_sim_gripper.compiled.compose import plant_move
 from graspsense_sim_gripper.terms.registry import laws_of
@@ -32,3 +34,16 @@ def test_the_open_loop_profile_gives_the_exact_trace(ticks):
     assert np.max(np.abs(np.array(gaps) - gap)) < 1e-5
     assert np.sqrt(np.mean((np.array(forces) - force) ** 2)) < 1e-2 * peak
     assert state.contact.left_n == pytest.approx(state.contact.right_n)
+
+
+@pytest.mark.slow
+def test_a_grasp_of_linear_contact_has_the_accuracy_that_is_asked_for():
+    """Every term is linear and the drive is straight. Its steps are those of any other scene."""
+    run, accuracy = RunConfig(hold_s=0.0), CONFIG.accuracy
+    done = run_many(CONFIG, Law(None), [CONFIG.object], [0], compiled=False, run=run)[0]
+    force = exact_closed().force
+    found = done.trace.force_left_n[: len(force)]
+    peak = force.max()
+    assert np.sqrt(np.mean((found - force) ** 2)) < accuracy * peak
+    assert done.state.peak_n == pytest.approx(peak, rel=accuracy)
+    assert done.report()["not_verified"] == []

@@ -81,19 +81,25 @@ def test_a_text_that_is_not_a_scene_is_refused():
         find("widht_m = 0.05\n")
 
 
-def test_a_fixed_model_keeps_every_term_and_is_not_verified():
+def test_fixed_steps_are_not_verified_and_are_those_of_a_prescribed_scheme():
     config = SimConfig(object=dedent(BOTTLE), fidelity="fixed", scheme="explicit", sensor="ideal")
     backend = SimBackend(config)
     backend.open(0)
     selection = backend.report()["selection"]
-    decisions = {row["term"]: row["decision"] for row in selection["decisions"]}
-    assert decisions == {"elastic": "kept", "maxwell": "kept", "steps": "Verlet", "contact": "not examined"}
+    decisions = {row["subject"]: row["decision"] for row in selection["decisions"]}
+    assert decisions == {"steps": "Verlet", "contact": "not examined"}
     assert selection["verified"] is None
-    fixed, full = (
+    fixed, prescribed = (
         run_many(evolve(config, fidelity=fidelity), HYBRID, [config.object], [2])[0].trace
-        for fidelity in ("fixed", "full")
+        for fidelity in ("fixed", "scene")
     )
-    assert fixed.gap_m.tolist() == full.gap_m.tolist()
+    assert fixed.gap_m.tolist() == prescribed.gap_m.tolist()
+
+
+def test_a_fidelity_that_drops_or_keeps_terms_is_refused():
+    """A scene has the terms that it names. There is no other model of it."""
+    with pytest.raises(ConfigError, match=r"fidelity.*scene.*reference.*fixed"):
+        create("sensor-backend", "sim", fidelity="full")
 
 
 SPREAD = """width_m = 0.06

@@ -14,7 +14,7 @@ from graspsense.cli.main import cli
 from graspsense.plugin_api import ConfigError, create
 from graspsense_sim_gripper.batch import run_many
 from graspsense_sim_gripper.build import unverified_setup
-from graspsense_sim_gripper.compiled.compose import composed_move
+from graspsense_sim_gripper.compiled.compose import composed_move, contact_solver, grasp_loop
 from graspsense_sim_gripper.compiled.padding import composition_of
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.objects.spec import ObjectSpec
@@ -39,7 +39,7 @@ def pressed(terms, config=None, seconds=0.1, effort_n=60.0, held=False, **steps)
     spec = ObjectSpec(name="object", width_m=0.05, terms=tuple(terms.items()), held=held)
     setup = unverified_setup(config, spec, 0)
     plant, state = setup.plant._replace(steps=setup.plant.steps._replace(**steps)), setup.state
-    move, forces = composed_move(composition_of(config, setup, pad=False)), []
+    move, forces = composed_move(composition_of(setup, pad=False)), []
     for _ in range(round(seconds / 1e-3)):
         state = move(plant, state, effort_n, 1e-3)
         forces.append(state.contact.left_n)
@@ -54,7 +54,7 @@ def test_a_rigid_body_breaks_at_its_crush_force(scheme, forced, held, pads_n_m):
     config = SimConfig(sensor="ideal", spread=False, open_gap_m=0.051, pad_stiffness_n_m=pads_n_m)
     body = {"rigid": {"hertz_n_m15": 1e8, "crush_force_n": 10.0, "broken_n_m": 100.0}}
     state, forces = pressed(body, config, held=held, scheme=scheme, **forced)
-    assert state.contact.left.states[1].broken == 1
+    assert state.contact.left.states[0].broken == 1
     assert state.peak_n == pytest.approx(10.0, rel=1e-5)
     assert state.step.unresolved + state.contact.unbalanced == 0
     assert 0.0 < forces[-1] < 5.0
@@ -70,7 +70,7 @@ def test_an_object_of_any_terms_breaks_at_a_force(scheme, forced, held):
         "fracture": {"force_n": 10.0, "left": 0.25},
     }
     state, forces = pressed(terms, held=held, scheme=scheme, **forced)
-    assert state.contact.left.states[3].broken == 1
+    assert state.contact.left.states[2].broken == 1
     k = int(np.argmax(np.diff(forces) < -1.0)) + 1
     assert forces[:k].max() <= 10.0 < 1.02 * forces[:k].max() * (1.2 if forced else 1.0)
     assert forces[k] < 7.0
@@ -87,7 +87,7 @@ def test_an_object_breaks_at_a_compression(scheme):
 
 
 @pytest.mark.slow
-def test_a_fracture_is_the_same_compiled_and_plain_and_in_a_reduced_model():
+def test_a_fracture_is_the_same_compiled_and_plain_and_as_the_reference():
     scene = """width_m = 0.05
 [[terms]]
 type = "fracture"
@@ -115,7 +115,7 @@ def test_a_shell_snaps_at_its_critical_compression(scheme):
     shell = {"snap": {"k1_n_m": 5e3, "critical_m": 2e-3, "drop_n": 8.0, "fall_m": 4e-4, "k2_n_m": 100.0}}
     state, forces = pressed(shell, seconds=0.3, effort_n=40.0, scheme=scheme)
     assert state.peak_n == pytest.approx(10.0, rel=1e-5)
-    assert state.contact.left.states[1].part == 2
+    assert state.contact.left.states[0].part == 2
     assert state.step.unresolved + state.contact.unbalanced == 0
     assert forces[-1] < 5.0
 
@@ -142,7 +142,7 @@ def test_steps_of_a_tick_keep_their_order_through_an_event(scheme, order, event)
     }[event]
     spec = ObjectSpec(name="object", width_m=0.05, terms=tuple(terms.items()))
     setup = unverified_setup(config, spec, 0)
-    move = composed_move(composition_of(config, setup, pad=False))
+    move = composed_move(composition_of(setup, pad=False))
 
     def end(n):
         state = setup.state
@@ -168,7 +168,7 @@ def test_a_body_may_break_while_the_fingers_stand_still():
         "maxwell": {"k_n_m": 2e4, "tau_s": 0.2},
     }
     state, _ = pressed(terms, config, 0.3, effort_n=31.0)
-    assert state.contact.left.states[1].broken == 1
+    assert state.contact.left.states[0].broken == 1
     coarse, fine = (pressed(terms, config, 0.3, effort_n=31.0, longest_s=h)[1] for h in (math.inf, 1e-5))
     np.testing.assert_allclose(coarse, fine, rtol=0.01, atol=0.05)
 
@@ -239,6 +239,9 @@ def stuff(tmp_path, monkeypatch):
 
     def scene(law):
         monkeypatch.setitem(TERMS, "stuff", Term(name="stuff", summary="", params=Stuff, law=law))
+        # They are found by the names of terms, and another test gave this name to another law.
+        for cached in (contact_solver, grasp_loop, composed_move):
+            cached.cache_clear()
         file = tmp_path / "stuff.toml"
         file.write_text(STUFF)
         return str(file)
@@ -307,15 +310,15 @@ def test_steps_resolve_a_fast_oscillation_in_the_grasp_and_after_the_release(tmp
         assert done.report["resolved"]
 
 
-def test_an_oscillation_that_is_too_fast_is_left_out_and_reported(tmp_path):
+def test_an_oscillation_that_is_too_fast_is_reported(tmp_path):
     file = tmp_path / "slosh.toml"
     file.write_text(SLOSH.format(mass=0.1, frequency=1e6))
     gripper = create("sensor-backend", "sim", sensor="ideal", spread=False, object=str(file))
     gripper.open(0)
     selection = gripper.report()["selection"]
-    slosh, contact = selection["decisions"][-3], selection["decisions"][-1]
-    assert (slosh["term"], slosh["decision"]) == ("slosh", "dropped")
-    assert contact["decision"] == "trace not verified"
+    decisions = {row["subject"]: row["decision"] for row in selection["decisions"]}
+    assert decisions["slosh"] == "its oscillation is not resolved"
+    assert decisions["contact"] == "trace not verified"
     assert selection["verified"] is None
 
 
@@ -325,7 +328,7 @@ def test_an_object_that_is_too_heavy_to_push_stops_the_finger_and_does_not_throw
         name="anvil", width_m=0.05, offset_m=0.005, mass_kg=300.0, terms=(("elastic", {"k1_n_m": 2e3}),)
     )
     setup = unverified_setup(config, spec, 0)
-    move, state, gaps = composed_move(composition_of(config, setup, pad=False)), setup.state, []
+    move, state, gaps = composed_move(composition_of(setup, pad=False)), setup.state, []
     for _ in range(300):
         state = move(setup.plant, state, 23.0, 1e-3)
         gaps.append(state.motion.gap_m)

@@ -89,7 +89,6 @@ def experiment(
     from graspsense.experiments.page import findings_of
     from graspsense.experiments.results import Results
     from graspsense.experiments.run import refuse_store, run_experiment
-    from graspsense.experiments.savings import savings_of
     from graspsense.experiments.summary import summarise
 
     planned = read_experiment(experiment, options, force=force)
@@ -112,11 +111,10 @@ def experiment(
     found = summarise(planned, results)
     page, problem = _written_page(found, results)
     more = findings_of(found)
-    saved = savings_of(planned) if account.done and account.complete else ""
     if as_json:
-        _print_json(found, more, page, {**_counts(account, problem), "simulation": saved or None})
+        _print_json(found, more, page, _counts(account, problem))
     else:
-        _print(found, more, account, f"none: {problem}" if problem else str(page), saved)
+        _print(found, more, account, f"none: {problem}" if problem else str(page))
     if account.stopped == "interrupted":
         raise click.exceptions.Exit(EXIT_INTERRUPTED)
     if problem or not account.complete:
@@ -216,7 +214,7 @@ def _print_json(found: Summary, more: Findings | None, page: Path | None, counts
     echo_json({**found.as_json(), **findings, "page": None if page is None else str(page), **counts})
 
 
-def _print(found: Summary, more: Findings | None, account: Account, page: str, saved: str) -> None:
+def _print(found: Summary, more: Findings | None, account: Account, page: str) -> None:
     from graspsense.experiments.answer import answer
 
     echo(answer(found) if more is None else more.answer, Style.HEADING)
@@ -240,8 +238,6 @@ def _print(found: Summary, more: Findings | None, account: Account, page: str, s
         echo(f"  stopped: {account.stopped}", Style.BAD, indent=2)
     if not account.complete:
         echo("  go on with the same command and --resume: it does what is missing and what failed")
-    if saved:
-        echo_entry("simulation", saved)
     echo_entry("page", page)
 
 

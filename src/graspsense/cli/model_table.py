@@ -1,11 +1,15 @@
-"""The table of `run --explain-model`: how much each term of a simulated object did in this grasp."""
+"""The tables of `run --explain-model`: what each term did in this grasp, and what the scene would lose without it."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
-from typing import Any
+from typing import Any, Final
 
 from graspsense.cli.terminal import echo, echo_entry, echo_table
+
+MOST_CHANGES: Final = 4
+"""Features whose changes are listed for a term; of the others there is only the number."""
 
 
 def print_model(model: Mapping[str, Any]) -> None:
@@ -36,6 +40,40 @@ def print_model(model: Mapping[str, Any]) -> None:
     echo_table(header, rows)
 
 
+def print_without(rows: Iterable[Mapping[str, Any]], accuracy: float) -> None:
+    """Print what a simulated gripper reports as `model.without`: what the scene would lose without each term.
+
+    A change of at most `accuracy` (relative) counts as none.
+    """
+    lines = [(row["term"], _loss(row, accuracy)) for row in rows]
+    if lines:
+        echo()
+        echo_table(("WITHOUT", "CHANGES"), lines)
+
+
+def _loss(row: Mapping[str, Any], accuracy: float) -> str:
+    """Return in words what the absence of a term changes, the largest changes first."""
+    if row["failed"]:
+        return str(row["failed"])
+    lost = [
+        (math.inf if one["change"] is None else abs(one["change"]), name, one)
+        for name, one in row["changes"].items()
+    ]
+    beyond = sorted((one for one in lost if one[0] > accuracy), key=lambda one: -one[0])
+    if not beyond and row["same_outcome"]:
+        return f"nothing by more than {accuracy:.2g}: it can be left out of the scene"
+    words = [_change(name, one) for _, name, one in beyond[:MOST_CHANGES]]
+    if len(beyond) > MOST_CHANGES:
+        words.append(f"and {len(beyond) - MOST_CHANGES} more")
+    return ", ".join(words if row["same_outcome"] else ["the outcome", *words])
+
+
+def _change(name: str, one: Mapping[str, Any]) -> str:
+    if one["change"] is not None:
+        return f"{name} {one['change']:+.1%}"
+    return f"{name} is no longer defined" if one["without"] is None else f"{name} becomes defined"
+
+
 def print_not_verified(report: Mapping[str, Any]) -> None:
     """Print for which quantities a simulated gripper does not guarantee its accuracy, if any, and an unstable loop."""
     if report.get("unstable_loop"):
@@ -46,13 +84,12 @@ def print_not_verified(report: Mapping[str, Any]) -> None:
 
 
 def print_selection(selection: Mapping[str, Any]) -> None:
-    """Print what a simulated gripper reports as `selection`: what became of each term, why, and the error of that."""
+    """Print what a simulated gripper reports as `selection`: the steps of the grasp, and what verified them."""
     echo()
     level, verified = selection["level"], selection["verified"]
     echo_entry(
         "accuracy",
-        f"{selection['accuracy']:.3g} required, {selection['error']:.2g} estimated for what is left out "
-        f"(tolerance {level['model_tol']:.2g}); {selection['steps']} steps (tolerance {level['step_tol']:.2g})",
+        f"{selection['accuracy']:.3g} required; {selection['steps']} steps (tolerance {level['step_tol']:.2g})",
     )
     echo_entry(
         "verified",
@@ -62,10 +99,10 @@ def print_selection(selection: Mapping[str, Any]) -> None:
         f"{selection['expected_force_n']:.3g} N and {selection['expected_speed_m_s'] * 1e3:.3g} mm/s",
     )
     rows = [
-        (row["term"], row["decision"], f"{row['error']:.2g}", f"{row['what']} = {row['number']:.3g}")
+        (row["subject"], row["decision"], f"{row['what']} = {row['number']:.3g}")
         for row in selection["decisions"]
     ]
-    echo_table(("TERM", "DECISION", "ERROR", "REASON"), rows)
+    echo_table(("SUBJECT", "DECISION", "REASON"), rows)
 
 
 def _times(rates: Iterable[Mapping[str, Any]]) -> str:

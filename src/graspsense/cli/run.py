@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from graspsense.cli.live_rows import LiveRows
-from graspsense.cli.model_table import print_model, print_not_verified, print_selection
+from graspsense.cli.model_table import print_model, print_not_verified, print_selection, print_without
 from graspsense.cli.options import contradiction, names_object, pipeline_options, settings_of
 from graspsense.cli.output import echo_json
 from graspsense.cli.terminal import (
@@ -49,7 +49,9 @@ MANY_GUARDED: Final = 0.1
     "--changed", is_flag=True, help="With --save: accept another gripper or other settings than before."
 )
 @click.option(
-    "--explain-model", is_flag=True, help="Simulated: list what every term contributed. (gripper.explain)"
+    "--explain-model",
+    is_flag=True,
+    help="Simulated: list what every term contributed, and what each feature would lose without it. (gripper.explain)",
 )
 @click.option("--plot", metavar="FILE.png", help="Draw the grasp: forces, gap, phases, features, prediction.")
 @click.option("--dry-run", is_flag=True, help="Print what would be done, and open nothing.")
@@ -154,6 +156,7 @@ def _print_model(trial: Trial, condition: Conditions | None) -> None:
     if "model" in trial.report:
         print_model(trial.report["model"])
         if "selection" in trial.report:
+            print_without(trial.report["model"].get("without", ()), trial.report["selection"]["accuracy"])
             print_selection(trial.report["selection"])
     if condition is not None:
         print_conditions(condition, trial.report["selection"]["accuracy"])

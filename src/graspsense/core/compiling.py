@@ -132,21 +132,13 @@ def is_on_disk(function: Callable[..., Any], options: CompileOptions | None = No
 
 
 @contextmanager
-def first_call(*, slp_vectorize: bool = False) -> Iterator[None]:
+def first_call() -> Iterator[None]:
     """Call a compiled function for the first time inside this context, which compiles it.
-
-    `slp_vectorize`: have independent operations on neighbouring numbers compiled to vector instructions, which pays for
-    products of matrices and only lengthens other code.
 
     Raises NotCompilable if numba refuses, with the file and line that it names.
     """
-    import numba
     from numba.core.errors import NumbaError, UnsupportedBytecodeError
 
-    config: Any = numba.config
-    before = config.SLP_VECTORIZE
-    if slp_vectorize:
-        config.SLP_VECTORIZE = 1
     try:
         # The compiler makes millions of objects, nearly all of which remain until it has ended.
         with no_collection():
@@ -158,8 +150,6 @@ def first_call(*, slp_vectorize: bool = False) -> Iterator[None]:
             (line.strip() for line in str(error).splitlines() if line.strip()), type(error).__name__
         )
         raise NotCompilable(f"the compiler refuses {where}: {reason}") from error
-    finally:
-        config.SLP_VECTORIZE = before
 
 
 def entry_point(compiled: Callable[..., Any]) -> Callable[..., Any]:

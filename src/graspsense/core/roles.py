@@ -319,16 +319,6 @@ class BatchBackend(SensorBackend[ConfigT]):
         """
         return {}
 
-    def savings(
-        self, controller: Controller[Any], scenes: Sequence[str], seeds: Sequence[int], run: RunConfig
-    ) -> str:
-        """Return in words what the simulator saves in these grasps by its choice of a model; empty if it chooses none.
-
-        It measures a few of the grasps, which takes seconds.
-        """
-        del controller, scenes, seeds, run
-        return ""
-
     @abstractmethod
     def run_many(
         self,

@@ -16,7 +16,6 @@ from graspsense_sim_gripper.dynamics.contact import offset_of_pushed
 from graspsense_sim_gripper.dynamics.drive import STRIBECK_SPEEDS, stribeck_excess
 from graspsense_sim_gripper.dynamics.state import Contact, Motion, PlantState, StepState
 from graspsense_sim_gripper.loop import (
-    MACRO_STEPS,
     NOT_NEGATIVE,
     ROWS_AT_ONCE,
     GraspParams,
@@ -60,11 +59,7 @@ def approach_ticks(
 ) -> LoopProgress:
     """Run the ticks of an approach after that of `frame`; return where they end: at `at` if there are none."""
     contact, motion = at.plant.contact, at.plant.motion
-    if (
-        params.macro_steps != MACRO_STEPS
-        or motion.speed_rev_s == 0.0
-        or not _closes_freely(params, contact, frame)
-    ):
+    if params.macro_steps != 1 or motion.speed_rev_s == 0.0 or not _closes_freely(params, contact, frame):
         return at
     free, now = free_from(params.controller, at.controller, frame)
     nearest = _nearest(params, contact)

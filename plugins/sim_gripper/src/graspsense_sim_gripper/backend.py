@@ -38,8 +38,6 @@ from graspsense_sim_gripper.build import EFFORT_LIMIT_N, build, device_info, ins
 from graspsense_sim_gripper.compiled.compose import INTERPRETED, composed_move, composition, free_motion
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.dynamics.state import PlantReadings, PlantState, is_finite, right_of
-from graspsense_sim_gripper.exact.discretise import discretise
-from graspsense_sim_gripper.exact.propagate import ExactPlant
 from graspsense_sim_gripper.explain import explain
 from graspsense_sim_gripper.fingertip import CELL_OFFSET, CELLS, FIRST_PAD_CELL, fingertips
 from graspsense_sim_gripper.loop import COLUMNS, GraspParams, LoopProgress
@@ -59,7 +57,6 @@ from graspsense_sim_gripper.sensing import (
     sense,
     with_listed_cells,
 )
-from graspsense_sim_gripper.stepping.scheme import PlantParams
 from graspsense_sim_gripper.term_failure import TermFailed, not_finite_in_tick, raised_in_term
 from graspsense_sim_gripper.terms.term import LAW_ERRORS
 
@@ -148,10 +145,7 @@ class SimBackend(BatchBackend[SimConfig]):
             self._reduction = select(problem, self._controller or default_controller(self.config))
         setup = instantiate(problem, self._reduction, seed)
         self._setup = setup = evolve(setup, sensor=with_listed_cells(setup.sensor))
-        exact = discretise(self.config, setup)
-        self._plant: PlantParams | ExactPlant = setup.plant if exact is None else exact[0]
-        shape = None if exact is None else exact[1]
-        composed = composition(setup.kinds, setup.plant, shape, has_palm=setup.has_palm)
+        composed = composition(setup.kinds, setup.plant, has_palm=setup.has_palm)
         self._move = composed_move(composed)
         self._free_ticks = None if self._controller is None else free_motion(composed, self._controller.step)
         self._table = [[0.0] * MOST_FREE_TICKS for _ in COLUMNS]
@@ -218,7 +212,7 @@ class SimBackend(BatchBackend[SimConfig]):
         self._moved_on = True
         setup, table, first = self._setup, self._table, self._ticks
         most = min(most, MOST_FREE_TICKS)
-        constants = GraspParams(self._plant, setup.sensor, params, setup.dt_s, first + most)
+        constants = GraspParams(setup.plant, setup.sensor, params, setup.dt_s, first + most)
         at = LoopProgress(first, 0, effort, self._state, self._sensor, state)
         at = self._free_ticks(constants, at, frame, table, self._phases)
         if at.ticks == first:
@@ -243,7 +237,7 @@ class SimBackend(BatchBackend[SimConfig]):
         """Return the plant after a tick. Raises TermFailed."""
         setup, before = self._setup, self._state
         try:
-            after = self._move(self._plant, before, effort_n, setup.dt_s)
+            after = self._move(setup.plant, before, effort_n, setup.dt_s)
         except LAW_ERRORS as error:
             raise TermFailed(raised_in_term(error, setup.kinds) or str(error)) from error
         if not is_finite(after):
@@ -268,14 +262,12 @@ class SimBackend(BatchBackend[SimConfig]):
     def report(self) -> Mapping[str, Any]:
         """Return what only the model knows, such as the true peak force on the pads and whether something broke.
 
-        `selection` describes the reduced model. With `explain` in the settings, `model` gives the contribution of each
-        term.
+        `selection` describes the steps. With `explain` in the settings, `model` gives the contribution of each term,
+        and what each feature would lose without it.
         """
         setup, reduction = self._setup, self._reduction
         report = model_report(self._state, setup.kinds)
         if reduction is not None:
-            if isinstance(self._plant, ExactPlant):
-                reduction = reduction.with_exact_discretisation()
             report["selection"] = {
                 "fidelity": self.config.fidelity,
                 **reduction.as_values(),
@@ -285,8 +277,18 @@ class SimBackend(BatchBackend[SimConfig]):
             controller = self._controller or default_controller(self.config)
             report |= accuracy_report(report, reduction, instability(setup, controller, reduction))
         if self.config.explain:
-            report["model"] = explain(setup, self._compressions)
+            report["model"] = explain(setup, self._compressions) | {"without": self._without()}
         return report
+
+    def _without(self) -> list[dict[str, Any]]:
+        """Return what each feature would lose without each term, see `reduction.without`."""
+        # Imported here, since only `explain` needs it.
+        from graspsense_sim_gripper.reduction.without import without_each_term
+
+        if self._reduction is None:
+            return []
+        controller = self._controller or default_controller(self.config)
+        return without_each_term(build(self.config, self.config.object), controller, self._reduction)
 
     def _draw_noise(self) -> None:
         """Draw the noise of the next images, and extend the buffer of images by as many."""
@@ -319,15 +321,6 @@ class SimBackend(BatchBackend[SimConfig]):
             changed[name] = SimBackend(one.config)
             changed[name]._scaled = one.scaled
         return changed
-
-    def savings(
-        self, controller: Controller[Any], scenes: Sequence[str], seeds: Sequence[int], run: RunConfig
-    ) -> str:
-        """Return what the chosen models save, see `batch.savings`. Raises ConfigError."""
-        from graspsense_sim_gripper.batch.savings import savings
-        from graspsense_sim_gripper.batch.threads import job_of
-
-        return savings(job_of(self.config, controller, {"run": run}, features=self._features), scenes, seeds)
 
     def run_many(
         self,

@@ -1,6 +1,6 @@
 """Building the parameters and initial states of a grasp from a config, the name of an object, and a seed.
 
-This takes three steps: `build` gives the problem, `reduction.select` its reduced model, and `instantiate` one grasp.
+This takes three steps: `build` gives the problem, `reduction.select` its steps, and `instantiate` one grasp.
 """
 
 from __future__ import annotations
@@ -36,7 +36,6 @@ from graspsense_sim_gripper.objects.spec import PATCHES, ObjectSpec
 from graspsense_sim_gripper.palm import AT_REST, palm_params
 from graspsense_sim_gripper.problem import GraspSetup, Problem
 from graspsense_sim_gripper.random_numbers import Generator, GeneratorOf, NumpyGenerator
-from graspsense_sim_gripper.reduction.candidates import reduce_plant
 from graspsense_sim_gripper.reduction.levels import step_tolerance
 from graspsense_sim_gripper.reduction.model import Reduction
 from graspsense_sim_gripper.reduction.propose import grip_of, propose
@@ -62,7 +61,7 @@ _NOT_OF_THE_MODEL: Final[dict[str, Any]] = {
     for field in fields(SimConfig)
     if field.name in ("object", "explain", "compile", *_SENSOR_SETTINGS)
 } | {"sensor": "ideal"}
-"""The settings that a reduced model does not depend on, with the values that they have in its trial grasps."""
+"""The settings that the choice of steps does not depend on, with the values that they have in its trial grasps."""
 
 
 def device_info(config: SimConfig) -> DeviceInfo:
@@ -118,7 +117,7 @@ def problem_of(config: SimConfig, spec: ObjectSpec | None, number: int | None = 
 
 @lru_cache(maxsize=64)
 def _model_config(config: SimConfig, spread: bool) -> SimConfig:
-    """Return the settings that a reduced model depends on, with this `spread`; the objects of a batch share them."""
+    """Return the settings that the choice of steps depends on, with this `spread`. A batch shares them."""
     return evolve(config, **_NOT_OF_THE_MODEL, spread=spread)
 
 
@@ -142,7 +141,7 @@ def instantiate(
     seed: int,
     generator_of: GeneratorOf = NumpyGenerator,
 ) -> GraspSetup:
-    """Return the grasp with this seed, of an instance in its reduced model; `reduction` None: with all its terms.
+    """Return the grasp with this seed, of an instance; `reduction` None: in steps that are not chosen for it.
 
     `generator_of`: draws all that the seed gives.
 
@@ -185,10 +184,10 @@ def _setup(
     rng: Generator,
     reduction: Reduction | None = None,
 ) -> GraspSetup:
-    """Return the grasp of an instance in its reduced model; `reduction` None: with all its terms."""
+    """Return the grasp of an instance; `reduction` None: in steps that are not chosen for it."""
     plant, state = _plant(config, instance, rng)
     if instance is not None and reduction is not None:
-        plant = reduce_plant(plant, instance.kinds, reduction)
+        plant = reduction.applied_to(plant)
     sensor = _sensor(config, instance, rng)
     palm: dict[str, Any] = {}
     if config.acceleration:

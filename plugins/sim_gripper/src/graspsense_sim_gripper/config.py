@@ -46,14 +46,13 @@ class SimConfig:
         default=0.01,
         minimum=1e-4,
         maximum=0.5,
-        meaning="Relative error that features, peak force and trace may have; model and steps follow from it.",
+        meaning="Relative error that features, peak force and trace may have; the steps follow from it.",
     )
-    fidelity: Literal["scene", "full", "reference", "fixed"] = setting(
+    fidelity: Literal["scene", "reference", "fixed"] = setting(
         default="scene",
         validator=_has_scheme,
-        meaning="scene: the terms that the accuracy needs. full: every term. reference: every term, in steps that "
-        "are halved until the result no longer changes. fixed: every term with the given `scheme`; nothing is "
-        "selected and no trial grasp verifies it.",
+        meaning="scene: steps for the accuracy, verified by trial grasps. reference: steps that are halved until the "
+        "result no longer changes. fixed: the given `scheme`; nothing is selected and no trial grasp verifies it.",
     )
     expected_force_n: float | None = setting(
         default=None,
@@ -61,7 +60,7 @@ class SimConfig:
         above=0.0,
         plausible=(0.1, 1000.0),
         effect=CHANGES_NO_RESULT,
-        meaning="Gripping force for which the model is selected; not set: that of a trial grasp under the controller.",
+        meaning="Gripping force for which the steps are selected; not set: that of a trial grasp under the controller.",
     )
     expected_speed_m_s: float | None = setting(
         default=None,
@@ -69,7 +68,7 @@ class SimConfig:
         above=0.0,
         plausible=(1e-4, 1.0),
         effect=CHANGES_NO_RESULT,
-        meaning="Speed of the fingers at the contact for which the model is selected; not set: that of a trial grasp.",
+        meaning="Speed of the fingers at the contact for which the steps are selected; not set: that of a trial grasp.",
     )
     scheme: Literal["auto", "explicit", "implicit"] = setting(
         default="auto",
@@ -235,7 +234,8 @@ class SimConfig:
     explain: bool = setting(
         default=False,
         effect=CHANGES_NO_RESULT,
-        meaning="Whether the report lists the contribution of each term of the object (--explain-model).",
+        meaning="Whether the report lists what each term contributes, and what features lose without it "
+        "(--explain-model).",
     )
     noise_counts: float = setting(
         default=15.0,

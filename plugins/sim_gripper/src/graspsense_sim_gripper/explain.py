@@ -13,7 +13,7 @@ from graspsense_sim_gripper.terms.term import WorkingPoint
 
 
 def explain(setup: GraspSetup, compressions: Sequence[tuple[float, float]]) -> dict[str, Any]:
-    """Return the contribution of each term as plain values, also of terms that the reduced model dropped.
+    """Return the contribution of each term as plain values.
 
     `compressions` holds the compression (m) and the force (N) of the object at each tick from the first contact on.
     Ticks in which the fingers do not press the object are left out: what its terms do to each other while it recovers

@@ -9,30 +9,29 @@ from graspsense.plugin_api import CALLED, TARING, Frame, after_free, free_from, 
 from graspsense_sim_gripper.approach import approach_ticks
 from graspsense_sim_gripper.dynamics.state import Contact, Motion, PlantState
 from graspsense_sim_gripper.loop import (
-    MACRO_STEPS,
     NOT_NEGATIVE,
     GraspParams,
     LoopProgress,
-    PlantModel,
     Table,
 )
 from graspsense_sim_gripper.sensing import moved_sensor, next_image_s, sense_motion
 from graspsense_sim_gripper.stepping.coast import glided
+from graspsense_sim_gripper.stepping.scheme import PlantParams
 
 
-def _cannot_glide(plant: PlantModel, state: PlantState, dt_s: float) -> bool:
+def _cannot_glide(plant: PlantParams, state: PlantState, dt_s: float) -> bool:
     return False
 
 
 def _never_glides(
-    plant: PlantModel, motion: Motion, contact: Contact, effort_n: float, h: float
+    plant: PlantParams, motion: Motion, contact: Contact, effort_n: float, h: float
 ) -> tuple[bool, Motion, Contact]:
     return False, motion, contact
 
 
-glide: Callable[[PlantModel, Motion, Contact, float, float], tuple[bool, Motion, Contact]] = _never_glides
+glide: Callable[[PlantParams, Motion, Contact, float, float], tuple[bool, Motion, Contact]] = _never_glides
 """`stepping.coast.glide`, where it does what `move` does in a tick of free motion."""
-can_glide: Callable[[PlantModel, PlantState, float], bool] = _cannot_glide
+can_glide: Callable[[PlantParams, PlantState, float], bool] = _cannot_glide
 """`stepping.coast.can_glide`, likewise."""
 
 
@@ -96,6 +95,6 @@ def approach_or_free_ticks(
     params: GraspParams, at: LoopProgress, frame: Frame, columns: Table, phases: Any
 ) -> LoopProgress:
     """Run what compiled code does: `approach_ticks` where steps may last several ticks, otherwise `free_ticks`."""
-    if params.macro_steps == MACRO_STEPS:
+    if params.macro_steps == 1:
         return approach_ticks(params, at, frame, columns, phases)
     return free_ticks(params, at, frame, columns, phases)

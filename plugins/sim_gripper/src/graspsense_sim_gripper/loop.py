@@ -29,7 +29,7 @@ from graspsense_sim_gripper.sensing import (
     apply_tare,
     sense,
 )
-from graspsense_sim_gripper.stepping.scheme import Steps
+from graspsense_sim_gripper.stepping.scheme import PlantParams, Steps
 from graspsense_sim_gripper.stepping.trend import UNKNOWN, Trend
 
 COLUMNS: Final = (
@@ -45,19 +45,14 @@ COLUMNS: Final = (
 )
 """The rows of the recorded table; each is a column of the trace. The phases are integers, in an array of their own."""
 
-PlantModel = Any
-"""`PlantParams`, or `ExactPlant` where exact discretisation advances the plant."""
 Table = Any
 """Rows of numbers: an array in compiled code, a list of lists in the interpreter."""
-
-
-MACRO_STEPS, EXACT_TICKS = 1, 2
 
 
 class GraspParams(NamedTuple):
     """The constants of a grasp."""
 
-    plant: PlantModel
+    plant: PlantParams
     sensor: SensorParams
     controller: TickParams
     dt_s: float
@@ -65,8 +60,8 @@ class GraspParams(NamedTuple):
     palm: Any = ()
     """`PalmParams`; () without an accelerometer."""
     macro_steps: int = 0
-    """MACRO_STEPS: steps of the plant may last several ticks (`macro_ticks`), and the ticks of an approach are run at
-    once (`approach`). EXACT_TICKS: ticks of an exactly discretised plant are (`exact_ticks`)."""
+    """1: steps of the plant may last several ticks (`macro_ticks`), and the ticks of an approach are run at once
+    (`approach`)."""
 
 
 class MacroControl(NamedTuple):
@@ -82,11 +77,9 @@ class MacroControl(NamedTuple):
     """That at the end of the last one, if it was accepted."""
 
 
-def uses_macro_steps(exact: Any, steps: Steps) -> int:
-    """Return `GraspParams.macro_steps` for a plant with these steps; `exact`: its exact discretisation, or None."""
-    if exact is not None:
-        return EXACT_TICKS
-    return MACRO_STEPS if steps.macro_tolerance > 0.0 else 0
+def uses_macro_steps(steps: Steps) -> int:
+    """Return `GraspParams.macro_steps` for a plant with these steps."""
+    return 1 if steps.macro_tolerance > 0.0 else 0
 
 
 class LoopState(NamedTuple):
@@ -180,7 +173,7 @@ NOT_NEGATIVE: Final = 0x3FFFFFFF
 """After `&` with this mask the compiler knows that an index is not negative, and omits the check at each access."""
 
 
-def move_unbound(plant: PlantModel, state: PlantState, effort_n: float, dt_s: float) -> PlantState:
+def move_unbound(plant: PlantParams, state: PlantState, effort_n: float, dt_s: float) -> PlantState:
     """Raise TypeError: the composition binds the motion of the plant."""
     raise TypeError("the loop has no plant: compose.grasp_loop binds one")
 
@@ -216,11 +209,10 @@ further_signals: Callable[..., tuple[Any, Any]] = _no_signals
 """What gives `Reading.signals`: `palm.palm_signals` of a gripper with an accelerometer."""
 keep_signals: Callable[[Any, Any, int], None] = _keep_nothing
 """What records them: `palm.keep_samples` of a gripper with an accelerometer."""
-move: Callable[[PlantModel, PlantState, float, float], PlantState] = move_unbound
+move: Callable[[PlantParams, PlantState, float, float], PlantState] = move_unbound
 control: Callable[[TickParams, TickState, Reading], tuple[Command, TickState]] = control_unbound
 run_ticks: Callable[..., tuple[LoopProgress, MacroControl]] = _no_ticks
-"""`macro_ticks.run_macro_step` where a step may last several ticks, after which the plant has moved in all of them;
-`exact_ticks.exact_ticks` where exact discretisation advances the plant, which has not moved in the last of them yet."""
+"""`macro_ticks.run_macro_step` where a step may last several ticks, after which the plant has moved in all of them."""
 run_approach_ticks: Callable[[GraspParams, LoopProgress, Frame, Table, Any], LoopProgress] = _every_tick
 """`approach.approach_ticks`, in the interpreter `free_ticks.approach_or_free_ticks`, where ticks are run at once."""
 
@@ -266,14 +258,14 @@ def grasp(params: GraspParams, progress: SimulationState, buffers: Buffers) -> S
         ticks += 1
         if state.done == 1 or state.guard.stopped == 1:
             break
-        before, suits = ticks, effort == last_effort or params.macro_steps == EXACT_TICKS
+        before, suits = ticks, effort == last_effort
         if params.macro_steps > 0 and suits and same_phase and phase >= APPROACH and ticks >= macro.from_tick:
             at = LoopProgress(ticks, recorded, effort, plant, sensor, state)
             at, macro = run_ticks(params, at, macro, pads, columns, buffers.phases)
             ticks, recorded, effort, plant, sensor, state = at
             if state.done == 1 or state.guard.stopped == 1:
                 break
-        if ticks == before or params.macro_steps == EXACT_TICKS:
+        if ticks == before:
             # Keeping the plant before the tick as well would cost compiled code a sixth of its time.
             plant = move(params.plant, plant, effort, dt_s)
         if not is_finite(plant):

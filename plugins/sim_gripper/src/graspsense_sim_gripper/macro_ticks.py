@@ -14,7 +14,6 @@ from graspsense_sim_gripper.loop import (
     GraspParams,
     LoopProgress,
     MacroControl,
-    PlantModel,
     Table,
     control_unbound,
     move_unbound,
@@ -42,7 +41,7 @@ place, are of lower order and less exact (docs/numerics.md, "Steps over several 
 MAX_WAIT: Final = 16
 """Most ticks to wait after a macro-step that was not accepted."""
 
-move: Callable[[PlantModel, PlantState, float, float], PlantState] = move_unbound
+move: Callable[[PlantParams, PlantState, float, float], PlantState] = move_unbound
 control: Callable[[TickParams, TickState, Reading], tuple[Command, TickState]] = control_unbound
 
 

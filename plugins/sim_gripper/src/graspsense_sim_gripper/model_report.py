@@ -79,18 +79,18 @@ class StoredReport(NamedTuple):
 def stored_report(plant: TupleType, layout: PaddedLayout, kinds: tuple[str, ...]) -> StoredReport:
     """Return what makes the reports of states of the plant of this type, padded in this layout.
 
-    `kinds`: those of the object's own terms. Terms that are not in the layout stay at rest, and are not looked at.
+    `kinds`: those of the object's own terms.
     """
     padded = plant.filled([0.0] * plant.count)
     at = with_places(padded)
     states = zip(
         (padded.contact.left, *padded.contact.right), (at.contact.left, *at.contact.right), strict=True
     )
+    of_kinds = [(kind, check, layout.places[i]) for i, kind, check in _checked(kinds)]
     checked = tuple(
         _CheckedTerm(kind, check, TupleType.of(half.states[place]), first_place(places.states[place]))
         for half, places in states
-        for i, kind, check in _checked(kinds)
-        if (place := layout.places[i][0]) >= 0
+        for kind, check, place in of_kinds
     )
     broken = tuple(state.broken for state in at.contact.left.states if hasattr(state, "broken"))
     places = at.peak_n, at.step.unresolved, at.contact.unbalanced, *broken
@@ -100,7 +100,7 @@ def stored_report(plant: TupleType, layout: PaddedLayout, kinds: tuple[str, ...]
 @lru_cache(maxsize=256)
 def _checked(kinds: tuple[str, ...]) -> list[tuple[int, str, Callable[[TermState], str]]]:
     """Return place and kind of each term whose law may be used beyond its validity, with what says so."""
-    terms = [(i, kind, find_term(kind)[1].beyond) for i, kind in enumerate(kinds, 1)]
+    terms = [(i, kind, find_term(kind)[1].beyond) for i, kind in enumerate(kinds)]
     return [term for term in terms if term[2] is not never_beyond]
 
 
@@ -110,7 +110,7 @@ class GraspModel(NamedTuple):
     kinds: tuple[str, ...]
     """Those of the object's own terms."""
     reduction: Reduction | None
-    """The reduced model; None without an object."""
+    """Its steps; None without an object."""
     unstable_loop: str
     """The text of `sampled_loop.instability` for the scene."""
 
@@ -119,7 +119,7 @@ NO_MODEL: Final = GraspModel((), None, "")
 
 
 def accuracy_report(report: Mapping[str, Any], reduction: Reduction, unstable_loop: str) -> dict[str, Any]:
-    """Return which quantities are not verified in a grasp with this report and reduced model, and the unstable loop.
+    """Return which quantities are not verified in a grasp with this report and these steps, and the unstable loop.
 
     `unstable_loop` is as in `GraspModel`.
     """

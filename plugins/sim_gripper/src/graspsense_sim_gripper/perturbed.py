@@ -31,7 +31,7 @@ def perturbed(config: SimConfig, scenes: Sequence[str], share: float) -> Mapping
     """
     # Steps of a fixed length depend smoothly on the parameters, so what 1 ppm moves is not due to their control.
     step_s = config.step_s or 1.0 / config.rate_hz
-    steady = evolve(config, fidelity="full", step_s=step_s, explain=False)
+    steady = evolve(config, fidelity="scene", step_s=step_s, explain=False)
     names = dict.fromkeys(
         name
         for scene in dict.fromkeys(split_number(scene)[0] for scene in scenes if scene != "none")

@@ -60,7 +60,7 @@ class GraspSetup:
     kinds: tuple[str, ...]
     """The kinds of the object's terms."""
     terms: tuple[TermParams, ...]
-    """Their parameters, whether the model keeps them or not."""
+    """Their parameters."""
     plant: PlantParams
     state: PlantState
     sensor: SensorParams
@@ -105,8 +105,8 @@ class Problem:
     number: int | None
     """The number of a particular instance; None: the seed draws the instance."""
     model_config: SimConfig
-    """The settings that a reduced model depends on; all others have fixed values, such as ideal sensors. `spread` is
-    True for a numbered instance, which also differs from the nominal object."""
+    """The settings that the choice of steps depends on; all others have fixed values, such as ideal sensors. `spread`
+    is True for a numbered instance, which also differs from the nominal object."""
     device: DeviceInfo
     """The properties of the gripper with ideal sensors, for the controller of a trial grasp."""
     nominal: GraspSetup | None

@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graspsense.plugin_api import NOT_FREE, Frame, FreeMotion, Reading, no_pads
-from graspsense_sim_gripper.exact.expm import exponentials
 from graspsense_sim_gripper.fingertip import CELLS
 from graspsense_sim_gripper.problem import GraspController, GraspSetup
 from graspsense_sim_gripper.reduction.model import Reduction
@@ -25,6 +24,10 @@ STABLE: Final = 1.0 + 1e-9
 """A loop is stable if no deviation grows by more than this from tick to tick. That of the gap remains as it is."""
 DIFFERENCE: Final = 1e-6
 """The change (m, m/s, or units of its memory) of each input by which the law of the controller is linearised."""
+
+TAYLOR_TERMS: Final = 13
+LARGEST_NORM: Final = 0.125
+"""The Taylor series of an exponential is summed for a duration over which the norm of the matrix is at most this."""
 
 Array = NDArray[np.float64]
 
@@ -42,7 +45,7 @@ def growth_per_tick(setup: GraspSetup, controller: GraspController, reduction: R
         return None
     drive, dt = setup.plant.drive, setup.dt_s
     mass = drive.inertia / setup.state.motion.jacobian_m_rev**2
-    stiffest = mass * (reduction.contact.number / dt) ** 2
+    stiffest = mass * (reduction.frequency / dt) ** 2
     rows = tuple(map(tuple, law.tolist()))
     return _growth(rows, mass, drive.friction.damping_n_s_m, stiffest, drive.lag_s, dt)
 
@@ -117,12 +120,32 @@ def _spectral_radius(law: Array, rates: Array, by_effort: float, lag_s: float, d
         lagging[:, :2, :2], lagging[:, :2, 2], lagging[:, 2, 2] = rates, driven, -1.0 / lag_s
         rates, driven = lagging, np.array([0.0, 0.0, 1.0 / lag_s])
     n, n_memory = len(driven), len(law) - 1
-    ahead, integral = exponentials(rates, dt_s)
+    ahead, integral = _exponential(rates, dt_s)
     # The gap and its rate are the closure and the closing speed with the opposite sign.
     measured = np.zeros((len(law), n + n_memory))
     measured[:, :2], measured[:, n:] = -law[:, :2], law[:, 2:]
     onward = np.zeros((len(rates), n + n_memory, n + n_memory))
-    onward[:, :n, :n] = ahead[:, 0]
-    onward[:, :n] += (integral[:, 0] @ driven)[:, :, None] * measured[0]
+    onward[:, :n, :n] = ahead
+    onward[:, :n] += (integral @ driven)[:, :, None] * measured[0]
     onward[:, n:] = measured[1:]
     return float(np.max(np.abs(np.linalg.eigvals(onward))))
+
+
+def _exponential(rates: Array, dt_s: float) -> tuple[Array, Array]:
+    """Return exp(A dt) and its integral over 0 to dt, for matrices A (1/s) of shape (n, k, k).
+
+    A Taylor series, with scaling and squaring. E - I is squared instead of E, so that the eigenvalue 1 of a free mass,
+    whose place does not matter, is not lost to rounding.
+    """
+    norm = float(np.abs(rates).sum(axis=-1).max()) * dt_s
+    halvings = max(0, math.ceil(math.log2(max(norm, 1e-300) / LARGEST_NORM)))
+    h, eye = math.ldexp(dt_s, -halvings), np.eye(rates.shape[-1])
+    term, less_eye, integral = np.broadcast_to(eye, rates.shape), np.zeros_like(rates), h * eye
+    for k in range(1, TAYLOR_TERMS + 1):
+        term = term @ rates * (h / k)
+        less_eye = less_eye + term
+        integral = integral + h / (k + 1) * term
+    for _ in range(halvings):
+        integral = 2.0 * integral + less_eye @ integral
+        less_eye = 2.0 * less_eye + less_eye @ less_eye
+    return eye + less_eye, integral

@@ -22,7 +22,7 @@ class TermFailed(GraspsenseError):
 
 def raised_in_term(error: BaseException, kinds: Sequence[str]) -> str:
     """Return in words which term raised this exception in the interpreter; empty if none of these did."""
-    laws = zip(kinds, active_laws(kinds)[1:], strict=True)
+    laws = zip(kinds, active_laws(kinds), strict=True)
     names: dict[CodeType, str] = {
         (law.law if isinstance(law, OnSum) else law).__code__: kind for kind, law in laws
     }
@@ -40,7 +40,7 @@ def not_finite_in_tick(
     """Return in words which term gives no finite force in the tick that begins with `before`."""
     laws = [
         OnSum(_checked_on_sum(kind, law.law)) if isinstance(law, OnSum) else _checked(kind, law)
-        for kind, law in zip(("lumped", *kinds), active_laws(kinds), strict=True)
+        for kind, law in zip(kinds, active_laws(kinds), strict=True)
     ]
     move = plant_move(laws, phases_of(kinds), hardens=hardens(plant.object))
     try:

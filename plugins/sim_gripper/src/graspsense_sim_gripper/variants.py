@@ -10,15 +10,12 @@ from attrs import evolve
 from graspsense.plugin_api import SimulationVariant
 
 ACCURACIES: Final = (0.5, 0.3, 0.1, 0.03, 0.01, 0.001, 1e-4)
-MIDDLE: Final = 0.01
 STEPS_S: Final = (1e-3, 5e-4, 2e-4, 1e-4)
-FINE_S: Final = 2e-5
-"""Steps so short that their error is negligible beside that of the model."""
 
 _FORMS: Final = (
     SimulationVariant(
         method="halved steps",
-        fidelity="full",
+        fidelity="reference",
         step="until all stands still",
         settings={"fidelity": "reference", "accuracy": 1e-4},
         role="reference",
@@ -27,20 +24,19 @@ _FORMS: Final = (
     *(
         SimulationVariant(
             method="steps by their error",
-            fidelity=fidelity,
+            fidelity="scene",
             step=f"{accuracy:g}",
-            settings={"fidelity": fidelity, "accuracy": accuracy},
-            for_recognition=fidelity == "scene" or accuracy == MIDDLE,
+            settings={"fidelity": "scene", "accuracy": accuracy},
+            for_recognition=True,
         )
-        for fidelity in ("scene", "full")
         for accuracy in ACCURACIES
     ),
     *(
         SimulationVariant(
             method=f"even steps, {scheme}",
-            fidelity="full",
+            fidelity="scene",
             step=f"{step_s * 1e3:g} ms",
-            settings={"fidelity": "full", "scheme": scheme, "step_s": step_s},
+            settings={"fidelity": "scene", "scheme": scheme, "step_s": step_s},
             for_recognition=step_s == STEPS_S[0],
         )
         for scheme in ("explicit", "implicit")
@@ -52,21 +48,11 @@ _FORMS: Final = (
         step="0.01",
         settings={"fidelity": "scene", "accuracy": 0.01, "compile": "never"},
     ),
-    *(
-        SimulationVariant(
-            method="even steps, explicit",
-            fidelity=f"scene at {accuracy:g}",
-            step=f"{FINE_S * 1e3:g} ms",
-            settings={"fidelity": "scene", "accuracy": accuracy, "scheme": "explicit", "step_s": FINE_S},
-            role="floor",
-        )
-        for accuracy in (0.1, 0.01)
-    ),
 )
 
 
 def variants() -> tuple[SimulationVariant, ...]:
-    """Return the settings to compare: the reference, steps by their error, even steps of both schemes, and floors.
+    """Return the settings to compare: the reference, steps by their error, and even steps of both schemes.
 
     They are compiled if numba is installed, except for the one that measures the interpreter.
     """

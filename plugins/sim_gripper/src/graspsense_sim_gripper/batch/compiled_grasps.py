@@ -71,7 +71,7 @@ class CompiledGrasps:
             if done is not None:
                 return done
         setup = self.scenes.setup(scene, seed)
-        composition = composition_of(self.job.config, setup)
+        composition = composition_of(setup)
         if not self.is_compiled(composition):
             return None
         return grasp_compiled(self.job, setup, self.loops.of(composition), self.storage, self.measure)

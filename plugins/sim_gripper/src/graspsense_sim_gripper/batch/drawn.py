@@ -16,7 +16,6 @@ from graspsense_sim_gripper.build import check_fit, friction_spread
 from graspsense_sim_gripper.compiled.compose import Composition
 from graspsense_sim_gripper.compiled.drawing import (
     NO_NUMBER,
-    NO_PLACE,
     DrawBuffers,
     Drawing,
     Places,
@@ -33,7 +32,6 @@ from graspsense_sim_gripper.compiled.loop_code import (
 )
 from graspsense_sim_gripper.compiled.padding import PaddedLayout, composition_of, layout_of
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.exact.propagate import ExactPlant
 from graspsense_sim_gripper.loop import GraspParams, SimulationState
 from graspsense_sim_gripper.nested import appender, with_places
 from graspsense_sim_gripper.objects.instance import (
@@ -44,7 +42,7 @@ from graspsense_sim_gripper.objects.instance import (
 )
 from graspsense_sim_gripper.objects.spec import PATCHES, NominalParams, ObjectSpec
 from graspsense_sim_gripper.problem import GraspSetup, Problem
-from graspsense_sim_gripper.reduction.model import DROPPED, KEPT, Reduction
+from graspsense_sim_gripper.reduction.model import Reduction
 from graspsense_sim_gripper.sensing import PadCells
 
 
@@ -64,8 +62,6 @@ class StartLayout(NamedTuple):
     """Parameters and state, in which each number is its place among all numbers."""
     cells: tuple[int, ...]
     """The places of the weights and offsets of the left and of the right cells among all arrays."""
-    workspace: int | None
-    """The place of the workspace of exact discretisation among them; None without."""
 
     @classmethod
     def of(cls, params: GraspParams, state: SimulationState) -> StartLayout:
@@ -83,7 +79,6 @@ class StartLayout(NamedTuple):
             LoopTypes.of(params, state),
             with_places((params, state)),
             tuple(place(array) for array in (*left, *right)),
-            place(params.plant.workspace) if isinstance(params.plant, ExactPlant) else None,
         )
 
 
@@ -111,9 +106,7 @@ class DrawnScene:
     def memory(self) -> DrawMemory:
         """Return memory for drawing and simulating its grasps one after the other, in one thread."""
         buffers = draw_buffers(N_COMMON_DRAWS + self.scene.n_own + 1, len(self.places.params))
-        arrays, workspace, (weights, left, right) = [*self.arrays], self.start.workspace, buffers.cells
-        if workspace is not None:
-            arrays[workspace] = arrays[workspace].copy()
+        arrays, (weights, left, right) = [*self.arrays], buffers.cells
         if self.has_cells:
             for place, array in zip(self.start.cells, (weights, left, weights, right), strict=True):
                 arrays[place] = array
@@ -159,16 +152,11 @@ def drawn_scene(
     `example`: one of them; `begun`: its parameters and its first state, padded. `layouts`: those that are known, to
     which that of this scene is added.
     """
-    spec, plant, sensor = problem.spec, example.plant, example.sensor
+    spec, sensor = problem.spec, example.sensor
     if spec is None or reduction is None or example.has_palm:
         return None
-    # With a straight linkage the draws may decide how a grasp is discretised; limits of terms depend on the instance.
-    if plant.drive.link.finger_m == 0.0 and problem.config.spread:
-        return None
-    if not set(reduction.treatment[:-1]) <= {KEPT, DROPPED}:
-        return None
     layout, config = layout_of(example), problem.config
-    composition = composition_of(config, example)
+    composition = composition_of(example)
     if composition not in layouts:
         layouts[composition] = StartLayout.of(*begun)
     known = layouts[composition]
@@ -204,12 +192,10 @@ def drawn_scene(
 def _places(at: Any, layout: PaddedLayout, spec: ObjectSpec) -> Places:
     """Return where the numbers are that a seed decides; `at`: parameters and state with the place of each number."""
     params, state = at
-    plant: Any = params.plant.plant if isinstance(params.plant, ExactPlant) else params.plant
-    friction, model = plant.drive.friction, plant.object
+    friction, model = params.plant.drive.friction, params.plant.object
     of_params: list[int] = []
-    for (position, _), (_, begin, end) in zip(layout.places[1:], spec.params_of_terms, strict=True):
-        # A term that the model drops may not be in the composition.
-        of_params += model.terms[position].params if position >= 0 else (NO_PLACE,) * (end - begin)
+    for position in layout.places:
+        of_params += model.terms[position].params
     return Places(
         coulomb_n=friction.coulomb_n,
         breakaway_n=friction.breakaway_n,

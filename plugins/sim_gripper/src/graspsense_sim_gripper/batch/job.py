@@ -34,7 +34,6 @@ from graspsense_sim_gripper.compiled.loop_code import CompiledLoop
 from graspsense_sim_gripper.compiled.padding import PaddedLayout, composition_of, layout_of, padded, unpadded
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.dynamics.state import PlantState
-from graspsense_sim_gripper.exact.discretise import discretise
 from graspsense_sim_gripper.fingertip import CELL_OFFSET, CELLS
 from graspsense_sim_gripper.loop import (
     COLUMNS,
@@ -226,11 +225,11 @@ def grasp_compiled(
 
 def grasp_plain(job: Job, setup: GraspSetup) -> FinishedGrasp:
     """Simulate a grasp in the interpreter."""
-    composition, step = composition_of(job.config, setup, pad=False), type(job.controller).step
+    composition, step = composition_of(setup, pad=False), type(job.controller).step
     try:
         return grasp_once(job, setup, grasp_loop(composition, step), Storage())
     except LAW_ERRORS as error:
-        if composition.shape is not None or not raised_in_term(error, setup.kinds):
+        if not raised_in_term(error, setup.kinds):
             raise
     return grasp_once(job, setup, guarded_loop(composition, step), Storage())
 
@@ -368,15 +367,14 @@ def _run(job: Job, setup: GraspSetup, loop: GraspLoop, storage: Storage) -> tupl
 
 def started(job: Job, setup: GraspSetup, *, on_arrays: bool) -> tuple[GraspParams, SimulationState]:
     """Return the parameters of the loop for a grasp, and the state in which it begins."""
-    exact = discretise(job.config, setup, on_arrays=on_arrays)
     params = GraspParams(
-        plant=setup.plant if exact is None else exact[0],
+        plant=setup.plant,
         sensor=setup.sensor if on_arrays else with_listed_cells(setup.sensor),
         controller=job.params,
         dt_s=setup.dt_s,
         max_ticks=math.ceil(seconds_at_most(job.run) / setup.dt_s),
         palm=setup.palm,
-        macro_steps=uses_macro_steps(exact, setup.plant.steps),
+        macro_steps=uses_macro_steps(setup.plant.steps),
     )
     return params, SimulationState(
         NOT_STARTED, setup.state, setup.sensor_state, job.initial, setup.palm_state

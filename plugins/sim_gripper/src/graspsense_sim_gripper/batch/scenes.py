@@ -1,4 +1,4 @@
-"""The scenes of a batch, each with its reduced model."""
+"""The scenes of a batch, each with its steps."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from graspsense_sim_gripper.sampled_loop import instability
 
 @define
 class Scenes:
-    """The scenes of a job, each with its reduced model. All seeds of a scene share the model."""
+    """The scenes of a job, each with its steps. All seeds of a scene share them."""
 
     job: Job
     selected: Mapping[tuple[str, bool], Reduction | None] = field(factory=dict)

@@ -197,12 +197,10 @@ class _Batch:
         of_kinds: Counter[tuple[str, ...]] = Counter()
         for key, n in counts.items():
             of_kinds[compiled_kinds(kinds_in(examples[key]))] += n
-        # With a straight drive grasps are exact, but trial grasps take steps: these are not worth compiling.
-        may_compile = self.job.config.transmission != "straight"
         for key, n in counts.items():
             worth = self._worth(of_kinds[compiled_kinds(kinds_in(examples[key]))])
-            self.models.add(examples[key], compiled=may_compile and worth)
-            self.counts[composition_of(self.job.config, self.models.example(examples[key]))] += n
+            self.models.add(examples[key], compiled=worth)
+            self.counts[composition_of(self.models.example(examples[key]))] += n
         for composition, n in self.counts.items():
             self.is_compiled[composition] = self._worth(n)
         if any(self.is_compiled.values()):
@@ -264,7 +262,7 @@ class _Batch:
             grasps: CompiledGrasps = self.local.grasps
             return grasps.grasp(scene, seed)
         except NotCompilable as error:
-            self._note_not_compilable(composition_of(self.job.config, self.models.setup(scene, seed)), error)
+            self._note_not_compilable(composition_of(self.models.setup(scene, seed)), error)
             return None
 
     def _is_compiled(self, composition: Composition) -> bool:

@@ -24,10 +24,6 @@ from graspsense_sim_gripper.dynamics.contact import (
     solve_contact,
 )
 from graspsense_sim_gripper.dynamics.state import Contact, ContactState, Motion, Past, PlantState, StepState
-from graspsense_sim_gripper.exact.modes import Shape
-from graspsense_sim_gripper.exact.propagate import Mode, bind_move, exact_parts
-from graspsense_sim_gripper.exact.run import ExactRun
-from graspsense_sim_gripper.exact_ticks import exact_ticks
 from graspsense_sim_gripper.free_ticks import approach_or_free_ticks, free_ticks
 from graspsense_sim_gripper.loop import GraspParams, LoopProgress, SimulationState, grasp
 from graspsense_sim_gripper.macro_ticks import run_macro_step
@@ -40,10 +36,9 @@ from graspsense_sim_gripper.stepping.converge import refine_until_converged
 from graspsense_sim_gripper.stepping.implicit import SpeedSearch
 from graspsense_sim_gripper.stepping.scheme import Attempt, PlantParams, Start
 from graspsense_sim_gripper.stepping.tr_bdf2 import Stage
-from graspsense_sim_gripper.terms.lumped import LumpedSpringDamper
 from graspsense_sim_gripper.terms.registry import active_laws, find_term, laws_of, moving_of, phases_of
 from graspsense_sim_gripper.terms.switchable import Switchable, switched_on_sum
-from graspsense_sim_gripper.terms.term import LAW_ERRORS, NO_STATE, Law, Moves, OnSum, Phase, SumLaw
+from graspsense_sim_gripper.terms.term import LAW_ERRORS, Law, Moves, OnSum, Phase, SumLaw
 
 TermsStates = Any
 """A tuple with a state of its own type for each term."""
@@ -59,7 +54,6 @@ INTERPRETED: Final[Constructors] = {
     for kind in (
         *(PlantState, Motion, Contact, ContactState, Past, StepState, SensorState, Frame),
         *(Start, Attempt, SpeedSearch, Stage, PadLoad, BalanceSearch),
-        *(Mode, ExactRun),
     )
 }
 """The named tuples that a tick creates, each with a constructor that takes the interpreter half the time."""
@@ -234,17 +228,14 @@ def any_moves(moving: Sequence[tuple[int, Moves]]) -> Moves:
     return combined
 
 
-NOTHING_LUMPED: Final = Switchable(0, LumpedSpringDamper(0.0, 0.0))
-
-
 def all_active(terms: Sequence[Any]) -> tuple[Switchable, ...]:
-    """Return the parameters of these terms as the sum of `laws_of` takes them: all kept, and nothing lumped."""
-    return (NOTHING_LUMPED, *[Switchable(1, params) for params in terms])
+    """Return the parameters of these terms as the sum of `laws_of` takes them: all active."""
+    return tuple([Switchable(1, params) for params in terms])
 
 
 def uncompressed(kinds: Sequence[str]) -> ContactState:
     """Return the state of an object of these terms that nothing has pressed yet."""
-    states = (NO_STATE, *(find_term(kind)[1].at_rest for kind in kinds))
+    states = tuple([find_term(kind)[1].at_rest for kind in kinds])
     return ContactState(0.0, 0.0, 0.0, states, 0.0, 0.0, Past(0.0, 0.0, math.inf, math.inf))
 
 
@@ -256,8 +247,6 @@ class Composition(NamedTuple):
 
     kinds: tuple[str, ...]
     """The kinds of the object's terms."""
-    shape: Shape | None
-    """The shape of the exact discretisation; None if time steps advance the plant."""
     converges: bool
     """Whether the steps of a tick are halved until the result no longer changes."""
     lags: bool = False
@@ -270,13 +259,11 @@ class Composition(NamedTuple):
     """Whether the object is held fast, so that its state has two halves."""
 
 
-def composition(
-    kinds: tuple[str, ...], plant: PlantParams, shape: Shape | None, *, has_palm: bool = False
-) -> Composition:
-    """Return the composition of a loop for this plant; `shape` is that of its exact discretisation, or None."""
+def composition(kinds: tuple[str, ...], plant: PlantParams, *, has_palm: bool = False) -> Composition:
+    """Return the composition of a loop for this plant."""
     converges, lags = plant.steps.settle > 0.0, plant.drive.lag_s > 0.0
     held = plant.object.held == 1
-    return Composition(kinds, shape, converges, lags, has_palm, hardens(plant.object), held)
+    return Composition(kinds, converges, lags, has_palm, hardens(plant.object), held)
 
 
 def hardens(model: ObjectModel) -> bool:
@@ -334,18 +321,8 @@ def _object_parts(
 @lru_cache(maxsize=64)
 def composed_move(composition: Composition, *, interpreted: bool = True) -> PlantMove:
     """Return the function that advances the plant by a tick; `interpreted` False: in the form that is compiled."""
-    kinds, move = composition.kinds, _step_move(composition)
-    if composition.shape is not None:
-        move = bind_move(kinds, composition.shape, move)
-    if not interpreted:
-        return move
-    return bind_reachable(move, {"object_force": sum_of_active(active_laws(kinds))}, INTERPRETED)
-
-
-def _step_move(composition: Composition) -> PlantMove:
-    """Return the function that advances the plant by a tick in time steps."""
     kinds = composition.kinds
-    return plant_move(
+    move = plant_move(
         laws_of(kinds),
         phases_of(kinds),
         moving_of(kinds),
@@ -353,6 +330,9 @@ def _step_move(composition: Composition) -> PlantMove:
         lags=composition.lags,
         hardens=composition.hardens,
     )
+    if not interpreted:
+        return move
+    return bind_reachable(move, {"object_force": sum_of_active(active_laws(kinds))}, INTERPRETED)
 
 
 def step_parts(composition: Composition) -> dict[str, Any]:
@@ -372,10 +352,10 @@ def grasp_loop(
 
 @lru_cache(maxsize=64)
 def guarded_loop(composition: Composition, step: ControllerStep) -> Callable[..., SimulationState]:
-    """Return the loop of a grasp by steps in the interpreter, in which a law that raises an exception gives NaN."""
+    """Return the loop of a grasp in the interpreter, in which a law that raises an exception gives NaN."""
     laws = [law if isinstance(law, OnSum) else _guarded(law) for law in active_laws(composition.kinds)]
     force = sum_of_active(laws)
-    return _loop_of(_step_move(composition), step, force, composition)
+    return _loop_of(composed_move(composition, interpreted=False), step, force, composition)
 
 
 @lru_cache(maxsize=64)
@@ -384,15 +364,14 @@ def free_motion(
 ) -> Callable[[GraspParams, LoopProgress, Frame, Any, Any], LoopProgress] | None:
     """Return `free_ticks` for the interpreter; None where every tick needs the controller and all sensors."""
     parts = free_parts(step)
-    if not parts or not _takes_steps(composition):
+    if not parts or not _may_last_several_ticks(composition):
         return None
     return bind_reachable(free_ticks, {**parts, "can_glide": can_glide, "glide": glide}, INTERPRETED)
 
 
-def _takes_steps(composition: Composition) -> bool:
+def _may_last_several_ticks(composition: Composition) -> bool:
     """Return whether a step of this plant may last several ticks."""
-    by_steps = composition.shape is None and not composition.converges and not composition.lags
-    return by_steps and not composition.has_palm
+    return not (composition.converges or composition.lags or composition.has_palm)
 
 
 def _loop_of(
@@ -401,7 +380,7 @@ def _loop_of(
     """Return the loop with this plant; `force`: of the object, in the form that suits the interpreter."""
     control = bind_reachable(tick, {"step": step, "events_told": events_of(step)})
     parts: dict[str, Any] = {"move": move, "control": control}
-    if _takes_steps(composition):
+    if _may_last_several_ticks(composition):
         own = {"move": move, "control": control, **step_parts(composition)}
         parts["run_ticks"] = bind_reachable(run_macro_step, own)
         if law := free_parts(step):
@@ -411,9 +390,6 @@ def _loop_of(
                 if force
                 else bind_reachable(approach_ticks, law)
             )
-    if composition.shape is not None and not composition.has_palm:
-        own = {"control": control, **exact_parts(composition.kinds, composition.shape)}
-        parts["run_ticks"] = bind_reachable(exact_ticks, own, INTERPRETED if force else None)
     if composition.has_palm:
         parts |= {"further_signals": palm_signals, "keep_signals": keep_samples}
     loop = bind_reachable(grasp, parts)

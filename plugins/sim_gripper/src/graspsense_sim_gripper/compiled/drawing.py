@@ -53,7 +53,7 @@ class Places(NamedTuple):
     share: int
     image_phase_s: int
     params: NDArray[np.int64]
-    """Those of the terms, in the order of `NominalParams`; NO_PLACE for a term that the composition does not have."""
+    """Those of the terms, in the order of `NominalParams`."""
 
 
 class SceneNumbers(NamedTuple):
@@ -94,7 +94,6 @@ class DrawBuffers(NamedTuple):
     cells: CellArrays
 
 
-NO_PLACE: Final = -1
 NO_NUMBER: Final = np.zeros(0)
 """The draws of an object without a number."""
 
@@ -138,8 +137,7 @@ def _write_instance(scene: SceneNumbers, places: Places, draws: Any, params: Any
     """Write the parameters and the placement of an instance to `numbers`; return its `Placement.patch_row`."""
     draw_params(scene.nominal, scene.spread.stiffness, draws, params)
     for i in range(len(places.params)):
-        if places.params[i] != NO_PLACE:
-            numbers[places.params[i]] = params[i]
+        numbers[places.params[i]] = params[i]
     placement = placed(scene.spread, draws)
     numbers[places.width_m], numbers[places.offset_m] = placement.width_m, placement.offset_m
     if scene.has_cells == 1:

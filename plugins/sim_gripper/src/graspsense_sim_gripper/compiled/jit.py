@@ -9,7 +9,6 @@ from typing import Any, Final
 
 from graspsense.plugin_api import CompileOptions, Inlining, compile_function, first_call
 from graspsense_sim_gripper.dynamics.contact import _pressed, solve_contact
-from graspsense_sim_gripper.exact.propagate import cold_calls
 from graspsense_sim_gripper.stepping.advance import advance, attempt_of, move, take_step, take_steps
 from graspsense_sim_gripper.stepping.converge import refine_until_converged
 
@@ -25,7 +24,7 @@ _REMAIN_CALLS: Final = {
 
 def _remaining_calls(function: Callable[..., Any]) -> tuple[str, ...]:
     """Return the names of the functions that are not inlined in the code of this one."""
-    return _REMAIN_CALLS.get(function.__code__) or cold_calls(function)
+    return _REMAIN_CALLS.get(function.__code__, ())
 
 
 OPTIONS: Final = CompileOptions(
@@ -54,10 +53,10 @@ def compile_part(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 @contextmanager
-def generating(*, slp_vectorize: bool = False) -> Iterator[None]:
+def generating() -> Iterator[None]:
     """Context as of `first_call`, for a call of a compiled function that may be its first.
 
     Threads wait for each other here, so that the code is not generated twice. Raises NotCompilable if numba refuses.
     """
-    with COMPILING, first_call(slp_vectorize=slp_vectorize):
+    with COMPILING, first_call():
         yield

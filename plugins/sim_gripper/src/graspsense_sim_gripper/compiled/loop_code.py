@@ -175,9 +175,9 @@ def loop_start(params: GraspParams, state: SimulationState, types: LoopTypes | N
 class CompiledLoop:
     """The compiled loop of a composition for a controller. Its first grasp decides which numbers are integers."""
 
-    def __init__(self, composition: Composition, compiled: Callable[..., Ending]) -> None:
+    def __init__(self, compiled: Callable[..., Ending]) -> None:
         """Take the function that `compile_function` returned; its first call makes machine code."""
-        self._composition, self._compiled = composition, compiled
+        self._compiled = compiled
         self._machine_code: Callable[..., Ending] | None = None
         self._types: LoopTypes | None = None
 
@@ -195,7 +195,7 @@ class CompiledLoop:
         if self._machine_code is not None:
             end = self._machine_code(*arguments)
         else:
-            with generating(slp_vectorize=self._composition.shape is not None):
+            with generating():
                 end = self._compiled(*arguments)
             self._types, self._machine_code = types, entry_point(self._compiled)
         plant = state[types.before_plant : types.before_plant + types.plant.count]
@@ -224,7 +224,7 @@ class CompiledLoops:
             # Threads wait for each other, so that the functions of a loop are not found twice.
             with COMPILING:
                 if composition not in self._loops:
-                    self._loops[composition] = CompiledLoop(composition, _compiled(composition, self._step))
+                    self._loops[composition] = CompiledLoop(_compiled(composition, self._step))
         return self._loops[composition]
 
 

@@ -2,7 +2,7 @@
 
 Compiling takes seconds per composition. The objects of the catalogue have few kinds of terms among them. All of them
 therefore share one composition that contains each kind once; the terms that an object does not have are switched off.
-Any other object is compiled with the terms that its reduced model keeps. Forces are added from the last term to the
+Any other object is compiled with its own terms. Forces are added from the last term to the
 first, so that a term that is switched off changes no bit.
 """
 
@@ -15,10 +15,8 @@ from typing import Final, NamedTuple
 from attrs import frozen
 
 from graspsense_sim_gripper.compiled.compose import Composition, composition
-from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.dynamics.contact import ObjectModel
 from graspsense_sim_gripper.dynamics.state import Contact, ContactState, PlantState
-from graspsense_sim_gripper.exact.discretise import discretise
 from graspsense_sim_gripper.objects.library import catalogue
 from graspsense_sim_gripper.problem import GraspSetup
 from graspsense_sim_gripper.stepping.scheme import PlantParams
@@ -41,16 +39,13 @@ NOTHING: Final = Filler(Switchable(0, None), None)
 
 @frozen(eq=False)
 class PaddedLayout:
-    """The terms of a composition, and the positions of an object's own terms in it.
-
-    In `sources` and `places`, though not in `kinds`, the lumped spring and damper is at position 0.
-    """
+    """The terms of a composition, and the positions of an object's own terms in it."""
 
     kinds: tuple[str, ...]
     sources: tuple[tuple[int, Filler], ...]
     """For each position the index of the object's own term, or -1 and the placeholder in its stead."""
-    places: tuple[tuple[int, TermState], ...]
-    """For each of the object's own terms its position, or -1 and the state that it keeps."""
+    places: tuple[int, ...]
+    """For each of the object's own terms its position."""
 
 
 def layout_of(setup: GraspSetup, kinds: tuple[str, ...] | None = None) -> PaddedLayout:
@@ -59,7 +54,7 @@ def layout_of(setup: GraspSetup, kinds: tuple[str, ...] | None = None) -> Padded
         return _with_kinds(setup.kinds, kinds)
     if is_common(setup.kinds):
         return _with_kinds(setup.kinds, common_kinds())
-    return _with_kept(setup.kinds, tuple([term.active for term in setup.plant.object.terms[1:]]))
+    return _own_kinds(setup.kinds)
 
 
 @cache
@@ -76,15 +71,14 @@ def is_common(kinds: tuple[str, ...]) -> bool:
 
 
 def compiled_kinds(kinds: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the kinds in the composition of an object with these terms, if its reduced model keeps all of them."""
+    """Return the kinds in the composition of an object with these terms."""
     return common_kinds() if is_common(kinds) else kinds
 
 
-def composition_of(config: SimConfig, setup: GraspSetup, *, pad: bool = True) -> Composition:
+def composition_of(setup: GraspSetup, *, pad: bool = True) -> Composition:
     """Return the composition in which a grasp is compiled; not `pad`: with the object's own terms."""
-    exact = discretise(config, setup, on_arrays=True)
     kinds = layout_of(setup).kinds if pad else setup.kinds
-    return composition(kinds, setup.plant, None if exact is None else exact[1], has_palm=setup.has_palm)
+    return composition(kinds, setup.plant, has_palm=setup.has_palm)
 
 
 def padded(setup: GraspSetup, kinds: tuple[str, ...] | None = None) -> GraspSetup:
@@ -116,9 +110,7 @@ def padded(setup: GraspSetup, kinds: tuple[str, ...] | None = None) -> GraspSetu
 
 def unpadded(state: PlantState, layout: PaddedLayout) -> PlantState:
     """Return the state of the plant after a grasp in this layout, with the states of the object's own terms only."""
-    return _with_term_states(
-        state, lambda states: tuple([states[i] if i >= 0 else rest for i, rest in layout.places])
-    )
+    return _with_term_states(state, lambda states: tuple([states[i] for i in layout.places]))
 
 
 def _with_term_states(state: PlantState, of: Callable[[TermStates], TermStates]) -> PlantState:
@@ -135,21 +127,15 @@ def _with_term_states(state: PlantState, of: Callable[[TermStates], TermStates])
 
 @lru_cache(maxsize=256)
 def _with_kinds(own: tuple[str, ...], kinds: tuple[str, ...]) -> PaddedLayout:
-    sources = tuple((own.index(kind) + 1 if kind in own else -1, _filler(kind)) for kind in kinds)
-    places = tuple((kinds.index(kind) + 1, find_term(kind)[1].at_rest) for kind in own)
-    return PaddedLayout(kinds, ((0, NOTHING), *sources), ((0, None), *places))
+    sources = tuple((own.index(kind) if kind in own else -1, _filler(kind)) for kind in kinds)
+    return PaddedLayout(kinds, sources, tuple(kinds.index(kind) for kind in own))
 
 
 @lru_cache(maxsize=256)
-def _with_kept(own: tuple[str, ...], kept: tuple[int, ...]) -> PaddedLayout:
-    """Return the layout with the terms that a model keeps; `kept` is 1 for these. A kind may occur more than once."""
-    indices = [i for i, keeps in enumerate(kept) if keeps == 1]
-    sources = tuple((i + 1, NOTHING) for i in indices)
-    places = tuple(
-        (indices.index(i) + 1 if i in indices else -1, find_term(kind)[1].at_rest)
-        for i, kind in enumerate(own)
-    )
-    return PaddedLayout(tuple(own[i] for i in indices), ((0, NOTHING), *sources), ((0, None), *places))
+def _own_kinds(own: tuple[str, ...]) -> PaddedLayout:
+    """Return the layout of an object with its own terms only. A kind may occur more than once."""
+    places = range(len(own))
+    return PaddedLayout(own, tuple((i, NOTHING) for i in places), tuple(places))
 
 
 @lru_cache(maxsize=256)

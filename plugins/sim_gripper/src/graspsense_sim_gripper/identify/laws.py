@@ -16,7 +16,6 @@ from graspsense_sim_gripper.terms.elastic import Elastic
 from graspsense_sim_gripper.terms.foam import Foam
 from graspsense_sim_gripper.terms.gas import Gas
 from graspsense_sim_gripper.terms.loss import Loss
-from graspsense_sim_gripper.terms.lumped import LumpedSpringDamper
 from graspsense_sim_gripper.terms.maxwell import Maxwell
 from graspsense_sim_gripper.terms.registry import find_term
 from graspsense_sim_gripper.terms.rigid import Rigid
@@ -209,12 +208,11 @@ N_NUMBERS: Final = sum(len(one._fields) for one in _PARAMS)
 
 
 def terms_of(active: Any, numbers: Any, r: int) -> tuple[Switchable, ...]:
-    """Return the parameters of the terms of all slots from row r of the numbers. Runs compiled, so it spells them out.
+    """Return the parameters of the terms of all slots from row r of the numbers.
 
-    The first is the lumped spring of `terms.registry.laws_of`, which is switched off.
+    It runs compiled, so it spells them out.
     """
     return (
-        Switchable(0, LumpedSpringDamper(0.0, 0.0)),
         Switchable(int(active[0]), Elastic(float(numbers[r, 0]), float(numbers[r, 1]))),
         Switchable(int(active[1]), Rigid(float(numbers[r, 2]), float(numbers[r, 3]), float(numbers[r, 4]))),
         Switchable(int(active[2]), Maxwell(float(numbers[r, 5]), float(numbers[r, 6]))),

@@ -1,1 +1,1 @@
-"""The reduced model of an object that meets an accuracy: its selection, its verification and their cache."""
+"""The steps that meet an accuracy: their selection, their verification and their cache."""

@@ -1,8 +1,8 @@
-"""The cache of reduced models, in memory and on disk.
+"""The cache of chosen steps, in memory and on disk.
 
-A model depends on the settings, the object and the controller, and on the code of the simulator, the terms and the
+A choice depends on the settings, the object and the controller, and on the code of the simulator, the terms and the
 controller. In memory the key holds the settings, the object and the controller. On disk the key is a digest of these
-and of the code, so that a model is never used with other code. A file that cannot be read is ignored.
+and of the code, so that a choice is never used with other code. A file that cannot be read is ignored.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from graspsense.plugin_api import (
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.problem import ControllerStep, GraspController, Problem
 from graspsense_sim_gripper.reduction.levels import Level
-from graspsense_sim_gripper.reduction.model import Reduction, TermDecision, Verification
+from graspsense_sim_gripper.reduction.model import Decision, Reduction, Verification
 from graspsense_sim_gripper.stepping.scheme import Steps
 from graspsense_sim_gripper.terms.registry import active_laws
 from graspsense_sim_gripper.terms.term import OnSum, WorkingPoint
@@ -231,12 +231,10 @@ def restored(values: dict[str, Json]) -> Reduction:
     return Reduction(
         **{
             **values,
-            "treatment": tuple(values["treatment"]),
             "point": WorkingPoint(**values["point"]),
             "steps": Steps(**values["steps"]),
-            "decisions": tuple(TermDecision(**decision) for decision in values["decisions"]),
-            "scheme": TermDecision(**values["scheme"]),
-            "contact": TermDecision(**values["contact"]),
+            "decisions": tuple(Decision(**decision) for decision in values["decisions"]),
+            "unresolved": tuple(values["unresolved"]),
             "level": Level(**values["level"]),
             "verification": None if verification is None else _verification(verification),
         }

@@ -1,26 +1,25 @@
-"""Compressing an object along prescribed paths, to find how much each of its terms contributes to the force.
+"""Compressing an object along prescribed paths, to find how stiff and how damped its contact is.
 
-There are three paths: closing at the speed of the first contact, closing as fast as the gripping force can accelerate
-the fingers, and closing over the longest duration of a squeeze. Each path ends with a hold of `HOLD_S`.
+There are two paths: closing as fast as the gripping force can accelerate the fingers, and closing over the longest
+duration of a squeeze.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import Final
 
 from attrs import frozen
 
 from graspsense_sim_gripper.compiled.compose import contact_solver, hardens, uncompressed
 from graspsense_sim_gripper.dynamics.contact import ObjectModel
-from graspsense_sim_gripper.reduction.candidates import without_term
 from graspsense_sim_gripper.reduction.levels import MAX_BALANCE_RTOL
 from graspsense_sim_gripper.terms.term import WorkingPoint
 
 HOLD_S: Final = 1.0
-"""Duration of the rest at the end of each path."""
+"""Duration of the hold at a working point."""
 SQUEEZE_S: Final = 3.0
 """The longest duration of a squeeze: controllers give up after it."""
 POINTS: Final = 24
@@ -29,8 +28,6 @@ SEARCH_POINTS: Final = 12
 """The same where only the end of the path counts."""
 EARLY_POINTS: Final = 3
 """Number of further points within the first of these steps, to resolve the beginning of the contact."""
-MAX_CHANGE: Final = 0.5
-"""A relative change of the force above this is too large for any accuracy."""
 MIN_SPEED_M_S: Final = 1e-4
 """Slower contacts are probed at this speed."""
 MAX_DEPTH: Final = 0.9
@@ -43,7 +40,7 @@ MOST_FURTHER: Final = 4.0
 reached the force, or by the missing share of the force, but by no more than the last factor, where it did not. The
 search ends when the depth changes by less than the tolerance."""
 MIN_FORCE_N: Final = 1.0
-"""The change of a force is relative to the force, or to this value if the force is smaller."""
+"""A path that reaches less than this is lengthened as if it reached it."""
 
 
 @frozen(kw_only=True)
@@ -59,7 +56,7 @@ class ProbePath:
 
 
 class Grip:
-    """The full model of an object, its probe paths, and the forces on them. None of these depends on the accuracy.
+    """An object and its probe paths, which do not depend on the accuracy.
 
     `point` is the working point that the paths reach. `force_n` is the gripping force, `speed_m_s` the speed of the gap
     at the first contact, and `mass_kg` the mass that moves with the gap.
@@ -68,42 +65,12 @@ class Grip:
     def __init__(
         self, model: ObjectModel, kinds: tuple[str, ...], force_n: float, speed_m_s: float, mass_kg: float
     ) -> None:
-        # The forces are compared to parts of the accuracy, so their balance need not be that of a reference.
+        # Only orders of magnitude follow from the forces, so their balance need not be that of a reference.
         self.model, self.kinds = model._replace(balance_rtol=MAX_BALANCE_RTOL), kinds
         self.mass_kg = mass_kg
-        self.paths, self.point = _paths(self.model, kinds, force_n, max(speed_m_s, MIN_SPEED_M_S), mass_kg)
-        self._alternatives: list[list[tuple[str, float]]] | None = None
-
-    @cached_property
-    def forces(self) -> list[list[float]]:
-        """The forces (N) of the full model on each path."""
-        return [list(forces_along(self.model, self.kinds, path)) for path in self.paths]
-
-    def alternatives(self) -> list[list[tuple[str, float]]]:
-        """Return for each term the names of its simplifications, each with the error that it causes alone."""
-        if self._alternatives is None:
-            self._alternatives = [
-                [
-                    (name, self.error_of(other))
-                    for name, other in without_term(self.model, self.kinds, i, self.point)
-                ]
-                for i in range(len(self.kinds))
-            ]
-        return self._alternatives
-
-    def error_of(self, model: ObjectModel, max_error: float = MAX_CHANGE) -> float:
-        """Return the largest relative change of the force on the paths if `model` replaces the full model.
-
-        A change larger than `max_error`, or a force that is not finite, gives infinity.
-        """
-        worst = 0.0
-        for path, expected in zip(self.paths, self.forces, strict=True):
-            # The forces of the model are computed one by one, and only until `max_error` is exceeded.
-            for force, other in zip(forces_along(model, self.kinds, path), expected, strict=False):
-                worst = max(worst, abs(force - other) / max(abs(other), MIN_FORCE_N))
-                if not math.isfinite(force) or worst > max_error:
-                    return math.inf
-        return worst
+        self.fast, self.slow, self.point = _paths(
+            self.model, kinds, force_n, max(speed_m_s, MIN_SPEED_M_S), mass_kg
+        )
 
 
 def forces_along(model: ObjectModel, kinds: Sequence[str], path: ProbePath) -> Iterator[float]:
@@ -122,13 +89,11 @@ def stiffness(grip: Grip, dt_s: float) -> tuple[float, float]:
 
     The first is the force after a further step within a tick less the force after a tick at rest, over that step.
     """
-    model, path = grip.model, grip.paths[-1]
+    model, path = grip.model, grip.slow
     press = contact_solver(grip.kinds, hardens(model))
     contact = uncompressed(grip.kinds)
     largest, before, further_m = 0.0, 0.0, path.closures[-1] / POINTS
     for k, (closure, t, speed) in enumerate(zip(path.closures, path.times, path.speeds, strict=True)):
-        if speed == 0.0:
-            break
         (contact, _), before = press(model, contact, closure, speed, t - before), t
         if k % 4 < 3:
             continue
@@ -141,17 +106,17 @@ def stiffness(grip: Grip, dt_s: float) -> tuple[float, float]:
 
 
 @lru_cache(maxsize=64)
-def damping(grip: Grip, model: ObjectModel, dt_s: float) -> float:
-    """Return the damping (N s/m) of the pads and the object in this model, over a tick at the end of the fast path.
+def damping(grip: Grip, dt_s: float) -> float:
+    """Return the damping (N s/m) of the pads and the object, over a tick at the end of the fast path.
 
     It is the difference of the force at the closing speed and the force at a speed of 0, over the closing speed.
     """
     if not grip.kinds:
         return 0.0
-    fast = grip.paths[1]
+    model, fast = grip.model, grip.fast
     depth, speed = fast.closures[-1], fast.speeds[0]
     back = min(speed * dt_s, 0.5 * depth)
-    moving = _path(depth - back, (depth - back) / speed, 0.0, SEARCH_POINTS)
+    moving = _path(depth - back, (depth - back) / speed, SEARCH_POINTS)
     press, contact, before = contact_solver(grip.kinds, hardens(model)), uncompressed(grip.kinds), 0.0
     for closure, t in zip(moving.closures, moving.times, strict=True):
         contact, _ = press(model, contact, closure, speed, t - before)
@@ -162,8 +127,8 @@ def damping(grip: Grip, model: ObjectModel, dt_s: float) -> float:
 
 def _paths(
     model: ObjectModel, kinds: Sequence[str], force_n: float, speed_m_s: float, mass_kg: float
-) -> tuple[list[ProbePath], WorkingPoint]:
-    """Return the paths up to the expected force, and the working point that they reach."""
+) -> tuple[ProbePath, ProbePath, WorkingPoint]:
+    """Return the fast and the slow path up to the expected force, and the working point that they reach."""
     depth = _depth(model, kinds, force_n, speed_m_s)
     # A spring k that stops a mass m at a speed v bears the force v sqrt(k m).
     impact = speed_m_s * math.sqrt(force_n / depth * mass_kg)
@@ -174,12 +139,8 @@ def _paths(
     slow_depth = _depth(model, kinds, force_n, 0.0)
     # A step of force F on a mass m with a spring k reaches the speed F / sqrt(k m).
     fast = max(force_n / math.sqrt(force_n / depth * mass_kg), speed_m_s)
-    paths = [
-        _path(depth, depth / speed_m_s, HOLD_S),
-        _path(depth, depth / fast, HOLD_S),
-        _path(slow_depth, SQUEEZE_S, HOLD_S),
-    ]
-    return paths, WorkingPoint(slow_depth, speed_m_s, slow_depth / speed_m_s + HOLD_S, force_n)
+    point = WorkingPoint(slow_depth, speed_m_s, slow_depth / speed_m_s + HOLD_S, force_n)
+    return _path(depth, depth / fast), _path(slow_depth, SQUEEZE_S), point
 
 
 def _depth(model: ObjectModel, kinds: Sequence[str], force_n: float, speed_m_s: float) -> float:
@@ -190,7 +151,7 @@ def _depth(model: ObjectModel, kinds: Sequence[str], force_n: float, speed_m_s: 
     most = depth = MAX_DEPTH * max(model.width_m, 1e-4)
     for _ in range(MAX_WALKS):
         duration = depth / speed_m_s if speed_m_s > 0.0 else SQUEEZE_S
-        path = _path(depth, duration, 0.0, SEARCH_POINTS)
+        path = _path(depth, duration, SEARCH_POINTS)
         reached, largest_n = _reached(path.closures, forces_along(model, kinds, path), force_n)
         if reached is None:
             if depth == most:
@@ -220,18 +181,13 @@ def _reached(
     return None, largest_n
 
 
-def _path(depth_m: float, duration_s: float, hold_s: float, n: int = POINTS) -> ProbePath:
-    """Return a path that closes at constant speed in `n` steps and then rests, at points further and further apart."""
+def _path(depth_m: float, duration_s: float, n: int = POINTS) -> ProbePath:
+    """Return a path that closes at constant speed in `n` steps, the first of which is divided further."""
     speed = depth_m / duration_s
     early = (4.0**-k / n for k in range(EARLY_POINTS, 0, -1))
     shares = [*early, *((k + 1) / n for k in range(n))]
-    times = [duration_s * share for share in shares]
-    closures = [depth_m * share for share in shares]
-    speeds = [speed] * len(shares)
-    wait = min(1e-3, hold_s)
-    while 0.0 < wait <= hold_s * 1.0001:
-        times.append(duration_s + wait)
-        closures.append(depth_m)
-        speeds.append(0.0)
-        wait *= 10.0**0.5
-    return ProbePath(closures=tuple(closures), times=tuple(times), speeds=tuple(speeds))
+    return ProbePath(
+        closures=tuple(depth_m * share for share in shares),
+        times=tuple(duration_s * share for share in shares),
+        speeds=(speed,) * len(shares),
+    )

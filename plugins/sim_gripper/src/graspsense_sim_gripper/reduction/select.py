@@ -1,15 +1,14 @@
-"""Selecting the reduced model of an object: the first level whose trial grasp is accurate enough.
+"""Selecting the steps of the grasps of an object: the first level whose trial grasp is accurate enough.
 
-The first trial grasp has every term and a step per tick. It gives the speed at the contact and the peak force, for
-which models are proposed; a second one, in the full model with finer steps, corrects them where it has others. Each
-proposed model is then simulated in a trial grasp, and compared with a trial grasp in the full model with finer steps. A
-step per tick with every term is tried first, since it costs least; then levels from the largest tolerances to the
-smallest.
+The first trial grasp has a step per tick. It gives the speed at the contact and the peak force, for which steps are
+proposed; a second one, in finer steps, corrects them where it has others. The steps of each level are then tried in a
+trial grasp, and compared with a trial grasp in finer ones. A step per tick is tried first, since it costs least; then
+steps whose error is controlled, for the accuracy, a tenth and a hundredth of it.
 
-A model that passes is tried twice more, with a controller that reads slightly larger and slightly smaller values of
-force and travel. This finds a threshold that is met so closely that an error of this size makes the grasp continue a
-tick earlier or later. Both compared grasps may then be on the wrong side of the threshold, and a level with smaller
-steps is tried. If the last level fails as well, no model of the scene has the accuracy, and ConfigError says so.
+Steps that pass are tried twice more, with a controller that reads slightly larger and slightly smaller values of force
+and travel. This finds a threshold that is met so closely that an error of this size makes the grasp continue a tick
+earlier or later. Both compared grasps may then be on the wrong side of the threshold, and a level with smaller steps is
+tried. If the last level fails as well, no steps have the accuracy, and ConfigError says so.
 """
 
 from __future__ import annotations
@@ -24,14 +23,12 @@ from attrs import evolve
 
 from graspsense.plugin_api import ConfigError
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.exact.discretise import why_not_exact
 from graspsense_sim_gripper.objects.spec import ObjectSpec
 from graspsense_sim_gripper.problem import GraspController, Problem
 from graspsense_sim_gripper.reduction.cache import ReductionCache
-from graspsense_sim_gripper.reduction.candidates import reduced
 from graspsense_sim_gripper.reduction.error import deviation
-from graspsense_sim_gripper.reduction.levels import FULL_SCALES, REFERENCE_SCALES, LevelScale, scales_for
-from graspsense_sim_gripper.reduction.model import DROPPED, Reduction, TermDecision, Verification
+from graspsense_sim_gripper.reduction.levels import CONTROLLED, PLAIN, REFERENCE_SCALES, LevelScale
+from graspsense_sim_gripper.reduction.model import QUANTITIES, Decision, Reduction, Verification
 from graspsense_sim_gripper.reduction.own_features import NOT_READ
 from graspsense_sim_gripper.reduction.probe import Grip
 from graspsense_sim_gripper.reduction.propose import fixed, grip_of, plain, propose
@@ -41,20 +38,21 @@ from graspsense_sim_gripper.reduction.verify import (
     TooMuchWork,
     TrialGrasps,
     trial_grasps,
+    without_term,
 )
-from graspsense_sim_gripper.stepping.scheme import TR_BDF2, Steps
+from graspsense_sim_gripper.stepping.scheme import TR_BDF2
 from graspsense_sim_gripper.term_failure import raised_in_term
 from graspsense_sim_gripper.terms.term import LAW_ERRORS
 
 ACCEPTED_WITH_SPREAD: Final = 0.5
 ACCEPTED: Final = 0.8
-"""A model is accepted if the trial grasps differ by at most this share of the accuracy. With spread, the rest allows
+"""Steps are accepted if the trial grasps differ by at most this share of the accuracy. With spread, the rest allows
 for the differences between instances. Without spread, it allows for pad sensors and the errors of the trial grasps."""
 COARSE: Final = 0.03
 """From this accuracy upwards, a threshold that is met too closely is examined again with a tenth of the accuracy."""
 FINE: Final = 0.003
-"""Down from this accuracy, the full model to compare with takes twice as many steps per tick, because one of two grasps
-may resolve a short contact that the other misses."""
+"""Down from this accuracy, the grasp to compare with takes twice as many steps per tick, because one of two grasps may
+resolve a short contact that the other misses."""
 CULPRIT: Final = 0.2
 """A term is named as the cause of an error if less than this share of the error remains without the term."""
 
@@ -74,18 +72,18 @@ def select(
     compiled: bool = False,
     padding: tuple[str, ...] | None = None,
 ) -> Reduction:
-    """Return the reduced model of a problem's object, verified by trial grasps under the controller.
+    """Return the steps for a problem's object, verified by trial grasps under the controller.
 
-    Models are cached in memory and on disk, by everything that they depend on. The model is not verified, and its
-    `verification` is None, if the settings fix the model, prescribe the steps or ask for the reference, if the
-    controller raises in the first trial grasp, if the peak force cannot be resolved (`Reduction.contact`), or if the
-    trial grasps would take too much work (`MOST_WORK`).
+    They are cached in memory and on disk, by everything that they depend on. They are not verified, and their
+    `verification` is None, if the settings prescribe the steps or ask for the reference, if the controller raises in
+    the first trial grasp, if something cannot be resolved (`Reduction.unresolved`), or if the trial grasps would take
+    too much work (`MOST_WORK`).
 
     `compiled`: run the trial grasps compiled, if the controller can be compiled. `padding`: the kinds of terms in the
     compiled code, by default those of a batch. Both change the run time only.
 
-    Raises ConfigError if no model reaches the requested accuracy or a term raises an exception, TypeError if there is
-    no object.
+    Raises ConfigError if no steps reach the requested accuracy or a term raises an exception, TypeError if there is no
+    object.
     """
     if problem.config.fidelity == "fixed":
         return fixed(problem)
@@ -117,19 +115,18 @@ def select_anew(
 
 
 def _select_within_limit(problem: Problem, trial: TrialGrasps) -> Reduction:
-    """Return the model as `_select` does, or the unverified full model if the trial grasps take too much work."""
+    """Return the steps as `_select` does, or unverified ones if the trial grasps take too much work."""
     try:
         return _select(problem, trial)
     except TooMuchWork:
-        full = propose(problem, grip_of(problem), FULL_SCALES[0])
-    limit = TermDecision(
-        term="trial grasps",
-        decision="stopped at the limit: every term is kept, not verified",
+        found = propose(problem, grip_of(problem))
+    limit = Decision(
+        subject="trial grasps",
+        decision="stopped at the limit: not verified",
         what="ticks and steps",
         number=float(MOST_WORK),
-        error=math.inf,
     )
-    return evolve(full, decisions=(*full.decisions, limit))
+    return evolve(found, decisions=(*found.decisions, limit), unresolved=QUANTITIES)
 
 
 def _select(problem: Problem, trial: TrialGrasps) -> Reduction:
@@ -137,14 +134,14 @@ def _select(problem: Problem, trial: TrialGrasps) -> Reduction:
     config = problem.model_config
     if config.has_forced_steps or config.fidelity == "reference":
         return propose(problem, grip_of(problem))
-    scale = _reference_scale(config, FULL_SCALES[0])
+    scale = _reference_scale(config, CONTROLLED[0])
     expected = _gripped(trial, plain(problem))
     grip = grip_of(problem, *expected)
     reference = propose(problem, grip, scale)
-    if math.isinf(reference.contact.error):
+    if reference.unresolved:
         expected, grip = _UNKNOWN, grip_of(problem)
         reference = propose(problem, grip, scale)
-    if math.isinf(reference.contact.error):
+    if reference.unresolved:
         return propose(problem, grip)
     found = _gripped(trial, reference)
     if found == _UNKNOWN:
@@ -152,22 +149,24 @@ def _select(problem: Problem, trial: TrialGrasps) -> Reduction:
     if found != expected:
         grip = grip_of(problem, *found)
         reference = propose(problem, grip, scale)
-        if math.isinf(reference.contact.error):
+        if reference.unresolved:
             return propose(problem, grip)
     return _best(problem, grip, trial)
 
 
 def _gripped(trial: TrialGrasps, reduction: Reduction) -> tuple[float | None, float | None]:
-    """Return the peak force and the speed at the contact of a trial grasp in this model, to two digits.
+    """Return the peak force and the speed at the contact of a trial grasp in these steps, to two digits.
 
     They suffice: similar grasps then get the same proposals. `_UNKNOWN` if the grasp fails; a controller that raises
-    does so in the grasp of the run as well, and is reported there. Raises TooMuchWork.
+    does so in the grasp of the run as well, and is reported there. Raises TooMuchWork, and what a term raises.
     """
     try:
         grasp = trial.record(reduction)
     except TooMuchWork:
         raise
-    except Exception:
+    except Exception as error:
+        if isinstance(error, LAW_ERRORS) and raised_in_term(error, trial.setup.kinds):
+            raise
         return _UNKNOWN
     force_n, speed_m_s = (float(f"{value:.1e}") for value in (grasp.peak_n, grasp.contact_speed_m_s()))
     return (force_n, speed_m_s) if math.isfinite(force_n + speed_m_s) else _UNKNOWN
@@ -191,15 +190,11 @@ def _accepted(problem: Problem, grip: Grip, trial: TrialGrasps) -> Iterator[Redu
     config = problem.model_config
     least, quantity, grasps, n_accepted = math.inf, "", 1, 0
     near_threshold: Sensitivity | None = None
-    tried: set[tuple[tuple[str, ...], Steps]] = set()
-    for scale in scales_for(config.fidelity, config.spread, config.accuracy, _suits_explicit(problem, grip)):
+    scales = (PLAIN, *CONTROLLED) if _suits_explicit(problem, grip) else CONTROLLED
+    for scale in scales:
         if near_threshold and scale.at(config.accuracy).step_tol >= near_threshold.step_tol:
             continue
         reduction = propose(problem, grip, scale)
-        model = reduction.treatment, reduction.steps
-        if model in tried:
-            continue
-        tried.add(model)
         full = propose(problem, grip, _reference_scale(config, scale))
         expected = trial.record(full)
         error, of = deviation(trial.record(reduction), expected)
@@ -236,7 +231,7 @@ def _accepted(problem: Problem, grip: Grip, trial: TrialGrasps) -> Iterator[Redu
 def _is_confirmed(
     problem: Problem, grip: Grip, trial: TrialGrasps, reduction: Reduction, scale: LevelScale
 ) -> bool:
-    """Return whether the model also agrees with the full model in still smaller steps.
+    """Return whether the grasp also agrees with one in still smaller steps.
 
     A grasp that meets a threshold closely may be on one side of it in both grasps that were compared, and on the other
     in the exact grasp.
@@ -299,15 +294,12 @@ def _accepted_for_instances(
 
 
 def _suits_explicit(problem: Problem, grip: Grip) -> bool:
-    """Return whether explicit steps suit the full model: it is neither stiff nor linear (which takes no steps)."""
-    full = propose(problem, grip, FULL_SCALES[0])
-    if full.steps.scheme == TR_BDF2 or problem.nominal is None:
-        return False
-    return bool(why_not_exact(problem.model_config, reduced(problem.nominal, full)))
+    """Return whether explicit steps suit the object: it is not stiff."""
+    return propose(problem, grip).steps.scheme != TR_BDF2
 
 
 def _reference_scale(config: SimConfig, scale: LevelScale) -> LevelScale:
-    """Return the scale of the full model that a candidate of this scale is compared with."""
+    """Return the scale of the steps that a candidate of this scale is compared with."""
     reference = REFERENCE_SCALES[scale.refinement]
     factor = 2 if config.accuracy <= FINE else 1
     return reference._replace(min_steps=factor * reference.min_steps)
@@ -320,13 +312,13 @@ def _accepted_share(config: SimConfig) -> float:
 
 def _culprit(problem: Problem, grip: Grip, trial: TrialGrasps) -> str:
     """Return the kind of the term that makes the grasp depend on its steps; empty if no single term does."""
-    scale = FULL_SCALES[1]
+    scale = CONTROLLED[1]
     pair = [propose(problem, grip, s) for s in (scale, _reference_scale(problem.model_config, scale))]
     fine, finer = pair
     errors = {}
     for i, kind in enumerate(grip.kinds):
-        treatment = (*fine.treatment[:i], DROPPED, *fine.treatment[i + 1 :])
-        errors[kind] = deviation(*(trial.record(evolve(r, treatment=treatment)) for r in pair))[0]
+        without = trial.of(without_term(trial.setup, i))
+        errors[kind] = deviation(*(without.record(steps) for steps in pair))[0]
     with_all, _ = deviation(trial.record(fine), trial.record(finer))
     term = min(errors, key=errors.__getitem__, default="")
     return term if term and errors[term] < CULPRIT * with_all else ""

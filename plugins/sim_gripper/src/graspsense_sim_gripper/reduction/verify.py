@@ -1,7 +1,7 @@
-"""Trial grasps of the nominal object, in one reduced model after another.
+"""Trial grasps of the nominal object, in the steps of one level after another.
 
 A trial grasp uses ideal sensors and the controller of the run. It begins with open fingers and ends with the release.
-The approach depends on the steps, but not on the reduced model. It is therefore simulated once for each set of steps.
+The approach is simulated once for each set of steps.
 """
 
 from __future__ import annotations
@@ -33,7 +33,6 @@ from graspsense_sim_gripper.compiled.loop_code import CompiledLoops
 from graspsense_sim_gripper.compiled.padding import padded
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.dynamics.state import Motion, PlantState
-from graspsense_sim_gripper.exact.discretise import discretise
 from graspsense_sim_gripper.fingertip import CELLS
 from graspsense_sim_gripper.loop import (
     COLUMNS,
@@ -42,7 +41,6 @@ from graspsense_sim_gripper.loop import (
     ROWS_AT_ONCE,
     Buffers,
     GraspParams,
-    PlantModel,
     SimulationState,
     before_failure,
     has_ended,
@@ -50,13 +48,13 @@ from graspsense_sim_gripper.loop import (
 )
 from graspsense_sim_gripper.palm import NUMBERS, PalmBuffers
 from graspsense_sim_gripper.problem import GraspController, GraspSetup, Problem
-from graspsense_sim_gripper.reduction.candidates import reduced
-from graspsense_sim_gripper.reduction.error import GraspRecord, deviation
+from graspsense_sim_gripper.reduction.error import SCALES, UNIT_SCALES, GraspRecord, deviation
 from graspsense_sim_gripper.reduction.model import Reduction
 from graspsense_sim_gripper.reduction.own_features import OwnFeatures, beyond, own_features
 from graspsense_sim_gripper.sensing import Bias, PadBuffers
 from graspsense_sim_gripper.stepping.scheme import Steps
 from graspsense_sim_gripper.term_failure import TermFailed, not_finite_in_tick
+from graspsense_sim_gripper.terms.switchable import Switchable
 
 _LOG: Final = logging.getLogger(__name__)
 MAX_SECONDS: Final = 40.0
@@ -157,8 +155,8 @@ class TrialGrasps:
         return CompiledLoops(self.controller.step)
 
     def record(self, reduction: Reduction, force_n: float = 0.0, travel: float = 0.0) -> GraspRecord:
-        """Return the grasp in this model; the controller reads values with these errors (see `Sensitivity`)."""
-        key = (reduction.treatment, reduction.steps, force_n, travel)
+        """Return the grasp in these steps; the controller reads values with these errors (see `Sensitivity`)."""
+        key = (reduction.steps, force_n, travel)
         if key not in self._records:
             try:
                 self._records[key] = self._grasp(reduction, force_n, travel)
@@ -168,7 +166,7 @@ class TrialGrasps:
         return self._records[key]
 
     def features_beyond(self, reduction: Reduction, full: Reduction) -> tuple[str, ...]:
-        """Return the features of the pipeline that differ in this model from the full one by more than the accuracy.
+        """Return the features of the pipeline that differ from those in finer steps by more than the accuracy.
 
         Empty without a feature set, `own_features.NOT_READ` for one that ideal sensors do not suffice for.
         """
@@ -176,13 +174,28 @@ class TrialGrasps:
             return ()
         self.record(reduction)
         self.record(full)
-        grasp, expected = (self._features[one.treatment, one.steps] for one in (reduction, full))
+        grasp, expected = (self._features[one.steps] for one in (reduction, full))
         return beyond(grasp, expected, self.config.accuracy)
+
+    def values(self, reduction: Reduction) -> dict[str, tuple[float, float]]:
+        """Return the features of the pipeline and the peak force in these steps, each with the scale of its unit.
+
+        The features of the paper, if the pipeline has none or ideal sensors do not suffice for them.
+        """
+        record = self.record(reduction)
+        own = self._features.get(reduction.steps)
+        if own is None:
+            return {name: (value, SCALES[name]) for name, value in record.quantities.items()}
+        names, values, units = own.features.names, own.features.values, own.features.units
+        scales = [UNIT_SCALES.get(unit, 0.0) for unit in units]
+        return dict(zip(names, zip(values, scales, strict=True), strict=True)) | {
+            "peak": (record.peak_n, SCALES["peak"])
+        }
 
     def sensitivity(self, reduction: Reduction, expected: GraspRecord) -> Sensitivity:
         """Return the change of the grasp if the controller reads values that are as wrong as the model may be.
 
-        `expected` is the grasp in the full model. The grasp is simulated twice, with errors of either sign.
+        `expected` is the grasp in finer steps. The grasp is simulated twice, with errors of either sign.
         """
         exact, scale = self.record(reduction), reduction.level.step_tol
         difference_n = _force_difference_n(exact, expected)
@@ -194,7 +207,7 @@ class TrialGrasps:
 
     def _grasp(self, reduction: Reduction, force_n: float, travel: float) -> GraspRecord:
         """Simulate what `record` returns. Raises NotCompilable."""
-        setup = reduced(self.setup, reduction)
+        setup = evolve(self.setup, plant=reduction.applied_to(self.setup.plant))
         steps = None if self.only_near else _approach_steps(setup)
         if steps not in self._starts:
             self._starts[steps] = self._approach(setup)
@@ -205,7 +218,7 @@ class TrialGrasps:
         end = self._runner(setup, start.from_open)(setup.plant.steps, start, until)
         rows = np.concatenate(end.rows, axis=1)
         if self.features is not None and force_n == 0.0:
-            self._features[reduction.treatment, reduction.steps] = own_features(
+            self._features[reduction.steps] = own_features(
                 self.features, rows[:-1], rows[-1], compiled=self.compiled
             )
         return _record(end, rows, bias, setup.dt_s)
@@ -259,7 +272,7 @@ class TrialGrasps:
 
     def _runner(self, setup: GraspSetup, from_open: bool) -> Callable[[Steps, _Stage, int], _Stage]:
         """Return a function `run(steps, stage, until)` that continues a grasp of this model up to the tick `until`."""
-        on_arrays, loop, made, exact = self._loop(setup)
+        on_arrays, loop, made = self._loop(setup)
         buffers = _ideal_buffers(on_arrays)
         params = self.params if from_open else self.params_near
 
@@ -270,7 +283,7 @@ class TrialGrasps:
                 fresh = made.state.contact
                 contact = progress.plant.contact._replace(left=fresh.left, right=fresh.right)
                 progress = progress._replace(plant=progress.plant._replace(contact=contact))
-            plant = made.plant._replace(steps=steps) if exact is None else exact
+            plant = made.plant._replace(steps=steps)
             grasp_params = GraspParams(
                 plant,
                 made.sensor,
@@ -278,7 +291,7 @@ class TrialGrasps:
                 setup.dt_s,
                 until,
                 made.palm,
-                macro_steps=uses_macro_steps(exact, steps),
+                macro_steps=uses_macro_steps(steps),
             )
             while not has_ended(progress.controller) and progress.loop.ticks < until:
                 n_rows = min(until - progress.loop.ticks, CAPACITY) + ROWS_AT_ONCE
@@ -320,26 +333,18 @@ class TrialGrasps:
         # Compiling takes seconds too, but no work.
         if percent > 0 and time.monotonic() - self._reported_s > PROGRESS_S:
             _LOG.warning(
-                "selecting the model of the object: %d %% of the allowed ticks and steps used", percent
+                "selecting the steps for the object: %d %% of the allowed ticks and steps used", percent
             )
             self._reported_s = time.monotonic()
 
-    def _loop(
-        self, setup: GraspSetup
-    ) -> tuple[bool, Callable[..., SimulationState], GraspSetup, PlantModel | None]:
-        """Return whether the loop is compiled, the loop, its setup, and the exactly discretised plant or None.
-
-        Raises NotCompilable.
-        """
+    def _loop(self, setup: GraspSetup) -> tuple[bool, Callable[..., SimulationState], GraspSetup]:
+        """Return whether the loop is compiled, the loop, and its setup. Raises NotCompilable."""
         on_arrays = self.compiled
         made = padded(setup, self.padding) if on_arrays else setup
-        exact = discretise(self.config, made, on_arrays=on_arrays)
-        shape = None if exact is None else exact[1]
-        composed = composition(made.kinds, made.plant, shape, has_palm=made.has_palm)
-        model = None if exact is None else exact[0]
+        composed = composition(made.kinds, made.plant, has_palm=made.has_palm)
         if not on_arrays:
-            return False, grasp_loop(composed, self.controller.step), made, model
-        return True, self._loops.of(composed), made, model
+            return False, grasp_loop(composed, self.controller.step), made
+        return True, self._loops.of(composed), made
 
 
 def trial_grasps(
@@ -420,3 +425,11 @@ def _force_difference_n(grasp: GraspRecord, expected: GraspRecord) -> float:
     i = min(int(np.argmax(force >= CONTACT_FORCE_N)) for force in (forces, others))
     there = slice(max(i - 1, 0), i + 1)
     return float(np.max(np.abs(forces[there] - others[there])))
+
+
+def without_term(setup: GraspSetup, i: int) -> GraspSetup:
+    """Return the same grasp of the object without its term `i`."""
+    model = setup.plant.object
+    off = Switchable(0, model.terms[i].params)
+    terms = (*model.terms[:i], off, *model.terms[i + 1 :])
+    return evolve(setup, plant=setup.plant._replace(object=model._replace(terms=terms)))

@@ -9,12 +9,10 @@ interpreter and compiled; parameters and states are named tuples of floats and i
 
 from graspsense_sim_gripper.terms.term import (
     Law,
-    LinearForm,
     NoState,
-    OwnContact,
     Rate,
     Term,
     WorkingPoint,
 )
 
-__all__ = ["Law", "LinearForm", "NoState", "OwnContact", "Rate", "Term", "WorkingPoint"]
+__all__ = ["Law", "NoState", "Rate", "Term", "WorkingPoint"]

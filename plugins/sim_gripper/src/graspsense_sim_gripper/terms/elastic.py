@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final, NamedTuple
 
-from graspsense_sim_gripper.terms.term import Limit, LinearForm, NoState, Term, WorkingPoint
+from graspsense_sim_gripper.terms.term import NoState, Term
 
 LEAST_SLOPE: Final = 0.05
 """A shell softens until its slope is this share of k1, and keeps that slope from there on."""
@@ -67,16 +67,6 @@ def elastic(
     return shell_force(params.k1_n_m, params.k3_n_m3, d1), state
 
 
-def limits(params: Elastic, at: WorkingPoint) -> tuple[Limit, ...]:
-    """Return the linear spring k1, the limit of small compressions."""
-    return (Limit("spring", spring_n_m=params.k1_n_m),)
-
-
-def linear(params: Elastic) -> LinearForm | None:
-    """Return the spring k1; None if the shell stiffens or softens."""
-    return LinearForm(params.k1_n_m) if params.k3_n_m3 == 0.0 else None
-
-
 def refusal(params: Elastic) -> str:
     """Return why the shell has no stable law."""
     return unstable(params.k1_n_m, params.k3_n_m3)
@@ -87,8 +77,6 @@ TERM = Term(
     summary="elastic shell, k1 d + k3 d^3; softens with k3 < 0",
     params=Elastic,
     law=elastic,
-    limits=limits,
-    linear=linear,
     signed=("k3_n_m3",),
     refusal=refusal,
     stiffnesses=("k1_n_m", "k3_n_m3"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 from graspsense_sim_gripper.terms.maxwell import Maxwell, MaxwellState, maxwell
-from graspsense_sim_gripper.terms.term import Limit, LinearForm, Rate, Term, WorkingPoint
+from graspsense_sim_gripper.terms.term import Rate, Term, WorkingPoint
 
 LEAST_EXPONENT: Final = 0.2
 MOST_EXPONENT: Final = 20.0
@@ -56,38 +56,6 @@ def rates(params: Foam, at: WorkingPoint) -> tuple[Rate, ...]:
     return tuple(Rate("relaxes", 1.0 / tau) for stiffness, tau in arms if stiffness > 0.0)
 
 
-def limits(params: Foam, at: WorkingPoint) -> tuple[Limit, ...]:
-    """Return the power law alone; each branch becomes a spring if it is slow, or a damper if it is fast."""
-    spring = damper = 0.0
-    for stiffness, tau in ((params.arm1_n_m, params.tau1_s), (params.arm2_n_m, params.tau2_s)):
-        if tau > at.seconds:
-            spring += stiffness
-        else:
-            damper += stiffness * tau
-    bare = params._replace(arm1_n_m=0.0, arm2_n_m=0.0)
-    return (Limit("without arms", bare, spring, damper),)
-
-
-def linear(params: Foam) -> LinearForm | None:
-    """Return a spring with the two Maxwell branches if the exponent is 1, otherwise None."""
-    if params.exponent != 1.0:
-        return None
-    form = LinearForm(params.force_n / params.at_m)
-    if params.arm1_n_m == 0.0 and params.arm2_n_m == 0.0:
-        return form
-    # An absent branch must not determine the length of the steps.
-    first, second = (
-        1.0 / tau if stiffness > 0.0 else 0.0
-        for stiffness, tau in ((params.arm1_n_m, params.tau1_s), (params.arm2_n_m, params.tau2_s))
-    )
-    return form._replace(
-        rates=((-first, 0.0), (0.0, -second)),
-        by_compression=(0.0, 0.0),
-        by_speed=(params.arm1_n_m, params.arm2_n_m),
-        force=(1.0, 1.0),
-    )
-
-
 def refusal(params: Foam) -> str:
     """Return why there is no law with this exponent."""
     if params.exponent > MOST_EXPONENT:
@@ -110,8 +78,6 @@ TERM = Term(
     law=foam,
     at_rest=FoamState(0.0, 0.0),
     rates=rates,
-    limits=limits,
-    linear=linear,
     refusal=refusal,
     positive=("at_m", "exponent", "tau1_s", "tau2_s"),
     stiffnesses=("force_n", "arm1_n_m", "arm2_n_m"),

@@ -6,7 +6,7 @@ import math
 from typing import Final, NamedTuple
 
 from graspsense_sim_gripper.terms.phi import phi1, phi_ramp
-from graspsense_sim_gripper.terms.term import Limit, Rate, Term, WorkingPoint
+from graspsense_sim_gripper.terms.term import Rate, Term, WorkingPoint
 from graspsense_sim_gripper.terms.vent import conductance, vented
 
 LEAST_M3: Final = 1e-9
@@ -139,20 +139,6 @@ def rates(params: Gas, at: WorkingPoint) -> tuple[Rate, ...]:
     return tuple(found)
 
 
-def limits(params: Gas, at: WorkingPoint) -> tuple[Limit, ...]:
-    """Return the limits: a spring, or no vent, no heat exchange or neither, each isothermal or adiabatic."""
-    found = []
-    for name, exponent in (("isothermal", 1.0), ("adiabatic", params.exponent)):
-        give = _give(params.volume_m3, params.pressure_pa, exponent) + params.bulge_m3_pa
-        sealed = params._replace(vent_m2=0.0, heat_s=math.inf, exponent=exponent)
-        found.append(Limit(f"{name} spring", spring_n_m=params.area_m2 * params.area_m2 / give))
-        found.append(Limit(f"sealed, {name}", sealed))
-        if params.vent_m2 > 0.0:
-            found.append(Limit(name, sealed._replace(vent_m2=params.vent_m2)))
-    found.append(Limit("sealed", params._replace(vent_m2=0.0)))
-    return tuple(found)
-
-
 def beyond(state: GasState) -> str:
     """Return what happened if more volume was displaced than the gas had."""
     return (
@@ -169,7 +155,6 @@ TERM = Term(
     law=gas,
     at_rest=GasState(0.0),
     rates=rates,
-    limits=limits,
     positive=("volume_m3", "pressure_pa", "exponent", "heat_s"),
     beyond=beyond,
 )

@@ -6,7 +6,7 @@ import math
 from typing import Final, NamedTuple
 
 from graspsense_sim_gripper.terms.oscillator import Forcing, OscillatorState, moved
-from graspsense_sim_gripper.terms.term import Limit, LinearForm, Rate, Term, WorkingPoint
+from graspsense_sim_gripper.terms.term import Rate, Term, WorkingPoint
 
 GRAVITY_M_S2: Final = 9.80665
 
@@ -64,27 +64,6 @@ def rates(params: Liquid, at: WorkingPoint) -> tuple[Rate, ...]:
     return (Rate("swings", math.sqrt((k + wall) / mass)), Rate("relaxes", 0.5 * damping / mass))
 
 
-def limits(params: Liquid, at: WorkingPoint) -> tuple[Limit, ...]:
-    """Return the limits of a column that follows immediately, and of one that does not move."""
-    _, k, damping, wall = _seen(params)
-    return (
-        Limit("column that follows", None, k * wall / (k + wall), damping),
-        Limit("column that stands", None, wall),
-    )
-
-
-def linear(params: Liquid) -> LinearForm:
-    """Return the motion of the column behind the wall."""
-    mass, k, damping, wall = _seen(params)
-    return LinearForm(
-        spring_n_m=wall,
-        rates=((0.0, 1.0), (-(k + wall) / mass, -damping / mass)),
-        by_compression=(0.0, wall / mass),
-        by_speed=(0.0, 0.0),
-        force=(-wall, 0.0),
-    )
-
-
 TERM = Term(
     name="liquid",
     summary="liquid pressed up a neck: weight, viscosity and inertia, in series with the bulge of the wall",
@@ -92,7 +71,5 @@ TERM = Term(
     law=liquid,
     at_rest=OscillatorState(0.0, 0.0),
     rates=rates,
-    limits=limits,
-    linear=linear,
     positive=("area_m2", "neck_m2", "column_m", "bulge_m3_pa", "density_kg_m3"),
 )

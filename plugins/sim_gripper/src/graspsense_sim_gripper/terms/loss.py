@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from graspsense_sim_gripper.terms.term import Limit, LinearForm, NoState, Term, WorkingPoint
+from graspsense_sim_gripper.terms.term import NoState, Term
 
 
 class Loss(NamedTuple):
@@ -18,21 +18,9 @@ def loss(params: Loss, state: NoState, d0: float, d1: float, h: float, v1: float
     return params.damping_n_s_m * v1, state
 
 
-def limits(params: Loss, at: WorkingPoint) -> tuple[Limit, ...]:
-    """Return the damper, which is exact."""
-    return (Limit("damper", damper_n_s_m=params.damping_n_s_m),)
-
-
-def linear(params: Loss) -> LinearForm:
-    """Return the damper, which is exact."""
-    return LinearForm(0.0, params.damping_n_s_m)
-
-
 TERM = Term(
     name="loss",
     summary="damper on the compression; fitted where it is used",
     params=Loss,
     law=loss,
-    limits=limits,
-    linear=linear,
 )

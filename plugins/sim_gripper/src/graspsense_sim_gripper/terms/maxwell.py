@@ -6,7 +6,7 @@ import math
 from typing import NamedTuple
 
 from graspsense_sim_gripper.terms.phi import phi1, phi_ramp
-from graspsense_sim_gripper.terms.term import Limit, LinearForm, Rate, Term, WorkingPoint
+from graspsense_sim_gripper.terms.term import Rate, Term, WorkingPoint
 
 
 class Maxwell(NamedTuple):
@@ -38,21 +38,6 @@ def rates(params: Maxwell, at: WorkingPoint) -> tuple[Rate, ...]:
     return (Rate("relaxes", 1.0 / params.tau_s),)
 
 
-def limits(params: Maxwell, at: WorkingPoint) -> tuple[Limit, ...]:
-    """Return the damper of a branch that relaxes immediately, and the spring of one that does not relax."""
-    return (
-        Limit("damper", damper_n_s_m=params.k_n_m * params.tau_s),
-        Limit("spring", spring_n_m=params.k_n_m),
-    )
-
-
-def linear(params: Maxwell) -> LinearForm:
-    """Return the linear form q' = k d' - q / tau with the force q."""
-    return LinearForm(
-        rates=((-1.0 / params.tau_s,),), by_compression=(0.0,), by_speed=(params.k_n_m,), force=(1.0,)
-    )
-
-
 TERM = Term(
     name="maxwell",
     summary="viscoelastic branch, q' = k d' - q / tau",
@@ -60,8 +45,6 @@ TERM = Term(
     law=maxwell,
     at_rest=MaxwellState(0.0),
     rates=rates,
-    limits=limits,
-    linear=linear,
     positive=("tau_s",),
     stiffnesses=("k_n_m",),
 )

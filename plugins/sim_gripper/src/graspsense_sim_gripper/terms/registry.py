@@ -22,7 +22,6 @@ from graspsense_sim_gripper.terms import (
     surface,
     worn,
 )
-from graspsense_sim_gripper.terms.lumped import lumped
 from graspsense_sim_gripper.terms.switchable import switched, switched_on_sum
 from graspsense_sim_gripper.terms.term import Law, Moves, OnSum, Phase, Term, never_moves, one_phase
 
@@ -90,10 +89,7 @@ def in_order(names: Sequence[str]) -> list[int]:
 
 
 def laws_of(names: Sequence[str]) -> list[Law | OnSum]:
-    """Return the laws of an object with these terms: that of the lumped spring and damper, then that of each term.
-
-    The parameters of each are `Switchable`. Raises UnknownName.
-    """
+    """Return the laws of an object with these terms. The parameters of each are `Switchable`. Raises UnknownName."""
     return [
         OnSum(bind(switched_on_sum, on_sum=one.law)) if isinstance(one, OnSum) else bind(switched, law=one)
         for one in active_laws(names)
@@ -101,15 +97,15 @@ def laws_of(names: Sequence[str]) -> list[Law | OnSum]:
 
 
 def active_laws(names: Sequence[str]) -> list[Law | OnSum]:
-    """Return the laws that `laws_of` makes switchable: that of the lumped spring and damper, then that of each term."""
+    """Return the laws that `laws_of` makes switchable."""
     terms = [find_term(name)[1] for name in names]
-    return [lumped, *(term.law if term.on_sum is None else OnSum(term.on_sum) for term in terms)]
+    return [term.law if term.on_sum is None else OnSum(term.on_sum) for term in terms]
 
 
 def phases_of(names: Sequence[str]) -> list[tuple[int, Phase]]:
     """Return the terms with events among those of `laws_of`: the place of each, and its `phase`. Raises UnknownName."""
     terms = [find_term(name)[1] for name in names]
-    return [(i, term.phase) for i, term in enumerate(terms, 1) if term.phase is not one_phase]
+    return [(i, term.phase) for i, term in enumerate(terms) if term.phase is not one_phase]
 
 
 def moving_of(names: Sequence[str]) -> list[tuple[int, Moves]]:
@@ -118,4 +114,4 @@ def moving_of(names: Sequence[str]) -> list[tuple[int, Moves]]:
     Raises UnknownName.
     """
     terms = [find_term(name)[1] for name in names]
-    return [(i, term.moves) for i, term in enumerate(terms, 1) if term.moves is not never_moves]
+    return [(i, term.moves) for i, term in enumerate(terms) if term.moves is not never_moves]

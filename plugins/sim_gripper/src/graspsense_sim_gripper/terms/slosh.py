@@ -6,7 +6,7 @@ import math
 from typing import NamedTuple
 
 from graspsense_sim_gripper.terms.oscillator import Forcing, OscillatorState, moved
-from graspsense_sim_gripper.terms.term import LinearForm, Rate, Term, WorkingPoint
+from graspsense_sim_gripper.terms.term import Rate, Term, WorkingPoint
 
 
 class Slosh(NamedTuple):
@@ -41,20 +41,6 @@ def rates(params: Slosh, at: WorkingPoint) -> tuple[Rate, ...]:
     return (Rate("swings", w), Rate("relaxes", params.damping_ratio * w))
 
 
-def linear(params: Slosh) -> LinearForm:
-    """Return the motion of the mass relative to the wall."""
-    mass, w = params.mass_kg, 2.0 * math.pi * params.frequency_hz
-    a, square = params.damping_ratio * w, w * w
-    return LinearForm(
-        spring_n_m=mass * square,
-        damper_n_s_m=2.0 * a * mass,
-        rates=((0.0, 1.0), (-square, -2.0 * a)),
-        by_compression=(0.0, square),
-        by_speed=(0.0, 2.0 * a),
-        force=(-mass * square, -2.0 * a * mass),
-    )
-
-
 TERM = Term(
     name="slosh",
     summary="lightly damped mode of the contents, attached to the wall",
@@ -62,6 +48,5 @@ TERM = Term(
     law=slosh,
     at_rest=OscillatorState(0.0, 0.0),
     rates=rates,
-    linear=linear,
     positive=("mass_kg", "frequency_hz"),
 )

@@ -7,7 +7,7 @@ from typing import Final, NamedTuple
 
 from graspsense_sim_gripper.terms.oscillator import Forcing, OscillatorState, moved
 from graspsense_sim_gripper.terms.phi import phi1, phi_ramp
-from graspsense_sim_gripper.terms.term import Limit, LinearForm, OwnContact, Rate, Term, WorkingPoint
+from graspsense_sim_gripper.terms.term import Rate, Term, WorkingPoint
 
 MAX_CHECKS: Final = 64
 BISECTIONS: Final = 45
@@ -107,34 +107,6 @@ def rates(params: Surface, at: WorkingPoint) -> tuple[Rate, ...]:
     )
 
 
-def limits(params: Surface, at: WorkingPoint) -> tuple[Limit, ...]:
-    """Return the limits: without the mass, with a mass that does not move, and without mass and damper."""
-    _, k, _, contact = params
-    return (
-        Limit("springs in series", spring_n_m=k * contact / (k + contact)),
-        Limit("wall", spring_n_m=contact),
-        Limit("massless", params._replace(mass_kg=0.0)),
-    )
-
-
-def linear(params: Surface) -> OwnContact | None:
-    """Return the linear forms in contact and separated; None without mass and damper, where it is a plain spring."""
-    mass, k, damping, contact = params
-
-    def form(by: float) -> LinearForm:
-        if mass > 0.0:
-            rates = ((0.0, 1.0), (-(k + by) / mass, -damping / mass))
-            moved_by = (0.0, by / mass)
-        else:
-            rates = ((-(k + by) / damping, 0.0), (0.0, 0.0))
-            moved_by = (by / damping, 0.0)
-        return LinearForm(by, 0.0, rates, moved_by, (0.0, 0.0), (-by, 0.0))
-
-    if mass <= 0.0 and damping <= 0.0:
-        return None
-    return OwnContact(form(contact), form(0.0), (-1.0, 0.0))
-
-
 TERM = Term(
     name="surface",
     summary="mass on a spring and a damper behind a contact that can only push",
@@ -143,8 +115,7 @@ TERM = Term(
     at_rest=OscillatorState(0.0, 0.0),
     rates=rates,
     moves=moves,
-    limits=limits,
-    linear=linear,
+    divides_steps=True,
     positive=("mass_kg", "k_n_m", "contact_n_m"),
     stiffnesses=("k_n_m",),
 )

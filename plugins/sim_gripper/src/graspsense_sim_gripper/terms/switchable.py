@@ -1,14 +1,13 @@
 """A term that can be switched off by a parameter.
 
-All reduced models of an object are therefore one composition, which is compiled once.
+All objects of the catalogue are therefore one composition, which is compiled once.
 """
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
-from graspsense_sim_gripper.terms.lumped import lumped
-from graspsense_sim_gripper.terms.term import Law, SumLaw, TermParams, TermState
+from graspsense_sim_gripper.terms.term import Law, SumLaw, TermParams, TermState, no_force
 
 
 class Switchable(NamedTuple):
@@ -22,7 +21,7 @@ def _unchanged(params: TermParams, state: TermState, force_n: float, d1: float) 
     return force_n, state
 
 
-law: Law = lumped
+law: Law = no_force
 on_sum: SumLaw = _unchanged
 
 

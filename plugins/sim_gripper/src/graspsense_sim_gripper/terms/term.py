@@ -52,60 +52,6 @@ class Rate(NamedTuple):
     per_s: float
 
 
-class Limit(NamedTuple):
-    """A limit of a term for fast or slow states: a spring and a damper, or the term with other parameters."""
-
-    name: str
-    params: TermParams = None
-    """The parameters of the term in this limit; None if only the spring and the damper remain."""
-    spring_n_m: float = 0.0
-    damper_n_s_m: float = 0.0
-
-
-class LinearForm(NamedTuple):
-    """The linear form of a term: its states s follow s' = A s + b d + c d', and its force is k d + g d' + f s.
-
-    d is the compression (m); the states are the fields of the state of the term in their order, all floats. A form
-    without `rates` does not change the state.
-    """
-
-    spring_n_m: float = 0.0
-    """k"""
-    damper_n_s_m: float = 0.0
-    """g, not negative"""
-    rates: tuple[tuple[float, ...], ...] = ()
-    """A, one row for each state"""
-    by_compression: tuple[float, ...] = ()
-    """b"""
-    by_speed: tuple[float, ...] = ()
-    """c"""
-    force: tuple[float, ...] = ()
-    """f"""
-
-
-class OwnContact(NamedTuple):
-    """The linear forms of a term with an internal contact, closed and open; the force is continuous between them.
-
-    The contact is closed if d + reach s (m) is positive.
-    """
-
-    touching: LinearForm
-    parted: LinearForm
-    reach: tuple[float, ...]
-
-
-def not_linear(params: TermParams) -> LinearForm | OwnContact | None:
-    """Return None: the term has no linear form."""
-    del params
-    return None
-
-
-def no_limits(params: TermParams, at: WorkingPoint) -> tuple[Limit, ...]:
-    """Return no limits: the term is either kept or dropped."""
-    del params, at
-    return ()
-
-
 def no_rates(params: TermParams, at: WorkingPoint) -> tuple[Rate, ...]:
     """Return the rates of a term that declares none: unknown if it has a state."""
     del params, at
@@ -168,10 +114,9 @@ class Term:
     law: Law
     at_rest: TermState = NO_STATE
     rates: Callable[[TermParams, WorkingPoint], tuple[Rate, ...]] = no_rates
-    limits: Callable[[TermParams, WorkingPoint], tuple[Limit, ...]] = no_limits
-    """The limits that can replace the term, the cheapest first; the simulator compares the resulting forces."""
-    linear: Callable[[TermParams], LinearForm | OwnContact | None] = not_linear
-    """Its linear form with these parameters, or None. A scene can be discretised exactly if every term has one."""
+    divides_steps: bool = False
+    """Whether the law divides a step by itself to resolve the oscillation that its rates give, as a contact inside of
+    the term needs it. For any other term the simulator takes steps that are short enough."""
     positive: tuple[str, ...] = ()
     signed: tuple[str, ...] = ()
     refusal: Callable[[TermParams], str] = never_refused
