@@ -28,6 +28,7 @@ from graspsense.plugin_api import (
     setting,
 )
 from graspsense_robotiq_2f85.fake import Fake
+from graspsense_robotiq_2f85.faults import STATUS_BITS, bit_of
 from graspsense_robotiq_2f85.modbus import Client, NoReply, opened
 from graspsense_robotiq_2f85.registers import (
     ACTIVE,
@@ -133,6 +134,7 @@ class Robotiq2F85(SensorBackend[Robotiq2F85Config]):
             speed_limit_m_s=SPEEDS_M_S[1],
             opening=Command(POSITION, OPEN_M, inf, 0.05),
             relaxed=Command(VELOCITY, 0.0, inf, inf),
+            status_bits=STATUS_BITS,
             numbers={"newtons_per_ampere": self.config.newtons_per_ampere},
             notes=(
                 "effort is the motor's current times gripper.newtons_per_ampere, an assumption unless you measured it",
@@ -160,7 +162,7 @@ class Robotiq2F85(SensorBackend[Robotiq2F85Config]):
         effort = status.current * AMPERES_A_STEP * self.config.newtons_per_ampere
         self._frames += 1
         return Reading(
-            Frame(t_s, dt_s, gap_m, velocity, effort, nan, nan, nan, nan, status.fault | status.objects << 4),
+            Frame(t_s, dt_s, gap_m, velocity, effort, nan, nan, nan, nan, bit_of(status.fault)),
             NO_PADS,
         )
 
