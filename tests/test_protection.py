@@ -185,6 +185,11 @@ def test_fingers_that_stop_without_a_feeling_are_released():
     assert after_s < 0.3
 
 
+def test_fingers_that_are_closed_are_not_stalled():
+    # From 90 mm at 10 mm/s to the end of the stroke, without an object.
+    assert Approach(seconds=8.8).go(2.0, speed=0.0)[0] is None
+
+
 def test_fingers_that_have_not_moved_yet_are_not_stalled():
     assert Approach(seconds=0.0).go(2.0, speed=0.0)[0] is None
 

@@ -43,6 +43,8 @@ MOVED_M: Final = 0.001
 """Travel after which the fingers have overcome static friction: a later stop is not the start of the motion."""
 STALL_M: Final = 0.0005
 """Travel within which a stalled motor is searched for."""
+CLOSED_M: Final = 0.003
+"""Gap at which the fingers are closed: what then stands still has nothing between it."""
 STALL_SHARE: Final = 0.2
 """Share of the approach speed below which the motor counts as stalled."""
 SHARP_M: Final = 0.0015
@@ -233,7 +235,7 @@ class Touch:
             return None
         # One pad alone, and both of them, have bounds of their own.
         felt = self._left.felt or self._right.felt
-        if phase != APPROACH or felt or not self._has_moved(frame):
+        if phase != APPROACH or felt or frame.gap_m <= CLOSED_M or not self._has_moved(frame):
             return None
         elapsed_s = frame.t_s - self._moved_t_s
         if elapsed_s < max(self._allowed_s(STALL_M / STALL_SHARE), 2.0 * LEAST_S):
