@@ -1,7 +1,7 @@
 """The rules by which C4.5 splits and prunes: gain, gain ratio, least weights, tolerances.
 
-All functions but `choose_attribute` are elementwise, on numbers and on arrays. Both forms of the builder call them. W is
-the weight at a node, T the weight of its rows that know the value of the attribute, and L(x) = x ln x. Gains are in
+All functions but `choose_attribute` are elementwise, on numbers and on arrays. Both forms of the builder call them. W
+is the weight at a node, T the weight of its rows that know the value of the attribute, and L(x) = x ln x. Gains are in
 bits.
 
 Source: Quinlan, C4.5: Programs for Machine Learning (1993), sections 2.2 to 2.4 (gain, gain ratio, tests on numbers)
