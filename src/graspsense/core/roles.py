@@ -549,5 +549,6 @@ class Classifier(ABC, Generic[ConfigT]):
     def from_json(self, model: Mapping[str, Any]) -> None:
         """Load a model that `to_json` returned. Nothing that the model names may be executed or imported.
 
-        Raises KeyError, TypeError, ValueError or DataDamaged if the values are not such a model.
+        Raises KeyError, TypeError, ValueError or DataDamaged if the values are not such a model. A model file comes
+        from anywhere: `StoredValues` checks types, ranges and sizes before anything is made of them.
         """
