@@ -74,25 +74,32 @@ def extract_again(
     """
     _refuse_other_tables(options)
     resolved: dict[str, Settings] = {}
+    refused: dict[str, ConfigError] = {}
     found: dict[int, ExtractedAgain] = {}
     unreadable: list[UnreadableRecording] = []
     settings = None
     for done, number in enumerate(numbers):
-        recording = f"store:{store.folder}#{number}"
+        recording, text = f"store:{store.folder}#{number}", ""
         try:
             with readable(recording):
                 recorded = store.trial(number).record.settings
                 own = {table: keys for table, keys in recorded.items() if table != "gripper"}
                 text = json.dumps(own, sort_keys=True)
+                if text in refused:
+                    raise refused[text]
                 if text not in resolved:
                     resolved[text] = _resolved(own, recording, options, flags)
                 found[number] = _extracted(resolved[text], recording, checkpoints_s)
                 settings = resolved[text]
-        except DataDamaged as error:
+        except (ConfigError, DataDamaged) as error:
+            if isinstance(error, ConfigError):
+                refused[text] = error
             unreadable.append(UnreadableRecording(source=recording, error=error))
         if progress is not None:
             progress(done + 1, len(numbers))
     if settings is None:
+        if unreadable and all(isinstance(one.error, ConfigError) for one in unreadable):
+            raise unreadable[0].error  # a mistake in the options, not in the recordings
         if unreadable:
             raise error_of_all(unreadable)
         raise ConfigError(f"the store in {store.folder} has no trial to extract features from")
