@@ -235,6 +235,7 @@ def restored(values: dict[str, Json]) -> Reduction:
             "steps": Steps(**values["steps"]),
             "decisions": tuple(Decision(**decision) for decision in values["decisions"]),
             "unresolved": tuple(values["unresolved"]),
+            "left_out": tuple(values["left_out"]),
             "level": Level(**values["level"]),
             "verification": None if verification is None else _verification(verification),
         }

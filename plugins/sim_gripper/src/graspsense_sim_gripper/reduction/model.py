@@ -8,6 +8,7 @@ from attrs import asdict, field, frozen
 
 from graspsense_sim_gripper.reduction.levels import Level, balance_rtol
 from graspsense_sim_gripper.stepping.scheme import PlantParams, Steps
+from graspsense_sim_gripper.terms.switchable import switched_off
 from graspsense_sim_gripper.terms.term import WorkingPoint
 
 QUANTITIES: Final = ("peak", "trace", "features")
@@ -56,6 +57,8 @@ class Reduction:
     """The natural frequency of the stiffest contact times the tick."""
     unresolved: tuple[str, ...]
     """Those of `QUANTITIES` that the steps cannot resolve, so that no trial grasp can verify them."""
+    left_out: tuple[int, ...]
+    """The places of terms that oscillate so fast that no steps resolve them. They are switched off."""
     oscillates: bool
     """Whether a term has a state that oscillates, or a state without declared rates."""
     level: Level
@@ -90,7 +93,8 @@ class Reduction:
 
     def applied_to(self, plant: PlantParams) -> PlantParams:
         """Return the plant of an instance with these steps."""
-        model = plant.object._replace(overshoots=1 if self.oscillates else 0)
+        terms = switched_off(plant.object.terms, self.left_out) if self.left_out else plant.object.terms
+        model = plant.object._replace(terms=terms, overshoots=1 if self.oscillates else 0)
         if self.steps.settle == 0.0:
             model = model._replace(balance_rtol=balance_rtol(self.level.step_tol))
         return PlantParams(plant.drive, model, self.steps)

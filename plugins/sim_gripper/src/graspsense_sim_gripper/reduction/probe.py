@@ -106,14 +106,14 @@ def stiffness(grip: Grip, dt_s: float) -> tuple[float, float]:
 
 
 @lru_cache(maxsize=64)
-def damping(grip: Grip, dt_s: float) -> float:
-    """Return the damping (N s/m) of the pads and the object, over a tick at the end of the fast path.
+def damping(grip: Grip, model: ObjectModel, dt_s: float) -> float:
+    """Return the damping (N s/m) of the pads and the object in this model, over a tick at the end of the fast path.
 
     It is the difference of the force at the closing speed and the force at a speed of 0, over the closing speed.
     """
     if not grip.kinds:
         return 0.0
-    model, fast = grip.model, grip.fast
+    fast = grip.fast
     depth, speed = fast.closures[-1], fast.speeds[0]
     back = min(speed * dt_s, 0.5 * depth)
     moving = _path(depth - back, (depth - back) / speed, SEARCH_POINTS)

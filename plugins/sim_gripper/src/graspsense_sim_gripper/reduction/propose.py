@@ -30,6 +30,7 @@ from graspsense_sim_gripper.reduction.model import QUANTITIES, Decision, Reducti
 from graspsense_sim_gripper.reduction.probe import Grip, damping, stiffness
 from graspsense_sim_gripper.stepping.scheme import BOGACKI_SHAMPINE, MEAN_FORCE, TR_BDF2, VERLET, Steps
 from graspsense_sim_gripper.terms.registry import find_term
+from graspsense_sim_gripper.terms.switchable import Switchable, switched_off
 from graspsense_sim_gripper.terms.term import NO_STATE, Term, WorkingPoint, no_rates
 
 FORCE_N: Final = 20.0
@@ -52,7 +53,7 @@ MAX_SWING_RAD: Final = 1.0
 """The angle of the fastest oscillation of a term over a step: the square root of this share of the accuracy, at most
 one radian. Longer steps see an oscillation at a few phases only, and the error estimate does not notice it."""
 MOST_SWING_STEPS: Final = 500
-"""An oscillation that needs more steps a tick is not resolved, and the report says so."""
+"""An oscillation that needs more steps a tick is not resolved: its term is left out, and the report says so."""
 SCHEMES: Final = {
     VERLET: "Verlet",
     TR_BDF2: "TR-BDF2",
@@ -85,7 +86,8 @@ def propose(problem: Problem, grip: Grip, scale: LevelScale = CONTROLLED[0]) -> 
     angle = min(math.sqrt(SWING_SHARE * level.step_tol), MAX_SWING_RAD)
     swings = _frequencies(grip.kinds, grip.model, grip.point)
     too_fast = {i: per_s for i, per_s in swings.items() if per_s * dt_s > MOST_SWING_STEPS * angle}
-    damping_rate = (drive.friction.damping_n_s_m + damping(grip, dt_s)) / grip.mass_kg
+    model = grip.model._replace(terms=switched_off(grip.model.terms, tuple(too_fast)))
+    damping_rate = (drive.friction.damping_n_s_m + damping(grip, model, dt_s)) / grip.mass_kg
     stiffnesses = stiffness(grip, dt_s)
     frequency = max(math.sqrt(max(stiffnesses[0], 0.0) / grip.mass_kg), *too_fast.values(), 0.0) * dt_s
     resolved = max(stiffnesses) <= 1.05 * STIFFEST_N_M and frequency <= 1.05
@@ -116,7 +118,7 @@ def propose(problem: Problem, grip: Grip, scale: LevelScale = CONTROLLED[0]) -> 
             *(
                 Decision(
                     subject=grip.kinds[i],
-                    decision="its oscillation is not resolved",
+                    decision="left out: its oscillation is not resolved",
                     what="angle in a tick (rad)",
                     number=per_s * dt_s,
                 )
@@ -125,7 +127,8 @@ def propose(problem: Problem, grip: Grip, scale: LevelScale = CONTROLLED[0]) -> 
         ),
         frequency=frequency,
         unresolved=QUANTITIES if too_fast else () if resolved else QUANTITIES[1:],
-        oscillates=_any_oscillates(grip.kinds, [term.params for term in grip.model.terms], grip.point),
+        left_out=tuple(too_fast),
+        oscillates=_any_oscillates(grip.kinds, model.terms, grip.point),
         level=level,
     )
 
@@ -154,7 +157,8 @@ def fixed(problem: Problem) -> Reduction:
         ),
         frequency=0.0,
         unresolved=(),
-        oscillates=_any_oscillates(setup.kinds, setup.terms, USUAL_POINT),
+        left_out=(),
+        oscillates=_any_oscillates(setup.kinds, setup.plant.object.terms, USUAL_POINT),
         level=level,
     )
 
@@ -213,10 +217,11 @@ def _with_settings(steps: Steps, config: SimConfig) -> Steps:
     return steps
 
 
-def _any_oscillates(kinds: Sequence[str], terms: Sequence[TermParams], point: WorkingPoint) -> bool:
-    """Return whether a term has a state that oscillates, or a state without declared rates."""
+def _any_oscillates(kinds: Sequence[str], terms: Sequence[Switchable], point: WorkingPoint) -> bool:
+    """Return whether an active term has a state that oscillates, or a state without declared rates."""
     return any(
-        _oscillates(find_term(kind)[1], params, point) for kind, params in zip(kinds, terms, strict=True)
+        term.active == 1 and _oscillates(find_term(kind)[1], term.params, point)
+        for kind, term in zip(kinds, terms, strict=True)
     )
 
 

@@ -54,7 +54,7 @@ from graspsense_sim_gripper.reduction.own_features import OwnFeatures, beyond, o
 from graspsense_sim_gripper.sensing import Bias, PadBuffers
 from graspsense_sim_gripper.stepping.scheme import Steps
 from graspsense_sim_gripper.term_failure import TermFailed, not_finite_in_tick
-from graspsense_sim_gripper.terms.switchable import Switchable
+from graspsense_sim_gripper.terms.switchable import switched_off
 
 _LOG: Final = logging.getLogger(__name__)
 MAX_SECONDS: Final = 40.0
@@ -156,7 +156,7 @@ class TrialGrasps:
 
     def record(self, reduction: Reduction, force_n: float = 0.0, travel: float = 0.0) -> GraspRecord:
         """Return the grasp in these steps; the controller reads values with these errors (see `Sensitivity`)."""
-        key = (reduction.steps, force_n, travel)
+        key = (reduction.steps, reduction.left_out, force_n, travel)
         if key not in self._records:
             try:
                 self._records[key] = self._grasp(reduction, force_n, travel)
@@ -430,6 +430,5 @@ def _force_difference_n(grasp: GraspRecord, expected: GraspRecord) -> float:
 def without_term(setup: GraspSetup, i: int) -> GraspSetup:
     """Return the same grasp of the object without its term `i`."""
     model = setup.plant.object
-    off = Switchable(0, model.terms[i].params)
-    terms = (*model.terms[:i], off, *model.terms[i + 1 :])
-    return evolve(setup, plant=setup.plant._replace(object=model._replace(terms=terms)))
+    model = model._replace(terms=switched_off(model.terms, (i,)))
+    return evolve(setup, plant=setup.plant._replace(object=model))

@@ -5,6 +5,7 @@ All objects of the catalogue are therefore one composition, which is compiled on
 
 from __future__ import annotations
 
+from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
 from graspsense_sim_gripper.terms.term import Law, SumLaw, TermParams, TermState, no_force
@@ -15,6 +16,11 @@ class Switchable(NamedTuple):
 
     active: int
     params: TermParams
+
+
+def switched_off(terms: Sequence[Switchable], which: Collection[int]) -> tuple[Switchable, ...]:
+    """Return these terms, with those at the places `which` switched off."""
+    return tuple([Switchable(0, term.params) if i in which else term for i, term in enumerate(terms)])
 
 
 def _unchanged(params: TermParams, state: TermState, force_n: float, d1: float) -> tuple[float, TermState]:
