@@ -42,11 +42,11 @@ LEAST_SAMPLES: Final = 6
 WIDTH_WEIGHT: Final = 0.01
 """Weight of a force at the contact in the least squares. Where a single sample precedes the critical compression, it
 does not determine both stiffness and width: then the width is the first estimate."""
-
 RIDGE: Final = np.diag([WIDTH_WEIGHT**2, 1e-12, 1e-12, 1e-12])
-"""Added to the normal equations; the others only keep them solvable where no sample shows a number."""
+"""Added to the normal equations: the weight of the width, and small numbers that keep the equations solvable where no
+sample shows a stiffness or a drop."""
 LEAST_NUMBER: Final = 1e-6
-"""Stiffness and drop that no sample shows are smaller."""
+"""A stiffness or a drop, over those of the squeeze, that is smaller is shown by no sample."""
 
 
 class _Load(NamedTuple):
@@ -56,8 +56,8 @@ class _Load(NamedTuple):
     force: Floats
 
 
-class _Tried(NamedTuple):
-    """What follows from corners: arrays with one entry, or one row of numbers, for each pair."""
+class _Corners(NamedTuple):
+    """Pairs of corners over the largest compression, and what follows from them: an entry or a row for each pair."""
 
     critical: Floats
     fall: Floats
@@ -71,16 +71,17 @@ def with_corners(model: ForwardModel, law: CandidateLaw, squeezes: Sequence[Sque
     """Return the law with further starts at the corners that the squeezes show, if it is a snap-through alone."""
     if law.slots != (SNAP,):
         return law
-    parts = [_loading(model, squeeze) for squeeze in squeezes]
-    parts = [one for one in parts if len(one.force) >= LEAST_SAMPLES]
-    if not parts:
+    loads_m = [_loading(model, squeeze) for squeeze in squeezes]
+    # Through the fingertips, a hard object has no compression but that of the noise.
+    loads_m = [load for load in loads_m if len(load.force) >= LEAST_SAMPLES and load.compression[-1] > 0.0]
+    if not loads_m:
         return law
-    depth = float(np.median([one.compression[-1] for one in parts]))
-    loads = [one._replace(compression=one.compression / depth) for one in parts]
-    peak_n = float(np.median([one.peak_n for one in squeezes]))
-    starts = [_start(law, one, depth, peak_n) for one in _minima(loads)]
+    depth = float(np.median([load.compression[-1] for load in loads_m]))
+    loads = [load._replace(compression=load.compression / depth) for load in loads_m]
+    peak_n = float(np.median([squeeze.peak_n for squeeze in squeezes]))
+    starts = [_start(corners, depth, peak_n) for corners in _minima(loads)]
     # The error of the width by the force at the contact is itself in error by noise.
-    return evolve(law, more_starts=(*starts, *(one._replace(wider_m=0.0) for one in starts)))
+    return evolve(law, more_starts=(*starts, *(start._replace(wider_m=0.0) for start in starts)))
 
 
 def _loading(model: ForwardModel, squeeze: Squeeze) -> _Load:
@@ -92,30 +93,30 @@ def _loading(model: ForwardModel, squeeze: Squeeze) -> _Load:
     return _Load(compression[part], force[part])
 
 
-def _minima(loads: Sequence[_Load]) -> list[_Tried]:
+def _minima(loads: Sequence[_Load]) -> list[_Corners]:
     """Return the best minima over the corners, the best one first, each with a single pair of corners."""
-    critical, fall = (one.ravel() for one in np.meshgrid(CRITICAL, FALL, indexing="ij"))
+    critical, fall = (axis.ravel() for axis in np.meshgrid(CRITICAL, FALL, indexing="ij"))
     tried = _at_corners(loads, critical, fall)
     cost = tried.cost.reshape(len(CRITICAL), len(FALL))
     bordered = np.pad(cost, 1, constant_values=np.inf)
     neighbours = np.lib.stride_tricks.sliding_window_view(bordered, (3, 3)).min(axis=(2, 3))
     minima = np.flatnonzero((cost <= neighbours) & np.isfinite(cost))
     minima = minima[np.argsort(tried.cost[minima], kind="stable")][:TRIED]
-    found = sorted((_refined(loads, _row(tried, k)) for k in minima.tolist()), key=lambda one: one.cost[0])
+    refined = [_refined(loads, _pair(tried, k)) for k in minima.tolist()]
     # Corners between the same samples often explain them equally well, so only the best of these is kept.
-    of_parts: dict[tuple[int, ...], _Tried] = {}
-    for one in found:
-        of_parts.setdefault(_parts(loads, one), one)
-    return list(of_parts.values())[:BEST]
+    by_division: dict[tuple[int, ...], _Corners] = {}
+    for corners in sorted(refined, key=lambda corners: float(corners.cost[0])):
+        by_division.setdefault(_division(loads, corners), corners)
+    return list(by_division.values())[:BEST]
 
 
-def _parts(loads: Sequence[_Load], corners: _Tried) -> tuple[int, ...]:
+def _division(loads: Sequence[_Load], corners: _Corners) -> tuple[int, ...]:
     """Return the numbers of samples before each corner."""
     ends = (corners.critical, corners.critical + corners.fall)
-    return tuple(int(np.count_nonzero(one.compression < end)) for one in loads for end in ends)
+    return tuple(int(np.count_nonzero(load.compression < end)) for load in loads for end in ends)
 
 
-def _refined(loads: Sequence[_Load], best: _Tried) -> _Tried:
+def _refined(loads: Sequence[_Load], best: _Corners) -> _Corners:
     """Return the minimum near these corners, by a grid that becomes finer."""
     for step in range(STEPS):
         moves = FINER * REACH * SHRINK**step
@@ -123,15 +124,15 @@ def _refined(loads: Sequence[_Load], best: _Tried) -> _Tried:
         tried = _at_corners(loads, critical, best.fall * np.exp(moves[:, 1]))
         k = int(np.argmin(tried.cost))
         if tried.cost[k] < best.cost[0]:
-            best = _row(tried, k)
+            best = _pair(tried, k)
     return best
 
 
-def _row(tried: _Tried, k: int) -> _Tried:
-    return _Tried(*(one[k : k + 1] for one in tried))
+def _pair(tried: _Corners, k: int) -> _Corners:
+    return _Corners(*(column[k : k + 1] for column in tried))
 
 
-def _at_corners(loads: Sequence[_Load], critical: Floats, fall: Floats) -> _Tried:
+def _at_corners(loads: Sequence[_Load], critical: Floats, fall: Floats) -> _Corners:
     """Return what follows from each of these pairs of corners, over the largest compression."""
     cost, numbers = np.zeros(len(critical)), []
     begin, length = critical[:, np.newaxis], fall[:, np.newaxis]
@@ -154,15 +155,15 @@ def _at_corners(loads: Sequence[_Load], critical: Floats, fall: Floats) -> _Trie
     median = np.median(numbers, axis=0)
     offset, k1 = median[:, 0], median[:, 1]
     snaps = (median[:, 1:].min(axis=1) > LEAST_NUMBER) & (critical * k1 + offset > 0.0)
-    return _Tried(critical, fall, np.where(snaps, cost, np.inf), median)
+    return _Corners(critical, fall, np.where(snaps, cost, np.inf), median)
 
 
-def _start(law: CandidateLaw, tried: _Tried, depth: float, peak_n: float) -> FitStart:
+def _start(corners: _Corners, depth: float, peak_n: float) -> FitStart:
     """Return the start at a pair of corners."""
-    offset, k1, drop, k2 = tried.numbers[0].tolist()
+    offset, k1, drop, k2 = corners.numbers[0].tolist()
     # A force at the contact is that of a wider object, whose compression is larger by as much.
     wider = offset / k1
-    shares = (k1, float(tried.critical[0]) + wider, drop, float(tried.fall[0]), k2)
+    shares = (k1, float(corners.critical[0]) + wider, drop, float(corners.fall[0]), k2)
     stiffness = peak_n / depth
     units = (stiffness, depth, peak_n, depth, stiffness)
     return FitStart(tuple(np.multiply(shares, units).tolist()), wider * depth)
