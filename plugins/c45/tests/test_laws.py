@@ -10,7 +10,7 @@ import pytest
 from graspsense_c45 import JavaRandom, criteria
 from graspsense_c45.arithmetic import ln, one_minus_exp, x_ln_x
 from graspsense_c45.estimates import estimated_errors, prepare_confidence
-from graspsense_c45.nodewise.cuts import NOT_ADMISSIBLE, Limits, scan
+from graspsense_c45.nodewise.cuts import NOT_ADMISSIBLE, CutLimits, scan
 
 
 def test_logarithm_is_right_to_the_last_bits() -> None:
@@ -70,7 +70,7 @@ def test_best_cut_is_the_one_the_scan_ends_on() -> None:
         numerators = np.cumsum(rng.integers(-3, 4, shape), axis=1) + rng.integers(-20, 20)
         numerators[rng.random(shape) < 0.2] = NOT_ADMISSIBLE
         tolerance, least = int(rng.integers(0, 7)), rng.integers(0, 7, shape[0])
-        limits = Limits(np.zeros((shape[0], 1), np.int64), least, least, tolerance)
+        limits = CutLimits(np.zeros((shape[0], 1), np.int64), least, least, tolerance)
         best, place = np.zeros(shape[0], np.int64), np.full(shape[0], -1)
         scan(numerators, limits, best, place)
         for a, own in enumerate(numerators.tolist()):

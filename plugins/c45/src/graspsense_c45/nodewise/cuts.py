@@ -25,7 +25,7 @@ class SortedRows(NamedTuple):
     weights: FixedPoint
 
 
-class Limits(NamedTuple):
+class CutLimits(NamedTuple):
     """What a cut must reach, in fixed point; see `criteria`. Each array has one entry per attribute.
 
     totals: attributes x classes, the weight that knows the value. least_weight: on each side. least_numerator,
@@ -51,7 +51,7 @@ class BestCuts(NamedTuple):
     n_cuts: Indices
 
 
-def best_cuts(rows: SortedRows, limits: Limits, training: TrainingSet) -> BestCuts:
+def best_cuts(rows: SortedRows, limits: CutLimits, training: TrainingSet) -> BestCuts:
     """Return the cut that J48's scan along the sorted rows ends on, for each attribute."""
     known = limits.totals.sum(axis=1)
     left = rows.weights.cumsum(axis=1)
@@ -70,7 +70,7 @@ def best_cuts(rows: SortedRows, limits: Limits, training: TrainingSet) -> BestCu
     return BestCuts(best, place, left[np.arange(len(known)), place], n_cuts)
 
 
-def scan(numerators: FixedPoint, limits: Limits, best: FixedPoint, place: Indices) -> None:
+def scan(numerators: FixedPoint, limits: CutLimits, best: FixedPoint, place: Indices) -> None:
     """Write the best numerator and its place. Only those above all earlier ones are looked at: no other is taken."""
     highest = np.maximum.accumulate(numerators, axis=1)
     record = numerators > NOT_ADMISSIBLE

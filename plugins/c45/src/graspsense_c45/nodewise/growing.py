@@ -7,7 +7,7 @@ import numpy as np
 from graspsense_c45 import criteria
 from graspsense_c45.arithmetic import TOLERANCE
 from graspsense_c45.arrays import FixedPoint, Indices, Mask, Reals
-from graspsense_c45.nodewise.cuts import BestCuts, Limits, SortedRows, best_cuts
+from graspsense_c45.nodewise.cuts import BestCuts, CutLimits, SortedRows, best_cuts
 from graspsense_c45.nodewise.nodes import NodeList, NodeRows
 from graspsense_c45.nodewise.nominal import split_by_values
 from graspsense_c45.routing import distribute
@@ -111,7 +111,7 @@ class _Grower:
         least_weight = criteria.min_side_weight(real_known, training.n_classes, training.options.min_objects)
         with np.errstate(divide="ignore"):
             least = training.least_numerator(real_weight, np.maximum(real_known, TOLERANCE))
-        limits = Limits(
+        limits = CutLimits(
             totals, training.least_units(least_weight), least, int(training.gain_tolerance(real_weight))
         )
         cuts = best_cuts(SortedRows(values, labels, weights), limits, training)

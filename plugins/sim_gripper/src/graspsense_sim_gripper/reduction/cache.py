@@ -32,7 +32,7 @@ from graspsense.plugin_api import (
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.problem import ControllerStep, GraspController, Problem
 from graspsense_sim_gripper.reduction.levels import Level
-from graspsense_sim_gripper.reduction.model import Decision, Reduction, Verification
+from graspsense_sim_gripper.reduction.model import Reduction, StepDecision, Verification
 from graspsense_sim_gripper.stepping.scheme import Steps
 from graspsense_sim_gripper.terms.registry import active_laws
 from graspsense_sim_gripper.terms.term import OnSum, WorkingPoint
@@ -233,7 +233,7 @@ def restored(values: dict[str, Json]) -> Reduction:
             **values,
             "point": WorkingPoint(**values["point"]),
             "steps": Steps(**values["steps"]),
-            "decisions": tuple(Decision(**decision) for decision in values["decisions"]),
+            "decisions": tuple(StepDecision(**decision) for decision in values["decisions"]),
             "unresolved": tuple(values["unresolved"]),
             "left_out": tuple(values["left_out"]),
             "level": Level(**values["level"]),

@@ -18,7 +18,7 @@ FORCE_MARGIN: Final = 1.5
 
 
 @frozen(kw_only=True)
-class Decision:
+class StepDecision:
     """A decision on the steps of a grasp, and the number that it follows from, as a row of a report."""
 
     subject: str
@@ -51,7 +51,7 @@ class Reduction:
     point: WorkingPoint
     """The compression, speed, duration and force for which the steps were selected."""
     steps: Steps
-    decisions: tuple[Decision, ...]
+    decisions: tuple[StepDecision, ...]
     """The scheme, and what the steps may not resolve."""
     frequency: float
     """The natural frequency of the stiffest contact times the tick."""

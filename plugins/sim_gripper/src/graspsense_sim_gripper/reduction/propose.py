@@ -26,7 +26,7 @@ from graspsense_sim_gripper.reduction.levels import (
     step_tolerance,
     steps_for,
 )
-from graspsense_sim_gripper.reduction.model import QUANTITIES, Decision, Reduction
+from graspsense_sim_gripper.reduction.model import QUANTITIES, Reduction, StepDecision
 from graspsense_sim_gripper.reduction.probe import Grip, damping, stiffness
 from graspsense_sim_gripper.stepping.scheme import BOGACKI_SHAMPINE, MEAN_FORCE, TR_BDF2, VERLET, Steps
 from graspsense_sim_gripper.terms.registry import find_term
@@ -103,20 +103,20 @@ def propose(problem: Problem, grip: Grip, scale: LevelScale = CONTROLLED[0]) -> 
         point=grip.point,
         steps=steps,
         decisions=(
-            Decision(
+            StepDecision(
                 subject="steps",
                 decision=_scheme_in_words(scheme, level.plain, steps),
                 what="damping rate times tick",
                 number=damping_rate * dt_s,
             ),
-            Decision(
+            StepDecision(
                 subject="contact",
                 decision="trace resolved" if resolved else NOT_VERIFIED,
                 what="natural frequency times tick",
                 number=frequency,
             ),
             *(
-                Decision(
+                StepDecision(
                     subject=grip.kinds[i],
                     decision="left out: its oscillation is not resolved",
                     what="angle in a tick (rad)",
@@ -152,8 +152,8 @@ def fixed(problem: Problem) -> Reduction:
         point=USUAL_POINT,
         steps=steps,
         decisions=(
-            Decision(subject="steps", decision=SCHEMES[steps.scheme], what=what, number=0.0),
-            Decision(subject="contact", decision="not examined", what=what, number=0.0),
+            StepDecision(subject="steps", decision=SCHEMES[steps.scheme], what=what, number=0.0),
+            StepDecision(subject="contact", decision="not examined", what=what, number=0.0),
         ),
         frequency=0.0,
         unresolved=(),

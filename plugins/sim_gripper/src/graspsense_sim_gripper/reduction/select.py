@@ -28,7 +28,7 @@ from graspsense_sim_gripper.problem import GraspController, Problem
 from graspsense_sim_gripper.reduction.cache import ReductionCache
 from graspsense_sim_gripper.reduction.error import deviation
 from graspsense_sim_gripper.reduction.levels import CONTROLLED, PLAIN, REFERENCE_SCALES, LevelScale
-from graspsense_sim_gripper.reduction.model import QUANTITIES, Decision, Reduction, Verification
+from graspsense_sim_gripper.reduction.model import QUANTITIES, Reduction, StepDecision, Verification
 from graspsense_sim_gripper.reduction.own_features import NOT_READ
 from graspsense_sim_gripper.reduction.probe import Grip
 from graspsense_sim_gripper.reduction.propose import fixed, grip_of, plain, propose
@@ -120,7 +120,7 @@ def _select_within_limit(problem: Problem, trial: TrialGrasps) -> Reduction:
         return _select(problem, trial)
     except TooMuchWork:
         found = propose(problem, grip_of(problem))
-    limit = Decision(
+    limit = StepDecision(
         subject="trial grasps",
         decision="stopped at the limit: not verified",
         what="ticks and steps",
