@@ -307,9 +307,16 @@ def test_images_that_stop_end_the_grasp():
 
 def test_lost_frames_are_told_with_their_share():
     reports = Reports(1000.0, 0.0)
-    faults = [reports.see(reading(0.002 * k, dt=0.002), APPROACH) for k in range(400)]
-    assert "50 %" in faults[-1].words
+    # Two of three frames come.
+    faults = [reports.see(reading(0.0015 * k, dt=0.001 + 0.001 * (k % 2)), APPROACH) for k in range(400)]
+    assert "33 %" in faults[-1].words
     assert not faults[-1].ends
+
+
+def test_more_than_half_of_the_frames_lost_ends_the_grasp():
+    reports = Reports(1000.0, 0.0)
+    faults = [reports.see(reading(0.003 * k, dt=0.003), APPROACH) for k in range(400)]
+    assert faults[-1].ends
 
 
 def images(n, frozen=(), noise=15.0, seed=0):

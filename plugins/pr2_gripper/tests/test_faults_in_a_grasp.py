@@ -69,6 +69,13 @@ def test_a_healthy_grasp_has_no_warnings(seed):
         assert (grasp.outcome.words, grasp.warnings) == ("steady", ())
 
 
+@pytest.mark.parametrize(("drop", "outcome"), [(0.05, "steady"), (0.25, "aborted")])
+def test_lost_reports_are_told_and_a_quarter_of_them_ends_the_grasp(drop, outcome):
+    grasp = gripper_faults.grasped(gripper_faults.controller_named("hybrid"), FaultConfig(drop=drop))
+    assert grasp.outcome.words == outcome
+    assert any(warning.startswith("reports lost") for warning in grasp.warnings)
+
+
 def test_a_pad_that_is_known_to_be_bad_refuses_the_grasp():
     faults = FaultConfig(pad_fault="absent", pad_side="right")
     grasp = gripper_faults.grasped(gripper_faults.controller_named("hybrid"), faults)

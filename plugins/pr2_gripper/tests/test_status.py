@@ -183,7 +183,9 @@ def test_words_name_the_pad_that_has_no_force(bit: int, swap: bool) -> None:
 def test_what_a_grasp_cannot_do_without_has_a_limit_and_what_only_informs_has_none() -> None:
     endless = {one.name for one in status_bits(False) if one.limit_s == math.inf}
     assert endless == {"samples missed", "bad cell", "beyond load table", "command refused"}
-    assert all(0.0 < one.limit_s <= 0.2 for one in status_bits(False) if one.name not in endless)
+    # The gaps between reports are summed over the whole grasp.
+    short = [one for one in status_bits(False) if one.name not in {*endless, "reports lost"}]
+    assert all(0.0 < one.limit_s <= 0.2 for one in short)
 
 
 def test_page_has_the_table_of_the_code() -> None:

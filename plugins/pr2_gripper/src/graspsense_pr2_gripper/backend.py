@@ -43,7 +43,7 @@ from graspsense_pr2_gripper.protocol import (
     limit,
     micro,
 )
-from graspsense_pr2_gripper.status import status_bits
+from graspsense_pr2_gripper.status import REPORTS_LOST, status_bits
 
 _RATE_HZ: Final = 1000.0
 _PADS_RATE_HZ: Final = 24.39
@@ -77,7 +77,7 @@ class Pr2Backend(SensorBackend[Pr2Config]):
     _report: dict[str, float | int | str | bool] | None = None
     _lost_serial = ""
     _stands_in = False
-    _sent = _echo = _heard_us = 0
+    _sent = _echo = _heard_us = _lost = 0
 
     @property
     def channels(self) -> tuple[Channel, ...]:
@@ -133,6 +133,9 @@ class Pr2Backend(SensorBackend[Pr2Config]):
         else:
             self._heard_us = report.time_us
         self._echo = report.echo
+        lost, self._lost = self._lost, link.stream.counts.lost
+        if self._lost > lost:
+            report = report._replace(status=report.status | REPORTS_LOST)
         return self._measure.reading(report, arrival.image, arrival.words, arrival.sampled)
 
     def apply(self, command: Command) -> None:
@@ -199,7 +202,7 @@ class Pr2Backend(SensorBackend[Pr2Config]):
         )
         self._effort_limit_n = min(identity.effort_limit_un / 1e6, EFFORT_CEILING_N)
         self._speed_limit_m_s = min(identity.speed_limit_um_s / 1e6, SPEED_CEILING_M_S)
-        self._sent = self._echo = 0
+        self._sent = self._echo = self._lost = 0
         self._heard_us = 0
         notes = [f"calibration {kind} of {one.made} is in use" for kind, one in found.items()]
         friction_n = FRICTION_N

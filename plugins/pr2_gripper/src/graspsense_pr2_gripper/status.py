@@ -35,6 +35,8 @@ RIGHT_DEAD: Final = 1 << 22
 """The same of the right pad. Left and right are those of the frames, after `swap_fingers`."""
 ENCODER_WRONG: Final = 1 << 23
 """The motor angle lies outside of the stroke, or moved faster than the fingers can."""
+REPORTS_LOST: Final = 1 << 24
+"""Reports before this one were lost, by their numbers."""
 
 ENDURED_CELLS: Final = 5
 """Number of cells on the face of a pad that may be dead: with a third of them, a force is up to a third too small."""
@@ -46,6 +48,9 @@ WRONG_EFFORT_S: Final = 0.1
 """The time after which the watchdog lets go of an effort that nobody commands."""
 OLD_IMAGE_S: Final = 0.2
 """Five images that should have come."""
+GAPS_S: Final = 1.0
+"""Sum of the times between reports of which some were lost in between. A tenth of lost reports stays below it in a
+grasp, a quarter does not, and changes what is recognised."""
 
 RESULT_BITS: Final = {CLAMPED: COMMAND_CLAMPED, REFUSED: COMMAND_REFUSED}
 """The bit of the frame for a command result of a report; the other results have none."""
@@ -110,6 +115,12 @@ _COMMON: Final = (
         name="encoder implausible",
         meaning="the motor angle is outside of the stroke or jumped, so gap and velocity are wrong",
         limit_s=BLIND_S,
+    ),
+    StatusBit(
+        mask=REPORTS_LOST,
+        name="reports lost",
+        meaning="forces and gaps are missing, so rates and times are less exact: check the cable and the USB hub",
+        limit_s=GAPS_S,
     ),
 )
 _ABSENT_MEANING: Final = (

@@ -12,6 +12,8 @@ STANDS_S: Final = 0.1
 """Time, counted in frames of the declared rate, for which the clock of the gripper may stand still."""
 LOST_SHARE: Final = 0.02
 """Share of lost frames from which on a person must know: derivatives of the force then change."""
+ENDS_SHARE: Final = 0.5
+"""Share of lost frames that ends the grasp: a controller that sees half of them does not control."""
 FEWEST: Final = 200
 """Frames after which a share is told."""
 IMAGES_LATE: Final = 5.0
@@ -68,4 +70,5 @@ class Reports:
             "frames lost",
             f"{lost / self._expected * 100:.0f} % of the frames are missing: rates and times are less exact; check the "
             "connection and the load of this computer",
+            ends=lost >= ENDS_SHARE * self._expected,
         )
