@@ -1,12 +1,12 @@
 """Whether `graspsense identify` brings known scenes back, and at how many recordings a simulator stops paying.
 
     python benchmarks/identify.py [--repeats 4] [--only NAME...] [--sensors NAME...] [--recordings N...] [--rows FILE]
-    python benchmarks/identify.py --delays 0 0.01 0.025 [...] [--rows FILE] [--markdown docs/identify.md]
-    python benchmarks/identify.py --spreads 0 0.3 [...] [--rows FILE] [--markdown docs/identify.md]
-    python benchmarks/identify.py --true-terms [...] [--rows FILE] [--markdown docs/identify.md]
-    python benchmarks/identify.py --rows FILE --markdown docs/identify.md
-    python benchmarks/identify.py --true-steps 6 [--recordings 30] [--rows FILE] [--markdown docs/identify.md]
-    python benchmarks/identify.py --transfer [--rows FILE] [--markdown docs/identify.md] [--png docs/identify.png]
+    python benchmarks/identify.py --delays 0 0.01 0.025 [...] [--rows FILE] [--markdown FILE]
+    python benchmarks/identify.py --spreads 0 0.3 [...] [--rows FILE] [--markdown FILE]
+    python benchmarks/identify.py --true-terms [...] [--rows FILE] [--markdown FILE]
+    python benchmarks/identify.py --rows FILE --markdown FILE
+    python benchmarks/identify.py --true-steps 6 [--recordings 30] [--rows FILE] [--markdown FILE]
+    python benchmarks/identify.py --transfer [--rows FILE] [--markdown docs/identify.md] [--png FILE]
 
 Each scene below is grasped in simulation by the hybrid controller with a hold, with ideal sensors, with PR2 pads, and
 with pads at the 60 Hz of Robotiq's TSF-85 whose fingertips harden, once, three times and ten times. In each repeat,

@@ -1,6 +1,6 @@
 """Coverage of the intervals of `graspsense identify` from the scatter of a few squeezes, and of other rules.
 
-    python benchmarks/identify_intervals.py [--markdown docs/identify.md]
+    python benchmarks/identify_intervals.py [--markdown FILE]
 
 A parameter has a normal error in each squeeze: that of the fit, whose variance is known, and a difference between
 objects. The scatter between n squeezes estimates the sum of both variances with n - 1 degrees of freedom. For each

@@ -1,7 +1,7 @@
 """The simulator beside other ways to integrate the same grasps: six scenes, the controller closed everywhere.
 
     pip install -c constraints.txt -r benchmarks/requirements.txt
-    python benchmarks/peers.py [--json FILE] [--markdown docs/peers.md] [--short] [--scenes linear,...] [--repeats 5]
+    python benchmarks/peers.py [--json FILE] [--markdown FILE] [--short] [--scenes linear,...] [--repeats 5]
 
 `peer_scenes.py` has the scenes, written down apart from the simulator; `peer_engines.py` the engines. All engines of a
 scene are prepared first (set-up: compiling, choosing a model, loading), then each grasps in turn, `--repeats` times.
@@ -161,7 +161,7 @@ def page(result: dict[str, Any]) -> Iterator[str]:
     made_with = ", ".join(f"{key} {value}" for key, value in result["made"].items())
     yield "# The simulator beside other integrators"
     yield ""
-    yield "Written by `python benchmarks/peers.py --markdown docs/peers.md`. All grasps are simulated."
+    yield "Written by `python benchmarks/peers.py --markdown benchmarks/results/peers.md`. All grasps are simulated."
     yield ""
     yield (
         "Each engine integrates the same 7 s under the same controller, which is closed at 1 kHz, and keeps the "

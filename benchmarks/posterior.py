@@ -1,7 +1,7 @@
 """A posterior of the uncertain figures of the simulator, given results of the paper. Simulated.
 
     python benchmarks/posterior.py --out FOLDER [--particles 150] [--generations 6] [--minutes 30] [--short]
-    python benchmarks/posterior.py --out FOLDER --markdown docs/posterior.md
+    python benchmarks/posterior.py --out FOLDER --markdown benchmarks/results/posterior.md
 
 It infers the figures of `paper_model.PRIORS`, with the explanations of `paper_model.EXPLANATIONS`, by approximate
 Bayesian computation with sequential Monte Carlo (pyABC; T. Toni et al., J. R. Soc. Interface 6 (2009) 187). Each

@@ -43,8 +43,9 @@ def page(result: Mapping[str, Any]) -> str:
     parts = [
         "# A posterior of the simulator's uncertain figures",
         "All grasps are simulated, with models of the gripper and of the objects.\n"
-        "Made by `python benchmarks/posterior.py --out FOLDER` and `--markdown docs/posterior.md`, "
-        f"{result['date']}, on {result['machine']}, pyABC {result['pyabc']}. `docs/posterior.json` has the result.",
+        "Made by `python benchmarks/posterior.py --out FOLDER` and `--markdown benchmarks/results/posterior.md`, "
+        f"{result['date']}, on {result['machine']}, pyABC {result['pyabc']}. "
+        "`benchmarks/results/posterior.json` has the result.",
         _answer(result),
         "## How it was made",
         _method(result),

@@ -4,8 +4,9 @@
 
 SOURCE is `simulated`, `icub:FOLDER` or `store:DIR`; without any it is `simulated`, and `icub:` with the folder that
 GRASPSENSE_ICUB names. With `--aeon-python`, the Python of an environment with aeon, benchmarks/recognition_peers.py is
-trained on the curves of the same trials and predicts the same folds. Prints the tables of docs/recognition.md as
-Markdown. The seeds 0 to 9 were used to choose defaults; a measurement uses another one.
+trained on the curves of the same trials and predicts the same folds. Prints the tables of
+benchmarks/results/recognition.md as Markdown. The seeds 0 to 9 were used to choose defaults; a measurement uses another
+one.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """A map of regimes: which scheme a scene needs, and where fixed steps of 1 ms fail. Simulated.
 
-    python benchmarks/regimes.py [--scenes 1500] [--rows FILE] [--markdown docs/regimes.md] [--first N] [--short]
+    python benchmarks/regimes.py [--scenes 1500] [--rows FILE] [--markdown FILE] [--first N] [--short]
 
 The scenes are drawn from the ranges that gripper, object and controller may physically have, not from those in which
 the simulator works, and apart from those of `benchmarks/selection.py`. Their seeds are fresh unless `--first` names the
@@ -245,7 +245,7 @@ def page(rows: Sequence[Row], picture: str | None) -> str:
         "# Regimes of the simulator",
         "",
         *_summary(stable),
-        "Written by `python benchmarks/regimes.py --markdown docs/regimes.md`. Simulated.",
+        "Written by `python benchmarks/regimes.py --markdown benchmarks/results/regimes.md`. Simulated.",
         "Scenes are drawn from physical ranges, apart from the scenes on which the simulator was developed:",
         "contact stiffness 1e2 to 1e7 N/m, moving mass 0.5 to 300 kg, mass ratio 1e-5 to 10, damping ratio",
         "1e-3 to 30, head space 1e-7 to 2e-3 m³, vent 0 to 1e-4 m², relaxation time 1e-6 to 1e4 s,",

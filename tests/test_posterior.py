@@ -39,8 +39,8 @@ def scene(name, force_n=20.0, node=0.0, **values):
 
 
 def test_the_page_is_that_of_the_result():
-    result = json.loads((ROOT / "docs" / "posterior.json").read_text(encoding="utf-8"))
-    page = (ROOT / "docs" / "posterior.md").read_text(encoding="utf-8")
+    result = json.loads((ROOT / "benchmarks" / "results" / "posterior.json").read_text(encoding="utf-8"))
+    page = (ROOT / "benchmarks" / "results" / "posterior.md").read_text(encoding="utf-8")
     assert page == posterior_page.page(result), "run: python benchmarks/posterior.py --out ... --markdown"
     assert set(result["figures"]) == set(paper_model.NAMES)
     assert set(result["conditioned_on"]) == set(paper_model.observed())

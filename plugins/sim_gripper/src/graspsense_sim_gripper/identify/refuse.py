@@ -48,7 +48,7 @@ _NOT_FITTED: Final = (
         "record one object many times in a row, and identify the first and the last ten apart",
     ),
 )
-"""The terms that are not fitted, why (`benchmarks/determined.py`), and what would determine them."""
+"""The terms that are not fitted, why, and what would determine them."""
 
 _GAS_UNTOLD: Final = Undetermined(
     what="gas",

@@ -17,7 +17,7 @@ accuracy, and smaller."""
 MACRO_SHARE: Final = 1e-3
 """The tolerance of a macro-step, relative to the accuracy. Near rest the gap changes so slowly that a small error moves
 the detected time of rest by many ticks, so it has to be this small. With this share, the median error of the
-catalogue at an accuracy of 1 % is not larger than that of fixed steps of 1 ms (benchmarks/default_batches.py)."""
+catalogue at an accuracy of 1 % is not larger than that of fixed steps of 1 ms."""
 GROWTH_ACCURACY: Final = 0.1
 """From this accuracy upwards, a step in contact may be twice as long as the one before."""
 PLAIN_GROWTH: Final = 2.0
