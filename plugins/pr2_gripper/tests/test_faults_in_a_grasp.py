@@ -15,14 +15,15 @@ TELLS_NOTHING = {
 }
 
 
-def check(row: FaultyGrasp, healthy_n: float) -> None:
+def check(row: FaultyGrasp, healthy: FaultyGrasp) -> None:
     """The invariants of one grasp: effort, true force on the object, and time until the release."""
     name = f"{row.fault}, {row.side}, {row.phase}, {row.controller}: {row.outcome} ({row.words})"
     motor = "motor" in row.fault
     allowed_n = 2.0 * CEILING_N if motor else CEILING_N
     assert row.largest_effort_n <= allowed_n + 1e-6, name
-    assert row.strong_s <= (0.1 if motor else 0.0) or row.largest_effort_n <= CEILING_N, name
-    assert row.largest_force_n <= 1.5 * healthy_n, name
+    # A motor that does twice what it is told is seen within a tenth of a second.
+    assert row.strong_s <= healthy.strong_s + (0.1 if motor else 0.0), name
+    assert row.largest_force_n <= 1.5 * healthy.largest_force_n, name
     assert row.outcome != "running", name
     if row.phase not in TELLS_NOTHING:
         assert row.words, name
@@ -39,7 +40,7 @@ def test_a_fault_in_any_phase_crushes_nothing(fault):
     healthy, rows = rows_of("hybrid", [found for found in FAULTS if found.name == fault], ("left",))
     assert len(rows) == 5
     for row in rows:
-        check(row, healthy.largest_force_n)
+        check(row, healthy)
 
 
 @pytest.mark.slow
@@ -49,7 +50,7 @@ def test_every_fault_in_every_phase_on_both_sides_crushes_nothing(controller):
     sided = sum(fault.sided for fault in FAULTS)
     assert len(rows) == 5 * (2 * sided + len(FAULTS) - sided)
     for row in rows:
-        check(row, healthy.largest_force_n)
+        check(row, healthy)
 
 
 @pytest.mark.slow

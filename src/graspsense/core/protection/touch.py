@@ -48,7 +48,7 @@ CLOSED_M: Final = 0.003
 STALL_SHARE: Final = 0.2
 """Share of the approach speed below which the motor counts as stalled."""
 SHARP_M: Final = 0.0015
-"""Travel within which the force of a pad rises to the contact force where an object is touched."""
+"""Travel, and the time of the approach for it, in which the force of a pad rises when it touches an object."""
 FREE_SHARE: Final = 0.3
 """Share of the contact force below which a pad is free."""
 SLOWED_SHARE: Final = 0.7
@@ -87,16 +87,17 @@ class Pad:
         self._contact_n = contact_force_n
         self.felt = False
         self.force_n = nan
-        self._free_gap_m = nan
+        self._free_gap_m = self._free_t_s = nan
         self.sharp = False
-        """Whether the force rose to that of the contact within a short travel."""
+        """Whether the force rose to that of the contact within a short travel and time."""
 
-    def see(self, force_n: float, gap_m: float) -> None:
-        """Take the force (N) and the gap of this tick; a force of NaN is not felt."""
+    def see(self, force_n: float, frame: Frame, sharp_s: float) -> None:
+        """Take the force (N) of this tick, which is not felt if it is NaN. A sharp rise takes at most `sharp_s`."""
         if force_n < FREE_SHARE * self._contact_n:
-            self._free_gap_m = gap_m
+            self._free_gap_m, self._free_t_s = frame.gap_m, frame.t_s
         if not self.felt and force_n >= self._contact_n:
-            self.sharp = self._free_gap_m - gap_m <= SHARP_M
+            travel_m, elapsed_s = self._free_gap_m - frame.gap_m, frame.t_s - self._free_t_s
+            self.sharp = travel_m <= SHARP_M and elapsed_s <= sharp_s
         self.force_n = force_n
         self.felt = force_n >= (0.5 * self._contact_n if self.felt else self._contact_n)
 
@@ -127,8 +128,9 @@ class Touch:
         if self._start_gap_m != self._start_gap_m:
             self._start_gap_m = frame.gap_m
             self._moved_t_s, self._moved_gap_m = frame.t_s, frame.gap_m
-        self._left.see(frame.force_left_n, frame.gap_m)
-        self._right.see(frame.force_right_n, frame.gap_m)
+        sharp_s = self._allowed_s(SHARP_M)
+        self._left.see(frame.force_left_n, frame, sharp_s)
+        self._right.see(frame.force_right_n, frame, sharp_s)
         self._speed_m_s.add(-frame.velocity_m_s, frame.dt_s)
         self._approached(frame, asked)
         return self._alone(frame) or self._free_air(frame, asked) or self._stalled(frame, phase, asked)
@@ -210,10 +212,10 @@ class Touch:
         mean_m_s = self._approach_m_s.value
         needed_n = self._needed_n.value
         sharp = self._left.sharp or self._right.sharp
-        slowed = not self._speed_m_s.value >= SLOWED_SHARE * mean_m_s
+        slowed = self._speed_m_s.value < SLOWED_SHARE * mean_m_s
         risen = max(self._left.force_n, self._right.force_n) >= 2.0 * self._contact_n
         pressed = asked.kind == EFFORT and frame.effort_n > NEEDED_MARGIN * needed_n + 2.0 * self._contact_n
-        if mean_m_s != mean_m_s or sharp or slowed or risen or pressed:
+        if sharp or slowed or risen or pressed:
             self._witnessed = True
             self._claimed_t_s = nan
             return None
