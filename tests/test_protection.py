@@ -65,8 +65,7 @@ def gripper(**changes):
         (HybridController(HybridConfig()), RunConfig(), 1.25 * 20.0 + 7.0),
         # A law without a force: as for the paper's 20 N.
         (VelocityController(VelocityConfig()), RunConfig(), 1.25 * 20.0 + 7.0),
-        # Never below what the first closing is allowed.
-        (HybridController(HybridConfig(probing_force_n=2.0)), RunConfig(), 12.0),
+        (HybridController(HybridConfig(probing_force_n=2.0)), RunConfig(), 1.25 * 2.0 + 7.0),
         (HybridController(HybridConfig()), RunConfig(effort_ceiling_n=60.0), 60.0),
         # The gripper's own limit holds too.
         (HybridController(HybridConfig(probing_force_n=90.0)), RunConfig(), 100.0),
@@ -120,7 +119,7 @@ def test_a_heavy_bottle_may_be_pushed_by_one_finger():
     assert Approach().go(1.3, right=2.0)[0] is None
 
 
-@pytest.mark.parametrize(("left", "right"), [(3.0, 0.0), (0.0, 3.0), (3.0, nan)])
+@pytest.mark.parametrize(("left", "right"), [(3.0, 0.0), (0.0, 3.0)])
 def test_a_finger_that_presses_alone_is_released_after_three_tenths_of_a_second(left, right):
     fault, after_s = Approach().go(2.0, left=left, right=right, speed=0.002)
     assert fault.outcome is Outcome.ONE_FINGER
@@ -203,14 +202,14 @@ def test_a_law_that_pauses_is_not_stalled():
 
 def answered(asked, answer, seconds=1.0, phase=APPROACH, gap=lambda t: 0.05, motor=None):
     """Return the faults of a motor that is asked for one effort and answers with another."""
-    motor = motor or Motor(reports_effort=True)
+    motor = motor or Motor(reports_effort=True, rate_hz=1000.0)
     seen = []
     for k in range(round(seconds * 1000)):
         t = 0.001 * k
         fault = motor.see(frame(t, gap(t), effort=answer), phase)
         if fault is not None:
             seen.append((t, fault))
-        motor.apply(t, Command(EFFORT, asked, inf, inf))
+        motor.apply(frame(t, gap(t)), Command(EFFORT, asked, inf, inf))
     return seen
 
 
@@ -253,10 +252,10 @@ def test_fingers_that_a_spring_pushes_open_in_the_squeeze_are_not_reversed():
 
 
 def test_commands_of_a_velocity_are_not_compared():
-    motor = Motor(reports_effort=True)
+    motor = Motor(reports_effort=True, rate_hz=1000.0)
     for k in range(1000):
         assert motor.see(frame(0.001 * k, effort=50.0), APPROACH) is None
-        motor.apply(0.001 * k, Command(VELOCITY, -0.01, inf, inf))
+        motor.apply(frame(0.001 * k), Command(VELOCITY, -0.01, inf, inf))
 
 
 # ------------------------------------------------------------------------------------------------------- the status
@@ -362,7 +361,7 @@ def test_a_fingertip_that_goes_blank_ends_the_grasp_with_the_second_image():
 
 
 def test_a_force_that_stands_still_while_the_other_one_rises_is_stuck():
-    stuck = StuckForce()
+    stuck = StuckForce(pads_hz=24.0)
     faults = [stuck.see(frame(0.001 * k, left=2.0, right=2.0 + 0.01 * (k // 40))) for k in range(200)]
     assert faults == [None] * 200
     faults = [stuck.see(frame(0.2 + 0.001 * k, left=2.0, right=2.0 + 0.01 * k)) for k in range(400)]
@@ -410,3 +409,133 @@ def test_a_contact_within_a_millimetre_is_no_drift():
 @pytest.mark.parametrize("seed", range(5))
 def test_noise_is_no_drift(seed):
     assert drifted(lambda t: 0.0, all_cells if seed % 2 else None, seed=seed) is None
+
+
+def test_a_pad_that_an_object_presses_steadily_is_no_drift():
+    # An object of 80 g that one finger pushes, below the contact force, on a pad without cells.
+    assert drifted(lambda t: 0.31 * (t > 0.2)) is None
+
+
+def test_a_gripper_without_a_gap_has_contacts():
+    assert drifted(lambda t: max(0.0, 4.5 * (t - 1.0)), seconds=1.12, speed=nan) is None
+
+
+# ------------------------------------------------------------------------------- grippers of other rates and channels
+
+
+def test_a_drift_is_not_squeezed_because_the_effort_is_noisy():
+    approach, rng = Approach(), np.random.default_rng(0)
+    for force in (0.2, 0.3, 0.4, 0.5, 0.6):
+        approach.go(0.12, left=force, right=force)
+    fault = None
+    for _ in range(1000):
+        effort = 10.0 + 0.05 * float(rng.standard_normal())
+        fault = fault or approach.go(0.001, left=0.7, right=0.7, effort=effort, phase=SQUEEZE)[0]
+    assert fault.name == "contact in free air"
+
+
+def test_a_bump_is_no_contact_that_lasts():
+    approach = Approach(seconds=1.0)
+    for force in (0.2, 0.3, 0.4, 0.5, 0.6):
+        approach.go(0.12, left=force, right=force)
+    approach.go(0.005, left=0.7, right=0.7)
+    assert approach.go(1.0)[0] is None
+    assert approach.touch.closing_limit_n() == inf
+
+
+@pytest.mark.parametrize("speed", [0.001, 0.003])
+def test_a_slow_approach_may_push_an_object_as_far(speed):
+    touch, t, gap = Touch(CONTACT_N), 0.0, 0.09
+    for k in range(round(0.016 / speed * 100)):
+        t, gap = t + 0.01, gap - 0.01 * speed
+        pushes = gap < 0.088
+        now = Frame(t, 0.01, gap, nan, 8.0, 1.0 if pushes else 0.0, 0.0, 0.0, 0.0, 0)
+        # 14 mm of pushing, from gaps alone: this gripper has no velocity.
+        assert touch.see(now, APPROACH, CLOSING) is None, k
+
+
+def test_stalled_fingers_are_found_whatever_phase_the_law_claims():
+    fault, _ = Approach().go(1.0, speed=0.0, phase=SQUEEZE)
+    assert fault.name == "stalled"
+
+
+def test_a_force_that_becomes_no_number_ends_the_grasp():
+    approach = Approach()
+    approach.go(0.3, left=4.0, right=4.0, speed=0.001, phase=SQUEEZE)
+    fault, after_s = approach.go(1.0, left=nan, right=nan, speed=0.0, phase=SQUEEZE)
+    assert fault.name == "left pad absent"
+    assert after_s == pytest.approx(0.1, abs=0.01)
+
+
+def test_a_contact_that_is_not_clear_without_a_known_effort_is_held_at_the_usual_one():
+    touch = Touch(CONTACT_N, usual_effort_n=12.0)
+    touch.see(frame(0.0, left=1.0), APPROACH, Command(VELOCITY, -0.01, inf, inf))
+    assert touch.closing_limit_n() == 12.0
+
+
+def test_a_slow_gripper_may_answer_a_frame_late():
+    motor = Motor(reports_effort=True, rate_hz=10.0)
+    answers = [10.0, 10.0, 10.0, 10.0, -10.0, -10.0, -10.0]
+    asked = [10.0, 10.0, 10.0, -10.0, -10.0, -10.0, -10.0]
+    for k, (answer, value) in enumerate(zip(answers, asked, strict=True)):
+        now = Frame(0.1 * k, 0.1, 0.05, 0.0, answer, 0.0, 0.0, 0.0, 0.0, 0)
+        assert motor.see(now, APPROACH) is None
+        motor.apply(now, Command(EFFORT, value, inf, inf))
+
+
+def test_a_motor_that_opens_on_a_velocity_that_closes_is_reversed():
+    motor, faults = Motor(reports_effort=False, rate_hz=1000.0), []
+    for k in range(1000):
+        now = frame(0.001 * k, gap=0.05 + 0.00001 * k)
+        faults.append(motor.see(now, APPROACH))
+        motor.apply(now, Command(VELOCITY, -0.01, inf, inf))
+    assert any(fault is not None and fault.relaxes for fault in faults)
+
+
+def test_frames_that_come_unevenly_are_not_lost():
+    reports = Reports(1000.0, 0.0)
+    faults = [reports.see(reading(0.001 * k, dt=0.0005 + 0.001 * (k % 2)), APPROACH) for k in range(1000)]
+    assert faults == [None] * 1000
+
+
+@pytest.mark.parametrize("share", [0.5, 0.8])
+@pytest.mark.parametrize("seed", range(6))
+def test_cells_that_change_now_and_then_are_not_frozen(share, seed):
+    rng, tips = np.random.default_rng(seed), Fingertips()
+    cells = 1000.0 * np.arange(1.0, 9.0).reshape(2, 4)
+    for k in range(240):
+        cells += (rng.random((2, 4)) < share) * 1.0
+        assert tips.see(Pads(0.04 * k, k + 1, tuple(cells[0]), tuple(cells[1])), True) == []
+
+
+def test_dark_pixels_of_a_camera_do_not_make_it_stuck():
+    pads = images(60, frozen=range(7))
+    assert [fault.ends for fault in seen(pads)] == [False]
+
+
+def test_cells_at_the_end_of_their_range_are_not_stuck():
+    tips = Fingertips()
+    for image in images(20):
+        tips.see(image, True)
+    pressed = [image._replace(left=(4095.0,) * 7 + image.left[7:]) for image in images(40)[20:]]
+    assert [tips.see(image, False) for image in pressed] == [[]] * 20
+
+
+def test_an_array_without_noise_may_read_the_same_everywhere():
+    tips = Fingertips()
+    for k in range(20):
+        left = (0.0,) * 15 + (float(k == 5),)
+        assert tips.see(Pads(0.04 * k, k + 1, left, (0.0,) * 16), True) == []
+
+
+def test_a_fingertip_without_cells_is_no_fault():
+    assert Fingertips().see(Pads(0.0, 1, (), (1.0, 2.0)), True) == []
+
+
+@pytest.mark.parametrize("asked", [nan, -1.0, inf])
+def test_a_force_that_is_none_does_not_lift_the_ceiling(asked):
+    class Careless(HybridController):
+        def asked_force_n(self):
+            return asked
+
+    assert effort_ceiling_n(gripper(friction_n=nan), Careless(HybridConfig()), RunConfig()) == 25.0

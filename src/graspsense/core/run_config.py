@@ -74,7 +74,7 @@ class RunConfig:
         plausible=(0.1, 200.0),
         meaning="Greatest effort with which the fingers close on anything that can be hurt, whatever the controller "
         "commands; not set: a quarter above the force that it asks for (20 N where it asks for none), plus the "
-        "friction of the drive.",
+        "friction of the drive, in the approach at least first_effort_n.",
     )
     stop_when_sure: bool = setting(
         default=False,

@@ -398,7 +398,8 @@ class _Grasp:
                 self._event(frame.t_s, Phase(phase), Phase(phase).name.lower())
             if state.guard is not watcher:
                 watcher = self._guard_event(frame, watcher, state.guard)
-            command = command if protection is None else protection.limit(reading, phase, command)
+            if protection is not None:
+                command = protection.limit(reading, phase if stepped else TARING, command)
             # The frame that ended the taring still has forces relative to the old zero.
             recorded = phase >= APPROACH and stepped
             if recorded:

@@ -152,6 +152,9 @@ def tick(params: TickParams, state: TickState, reading: Reading) -> tuple[Comman
             else:
                 phase, since, first_image = TARING, frame.t_s, reading.pads.counter
     command, watcher = guard(params.guard, watcher, frame, command)
+    if state.phase < APPROACH:
+        # Before the approach nothing is touched: these forces may be relative to an old zero.
+        watcher = GuardState(0, watcher.acted, watcher.stopped)
     return command, TickState(phase, since, still, first_image, law, watcher, done, events)
 
 

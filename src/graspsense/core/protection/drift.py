@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graspsense.core.faults import Fault
+from graspsense.core.protection.cells import watched
 from graspsense.core.signals import Reading
 
 SAMPLES: Final = 3
@@ -29,6 +30,8 @@ TRAVEL_M: Final = 0.003
 """Travel from free to a share of the contact force that is too long for a contact."""
 SIGMAS: Final = 6.0
 """The drift must exceed this many standard deviations of the averaged force."""
+FEWEST_CELLS: Final = 4
+"""Cells of a fingertip from which on a rise of all of them alike tells drift from a contact."""
 UNIFORM: Final = 0.3
 """Share of the median change of the cells that a tenth of them may not reach under a contact."""
 
@@ -54,10 +57,14 @@ class PadDrift:
             self._differences += 1
         self._forces.append(force_n)
         if cells:
-            self._images.append(np.asarray(cells, float))
+            image = watched(cells)
+            if self._images and image.shape != self._images[-1].shape:
+                self._images.clear()
+                self._start = None
+            self._images.append(image)
         if len(self._forces) < SAMPLES:
             return None
-        if self._start is None and self._images:
+        if self._start is None and len(self._images) == SAMPLES:
             self._start = np.mean(self._images, axis=0)
         mean_n = sum(self._forces) / SAMPLES
         if self._low_gap_m != self._low_gap_m or mean_n < LOW * self._contact_n:
@@ -65,7 +72,7 @@ class PadDrift:
         noise_n = SIGMAS * sqrt(self._squares / (2.0 * self._differences) / SAMPLES)
         if abs(mean_n) < max(WARNS * self._contact_n, noise_n):
             return None
-        if mean_n > 0.0 and (self._low_gap_m - gap_m < TRAVEL_M or not self._on_all_cells()):
+        if mean_n > 0.0 and not (self._low_gap_m - gap_m >= TRAVEL_M and self._on_all_cells()):
             return None
         return Fault(
             f"{self._side} pad drifts",
@@ -75,9 +82,9 @@ class PadDrift:
         )
 
     def _on_all_cells(self) -> bool:
-        """Return whether nearly all cells have risen alike, or there are none."""
-        if self._start is None:
-            return True
+        """Return whether nearly all cells have risen alike; without several cells, a slow contact looks the same."""
+        if self._start is None or self._start.size < FEWEST_CELLS or len(self._images) < SAMPLES:
+            return False
         change = np.mean(self._images, axis=0) - self._start
         return bool(np.quantile(change, 0.1) >= UNIFORM * np.median(change) > 0.0)
 

@@ -19,14 +19,15 @@ def effort_ceiling_n(info: DeviceInfo, controller: Controller[object], run: RunC
     """Return the greatest effort (N) with which the fingers may close in this grasp.
 
     It is `run.effort_ceiling_n` where that is set. Otherwise it is the force that the controller asks for, with a
-    margin of a quarter, plus the friction of the drive, and not less than `run.first_effort_n`.
+    margin of a quarter, plus the friction of the drive.
     """
     if run.effort_ceiling_n is not None:
         return min(run.effort_ceiling_n, info.effort_limit_n)
     asked_n = controller.asked_force_n()
-    force_n = FORCE_N if asked_n is None else asked_n
-    first_n = run.first_effort_n if run.first_effort_n < inf else 0.0
-    return min(max(MARGIN * force_n + info.friction_n, first_n), info.effort_limit_n)
+    # What is not a number, or below zero, is no force.
+    force_n = asked_n if asked_n is not None and 0.0 <= asked_n < inf else FORCE_N
+    friction_n = info.friction_n if 0.0 <= info.friction_n < inf else 0.0
+    return min(MARGIN * force_n + friction_n, info.effort_limit_n)
 
 
 def limited(command: Command, closing_n: float, opening_n: float) -> Command:

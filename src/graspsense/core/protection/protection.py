@@ -7,7 +7,10 @@ channels of the gripper allow. The runner passes each reading and each command t
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import inf
 from typing import Final
+
+from attrs import evolve
 
 from graspsense.core.faults import Fault
 from graspsense.core.protection.cells import Fingertips
@@ -45,6 +48,8 @@ class Protection:
         self.acted = 0
         rates = {channel.name: channel.rate_hz for channel in info.channels}
         self._ceiling_n = effort_ceiling_n(info, controller, run)
+        self._approach_n = max(self._ceiling_n, run.first_effort_n if run.first_effort_n < inf else 0.0)
+        self._relaxed = info.relaxed
         opening_n = (
             abs(info.opening.value) if info.opening is not None and info.opening.kind == EFFORT else 0.0
         )
@@ -53,10 +58,11 @@ class Protection:
         # Where only the entry of a plugin declares the channels, the frames show which there are.
         self._declared = bool(rates)
         self._has_pads = "force_left" in rates and "force_right" in rates
-        self._touch, self._drift = Touch(contact_n), Drift(contact_n)
-        self._stuck = StuckForce()
+        pads_hz = min(rates.get("force_left", 0.0), rates.get("force_right", 0.0))
+        self._touch, self._drift = Touch(contact_n, run.first_effort_n, pads_hz), Drift(contact_n)
+        self._stuck = StuckForce(pads_hz)
         self._fingertips = Fingertips()
-        self._motor = Motor("effort" in rates)
+        self._motor = Motor("effort" in rates, info.rate_hz)
         self._status = StatusWatch(info.status_bits)
         self._reports = Reports(info.rate_hz, rates.get("pads", 0.0))
 
@@ -68,20 +74,21 @@ class Protection:
     def limit(self, reading: Reading, phase: int, command: Command) -> Command:
         """Take the reading of a tick and the command for it; return the command that may be applied.
 
-        If the reading shows a fault that ends the grasp, it is `ending`, and the command exerts no effort.
+        If the reading shows a fault that ends the grasp, it is `ending`, and the command is the relaxing one. In the
+        release, only a motor that turns the wrong way ends it: the grasp is over, and its outcome stays.
         """
         frame = reading.frame
-        self._see(self._reports.see(reading, phase))
+        self._see(self._reports.see(reading, phase), phase)
         for fault in self._status.see(frame, phase):
-            self._see(fault)
-        self._see(self._motor.see(frame, phase))
+            self._see(fault, phase)
+        self._see(self._motor.see(frame, phase), phase)
         if not self._declared and frame.force_left_n == frame.force_left_n:
             self._has_pads = True
         if self._has_pads:
             self._see_pads(reading, phase, command)
         allowed = self._limited(phase, command)
         self.acted += allowed.value != command.value
-        self._motor.apply(frame.t_s, allowed)
+        self._motor.apply(frame, allowed)
         return allowed
 
     def before_closing(self, frame: Frame) -> Fault | None:
@@ -89,15 +96,6 @@ class Protection:
         faults = self._status.before_closing(frame)
         if self._has_pads:
             faults += [fault for fault in self._fingertips.faults() if fault.ends]
-            for side, force_n in (("left", frame.force_left_n), ("right", frame.force_right_n)):
-                if force_n != force_n:
-                    faults.append(
-                        Fault(
-                            f"{side} pad absent",
-                            "it gives no force: check the fingertip and its cable",
-                            ends=True,
-                        )
-                    )
         for fault in faults:
             self._see(fault)
         return faults[0] if faults else None
@@ -105,7 +103,8 @@ class Protection:
     def opens_wrongly(self, reading: Reading, command: Command) -> bool:
         """Take a reading, and the command that opens the fingers at last; return whether the motor closes them."""
         fault = self._motor.see(reading.frame, RELEASE)
-        self._motor.apply(reading.frame.t_s, command)
+        self._see(fault, RELEASE)
+        self._motor.apply(reading.frame, command)
         return fault is not None and fault.relaxes
 
     def _see_pads(self, reading: Reading, phase: int, command: Command) -> None:
@@ -123,9 +122,11 @@ class Protection:
         elif phase in (SQUEEZE, HOLD):
             self._see(self._stuck.see(frame))
 
-    def _see(self, fault: Fault | None) -> None:
+    def _see(self, fault: Fault | None, phase: int = APPROACH) -> None:
         if fault is None:
             return
+        if phase == RELEASE and fault.ends and not fault.relaxes:
+            fault = evolve(fault, ends=False)
         before = self._told.get(fault.name)
         if before is None or (fault.ends and not before.ends):
             self._told[fault.name] = fault
@@ -135,8 +136,8 @@ class Protection:
 
     def _limited(self, phase: int, command: Command) -> Command:
         if self.ending is not None:
-            return limited(command, 0.0, 0.0)
-        closing_n = self._ceiling_n
+            return self._relaxed
+        closing_n = self._approach_n if phase == APPROACH else self._ceiling_n
         if phase in (SQUEEZE, HOLD) and command.kind in (EFFORT, FORCE) and command.value > closing_n:
             self._see(
                 Fault(

@@ -10,6 +10,8 @@ from graspsense.core.signals import APPROACH, HOLD, SQUEEZE, Reading
 
 STANDS_S: Final = 0.1
 """Time, counted in frames of the declared rate, for which the clock of the gripper may stand still."""
+FEWEST_STILL: Final = 3
+"""Frames in a row that show a clock that stands still."""
 LOST_SHARE: Final = 0.02
 """Share of lost frames from which on a person must know: derivatives of the force then change."""
 ENDS_SHARE: Final = 0.5
@@ -42,7 +44,7 @@ class Reports:
             self._stands = 0
         else:
             self._stands += 1
-            if self._stands * self._period_s > STANDS_S:
+            if self._stands >= FEWEST_STILL and self._stands * self._period_s > STANDS_S:
                 return Fault(
                     "clock stands still",
                     f"the time of the gripper has not advanced in {self._stands} frames: speeds and time limits "
@@ -62,7 +64,7 @@ class Reports:
 
     def _lost(self, dt_s: float) -> Fault | None:
         self._frames += 1
-        self._expected += max(dt_s / self._period_s, 1.0)
+        self._expected += dt_s / self._period_s
         lost = self._expected - self._frames
         if self._frames < FEWEST or lost < LOST_SHARE * self._expected:
             return None

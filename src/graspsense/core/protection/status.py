@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import reduce
 from math import inf
+from operator import or_
 
 from graspsense.core.faults import Fault, StatusBit
 from graspsense.core.signals import APPROACH, HOLD, SQUEEZE, Frame
@@ -14,7 +16,7 @@ class StatusWatch:
 
     def __init__(self, bits: Sequence[StatusBit]) -> None:
         self._bits = tuple(bits)
-        self._known = sum(bit.mask for bit in self._bits)
+        self._known = reduce(or_, (bit.mask for bit in self._bits), 0)
         self._seconds = [0.0] * len(self._bits)
 
     def see(self, frame: Frame, phase: int) -> list[Fault]:

@@ -9,15 +9,21 @@ from graspsense.core.faults import Fault
 from graspsense.core.signals import Frame
 
 STILL_S: Final = 0.25
-"""Least time for which the force of a pad stands still, several cell images of any fingertip."""
+"""Least time for which the force of a pad stands still."""
+IMAGES: Final = 5.0
+"""Periods of the pads for which it stands still at least."""
 CHANGE_N: Final = 1.0
 """Change of the other pad's force in that time that a sound pad would have felt too."""
 
 
 class StuckForce:
-    """Compares the forces of both pads from the contact on; for grippers without noise or without cells too."""
+    """Compares the forces of both pads from the contact on; for grippers without noise or without cells too.
 
-    def __init__(self) -> None:
+    `pads_hz` is the rate of the forces, 0 if it is not known.
+    """
+
+    def __init__(self, pads_hz: float) -> None:
+        self._still_s = max(STILL_S, IMAGES / pads_hz) if pads_hz > 0.0 else STILL_S
         self._forces = (nan, nan)
         self._since: list[float] = [nan, nan]
         self._others: list[float] = [nan, nan]
@@ -29,7 +35,7 @@ class StuckForce:
             if forces[i] != self._forces[i]:
                 self._since[i], self._others[i] = frame.t_s, forces[1 - i]
             elif (
-                frame.t_s - self._since[i] >= STILL_S
+                frame.t_s - self._since[i] >= self._still_s
                 and abs(forces[1 - i] - self._others[i]) >= CHANGE_N
                 and self._forces[1 - i] == self._forces[1 - i]
             ):

@@ -37,6 +37,10 @@ PUSHED_SHARE: Final = 4.0
 LEAST_S: Final = 0.1
 MOST_S: Final = 3.0
 """Bounds of the time that stands for this travel, for fast and for slow approaches."""
+MOST_PUSHED_S: Final = 15.0
+"""The longest time for which one pad may push an object."""
+ABSENT_S: Final = 0.1
+"""Time for which the force of a pad may be no number while the fingers close; at least three periods of the pads."""
 USUAL_M_S: Final = 0.010
 """The speed that is assumed for an approach that has not begun to move: that of the paper."""
 MOVED_M: Final = 0.001
@@ -88,6 +92,7 @@ class Pad:
         self.felt = False
         self.force_n = nan
         self._free_gap_m = self._free_t_s = nan
+        self.absent_s = 0.0
         self.sharp = False
         """Whether the force rose to that of the contact within a short travel and time."""
 
@@ -108,11 +113,18 @@ class Pad:
 
 
 class Touch:
-    """Watches both pads against the motion of the fingers, from the approach to the hold."""
+    """Watches both pads against the motion of the fingers, from the approach to the hold.
 
-    def __init__(self, contact_force_n: float) -> None:
-        self._contact_n = contact_force_n
+    `usual_effort_n` limits a contact that is not clear where the approach has shown no effort. `pads_hz` is the rate of
+    the forces of the pads, 0 if it is not known.
+    """
+
+    def __init__(self, contact_force_n: float, usual_effort_n: float = inf, pads_hz: float = 0.0) -> None:
+        self._contact_n, self._usual_n = contact_force_n, usual_effort_n
+        self._absent_s = max(ABSENT_S, 3.0 / pads_hz) if pads_hz > 0.0 else ABSENT_S
         self._left, self._right = Pad(contact_force_n), Pad(contact_force_n)
+        self._ever_felt = False
+        self._gap_m = nan
         self._needed_n, self._approach_m_s = Mean(SMOOTHING_S), Mean(SMOOTHING_S)
         self._speed_m_s = Mean(SPEED_SMOOTHING_S)
         self._start_gap_m = nan
@@ -131,16 +143,25 @@ class Touch:
         sharp_s = self._allowed_s(SHARP_M)
         self._left.see(frame.force_left_n, frame, sharp_s)
         self._right.see(frame.force_right_n, frame, sharp_s)
-        self._speed_m_s.add(-frame.velocity_m_s, frame.dt_s)
+        self._ever_felt = self._ever_felt or not self.free()
+        velocity_m_s = frame.velocity_m_s
+        if velocity_m_s != velocity_m_s and frame.dt_s > 0.0:
+            velocity_m_s = (frame.gap_m - self._gap_m) / frame.dt_s
+        self._gap_m = frame.gap_m
+        self._speed_m_s.add(-velocity_m_s, frame.dt_s)
         self._approached(frame, asked)
-        return self._alone(frame) or self._free_air(frame, asked) or self._stalled(frame, phase, asked)
+        return (
+            self._absent(frame) or self._alone(frame) or self._free_air(frame) or self._stalled(frame, asked)
+        )
 
     def closing_limit_n(self) -> float:
         """Return the greatest closing effort (N) in this tick: that of the approach while a contact is not clear."""
         unclear = self._alone_t_s == self._alone_t_s or self._claimed_t_s == self._claimed_t_s
-        needed_n = self._needed_n.value
-        if not unclear or needed_n != needed_n:
+        if not unclear:
             return inf
+        needed_n = self._needed_n.value
+        if needed_n != needed_n:
+            return self._usual_n
         return NEEDED_MARGIN * needed_n + NEEDED_CONTACTS * self._contact_n
 
     def free(self) -> bool:
@@ -156,18 +177,28 @@ class Touch:
         if mean_m_s == mean_m_s and speed_m_s < SLOWED_SHARE * mean_m_s:
             return
         self._approach_m_s.add(speed_m_s, frame.dt_s)
-        effort_n = asked.value if asked.kind in (EFFORT, FORCE) else frame.effort_n
-        self._needed_n.add(max(min(effort_n, asked.effort_limit_n), 0.0), frame.dt_s)
+        # A gripper that controls its speed itself may report the force of its grip, which is nothing in free air.
+        if asked.kind in (EFFORT, FORCE):
+            self._needed_n.add(max(min(asked.value, asked.effort_limit_n), 0.0), frame.dt_s)
 
     def _has_moved(self, frame: Frame) -> bool:
         return self._start_gap_m - frame.gap_m >= MOVED_M
 
-    def _allowed_s(self, travel_m: float) -> float:
+    def _allowed_s(self, travel_m: float, most_s: float = MOST_S) -> float:
         """Return the time (s) that the approach takes for this travel, within bounds."""
         speed_m_s = self._approach_m_s.value
         if not speed_m_s > 0.0:
             speed_m_s = USUAL_M_S
-        return min(max(travel_m / speed_m_s, LEAST_S), MOST_S)
+        return min(max(travel_m / speed_m_s, LEAST_S), most_s)
+
+    def _absent(self, frame: Frame) -> Fault | None:
+        for side, pad in (("left", self._left), ("right", self._right)):
+            pad.absent_s = pad.absent_s + frame.dt_s if pad.force_n != pad.force_n else 0.0
+            if pad.absent_s > self._absent_s:
+                return Fault(
+                    f"{side} pad absent", "it gives no force: check the fingertip and its cable", ends=True
+                )
+        return None
 
     def _alone(self, frame: Frame) -> Fault | None:
         left, right = self._left, self._right
@@ -194,33 +225,34 @@ class Touch:
 
     def _presses(self, force_n: float, elapsed_s: float, travel_m: float) -> bool:
         """Return whether the pad that feels presses the object, or has pushed it for long enough."""
-        if elapsed_s >= self._allowed_s(PUSHED_M) or travel_m >= PUSHED_M:
+        if elapsed_s >= self._allowed_s(PUSHED_M, MOST_PUSHED_S) or travel_m >= PUSHED_M:
             return True
         if elapsed_s < self._allowed_s(TRAVEL_M) and travel_m < TRAVEL_M:
             return False
-        slow = not self._speed_m_s.value >= STALL_SHARE * self._approach_m_s.value
+        slow = self._speed_m_s.value < STALL_SHARE * self._approach_m_s.value
         return slow or force_n >= PUSHED_SHARE * self._contact_n
 
-    def _free_air(self, frame: Frame, asked: Command) -> Fault | None:
+    def _free_air(self, frame: Frame) -> Fault | None:
         """A contact that both pads claim has a witness: the force rose in a short travel, the fingers slow down, or the
         force goes on rising.
         """
         if self._witnessed or not (self._left.felt and self._right.felt):
+            self._claimed_t_s = nan
             return None
         if self._claimed_t_s != self._claimed_t_s:
             self._claimed_t_s, self._claimed_gap_m = frame.t_s, frame.gap_m
         mean_m_s = self._approach_m_s.value
-        needed_n = self._needed_n.value
         sharp = self._left.sharp or self._right.sharp
         slowed = self._speed_m_s.value < SLOWED_SHARE * mean_m_s
         risen = max(self._left.force_n, self._right.force_n) >= 2.0 * self._contact_n
-        pressed = asked.kind == EFFORT and frame.effort_n > NEEDED_MARGIN * needed_n + 2.0 * self._contact_n
-        if sharp or slowed or risen or pressed:
+        if sharp or slowed or risen:
             self._witnessed = True
             self._claimed_t_s = nan
             return None
         elapsed_s, travel_m = frame.t_s - self._claimed_t_s, self._claimed_gap_m - frame.gap_m
-        if elapsed_s < self._allowed_s(TRAVEL_M) and not travel_m >= TRAVEL_M:
+        # Fingers that have not approached cannot slow down: they may rest on the object.
+        allowed_s = self._allowed_s(TRAVEL_M) if mean_m_s == mean_m_s else inf
+        if elapsed_s < allowed_s and not travel_m >= TRAVEL_M:
             return None
         return Fault(
             "contact in free air",
@@ -230,14 +262,16 @@ class Touch:
             ends=True,
         )
 
-    def _stalled(self, frame: Frame, phase: int, asked: Command) -> Fault | None:
-        """The fingers moved and stand still now, under a command that closes, and the pads do not feel why."""
+    def _stalled(self, frame: Frame, asked: Command) -> Fault | None:
+        """The fingers moved and stand still now, under a command that closes, and no pad has felt why.
+
+        This does not depend on the phase, which is what the law claims.
+        """
         if self._moved_gap_m - frame.gap_m >= STALL_M or not closes(asked, frame, self._needed_n.value):
             self._moved_t_s, self._moved_gap_m = frame.t_s, frame.gap_m
             return None
         # One pad alone, and both of them, have bounds of their own.
-        felt = self._left.felt or self._right.felt
-        if phase != APPROACH or felt or frame.gap_m <= CLOSED_M or not self._has_moved(frame):
+        if self._ever_felt or frame.gap_m <= CLOSED_M or not self._has_moved(frame):
             return None
         elapsed_s = frame.t_s - self._moved_t_s
         if elapsed_s < max(self._allowed_s(STALL_M / STALL_SHARE), 2.0 * LEAST_S):
@@ -257,4 +291,4 @@ def closes(asked: Command, frame: Frame, needed_n: float) -> bool:
         return value > 0.0 and not value < 0.5 * needed_n
     if kind == VELOCITY:
         return value < 0.0
-    return kind == POSITION and value < frame.gap_m
+    return kind == POSITION and value < frame.gap_m - STALL_M
