@@ -14,6 +14,7 @@ from attrs import define, field, frozen
 from graspsense.core.errors import ConfigError, UnknownName
 from graspsense.core.limits import SETTINGS_BYTES
 from graspsense.core.plugins import Plugins
+from graspsense.core.regular_file import first_bytes
 from graspsense.core.strict import InvalidValue, shown
 from graspsense.core.toml_lines import KeyPath, key_lines
 from graspsense.core.toml_text import TomlError, toml_values
@@ -175,8 +176,7 @@ def read_toml(source: Traversable, label: str, what: str) -> Layer:
 def _settings_text(source: Traversable, label: str, what: str) -> str:
     """Return the text of a file of settings. Raises ConfigError."""
     try:
-        with source.open("rb") as file:
-            data: bytes = file.read(SETTINGS_BYTES.most + 1)
+        data = first_bytes(source, SETTINGS_BYTES.most)
     except FileNotFoundError:
         raise ConfigError(f"no {what} {label!r}{_nearby(source)}") from None
     except OSError as error:

@@ -59,6 +59,7 @@ CHANNEL_NUMBERS: Final = SizeLimit(
     "GRASPSENSE_MAX_CHANNEL_NUMBERS", 65_536, "numbers of a channel in one sample"
 )
 ENTRIES: Final = SizeLimit("GRASPSENSE_MAX_ENTRIES", 500, "entries of a key of a manifest")
+MODEL_BYTES: Final = SizeLimit("GRASPSENSE_MAX_MODEL_BYTES", 256 * 2**20, "bytes of a model")
 CASES: Final = SizeLimit("GRASPSENSE_MAX_CASES", 1000, "cases of an experiment")
 RECORDINGS: Final = SizeLimit("GRASPSENSE_MAX_RECORDINGS", 20_000, "recordings of a data set")
 CLASSES: Final = SizeLimit("GRASPSENSE_MAX_CLASSES", 100, "different labels")
@@ -74,6 +75,7 @@ LIMITS: Final = (
     SETTINGS_BYTES,
     CHANNEL_NUMBERS,
     ENTRIES,
+    MODEL_BYTES,
     CASES,
     RECORDINGS,
     CLASSES,

@@ -33,7 +33,7 @@ from graspsense.core.features import (
 )
 from graspsense.core.firstparty import MODELS
 from graspsense.core.json_values import json_ready, settings_from_json
-from graspsense.core.model_content import digest, parsed, sealed_content
+from graspsense.core.model_content import digest, model_bytes, parsed, sealed_content
 from graspsense.core.novelty import Novelty, novelty_from, novelty_of
 from graspsense.core.reasons import Reason
 from graspsense.core.setting import CHANGES_NO_RESULT, NAMES_INPUT, UNIT_OF_ENDING, settings_marked
@@ -590,10 +590,7 @@ def _text(name: str, plugins: Plugins) -> bytes:
             raise UnknownName(
                 f"{error}{hint}\n  A model of your own is a file: write its name with .json"
             ) from error
-    try:
-        return Path(name).expanduser().read_bytes()
-    except OSError as error:
-        raise ConfigError(f"model {name} cannot be read: {error.strerror}") from error
+    return model_bytes(name)
 
 
 def _content(name: str, text: bytes) -> dict[str, Any]:

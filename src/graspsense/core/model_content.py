@@ -10,15 +10,31 @@ import hashlib
 import json
 import math
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any, Final
 
 from graspsense import __version__
-from graspsense.core.errors import DataDamaged
+from graspsense.core.errors import ConfigError, DataDamaged
+from graspsense.core.limits import MODEL_BYTES
+from graspsense.core.regular_file import first_bytes
 
 MOST_DIGITS: Final = 100
 """Largest number of digits of a whole number in a model."""
 MOST_NESTED: Final = 100
 """Largest depth of lists and tables within each other."""
+
+
+def model_bytes(name: str) -> bytes:
+    """Return the content of the file of a model. Raises ConfigError if it cannot be read, or is too large."""
+    try:
+        content = first_bytes(Path(name).expanduser(), MODEL_BYTES.most)
+    except (OSError, ValueError, RuntimeError) as error:
+        raise ConfigError(
+            f"model {name} cannot be read: {getattr(error, 'strerror', None) or error}"
+        ) from error
+    if too_large := MODEL_BYTES.exceeded(len(content)):
+        raise ConfigError(f"model {name} has {too_large}")
+    return content
 
 
 def parsed(name: str, text: bytes) -> Any:

@@ -22,7 +22,7 @@ from graspsense.core.errors import ConfigError, DataDamaged
 from graspsense.core.features import FeatureTable
 from graspsense.core.json_values import json_ready
 from graspsense.core.model import REGRESSION_FORMAT, write_json_lines
-from graspsense.core.model_content import digest, parsed, sealed_content
+from graspsense.core.model_content import digest, model_bytes, parsed, sealed_content
 from graspsense.core.novelty import Novelty, novelty_of
 from graspsense.core.stored_values import LARGEST_SEED, StoredValues
 from graspsense.core.target_value import TargetValue
@@ -185,19 +185,17 @@ def write_regression(path: Path, model: RegressionModel) -> None:
 def is_regression(name: str) -> bool:
     """Return whether this file is a model of a number."""
     try:
-        content = parsed(name, Path(name).expanduser().read_bytes()) if name.endswith(".json") else None
-    except (OSError, DataDamaged):
+        content = parsed(name, model_bytes(name)) if name.endswith(".json") else None
+    except (ConfigError, DataDamaged):
         return False
     return isinstance(content, dict) and content.get("format") == REGRESSION_FORMAT
 
 
 def load_regression(name: str) -> RegressionModel:
     """Return the model in a file. Raises ConfigError if it cannot be read, DataDamaged if it is not such a model."""
-    try:
-        text = Path(name).expanduser().read_bytes()
-    except OSError as error:
-        raise ConfigError(f"model {name} cannot be read: {error.strerror}") from error
-    content = sealed_content(name, parsed(name, text), REGRESSION_FORMAT, VERSION, "model of a number")
+    content = sealed_content(
+        name, parsed(name, model_bytes(name)), REGRESSION_FORMAT, VERSION, "model of a number"
+    )
     try:
         return _restored(Path(name).stem, StoredValues(content))
     except ValueError as error:

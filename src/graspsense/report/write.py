@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,10 @@ def write_picture(path: Path, figure: Any, **how: Any) -> None:
     """Write a figure of matplotlib as a PNG file, with its texts as they are. Raises ConfigError if it cannot."""
     show_literally(figure)
     data = io.BytesIO()
-    figure.savefig(data, format="png", **how)
+    with warnings.catch_warnings():
+        # A character that the font lacks is drawn as a box; matplotlib would print it.
+        warnings.filterwarnings("ignore", message="Glyph", category=UserWarning)
+        figure.savefig(data, format="png", **how)
     try:
         write_whole(path, data.getvalue())
     except OSError as error:

@@ -86,6 +86,8 @@ class Store:
             raise SaveFailed(
                 f"cannot write to the store in {folder}: it is read-only. Name a writable folder"
             )
+        if (folder / FILE).exists() and not (folder / FILE).is_file():
+            raise ConfigError(f"{folder / FILE} is not a file: move it away, or name another store")
         new = is_new(folder)
         with sqlite_errors(folder):
             connection = sqlite3.connect(folder / FILE, timeout=BUSY_S, isolation_level=None)

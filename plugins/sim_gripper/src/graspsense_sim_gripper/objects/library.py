@@ -163,6 +163,8 @@ def kinds_in(scene: str) -> tuple[str, ...]:
 
 def _read_scene(path: Path) -> ObjectSpec:
     try:
+        if path.exists() and not path.is_file():
+            raise ConfigError(f"{path}: is not a file")
         with path.open(encoding="utf-8") as file:
             text = file.read(LONGEST_SCENE + 1)
     except FileNotFoundError:

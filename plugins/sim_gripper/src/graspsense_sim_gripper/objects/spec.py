@@ -89,7 +89,7 @@ class ObjectSpec:
     """The shape of the contact with a pad: a line, a face or a point."""
     width_m: float = _positive()
     width_spread_m: float = _not_negative(0.0)
-    stiffness_spread: float = _not_negative(0.0)
+    stiffness_spread: float = field(default=0.0, validator=[ge(0.0), le(MOST_SPREAD)])
     """Standard deviation of the logarithm of the stiffness."""
     offset_m: float = field(default=0.0, metadata=gives("one_finger_first"))
     """Distance from the gripper's centre line, positive towards the right finger."""

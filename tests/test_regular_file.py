@@ -1,0 +1,78 @@
+"""Files that a user names: a pipe or a device is refused at once, and a large file is not read whole."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from graspsense.cli.main import main
+from graspsense.core.regular_file import NotAFile, first_bytes
+
+ZERO = Path("/dev/zero")
+
+
+@pytest.fixture
+def pipe(tmp_path):
+    """Return a pipe without a writer, whose reader would wait for ever."""
+    path = tmp_path / "pipe.toml"
+    os.mkfifo(path)
+    return path
+
+
+def exit_code(*arguments):
+    with pytest.raises(SystemExit) as ended:
+        main([str(argument) for argument in arguments])
+    return ended.value.code
+
+
+def test_a_pipe_is_no_file(pipe):
+    with pytest.raises(NotAFile, match="pipe"):
+        first_bytes(pipe, 100)
+
+
+def test_no_more_is_read_than_asked(tmp_path):
+    path = tmp_path / "long"
+    path.write_bytes(b"x" * 1000)
+    assert len(first_bytes(path, 100)) == 101
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("import", "{}", "--check"),
+        ("experiment", "{}"),
+        ("config", "validate", "{}"),
+        ("run", "--object", "{}"),
+        ("run", "--pipeline", "{}"),
+        ("predict", "{}", "{}"),
+    ],
+)
+def test_a_pipe_for_settings_a_scene_or_a_model_is_refused(pipe, command, capsys):
+    assert exit_code(*[word.format(pipe) for word in command]) == 2
+    assert "Traceback" not in capsys.readouterr().err
+
+
+@pytest.mark.skipif(not ZERO.exists(), reason="needs /dev/zero")
+def test_a_device_or_an_endless_file_as_a_model_is_refused(tmp_path, capsys):
+    (tmp_path / "zero.json").symlink_to(ZERO)
+    with (tmp_path / "sparse.json").open("wb") as file:
+        file.truncate(40 * 10**9)
+    for name in ("zero.json", "sparse.json"):
+        assert exit_code("run", "-o", f"classifier.model={tmp_path / name}") == 2
+        assert "model" in capsys.readouterr().err
+
+
+def test_a_pipe_in_the_place_of_a_database_is_refused(tmp_path, capsys):
+    (tmp_path / "st").mkdir()
+    os.mkfifo(tmp_path / "st" / "store.sqlite")
+    for command in ("recover", "verify"):
+        assert exit_code(command, tmp_path / "st") == 2
+
+
+def test_a_scene_whose_instances_differ_without_bound_is_refused(tmp_path, capsys):
+    scene = tmp_path / "s.toml"
+    scene.write_text(
+        'width_m = 0.06\nstiffness_spread = 1e10\n[[terms]]\ntype = "elastic"\nk1_n_m = 2000.0\n'
+    )
+    assert exit_code("run", "--object", scene) == 2
+    assert "stiffness_spread" in capsys.readouterr().err
