@@ -84,19 +84,23 @@ def test_a_damaged_model_is_refused_or_answers(tmp_path):
     assert read_damaged(1, 3, 8, *files) == 9 * 3 * 8
 
 
-@pytest.mark.slow
+SOME = pytest.param((2, 40, 8), 300, marks=pytest.mark.slow, id="some")
+EVERY = pytest.param((0, 0, 0), 1000, marks=pytest.mark.long, id="every")
+
+
+@pytest.mark.parametrize(("damages", "least"), [SOME, EVERY])
 @pytest.mark.parametrize("name", KINDS)
-def test_every_damage_of_a_model_is_refused_or_answers(tmp_path, name):
+def test_damages_of_a_model_are_refused_or_answer(tmp_path, name, damages, least):
     write_model(tmp_path / "m.json", trained(name))
-    assert read_damaged(0, 0, 0, tmp_path / "m.json") > 2000
+    assert read_damaged(*damages, tmp_path / "m.json") >= least
 
 
-@pytest.mark.slow
+@pytest.mark.parametrize(("damages", "least"), [SOME, EVERY])
 @pytest.mark.parametrize("name", KEPT_AS_SKOPS)
-def test_every_damage_of_a_model_kept_as_skops_is_refused_or_answers(tmp_path, name):
+def test_damages_of_a_model_kept_as_skops_are_refused_or_answer(tmp_path, name, damages, least):
     pytest.importorskip("skops", reason="the extra 'skops' is not installed")
     write_model(tmp_path / "m.json", trained(name, kept_as="skops"))
-    assert read_damaged(0, 0, 0, tmp_path / "m.json") > 1000
+    assert read_damaged(*damages, tmp_path / "m.json") >= least
 
 
 @pytest.mark.parametrize(

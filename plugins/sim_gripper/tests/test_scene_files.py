@@ -333,7 +333,7 @@ def test_run_explains_the_model_in_the_terminal_and_in_json():
     assert [line.split()[0] for line in table[2:4]] == ["elastic", "gas"]
     assert "relaxes in 5 s" in table[3]
     none = CliRunner().invoke(cli, ["run", "--object", "none", "--explain-model", "--json"])
-    assert json.loads(none.stdout)["report"]["model"] == {"touched": False, "terms": []}
+    assert json.loads(none.stdout)["report"]["model"] == {"touched": False, "terms": [], "without": []}
 
 
 # ---------------------------------------------------------------------------------- somebody else's term

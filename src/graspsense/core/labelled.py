@@ -78,9 +78,9 @@ class Labelled:
                 raise ValueError(
                     f"{len(self.table)} trials and {len(column)} {name}: give one for each trial"
                 )
-        _refuse_too_large(self.table)
+        _refuse_too_large(self.table, self.source)
         if self.value is not None:
-            _refuse_large_target(self.value)
+            _refuse_large_target(self.value, self.source)
         labels = len(set(self.labels)) if self.value is None else 1
         too_many = CLASSES.exceeded(labels) or FEATURES.exceeded(len(self.table.names))
         if too_many:
@@ -148,7 +148,7 @@ class Labelled:
         return evolve(self, labels=tuple(label.partition(":")[2] for label in self.labels))
 
 
-def _refuse_too_large(table: FeatureTable) -> None:
+def _refuse_too_large(table: FeatureTable, source: str) -> None:
     """Raise DataDamaged for a number that nothing can be learned from, since its square is not finite."""
     import numpy as np
 
@@ -156,16 +156,16 @@ def _refuse_too_large(table: FeatureTable) -> None:
     if large.any():
         trial, column = (int(number) for number in np.argwhere(large)[0])
         raise DataDamaged(
-            f"feature {table.names[column]!r} of trial {trial + 1} is {table.values[trial, column]:g}: the largest "
-            f"magnitude to learn from is {LARGEST_VALUE:g}. Correct it, or leave this feature out (--features)"
+            f"{source}: feature {table.names[column]!r} of trial {trial + 1} is {table.values[trial, column]:g}: the "
+            f"largest magnitude to learn from is {LARGEST_VALUE:g}. Correct it, or leave this feature out (--features)"
         )
 
 
-def _refuse_large_target(target: TargetValue) -> None:
+def _refuse_large_target(target: TargetValue, source: str) -> None:
     for trial, value in enumerate(target.values):
         if abs(value) > LARGEST_VALUE:
             raise DataDamaged(
-                f"{target.name!r} of trial {trial + 1} is {value:g}: the largest magnitude to predict is "
+                f"{source}: {target.name!r} of trial {trial + 1} is {value:g}: the largest magnitude to predict is "
                 f"{LARGEST_VALUE:g}"
             )
 
