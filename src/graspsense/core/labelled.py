@@ -32,9 +32,6 @@ class ControlFeatures:
     what: str
     missing: str = ""
 
-    def __attrs_post_init__(self) -> None:
-        _refuse_too_large(self.table)
-
 
 @frozen(kw_only=True, eq=False)
 class Labelled:
@@ -79,6 +76,9 @@ class Labelled:
                     f"{len(self.table)} trials and {len(column)} {name}: give one for each trial"
                 )
         _refuse_too_large(self.table, self.source)
+        for control in (self.before_contact, self.first_line, self.width, *self.variants.values()):
+            if control is not None:
+                _refuse_too_large(control.table, self.source)
         if self.value is not None:
             _refuse_large_target(self.value, self.source)
         labels = len(set(self.labels)) if self.value is None else 1

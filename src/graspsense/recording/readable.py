@@ -72,7 +72,8 @@ def not_opened(source: str | Path, error: OSError) -> ConfigError:
 
 def refuse_devices(path: Path) -> None:
     """Raise ConfigError for a pipe or a device, whose reading might never end."""
-    if path.exists() and not (path.is_file() or path.is_dir()):
+    # Those of pathlib raise for a name that is too long.
+    if os.path.exists(path) and not (os.path.isfile(path) or os.path.isdir(path)):
         raise ConfigError(f"{path} is a pipe or a device, not a file")
 
 

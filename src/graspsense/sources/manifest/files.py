@@ -101,7 +101,7 @@ def _listed(manifest: ReadManifest) -> Iterator[NamedFile]:
             if one != "file" and not is_missing(cells[k])
         }
         path, where = manifest.base / name, f"{place}, line {columns.lines[k]}"
-        rows, problem = None, "" if _exists(path) else f"{where}: there is no file {path}"
+        rows, problem = None, "" if os.path.exists(path) else f"{where}: there is no file {path}"
         try:
             rows = _rows(where, row)
         except ConfigError as error:
@@ -123,11 +123,3 @@ def _rows(where: str, row: dict[str, str]) -> tuple[int, int] | None:
 
 def _is_row(text: str) -> bool:
     return text.isdecimal() and len(text) < 16
-
-
-def _exists(path: Path) -> bool:
-    """Return whether there is such a file; there is none of a name that the operating system does not allow."""
-    try:
-        return path.exists()
-    except (OSError, ValueError):
-        return False
