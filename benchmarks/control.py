@@ -136,7 +136,8 @@ class Watched:
 def recorded() -> tuple[Sequence[bytes], bytes]:
     """Return the reports of an emulated grasp, and the description of the board."""
     emulation.Wire = Recorded  # type: ignore[misc]
-    run_grasp(Pr2Backend(EMULATED), create("controller", "hybrid"), RunConfig())
+    # With the limits of a real gripper, so that its efforts answer the commands when it is played back.
+    run_grasp(RealTime(EMULATED), create("controller", "hybrid"), RunConfig())
     emulation.Wire = Wire  # type: ignore[misc]
     return recordings[0].sent, recordings[0].firmware.feature()
 
@@ -146,8 +147,7 @@ def played(wire: Playback, feature: bytes, watcher: Watched | None = None) -> No
     identity = decode_identity(feature)
     link = LockStepLink(wire, 1.0 / identity.report_rate_hz)
     driver.open_board = lambda *_: opening.Opened(link, identity, None)  # type: ignore[assignment]
-    backend = Pr2Backend(EMULATED) if watcher is None else RealTime(EMULATED)
-    grasp = run_grasp(backend, create("controller", "hybrid"), RunConfig(), watcher=watcher)
+    grasp = run_grasp(RealTime(EMULATED), create("controller", "hybrid"), RunConfig(), watcher=watcher)
     driver.open_board = opening.open_board
     assert grasp.outcome.words == "steady", grasp.reason
 
