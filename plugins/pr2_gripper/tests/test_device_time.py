@@ -196,14 +196,14 @@ def host_times(rate: float, seconds: float, jump_s: float = 0.0) -> float:
     return float("inf")
 
 
-@pytest.mark.parametrize(("rate", "within_s"), [(1.2, 4.01), (2.0, 2.3), (100.0, 2.01)])
+@pytest.mark.parametrize(("rate", "within_s"), [(1.3, 4.01), (2.0, 2.6), (100.0, 2.01)])
 def test_fast_clock_is_found_in_a_few_seconds(rate: float, within_s: float) -> None:
     assert host_times(rate, 5.0) < within_s
 
 
-def test_jump_of_more_than_a_quarter_of_a_second_is_found_at_once() -> None:
-    assert host_times(1.0, 5.0, jump_s=0.26) == pytest.approx(3.501)
-    assert host_times(1.0, 5.0, jump_s=0.24) == float("inf")
+def test_jump_of_more_than_half_a_second_is_found_at_once() -> None:
+    assert host_times(1.0, 5.0, jump_s=0.51) == pytest.approx(3.501)
+    assert host_times(1.0, 5.0, jump_s=0.49) == float("inf")
 
 
 @given(st.integers(0, 2**32), st.floats(-200e-6, 200e-6))

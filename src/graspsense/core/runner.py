@@ -367,7 +367,7 @@ class _Grasp:
         read, apply, run = self.backend.read, self.backend.apply, self.run
         step = with_plain_commands(self.step)
         advance = bind(tick, step=step, events_told=events_of(self.step), TickState=maker(TickState))
-        params, record, protection = self.params, self.recorder.add, self.protection
+        params, record = self.params, self.recorder.add
         on_device_clock = self.info.clock == "device"
         late_s = run.late_periods / self.info.rate_hz if on_device_clock else float("inf")
         timeout_s = frame_timeout_s(run, self.info)
@@ -398,8 +398,7 @@ class _Grasp:
                 self._event(frame.t_s, Phase(phase), Phase(phase).name.lower())
             if state.guard is not watcher:
                 watcher = self._guard_event(frame, watcher, state.guard)
-            if protection is not None:
-                command = protection.limit(reading, phase if stepped else TARING, command)
+            command = self._protected(reading, phase if stepped else TARING, command)
             # The frame that ended the taring still has forces relative to the old zero.
             recorded = phase >= APPROACH and stepped
             if recorded:
@@ -462,6 +461,10 @@ class _Grasp:
             except FAILURES as error:
                 self.sinks = [other for other in self.sinks if other is not sink]
                 self._event(reading.frame.t_s, Phase(phase), f"{type(sink).__name__} failed: {named(error)}")
+
+    def _protected(self, reading: Reading, phase: int, command: Command) -> Command:
+        """Return the command that the protection allows, if this gripper can hurt something."""
+        return command if self.protection is None else self.protection.limit(reading, phase, command)
 
     def _tared(self, images: list[Pads], frame: Frame) -> bool:
         """Set the zero of the pads; return whether the fingers may close."""

@@ -15,8 +15,8 @@ COUNTED_OFF_S: Final = 0.1
 """Largest difference between the time that passed and the periods of the reports, in `COUNTED_S`."""
 COUNTED_S: Final = 60.0
 """Time after which the count begins again, so that two good crystals never differ by so much."""
-AHEAD_S: Final = 0.25
-"""Time by which no report can be ahead of the fastest one of the window before."""
+AHEAD_S: Final = 0.5
+"""Time by which no report can be ahead of the fastest one of the window before, also on a host that was held up."""
 WINDOW_S: Final = 2.0
 
 

@@ -211,7 +211,7 @@ class Touch:
             self._alone_t_s, self._alone_gap_m = frame.t_s, frame.gap_m
         elapsed_s, travel_m = frame.t_s - self._alone_t_s, self._alone_gap_m - frame.gap_m
         feels, other = ("left", right) if left.presses else ("right", left)
-        if not self._presses((left if left.presses else right).force_n, elapsed_s, travel_m):
+        if not self._presses(frame, (left if left.presses else right).force_n, elapsed_s, travel_m):
             return None
         lacking = "right" if feels == "left" else "left"
         why = "gives no force" if other.force_n != other.force_n else f"reads {other.force_n:.2f} N"
@@ -223,14 +223,18 @@ class Touch:
             outcome=Outcome.ONE_FINGER,
         )
 
-    def _presses(self, force_n: float, elapsed_s: float, travel_m: float) -> bool:
+    def _presses(self, frame: Frame, force_n: float, elapsed_s: float, travel_m: float) -> bool:
         """Return whether the pad that feels presses the object, or has pushed it for long enough."""
         if elapsed_s >= self._allowed_s(PUSHED_M, MOST_PUSHED_S) or travel_m >= PUSHED_M:
             return True
         if elapsed_s < self._allowed_s(TRAVEL_M) and travel_m < TRAVEL_M:
             return False
-        slow = self._speed_m_s.value < STALL_SHARE * self._approach_m_s.value
-        return slow or force_n >= PUSHED_SHARE * self._contact_n
+        return self._stands(frame) or force_n >= PUSHED_SHARE * self._contact_n
+
+    def _stands(self, frame: Frame) -> bool:
+        """Return whether the fingers have moved by less than a fifth of the approach for some time."""
+        elapsed_s = frame.t_s - self._moved_t_s
+        return elapsed_s >= max(self._allowed_s(STALL_M / STALL_SHARE), 2.0 * LEAST_S)
 
     def _free_air(self, frame: Frame) -> Fault | None:
         """A contact that both pads claim has a witness: the force rose in a short travel, the fingers slow down, or the
@@ -273,13 +277,12 @@ class Touch:
         # One pad alone, and both of them, have bounds of their own.
         if self._ever_felt or frame.gap_m <= CLOSED_M or not self._has_moved(frame):
             return None
-        elapsed_s = frame.t_s - self._moved_t_s
-        if elapsed_s < max(self._allowed_s(STALL_M / STALL_SHARE), 2.0 * LEAST_S):
+        if not self._stands(frame):
             return None
         return Fault(
             "stalled",
-            f"the fingers have stood still for {elapsed_s:.2f} s under a closing command, and the pads do not both "
-            "feel a contact: something is in the way that they do not feel; check the fingertips and the drive",
+            f"the fingers have stood still for {frame.t_s - self._moved_t_s:.2f} s under a closing command, and the "
+            "pads feel nothing: something is in the way that they do not feel; check the fingertips and the drive",
             ends=True,
         )
 
