@@ -5,6 +5,7 @@ A pipe without a writer, or a device such as /dev/zero, would keep its reader fo
 
 from __future__ import annotations
 
+import errno
 import os
 import stat
 from importlib.resources.abc import Traversable
@@ -30,7 +31,7 @@ def opened_file(source: Traversable | Path) -> BinaryIO:
         return os.fdopen(descriptor, "rb")
     os.close(descriptor)
     if stat.S_ISDIR(kind):
-        raise IsADirectoryError(f"{source} is a folder, not a file")
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(source))
     raise NotAFile(f"{source} is a pipe or a device, not a file")
 
 

@@ -391,7 +391,7 @@ def killed(way: Way) -> None:
     told_s = time.monotonic() - at.when_s
     check(
         trial.outcome is Outcome.DEVICE_LOST,
-        f"{way.name}: emulator killed in squeeze: {trial.outcome.words} after {told_s:.2f} s",
+        f"{way.name}: emulator killed in squeeze: {trial.outcome.words} after {told_s:.2f} s: {trial.reason}",
     )
     check(vanished(), f"{way.name}: the device vanished with its process")
     device.gone()
