@@ -116,8 +116,8 @@ def test_one_that_was_edited_is_made_anew(trials, folder):
     made = select()
     (kept,) = folder.iterdir()
     content = json.loads(kept.read_text())
-    assert content["model"]["treatment"]
-    content["model"]["treatment"] = [*content["model"]["treatment"][::-1], "dropped"]
+    assert content["model"]["left_out"] == []
+    content["model"]["left_out"] = [0]
     kept.write_text(json.dumps(content))
     assert select() == made
     assert len(trials) == 2
