@@ -14,8 +14,9 @@ from scipy.io import savemat
 from graspsense.cli.main import main
 from graspsense.core.errors import ConfigError, DataDamaged
 from graspsense.core.trace import signals_of
+from graspsense.recording.labelled_recording import UnreadableRecording
 from graspsense.recording.reader import read_recorded
-from graspsense.sources.dataset_recordings import recordings_of
+from graspsense.sources.dataset_recordings import readable_or_not
 from graspsense.store.store import Store
 
 RATE_HZ = 100.0
@@ -38,7 +39,11 @@ def manifest(folder, text):
 
 
 def recordings(folder, text):
-    return list(recordings_of("manifest", str(manifest(folder, text))))
+    found = list(readable_or_not("manifest", str(manifest(folder, text))))
+    for recording in found:
+        if isinstance(recording, UnreadableRecording):
+            raise recording.error
+    return found
 
 
 def column(one, name):

@@ -29,22 +29,11 @@ def is_recording_number(kind: str, name: str) -> bool:
     return _NUMBERED.fullmatch(name) is not None and kind in datasets_with_recordings()
 
 
-def recordings_of(kind: str, place: str) -> Iterator[LabelledRecording]:
-    """Yield every recording of a data set.
-
-    Raises UnknownName, PluginUnavailable, ConfigError, DataDamaged, also for the first one that cannot be read.
-    """
-    for one in readable_or_not(kind, place):
-        if isinstance(one, UnreadableRecording):
-            raise one.error
-        yield one
-
-
 def readable_or_not(kind: str, place: str) -> Iterator[LabelledRecording | UnreadableRecording]:
     """Yield every recording of a data set, also those that cannot be read.
 
-    A reader that fails ends its data set: what it failed with comes last. Raises as `recordings_of` if it fails before
-    the first recording.
+    A reader that fails ends its data set: what it failed with comes last. Raises UnknownName, PluginUnavailable, and
+    ConfigError or DataDamaged if it fails before the first recording.
     """
     dataset = installed().dataset(kind)
     read = dataset.recordings()
@@ -93,7 +82,7 @@ def _failing_as(dataset: str) -> Iterator[None]:
 
 
 def numbered_recording(kind: str, name: str) -> LabelledRecording:
-    """Return the recording that `PLACE#NUMBER` names. Raises ConfigError if there is none, and as `recordings_of`."""
+    """Return the recording that `PLACE#NUMBER` names. Raises ConfigError if there is none, and as `readable_or_not`."""
     match = _NUMBERED.fullmatch(name)
     if match is None:
         raise ConfigError(
