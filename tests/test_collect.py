@@ -67,6 +67,17 @@ def test_it_prompts_counts_undoes_retakes_and_stops_when_everything_is_there(col
     assert "next: block  (1 of 2)" in done.stderr
 
 
+def test_a_fault_that_ends_no_grasp_is_told_with_each_trial(collect, tmp_path):
+    frozen = ["--gripper", "pr2", "-o", "gripper.transport=emulated", "-o", "gripper.faults.freeze_cell=15"]
+    done = collect(tmp_path / "t", "\n", labels="block", each=1, more=frozen)
+    assert done.returncode == 0, done.stderr
+    told = [line for line in done.stderr.splitlines() if "frozen cells" in line]
+    assert len(told) == 1
+    assert "warning" in told[0]
+    with Store.read(tmp_path / "t") as store:
+        assert "(15)" in store.trial(1).result.details["warnings"][0]
+
+
 @pytest.mark.slow
 def test_classes_come_in_rounds_so_that_none_is_recorded_in_one_go(collect, tmp_path):
     collect(tmp_path / "t", "\n" * 9, labels="block,toy,can:full_open", each=3)

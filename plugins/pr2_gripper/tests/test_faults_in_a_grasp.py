@@ -83,3 +83,14 @@ def test_a_pad_that_is_known_to_be_bad_refuses_the_grasp():
     assert "right" in grasp.reason
     # The fingers never closed.
     assert grasp.report["largest_effort_n"] == 0.0
+
+
+def test_a_picture_and_a_notebook_show_the_reason_and_the_warnings() -> None:
+    from graspsense import load_pipeline
+    from graspsense.report.grasp_picture import _words
+
+    faults = ["pad_fault=stuck", "pad_side=left", "pad_at_s=2"]
+    options = ["gripper.type=pr2", "gripper.transport=emulated", *(f"gripper.faults.{one}" for one in faults)]
+    trial = load_pipeline(options=options).grasp()
+    assert "left fingertip stuck" in _words(trial)[0]
+    assert "left fingertip stuck" in trial._repr_html_()

@@ -122,9 +122,12 @@ def _run(collection: Collection, save: str, as_json: bool) -> None:
 
 
 def _show(word: str, trial: Trial) -> None:
-    """Print what was felt in a trial, and what the model takes the object for."""
+    """Print the faults that were seen in a trial, what was felt, and what the model takes the object for."""
     from graspsense.core.units import in_words
 
+    for warning in trial.warnings:
+        if warning != trial.reason:
+            echo_entry("  warning", warning, Style.CAUTION, err=True, width=_LABEL)
     features = trial.features
     felt = ", ".join(
         f"{name} {in_words(value, unit)}"

@@ -79,10 +79,11 @@ def prediction_html(prediction: Prediction) -> str:
 
 
 def trial_html(trial: Trial) -> str:
-    """Return outcome, curve, features and prediction of a trial."""
+    """Return outcome, warnings, curve, features and prediction of a trial."""
     labels = ", ".join(f"{key} {value}" for key, value in trial.run.labels.items())
     reason = f": {trial.reason}" if trial.reason else ""
     parts = [sentence(f"{trial.outcome.words}{reason}" + f" ({labels})" * bool(labels), strong=True)]
+    parts += [sentence(f"warning: {warning}") for warning in trial.warnings]
     parts += [
         trace_svg(trial.trace),
         samples_html(trial.trace),

@@ -40,7 +40,10 @@ Origin = Literal["run", "collect", "import"]
 Metadata = Mapping[str, Mapping[str, str]]
 """Section of a recording to its texts."""
 
-DETAILS: Final = ("prediction", "report", "counts", "events", "seconds_simulated", "seconds_wall")
+DETAILS: Final = (
+    *("prediction", "report", "counts", "events", "warnings"),
+    *("seconds_simulated", "seconds_wall"),
+)
 """Keys of `graspsense run --json` that `TrialResult.details` holds; the others have fields of their own."""
 _OUTCOMES: Final = frozenset(outcome.words for outcome in Outcome)
 
@@ -165,7 +168,7 @@ class DeviceRecord:
 class TrialResult:
     """The result of a grasp: its outcome, its features, and those from before contact.
 
-    `details` holds the prediction, the gripper's report, the runner's counts, the events and the durations, as
+    `details` holds the prediction, the gripper's report, the runner's counts, events, warnings and durations, as
     `graspsense run --json` prints them.
     """
 

@@ -66,9 +66,12 @@ def grasp_png(trial: Trial, path: Path) -> None:
 
 
 def _words(trial: Trial) -> list[str]:
-    """Return outcome, features and prediction, line by line."""
+    """Return outcome, warnings, features and prediction, line by line."""
     features, prediction = trial.features, trial.prediction
-    lines = [f"Outcome: {trial.outcome.words}", "", "Features"]
+    reason = f": {trial.reason}" if trial.reason else ""
+    lines = [f"Outcome: {trial.outcome.words}{reason}"]
+    lines += [f"Warning: {warning}" for warning in trial.warnings if warning != trial.reason]
+    lines += ["", "Features"]
     for name, value, unit in zip(features.names, features.values, features.units, strict=True):
         shown, factor = display_unit(unit)
         number = "missing" if value != value else f"{factor * value:.4g} {'' if shown == '1' else shown}"
