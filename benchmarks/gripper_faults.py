@@ -1,6 +1,7 @@
 """Inject faults in every phase of a grasp with an emulated PR2 gripper, and print what its fingers then did.
 
     python benchmarks/gripper_faults.py [--write docs/pr2.md] [--json] [--short]
+    python benchmarks/gripper_faults.py --pushed [--short]
 
 The emulated board is treated as a real gripper, with the limits of a first closing. Each fault begins at five times:
 while the fingers open, early and late in the approach, in the squeeze, and in the hold; those times are taken from a
@@ -8,7 +9,9 @@ grasp without a fault. The fault is on the left fingertip, then on the right one
 graspsense, and four hostile ones. Effort and force are those of the simulated body, whatever the board reported.
 
 The table has a row for each fault and group of controllers, with the worst of its grasps. `--write` puts it between
-the marks of the page. `--short` runs a few of the grasps. Emulated and simulated; nothing was measured on a gripper.
+the marks of the page. `--pushed` prints instead how far one pad pushes a
+sound object before the other pad feels it, on the simulated gripper: what a limit on one finger alone has to endure.
+`--short` runs a few of the grasps. Emulated and simulated; nothing was measured on a gripper.
 """
 
 from __future__ import annotations
@@ -195,6 +198,30 @@ def table(rows: Iterable[FaultyGrasp]) -> str:
     return "\n".join(lines)
 
 
+def pushed(instances: int) -> str:
+    """Return as a table how far, how long and how hard one pad pushes each object of the catalogue, at most."""
+    gripper, controller = create("sensor-backend", "sim"), create("controller", "hybrid")
+    contact_n = controller.contact_force_n()
+
+    def push(trace: Any) -> tuple[float, float, float]:
+        left, right = trace.force_left_n >= contact_n, trace.force_right_n >= contact_n
+        alone, both = np.flatnonzero(left | right), np.flatnonzero(left & right)
+        if not len(both):
+            return 0.0, 0.0, 0.0
+        begin, end = alone[0], both[0]
+        forces = np.maximum(trace.force_left_n, trace.force_right_n)[begin:end]
+        travel_m, time_s = trace.gap_m[begin] - trace.gap_m[end], trace.t_s[end] - trace.t_s[begin]
+        return float(travel_m), float(time_s), float(forces.max(initial=0.0))
+
+    lines = ["| object | travel | time | force |", "|---|---|---|---|"]
+    for name in (name for kind in gripper.objects() for name in kind.full_names):
+        scenes = [f"{name}#{number}" for number in range(instances)]
+        grasps = gripper.run_many(controller, scenes, list(range(instances)), run=RunConfig(), extract=push)
+        travel_m, time_s, force_n = np.max([grasp.extracted for grasp in grasps], axis=0)
+        lines.append(f"| {name} | {travel_m * 1e3:.1f} mm | {time_s:.2f} s | {force_n:.1f} N |")
+    return "\n".join(lines)
+
+
 def main() -> None:
     """Run the grasps and print the table."""
     parser = argparse.ArgumentParser(
@@ -202,8 +229,12 @@ def main() -> None:
     )
     parser.add_argument("--write", type=Path, help="page whose table is replaced")
     parser.add_argument("--json", action="store_true")
+    parser.add_argument("--pushed", action="store_true", help="how far one pad pushes a sound object")
     parser.add_argument("--short", action="store_true")
     given = parser.parse_args()
+    if given.pushed:
+        print(pushed(1 if given.short else 12))
+        return
     rows = list(injected(("hybrid",), FAULTS[:1], ("left",)) if given.short else injected(CONTROLLERS))
     rows += hostile()
     if given.json:
