@@ -89,7 +89,10 @@ class Lab:
         if kind == "train":
             return ["train", f"store:{self.store}", "--out", out / "model.json", "--overwrite"]
         if kind == "change":
-            label = ("can:full_open", "can:half_open")[self.made % 2]
+            # A killed change was made or was not: the next one is always another label than the present one.
+            with Store.read(self.store) as store:
+                present = store.trial(1).summary.label
+            label = "can:half_open" if present == "can:full_open" else "can:full_open"
             return [
                 "trials",
                 "relabel",
