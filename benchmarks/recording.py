@@ -25,9 +25,10 @@ from pathlib import Path
 
 import numpy as np
 
-from graspsense.core.components.roles import DeviceInfo, SensorBackend
+from graspsense.core.components.roles import SensorBackend
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.runner import run_grasp
+from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import RecordingEnded
 from graspsense.core.values.signals import EFFORT, Command, Frame, Pads, Reading
 from graspsense.plugin_api import create

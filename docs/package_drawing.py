@@ -47,6 +47,11 @@ def host_subpackages() -> Graph:
     return graph
 
 
+def rooms_of_core() -> Graph:
+    """Return the rooms of `graspsense.core`, each with those that it imports from."""
+    return _imports_within(ROOT / "src" / HOST / "core", f"{HOST}.core", leave_out={"__init__"})
+
+
 def simulator_subpackages() -> Graph:
     """Return the subpackages of the simulator, each with those that it imports from."""
     return _imports_within(
@@ -67,9 +72,10 @@ def _imports_within(package: Path, name: str, leave_out: set[str]) -> Graph:
 def _used(path: Path, package: str) -> Iterator[str]:
     """Yield the subpackages of `package` that a file imports from, but for imports for type checking."""
     for module, names in _imports(path):
-        parts = module.split(".")
-        if parts[0] == package:
-            yield from parts[1:2] or names
+        if module == package:
+            yield from names
+        elif module.startswith(f"{package}."):
+            yield module.removeprefix(f"{package}.").partition(".")[0]
 
 
 @cache
@@ -188,11 +194,12 @@ def _ordered(rows: list[list[str]], pairs: list[tuple[str, str]]) -> list[list[s
 
 
 def drawing() -> str:
-    """Return the drawing of the host and of the simulator as SVG."""
+    """Return the drawing of the host, of its core and of the simulator as SVG."""
     parts: list[str] = []
     top = 0.0
     for title, graph in (
         ("graspsense and the distributions beside it", host_subpackages()),
+        ("graspsense.core", rooms_of_core()),
         ("graspsense-sim-gripper", simulator_subpackages()),
     ):
         top = _draw(parts, panel(graph), title, top + 30)

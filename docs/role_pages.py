@@ -25,10 +25,13 @@ from graspsense.core.components import compiled_features, entries, hookspecs, ro
 from graspsense.core.components.entries import DECLARED, TABLE_OF_ROLE
 from graspsense.core.control import contact, free_motion, tick
 from graspsense.core.values import signals
+from graspsense.core.values.channel import Channel, FastChannel, TactileArray
+from graspsense.core.values.device import DeviceInfo
+from graspsense.core.values.events import GraspEvent
 from graspsense.core.values.features import Features, FeatureTable, Prediction
 from graspsense.core.values.reasons import Contribution, FeatureValue, Reason
 from graspsense.core.values.trace import ImageTrace, SampleTrace, Trace
-from graspsense.core.values.trial import GraspEvent, RunInfo, Trial
+from graspsense.core.values.trial import RunInfo, Trial
 from graspsense.recording.labelled_recording import LabelledRecording
 from graspsense.recording.replayable import Recording
 from graspsense.scaffold.make import KINDS, plugin_module, words_of
@@ -99,7 +102,7 @@ FASTER: dict[str, tuple[str, str, Any, tuple[Any, ...]]] = {
 """What a role may declare so that simulated grasps take less time: title, attribute, module and classes."""
 FLOWING: tuple[Any, ...] = (
     *(signals.Reading, signals.Frame, signals.Pads, signals.Image, signals.Samples, signals.Command),
-    *(entries.Channel, entries.TactileArray, entries.FastChannel, roles.DeviceInfo),
+    *(Channel, TactileArray, FastChannel, DeviceInfo),
     *(
         Trace,
         ImageTrace,

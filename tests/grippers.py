@@ -2,7 +2,8 @@
 
 from math import inf
 
-from graspsense.core.components.roles import DeviceInfo, SensorBackend
+from graspsense.core.components.roles import SensorBackend
+from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import DeviceLost
 from graspsense.core.values.signals import EFFORT, Command, Frame, Pads, Reading
 from graspsense.testing.model_gripper import CELLS

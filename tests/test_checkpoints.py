@@ -23,9 +23,9 @@ from graspsense.core.learn.checkpoints import (
 )
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.learn.model import load_model, train, write_model
-from graspsense.core.pipeline.anytime import Anytime, CheckpointPrediction, anytime_of
+from graspsense.core.pipeline.anytime import Anytime, anytime_of
 from graspsense.core.values.errors import ConfigError
-from graspsense.core.values.features import Features, Prediction, table_of
+from graspsense.core.values.features import CheckpointPrediction, Features, Prediction, table_of
 from graspsense.core.values.signals import Outcome, Phase
 from graspsense.evaluation.checkpoints import SURE, WHOLE, checkpoint_models, early_recognition
 from graspsense.evaluation.doubt import calibrated

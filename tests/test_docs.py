@@ -15,7 +15,7 @@ from pathlib import Path
 import click
 import numpy
 import pytest
-from test_imports import MAY_KNOW
+from test_imports import MAY_KNOW, ROOMS
 
 from graspsense import plugin_api
 from graspsense.cli.main import cli
@@ -56,7 +56,7 @@ def test_the_drawing_of_the_packages_is_that_of_the_imports():
 
 
 def test_no_package_imports_in_a_circle():
-    for graph in (DRAWING.host_subpackages(), DRAWING.simulator_subpackages()):
+    for graph in (DRAWING.host_subpackages(), DRAWING.rooms_of_core(), DRAWING.simulator_subpackages()):
         assert not DRAWING.panel(graph).against
 
 
@@ -101,6 +101,10 @@ def test_the_table_of_packages_is_the_rule_that_is_enforced():
     assert table == {name: used - {name} for name, used in packages.items()}
 
 
+def test_the_table_of_rooms_is_their_order():
+    assert tuple(row[0].strip("`") for row in architecture_rows("Rooms of the core")) == ROOMS
+
+
 def test_the_table_of_the_simulator_has_every_folder():
     package = ROOT / "plugins" / "sim_gripper" / "src" / "graspsense_sim_gripper"
     folders = {path.parent.name for path in package.glob("*/__init__.py")}
@@ -141,21 +145,28 @@ def printed_commands():
         lines = re.findall(r"(?:`|^    )(?:sudo )?(graspsense [^`\n]+)", text, re.MULTILINE)
         lines += re.findall(r"^(graspsense [^\n]+)", blocks, re.MULTILINE)
         for line in sorted({line for line in lines if line.split()[1].islower()}):
-            yield pytest.param(line, id=f"{page.relative_to(ROOT)}: {line}")
+            yield page.relative_to(ROOT), line
 
 
-@pytest.mark.parametrize("line", [*printed_commands()])
-def test_a_printed_command_and_its_options_exist(line):
+def test_a_printed_command_and_its_options_exist():
+    lines = [*printed_commands()]
+    assert lines
+    for page, line in lines:
+        assert options_of(line) <= options_known(line), f"{page}: {line}"
+
+
+def options_of(line):
+    words = shlex.split(line, comments=True)[1:]
+    return {word.partition("=")[0] for word in words if re.match(r"--?[a-z]", word)} - {"--help"}
+
+
+def options_known(line):
     words = shlex.split(line, comments=True)[1:]
     command, context = cli, click.Context(cli)
     while isinstance(command, click.Group) and words and not words[0].startswith("-") and "|" not in words[0]:
         command = command.get_command(context, words.pop(0))
         assert command is not None, line
-    known = {
-        option for parameter in command.params for option in (*parameter.opts, *parameter.secondary_opts)
-    }
-    named = {word.partition("=")[0] for word in words if re.match(r"--?[a-z]", word)}
-    assert named <= known | {"--help"}, line
+    return {option for parameter in command.params for option in (*parameter.opts, *parameter.secondary_opts)}
 
 
 def in_backticks(pattern):
@@ -174,16 +185,18 @@ METADATA = ("graspsense.device", "graspsense.trial")
 """Names of metadata records in a recording."""
 
 
-@pytest.mark.parametrize(("page", "name"), in_backticks(r"graspsense(?:_\w+)?(?:\.\w+)+"))
-def test_a_module_or_name_that_a_page_mentions_exists(page, name):
-    assert name in METADATA or pkgutil.resolve_name(name) is not None
+def test_a_module_or_name_that_a_page_mentions_exists():
+    for page, name in in_backticks(r"graspsense(?:_\w+)?(?:\.\w+)+"):
+        assert name in METADATA or pkgutil.resolve_name(name) is not None, page
 
 
-@pytest.mark.parametrize(("page", "name"), in_backticks(r"[\w./]+/[\w.]+\.(?:py|toml|md|json)"))
-def test_a_file_that_a_page_mentions_exists(page, name):
+def test_a_file_that_a_page_mentions_exists():
     folders = (ROOT, ROOT / "src" / "graspsense", *ROOT.glob("plugins/*"))
     made_by_users = ("results/", "lab_", "OUT/", "~", "/")
-    assert name.startswith(made_by_users) or any((folder / name).exists() for folder in folders)
+    for page, name in in_backticks(r"[\w./]+/[\w.]+\.(?:py|toml|md|json)"):
+        assert name.startswith(made_by_users) or any((folder / name).exists() for folder in folders), (
+            f"{page}: {name}"
+        )
 
 
 def test_the_example_of_an_experiment_is_one(tmp_path):

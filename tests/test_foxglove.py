@@ -9,8 +9,8 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
 from graspsense import load_pipeline
-from graspsense.core.components.entries import TactileArray
 from graspsense.core.components.registry import installed
+from graspsense.core.values.channel import TactileArray
 from graspsense.core.values.errors import ConfigError
 from graspsense.recording.export_trace import write_mcap, write_pictures
 from graspsense.recording.foxglove import CELL_PIXELS, RAW_IMAGE, _grid_of

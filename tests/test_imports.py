@@ -45,10 +45,14 @@ MAY_KNOW = {
     },
     "testing": {"core", "plugin_api", "testing"},
     "scaffold": {"core", "scaffold"},
-    "plugin_api": {"core"},
-    "__init__": {"core"},
+    "plugin_api": {"core", "lazy_names"},
+    "__init__": {"core", "lazy_names"},
+    "lazy_names": set(),
 }
 """Subpackage to the subpackages it may import from; every subpackage may import the package itself, for its version."""
+
+ROOMS = ("values", "files", "control", "components", "grasp", "compiling", "learn", "pipeline")
+"""The rooms of core. Each may import from those before it."""
 
 HEAVY = {
     "numpy",
@@ -98,13 +102,53 @@ def distributions() -> list[Path]:
     return sorted(path.parent for path in (ROOT / "plugins").glob("*/pyproject.toml"))
 
 
-@pytest.mark.parametrize("path", files(SOURCE), ids=lambda path: str(path.relative_to(SOURCE)))
-def test_a_subpackage_knows_only_the_subpackages_it_may(path):
-    parts = path.relative_to(SOURCE).with_suffix("").parts
-    subpackage = parts[0]
-    package = ".".join(["graspsense", *parts[:-1]])
+def test_a_subpackage_knows_only_the_subpackages_it_may():
+    for path in files(SOURCE):
+        parts = path.relative_to(SOURCE).with_suffix("").parts
+        package = ".".join(["graspsense", *parts[:-1]])
+        assert subpackages_known(path, package) <= MAY_KNOW[parts[0]], path.relative_to(SOURCE)
 
-    assert subpackages_known(path, package) <= MAY_KNOW[subpackage]
+
+def modules() -> dict[str, Path]:
+    """Return the path of each module of graspsense."""
+    found = {}
+    for path in files(SOURCE):
+        parts = ("graspsense", *path.relative_to(SOURCE).with_suffix("").parts)
+        found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
+    return found
+
+
+def imports_of(name: str, known: dict[str, Path]) -> set[str]:
+    """Return the modules that a module imports in any way: at its beginning, late, or for types alone."""
+    found = set()
+    for node in statements(parsed(known[name])):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert not node.level, f"{name} imports from a package without its full name"
+            inner = {f"{node.module}.{alias.name}" for alias in node.names}
+            found |= inner & known.keys() or {node.module}
+    return found & known.keys()
+
+
+def test_a_room_of_core_knows_those_before_it_only():
+    known = modules()
+    for name in known:
+        if name.startswith("graspsense.core."):
+            room = name.split(".")[2]
+            allowed = {f"graspsense.core.{one}" for one in ROOMS[: ROOMS.index(room) + 1]}
+            within = [one for one in imports_of(name, known) if one.startswith("graspsense.core.")]
+            assert {".".join(one.split(".")[:3]) for one in within} <= allowed, name
+
+
+def test_no_module_imports_itself_through_others():
+    known = modules()
+    waiting = {name: imports_of(name, known) - {name, "graspsense"} for name in known}
+    while ready := [name for name, needed in waiting.items() if not needed & waiting.keys()]:
+        for name in ready:
+            del waiting[name]
+
+    assert not waiting, f"among these is a circle: {sorted(waiting)}"
 
 
 def test_the_rule_sees_every_way_of_importing():

@@ -12,9 +12,9 @@ from test_classifiers import NAMES, UNITS, trials
 
 from graspsense.core.components.config import Flag, resolve
 from graspsense.core.components.registry import IsolatedPlugins, installed
-from graspsense.core.components.roles import DeviceInfo
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.learn.model import load_model, model_for, train, worded, write_model
+from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import ConfigError, DataDamaged, UnknownName
 from graspsense.core.values.features import UNKNOWN, Features
 from graspsense.core.values.signals import EFFORT, Command

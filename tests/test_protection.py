@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from graspsense.core.components.roles import DeviceInfo
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.protection.cells import Fingertips
 from graspsense.core.grasp.protection.drift import PadDrift
@@ -17,6 +16,7 @@ from graspsense.core.grasp.protection.reports import Reports
 from graspsense.core.grasp.protection.status import StatusWatch
 from graspsense.core.grasp.protection.stuck_force import StuckForce
 from graspsense.core.grasp.protection.touch import Touch
+from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.faults import StatusBit
 from graspsense.core.values.signals import (
     APPROACH,

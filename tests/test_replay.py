@@ -19,8 +19,8 @@ from hypothesis import strategies as st
 
 from graspsense.core.components.config import Flag, resolve
 from graspsense.core.components.registry import installed
-from graspsense.core.components.roles import DeviceInfo
 from graspsense.core.pipeline.pipeline import grasp_with
+from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import ConfigError, DataDamaged, DeviceLost, RecordingEnded
 from graspsense.core.values.signals import EFFORT, NO_PADS, VELOCITY, Command, Frame, Phase
 from graspsense.core.values.trace import PAD_COLUMNS, TICK_COLUMNS

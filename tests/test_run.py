@@ -15,8 +15,8 @@ from graspsense import load_pipeline
 from graspsense.cli.main import main
 from graspsense.cli.run import effort_words, print_trial
 from graspsense.core.components.config import resolve
-from graspsense.core.components.entries import Channel
 from graspsense.core.grasp.dry_run import dry_run
+from graspsense.core.values.channel import Channel
 from graspsense.core.values.signals import VELOCITY, Command
 from graspsense.store.store import Store
 

@@ -18,11 +18,11 @@ from graspsense.core.components.config import (
 )
 from graspsense.core.components.layers import Layer
 from graspsense.core.components.registry import installed
-from graspsense.core.components.roles import DeviceInfo
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.components.setting import unit_of_name
 from graspsense.core.components.strict import keys_of
 from graspsense.core.grasp.runner import tick_params
+from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import ConfigError
 from graspsense.core.values.signals import EFFORT, Command
 from graspsense.experiments.experiment import read_experiment

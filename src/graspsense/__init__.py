@@ -7,9 +7,12 @@ from __future__ import annotations
 
 from typing import Any, Final
 
+from graspsense.core.values.display import drawn_by
 from graspsense.lazy_names import LazyNames
 
 __version__: Final = "0.1.0"
+
+drawn_by("graspsense.report.notebook")
 
 PUBLIC: Final = LazyNames(
     __name__,

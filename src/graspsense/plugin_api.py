@@ -14,15 +14,14 @@ from graspsense.lazy_names import LazyNames, Table
 _TABLE: Final[Table] = {
     "Declaring what a plugin brings": {
         "core.components.hookspecs": ("hookimpl",),
+        "core.values.channel": ("Channel", "FastChannel", "TactileArray"),
         "core.components.entries": (
-            "Channel",
             "ClassifierEntry",
             "CommandEntry",
             "ConformanceCheckEntry",
             "ControllerEntry",
             "DatasetEntry",
             "EmulatorEntry",
-            "FastChannel",
             "Feature",
             "FeatureSetEntry",
             "Finding",
@@ -30,7 +29,6 @@ _TABLE: Final[Table] = {
             "ModelEntry",
             "PipelineEntry",
             "SensorBackendEntry",
-            "TactileArray",
         ),
         "core.components.setting": ("CHANGES_NO_RESULT", "NAMES_INPUT", "setting"),
         "core.files.toml_text": ("TomlError", "toml_values"),
@@ -75,7 +73,8 @@ _TABLE: Final[Table] = {
     },
     "Sensor backends": {
         "core.values.faults": ("StatusBit",),
-        "core.components.roles": ("DeviceInfo", "ObjectKind", "SensorBackend"),
+        "core.values.device": ("DeviceInfo",),
+        "core.components.roles": ("ObjectKind", "SensorBackend"),
         "core.components.channels": ("no_signals", "signal_type"),
     },
     "Sensor backends that do many grasps at once": {
@@ -178,7 +177,8 @@ _TABLE: Final[Table] = {
         "testing.model_gripper": ("model_gripper", "drive"),
     },
     "Observers": {
-        "core.values.trial": ("GraspEvent", "RunInfo", "Trial", "event_name"),
+        "core.values.events": ("GraspEvent", "event_name"),
+        "core.values.trial": ("RunInfo", "Trial"),
     },
     "The tick of the runner, for a backend that runs it compiled": {
         "core.control.binding": ("bind", "maker"),

@@ -2,14 +2,15 @@
 
 # Declaring what a plugin brings
 from graspsense.core.components.hookspecs import hookimpl as hookimpl
-from graspsense.core.components.entries import Channel as Channel
+from graspsense.core.values.channel import Channel as Channel
+from graspsense.core.values.channel import FastChannel as FastChannel
+from graspsense.core.values.channel import TactileArray as TactileArray
 from graspsense.core.components.entries import ClassifierEntry as ClassifierEntry
 from graspsense.core.components.entries import CommandEntry as CommandEntry
 from graspsense.core.components.entries import ConformanceCheckEntry as ConformanceCheckEntry
 from graspsense.core.components.entries import ControllerEntry as ControllerEntry
 from graspsense.core.components.entries import DatasetEntry as DatasetEntry
 from graspsense.core.components.entries import EmulatorEntry as EmulatorEntry
-from graspsense.core.components.entries import FastChannel as FastChannel
 from graspsense.core.components.entries import Feature as Feature
 from graspsense.core.components.entries import FeatureSetEntry as FeatureSetEntry
 from graspsense.core.components.entries import Finding as Finding
@@ -17,7 +18,6 @@ from graspsense.core.components.entries import FoundDevice as FoundDevice
 from graspsense.core.components.entries import ModelEntry as ModelEntry
 from graspsense.core.components.entries import PipelineEntry as PipelineEntry
 from graspsense.core.components.entries import SensorBackendEntry as SensorBackendEntry
-from graspsense.core.components.entries import TactileArray as TactileArray
 from graspsense.core.components.setting import CHANGES_NO_RESULT as CHANGES_NO_RESULT
 from graspsense.core.components.setting import NAMES_INPUT as NAMES_INPUT
 from graspsense.core.components.setting import setting as setting
@@ -64,7 +64,7 @@ from graspsense.core.control.tick import TARING as TARING
 
 # Sensor backends
 from graspsense.core.values.faults import StatusBit as StatusBit
-from graspsense.core.components.roles import DeviceInfo as DeviceInfo
+from graspsense.core.values.device import DeviceInfo as DeviceInfo
 from graspsense.core.components.roles import ObjectKind as ObjectKind
 from graspsense.core.components.roles import SensorBackend as SensorBackend
 from graspsense.core.components.channels import no_signals as no_signals
@@ -185,10 +185,10 @@ from graspsense.testing.model_gripper import model_gripper as model_gripper
 from graspsense.testing.model_gripper import drive as drive
 
 # Observers
-from graspsense.core.values.trial import GraspEvent as GraspEvent
+from graspsense.core.values.events import GraspEvent as GraspEvent
+from graspsense.core.values.events import event_name as event_name
 from graspsense.core.values.trial import RunInfo as RunInfo
 from graspsense.core.values.trial import Trial as Trial
-from graspsense.core.values.trial import event_name as event_name
 
 # The tick of the runner, for a backend that runs it compiled
 from graspsense.core.control.binding import bind as bind

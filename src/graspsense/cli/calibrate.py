@@ -13,9 +13,9 @@ from graspsense.cli.output import echo_json
 from graspsense.cli.terminal import echo, echo_table, talk
 
 if TYPE_CHECKING:
-    from graspsense.core.components.roles import DeviceInfo
     from graspsense.core.grasp.calibrating import Rig
     from graspsense.core.grasp.calibration_files import Calibration
+    from graspsense.core.values.device import DeviceInfo
 
 
 class _Setup(NamedTuple):
@@ -170,7 +170,7 @@ def _store(setup: _Setup, kind: str, data: Mapping[str, Any], as_json: bool) -> 
 
 def _first_facing(setup: _Setup) -> int:
     """Return the number of the first cell on the gripping face, which its declaration states. Raises ConfigError."""
-    from graspsense.core.components.entries import TactileArray
+    from graspsense.core.values.channel import TactileArray
     from graspsense.core.values.errors import ConfigError
 
     for channel in setup.backend.channels:

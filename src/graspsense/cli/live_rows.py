@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Final
 from graspsense.cli.terminal import talk, terminal_width
 
 if TYPE_CHECKING:
+    from graspsense.core.values.events import GraspEvent
     from graspsense.core.values.signals import Command, Reading
-    from graspsense.core.values.trial import GraspEvent
 
 BAR: Final = 24
 """Characters of the bar of the widest gap, where the terminal has room for it."""

@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from graspsense.core.components.config import Settings
-    from graspsense.core.components.roles import DeviceInfo
     from graspsense.core.grasp.runner import Sink
+    from graspsense.core.values.device import DeviceInfo
     from graspsense.core.values.features import Prediction
     from graspsense.core.values.trial import Trial
     from graspsense.experiments.condition import Conditions

@@ -20,7 +20,7 @@ from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 
 from graspsense import __version__
-from graspsense.core.components.entries import TactileArray
+from graspsense.core.values.channel import TactileArray
 from graspsense.core.values.errors import ConfigError
 from graspsense.recording.layout import CDR_HEADER, PADS_TOPIC, SIGNAL_TOPIC
 from graspsense.recording.reader import LARGEST_RECORD

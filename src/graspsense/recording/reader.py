@@ -17,12 +17,12 @@ from mcap.exceptions import McapError
 from mcap.records import Channel, Chunk, DataEnd, Footer, Header, McapRecord, Message, Metadata, Schema
 
 from graspsense.core.components.channels import declared_shape, further, no_signals, signal_type
-from graspsense.core.components.entries import Channel as DeclaredChannel
-from graspsense.core.components.entries import FastChannel, TactileArray
+from graspsense.core.values.channel import Channel as DeclaredChannel
+from graspsense.core.values.channel import FastChannel, TactileArray
 from graspsense.core.values.errors import ConfigError, DataDamaged, TooLarge, named
+from graspsense.core.values.events import GraspEvent, event_from_json
 from graspsense.core.values.signals import Frame, Image, Pads, Phase, Reading, Samples, no_pads
 from graspsense.core.values.trace import SI_UNITS, Trace, trace_of
-from graspsense.core.values.trial import GraspEvent, event_from_json
 from graspsense.recording.layout import (
     CDR_HEADER,
     DEVICE,

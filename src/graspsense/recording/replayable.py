@@ -13,7 +13,7 @@ from typing import Any, Final
 from attrs import field, frozen
 
 from graspsense.core.components.channels import declared_shape, further, shape_of
-from graspsense.core.components.entries import Channel
+from graspsense.core.values.channel import Channel
 from graspsense.core.values.errors import DataDamaged
 from graspsense.core.values.signals import Frame, Image, Reading, Samples
 

@@ -19,8 +19,8 @@ from attrs import evolve, field, frozen
 from graspsense import __version__
 from graspsense.core.components.channels import as_json, from_json, further
 from graspsense.core.components.config import toml_key, toml_value
-from graspsense.core.components.entries import Channel, TactileArray
 from graspsense.core.files.toml_text import toml_values
+from graspsense.core.values.channel import Channel, TactileArray
 from graspsense.core.values.errors import DataDamaged
 from graspsense.core.values.json_values import json_text
 from graspsense.core.values.signals import Outcome
@@ -31,7 +31,7 @@ from graspsense.recording.provenance import provenance
 
 if TYPE_CHECKING:
     from graspsense.core.components.config import Settings
-    from graspsense.core.components.roles import DeviceInfo
+    from graspsense.core.values.device import DeviceInfo
     from graspsense.core.values.features import Features
     from graspsense.core.values.trial import Trial
 

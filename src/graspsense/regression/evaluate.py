@@ -89,7 +89,7 @@ def evaluate_regression(
 def interval_radius(errors: NDArray[np.float64], instances: Sequence[str] | None) -> tuple[float | None, str]:
     """Return half the width of a prediction interval that held-out errors calibrate, or None with the reason.
 
-    The unit of exchangeability is the instance, as in the prediction sets of labels (`graspsense.core.learn.conformal`).
+    The unit of exchangeability is the instance, as in the prediction sets of labels (`core.learn.conformal`).
     """
     unit = "trials" if instances is None else "instances"
     units = np.array([str(i) for i in range(len(errors))] if instances is None else instances)

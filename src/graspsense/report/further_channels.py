@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from graspsense.core.components.entries import Channel, FastChannel
+from graspsense.core.values.channel import Channel, FastChannel
 from graspsense.core.values.trace import SampleTrace
 from graspsense.core.values.units import display_unit, without_underscores
 from graspsense.report.heat import HeatScale, heat_rows
 from graspsense.report.html import figure
+from graspsense.report.moments import contact_time, shown_from
 from graspsense.report.svg import INKS, AxisScale, Picture, number, reaching
-from graspsense.report.trace_plot import contact_time, shown_from
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

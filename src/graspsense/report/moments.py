@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from attrs import frozen
@@ -11,10 +11,39 @@ from attrs import frozen
 from graspsense.core.values.signals import Phase
 from graspsense.core.values.trace import ImageTrace
 from graspsense.core.values.units import without_underscores
-from graspsense.report.trace_plot import contact_time
 
 if TYPE_CHECKING:
-    from graspsense.core.values.trace import Floats, Trace
+    from graspsense.core.values.trace import Floats, Integers, Trace
+
+
+BEFORE_CONTACT_S: Final = 0.8
+"""How much of the approach is shown where time is in seconds: the rest is motion through free air."""
+
+
+def contact_time(trace: Trace) -> float | None:
+    """Return when both pads touched, where the phase changes from approach to squeeze; None if they never did."""
+    squeezed = np.flatnonzero(trace.phase == int(Phase.SQUEEZE))
+    return float(trace.t_s[squeezed[0]]) if len(squeezed) else None
+
+
+def shown_from(trace: Trace) -> int:
+    """Return the first tick that is drawn: shortly before contact where there is one, else the first."""
+    contact = contact_time(trace)
+    if contact is None or trace.units["t"] != "s":
+        return 0
+    return int(np.searchsorted(trace.t_s, contact - BEFORE_CONTACT_S))
+
+
+def phase_spans(t: Floats, phases: Integers) -> list[tuple[Phase, float, float]]:
+    """Return each phase in turn with the times at which it begins and ends."""
+    if len(t) == 0:
+        return []
+    starts = [0, *(np.flatnonzero(np.diff(phases)) + 1).tolist()]
+    ends = [*starts[1:], len(t) - 1]
+    return [
+        (Phase(int(phases[start])), float(t[start]), float(t[end]))
+        for start, end in zip(starts, ends, strict=True)
+    ]
 
 
 def moments(trace: Trace) -> dict[str, float]:

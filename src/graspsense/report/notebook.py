@@ -9,16 +9,15 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from graspsense.core.values.features import percent
-from graspsense.core.values.trace import SampleTrace
-from graspsense.core.values.units import display_unit, in_words, without_underscores
-from graspsense.report.moments import array_images, images_at, moments
-from graspsense.report.trace_plot import contact_time, phase_spans, shown_from
+from graspsense.core.values.features import Features, Prediction, percent
+from graspsense.core.values.short_html import sentence, table
+from graspsense.core.values.trace import SampleTrace, Trace
+from graspsense.core.values.trial import Trial
+from graspsense.core.values.units import display_unit, quantity, without_underscores
+from graspsense.report.moments import array_images, contact_time, images_at, moments, phase_spans, shown_from
 
 if TYPE_CHECKING:
-    from graspsense.core.values.features import Features, Prediction
-    from graspsense.core.values.trace import Floats, Trace
-    from graspsense.core.values.trial import Trial
+    from graspsense.core.values.trace import Floats
 
 WIDTH, HEIGHT, LEFT_MARGIN, PANEL = 560.0, 264.0, 48.0, 92.0
 POINTS: Final = 300
@@ -30,24 +29,18 @@ INKS: Final = ("#3b8ad9", "#d9772b", "#8a8a8a")
 PHASE_INKS: Final = {"squeeze": "#e8963c", "hold": "#4caf6a", "release": "#9a9a9a"}
 
 
-def quantity(value: float, unit: str) -> str:
-    """Return a value in a person's unit, lengths in mm: `57.86 mm`."""
-    return "missing" if math.isnan(value) else in_words(value, unit)
-
-
-def sentence(text: str, *, strong: bool = False) -> str:
-    """Return a line of plain text."""
-    return f"<div>{'<strong>' if strong else ''}{escape(text)}{'</strong>' if strong else ''}</div>"
-
-
-def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Return a table of plain texts."""
-    head = "".join(f'<th style="text-align:left">{escape(cell)}</th>' for cell in header)
-    body = "".join(
-        "<tr>" + "".join(f'<td style="text-align:left">{escape(cell)}</td>' for cell in row) + "</tr>"
-        for row in rows
-    )
-    return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+def html(value: object) -> str:
+    """Return what a notebook shows of a trial, a trace, features or a prediction."""
+    match value:
+        case Trial():
+            return trial_html(value)
+        case Trace():
+            return trace_html(value)
+        case Features():
+            return features_html(value)
+        case Prediction():
+            return prediction_html(value)
+    raise TypeError(f"there is no picture of a {type(value).__name__}")
 
 
 def features_html(features: Features) -> str:
@@ -97,6 +90,11 @@ def trial_html(trial: Trial) -> str:
     return "".join(parts)
 
 
+def trace_html(trace: Trace) -> str:
+    """Return a trace in words, its curves and its arrays."""
+    return sentence(trace.words) + trace_svg(trace) + samples_html(trace) + arrays_html(trace)
+
+
 def trace_svg(trace: Trace) -> str:
     """Return pad forces and gap over time, with the phases behind them."""
     start = shown_from(trace)
@@ -115,7 +113,7 @@ def trace_svg(trace: Trace) -> str:
         *_time_labels(t, bottom + PANEL + 26, trace.units["t"]),
     ]
     return (
-        f'<svg viewBox="0 0 {WIDTH:g} {HEIGHT:g}" role="img" aria-label="{escape(trace_words(trace))}" '
+        f'<svg viewBox="0 0 {WIDTH:g} {HEIGHT:g}" role="img" aria-label="{escape(trace.words)}" '
         f'style="max-width:{WIDTH:g}px;font:11px sans-serif" xmlns="http://www.w3.org/2000/svg">'
         f"{''.join(parts)}</svg>"
     )
@@ -174,20 +172,6 @@ def _svg(drawn: Sequence[str], height: float, words: str) -> str:
         f'style="display:block;max-width:{WIDTH:g}px;font:11px sans-serif" xmlns="http://www.w3.org/2000/svg">'
         f"{''.join(drawn)}</svg>"
     )
-
-
-def trace_words(trace: Trace) -> str:
-    """Return a trace in a line: its ticks, its time, its largest force and its range of gaps."""
-    if len(trace) == 0:
-        return "no ticks"
-    words = [f"{len(trace)} ticks", f"{float(trace.t_s[-1] - trace.t_s[0]):.4g} {trace.units['t']}"]
-    forces = np.concatenate([trace.force_left_n, trace.force_right_n])
-    if not np.isnan(forces).all():
-        words.append(f"forces to {quantity(float(np.nanmax(forces)), trace.units['force_left'])}")
-    if not np.isnan(trace.gap_m).all():
-        low, high = float(np.nanmin(trace.gap_m)), float(np.nanmax(trace.gap_m))
-        words.append(f"gap {quantity(low, trace.units['gap'])} to {quantity(high, trace.units['gap'])}")
-    return ", ".join(words)
 
 
 def _x(t: Floats, value: float) -> float:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from attrs import frozen
 
-from graspsense.core.components.entries import Channel, TactileArray
+from graspsense.core.values.channel import Channel, TactileArray
 from graspsense.core.values.trace import ImageTrace
 from graspsense.core.values.units import display_unit, without_underscores
 from graspsense.report.heat import COLOURS, HeatScale

@@ -11,6 +11,7 @@ from graspsense.core.values.signals import Phase
 from graspsense.core.values.trace import SampleTrace
 from graspsense.core.values.units import display_unit, without_underscores
 from graspsense.report.literal_text import show_literally
+from graspsense.report.moments import array_images, contact_time, images_at, moments, phase_spans, shown_from
 
 if TYPE_CHECKING:
     from graspsense.core.values.trace import Floats, ImageTrace, Integers, Trace
@@ -18,8 +19,6 @@ if TYPE_CHECKING:
 MATPLOTLIB_HINT: Final = (
     'a picture needs matplotlib: pip install "graspsense[plot]", or pip install matplotlib'
 )
-BEFORE_CONTACT_S: Final = 0.8
-"""How much of the approach is shown where time is in seconds: the rest is motion through free air."""
 PHASE_COLOURS: Final = {Phase.APPROACH: "#e9eff6", Phase.SQUEEZE: "#fbdcb4", Phase.HOLD: "#c9e6cf"}
 OTHER_PHASE: Final = "#f3f3f3"
 LEAST_NAMED: Final = 0.05
@@ -33,8 +32,6 @@ def plot(trace: Trace) -> tuple[Any, Any]:
         from matplotlib import pyplot
     except ImportError as error:
         raise PluginUnavailable(f"{MATPLOTLIB_HINT} ({error})") from error
-    from graspsense.report.moments import array_images
-
     arrays = array_images(trace)
     fast = {
         name: signal
@@ -68,8 +65,6 @@ def _draw_samples(trace: Trace, axes: Any, name: str, signal: SampleTrace) -> No
 
 def _draw_array(trace: Trace, axes: Any, name: str, images: ImageTrace) -> Any:
     """Draw the cells of an array at contact, peak and rest, a row each; return the picture for its colour bar."""
-    from graspsense.report.moments import images_at, moments
-
     shown = images_at(images, 1.0, moments(trace))
     values = np.array(list(shown.values.values())) if shown.values else images.cells[-1:]
     picture = axes.imshow(values, aspect="auto", interpolation="nearest", cmap="Blues")
@@ -102,32 +97,6 @@ def draw_trace(trace: Trace, force: Any, gap: Any) -> None:
         axes.margins(x=0.0)
         axes.grid(color="white", lw=0.8)
         axes.set_axisbelow(True)
-
-
-def contact_time(trace: Trace) -> float | None:
-    """Return when both pads touched, where the phase changes from approach to squeeze; None if they never did."""
-    squeezed = np.flatnonzero(trace.phase == int(Phase.SQUEEZE))
-    return float(trace.t_s[squeezed[0]]) if len(squeezed) else None
-
-
-def shown_from(trace: Trace) -> int:
-    """Return the first tick that is drawn: shortly before contact where there is one, else the first."""
-    contact = contact_time(trace)
-    if contact is None or trace.units["t"] != "s":
-        return 0
-    return int(np.searchsorted(trace.t_s, contact - BEFORE_CONTACT_S))
-
-
-def phase_spans(t: Floats, phases: Integers) -> list[tuple[Phase, float, float]]:
-    """Return each phase in turn with the times at which it begins and ends."""
-    if len(t) == 0:
-        return []
-    starts = [0, *(np.flatnonzero(np.diff(phases)) + 1).tolist()]
-    ends = [*starts[1:], len(t) - 1]
-    return [
-        (Phase(int(phases[start])), float(t[start]), float(t[end]))
-        for start, end in zip(starts, ends, strict=True)
-    ]
 
 
 def _shade_phases(axes: Any, t: Floats, phases: Integers, *, named: bool) -> None:

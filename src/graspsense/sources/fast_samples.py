@@ -11,7 +11,7 @@ from graspsense.core.values.signals import Samples
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from graspsense.core.components.entries import FastChannel
+    from graspsense.core.values.channel import FastChannel
 
 
 def sample_blocks(

@@ -10,7 +10,7 @@ import numpy as np
 from attrs import evolve, field, frozen
 
 from graspsense.core.components.channels import signal_type
-from graspsense.core.components.entries import Channel, FastChannel, TactileArray
+from graspsense.core.values.channel import Channel, FastChannel, TactileArray
 from graspsense.core.values.errors import DataDamaged
 from graspsense.core.values.signals import NO_PADS, Frame, Image, Reading, Samples
 from graspsense.recording.replayable import Recording

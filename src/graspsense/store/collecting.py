@@ -26,8 +26,8 @@ from graspsense.store.store import Store
 if TYPE_CHECKING:
     from graspsense.core.components.config import Settings
     from graspsense.core.components.registry import Plugins
-    from graspsense.core.components.roles import DeviceInfo
     from graspsense.core.grasp.runner import Sink
+    from graspsense.core.values.device import DeviceInfo
     from graspsense.core.values.trial import Trial
 
 HELP: Final = (

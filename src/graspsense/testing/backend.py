@@ -12,11 +12,12 @@ from typing import Any, Final
 
 from graspsense.core.components.channels import further, no_signals, shape_of
 from graspsense.core.components.config import create
-from graspsense.core.components.entries import KINDS, Channel, FastChannel, TactileArray
+from graspsense.core.components.entries import KINDS
 from graspsense.core.components.roles import SensorBackend
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.control.guard import GuardState, guard
 from graspsense.core.grasp.runner import run_uninterrupted
+from graspsense.core.values.channel import Channel, FastChannel, TactileArray
 from graspsense.core.values.errors import DeviceLost, NoDevice, RecordingEnded, TareRefused, named
 from graspsense.core.values.signals import (
     CHANNELS,

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import Any, Final, Literal, Protocol
 
 from attrs import define, field, frozen
 
 from graspsense.core.values.errors import FAILURES, GraspsenseError, named
-
-if TYPE_CHECKING:
-    from graspsense.testing.subject import Subject
 
 State = Literal["passed", "failed", "skipped", "expected failure"]
 
@@ -30,6 +27,18 @@ class Check:
     id: str
     title: str
     test: Callable[[Any], None]
+
+
+class Named(Protocol):
+    """What is checked: a component or a distribution."""
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+
+    @property
+    def role(self) -> str:
+        """Its role, or `distribution`."""
 
 
 @frozen
@@ -68,7 +77,7 @@ def demand(holds: bool, text: str) -> None:
         raise CheckFailed(text)
 
 
-def outcome_of(check: Check, subject: Subject, expected: Mapping[str, str]) -> Result:
+def outcome_of(check: Check, subject: Named, expected: Mapping[str, str]) -> Result:
     """Run one check; `expected` maps the ids of checks that are known to fail to the reasons.
 
     Any exception of the component is a failure. A check that was expected to fail and passes is a failure too.

@@ -108,7 +108,7 @@ class Examined:
         if check is not first and self.result(subject, first).state == "failed":
             why = f"no other check can run before {first.id} passes"
             return Result(subject.name, subject.role, check.id, check.title, "skipped", why)
-        return outcome_of(check, subject, self.expected)  # type: ignore[arg-type]
+        return outcome_of(check, subject, self.expected)
 
     def cases(self) -> Iterator[BoundCheck | MinimumCase]:
         """Yield every check of every component, and after each component whether enough of them ran."""

@@ -9,10 +9,11 @@ from math import inf, isfinite, isinf, nan
 from typing import Any, Final, NamedTuple, get_type_hints
 
 from graspsense.core.components.channels import further, no_signals
-from graspsense.core.components.entries import KINDS, Channel
+from graspsense.core.components.entries import KINDS
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.control.free_motion import FreeMotion, free_motion_of
 from graspsense.core.grasp.runner import run_uninterrupted
+from graspsense.core.values.channel import Channel
 from graspsense.core.values.errors import named
 from graspsense.core.values.signals import (
     APPROACH,

@@ -7,8 +7,9 @@ from math import inf, nan
 from typing import TYPE_CHECKING, Any, Final
 
 from graspsense.core.components.channels import declared_shape, further, no_signals
-from graspsense.core.components.entries import Channel, FastChannel, TactileArray
-from graspsense.core.components.roles import Controller, DeviceInfo, SensorBackend
+from graspsense.core.components.roles import Controller, SensorBackend
+from graspsense.core.values.channel import Channel, FastChannel, TactileArray
+from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.signals import (
     EFFORT,
     FORCE,

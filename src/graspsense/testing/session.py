@@ -5,21 +5,19 @@ from __future__ import annotations
 import time
 from contextlib import suppress
 from math import ceil
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final, Protocol
 
 from attrs import define, field
 
-from graspsense.core.components.roles import DeviceInfo, SensorBackend
+from graspsense.core.components.roles import SensorBackend
 from graspsense.core.control.contact import CONTACT_FORCE_N
 from graspsense.core.control.garbage_collection import no_collection
 from graspsense.core.control.guard import GuardParams, GuardState, guard
+from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import GraspsenseError, RecordingEnded
 from graspsense.core.values.signals import Command, Frame, Pads, Reading
 from graspsense.testing.checks import CheckFailed
 from graspsense.testing.gentle import EFFORT_N, closing, kind_of
-
-if TYPE_CHECKING:
-    from graspsense.testing.subject import Subject
 
 TIMEOUT_S: Final = 0.1
 OPENING_S: Final = 1.0
@@ -57,9 +55,20 @@ class Session:
         return found
 
 
-def recorded(subject: Subject) -> Session:
+class Gripper(Protocol):
+    """What is recorded: a gripper that can be created, with the entry that declares it."""
+
+    @property
+    def entry(self) -> Any:
+        """The entry, which names the kinds of command that it accepts."""
+
+    def create(self) -> SensorBackend[Any]:
+        """Return a new instance of it."""
+
+
+def recorded(gripper: Gripper) -> Session:
     """Open the gripper, use it for some seconds of its own clock, close it, and return the readings."""
-    backend: SensorBackend[Any] = subject.create()
+    backend = gripper.create()
     try:
         info = backend.open(0)
         if not isinstance(info, DeviceInfo):
@@ -69,7 +78,7 @@ def recorded(subject: Subject) -> Session:
             if info.opening is None:
                 _use(session, backend, "recording", RECORDED_FRAMES, None)
             else:
-                kind = kind_of(subject.entry.accepts)
+                kind = kind_of(gripper.entry.accepts)
                 _use(session, backend, "opening", _ticks(info, OPENING_S), info.opening)
                 _use(session, backend, "closing", _ticks(info, CLOSING_S), kind)
                 _use(session, backend, "open again", _ticks(info, OPENING_S), info.opening)

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from attrs import define, field
 
 from graspsense.core.components.config import build
 from graspsense.core.components.registry import Component, Plugins, PluginStatus, Resource, canonical
-
-if TYPE_CHECKING:
-    from graspsense.testing.session import Session
+from graspsense.testing.session import Session, recorded
 
 
 @define(slots=False, eq=False, kw_only=True)
@@ -57,8 +55,6 @@ class Subject:
     @cached_property
     def session(self) -> Session:
         """Return the readings of the gripper while it is opened, closed and opened again; recorded once."""
-        from graspsense.testing.session import recorded
-
         return recorded(self)
 
 

@@ -1,7 +1,7 @@
 """The loop of a whole grasp on preallocated buffers: in each tick the sensors, the controller and the plant.
 
-It gives the same trace as the runner (`graspsense.core.grasp.runner`) with the simulated backend, and can be compiled as a
-whole. `test_runner_plain_loop_and_compiled_loop_give_one_trace` verifies that both are equal, including the tare.
+It gives the same trace as the runner (`graspsense.core.grasp.runner`) with the simulated backend, and can be compiled
+as a whole. `test_runner_plain_loop_and_compiled_loop_give_one_trace` verifies that both are equal, including the tare.
 """
 
 from __future__ import annotations

@@ -10,8 +10,8 @@ from typing import Any, Final
 
 from attrs import asdict
 
-from graspsense.core.components.entries import Channel, FastChannel, TactileArray
 from graspsense.core.files.limits import CHANNEL_NUMBERS
+from graspsense.core.values.channel import Channel, FastChannel, TactileArray
 from graspsense.core.values.signals import CHANNELS, Image, Samples
 
 KINDS: Final[Mapping[str, type[Channel]]] = {

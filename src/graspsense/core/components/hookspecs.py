@@ -27,7 +27,8 @@ from graspsense.core.components.entries import (
 )
 
 if TYPE_CHECKING:
-    from graspsense.core.values.trial import GraspEvent, RunInfo, Trial
+    from graspsense.core.values.events import GraspEvent
+    from graspsense.core.values.trial import RunInfo, Trial
 
 PROJECT = "graspsense"
 ENTRY_POINT_GROUP = "graspsense.plugins"

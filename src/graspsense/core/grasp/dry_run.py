@@ -6,11 +6,12 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from graspsense.core.components.entries import KINDS
-from graspsense.core.components.roles import Controller, DeviceInfo, FeatureSet, SensorBackend
+from graspsense.core.components.roles import Controller, FeatureSet, SensorBackend
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.runner import run_uninterrupted
+from graspsense.core.values.device import DeviceInfo
+from graspsense.core.values.events import GraspEvent
 from graspsense.core.values.signals import EFFORT, FORCE, VELOCITY, Command, Pads, Phase, Reading
-from graspsense.core.values.trial import GraspEvent
 
 
 class PhaseCommands(NamedTuple):

@@ -12,12 +12,11 @@ import time
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from math import ceil, inf
-from typing import TYPE_CHECKING, Any, Final, Protocol, runtime_checkable
+from typing import Any, Final, Protocol, runtime_checkable
 
 from attrs import evolve, frozen
 
-from graspsense.core.components.entries import Channel
-from graspsense.core.components.roles import Controller, DeviceInfo, SensorBackend
+from graspsense.core.components.roles import Controller, SensorBackend
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.control.binding import bind, maker
 from graspsense.core.control.contact import RestState, at_rest, update_rest
@@ -39,6 +38,8 @@ from graspsense.core.control.tick import (
 )
 from graspsense.core.grasp.interrupts import Interrupts
 from graspsense.core.grasp.protection.protection import Protection
+from graspsense.core.values.channel import Channel
+from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import (
     FAILURES,
     DeviceLost,
@@ -47,6 +48,7 @@ from graspsense.core.values.errors import (
     TareRefused,
     named,
 )
+from graspsense.core.values.events import EventSource, GraspEvent, event_name
 from graspsense.core.values.faults import Fault
 from graspsense.core.values.signals import (
     APPROACH,
@@ -62,10 +64,19 @@ from graspsense.core.values.signals import (
     Reading,
 )
 from graspsense.core.values.trace import SI_UNITS, Trace, TraceRecorder
-from graspsense.core.values.trial import EventSource, GraspEvent, event_name
 
-if TYPE_CHECKING:
-    from graspsense.core.pipeline.anytime import Watcher
+Tell = Callable[[float, int, str], None]
+"""Called with the time, the phase and a sentence for each prediction."""
+
+
+class Watcher(Protocol):
+    """What the runner shows each tick of a squeeze to, and asks whether to stop it."""
+
+    def begin(self, recorder: TraceRecorder, info: DeviceInfo, tell: Tell) -> None:
+        """Receive the recorder of the grasp, the opened gripper, and where to report predictions."""
+
+    def watch(self, frame: Frame, phase: int) -> str:
+        """Return the reason to stop the squeeze after this tick; empty if it goes on."""
 
 
 class Sink(Protocol):

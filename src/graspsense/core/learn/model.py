@@ -48,8 +48,9 @@ if TYPE_CHECKING:
 
     from graspsense.core.components.config import SelectedComponent, Settings
     from graspsense.core.components.registry import Component, Plugins
-    from graspsense.core.components.roles import Classifier, DeviceInfo
+    from graspsense.core.components.roles import Classifier
     from graspsense.core.learn.labelled import Labelled
+    from graspsense.core.values.device import DeviceInfo
 
 FORMAT: Final = "graspsense model"
 REGRESSION_FORMAT: Final = "graspsense regression model"
@@ -83,7 +84,7 @@ class Model:
     sets: PredictionSets | None = None
     """Calibrated prediction sets; None in a model of an earlier version."""
     temperature: float | None = None
-    """The temperature at which its probabilities are calibrated (`graspsense.core.learn.temperature`); None: they are not."""
+    """The temperature (`learn.temperature`) at which its probabilities are calibrated; None: they are not."""
     checkpoints: tuple[tuple[float, Model], ...] = ()
     """The models for grasps that go on: each with the seconds after the contact up to which it knows them."""
 

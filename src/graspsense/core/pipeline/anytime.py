@@ -12,67 +12,26 @@ from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from math import inf
-from typing import TYPE_CHECKING, Any, Final, Protocol
+from typing import TYPE_CHECKING, Any, Final
 
-from attrs import frozen
-
+from graspsense.core.grasp.runner import Tell
 from graspsense.core.learn.checkpoints import until_checkpoint
 from graspsense.core.values.errors import FAILURES, ConfigError, named
-from graspsense.core.values.features import UNKNOWN, percent
+from graspsense.core.values.features import CheckpointPrediction
 from graspsense.core.values.signals import HOLD, SQUEEZE
 from graspsense.core.values.trace import trace_of
 
 if TYPE_CHECKING:
     from graspsense.core.components.config import Settings
-    from graspsense.core.components.roles import DeviceInfo, FeatureSet
+    from graspsense.core.components.roles import FeatureSet
     from graspsense.core.learn.model import Model
+    from graspsense.core.values.device import DeviceInfo
     from graspsense.core.values.features import Features, Prediction
     from graspsense.core.values.signals import Frame
     from graspsense.core.values.trace import TraceRecorder
 
 SWITCH_S: Final = 1e-4
 """Time after which the thread gives the interpreter back to the control loop that waits for it; usually 5 ms."""
-
-Tell = Callable[[float, int, str], None]
-"""Called with the time, the phase and a sentence for each prediction."""
-
-
-@frozen(kw_only=True, eq=False)
-class CheckpointPrediction:
-    """A prediction while the grasp went on: so many seconds after the contact, known to the loop at the time `t_s`."""
-
-    after_s: float
-    t_s: float
-    features: Features
-    prediction: Prediction
-
-    @property
-    def sure(self) -> bool:
-        """Whether the prediction set has one label."""
-        return self.prediction.label != UNKNOWN and len(self.prediction.prediction_set) == 1
-
-    @property
-    def words(self) -> str:
-        """The checkpoint with the prediction: `0.2 s after the contact: can:full or can:empty, 90 %`.
-
-        Of a set with more than three labels, only the first is named, so that it stays one line in a terminal.
-        """
-        first, *others = self.prediction.prediction_set or (self.prediction.label,)
-        if len(others) > 2 and self.prediction.coverage is not None:
-            said = f"{first} or one of {len(others)} others, {percent(self.prediction.coverage)}"
-        else:
-            said = self.prediction.set_in_words or self.prediction.label
-        return f"{self.after_s:g} s after the contact: {said}"
-
-
-class Watcher(Protocol):
-    """What the runner shows each tick of a squeeze to, and asks whether to stop it."""
-
-    def begin(self, recorder: TraceRecorder, info: DeviceInfo, tell: Tell) -> None:
-        """Receive the recorder of the grasp, the opened gripper, and where to report predictions."""
-
-    def watch(self, frame: Frame, phase: int) -> str:
-        """Return the reason to stop the squeeze after this tick; empty if it goes on."""
 
 
 class Anytime:

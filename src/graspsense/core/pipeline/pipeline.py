@@ -11,16 +11,18 @@ from attrs import frozen
 
 from graspsense.core.components.config import Flag, Settings, resolve
 from graspsense.core.components.registry import Plugins, installed
-from graspsense.core.components.roles import Controller, DeviceInfo, FeatureSet, SensorBackend
+from graspsense.core.components.roles import Controller, FeatureSet, SensorBackend
 from graspsense.core.control.garbage_collection import no_collection
 from graspsense.core.grasp.runner import Grasp, Sink, run_grasp
 from graspsense.core.learn.model import Model, model_for
 from graspsense.core.pipeline.anytime import Anytime, anytime_of
 from graspsense.core.pipeline.wiring import check
+from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import FAILURES, named
+from graspsense.core.values.events import GraspEvent
 from graspsense.core.values.features import UNKNOWN, Features, Prediction, missing
 from graspsense.core.values.signals import Outcome
-from graspsense.core.values.trial import GraspEvent, RunInfo, Trial
+from graspsense.core.values.trial import RunInfo, Trial
 
 
 class GraspInterrupted(KeyboardInterrupt):

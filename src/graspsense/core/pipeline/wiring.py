@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 from graspsense.core.components.channels import declared_shape
 from graspsense.core.components.config import SelectedComponent, Settings, select_component
-from graspsense.core.components.entries import Channel, FastChannel, TactileArray
 from graspsense.core.components.registry import Component, installed
+from graspsense.core.values.channel import Channel, FastChannel, TactileArray
 from graspsense.core.values.errors import GraspsenseError, WiringError
 
 

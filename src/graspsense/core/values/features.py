@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING, Any, Final
 
 from attrs import field, frozen
 
+from graspsense.core.values.display import html
 from graspsense.core.values.errors import listed
 from graspsense.core.values.printable import in_one_line
 from graspsense.core.values.reasons import Reason
+from graspsense.core.values.units import quantity
 
 if TYPE_CHECKING:
     import numpy as np
@@ -51,16 +53,12 @@ class Features:
                 raise ValueError(f"feature {name!r} is NaN without a reason: add one to `reasons`")
 
     def __repr__(self) -> str:
-        from graspsense.report.notebook import quantity
-
         each = zip(self.names, self.values, self.units, strict=True)
         words = ", ".join(f"{name} {quantity(value, unit)}" for name, value, unit in each)
         return in_one_line(f"<Features: {words or 'none'}>")
 
     def _repr_html_(self) -> str:
-        from graspsense.report.notebook import features_html
-
-        return features_html(self)
+        return html(self)
 
     def __getitem__(self, name: str) -> float:
         """Return the value of one feature; KeyError names the known ones."""
@@ -230,12 +228,38 @@ class Prediction:
         return in_one_line(f"<Prediction: {self.label}{certainty}>")
 
     def _repr_html_(self) -> str:
-        from graspsense.report.notebook import prediction_html
-
-        return prediction_html(self)
+        return html(self)
 
 
 UNKNOWN = "unknown"
+
+
+@frozen(kw_only=True, eq=False)
+class CheckpointPrediction:
+    """A prediction while the grasp went on: so many seconds after the contact, known to the loop at the time `t_s`."""
+
+    after_s: float
+    t_s: float
+    features: Features
+    prediction: Prediction
+
+    @property
+    def sure(self) -> bool:
+        """Whether the prediction set has one label."""
+        return self.prediction.label != UNKNOWN and len(self.prediction.prediction_set) == 1
+
+    @property
+    def words(self) -> str:
+        """The checkpoint with the prediction: `0.2 s after the contact: can:full or can:empty, 90 %`.
+
+        Of a set with more than three labels, only the first is named, so that it stays one line in a terminal.
+        """
+        first, *others = self.prediction.prediction_set or (self.prediction.label,)
+        if len(others) > 2 and self.prediction.coverage is not None:
+            said = f"{first} or one of {len(others)} others, {percent(self.prediction.coverage)}"
+        else:
+            said = self.prediction.set_in_words or self.prediction.label
+        return f"{self.after_s:g} s after the contact: {said}"
 
 
 def percent(probability: float) -> str:

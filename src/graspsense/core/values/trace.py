@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from attrs import define, evolve, field, frozen
 
+from graspsense.core.values.display import html, plot
 from graspsense.core.values.signals import CHANNELS, NO_PADS, Command, Frame, Image, Pads, Reading, Samples
+from graspsense.core.values.units import quantity
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from graspsense.core.values.trial import GraspEvent
+    from graspsense.core.values.events import GraspEvent
 
     Floats = NDArray[np.float64]
     Integers = NDArray[np.int64]
@@ -98,14 +100,24 @@ class Trace:
         return len(self.t_s)
 
     def __repr__(self) -> str:
-        from graspsense.report.notebook import trace_words
+        return f"<Trace: {self.words}>"
 
-        return f"<Trace: {trace_words(self)}>"
+    @property
+    def words(self) -> str:
+        """The trace in a line: its ticks, its time, its largest force and its range of gaps."""
+        if len(self) == 0:
+            return "no ticks"
+        words = [f"{len(self)} ticks", f"{float(self.t_s[-1] - self.t_s[0]):.4g} {self.units['t']}"]
+        forces = np.concatenate([self.force_left_n, self.force_right_n])
+        if not np.isnan(forces).all():
+            words.append(f"forces to {quantity(float(np.nanmax(forces)), self.units['force_left'])}")
+        if not np.isnan(self.gap_m).all():
+            low, high = float(np.nanmin(self.gap_m)), float(np.nanmax(self.gap_m))
+            words.append(f"gap {quantity(low, self.units['gap'])} to {quantity(high, self.units['gap'])}")
+        return ", ".join(words)
 
     def _repr_html_(self) -> str:
-        from graspsense.report.notebook import arrays_html, samples_html, sentence, trace_svg, trace_words
-
-        return sentence(trace_words(self)) + trace_svg(self) + samples_html(self) + arrays_html(self)
+        return html(self)
 
     def plot(self) -> tuple[Any, Any]:
         """Draw the trace and return the axes of the forces and of the gap.
@@ -114,8 +126,6 @@ class Trace:
         These are matplotlib's, so that a notebook shows them and a script can add to them: `axes[0].figure` is the
         figure. Raises PluginUnavailable without matplotlib, which the extra `plot` installs.
         """
-        from graspsense.report.trace_plot import plot
-
         return plot(self)
 
     def until(self, t_s: float) -> Trace:

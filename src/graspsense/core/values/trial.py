@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Literal
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 from attrs import field, frozen
 
+from graspsense.core.values.display import html
+from graspsense.core.values.events import GraspEvent, event_as_json
 from graspsense.core.values.printable import in_one_line
-from graspsense.core.values.signals import Outcome, Phase
+from graspsense.core.values.signals import Outcome
 
 if TYPE_CHECKING:
-    from graspsense.core.components.roles import DeviceInfo
-    from graspsense.core.pipeline.anytime import CheckpointPrediction
-    from graspsense.core.values.features import Features, Prediction
+    from graspsense.core.values.device import DeviceInfo
+    from graspsense.core.values.features import CheckpointPrediction, Features, Prediction
     from graspsense.core.values.trace import Trace
 
 
@@ -25,30 +26,6 @@ class RunInfo:
     settings: Mapping[str, Any]
     seed: int
     labels: Mapping[str, str] = field(factory=dict)
-
-
-EventSource = Literal["runner", "controller", "model"]
-"""What an event of a grasp comes from."""
-
-
-@frozen
-class GraspEvent:
-    """An event of a grasp: its time (s), the phase, and a sentence.
-
-    `source` is `runner` for a change of phase, an action of the guard or a sink that failed, and `controller` for an
-    event that the controller told; `what` is then the name of the event, one of `Controller.events`. It is `model` for
-    a prediction while the grasp goes on.
-    """
-
-    t_s: float
-    phase: Phase
-    what: str
-    source: EventSource = "runner"
-
-
-def event_name(names: Sequence[str], number: int) -> str:
-    """Return the name of the event of a controller with this number, given its `events`."""
-    return names[number] if number < len(names) else f"event {number}"
 
 
 @frozen(kw_only=True, eq=False)
@@ -84,9 +61,7 @@ class Trial:
         return in_one_line(f"<Trial: {', '.join(parts)}>")
 
     def _repr_html_(self) -> str:
-        from graspsense.report.notebook import trial_html
-
-        return trial_html(self)
+        return html(self)
 
 
 def trial_as_json(trial: Trial) -> dict[str, Any]:
@@ -126,23 +101,3 @@ def trial_as_json(trial: Trial) -> dict[str, Any]:
 
 def _prediction_as_json(prediction: Prediction) -> dict[str, Any]:
     return {**prediction.as_json(), "warnings": list(prediction.warnings), "model": prediction.model}
-
-
-def event_as_json(event: GraspEvent) -> dict[str, Any]:
-    """Return an event as JSON values."""
-    return {
-        "t_s": event.t_s,
-        "phase": event.phase.name.lower(),
-        "what": event.what,
-        "source": event.source,
-    }
-
-
-def event_from_json(value: Mapping[str, Any]) -> GraspEvent:
-    """Return the event of `event_as_json`; without a source it is of the runner. Raises KeyError, ValueError."""
-    source: EventSource = "runner"
-    if value.get("source") == "controller":
-        source = "controller"
-    elif value.get("source") == "model":
-        source = "model"
-    return GraspEvent(float(value["t_s"]), Phase[str(value["phase"]).upper()], str(value["what"]), source)

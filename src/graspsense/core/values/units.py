@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 
@@ -22,6 +23,11 @@ def in_words(value: float, unit: str) -> str:
     """
     shown, factor = display_unit(unit)
     return with_unit(f"{value * factor:.4g}", shown)
+
+
+def quantity(value: float, unit: str) -> str:
+    """Return a value in a person's unit, lengths in mm: `57.86 mm`."""
+    return "missing" if math.isnan(value) else in_words(value, unit)
 
 
 def in_words_apart(values: Sequence[float], unit: str) -> list[str]:

@@ -60,7 +60,8 @@ from graspsense.core.components.registry.parts import (
 from graspsense.core.values.errors import FAILURES, PluginUnavailable, UnknownName, suggestion
 
 if TYPE_CHECKING:
-    from graspsense.core.values.trial import GraspEvent, RunInfo, Trial
+    from graspsense.core.values.events import GraspEvent
+    from graspsense.core.values.trial import RunInfo, Trial
 
 STRICT_VARIABLE: Final = "GRASPSENSE_STRICT_PLUGINS"
 """If this environment variable is 1, the error of a plugin that cannot be loaded is raised."""

@@ -5,8 +5,9 @@ from __future__ import annotations
 from math import inf
 from typing import Final
 
-from graspsense.core.components.roles import Controller, DeviceInfo
+from graspsense.core.components.roles import Controller
 from graspsense.core.components.run_config import RunConfig
+from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.signals import EFFORT, FORCE, Command
 
 FORCE_N: Final = 20.0

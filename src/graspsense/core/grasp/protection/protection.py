@@ -12,7 +12,7 @@ from typing import Final
 
 from attrs import evolve
 
-from graspsense.core.components.roles import Controller, DeviceInfo
+from graspsense.core.components.roles import Controller
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.protection.cells import Fingertips
 from graspsense.core.grasp.protection.drift import Drift
@@ -22,6 +22,7 @@ from graspsense.core.grasp.protection.reports import Reports
 from graspsense.core.grasp.protection.status import StatusWatch
 from graspsense.core.grasp.protection.stuck_force import StuckForce
 from graspsense.core.grasp.protection.touch import Touch
+from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.faults import Fault
 from graspsense.core.values.signals import (
     APPROACH,

@@ -1,0 +1,125 @@
+"""The channels of a gripper: numbers, arrays of tactile cells, and fast signals, each with its unit and rate."""
+
+from __future__ import annotations
+
+import re
+from keyword import iskeyword
+from typing import Any, Final, Literal
+
+from attrs import Attribute, field, frozen
+from attrs.validators import and_, deep_iterable, ge, in_, instance_of, min_len
+
+from graspsense.core.values.signals import CHANNELS
+
+
+def _is_name(entry: object, attribute: Attribute[Any], name: str) -> None:
+    if not re.fullmatch(r"[a-z][a-z0-9_-]*", name):
+        raise ValueError(
+            f"'{attribute.name}' is {name!r}: write small letters, digits, hyphens and underscores, a letter first, "
+            "without spaces, as in lab-hand"
+        )
+
+
+IS_NAME: Final = [instance_of(str), _is_name]
+"""The validators of the name of a component or channel."""
+
+
+@frozen
+class Channel:
+    """A signal that a backend provides or that a component requires: one number a tick.
+
+    `rate_hz` is the rate that a backend provides, or the least rate that a component requires (0: any rate). A name in
+    `signals.CHANNELS` must have the unit given there. A plugin may define further channels with units of its own,
+    which `Reading.signals` holds under their names. Raises ValueError for a wrong or missing unit, and for a name of a
+    further channel that cannot be the name of a field.
+    """
+
+    name: str = field(validator=IS_NAME)
+    """The name of the channel."""
+    unit: str = field(validator=instance_of(str))
+    """Its unit."""
+    rate_hz: float = field(default=0.0, converter=float, validator=ge(0.0))
+    """The rate that a backend provides, or the least rate that a component requires (0: any rate)."""
+
+    def __attrs_post_init__(self) -> None:
+        unit = CHANNELS.get(self.name)
+        if self.name == "pads" and isinstance(self, TactileArray):
+            unit = None  # the cells of other fingertips have other units
+        if unit is not None and self.unit != unit:
+            raise ValueError(
+                f"channel {self.name!r} is in {unit}, not in {self.unit!r}: convert its numbers, and write {unit!r}"
+            )
+        if not self.unit:
+            raise ValueError(f"channel {self.name!r} is not one of {', '.join(CHANNELS)}: give it a unit")
+        if self.name not in CHANNELS and (not self.name.isidentifier() or iskeyword(self.name)):
+            raise ValueError(
+                f"channel {self.name!r} is read as reading.signals.{self.name}, which Python does not allow: write "
+                f"{re.sub(r'[^a-z0-9_]', '_', self.name)!r}"
+                if not iskeyword(self.name)
+                else f"channel {self.name!r} is a word of Python: choose another name"
+            )
+
+
+@frozen
+class TactileArray(Channel):
+    """An array of tactile cells. An image of it has one number for each cell.
+
+    The array named `pads` stands for both fingertips, whose images are `Reading.pads`; every other array has its
+    `Image` in `Reading.signals`. Its cells are given by `rows` and `columns` (row by row), by `positions_m`, or by
+    both. Raises ValueError if there is no cell, or if these do not have the same number of cells.
+    """
+
+    finger: str = field(default="", validator=instance_of(str), kw_only=True)
+    """The finger that carries it, in the maker's words; empty for `pads`, and where it is not on a finger."""
+    rows: int = field(default=0, validator=[instance_of(int), ge(0)], kw_only=True)
+    columns: int = field(default=0, validator=[instance_of(int), ge(0)], kw_only=True)
+    positions_m: tuple[tuple[float, float], ...] = field(default=(), kw_only=True)
+    """The place of each cell on its surface, along the finger and across it; NaN for a cell that is elsewhere."""
+    facing: tuple[bool, ...] = field(default=(), kw_only=True)
+    """Whether each cell faces the object; empty if all do."""
+
+    def __attrs_post_init__(self) -> None:
+        super().__attrs_post_init__()
+        grid, placed = self.rows * self.columns, len(self.positions_m)
+        if not self.cells or (grid and placed and grid != placed):
+            raise ValueError(
+                f"array {self.name!r} has {self.rows} rows, {self.columns} columns and {placed} positions: give rows "
+                "and columns, the position of each cell, or both with the same number of cells"
+            )
+        if self.facing and len(self.facing) != self.cells:
+            raise ValueError(
+                f"array {self.name!r} has {self.cells} cells, and 'facing' has {len(self.facing)} values"
+            )
+
+    @property
+    def cells(self) -> int:
+        """The number of cells."""
+        return self.rows * self.columns or len(self.positions_m)
+
+
+@frozen
+class FastChannel(Channel):
+    """A signal with several samples a tick, such as an acceleration.
+
+    `rate_hz` is the number of samples a second. `samples` is the largest number of new samples in one tick. `clock`
+    says what the samples are timed by: `device`, the clock of the frames, or `sensor`, an oscillator of its own, whose
+    rate is nominal. Raises ValueError where there is no sample or no axis.
+    """
+
+    samples: int = field(default=1, validator=[instance_of(int), ge(1)], kw_only=True)
+    axes: tuple[str, ...] = field(
+        default=("value",),
+        validator=and_(deep_iterable(instance_of(str), instance_of(tuple)), min_len(1)),
+        kw_only=True,
+    )
+    """The names of its axes: `("x", "y", "z")`."""
+    clock: Literal["device", "sensor"] = field(
+        default="device", validator=in_(("device", "sensor")), kw_only=True
+    )
+
+    def __attrs_post_init__(self) -> None:
+        super().__attrs_post_init__()
+        if self.name in CHANNELS:
+            raise ValueError(
+                f"channel {self.name!r} is part of a frame, so it has one value a tick: give another name"
+            )
