@@ -17,7 +17,7 @@ from graspsense import __version__
 from graspsense.cli.main import COMMANDS, main
 from graspsense.core.components.entries import CommandEntry, FoundDevice
 from graspsense.core.components.registry import IsolatedPlugins
-from graspsense.core.components.registry import registry as loader
+from graspsense.core.components.registry import plugins as loader
 from graspsense.core.values.errors import DeviceLost, NoDevice
 from graspsense.plugin_api import hookimpl
 

@@ -45,9 +45,8 @@ MAY_KNOW = {
     },
     "testing": {"core", "plugin_api", "testing"},
     "scaffold": {"core", "scaffold"},
-    "plugin_api": {"core", "lazy_names"},
-    "__init__": {"core", "lazy_names"},
-    "lazy_names": set(),
+    "plugin_api": {"core"},
+    "__init__": {"core"},
 }
 """Subpackage to the subpackages it may import from; every subpackage may import the package itself, for its version."""
 

@@ -45,6 +45,19 @@ def test_requirements_install_every_distribution_in_editable_form() -> None:
     assert editable == [".", *(f"./plugins/{folder.name}" for folder in FOLDERS)]
 
 
+def test_an_installation_for_use_has_every_distribution_with_the_same_versions() -> None:
+    lines = [line for line in (ROOT / "requirements.txt").read_text().splitlines() if line[:1] != "#"]
+    assert lines[0] == "-c constraints.txt"
+    assert [line for line in lines if line.startswith(".")] == [
+        ".",
+        *(f"./plugins/{folder.name}" for folder in FOLDERS),
+    ]
+    tools = PROJECT["dependency-groups"]["dev"]
+    assert [line for line in lines if not line.startswith((".", "-"))] == [
+        line for line in tools if line.startswith(("matplotlib", "numba"))
+    ]
+
+
 def test_uv_knows_every_plugin() -> None:
     names = sorted(PLUGINS)
     assert sorted(PROJECT["dependency-groups"]["plugins"]) == names

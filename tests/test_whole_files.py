@@ -168,7 +168,7 @@ def test_a_new_file_on_a_disk_without_hard_links(tmp_path, monkeypatch):
 KILLED = """
 import os, signal, sys
 from pathlib import Path
-from graspsense.core import whole_file
+from graspsense.core.files import whole_file
 whole_file.os.replace = lambda *names: os.kill(os.getpid(), signal.SIGKILL)
 whole_file.write_whole(Path(sys.argv[1]), b"x" * 1000)
 """

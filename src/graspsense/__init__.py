@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from typing import Any, Final
 
+from graspsense.core.components.lazy_names import LazyNames
 from graspsense.core.values.display import drawn_by
-from graspsense.lazy_names import LazyNames
 
 __version__: Final = "0.1.0"
 

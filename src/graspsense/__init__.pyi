@@ -1,4 +1,4 @@
-"""Generated from the table of graspsense by `graspsense.lazy_names`: change the table."""
+"""Generated from the table of graspsense by `core/components/lazy_names.py`: change the table."""
 
 __version__: str
 

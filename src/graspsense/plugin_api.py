@@ -1,15 +1,15 @@
 """Everything that a plugin may import from graspsense, grouped by what it is for.
 
 A name is imported when it is first used. The entry module of a plugin, which is all that listing plugins imports,
-therefore loads neither numpy nor a driver. Type checkers read `plugin_api.pyi`, which `graspsense.lazy_names`
-generates from the table below.
+therefore loads neither numpy nor a driver. Type checkers read `plugin_api.pyi`, which is generated from the table below
+(`core/components/lazy_names.py`).
 """
 
 from __future__ import annotations
 
 from typing import Any, Final
 
-from graspsense.lazy_names import LazyNames, Table
+from graspsense.core.components.lazy_names import LazyNames, Table
 
 _TABLE: Final[Table] = {
     "Declaring what a plugin brings": {

@@ -1,4 +1,4 @@
-"""Generated from the table of graspsense.plugin_api by `graspsense.lazy_names`: change the table."""
+"""Generated from the table of graspsense.plugin_api by `core/components/lazy_names.py`: change the table."""
 
 # Declaring what a plugin brings
 from graspsense.core.components.hookspecs import hookimpl as hookimpl

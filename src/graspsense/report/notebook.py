@@ -15,6 +15,7 @@ from graspsense.core.values.trace import SampleTrace, Trace
 from graspsense.core.values.trial import Trial
 from graspsense.core.values.units import display_unit, quantity, without_underscores
 from graspsense.report.moments import array_images, contact_time, images_at, moments, phase_spans, shown_from
+from graspsense.report.trace_plot import plot as plot
 
 if TYPE_CHECKING:
     from graspsense.core.values.trace import Floats

@@ -44,7 +44,7 @@ class LazyNames:
     def stub(self) -> str:
         """Return the text of the type stub: an import of each name, in the groups of the table."""
         lines = [
-            f'"""Generated from the table of {self.module} by `graspsense.lazy_names`: change the table."""'
+            f'"""Generated from the table of {self.module} by `core/components/lazy_names.py`: change the table."""'
         ]
         if hasattr(sys.modules[self.module], "__version__"):
             lines += ["", "__version__: str"]
