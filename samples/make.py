@@ -40,18 +40,9 @@ def main() -> None:
         if seed == 0 and label.startswith("can"):
             write_recording(FOLDER / "recordings" / f"{label.replace(':', '_')}_1.csv", trial)
     shutil.rmtree(FOLDER / "trials", ignore_errors=True)
+    store = ["--save", str(FOLDER / "trials"), "--each", "2", "--seed", "1"]
     subprocess.run(
-        [
-            sys.executable,
-            "-m",
-            "graspsense",
-            "collect",
-            "--labels",
-            "can:full_open,can:empty_open",
-            "--each",
-            "2",
-        ]
-        + ["--save", str(FOLDER / "trials"), "--seed", "1"],
+        [sys.executable, "-m", "graspsense", "collect", "--labels", "can:full_open,can:empty_open", *store],
         input="\n" * 20,
         text=True,
         check=True,
