@@ -31,6 +31,7 @@ _TABLE: Final[Table] = {
             "SensorBackendEntry",
         ),
         "core.components.setting": ("CHANGES_NO_RESULT", "NAMES_INPUT", "setting"),
+        "core.components.strict": ("ValidationFailed", "structured"),
         "core.files.toml_text": ("TomlError", "toml_values"),
         "core.components.figure_origins": ("fitted_results", "given_claims", "gives"),
     },

@@ -1,0 +1,1 @@
+"""Grippers that have a MuJoCo model. Importing this imports nothing else."""

@@ -1,0 +1,295 @@
+"""A gripper that a MuJoCo model describes, as a sensor backend. Simulated."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import ceil, inf, nan
+from pathlib import Path
+from typing import Any, Final, final
+
+import mujoco
+import numpy as np
+from attrs import evolve
+from numpy.typing import NDArray
+
+from graspsense.plugin_api import (
+    EFFORT,
+    NO_PADS,
+    POSITION,
+    Channel,
+    Command,
+    ConfigError,
+    DeviceInfo,
+    DeviceLost,
+    Frame,
+    ObjectKind,
+    Pads,
+    Reading,
+    SensorBackend,
+    TactileArray,
+    signal_type,
+)
+from graspsense_mujoco_gripper.catalogue import catalogue, thing_named
+from graspsense_mujoco_gripper.config import MujocoConfig
+from graspsense_mujoco_gripper.drive import ActuatorDrive, Travel, instability, test_move
+from graspsense_mujoco_gripper.gripper_file import read_gripper
+from graspsense_mujoco_gripper.measurement import ForceGauge, GapGauge, between_fingers, cells_of
+from graspsense_mujoco_gripper.model import OBJ, compiled, gripper_spec, identifier, read_spec
+
+PREFIX: Final = "thing/"
+"""Before each name of the thing in the combined model."""
+OPENING_M_S: Final = 0.1
+SWING, MOST_SWINGS = 0.1, 20
+"""The loop counts as unstable if the effort changes its sign above this share of its limit more often than this."""
+MASS_SPREAD, FRICTION_SPREAD, PLACE_SPREAD_M = 0.1, 0.15, 0.001
+"""Standard deviations with which seeds draw: of the mass and friction (shares), and of the place along the gap."""
+
+
+@final
+class MujocoGripper(SensorBackend[MujocoConfig]):
+    """Steps the model between two reads, and closes its actuators as commanded."""
+
+    accepts = ("effort", "velocity", "position", "force")
+    _data: mujoco.MjData | None = None
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """Gap, velocity, effort and forces; cells and further sensors as the gripper file names them."""
+        rate = self.config.rate_hz
+        gripper, _ = read_gripper(self.config.file)
+        frame = [
+            ("gap", "m"),
+            ("velocity", "m/s"),
+            ("effort", "N"),
+            ("force_left", "N"),
+            ("force_right", "N"),
+        ]
+        channels = [Channel(name, unit, rate) for name, unit in frame]
+        if gripper.left.array:
+            left = gripper.left
+            channels.append(TactileArray("pads", "N", rate, rows=left.rows, columns=left.columns))
+        channels += [Channel(name, one.unit, rate) for name, one in gripper.channels.items()]
+        return tuple(channels)
+
+    def objects(self) -> Sequence[ObjectKind]:
+        """Return the things of the catalogue."""
+        return [ObjectKind(name=name, default=True) for name in catalogue()]
+
+    def with_object(self, name: str) -> MujocoGripper:
+        """Return this gripper with another thing between its fingers."""
+        return MujocoGripper(evolve(self.config, object=name))
+
+    def open(self, seed: int) -> DeviceInfo:
+        """Build the model with the thing between the open fingers. Raises ConfigError, UnknownName."""
+        self.close()
+        config = self.config
+        self._gripper, path = read_gripper(config.file)
+        self._thing, fragment = thing_named(config.object)
+        self._steps = ceil(1.0 / (config.rate_hz * config.timestep_s) - 1e-9)
+        timestep_s = 1.0 / (config.rate_hz * self._steps)
+        model = compiled(gripper_spec(path, timestep_s), str(path))
+        travel = test_move(model, self._gripper)
+        generator = np.random.default_rng(seed)
+        if fragment is not None:
+            model = self._with_thing(gripper_spec(path, timestep_s), fragment, travel, model)
+            if config.spread:
+                _vary(model, generator)
+        self._begin(model, travel, generator)
+        return self._described()
+
+    def _with_thing(
+        self, spec: mujoco.MjSpec, fragment: Path, travel: Travel, empty: mujoco.MjModel
+    ) -> mujoco.MjModel:
+        """Return the model with the thing in the middle of the fingers, its x axis along the closing direction."""
+        data = mujoco.MjData(empty)
+        data.qpos[:] = travel.qpos_open
+        mujoco.mj_forward(empty, data)
+        place = between_fingers(empty, data, self._gripper)
+        frame = spec.worldbody.add_frame(pos=place, quat=_turned(travel.axis))
+        child = read_spec(fragment)
+        try:
+            spec.attach(child, frame=frame, prefix=PREFIX)
+        except ValueError as error:
+            raise ConfigError(f"MuJoCo refuses to attach {fragment} to the gripper: {error}") from error
+        return compiled(spec, f"the gripper with {fragment}")
+
+    def _begin(self, model: mujoco.MjModel, travel: Travel, generator: np.random.Generator) -> None:
+        data = mujoco.MjData(model)
+        data.qpos[: len(travel.qpos_open)] = travel.qpos_open
+        mujoco.mj_forward(model, data)
+        self._model, self._travel, self._generator = model, travel, generator
+        self._gauge = GapGauge(model, self._gripper.gap)
+        self._left = ForceGauge(model, self._gripper.left, -1.0)
+        self._right = ForceGauge(model, self._gripper.right, 1.0)
+        self._cells = cells_of(model, self._gripper)
+        self._sensors = [
+            int(model.sensor_adr[identifier(model, OBJ.mjOBJ_SENSOR, one.sensor, "sensor")])
+            for one in self._gripper.channels.values()
+        ]
+        self._signals: Any = signal_type(self.channels)
+        self._shell = [
+            identifier(model, OBJ.mjOBJ_EQUALITY, PREFIX + name, "equality") for name in self._thing.shell
+        ]
+        self._drive = ActuatorDrive(model, self._gripper, travel)
+        self._data = data
+        self._check_start(data)
+        self._gap_m = self._gauge.gap_m(data, travel.axis)
+        self._drive.reset(self._gap_m)
+        self._command = Command(EFFORT, 0.0, inf, inf)
+        self._ticks, self._swings, self._broken, self._greatest_n = 0, 0, False, 0.0
+        self._measured_m = self._rounded(self._gap_m)
+
+    def _check_start(self, data: mujoco.MjData) -> None:
+        """Raise ConfigError where the thing is in the fingers at the start."""
+        deepest = min((data.contact[k].dist for k in range(data.ncon)), default=0.0)
+        if deepest < -1e-3 and self._left.force_n(data, self._travel.axis) != 0.0:
+            raise ConfigError(
+                f"{self.config.object} is wider than the opening of {self._travel.open_m * 1e3:.1f} mm: it penetrates "
+                f"a finger by {-deepest * 1e3:.1f} mm at the start. Choose a smaller thing"
+            )
+
+    def _described(self) -> DeviceInfo:
+        limit = self._drive.effort_limit_n
+        return DeviceInfo(
+            name=f"MuJoCo model {self._model.names[: self._model.names.find(0)].decode(errors='replace') or 'gripper'}",
+            clock="virtual",
+            simulated=True,
+            harmless=True,
+            rate_hz=self.config.rate_hz,
+            effort_limit_n=limit,
+            speed_limit_m_s=self._gripper.speed_limit_m_s,
+            opening=Command(POSITION, self._travel.open_m, limit, OPENING_M_S),
+            relaxed=Command(EFFORT, 0.0, inf, inf),
+            tare_images=4 if self._cells is not None else 0,
+            numbers={"moving_mass_kg": self._travel.mass_kg, "opening_m": self._travel.open_m},
+            notes=("simulated by MuJoCo; its contacts are soft by solref and solimp of the model",),
+        )
+
+    def read(self, timeout_s: float) -> Reading | None:
+        """Step the model by one tick and measure. Raises DeviceLost where MuJoCo warns that the state is bad."""
+        del timeout_s
+        data = self._opened()
+        axis, dt_s = self._travel.axis, self._model.opt.timestep
+        before_m = self._gap_m
+        for _ in range(self._steps):
+            now_m = self._gauge.gap_m(data, axis)
+            self._drive.set_controls(
+                data, self._command, now_m, (now_m - before_m) / dt_s if self._ticks else 0.0, dt_s
+            )
+            before_m = now_m
+            mujoco.mj_step(self._model, data)
+            self._break_shell(data, axis)
+        if problem := instability(data):
+            raise DeviceLost(f"the simulation became unstable: {problem}. Use a smaller gripper.timestep_s")
+        self._ticks += 1
+        return self._reading(data)
+
+    def _reading(self, data: mujoco.MjData) -> Reading:
+        axis, tick_s = self._travel.axis, 1.0 / self.config.rate_hz
+        self._gap_m = self._gauge.gap_m(data, axis)
+        measured_m = self._rounded(self._gap_m)
+        velocity = (measured_m - self._measured_m) / tick_s
+        self._measured_m = measured_m
+        forces = [gauge.force_n(data, axis) for gauge in (self._left, self._right)]
+        self._greatest_n = max(self._greatest_n, *forces)
+        left, right = (force + self._noise() for force in forces)
+        t_s = self._ticks * tick_s
+        frame = Frame(t_s, tick_s, measured_m, velocity, self._drive.effort_n, left, right, nan, nan, 0)
+        pads = NO_PADS
+        if self._cells is not None:
+            pads = Pads(t_s, self._ticks, *self._cells.images(data))
+        signals = self._signals(*(float(data.sensordata[k]) for k in self._sensors)) if self._sensors else ()
+        return Reading(frame, pads, signals)
+
+    def _break_shell(self, data: mujoco.MjData, axis: NDArray[np.float64]) -> None:
+        if self._broken or not self._shell:
+            return
+        if max(gauge.force_n(data, axis) for gauge in (self._left, self._right)) > self._thing.breaks_at_n:
+            self._broken = True
+            data.eq_active[self._shell] = 0
+
+    def _noise(self) -> float:
+        return (
+            float(self._generator.normal(0.0, self.config.force_noise_n))
+            if self.config.force_noise_n
+            else 0.0
+        )
+
+    def _rounded(self, gap_m: float) -> float:
+        step = self.config.gap_step_m
+        return round(gap_m / step) * step if step else gap_m
+
+    def _opened(self) -> mujoco.MjData:
+        if self._data is None:
+            raise DeviceLost("the gripper is not open")
+        return self._data
+
+    def apply(self, command: Command) -> None:
+        """Keep this command until the next one."""
+        self._opened()
+        if command.kind == EFFORT and command.value * self._command.value < 0.0:
+            swing_n = min(abs(command.value), abs(self._command.value))
+            self._swings += swing_n > SWING * self._drive.effort_limit_n
+        self._command = command
+
+    def tare(self, images: Sequence[Pads]) -> None:
+        """Do nothing: the cells of a model have no offset."""
+
+    def close(self) -> None:
+        """Forget the model."""
+        self._data = None
+
+    def report(self) -> dict[str, float | int | str | bool]:
+        """Return what only the model knows: whether the thing broke, and the largest true force on a finger."""
+        if not hasattr(self, "_ticks"):
+            return {}
+        report: dict[str, float | int | str | bool] = {
+            "broken": self._broken,
+            "greatest_force_n": self._greatest_n,
+            "steps": self._ticks * self._steps,
+        }
+        if self._swings > MOST_SWINGS:
+            report["unstable_loop"] = (
+                f"the effort changes its sign {self._swings} times: the gains of the controller are too high for a "
+                f"moving mass of {self._travel.mass_kg:.3g} kg at {self.config.rate_hz:g} Hz. Try "
+                "-o controller.sends=velocity"
+            )
+        return report
+
+
+def _vary(model: mujoco.MjModel, generator: np.random.Generator) -> None:
+    """Draw mass, friction and place of the thing."""
+    factor = float(np.exp(generator.normal(0.0, MASS_SPREAD)))
+    friction = float(np.exp(generator.normal(0.0, FRICTION_SPREAD)))
+    offset = float(generator.normal(0.0, PLACE_SPREAD_M))
+    for k in range(model.nbody):
+        if (mujoco.mj_id2name(model, OBJ.mjOBJ_BODY, k) or "").startswith(PREFIX):
+            model.body_mass[k] *= factor
+            model.body_inertia[k] *= factor
+            if model.body_parentid[k] == 0:
+                joint = int(model.body_jntadr[k])
+                axis = _rotated_x(model.body_quat[k])
+                if joint >= 0:
+                    address = int(model.jnt_qposadr[joint])
+                    model.qpos0[address : address + 3] += offset * axis
+    for k in range(model.ngeom):
+        if (mujoco.mj_id2name(model, OBJ.mjOBJ_GEOM, k) or "").startswith(PREFIX):
+            model.geom_friction[k] *= friction
+    mujoco.mj_setConst(model, mujoco.MjData(model))
+
+
+def _rotated_x(quaternion: NDArray[np.float64]) -> NDArray[np.float64]:
+    turned = np.zeros(3)
+    mujoco.mju_rotVecQuat(turned, np.array([1.0, 0.0, 0.0]), quaternion)
+    return turned
+
+
+def _turned(axis: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the quaternion of the smallest turn of the x axis onto this one."""
+    quaternion = np.zeros(4)
+    mujoco.mju_quatZ2Vec(quaternion, axis)
+    # mju_quatZ2Vec turns the z axis; before it, x is turned onto z.
+    first = np.array([np.sqrt(0.5), 0.0, -np.sqrt(0.5), 0.0])
+    turned = np.zeros(4)
+    mujoco.mju_mulQuat(turned, quaternion, first)
+    return turned

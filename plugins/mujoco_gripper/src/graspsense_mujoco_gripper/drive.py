@@ -1,0 +1,228 @@
+"""The drive: from a command to the controls of the actuators, by what a test move of the empty gripper showed.
+
+Effort is a force on the gap: by the principle of virtual work it is the force with which each finger presses. An
+actuator of gain g and bias b0 + b1 length + b2 velocity exerts the force g control + bias, solved for the control.
+"""
+
+from __future__ import annotations
+
+from math import inf, isfinite
+
+import mujoco
+import numpy as np
+from attrs import frozen
+from numpy.typing import NDArray
+
+from graspsense.plugin_api import EFFORT, FORCE, POSITION, VELOCITY, Command, ConfigError
+from graspsense_mujoco_gripper.gripper_file import GripperFile
+from graspsense_mujoco_gripper.measurement import GapGauge, closing_axis
+from graspsense_mujoco_gripper.model import identifier
+
+Floats = NDArray[np.float64]
+TEST_S = 1.0
+"""Time of each half of the test move: opening, and closing."""
+POINTS = 64
+LEAST_TRAVEL_M = 1e-3
+MASS_STEPS = 4
+LEAST_MASS_KG = 1e-3
+UNKNOWN_MASS_KG = 0.5
+"""Assumed where the fingers stand still in the first steps of the test move."""
+SERVO_RAD_S = 60.0
+"""Natural frequency of the servo on the gap, critically damped."""
+
+
+@frozen(eq=False)
+class Travel:
+    """The test move: the gap from closed to open, and the length of each actuator's transmission there."""
+
+    gap_m: Floats
+    length: Floats
+    mass_kg: float
+    """The mass that moves with the gap."""
+    axis: Floats
+    qpos_open: Floats
+
+    @property
+    def open_m(self) -> float:
+        """The gap with the fingers open."""
+        return float(self.gap_m[-1])
+
+    def lengths(self, gap_m: float) -> Floats:
+        """Return the length of each transmission at a gap."""
+        return np.array([np.interp(gap_m, self.gap_m, row) for row in self.length])
+
+    def slopes(self, gap_m: float) -> Floats:
+        """Return the change of each length with the gap (1, or rad/m)."""
+        k = int(np.clip(np.searchsorted(self.gap_m, gap_m), 1, len(self.gap_m) - 1))
+        slopes: Floats = (self.length[:, k] - self.length[:, k - 1]) / (self.gap_m[k] - self.gap_m[k - 1])
+        return slopes
+
+
+def test_move(model: mujoco.MjModel, gripper: GripperFile) -> Travel:
+    """Open and close the empty gripper. Raises ConfigError where the fingers do not move, or move the wrong way."""
+    data = mujoco.MjData(model)
+    ids = actuator_ids(model, gripper)
+    gauge = GapGauge(model, gripper.gap)
+    steps = max(int(TEST_S / model.opt.timestep), 1)
+    data.ctrl[ids] = gripper.open
+    for _ in range(steps):
+        mujoco.mj_step(model, data)
+    _check(model, data)
+    axis = closing_axis(model, data, gripper)
+    qpos_open = data.qpos.copy()
+    start_m = gauge.gap_m(data, axis)
+    data.ctrl[ids] = gripper.closed
+    gaps, lengths = [start_m], [data.actuator_length[ids].copy()]
+    for _ in range(steps):
+        mujoco.mj_step(model, data)
+        gap_m = gauge.gap_m(data, axis)
+        if gap_m < gaps[-1] - 1e-6:
+            gaps.append(gap_m)
+            lengths.append(data.actuator_length[ids].copy())
+    _check(model, data)
+    end_m = gauge.gap_m(data, axis)
+    if end_m > start_m - LEAST_TRAVEL_M:
+        raise ConfigError(
+            f"gripper.file: with the controls `closed` the gap goes from {start_m * 1e3:.3g} to {end_m * 1e3:.3g} mm, "
+            "so the fingers do not close: look at actuators, open, closed and gap"
+        )
+    grid = np.linspace(gaps[-1], gaps[0], POINTS)
+    order = np.argsort(gaps)
+    table = np.array(
+        [np.interp(grid, np.array(gaps)[order], column) for column in np.array(lengths)[order].T]
+    )
+    return Travel(grid, table, _mass(model, gripper, qpos_open, axis), axis, qpos_open)
+
+
+def _mass(model: mujoco.MjModel, gripper: GripperFile, qpos: Floats, axis: Floats) -> float:
+    """Return the mass (kg) that moves with the gap: from the accelerations under the controls `open` and `closed`."""
+    gauge, ids = GapGauge(model, gripper.gap), actuator_ids(model, gripper)
+    gaps, forces, lengths = [], [], []
+    for controls in (gripper.open, gripper.closed):
+        data = mujoco.MjData(model)
+        data.qpos[:] = qpos
+        data.ctrl[ids] = controls
+        mujoco.mj_forward(model, data)
+        forces.append(data.actuator_force[ids].copy())
+        for _ in range(MASS_STEPS):
+            mujoco.mj_step(model, data)
+        gaps.append(gauge.gap_m(data, axis))
+        lengths.append(data.actuator_length[ids].copy())
+    moved_m = gaps[0] - gaps[1]
+    if moved_m <= 0.0:
+        return UNKNOWN_MASS_KG
+    effort_n = float((forces[0] - forces[1]) @ (lengths[0] - lengths[1])) / moved_m
+    acceleration = 2.0 * moved_m / (MASS_STEPS * model.opt.timestep) ** 2
+    mass = effort_n / acceleration
+    return mass if isfinite(mass) and mass > LEAST_MASS_KG else UNKNOWN_MASS_KG
+
+
+def actuator_ids(model: mujoco.MjModel, gripper: GripperFile) -> list[int]:
+    """Return the numbers of the closing actuators. Raises ConfigError for one with a state or a nonlinear gain."""
+    ids = [identifier(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name, "actuator") for name in gripper.actuators]
+    for k, name in zip(ids, gripper.actuators, strict=True):
+        if model.actuator_gaintype[k] != mujoco.mjtGain.mjGAIN_FIXED or model.actuator_gainprm[k][0] == 0.0:
+            raise ConfigError(f"gripper.file: actuator {name!r} has no fixed gain: muscles are not supported")
+        if model.actuator_dyntype[k] != mujoco.mjtDyn.mjDYN_NONE:
+            raise ConfigError(
+                f"gripper.file: actuator {name!r} has a state of its own (dyntype): not supported"
+            )
+    return ids
+
+
+def _check(model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    """Raise ConfigError where MuJoCo warned that the state is bad."""
+    if problem := instability(data):
+        raise ConfigError(
+            f"gripper.file: {problem} while the empty gripper moves: use a smaller gripper.timestep_s"
+        )
+
+
+def instability(data: mujoco.MjData) -> str:
+    """Return what MuJoCo warned of; empty if the state is good."""
+    kinds = mujoco.mjtWarning
+    for kind, words in (
+        (kinds.mjWARN_BADQPOS, "positions are not finite or too large"),
+        (kinds.mjWARN_BADQVEL, "velocities are not finite or too large"),
+        (kinds.mjWARN_BADQACC, "accelerations are not finite or too large"),
+        (kinds.mjWARN_CONTACTFULL, "there are more contacts than the model has room for"),
+        (kinds.mjWARN_CNSTRFULL, "there are more constraints than the model has room for"),
+    ):
+        if data.warning[kind].number:
+            return f"MuJoCo warns: {words}"
+    return ""
+
+
+class ActuatorDrive:
+    """Sets the controls for a command, once for each step of the integrator."""
+
+    def __init__(self, model: mujoco.MjModel, gripper: GripperFile, travel: Travel) -> None:
+        self._travel = travel
+        self._ids = actuator_ids(model, gripper)
+        self._gain = model.actuator_gainprm[self._ids, 0].copy()
+        affine = model.actuator_biastype[self._ids] == mujoco.mjtBias.mjBIAS_AFFINE
+        self._bias = np.where(affine[:, None], model.actuator_biasprm[self._ids, :3], 0.0)
+        limited = model.actuator_ctrllimited[self._ids].astype(bool)
+        self._controls = np.where(limited[:, None], model.actuator_ctrlrange[self._ids], [-inf, inf])
+        forced = model.actuator_forcelimited[self._ids].astype(bool)
+        self._forces = np.where(forced[:, None], model.actuator_forcerange[self._ids], [-inf, inf])
+        self.effort_n = 0.0
+        """The effort that the actuators exert in this step (N), positive where it closes."""
+        self._target_m = travel.open_m
+        self.effort_limit_n = gripper.effort_limit_n or self._greatest()
+
+    def _greatest(self) -> float:
+        """Return the largest effort that the ranges of the actuators allow with the fingers half closed."""
+        gap_m = float(np.mean(self._travel.gap_m))
+        slopes, length = self._travel.slopes(gap_m), self._travel.lengths(gap_m)
+        ends = self._gain[:, None] * self._controls + (self._bias[:, 0] + self._bias[:, 1] * length)[:, None]
+        ends = np.clip(np.sort(ends, axis=1), self._forces[:, :1], self._forces[:, 1:])
+        closing = np.where(slopes > 0.0, -ends[:, 0], ends[:, 1])
+        effort = float(closing @ np.abs(slopes))
+        return effort if isfinite(effort) and effort > 0.0 else 100.0
+
+    def reset(self, gap_m: float) -> None:
+        """Begin at this gap."""
+        self._target_m = gap_m
+
+    def set_controls(
+        self, data: mujoco.MjData, command: Command, gap_m: float, rate_m_s: float, dt_s: float
+    ) -> None:
+        """Set the controls for one step under a command."""
+        effort = self._effort(command, gap_m, rate_m_s, dt_s)
+        limit = min(command.effort_limit_n, self.effort_limit_n)
+        effort = min(max(effort, -limit), limit)
+        slopes = self._travel.slopes(gap_m)
+        share = np.abs(slopes).sum()
+        wanted = -np.sign(slopes) * effort / share
+        length, velocity = data.actuator_length[self._ids], data.actuator_velocity[self._ids]
+        bias = self._bias[:, 0] + self._bias[:, 1] * length + self._bias[:, 2] * velocity
+        controls = np.clip((wanted - bias) / self._gain, self._controls[:, 0], self._controls[:, 1])
+        data.ctrl[self._ids] = controls
+        force = np.clip(self._gain * controls + bias, self._forces[:, 0], self._forces[:, 1])
+        self.effort_n = float(-force @ slopes)
+
+    def _effort(self, command: Command, gap_m: float, rate_m_s: float, dt_s: float) -> float:
+        """Return the effort for a command; a servo on the gap keeps the speed, or reaches the position."""
+        kind, value, _, speed_limit = command
+        if kind in (EFFORT, FORCE):
+            self._target_m = gap_m
+            if not isfinite(speed_limit):
+                return value
+            # From half of the largest speed on, the effort falls, to nothing at the largest.
+            closing = -rate_m_s if value > 0.0 else rate_m_s
+            return value * min(max(2.0 - 2.0 * closing / speed_limit, 0.0), 1.0)
+        if kind == VELOCITY:
+            speed = min(max(value, -speed_limit), speed_limit)
+        elif kind == POSITION:
+            most = speed_limit if isfinite(speed_limit) else 1.0
+            speed = min(max((value - self._target_m) / dt_s, -most), most)
+        else:
+            raise ValueError(f"{kind} is no kind of command")
+        self._target_m += speed * dt_s
+        stiffness = self._travel.mass_kg * SERVO_RAD_S**2
+        # A target that the fingers cannot follow runs away only as far as the limit of the effort can use.
+        farthest_m = min(command.effort_limit_n, self.effort_limit_n) / stiffness
+        self._target_m = min(max(self._target_m, gap_m - farthest_m), gap_m + farthest_m)
+        damping = 2.0 * self._travel.mass_kg * SERVO_RAD_S
+        return stiffness * (gap_m - self._target_m) + damping * (rate_m_s - speed)

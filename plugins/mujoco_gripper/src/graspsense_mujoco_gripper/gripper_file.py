@@ -1,0 +1,176 @@
+"""The gripper file: which parts of a MuJoCo model close the fingers, and what is measured.
+
+model = "package:robosuite:models/assets/grippers/panda_gripper.xml"
+actuators = ["gripper_finger_joint1", "gripper_finger_joint2"]
+open = [0.04, -0.04]
+closed = [0.0, 0.0]
+
+[gap]
+geoms = ["finger1_pad_collision", "finger2_pad_collision"]
+
+[left]
+geoms = ["finger1_pad_collision", "finger1_collision"]
+
+[right]
+geoms = ["finger2_pad_collision", "finger2_collision"]
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, Final
+
+from attrs import field, frozen
+
+from graspsense.plugin_api import ConfigError, TomlError, ValidationFailed, structured, toml_values
+
+LARGEST_BYTES: Final = 512 * 1024
+"""Limit on the size of a gripper file."""
+
+
+@frozen(kw_only=True)
+class Gap:
+    """How the gap is measured: as the distance of two sites, of two geoms, or from a joint; exactly one of them.
+
+    The gap of a joint is `offset_m` plus `scale` times its position.
+    """
+
+    sites: tuple[str, ...] = ()
+    geoms: tuple[str, ...] = ()
+    joint: str = ""
+    scale: float = 1.0
+    offset_m: float = 0.0
+
+    def __attrs_post_init__(self) -> None:
+        if bool(self.sites) + bool(self.geoms) + bool(self.joint) != 1:
+            raise ValueError("give the gap by one of sites, geoms and joint")
+        for name, pair in (("sites", self.sites), ("geoms", self.geoms)):
+            if pair and len(pair) != 2:
+                raise ValueError(f"{name} has {len(pair)} names: give two, one of each finger")
+
+
+@frozen(kw_only=True)
+class Finger:
+    """A finger: the geoms that touch things, and where its force comes from.
+
+    Without `sensor` the force is the sum of the contact forces on the geoms along the closing direction; with it, the
+    value of a touch sensor, or of a force sensor along that direction. `array` names a tactile sensor with `rows` times
+    `columns` cells (the plugin `mujoco.sensor.touch_grid`).
+    """
+
+    geoms: tuple[str, ...]
+    sensor: str = ""
+    array: str = ""
+    rows: int = 0
+    columns: int = 0
+
+    def __attrs_post_init__(self) -> None:
+        if not self.geoms:
+            raise ValueError("geoms is empty: name the geoms of the finger that touch things")
+        if bool(self.array) != (self.rows > 0 and self.columns > 0):
+            raise ValueError("an array has rows and columns: give array, rows and columns together")
+
+
+@frozen(kw_only=True)
+class ModelSensor:
+    """A further channel: a sensor of the model, with the unit of its values."""
+
+    sensor: str
+    unit: str
+
+
+@frozen(kw_only=True)
+class GripperFile:
+    """A gripper: its model, the actuators that close it, and its measurements.
+
+    `open` and `closed` are the controls of each actuator with the fingers open and closed. `closing` is the direction
+    in which the left finger moves (a vector of the world); empty: from the left finger to the right one.
+    """
+
+    model: str
+    actuators: tuple[str, ...]
+    open: tuple[float, ...]
+    closed: tuple[float, ...]
+    gap: Gap
+    left: Finger
+    right: Finger
+    closing: tuple[float, ...] = ()
+    effort_limit_n: float = field(default=0.0)
+    speed_limit_m_s: float = field(default=0.1)
+    channels: Mapping[str, ModelSensor] = field(factory=dict)
+
+    def __attrs_post_init__(self) -> None:
+        if not self.actuators:
+            raise ValueError("actuators is empty: name the actuators that close the fingers")
+        for name, values in (("open", self.open), ("closed", self.closed)):
+            if len(values) != len(self.actuators):
+                raise ValueError(f"{name} has {len(values)} values for {len(self.actuators)} actuators")
+        if self.closing and len(self.closing) != 3:
+            raise ValueError(f"closing has {len(self.closing)} numbers: a direction has three")
+        if self.effort_limit_n < 0.0 or self.speed_limit_m_s <= 0.0:
+            raise ValueError("effort_limit_n is at least 0 (0: from the model), speed_limit_m_s above 0")
+        if self.left.rows * self.left.columns != self.right.rows * self.right.columns:
+            raise ValueError("the arrays of both fingers have the same number of cells")
+
+
+def read_gripper(name: str) -> tuple[GripperFile, Path]:
+    """Return a gripper file and the path of its model. Raises ConfigError with what was found and what to do.
+
+    An empty name is the parallel gripper of this package.
+    """
+    path = (
+        Path(str(files("graspsense_mujoco_gripper") / "parallel.toml"))
+        if not name
+        else Path(name).expanduser()
+    )
+    try:
+        if path.stat().st_size > LARGEST_BYTES:
+            raise ConfigError(f"{path} is no gripper file: it has more than {LARGEST_BYTES} bytes")
+        values = toml_values(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError(f"gripper.file: {path} cannot be read: {error}") from error
+    except TomlError as error:
+        raise ConfigError(f"gripper.file: {path}, line {error.line}: {error}") from error
+    return _gripper_of(values, path), _model_path(str(values["model"]), path)
+
+
+def _gripper_of(values: Mapping[str, Any], path: Path) -> GripperFile:
+    try:
+        return structured(values, GripperFile, "a gripper file")
+    except ValidationFailed as misfit:
+        said = [f"{'.'.join(map(str, one.path)) or 'the file'}: {one.text}" for one in misfit.problems]
+        raise ConfigError(f"gripper.file: {path}\n  " + "\n  ".join(said)) from None
+
+
+def _model_path(name: str, beside: Path) -> Path:
+    """Return the path of a model: relative to the gripper file, or `package:DISTRIBUTION:PATH` in a package."""
+    if not name.startswith("package:"):
+        path = beside.parent / Path(name).expanduser()
+        if not path.is_file():
+            raise ConfigError(f"gripper.file: {beside} names the model {name}, and there is no file {path}")
+        return path
+    package, _, resource = name.removeprefix("package:").partition(":")
+    folder = _package_folder(package)
+    if folder is None:
+        raise ConfigError(
+            f"gripper.file: the model {name} is part of the package {package}, which is not installed: "
+            f"pip install {package}"
+        )
+    path = folder / resource
+    if ".." in Path(resource).parts or not path.is_file():
+        raise ConfigError(f"gripper.file: the package {package} has no file {resource}")
+    return path
+
+
+def _package_folder(package: str) -> Path | None:
+    """Return the folder of an installed package, without importing it."""
+    from importlib.util import find_spec
+
+    if not package.isidentifier():
+        raise ConfigError(f"gripper.file: {package!r} is not the name of a package: package:NAME:PATH")
+    spec = find_spec(package)
+    if spec is None or not spec.submodule_search_locations:
+        return None
+    return Path(next(iter(spec.submodule_search_locations)))

@@ -1,0 +1,143 @@
+"""What is measured in a MuJoCo model: the gap, the force on each finger, cells, and further sensors."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+from attrs import frozen
+from numpy.typing import NDArray
+
+from graspsense.plugin_api import ConfigError
+from graspsense_mujoco_gripper.gripper_file import Finger, Gap, GripperFile
+from graspsense_mujoco_gripper.model import OBJ, identifier
+
+Floats = NDArray[np.float64]
+FARTHEST_M = 10.0
+"""Beyond this distance two geoms are not measured."""
+
+
+class GapGauge:
+    """Measures the gap (m) as a gripper file says."""
+
+    def __init__(self, model: mujoco.MjModel, gap: Gap) -> None:
+        self._gap = gap
+        if gap.sites:
+            self._ids = [identifier(model, OBJ.mjOBJ_SITE, name, "site") for name in gap.sites]
+        elif gap.geoms:
+            self._ids = [identifier(model, OBJ.mjOBJ_GEOM, name, "geom") for name in gap.geoms]
+        else:
+            joint = identifier(model, OBJ.mjOBJ_JOINT, gap.joint, "joint")
+            self._ids = [int(model.jnt_qposadr[joint])]
+        self._model = model
+
+    def gap_m(self, data: mujoco.MjData, axis: Floats) -> float:
+        """Return the gap; that of two sites is their distance along the closing direction."""
+        if self._gap.sites:
+            left, right = (data.site_xpos[k] for k in self._ids)
+            return float((right - left) @ axis)
+        if self._gap.geoms:
+            return float(mujoco.mj_geomDistance(self._model, data, *self._ids, FARTHEST_M, None))
+        return float(self._gap.offset_m + self._gap.scale * data.qpos[self._ids[0]])
+
+
+class ForceGauge:
+    """Measures the force (N) that closes one finger on a thing; positive where it presses."""
+
+    def __init__(self, model: mujoco.MjModel, finger: Finger, side: float) -> None:
+        self.geoms = frozenset(identifier(model, OBJ.mjOBJ_GEOM, name, "geom") for name in finger.geoms)
+        self._model, self._side = model, side
+        self._sensor = -1
+        if finger.sensor:
+            self._sensor = identifier(model, OBJ.mjOBJ_SENSOR, finger.sensor, "sensor")
+            kind = int(model.sensor_type[self._sensor])
+            if kind not in (mujoco.mjtSensor.mjSENS_TOUCH, mujoco.mjtSensor.mjSENS_FORCE):
+                raise ConfigError(
+                    f"gripper.file: the sensor {finger.sensor!r} is neither a touch nor a force sensor"
+                )
+            self._is_touch = kind == mujoco.mjtSensor.mjSENS_TOUCH
+            self._address = int(model.sensor_adr[self._sensor])
+            self._site = int(model.sensor_objid[self._sensor])
+
+    def force_n(self, data: mujoco.MjData, axis: Floats) -> float:
+        """Return the force on the finger along the closing direction."""
+        if self._sensor < 0:
+            return self._of_contacts(data, axis)
+        if self._is_touch:
+            return float(data.sensordata[self._address])
+        local = data.sensordata[self._address : self._address + 3]
+        world = data.site_xmat[self._site].reshape(3, 3) @ local
+        return float(self._side * (world @ axis))
+
+    def _of_contacts(self, data: mujoco.MjData, axis: Floats) -> float:
+        total, wrench = 0.0, np.zeros(6)
+        for k in range(data.ncon):
+            contact = data.contact[k]
+            first, second = contact.geom[0] in self.geoms, contact.geom[1] in self.geoms
+            if first == second:
+                continue
+            mujoco.mj_contactForce(self._model, data, k, wrench)
+            # The frame's first row is the normal, from the first geom to the second; the force acts on the second.
+            world = contact.frame.reshape(3, 3).T @ wrench[:3]
+            on_finger = world if second else -world
+            total += self._side * float(on_finger @ axis)
+        return total
+
+
+@frozen
+class Cells:
+    """The sensors of the cells of both fingers: where their values are, and how many."""
+
+    addresses: tuple[int, int]
+    count: int
+
+    def images(self, data: mujoco.MjData) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Return the cells of the left and the right finger, row by row."""
+        left, right = (tuple(map(float, data.sensordata[a : a + self.count])) for a in self.addresses)
+        return left, right
+
+
+def cells_of(model: mujoco.MjModel, gripper: GripperFile) -> Cells | None:
+    """Return the cells of the fingers; None without arrays. Raises ConfigError for another number of values."""
+    if not gripper.left.array:
+        return None
+    addresses = []
+    for finger in (gripper.left, gripper.right):
+        sensor = identifier(model, OBJ.mjOBJ_SENSOR, finger.array, "sensor")
+        values, cells = int(model.sensor_dim[sensor]), finger.rows * finger.columns
+        if values % cells:
+            raise ConfigError(
+                f"gripper.file: the sensor {finger.array!r} has {values} values, which are not a multiple of "
+                f"{finger.rows} x {finger.columns} cells"
+            )
+        addresses.append(int(model.sensor_adr[sensor]))
+    # The first channel of a touch grid is the normal force.
+    return Cells((addresses[0], addresses[1]), gripper.left.rows * gripper.left.columns)
+
+
+def closing_axis(model: mujoco.MjModel, data: mujoco.MjData, gripper: GripperFile) -> Floats:
+    """Return the unit vector from the left finger to the right one. Raises ConfigError where they coincide."""
+    if gripper.closing:
+        axis = np.asarray(gripper.closing, float)
+    else:
+        left, right = (_middle(model, data, finger.geoms) for finger in (gripper.left, gripper.right))
+        axis = right - left
+    length = float(np.linalg.norm(axis))
+    if not length > 1e-9:
+        raise ConfigError(
+            "gripper.file: the fingers are at the same place, so their closing direction is not known: give closing"
+        )
+    return axis / length
+
+
+def between_fingers(model: mujoco.MjModel, data: mujoco.MjData, gripper: GripperFile) -> Floats:
+    """Return the point in the middle of both fingers."""
+    left, right = (_middle(model, data, finger.geoms[:1]) for finger in (gripper.left, gripper.right))
+    return (left + right) / 2.0
+
+
+def _middle(model: mujoco.MjModel, data: mujoco.MjData, names: Sequence[str]) -> Floats:
+    ids = [identifier(model, OBJ.mjOBJ_GEOM, name, "geom") for name in names]
+    middle: Floats = np.mean([data.geom_xpos[k] for k in ids], axis=0)
+    return middle

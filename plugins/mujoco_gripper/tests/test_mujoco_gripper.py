@@ -1,0 +1,192 @@
+"""Grasps with grippers that MuJoCo models describe, checked against what the mechanics give by hand. Simulated."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from graspsense import ConfigError, load_pipeline
+from graspsense.plugin_api import EFFORT, Command, DeviceLost, UnknownName, create, parametrize_checks
+from graspsense_mujoco_gripper.catalogue import FOLDER, catalogue
+
+PARALLEL = FOLDER.parent / "parallel.xml"
+
+
+@parametrize_checks("graspsense-mujoco-gripper")
+def test_the_distribution_conforms(check):
+    check.run()
+
+
+def grasped(*options, thing="can", seed=0):
+    pipeline = load_pipeline(
+        "default", options=["gripper.type=mujoco", "classifier.type=none", "gripper.spread=false", *options]
+    )
+    return pipeline.grasp(object=thing, seed=seed)
+
+
+def gripper_file(folder: Path, model: Path = PARALLEL, **changed: str) -> Path:
+    """Write the file of the parallel gripper with some lines changed."""
+    lines = {
+        "model": f"'{model}'",
+        "actuators": '["close"]',
+        "open": "[-20.0]",
+        "closed": "[20.0]",
+        "gap": '{ sites = ["left_face", "right_face"] }',
+        "left": '{ geoms = ["left_pad"] }',
+        "right": '{ geoms = ["right_pad"] }',
+        **changed,
+    }
+    path = folder / "gripper.toml"
+    path.write_text("".join(f"{key} = {value}\n" for key, value in lines.items()))
+    return path
+
+
+def test_a_can_yields_as_its_springs_do():
+    """Two walls of 10 600 N/m in series yield by 20 N / 5300 N/m; the contacts yield by a few hundredths of a mm."""
+    trial = grasped()
+    assert trial.outcome.words == "steady"
+    assert trial.features["f_steady"] == pytest.approx(20.0, abs=0.1)
+    assert trial.features["p_steady"] == pytest.approx(0.066 - 20.0 / 5300.0, abs=1e-4)
+    assert trial.features["p_first"] == pytest.approx(0.066, abs=3e-4)
+
+
+@pytest.mark.parametrize("sends", ["effort", "velocity"])
+def test_a_block_is_as_wide_as_it_is_and_both_pads_feel_the_effort(sends):
+    trial = grasped(f"controller.sends={sends}", thing="block")
+    assert trial.outcome.words == "steady"
+    assert trial.features["p_steady"] == pytest.approx(0.040, abs=2e-4)
+    assert trial.features["f_steady"] == pytest.approx(20.0, abs=0.2)
+
+
+def test_an_egg_survives_20_newtons_and_breaks_at_60():
+    whole, broken = grasped(thing="egg"), grasped("controller.probing_force_n=60", thing="egg")
+    assert (whole.outcome.words, whole.report["broken"]) == ("steady", False)
+    assert (broken.outcome.words, broken.report["broken"]) == ("crushed", True)
+
+
+def test_a_seed_decides_the_thing():
+    options = ("gripper.spread=true",)
+    first, again, other = (grasped(*options, thing="block", seed=seed) for seed in (1, 1, 2))
+    assert first.features.values == again.features.values
+    assert first.features.values != other.features.values
+
+
+def test_a_light_gripper_under_gains_for_a_heavy_one_says_so(tmp_path):
+    text = (
+        PARALLEL.read_text()
+        .replace('armature="20"', 'armature="0.5"')
+        .replace('damping="600"', 'damping="20"')
+    )
+    (tmp_path / "light.xml").write_text(text)
+    file = gripper_file(tmp_path, tmp_path / "light.xml")
+    trial = grasped(f"gripper.file={file}", thing="block")
+    assert "controller.sends=velocity" in trial.report["unstable_loop"]
+    assert (
+        "unstable_loop"
+        not in grasped(f"gripper.file={file}", "controller.sends=velocity", thing="block").report
+    )
+
+
+def test_the_gap_may_come_from_a_joint_or_from_geoms(tmp_path):
+    joint = gripper_file(tmp_path, gap='{ joint = "left", scale = -2.0, offset_m = 0.09 }')
+    by_joint = grasped(f"gripper.file={joint}", thing="block")
+    geoms = gripper_file(tmp_path, gap='{ geoms = ["left_pad", "right_pad"] }')
+    by_geoms = grasped(f"gripper.file={geoms}", thing="block")
+    assert by_joint.features["p_steady"] == pytest.approx(by_geoms.features["p_steady"], abs=2e-4)
+
+
+def test_a_touch_sensor_measures_the_force_of_the_contacts(tmp_path):
+    text = PARALLEL.read_text()
+    for side in ("left", "right"):
+        text = text.replace(
+            f'<site name="{side}_face" pos="0 0 0"/>',
+            f'<site name="{side}_face" pos="0 0 0"/><site name="{side}_zone" type="box" size="0.006 0.012 0.012"/>',
+        )
+    text = text.replace(
+        "</mujoco>",
+        '<sensor><touch name="lt" site="left_zone"/><touch name="rt" site="right_zone"/></sensor></mujoco>',
+    )
+    (tmp_path / "touch.xml").write_text(text)
+    file = gripper_file(
+        tmp_path,
+        tmp_path / "touch.xml",
+        left='{ geoms = ["left_pad"], sensor = "lt" }',
+        right='{ geoms = ["right_pad"], sensor = "rt" }',
+    )
+    trial = grasped(f"gripper.file={file}", thing="can")
+    assert trial.features["f_steady"] == pytest.approx(20.0, abs=0.2)
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"actuators": '["nosuch"]'}, ("actuator", "nosuch", "close")),
+        ({"left": '{ geoms = ["nosuch"] }'}, ("geom", "nosuch", "left_pad")),
+        ({"left": '{ geoms = ["left_pad"], sensor = "nosuch" }'}, ("sensor", "nosuch")),
+        ({"open": "[20.0]", "closed": "[-20.0]"}, ("do not close",)),
+        ({"open": "[1.0, 2.0]"}, ("open has 2 values",)),
+        ({"gap": "{ }"}, ("one of sites, geoms and joint",)),
+        ({"actuator": '["close"]'}, ("actuator", "actuators")),
+        ({"model": "nosuch.xml"}, ("nosuch.xml",)),
+        ({"model": "package:nosuchpackage:a.xml"}, ("pip install nosuchpackage",)),
+    ],
+)
+def test_a_gripper_file_that_is_wrong_says_what_is(tmp_path, changed, said):
+    file = gripper_file(tmp_path, **changed)
+    with pytest.raises(ConfigError) as error:
+        create("sensor-backend", "mujoco", file=str(file)).open(0)
+    assert all(word in str(error.value) for word in said), error.value
+
+
+def test_a_model_includes_nothing_outside_of_its_folder(tmp_path):
+    inside = tmp_path / "model"
+    inside.mkdir()
+    (tmp_path / "secret.xml").write_text("<mujocoinclude/>")
+    (inside / "m.xml").write_text('<mujoco><include file="../secret.xml"/></mujoco>')
+    with pytest.raises(ConfigError, match="outside of its folder"):
+        create("sensor-backend", "mujoco", file=str(gripper_file(inside, inside / "m.xml"))).open(0)
+
+
+def test_what_mujoco_refuses_is_told_with_its_message(tmp_path):
+    (tmp_path / "m.xml").write_text('<mujoco><worldbody><geom size="a"/></worldbody></mujoco>')
+    with pytest.raises(ConfigError, match=r"MuJoCo .* refuses"):
+        create("sensor-backend", "mujoco", file=str(gripper_file(tmp_path, tmp_path / "m.xml"))).open(0)
+
+
+def test_a_thing_that_is_wider_than_the_opening_is_refused(tmp_path):
+    (tmp_path / "wide.xml").write_text(
+        '<mujoco><worldbody><body name="wide" gravcomp="1"><freejoint/>'
+        '<geom type="box" size="0.06 0.02 0.02" mass="1"/></body></worldbody></mujoco>'
+    )
+    with pytest.raises(ConfigError, match="wider than the opening"):
+        create("sensor-backend", "mujoco", object=str(tmp_path / "wide.xml")).open(0)
+
+
+def test_an_unknown_thing_proposes_the_nearest():
+    with pytest.raises(UnknownName, match="block"):
+        create("sensor-backend", "mujoco", object="blok").open(0)
+
+
+def test_an_unstable_simulation_ends_with_its_reason(tmp_path):
+    (tmp_path / "wild.xml").write_text(
+        '<mujoco><worldbody><body name="wild" gravcomp="1"><freejoint/><geom type="box" size="0.02 0.02 0.02" '
+        'mass="0.1"/><body><joint name="j" type="slide" stiffness="-1e9"/><geom size="0.001" mass="1e-6" '
+        'contype="0" conaffinity="0"/></body></body></worldbody></mujoco>'
+    )
+    backend = create("sensor-backend", "mujoco", object=str(tmp_path / "wild.xml"), spread=False)
+    backend.open(0)
+    backend._data.qpos[-1] = 1e-3
+
+    def simulate():
+        for _ in range(100):
+            backend.read(0.1)
+            backend.apply(Command(EFFORT, 0.0, 1.0, 1.0))
+
+    with pytest.raises(DeviceLost, match="unstable"):
+        simulate()
+
+
+def test_every_thing_of_the_catalogue_has_its_file():
+    assert len(catalogue()) >= 10
+    assert {path.stem for path in FOLDER.glob("*.xml")} == set(catalogue())
