@@ -168,7 +168,8 @@ def test_an_unknown_thing_proposes_the_nearest():
         create("sensor-backend", "mujoco", object="blok").open(0)
 
 
-def test_an_unstable_simulation_ends_with_its_reason(tmp_path):
+def test_an_unstable_simulation_ends_with_its_reason_and_writes_nothing(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     (tmp_path / "wild.xml").write_text(
         '<mujoco><worldbody><body name="wild" gravcomp="1"><freejoint/><geom type="box" size="0.02 0.02 0.02" '
         'mass="0.1"/><body><joint name="j" type="slide" stiffness="-1e9"/><geom size="0.001" mass="1e-6" '
@@ -185,6 +186,7 @@ def test_an_unstable_simulation_ends_with_its_reason(tmp_path):
 
     with pytest.raises(DeviceLost, match="unstable"):
         simulate()
+    assert [path.name for path in tmp_path.iterdir()] == ["wild.xml"]
 
 
 def test_every_thing_of_the_catalogue_has_its_file():

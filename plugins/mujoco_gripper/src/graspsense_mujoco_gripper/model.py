@@ -11,6 +11,9 @@ import mujoco
 from graspsense.plugin_api import ConfigError
 
 OBJ: Final = mujoco.mjtObj
+# MuJoCo would print each warning and write it to MUJOCO_LOG.TXT in the current folder; `instability` tells them.
+mujoco.set_mju_user_warning(lambda text: None)
+
 LARGEST_BYTES: Final = 8 * 1024 * 1024
 """Limit on the size of the text of a model."""
 _INCLUDE: Final = re.compile(r"<include\b[^>]*\bfile\s*=\s*[\"']([^\"']*)[\"']")
