@@ -27,12 +27,12 @@ from typing import Any
 
 from attrs import evolve
 
-from graspsense.core.anytime import Anytime, anytime_of
-from graspsense.core.config import resolve
-from graspsense.core.model import model_for
-from graspsense.core.plugins import installed
-from graspsense.core.run_config import RunConfig
-from graspsense.core.runner import run_grasp
+from graspsense.core.components.config import resolve
+from graspsense.core.components.registry import installed
+from graspsense.core.components.run_config import RunConfig
+from graspsense.core.grasp.runner import run_grasp
+from graspsense.core.learn.model import model_for
+from graspsense.core.pipeline.anytime import Anytime, anytime_of
 from graspsense.plugin_api import SQUEEZE, DeviceInfo, create
 from graspsense_pr2_gripper import backend as driver
 from graspsense_pr2_gripper import emulation, opening

@@ -17,7 +17,7 @@ import time
 import tomllib
 from pathlib import Path
 
-from graspsense.core.config import toml_key
+from graspsense.core.components.config import toml_key
 from graspsense.experiments.executors.serial import Serial
 from graspsense.experiments.experiment import number_of_trials, read_experiment, shipped
 

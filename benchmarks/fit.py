@@ -41,7 +41,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from attrs import evolve, field, frozen
 
-from graspsense.core.trace import Trace
+from graspsense.core.values.trace import Trace
 from graspsense.evaluation.crossval import cross_validate
 from graspsense.evaluation.folds import stratified
 from graspsense.experiments.paper.published import published

@@ -27,8 +27,8 @@ from typing import Any, Final
 import numpy as np
 from attrs import asdict, evolve, frozen
 
-from graspsense.core.run_config import RunConfig
-from graspsense.core.runner import Grasp, run_grasp
+from graspsense.core.components.run_config import RunConfig
+from graspsense.core.grasp.runner import Grasp, run_grasp
 from graspsense.plugin_api import (
     APPROACH,
     EFFORT,

@@ -58,7 +58,7 @@ import numpy as np
 from attrs import asdict, evolve, frozen
 
 from graspsense import load_pipeline
-from graspsense.core.identification import Identification, RecordedSqueeze
+from graspsense.core.components.identification import Identification, RecordedSqueeze
 from graspsense.evaluation.intervals import wilson
 from graspsense.inference import interval_of_mean
 from graspsense.plugin_api import RunConfig, create, table_of

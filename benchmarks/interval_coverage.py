@@ -19,10 +19,10 @@ import time
 import numpy as np
 from scipy.special import stdtrit
 
-from graspsense.core.config import SelectedComponent
-from graspsense.core.features import FeatureTable
-from graspsense.core.labelled import Labelled
-from graspsense.core.plugins import installed
+from graspsense.core.components.config import SelectedComponent
+from graspsense.core.components.registry import installed
+from graspsense.core.learn.labelled import Labelled
+from graspsense.core.values.features import FeatureTable
 from graspsense.evaluation.evaluate import evaluate
 from graspsense.evaluation.intervals import Interval, clustered, wilson
 

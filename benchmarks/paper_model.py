@@ -15,7 +15,7 @@ import numpy as np
 from attrs import evolve
 from fit import FOLDS, SPLITS, SPREAD, TRIALS, Squeeze, as_toml, by_the_splits
 
-from graspsense.core.trace import Trace
+from graspsense.core.values.trace import Trace
 from graspsense.evaluation.folds import stratified
 from graspsense.experiments.grasping import measures
 from graspsense.experiments.paper.claims import split_by

@@ -25,12 +25,12 @@ from typing import Any
 import numpy as np
 from attrs import evolve
 
-from graspsense.core.config import build, resolve
-from graspsense.core.features import table_of
-from graspsense.core.labelled import Labelled
-from graspsense.core.plugins import installed
-from graspsense.core.roles import FeatureSet
-from graspsense.core.trace import Trace
+from graspsense.core.components.config import build, resolve
+from graspsense.core.components.registry import installed
+from graspsense.core.components.roles import FeatureSet
+from graspsense.core.learn.labelled import Labelled
+from graspsense.core.values.features import table_of
+from graspsense.core.values.trace import Trace
 from graspsense.evaluation.intervals import percentage, percentages
 from graspsense.evaluation.ranking import OutsideAnswers, Ranking, protocols_of, rank
 from graspsense.plugin_api import PluginUnavailable
@@ -140,7 +140,7 @@ def measured(source: str, given: argparse.Namespace) -> Ranking:
 
 
 def component(name: str) -> Any:
-    from graspsense.core.config import SelectedComponent
+    from graspsense.core.components.config import SelectedComponent
 
     chosen = installed().find("classifier", name)
     return SelectedComponent(chosen, build(chosen, {}))

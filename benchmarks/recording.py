@@ -24,12 +24,13 @@ from math import inf
 from pathlib import Path
 
 import numpy as np
+from graspsense.core.values.device import DeviceInfo
 
-from graspsense.core.errors import RecordingEnded
-from graspsense.core.roles import DeviceInfo, SensorBackend
-from graspsense.core.run_config import RunConfig
-from graspsense.core.runner import run_grasp
-from graspsense.core.signals import EFFORT, Command, Frame, Pads, Reading
+from graspsense.core.components.roles import SensorBackend
+from graspsense.core.components.run_config import RunConfig
+from graspsense.core.grasp.runner import run_grasp
+from graspsense.core.values.errors import RecordingEnded
+from graspsense.core.values.signals import EFFORT, Command, Frame, Pads, Reading
 from graspsense.plugin_api import create
 from graspsense.recording.layout import TICK_FIELDS, pads_topic
 from graspsense.recording.recorder import Recorder

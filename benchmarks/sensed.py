@@ -17,7 +17,7 @@ import secrets
 
 from attrs import asdict
 
-from graspsense.core.config import resolve
+from graspsense.core.components.config import resolve
 from graspsense.experiments.sensed import SensedTrade, sensed_trade
 from graspsense.experiments.versions import where_measured
 from graspsense.plugin_api import SimulationVariant

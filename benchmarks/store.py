@@ -22,9 +22,9 @@ from pathlib import Path
 
 import numpy as np
 
-from graspsense.core.errors import GraspsenseError
-from graspsense.core.model import load_model, train
-from graspsense.core.plugins import installed
+from graspsense.core.components.registry import installed
+from graspsense.core.learn.model import load_model, train
+from graspsense.core.values.errors import GraspsenseError
 from graspsense.plugin_api import create
 from graspsense.recording.recording_info import RecordingInfo
 from graspsense.recording.trial_record import DeviceRecord, FeatureValues, TrialRecord, TrialResult

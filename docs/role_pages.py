@@ -19,24 +19,17 @@ from string import Template
 from typing import Any
 
 import attrs
+from graspsense.core.values.events import GraspEvent
 
 from graspsense import plugin_api
-from graspsense.core import (
-    compiled_features,
-    contact,
-    entries,
-    free_motion,
-    hookspecs,
-    roles,
-    signals,
-    strict,
-    tick,
-)
-from graspsense.core.entries import DECLARED, TABLE_OF_ROLE
-from graspsense.core.features import Features, FeatureTable, Prediction
-from graspsense.core.reasons import Contribution, FeatureValue, Reason
-from graspsense.core.trace import ImageTrace, SampleTrace, Trace
-from graspsense.core.trial import GraspEvent, RunInfo, Trial
+from graspsense.core.components import compiled_features, entries, hookspecs, roles, strict
+from graspsense.core.components.entries import DECLARED, TABLE_OF_ROLE
+from graspsense.core.control import contact, free_motion, tick
+from graspsense.core.values import signals
+from graspsense.core.values.features import Features, FeatureTable, Prediction
+from graspsense.core.values.reasons import Contribution, FeatureValue, Reason
+from graspsense.core.values.trace import ImageTrace, SampleTrace, Trace
+from graspsense.core.values.trial import RunInfo, Trial
 from graspsense.recording.labelled_recording import LabelledRecording
 from graspsense.recording.replayable import Recording
 from graspsense.scaffold.make import KINDS, plugin_module, words_of

@@ -11,7 +11,7 @@ from textwrap import dedent
 import pytest
 from attrs import field, frozen
 
-from graspsense.core.plugins import Plugins
+from graspsense.core.components.registry import Plugins
 
 # Whoever starts the tests in the background of a shell has them ignore Ctrl-C, and every process they start, too.
 signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -19,11 +19,11 @@ from pathlib import Path
 
 import numpy as np
 
-from graspsense.core.errors import ConfigError, DataDamaged, UnknownName
-from graspsense.core.features import FeatureTable
-from graspsense.core.model import load_model
-from graspsense.core.model_content import digest
-from graspsense.core.plugins import installed
+from graspsense.core.components.registry import installed
+from graspsense.core.learn.model import load_model
+from graspsense.core.learn.model_content import digest
+from graspsense.core.values.errors import ConfigError, DataDamaged, UnknownName
+from graspsense.core.values.features import FeatureTable
 from graspsense.testing.damage import damaged_at, paths
 
 MEMORY = 300 * 2**20

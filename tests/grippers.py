@@ -2,9 +2,11 @@
 
 from math import inf
 
-from graspsense.core.errors import DeviceLost
-from graspsense.core.roles import DeviceInfo, SensorBackend
-from graspsense.core.signals import EFFORT, Command, Frame, Pads, Reading
+from graspsense.core.values.device import DeviceInfo
+
+from graspsense.core.components.roles import SensorBackend
+from graspsense.core.values.errors import DeviceLost
+from graspsense.core.values.signals import EFFORT, Command, Frame, Pads, Reading
 from graspsense.testing.model_gripper import CELLS
 
 

@@ -17,8 +17,8 @@ import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from graspsense.core.config import resolve
-from graspsense.core.errors import GraspsenseError
+from graspsense.core.components.config import resolve
+from graspsense.core.values.errors import GraspsenseError
 from graspsense.experiments.experiment import read_experiment
 from graspsense.recording.export_trace import declared_beside
 from graspsense.recording.labelled_recording import UnreadableRecording

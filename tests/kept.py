@@ -5,7 +5,7 @@ from math import inf, nan
 
 from attrs import evolve
 
-from graspsense.core.signals import EFFORT, Command, Frame, Pads
+from graspsense.core.values.signals import EFFORT, Command, Frame, Pads
 from graspsense.recording.layout import DEVICE, RESULT, START, TICK, pads_numbers, pads_topic
 from graspsense.recording.recording_info import RecordingInfo
 from graspsense.recording.trial_record import DeviceRecord, FeatureValues, TrialRecord, TrialResult

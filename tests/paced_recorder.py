@@ -19,7 +19,7 @@ from pathlib import Path
 
 from kept import command, ended, frame, pads
 
-from graspsense.core.signals import Reading
+from graspsense.core.values.signals import Reading
 from graspsense.recording.layout import DEVICE, RESULT, START, TICK_WIRE
 from graspsense.recording.recorder import Recorder
 from graspsense.store.store import Store

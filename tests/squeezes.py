@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from graspsense.core.identification import RecordedSqueeze
-from graspsense.core.trace import Trace
+from graspsense.core.components.identification import RecordedSqueeze
+from graspsense.core.values.trace import Trace
 
 WIDTH_M = 0.05
 DEPTH_M = 0.008

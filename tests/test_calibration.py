@@ -2,9 +2,9 @@
 
 import pytest
 
-from graspsense.core.calibration import edge_force, masked, pad_force, tare, zero_of
-from graspsense.core.errors import TareRefused
-from graspsense.core.signals import Pads
+from graspsense.core.grasp.calibration import edge_force, masked, pad_force, tare, zero_of
+from graspsense.core.values.errors import TareRefused
+from graspsense.core.values.signals import Pads
 from graspsense.testing.model_gripper import CELLS
 
 EDGE_COUNTS_PER_N = (600.0, 400.0, 600.0, 600.0, 600.0, 600.0, 400.0)

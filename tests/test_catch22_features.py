@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from graspsense.core.errors import PluginUnavailable
-from graspsense.core.plugins import Plugins
+from graspsense.core.components.registry import Plugins
+from graspsense.core.values.errors import PluginUnavailable
 from graspsense.plugin_api import create
 from graspsense.testing.samples import squeeze
 

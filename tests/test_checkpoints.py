@@ -8,8 +8,11 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from graspsense.core.anytime import Anytime, CheckpointPrediction, anytime_of
-from graspsense.core.checkpoints import (
+from graspsense.core.components.config import SelectedComponent, build, resolve
+from graspsense.core.components.registry import installed
+from graspsense.core.components.run_config import RunConfig
+from graspsense.core.grasp.runner import run_grasp
+from graspsense.core.learn.checkpoints import (
     CheckpointFeatures,
     checkpoints_of,
     contact_of,
@@ -18,15 +21,12 @@ from graspsense.core.checkpoints import (
     until_checkpoint,
     used,
 )
-from graspsense.core.config import SelectedComponent, build, resolve
-from graspsense.core.errors import ConfigError
-from graspsense.core.features import Features, Prediction, table_of
-from graspsense.core.labelled import Labelled
-from graspsense.core.model import load_model, train, write_model
-from graspsense.core.plugins import installed
-from graspsense.core.run_config import RunConfig
-from graspsense.core.runner import run_grasp
-from graspsense.core.signals import Outcome, Phase
+from graspsense.core.learn.labelled import Labelled
+from graspsense.core.learn.model import load_model, train, write_model
+from graspsense.core.pipeline.anytime import Anytime, anytime_of
+from graspsense.core.values.errors import ConfigError
+from graspsense.core.values.features import CheckpointPrediction, Features, Prediction, table_of
+from graspsense.core.values.signals import Outcome, Phase
 from graspsense.evaluation.checkpoints import SURE, WHOLE, checkpoint_models, early_recognition
 from graspsense.evaluation.doubt import calibrated
 from graspsense.plugin_api import create

@@ -10,8 +10,8 @@ import sys
 import numpy as np
 import pytest
 
-from graspsense.core.errors import ConfigError
-from graspsense.core.features import Features, FeatureTable
+from graspsense.core.values.errors import ConfigError
+from graspsense.core.values.features import Features, FeatureTable
 from graspsense.plugin_api import create
 
 ALL = ["c45", "svm", "mlp", "backprop", "forest", "boosted", "ebm", "knn", "tree"]
@@ -194,12 +194,12 @@ def test_pruning_against_held_out_trials_makes_a_smaller_tree():
 def test_scikit_learn_is_imported_when_one_of_its_own_is_fitted_and_not_before(name):
     code = f"""
 import sys
-from graspsense.core.plugins import installed
+from graspsense.core.components.registry import installed
 component = installed().find("classifier", {name!r})
 classifier = component.create(component.config_class()())
 assert "sklearn" not in sys.modules and "numba" not in sys.modules
 import numpy as np
-from graspsense.core.features import FeatureTable
+from graspsense.core.values.features import FeatureTable
 table = FeatureTable(names=("a",), units=("",), values=np.arange(20.0)[:, None])
 classifier.fit(table, ["x"] * 10 + ["y"] * 10, 0)
 assert ("sklearn" in sys.modules) is {name != "c45"}

@@ -15,10 +15,10 @@ import pytest
 
 from graspsense import __version__
 from graspsense.cli.main import COMMANDS, main
-from graspsense.core.entries import CommandEntry, FoundDevice
-from graspsense.core.errors import DeviceLost, NoDevice
-from graspsense.core.plugins import IsolatedPlugins
-from graspsense.core.plugins import registry as loader
+from graspsense.core.components.entries import CommandEntry, FoundDevice
+from graspsense.core.components.registry import IsolatedPlugins
+from graspsense.core.components.registry import plugins as loader
+from graspsense.core.values.errors import DeviceLost, NoDevice
 from graspsense.plugin_api import hookimpl
 
 REPLAY = ["--gripper", "replay", "-o", "gripper.recording=icub:some/file.txt", "-o", "classifier.type=none"]

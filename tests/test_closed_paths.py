@@ -12,15 +12,15 @@ from pathlib import Path
 
 import pytest
 
-from graspsense.core import closed_paths
-from graspsense.core.calibration_files import (
+from graspsense.core.files import closed_paths
+from graspsense.core.files.closed_paths import is_closed, make_closed, why_open
+from graspsense.core.grasp.calibration_files import (
     Calibration,
     calibration_path,
     calibrations_of,
     write_calibration,
 )
-from graspsense.core.closed_paths import is_closed, make_closed, why_open
-from graspsense.core.errors import ConfigError
+from graspsense.core.values.errors import ConfigError
 
 STRANGER = 4711
 """The number of a user whom nobody is."""

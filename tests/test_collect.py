@@ -9,7 +9,7 @@ from collections import Counter
 import pytest
 
 from graspsense.cli.main import main
-from graspsense.core.errors import ConfigError
+from graspsense.core.values.errors import ConfigError
 from graspsense.store.collecting import Collection, Wanted
 from graspsense.store.store import Store
 
@@ -124,8 +124,8 @@ def test_another_classifier_is_no_other_setting(collect, graspsense, tmp_path):
 def test_another_gripper_is_refused_before_it_moves(tmp_path):
     from grippers import Scripted, bottle, squeezing
 
-    from graspsense.core.config import resolve
-    from graspsense.core.plugins import installed
+    from graspsense.core.components.config import resolve
+    from graspsense.core.components.registry import installed
 
     plugins = installed()
 
@@ -307,7 +307,7 @@ def test_a_gripper_that_cannot_be_told_takes_the_word_of_the_operator(tmp_path):
     from grippers import Scripted, bottle, squeezing
 
     from graspsense.cli.collect import _label_selects_object
-    from graspsense.core.config import resolve
+    from graspsense.core.components.config import resolve
 
     class Choice:
         def create(self):
@@ -366,7 +366,7 @@ def test_collecting_into_a_store_of_runs_with_other_settings_is_refused(graspsen
 def test_a_setting_that_is_newer_than_the_trial_had_its_default(tmp_path):
     from kept import SETTINGS, keep
 
-    from graspsense.core.config import resolve
+    from graspsense.core.components.config import resolve
     from graspsense.store.comparable import check_settings, newest_grasp
 
     with Store.open(tmp_path / "t") as store:

@@ -12,9 +12,9 @@ from enum import IntEnum
 import numpy as np
 import pytest
 
-from graspsense.core import compiled_code_folder as folder_module
-from graspsense.core import compiling
-from graspsense.core.compiled_code_folder import compiled_code_folder, delete_older_half
+from graspsense.core.compiling import compiled_code_folder as folder_module
+from graspsense.core.compiling import compiling
+from graspsense.core.compiling.compiled_code_folder import compiled_code_folder, delete_older_half
 from graspsense.plugin_api import (
     CompileOptions,
     NotCompilable,

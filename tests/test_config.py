@@ -13,7 +13,7 @@ from attrs import asdict, evolve
 from hypothesis import given
 from hypothesis import strategies as st
 
-from graspsense.core.config import (
+from graspsense.core.components.config import (
     Flag,
     Layer,
     build,
@@ -25,9 +25,9 @@ from graspsense.core.config import (
     toml_key,
     toml_value,
 )
-from graspsense.core.errors import ConfigError, UnknownName
-from graspsense.core.plugins import IsolatedPlugins
-from graspsense.core.toml_lines import key_lines
+from graspsense.core.components.registry import IsolatedPlugins
+from graspsense.core.files.toml_lines import key_lines
+from graspsense.core.values.errors import ConfigError, UnknownName
 
 PARTS = """
     from __future__ import annotations

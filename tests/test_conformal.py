@@ -9,11 +9,11 @@ import pytest
 from attrs import evolve
 from test_evaluate import judged, labelled, learner
 
-from graspsense.core.conformal import sets_of, units_lacking, units_needed
-from graspsense.core.errors import DataDamaged
-from graspsense.core.features import UNKNOWN
-from graspsense.core.model import load_model, train, write_model
-from graspsense.core.plugins import installed
+from graspsense.core.components.registry import installed
+from graspsense.core.learn.conformal import sets_of, units_lacking, units_needed
+from graspsense.core.learn.model import load_model, train, write_model
+from graspsense.core.values.errors import DataDamaged
+from graspsense.core.values.features import UNKNOWN
 from graspsense.evaluation.doubt import calibrated
 from graspsense.evaluation.json_codec import from_json, to_json
 from graspsense.evaluation.results import Evaluation

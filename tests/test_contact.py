@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from graspsense.core.contact import (
+from graspsense.core.control.contact import (
     REST_SPEED_M_S,
     REST_WINDOW_S,
     RestState,

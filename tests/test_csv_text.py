@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from kept import keep
 
 from graspsense.cli.main import main
-from graspsense.core.csv_text import csv_text, text_of_cell
-from graspsense.core.features import FeatureTable
-from graspsense.core.labelled import Labelled
+from graspsense.core.files.csv_text import csv_text, text_of_cell
+from graspsense.core.learn.labelled import Labelled
+from graspsense.core.values.features import FeatureTable
 from graspsense.sources.features_csv import read_labelled, write_labelled
 from graspsense.store.dataset import labelled_store
 from graspsense.store.store import Store

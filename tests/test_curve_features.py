@@ -12,8 +12,8 @@ from attrs import evolve
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from graspsense.core.signals import Frame, Phase
-from graspsense.core.trace import SI_UNITS, Trace, trace_of
+from graspsense.core.values.signals import Frame, Phase
+from graspsense.core.values.trace import SI_UNITS, Trace, trace_of
 from graspsense.plugins.features.curve import NAMES, CurveConfig, CurveFeatures
 from graspsense.testing.samples import copied, squeeze
 

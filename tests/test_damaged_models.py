@@ -19,13 +19,13 @@ from attrs import evolve
 from parts import Nearest
 from test_classifiers import trials
 
-from graspsense.core.conformal import LabelThreshold, PredictionSets
-from graspsense.core.errors import DataDamaged
-from graspsense.core.labelled import Labelled
-from graspsense.core.model import checkpoint_model, classifier_from, load_model, train, write_model
-from graspsense.core.model_content import digest
-from graspsense.core.plugins import Component, installed
-from graspsense.core.stored_values import StoredValues
+from graspsense.core.components.registry import Component, installed
+from graspsense.core.learn.conformal import LabelThreshold, PredictionSets
+from graspsense.core.learn.labelled import Labelled
+from graspsense.core.learn.model import checkpoint_model, classifier_from, load_model, train, write_model
+from graspsense.core.learn.model_content import digest
+from graspsense.core.learn.stored_values import StoredValues
+from graspsense.core.values.errors import DataDamaged
 from graspsense.plugin_api import create
 from graspsense.regression.model import is_regression
 

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from graspsense.core.decision_path import FeatureRange, SplitTest, feature_ranges, path_reasons
-from graspsense.core.features import Features, FeatureTable, Prediction
-from graspsense.core.units import in_words_apart
+from graspsense.core.learn.decision_path import FeatureRange, SplitTest, feature_ranges, path_reasons
+from graspsense.core.values.features import Features, FeatureTable, Prediction
+from graspsense.core.values.units import in_words_apart
 from graspsense.plugin_api import create
 
 NUMBERS = st.floats(-1e3, 1e3) | st.sampled_from([0.0569, 0.057, 0.0570001])

@@ -12,12 +12,12 @@ import pytest
 from attrs import field, frozen
 from parts import GentleState, Hand, HandConfig, Peak, PeakConfig
 
-from graspsense.core.config import settings_from
-from graspsense.core.errors import PluginUnavailable, WiringError
-from graspsense.core.plugins import Component, IsolatedPlugins
-from graspsense.core.plugins.declaration import config_of
-from graspsense.core.step_params import params_of
-from graspsense.core.wiring import check
+from graspsense.core.components.config import settings_from
+from graspsense.core.components.registry import Component, IsolatedPlugins
+from graspsense.core.components.registry.declaration import config_of
+from graspsense.core.components.step_params import params_of
+from graspsense.core.pipeline.wiring import check
+from graspsense.core.values.errors import PluginUnavailable, WiringError
 from graspsense.plugin_api import (
     EFFORT,
     VELOCITY,
@@ -226,7 +226,7 @@ def test_a_law_with_the_numbers_of_its_config_is_compiled_once_and_then_loaded(t
     """Another process finds the machine code, although no module defines the type of the parameters."""
     (tmp_path / "lab_slow.py").write_text(
         "from attrs import frozen\n"
-        "from graspsense.core.step_params import params_of\n"
+        "from graspsense.core.components.step_params import params_of\n"
         "from graspsense.plugin_api import compile_function, first_call\n"
         "@frozen\n"
         "class SlowConfig:\n"

@@ -9,9 +9,9 @@ import sys
 import pytest
 
 from graspsense.cli.plugins import _rows
-from graspsense.core.disabling import config_file, disabled_in_config, write_disabled
-from graspsense.core.errors import ConfigError
-from graspsense.core.plugins import Plugins, builtin_source, installed_sources
+from graspsense.core.components.disabling import config_file, disabled_in_config, write_disabled
+from graspsense.core.components.registry import Plugins, builtin_source, installed_sources
+from graspsense.core.values.errors import ConfigError
 
 FEATURES = """
     from graspsense.plugin_api import Feature, FeatureSetEntry, hookimpl

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from test_classifiers import fitted, trials
 
-from graspsense.core.errors import PluginUnavailable
-from graspsense.core.features import FeatureTable
+from graspsense.core.values.errors import PluginUnavailable
+from graspsense.core.values.features import FeatureTable
 from graspsense.plugin_api import create
 from graspsense.plugins.classifiers import ebm
 
@@ -45,7 +45,7 @@ def test_a_stored_model_predicts_without_interpret(tmp_path):
 import json, sys
 sys.modules["interpret"] = None
 import numpy as np
-from graspsense.core.features import FeatureTable
+from graspsense.core.values.features import FeatureTable
 from graspsense.plugin_api import create
 again = create("classifier", "ebm")
 again.from_json(json.load(open({str(tmp_path / "m.json")!r})))

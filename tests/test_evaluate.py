@@ -12,11 +12,11 @@ import pytest
 from attrs import evolve
 from sklearn.exceptions import ConvergenceWarning
 
-from graspsense.core.config import SelectedComponent
-from graspsense.core.errors import ConfigError
-from graspsense.core.features import FeatureTable
-from graspsense.core.labelled import ControlFeatures, Labelled
-from graspsense.core.plugins import installed
+from graspsense.core.components.config import SelectedComponent
+from graspsense.core.components.registry import installed
+from graspsense.core.learn.labelled import ControlFeatures, Labelled
+from graspsense.core.values.errors import ConfigError
+from graspsense.core.values.features import FeatureTable
 from graspsense.evaluation.confusion import confusion
 from graspsense.evaluation.crossval import thinned
 from graspsense.evaluation.evaluate import evaluate

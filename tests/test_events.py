@@ -10,11 +10,11 @@ import pytest
 from attrs import frozen
 from grippers import Scripted, bottle, squeezing
 
-from graspsense.core.errors import DeviceLost
-from graspsense.core.run_config import RunConfig
-from graspsense.core.runner import run_grasp
-from graspsense.core.signals import Outcome, Phase
-from graspsense.core.tick import events_of
+from graspsense.core.components.run_config import RunConfig
+from graspsense.core.control.tick import events_of
+from graspsense.core.grasp.runner import run_grasp
+from graspsense.core.values.errors import DeviceLost
+from graspsense.core.values.signals import Outcome, Phase
 from graspsense.plugin_api import Feature, FeatureSet
 from graspsense.plugins.controllers.hybrid import HybridConfig, HybridController
 from graspsense.recording.reader import read_recorded
@@ -85,7 +85,7 @@ def test_a_grasp_that_is_cut_off_keeps_its_events(how, outcome):
 KILLED = """
     import os, signal, sys
     from graspsense import load_pipeline
-    from graspsense.core.plugins import installed
+    from graspsense.core.components.registry import installed
     from graspsense.store.record_grasp import record_grasp
     from graspsense.store.store import Store
 

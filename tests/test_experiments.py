@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from graspsense.cli.main import main
-from graspsense.core.errors import ConfigError
+from graspsense.core.values.errors import ConfigError
 from graspsense.evaluation.over_seeds import OverSeeds, mean_difference
 from graspsense.experiments.executors.serial import Serial
 from graspsense.experiments.experiment import read_experiment, shipped

@@ -12,8 +12,8 @@ from kept import ended, frame, keep, pads, write_recording
 from scipy.io import arff
 
 from graspsense.cli.main import main
-from graspsense.core.config import select_component
-from graspsense.core.errors import ConfigError, PluginUnavailable
+from graspsense.core.components.config import select_component
+from graspsense.core.values.errors import ConfigError, PluginUnavailable
 from graspsense.evaluation.evaluate import evaluate
 from graspsense.evaluation.json_codec import to_json
 from graspsense.recording.recording_info import RecordingInfo

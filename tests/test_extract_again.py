@@ -9,7 +9,7 @@ import pytest
 from kept import frame, keep
 
 from graspsense.cli.main import main
-from graspsense.core.errors import ConfigError, DataDamaged
+from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.sources.features_csv import read_labelled
 from graspsense.store.dataset import labelled_store, read_dataset
 from graspsense.store.store import Store

@@ -13,9 +13,9 @@ from test_classifiers import NAMES, UNITS, trials
 from test_damaged_models import KINDS, labelled, trained
 
 from graspsense.cli.main import main
-from graspsense.core.errors import DataDamaged
-from graspsense.core.features import UNKNOWN, Features, FeatureTable
-from graspsense.core.target_value import TargetValue
+from graspsense.core.learn.target_value import TargetValue
+from graspsense.core.values.errors import DataDamaged
+from graspsense.core.values.features import UNKNOWN, Features, FeatureTable
 from graspsense.plugin_api import create
 from graspsense.regression.estimators import ESTIMATORS
 from graspsense.regression.model import train_regression

@@ -9,10 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from traces import made_trace
 
-from graspsense.core.compiled_features import TickColumns, columns_of_ticks, compiled_extraction
-from graspsense.core.signals import Phase
-from graspsense.core.trace import SI_UNITS
-from graspsense.core.units import in_words
+from graspsense.core.components.compiled_features import TickColumns, columns_of_ticks, compiled_extraction
+from graspsense.core.values.signals import Phase
+from graspsense.core.values.trace import SI_UNITS
+from graspsense.core.values.units import in_words
 from graspsense.plugins.features.chitta import NAMES, ChittaConfig, ChittaFeatures
 
 FEATURES = ChittaFeatures(ChittaConfig())

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from graspsense.core.errors import ConfigError, DataDamaged
-from graspsense.core.features import FeatureTable
-from graspsense.core.labelled import Labelled
+from graspsense.core.learn.labelled import Labelled
+from graspsense.core.values.errors import ConfigError, DataDamaged
+from graspsense.core.values.features import FeatureTable
 from graspsense.sources.features_csv import read_labelled, read_table, write_labelled
 
 GOOD = "what,p_first [m],f_steady\n" + "".join(

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from graspsense.core.errors import ConfigError
+from graspsense.core.values.errors import ConfigError
 from graspsense.evaluation.folds import commonest, in_order, instance_held_out, stratified
 
 LABELS = st.lists(st.sampled_from("abcd"), min_size=10, max_size=80)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from graspsense.core.values.channel import TactileArray
 from kept import write_recording
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
 from graspsense import load_pipeline
-from graspsense.core.entries import TactileArray
-from graspsense.core.errors import ConfigError
-from graspsense.core.plugins import installed
+from graspsense.core.components.registry import installed
+from graspsense.core.values.errors import ConfigError
 from graspsense.recording.export_trace import write_mcap, write_pictures
 from graspsense.recording.foxglove import CELL_PIXELS, RAW_IMAGE, _grid_of
 from graspsense.recording.reader import read_recorded

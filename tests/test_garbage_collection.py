@@ -5,7 +5,7 @@ import threading
 
 import pytest
 
-from graspsense.core.garbage_collection import no_collection, present_objects_kept
+from graspsense.core.control.garbage_collection import no_collection, present_objects_kept
 
 
 @pytest.mark.parametrize("collects", [True, False])

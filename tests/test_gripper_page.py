@@ -12,7 +12,7 @@ from types import ModuleType, SimpleNamespace
 import pytest
 
 from graspsense import load_pipeline
-from graspsense.core.plugins import IsolatedPlugins
+from graspsense.core.components.registry import IsolatedPlugins
 from graspsense.plugin_api import Reading, SensorBackendEntry, hookimpl
 from graspsense.testing import examine
 

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from graspsense.core.guard import GuardParams, GuardState, guard
-from graspsense.core.signals import EFFORT, FORCE, POSITION, VELOCITY, Command, Frame
+from graspsense.core.control.guard import GuardParams, GuardState, guard
+from graspsense.core.values.signals import EFFORT, FORCE, POSITION, VELOCITY, Command, Frame
 
 LIMITS = GuardParams(100.0, 0.2, inf, inf, 0.625)
 FRESH = GuardState(0, 0, 0)

@@ -10,14 +10,15 @@ from pathlib import Path
 
 import click
 import pytest
+from graspsense.core.values.events import GraspEvent
 
-from graspsense.core import hookspecs
-from graspsense.core.entries import Finding, FoundDevice
-from graspsense.core.features import Features
-from graspsense.core.plugins import IsolatedPlugins
-from graspsense.core.signals import Outcome, Phase
-from graspsense.core.trace import trace_of
-from graspsense.core.trial import GraspEvent, RunInfo, Trial
+from graspsense.core.components import hookspecs
+from graspsense.core.components.entries import Finding, FoundDevice
+from graspsense.core.components.registry import IsolatedPlugins
+from graspsense.core.values.features import Features
+from graspsense.core.values.signals import Outcome, Phase
+from graspsense.core.values.trace import trace_of
+from graspsense.core.values.trial import RunInfo, Trial
 from graspsense.plugin_api import CommandEntry, collect, hookimpl
 
 HOOKS = {name: spec for name, spec in vars(hookspecs).items() if name.startswith("graspsense_")}

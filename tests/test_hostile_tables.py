@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 
 from graspsense.cli.main import main
-from graspsense.core import limits
-from graspsense.core.channels import from_json
-from graspsense.core.errors import ConfigError, DataDamaged, suggestion
-from graspsense.core.features import FeatureTable
-from graspsense.core.labelled import Labelled
-from graspsense.core.layers import Layer, Merged, option_layers, read_layer
-from graspsense.core.target_value import name_and_unit
-from graspsense.core.toml_text import MOST_NESTED, TomlError, toml_values
+from graspsense.core.components.channels import from_json
+from graspsense.core.components.layers import Layer, Merged, option_layers, read_layer
+from graspsense.core.files import limits
+from graspsense.core.files.toml_text import MOST_NESTED, TomlError, toml_values
+from graspsense.core.learn.labelled import Labelled
+from graspsense.core.learn.target_value import name_and_unit
+from graspsense.core.values.errors import ConfigError, DataDamaged, suggestion
+from graspsense.core.values.features import FeatureTable
 from graspsense.experiments.experiment import read_experiment
 from graspsense.recording.labelled_recording import UnreadableRecording
 from graspsense.sources.csv_columns import CsvColumns

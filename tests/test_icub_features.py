@@ -8,9 +8,9 @@ import re
 import numpy as np
 import pytest
 
-from graspsense.core.config import SelectedComponent
-from graspsense.core.errors import ConfigError, DataDamaged
-from graspsense.core.plugins import installed
+from graspsense.core.components.config import SelectedComponent
+from graspsense.core.components.registry import installed
+from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.evaluation.evaluate import evaluate
 from graspsense.plugin_api import create
 from graspsense.sources.icub_dataset import read_dataset

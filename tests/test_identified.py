@@ -6,7 +6,7 @@ import pytest
 from click.testing import CliRunner
 
 from graspsense.cli.main import cli
-from graspsense.core.errors import ConfigError
+from graspsense.core.values.errors import ConfigError
 from graspsense.sources.identified import gripper_flags, identified_scenes
 from graspsense.sources.squeezes import recorded_squeezes
 from graspsense.sources.trial_source import TrialSource, groups_of, kind_of

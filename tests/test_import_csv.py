@@ -8,8 +8,8 @@ import pytest
 from grippers import bottle, squeezing
 
 from graspsense.cli.main import main
-from graspsense.core.errors import ConfigError, DataDamaged
-from graspsense.core.signals import Phase
+from graspsense.core.values.errors import ConfigError, DataDamaged
+from graspsense.core.values.signals import Phase
 from graspsense.recording.reader import read_recorded
 from graspsense.sources.grasp_csv import named, read_squeeze
 from graspsense.store.store import Store

@@ -6,7 +6,7 @@ import pytest
 from attrs import evolve
 from kept import keep
 
-from graspsense.core.errors import ConfigError
+from graspsense.core.values.errors import ConfigError
 from graspsense.recording.replayable import content_sha256
 from graspsense.store.changes import set_aside
 from graspsense.store.imported_contents import ImportedContents

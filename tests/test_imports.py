@@ -111,7 +111,7 @@ def test_the_rule_sees_every_way_of_importing():
     source = """
 import graspsense.store.store
 from graspsense import report
-from graspsense.core import config
+from graspsense.core.components import config
 from ..cli import main
 def late():
     try:
@@ -268,7 +268,7 @@ def test_every_name_of_a_door_can_be_imported(door):
 
 
 def test_settings_are_read_without_the_simulator():
-    loaded = loaded_after("from graspsense.core.config import resolve; resolve('default')")
+    loaded = loaded_after("from graspsense.core.components.config import resolve; resolve('default')")
 
     assert not {one for one in loaded if one.startswith("graspsense_sim_gripper.")} - {
         "graspsense_sim_gripper.plugin",

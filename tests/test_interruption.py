@@ -13,12 +13,12 @@ from grippers import Scripted, bottle, squeezing
 
 from graspsense import GraspInterrupted, load_pipeline
 from graspsense.cli.main import main
-from graspsense.core.config import resolve
-from graspsense.core.pipeline import grasp_with
-from graspsense.core.plugins import installed
-from graspsense.core.run_config import RunConfig
-from graspsense.core.runner import run_uninterrupted
-from graspsense.core.signals import Outcome
+from graspsense.core.components.config import resolve
+from graspsense.core.components.registry import installed
+from graspsense.core.components.run_config import RunConfig
+from graspsense.core.grasp.runner import run_uninterrupted
+from graspsense.core.pipeline.pipeline import grasp_with
+from graspsense.core.values.signals import Outcome
 from graspsense.plugins.controllers.hybrid import HybridConfig, HybridController
 from graspsense.store.changes import relabel
 from graspsense.store.collecting import Collection, Wanted

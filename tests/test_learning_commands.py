@@ -266,7 +266,7 @@ def test_simulated_trials_with_each_instance_in_one_state_only(run, tmp_path):
 @pytest.fixture
 def opened(monkeypatch):
     """The list of real grippers that were opened: none may be by what is called simulated."""
-    from graspsense.core.plugins import installed
+    from graspsense.core.components.registry import installed
 
     opened = []
     backend = installed().find("sensor-backend", "pr2").component_class()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import nan
 
 from graspsense.cli.live_rows import LiveRows
-from graspsense.core.signals import EFFORT, NO_PADS, Command, Frame, Phase, Reading
+from graspsense.core.values.signals import EFFORT, NO_PADS, Command, Frame, Phase, Reading
 
 
 def test_a_gripper_without_pads_is_shown_as_often_as_another(capsys):

@@ -13,13 +13,13 @@ import pytest
 from kept import keep, write_recording
 
 from graspsense.cli.main import main
-from graspsense.core.calibration_files import (
+from graspsense.core.grasp.calibration_files import (
     Calibration,
     calibrations_of,
     read_calibration,
     write_calibration,
 )
-from graspsense.core.errors import ConfigError, DataDamaged
+from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.recording.atomic_file import SaveFailed
 from graspsense.recording.reader import read_recorded
 from graspsense.store.opening import refuse_read_fault

@@ -12,8 +12,8 @@ import pytest
 from scipy.io import savemat
 
 from graspsense.cli.main import main
-from graspsense.core.errors import ConfigError, DataDamaged
-from graspsense.core.trace import signals_of
+from graspsense.core.values.errors import ConfigError, DataDamaged
+from graspsense.core.values.trace import signals_of
 from graspsense.recording.labelled_recording import UnreadableRecording
 from graspsense.recording.reader import read_recorded
 from graspsense.sources.dataset_recordings import readable_or_not

@@ -5,11 +5,11 @@ import json
 import numpy as np
 import pytest
 
-from graspsense.core.errors import ConfigError
-from graspsense.core.features import UNKNOWN, FeatureTable
-from graspsense.core.labelled import Labelled
-from graspsense.core.model import train
-from graspsense.core.plugins import installed
+from graspsense.core.components.registry import installed
+from graspsense.core.learn.labelled import Labelled
+from graspsense.core.learn.model import train
+from graspsense.core.values.errors import ConfigError
+from graspsense.core.values.features import UNKNOWN, FeatureTable
 from graspsense.plugin_api import create
 
 NAMES = ("p_first", "f_steady", "dp_dt")

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.io import loadmat, savemat
 
-from graspsense.core.errors import ConfigError, DataDamaged
+from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.sources.manifest.mat_file import mat_variables
 
 VARIABLES = {

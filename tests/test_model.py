@@ -8,16 +8,16 @@ import math
 
 import pytest
 from attrs import evolve
+from graspsense.core.values.device import DeviceInfo
 from test_classifiers import NAMES, UNITS, trials
 
-from graspsense.core.config import Flag, resolve
-from graspsense.core.errors import ConfigError, DataDamaged, UnknownName
-from graspsense.core.features import UNKNOWN, Features
-from graspsense.core.labelled import Labelled
-from graspsense.core.model import load_model, model_for, train, worded, write_model
-from graspsense.core.plugins import IsolatedPlugins, installed
-from graspsense.core.roles import DeviceInfo
-from graspsense.core.signals import EFFORT, Command
+from graspsense.core.components.config import Flag, resolve
+from graspsense.core.components.registry import IsolatedPlugins, installed
+from graspsense.core.learn.labelled import Labelled
+from graspsense.core.learn.model import load_model, model_for, train, worded, write_model
+from graspsense.core.values.errors import ConfigError, DataDamaged, UnknownName
+from graspsense.core.values.features import UNKNOWN, Features
+from graspsense.core.values.signals import EFFORT, Command
 
 CAN = Features(names=NAMES, values=(0.0661, 8.0, 0.0), units=UNITS)
 

@@ -22,9 +22,9 @@ import pytest
 import recorded_files as write
 from attrs import frozen
 
-from graspsense.core.config import Flag, resolve
-from graspsense.core.errors import GraspsenseError
-from graspsense.core.plugins import installed
+from graspsense.core.components.config import Flag, resolve
+from graspsense.core.components.registry import installed
+from graspsense.core.values.errors import GraspsenseError
 from graspsense.recording.atomic_file import SaveFailed
 from graspsense.sources.dataset_recordings import handed_over
 from graspsense.sources.import_sources import recordings_to_import

@@ -15,11 +15,11 @@ import pytest
 from kept import SETTINGS, ended, keep, write_recording
 from mutated_files import bytes_of
 
-from graspsense.core.config import resolve
-from graspsense.core.errors import GraspsenseError
-from graspsense.core.labelled import Labelled
-from graspsense.core.model import load_model, train
-from graspsense.core.plugins import installed
+from graspsense.core.components.config import resolve
+from graspsense.core.components.registry import installed
+from graspsense.core.learn.labelled import Labelled
+from graspsense.core.learn.model import load_model, train
+from graspsense.core.values.errors import GraspsenseError
 from graspsense.plugin_api import create
 from graspsense.recording.reader import read_recorded
 from graspsense.store.dataset import labelled_store
@@ -112,7 +112,7 @@ def fewer(rows, good):
 
 def test_models(tmp_path):
     table_of = np.random.default_rng(1).normal(size=(40, 2)) + np.repeat([[0.0], [3.0]], 20, axis=0)
-    from graspsense.core.features import FeatureTable
+    from graspsense.core.values.features import FeatureTable
 
     labelled = Labelled(
         source="made up",

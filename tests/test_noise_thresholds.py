@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from graspsense.core.contact import REST_SPEED_M_S, REST_WINDOW_S, first_rest
-from graspsense.core.signals import NO_PADS, Frame, Reading
+from graspsense.core.control.contact import REST_SPEED_M_S, REST_WINDOW_S, first_rest
+from graspsense.core.values.signals import NO_PADS, Frame, Reading
 from graspsense.recording.replayable import Recording
 from graspsense.sources.noise_thresholds import thresholds_for
 

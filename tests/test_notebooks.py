@@ -12,7 +12,7 @@ import pytest
 from attrs import evolve
 
 from graspsense import Evaluation, Features, Prediction, load_pipeline
-from graspsense.core.errors import PluginUnavailable
+from graspsense.core.values.errors import PluginUnavailable
 from graspsense.evaluation.confusion import Confusion
 from graspsense.evaluation.intervals import RecognitionRate
 from graspsense.evaluation.results import Measurement

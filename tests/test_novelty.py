@@ -6,9 +6,9 @@ import math
 import numpy as np
 import pytest
 
-from graspsense.core.features import Features, FeatureTable
-from graspsense.core.novelty import REACH, novelty_from, novelty_of
-from graspsense.core.reasons import FeatureValue
+from graspsense.core.learn.novelty import REACH, novelty_from, novelty_of
+from graspsense.core.values.features import Features, FeatureTable
+from graspsense.core.values.reasons import FeatureValue
 
 NAMES, UNITS = ("p_first", "delta_t"), ("m", "s")
 

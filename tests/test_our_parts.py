@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from grippers import bottle, squeezing
 
-from graspsense.core.plugins import installed
+from graspsense.core.components.registry import installed
 from graspsense.sources.grasp_csv import named
 from graspsense.testing import CHECKS, Conformance, examine, parametrize_checks
 

@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from graspsense.cli.main import main
-from graspsense.core.errors import ConfigError
-from graspsense.core.setting import declared, setting
+from graspsense.core.components.setting import declared, setting
+from graspsense.core.values.errors import ConfigError
 from graspsense.evaluation.over_seeds import OverSeeds
 from graspsense.experiments.executors.serial import Serial
 from graspsense.experiments.experiment import read_experiment, shipped

@@ -9,7 +9,7 @@ import pytest
 from mutants import MUTANTS
 
 from graspsense.cli.main import main
-from graspsense.core.plugins import IsolatedPlugins
+from graspsense.core.components.registry import IsolatedPlugins
 from graspsense.plugin_api import hookimpl
 from graspsense.testing import CHECKS
 

@@ -8,14 +8,14 @@ from attrs import evolve, field, frozen
 from grippers import Scripted, bottle, squeezing
 
 from graspsense.cli.main import main
-from graspsense.core.config import resolve
-from graspsense.core.errors import DeviceLost
-from graspsense.core.pipeline import GraspInterrupted, grasp_with
-from graspsense.core.plugins import installed
-from graspsense.core.run_config import RunConfig
-from graspsense.core.runner import ended_by_itself, run_grasp
-from graspsense.core.signals import EFFORT, Command, Outcome
-from graspsense.core.strict import ValidationFailed, structured
+from graspsense.core.components.config import resolve
+from graspsense.core.components.registry import installed
+from graspsense.core.components.run_config import RunConfig
+from graspsense.core.components.strict import ValidationFailed, structured
+from graspsense.core.grasp.runner import ended_by_itself, run_grasp
+from graspsense.core.pipeline.pipeline import GraspInterrupted, grasp_with
+from graspsense.core.values.errors import DeviceLost
+from graspsense.core.values.signals import EFFORT, Command, Outcome
 from graspsense.plugins.controllers.hybrid import HybridConfig, HybridController
 
 RUN = RunConfig()

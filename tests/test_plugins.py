@@ -7,9 +7,9 @@ import types
 
 import pytest
 
-from graspsense.core.errors import PluginUnavailable, UnknownName
-from graspsense.core.plugins import IsolatedPlugins, canonical, installed
-from graspsense.core.roles import SensorBackend
+from graspsense.core.components.registry import IsolatedPlugins, canonical, installed
+from graspsense.core.components.roles import SensorBackend
+from graspsense.core.values.errors import PluginUnavailable, UnknownName
 
 HEAD = """
     from graspsense.plugin_api import Channel, ControllerEntry, PipelineEntry, SensorBackendEntry, hookimpl

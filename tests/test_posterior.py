@@ -12,7 +12,7 @@ import pytest
 from attrs import NOTHING, fields
 from scipy.stats import norm
 
-from graspsense.core.trace import Trace
+from graspsense.core.values.trace import Trace
 
 pytest.importorskip("graspsense_sim_gripper", reason="the paper is done again in simulation")
 pytest.importorskip("graspsense_c45", reason="the paper's classifier")

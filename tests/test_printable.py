@@ -13,7 +13,7 @@ from kept import BENCH, keep
 import graspsense.cli
 from graspsense.cli.main import main
 from graspsense.cli.terminal import echo, echo_as_it_is, echo_entry, echo_table, talk, warn
-from graspsense.core.printable import in_one_line, printable
+from graspsense.core.values.printable import in_one_line, printable
 from graspsense.store.changes import relabel, set_aside
 from graspsense.store.store import Store
 
@@ -196,9 +196,9 @@ def test_pictures_show_a_dollar_as_it_is(tmp_path):
     pytest.importorskip("matplotlib", reason="drawing needs the extra `plot`")
     from matplotlib.figure import Figure
 
-    from graspsense.core.literal_text import show_literally
     from graspsense.evaluation.confusion import Confusion
     from graspsense.report.confusion import confusion_png
+    from graspsense.report.literal_text import show_literally
 
     labels = tuple(MATHEMATICS)
     counts = tuple(tuple(3 * (i == k) for k in range(len(labels))) for i in range(len(labels)))

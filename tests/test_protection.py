@@ -4,21 +4,21 @@ from math import inf, nan
 
 import numpy as np
 import pytest
+from graspsense.core.values.device import DeviceInfo
 from hypothesis import given
 from hypothesis import strategies as st
 
-from graspsense.core.faults import StatusBit
-from graspsense.core.protection.cells import Fingertips
-from graspsense.core.protection.drift import PadDrift
-from graspsense.core.protection.effort_ceiling import effort_ceiling_n, limited
-from graspsense.core.protection.motor import Motor
-from graspsense.core.protection.reports import Reports
-from graspsense.core.protection.status import StatusWatch
-from graspsense.core.protection.stuck_force import StuckForce
-from graspsense.core.protection.touch import Touch
-from graspsense.core.roles import DeviceInfo
-from graspsense.core.run_config import RunConfig
-from graspsense.core.signals import (
+from graspsense.core.components.run_config import RunConfig
+from graspsense.core.grasp.protection.cells import Fingertips
+from graspsense.core.grasp.protection.drift import PadDrift
+from graspsense.core.grasp.protection.effort_ceiling import effort_ceiling_n, limited
+from graspsense.core.grasp.protection.motor import Motor
+from graspsense.core.grasp.protection.reports import Reports
+from graspsense.core.grasp.protection.status import StatusWatch
+from graspsense.core.grasp.protection.stuck_force import StuckForce
+from graspsense.core.grasp.protection.touch import Touch
+from graspsense.core.values.faults import StatusBit
+from graspsense.core.values.signals import (
     APPROACH,
     EFFORT,
     FORCE,

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from graspsense.core.signals import Frame, Phase
-from graspsense.core.trace import SI_UNITS, trace_of
+from graspsense.core.values.signals import Frame, Phase
+from graspsense.core.values.trace import SI_UNITS, trace_of
 from graspsense.plugin_api import create
 from graspsense.testing.samples import squeeze
 

@@ -68,7 +68,7 @@ def test_the_command_names_the_best_and_refuses_feature_sets_of_a_csv(tmp_path, 
 
 
 def test_features_from_before_the_contact_are_a_control_and_not_compared():
-    from graspsense.core.labelled import ControlFeatures
+    from graspsense.core.learn.labelled import ControlFeatures
 
     trials = bottles(12)
     width = ControlFeatures(table=trials.table, what="the same numbers")

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from test_classifiers import NAMES, UNITS, fitted, trials
 
-from graspsense.core.features import Features, FeatureTable, Prediction
-from graspsense.core.reasons import FeatureValue, Reason, contribution_reasons
+from graspsense.core.values.features import Features, FeatureTable, Prediction
+from graspsense.core.values.reasons import FeatureValue, Reason, contribution_reasons
 from graspsense.plugin_api import create
 
 FULL_CAN = Features(names=NAMES, values=(0.0661, 8.0, 0.0), units=UNITS)

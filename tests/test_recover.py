@@ -10,7 +10,7 @@ from attrs import evolve
 from kept import begun, ended, keep, write_recording
 from mcap.reader import make_reader
 
-from graspsense.core.errors import ConfigError, DataDamaged
+from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.recording.atomic_file import SaveFailed
 from graspsense.recording.reader import read_recorded
 from graspsense.store.recover import recover_file, recover_store

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from graspsense.cli.main import main
-from graspsense.core.regular_file import NotAFile, first_bytes
+from graspsense.core.files.regular_file import NotAFile, first_bytes
 
 ZERO = Path("/dev/zero")
 

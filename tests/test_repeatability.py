@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from graspsense.core.identification import SqueezeFit, repeatability
+from graspsense.core.components.identification import SqueezeFit, repeatability
 
 
 def squeeze(stiffness_n_m, depth_m, hysteresis=0.8):

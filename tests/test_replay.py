@@ -14,16 +14,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from graspsense.core.values.device import DeviceInfo
 from hypothesis import given
 from hypothesis import strategies as st
 
-from graspsense.core.config import Flag, resolve
-from graspsense.core.errors import ConfigError, DataDamaged, DeviceLost, RecordingEnded
-from graspsense.core.pipeline import grasp_with
-from graspsense.core.plugins import installed
-from graspsense.core.roles import DeviceInfo
-from graspsense.core.signals import EFFORT, NO_PADS, VELOCITY, Command, Frame, Phase
-from graspsense.core.trace import PAD_COLUMNS, TICK_COLUMNS
+from graspsense.core.components.config import Flag, resolve
+from graspsense.core.components.registry import installed
+from graspsense.core.pipeline.pipeline import grasp_with
+from graspsense.core.values.errors import ConfigError, DataDamaged, DeviceLost, RecordingEnded
+from graspsense.core.values.signals import EFFORT, NO_PADS, VELOCITY, Command, Frame, Phase
+from graspsense.core.values.trace import PAD_COLUMNS, TICK_COLUMNS
 from graspsense.sources.icub import IcubGrasp, read_grasp, read_recording, relative_readings
 from graspsense.sources.replay import ReplayBackend, ReplayConfig
 from graspsense.store.record_grasp import record_grasp

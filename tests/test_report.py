@@ -16,7 +16,7 @@ import wayward
 from kept import keep
 
 from graspsense.cli.main import main
-from graspsense.core.plugins import installed
+from graspsense.core.components.registry import installed
 from graspsense.evaluation.confusion import confusion
 from graspsense.evaluation.intervals import Difference, RecognitionRate
 from graspsense.evaluation.results import Evaluation, Measurement

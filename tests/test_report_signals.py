@@ -11,9 +11,9 @@ import pytest
 from attrs import evolve
 from traces import made_trace
 
-from graspsense.core.channels import as_json, from_json
-from graspsense.core.signals import Phase
-from graspsense.core.trace import ImageTrace, SampleTrace
+from graspsense.core.components.channels import as_json, from_json
+from graspsense.core.values.signals import Phase
+from graspsense.core.values.trace import ImageTrace, SampleTrace
 from graspsense.plugin_api import Channel, FastChannel, TactileArray
 from graspsense.report.further_channels import INTERVALS, channel_figures, envelope, spectrogram
 from graspsense.report.tactile import layout_of, moments, tactile_figures

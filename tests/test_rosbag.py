@@ -16,8 +16,8 @@ from rosbags.rosbag2 import Writer as Writer2  # noqa: E402
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore  # noqa: E402
 
 from graspsense import load_pipeline  # noqa: E402
-from graspsense.core.errors import ConfigError, DataDamaged  # noqa: E402
-from graspsense.core.trace import signals_of  # noqa: E402
+from graspsense.core.values.errors import ConfigError, DataDamaged  # noqa: E402
+from graspsense.core.values.trace import signals_of  # noqa: E402
 from graspsense.sources.rosbag import read_bag  # noqa: E402
 
 PRESSURE_NOW = (

@@ -9,15 +9,15 @@ from math import inf
 
 import pytest
 from attrs import evolve
+from graspsense.core.values.channel import Channel
 from grippers import Scripted, bottle, squeezing
 
 from graspsense import load_pipeline
 from graspsense.cli.main import main
 from graspsense.cli.run import effort_words, print_trial
-from graspsense.core.config import resolve
-from graspsense.core.dry_run import dry_run
-from graspsense.core.entries import Channel
-from graspsense.core.signals import VELOCITY, Command
+from graspsense.core.components.config import resolve
+from graspsense.core.grasp.dry_run import dry_run
+from graspsense.core.values.signals import VELOCITY, Command
 from graspsense.store.store import Store
 
 COMMAND = [sys.executable, "-m", "graspsense"]

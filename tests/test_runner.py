@@ -11,12 +11,12 @@ import pytest
 from attrs import evolve
 from grippers import CONTACT_S, REST_S, Scripted, bottle, squeezing
 
-from graspsense.core import runner
-from graspsense.core.errors import NoDevice, RecordingEnded, TareRefused
-from graspsense.core.roles import Controller
-from graspsense.core.run_config import RunConfig
-from graspsense.core.runner import run_grasp
-from graspsense.core.signals import EFFORT, Command, Outcome, Phase, Reading
+from graspsense.core.components.roles import Controller
+from graspsense.core.components.run_config import RunConfig
+from graspsense.core.grasp import runner
+from graspsense.core.grasp.runner import run_grasp
+from graspsense.core.values.errors import NoDevice, RecordingEnded, TareRefused
+from graspsense.core.values.signals import EFFORT, Command, Outcome, Phase, Reading
 from graspsense.plugins.controllers.hybrid import HybridConfig, HybridController
 from graspsense.plugins.controllers.supervision import not_begun
 from graspsense.plugins.controllers.velocity import VelocityState

@@ -11,9 +11,9 @@ import tomllib
 import pytest
 
 import graspsense_sim_gripper.plugin
-from graspsense.core.errors import ConfigError, WiringError
-from graspsense.core.pipeline import load_pipeline
-from graspsense.core.plugins import IsolatedPlugins
+from graspsense.core.components.registry import IsolatedPlugins
+from graspsense.core.pipeline.pipeline import load_pipeline
+from graspsense.core.values.errors import ConfigError, WiringError
 from graspsense.scaffold.make import KINDS, make
 
 COMBINATIONS = [

@@ -6,19 +6,25 @@ from typing import Literal
 
 import pytest
 from attrs import frozen
+from graspsense.core.values.device import DeviceInfo
 
 from graspsense import load_pipeline
 from graspsense.cli.main import main
-from graspsense.core.config import ImplausibleSettings, resolve, settings_from, to_toml, without_followers
-from graspsense.core.errors import ConfigError
-from graspsense.core.layers import Layer
-from graspsense.core.plugins import installed
-from graspsense.core.roles import DeviceInfo
-from graspsense.core.run_config import RunConfig
-from graspsense.core.runner import tick_params
-from graspsense.core.setting import unit_of_name
-from graspsense.core.signals import EFFORT, Command
-from graspsense.core.strict import keys_of
+from graspsense.core.components.config import (
+    ImplausibleSettings,
+    resolve,
+    settings_from,
+    to_toml,
+    without_followers,
+)
+from graspsense.core.components.layers import Layer
+from graspsense.core.components.registry import installed
+from graspsense.core.components.run_config import RunConfig
+from graspsense.core.components.setting import unit_of_name
+from graspsense.core.components.strict import keys_of
+from graspsense.core.grasp.runner import tick_params
+from graspsense.core.values.errors import ConfigError
+from graspsense.core.values.signals import EFFORT, Command
 from graspsense.experiments.experiment import read_experiment
 from graspsense.plugin_api import setting
 

@@ -10,7 +10,7 @@ import pytest
 from test_classifiers import fitted, trials
 from test_reasons import FULL_CAN, MISSING, total
 
-from graspsense.core.reasons import FeatureValue
+from graspsense.core.values.reasons import FeatureValue
 from graspsense.plugins.classifiers.shapley import shapley_values
 
 NAMES = ("svm", "mlp", "backprop", "knn")

@@ -11,10 +11,10 @@ import pytest
 from attrs import frozen
 
 from graspsense import load_pipeline
-from graspsense.core.errors import ConfigError, DataDamaged
-from graspsense.core.pipeline import grasp_with
-from graspsense.core.plugins import IsolatedPlugins
-from graspsense.core.trace import ImageTrace, SampleTrace
+from graspsense.core.components.registry import IsolatedPlugins
+from graspsense.core.pipeline.pipeline import grasp_with
+from graspsense.core.values.errors import ConfigError, DataDamaged
+from graspsense.core.values.trace import ImageTrace, SampleTrace
 from graspsense.plugin_api import (
     EFFORT,
     Channel,

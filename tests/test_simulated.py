@@ -9,9 +9,9 @@ from attrs import evolve, frozen
 from parts import CHANNELS_OF_HAND, Hand, HandConfig
 
 from graspsense import load_pipeline
-from graspsense.core.config import resolve
-from graspsense.core.errors import ConfigError
-from graspsense.core.plugins import IsolatedPlugins
+from graspsense.core.components.config import resolve
+from graspsense.core.components.registry import IsolatedPlugins
+from graspsense.core.values.errors import ConfigError
 from graspsense.plugin_api import (
     CHANNELS,
     Channel,

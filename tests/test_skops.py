@@ -8,11 +8,11 @@ from importlib import import_module
 import numpy as np
 import pytest
 
-from graspsense.core.errors import DataDamaged, PluginUnavailable
-from graspsense.core.features import FeatureTable
-from graspsense.core.labelled import Labelled
-from graspsense.core.model import load_model, train, write_model
-from graspsense.core.plugins import installed
+from graspsense.core.components.registry import installed
+from graspsense.core.learn.labelled import Labelled
+from graspsense.core.learn.model import load_model, train, write_model
+from graspsense.core.values.errors import DataDamaged, PluginUnavailable
+from graspsense.core.values.features import FeatureTable
 from graspsense.plugin_api import create
 
 
@@ -44,7 +44,7 @@ def test_it_comes_back_the_same_without_its_training_trials(name, tmp_path):
 
 def resigned(path, change):
     """Change a model's content and give it the hash of the changed one, as somebody with bad intent would."""
-    from graspsense.core.model import digest
+    from graspsense.core.learn.model import digest
 
     content = json.loads(path.read_text())
     change(content["model"])

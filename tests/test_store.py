@@ -11,7 +11,7 @@ from contextlib import suppress
 import pytest
 from kept import ended, keep, write_recording
 
-from graspsense.core.errors import ConfigError, DataDamaged
+from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.recording.atomic_file import SaveFailed
 from graspsense.recording.recording_info import RecordingInfo
 from graspsense.store import schema

@@ -11,12 +11,12 @@ import pytest
 from kept import keep
 
 from graspsense.cli.main import main
-from graspsense.core.errors import ConfigError, DataDamaged
-from graspsense.core.features import FeatureTable
-from graspsense.core.labelled import ControlFeatures, Labelled
-from graspsense.core.model import load_model
-from graspsense.core.plugins import installed
-from graspsense.core.target_value import TargetValue, value_label
+from graspsense.core.components.registry import installed
+from graspsense.core.learn.labelled import ControlFeatures, Labelled
+from graspsense.core.learn.model import load_model
+from graspsense.core.learn.target_value import TargetValue, value_label
+from graspsense.core.values.errors import ConfigError, DataDamaged
+from graspsense.core.values.features import FeatureTable
 from graspsense.evaluation.json_codec import to_json
 from graspsense.regression.estimators import ESTIMATORS
 from graspsense.regression.evaluate import evaluate_regression

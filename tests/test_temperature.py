@@ -12,10 +12,10 @@ from hypothesis.extra.numpy import arrays
 from test_conformal import bottles, model_of
 from test_evaluate import judged
 
-from graspsense.core.errors import DataDamaged
-from graspsense.core.model import load_model, write_model
-from graspsense.core.plugins import installed
-from graspsense.core.temperature import MIN_TRIALS, RANGE, at_temperature, temperature_of
+from graspsense.core.components.registry import installed
+from graspsense.core.learn.model import load_model, write_model
+from graspsense.core.learn.temperature import MIN_TRIALS, RANGE, at_temperature, temperature_of
+from graspsense.core.values.errors import DataDamaged
 
 
 def drawn(n, seed, sureness):

@@ -7,7 +7,7 @@ import parts
 import pytest
 from attrs import evolve
 
-from graspsense.core.plugins import Component, IsolatedPlugins
+from graspsense.core.components.registry import Component, IsolatedPlugins
 from graspsense.plugin_api import Feature, hookimpl
 from graspsense.testing import CHECKS, MINIMUM_CHECKS, examine
 from graspsense.testing.checks import ConformanceReport, Result, outcome_of

@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from graspsense.core.plugins import HEAVY
+from graspsense.core.components.registry import HEAVY
 from graspsense.testing import CHECKS
 from graspsense.testing.checks import outcome_of
 from graspsense.testing.conformance import checks_for

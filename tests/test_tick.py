@@ -4,9 +4,10 @@ from math import inf
 
 import pytest
 
-from graspsense.core.binding import bind
-from graspsense.core.guard import GuardParams
-from graspsense.core.signals import (
+from graspsense.core.control.binding import bind
+from graspsense.core.control.guard import GuardParams
+from graspsense.core.control.tick import Schedule, TickParams, first_state, tick
+from graspsense.core.values.signals import (
     APPROACH,
     EFFORT,
     HOLD,
@@ -19,7 +20,6 @@ from graspsense.core.signals import (
     Phase,
     Reading,
 )
-from graspsense.core.tick import Schedule, TickParams, first_state, tick
 from graspsense.plugins.controllers.velocity import VelocityState
 
 OPENING = Command(EFFORT, -20.0, inf, inf)

@@ -7,7 +7,7 @@ import pytest
 from attrs import evolve
 
 from graspsense.cli.main import main
-from graspsense.core.errors import ConfigError
+from graspsense.core.values.errors import ConfigError
 from graspsense.report.simulation import (
     PEAK,
     TRACE,
@@ -147,7 +147,7 @@ def test_who_asks_for_more_than_a_feature_can_give_is_told(capsys):
 
 @pytest.mark.slow
 def test_recognition_and_distances_of_variants_against_the_reference(tmp_path):
-    from graspsense.core.config import resolve
+    from graspsense.core.components.config import resolve
     from graspsense.experiments.sensed import sensed_trade
     from graspsense.experiments.sensed_report import conclusion, sensed_png, sensed_rows
 

@@ -13,7 +13,7 @@ from attrs import evolve
 from kept import BENCH, keep
 
 from graspsense.cli.main import main
-from graspsense.core.errors import ConfigError, DataDamaged
+from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.report.store_page import store_page
 from graspsense.store import changes
 from graspsense.store.dataset import labelled_store

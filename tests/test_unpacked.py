@@ -19,7 +19,7 @@ from kept import ended, write_recording
 from mcap.writer import CompressionType
 from mcap.writer import Writer as McapWriter
 
-from graspsense.core.errors import ConfigError, DataDamaged, TooLarge
+from graspsense.core.values.errors import ConfigError, DataDamaged, TooLarge
 from graspsense.recording.reader import read_recorded
 from graspsense.recording.unpacked import LIMIT_VARIABLE, Unpacked, limit_mb
 from graspsense.sources.manifest.array_format import read_mat, read_npy, read_npz
@@ -47,7 +47,7 @@ except ImportError:
     pass
 used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
 resource.setrlimit(resource.RLIMIT_AS, (used + {memory}, used + {memory}))
-from graspsense.core.errors import GraspsenseError
+from graspsense.core.values.errors import GraspsenseError
 try:
     {call}
 except GraspsenseError as error:

@@ -15,9 +15,9 @@ from attrs import evolve
 from kept import ended, frame, keep, write_recording
 
 from graspsense.cli.main import main
-from graspsense.core.errors import ComponentFailed, ConfigError, DataDamaged, TooLarge
-from graspsense.core.plugins.registry import STRICT_VARIABLE
-from graspsense.core.signals import EFFORT, NO_PADS, Reading
+from graspsense.core.components.registry.plugins import STRICT_VARIABLE
+from graspsense.core.values.errors import ComponentFailed, ConfigError, DataDamaged, TooLarge
+from graspsense.core.values.signals import EFFORT, NO_PADS, Reading
 from graspsense.recording.export_trace import write_npz
 from graspsense.recording.labelled_recording import LabelledRecording, UnreadableRecording
 from graspsense.recording.layout import RESULT, START, TICK

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from graspsense.core.calibration_files import calibration_path, calibrations_of
-from graspsense.core.disabling import disabled_in_config, write_disabled
-from graspsense.core.errors import ConfigError
-from graspsense.core.user_folders import cache_folder, config_folder, data_folder
+from graspsense.core.components.disabling import disabled_in_config, write_disabled
+from graspsense.core.files.user_folders import cache_folder, config_folder, data_folder
+from graspsense.core.grasp.calibration_files import calibration_path, calibrations_of
+from graspsense.core.values.errors import ConfigError
 
 VARIABLES = ("HOME", "XDG_CONFIG_HOME", "XDG_DATA_HOME", "XDG_CACHE_HOME", "NUMBA_CACHE_DIR")
 STRANGER = """

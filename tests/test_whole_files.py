@@ -12,9 +12,9 @@ from pathlib import Path
 
 import pytest
 
-from graspsense.core import whole_file
-from graspsense.core.errors import ConfigError, GraspsenseError
-from graspsense.core.whole_file import write_whole
+from graspsense.core.files import whole_file
+from graspsense.core.files.whole_file import write_whole
+from graspsense.core.values.errors import ConfigError, GraspsenseError
 from graspsense.recording.atomic_file import SaveFailed, write_new, write_or_replace
 from graspsense.recording.writer import RecordingWriter
 
@@ -23,7 +23,7 @@ BYTES = 200_000
 WRITER = """
 import sys
 from pathlib import Path
-from graspsense.core.whole_file import write_whole
+from graspsense.core.files.whole_file import write_whole
 path, letter, length = Path(sys.argv[1]), sys.argv[2], int(sys.argv[3])
 k = 0
 while not path.with_name("stop").exists():
@@ -168,7 +168,7 @@ def test_a_new_file_on_a_disk_without_hard_links(tmp_path, monkeypatch):
 KILLED = """
 import os, signal, sys
 from pathlib import Path
-from graspsense.core import whole_file
+from graspsense.core.files import whole_file
 whole_file.os.replace = lambda *names: os.kill(os.getpid(), signal.SIGKILL)
 whole_file.write_whole(Path(sys.argv[1]), b"x" * 1000)
 """
@@ -284,7 +284,7 @@ def test_all_of_the_code_replaces_files_in_one_place():
         if any(word in path.read_text() for word in ("os.replace(", "os.rename(", ".savefig(path"))
     }
     assert len(sources) > 200
-    assert found == {"src/graspsense/core/whole_file.py", "src/graspsense/recording/writer.py"}
+    assert found == {"src/graspsense/core/files/whole_file.py", "src/graspsense/recording/writer.py"}
 
 
 def test_a_link_in_place_of_the_lock_of_an_experiment_is_not_followed(tmp_path):

@@ -6,10 +6,10 @@ import sys
 
 import pytest
 
-from graspsense.core.config import Flag, resolve
-from graspsense.core.errors import WiringError
-from graspsense.core.plugins import IsolatedPlugins
-from graspsense.core.wiring import check
+from graspsense.core.components.config import Flag, resolve
+from graspsense.core.components.registry import IsolatedPlugins
+from graspsense.core.pipeline.wiring import check
+from graspsense.core.values.errors import WiringError
 
 PARTS = """
     from attrs import frozen

@@ -1,7 +1,7 @@
 """Traces with known answers, for tests."""
 
-from graspsense.core.signals import Frame, Phase
-from graspsense.core.trace import trace_of
+from graspsense.core.values.signals import Frame, Phase
+from graspsense.core.values.trace import trace_of
 
 
 def made_trace(rows, dt=0.001, phase=Phase.SQUEEZE, phases=None, units=None):

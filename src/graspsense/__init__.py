@@ -7,23 +7,26 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from graspsense.core.lazy_names import LazyNames
+from graspsense.core.components.lazy_names import LazyNames
 
 __version__: Final = "0.1.0"
 
 PUBLIC: Final = LazyNames(
     __name__,
     {
-        "Running a grasp": {"pipeline": ("GraspInterrupted", "load_pipeline"), "trial": ("Trial",)},
+        "Running a grasp": {
+            "core.pipeline.pipeline": ("GraspInterrupted", "load_pipeline"),
+            "core.values.trial": ("Trial",),
+        },
         "What a grasp returns": {
-            "signals": ("Outcome", "Phase"),
-            "trace": ("Trace",),
-            "features": ("FeatureTable", "Features", "Prediction"),
+            "core.values.signals": ("Outcome", "Phase"),
+            "core.values.trace": ("Trace",),
+            "core.values.features": ("FeatureTable", "Features", "Prediction"),
         },
         "Trials and evaluation": {
             "sources.trial_source": ("load_trials",),
-            "config": ("select_component",),
-            "labelled": ("Labelled",),
+            "core.components.config": ("select_component",),
+            "core.learn.labelled": ("Labelled",),
             "evaluation.evaluate": ("evaluate",),
             "evaluation.results": ("Evaluation",),
         },
@@ -34,7 +37,7 @@ PUBLIC: Final = LazyNames(
             "experiments.run": ("run_experiment",),
             "experiments.summary": ("summarise",),
         },
-        "Errors": {"errors": ("ConfigError", "GraspsenseError", "WiringError")},
+        "Errors": {"core.values.errors": ("ConfigError", "GraspsenseError", "WiringError")},
     },
 )
 

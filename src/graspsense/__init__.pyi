@@ -1,24 +1,24 @@
-"""Generated from the table of graspsense by `graspsense.core.lazy_names`: change the table."""
+"""Generated from the table of graspsense by `graspsense.core.components.lazy_names`: change the table."""
 
 __version__: str
 
 # Running a grasp
-from graspsense.core.pipeline import GraspInterrupted as GraspInterrupted
-from graspsense.core.pipeline import load_pipeline as load_pipeline
-from graspsense.core.trial import Trial as Trial
+from graspsense.core.pipeline.pipeline import GraspInterrupted as GraspInterrupted
+from graspsense.core.pipeline.pipeline import load_pipeline as load_pipeline
+from graspsense.core.values.trial import Trial as Trial
 
 # What a grasp returns
-from graspsense.core.signals import Outcome as Outcome
-from graspsense.core.signals import Phase as Phase
-from graspsense.core.trace import Trace as Trace
-from graspsense.core.features import FeatureTable as FeatureTable
-from graspsense.core.features import Features as Features
-from graspsense.core.features import Prediction as Prediction
+from graspsense.core.values.signals import Outcome as Outcome
+from graspsense.core.values.signals import Phase as Phase
+from graspsense.core.values.trace import Trace as Trace
+from graspsense.core.values.features import FeatureTable as FeatureTable
+from graspsense.core.values.features import Features as Features
+from graspsense.core.values.features import Prediction as Prediction
 
 # Trials and evaluation
 from graspsense.sources.trial_source import load_trials as load_trials
-from graspsense.core.config import select_component as select_component
-from graspsense.core.labelled import Labelled as Labelled
+from graspsense.core.components.config import select_component as select_component
+from graspsense.core.learn.labelled import Labelled as Labelled
 from graspsense.evaluation.evaluate import evaluate as evaluate
 from graspsense.evaluation.results import Evaluation as Evaluation
 
@@ -30,6 +30,6 @@ from graspsense.experiments.run import run_experiment as run_experiment
 from graspsense.experiments.summary import summarise as summarise
 
 # Errors
-from graspsense.core.errors import ConfigError as ConfigError
-from graspsense.core.errors import GraspsenseError as GraspsenseError
-from graspsense.core.errors import WiringError as WiringError
+from graspsense.core.values.errors import ConfigError as ConfigError
+from graspsense.core.values.errors import GraspsenseError as GraspsenseError
+from graspsense.core.values.errors import WiringError as WiringError

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from attrs import field, frozen
 from attrs.validators import in_, min_len
 
-from graspsense.core.figure_origins import ORIGINS
+from graspsense.core.components.figure_origins import ORIGINS
 
 if TYPE_CHECKING:
     import numpy as np

@@ -1,7 +1,7 @@
 """Everything that a plugin may import from graspsense, grouped by what it is for.
 
 A name is imported when it is first used. The entry module of a plugin, which is all that listing plugins imports,
-therefore loads neither numpy nor a driver. Type checkers read `plugin_api.pyi`, which `graspsense.core.lazy_names`
+therefore loads neither numpy nor a driver. Type checkers read `plugin_api.pyi`, which `graspsense.core.components.lazy_names`
 generates from the table below.
 """
 
@@ -9,12 +9,12 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from graspsense.core.lazy_names import LazyNames, Table
+from graspsense.core.components.lazy_names import LazyNames, Table
 
 _TABLE: Final[Table] = {
     "Declaring what a plugin brings": {
-        "hookspecs": ("hookimpl",),
-        "entries": (
+        "core.components.hookspecs": ("hookimpl",),
+        "core.components.entries": (
             "Channel",
             "ClassifierEntry",
             "CommandEntry",
@@ -32,12 +32,12 @@ _TABLE: Final[Table] = {
             "SensorBackendEntry",
             "TactileArray",
         ),
-        "setting": ("CHANGES_NO_RESULT", "NAMES_INPUT", "setting"),
-        "toml_text": ("TomlError", "toml_values"),
-        "figure_origins": ("fitted_results", "given_claims", "gives"),
+        "core.components.setting": ("CHANGES_NO_RESULT", "NAMES_INPUT", "setting"),
+        "core.files.toml_text": ("TomlError", "toml_values"),
+        "core.components.figure_origins": ("fitted_results", "given_claims", "gives"),
     },
     "Signals: what passes between a gripper and a controller": {
-        "signals": (
+        "core.values.signals": (
             "CHANNELS",
             "NO_PADS",
             "Command",
@@ -53,7 +53,7 @@ _TABLE: Final[Table] = {
         ),
     },
     "The same kinds, phases and outcomes as plain integers, for laws that are compiled": {
-        "signals": (
+        "core.values.signals": (
             "APPROACH",
             "CRUSHED",
             "EFFORT",
@@ -71,18 +71,18 @@ _TABLE: Final[Table] = {
             "TOO_WIDE",
             "VELOCITY",
         ),
-        "tick": ("OPENING", "RELEASE", "TARING"),
+        "core.control.tick": ("OPENING", "RELEASE", "TARING"),
     },
     "Sensor backends": {
-        "faults": ("StatusBit",),
-        "roles": ("DeviceInfo", "ObjectKind", "SensorBackend"),
-        "channels": ("no_signals", "signal_type"),
+        "core.values.faults": ("StatusBit",),
+        "core.components.roles": ("DeviceInfo", "ObjectKind", "SensorBackend"),
+        "core.components.channels": ("no_signals", "signal_type"),
     },
     "Sensor backends that do many grasps at once": {
-        "roles": ("BatchBackend", "BatchOptions", "Grasped", "SimulationVariant"),
+        "core.components.roles": ("BatchBackend", "BatchOptions", "Grasped", "SimulationVariant"),
     },
     "Sensor backends that identify an object from recorded squeezes": {
-        "identification": (
+        "core.components.identification": (
             "CandidateScore",
             "Identification",
             "IdentifiedParameter",
@@ -91,13 +91,13 @@ _TABLE: Final[Table] = {
             "SqueezeFit",
             "Undetermined",
         ),
-        ".inference": ("half_width", "interval_of_mean", "predictive_p"),
+        "inference": ("half_width", "interval_of_mean", "predictive_p"),
     },
     "Emulated devices": {
-        "emulated": ("EmulatedDevice",),
+        "core.components.emulated": ("EmulatedDevice",),
     },
     "Calibration: from cell counts to newtons": {
-        "calibration": (
+        "core.grasp.calibration": (
             "LoadTable",
             "edge_force",
             "load_of",
@@ -106,10 +106,15 @@ _TABLE: Final[Table] = {
             "tare",
             "zero_of",
         ),
-        "calibration_files": ("calibrations_of", "stored_friction", "stored_tables", "stored_zero"),
+        "core.grasp.calibration_files": (
+            "calibrations_of",
+            "stored_friction",
+            "stored_tables",
+            "stored_zero",
+        ),
     },
     "Transmission: from motor revolutions to the gap": {
-        "transmission": (
+        "core.grasp.transmission": (
             "ScrewLinkage",
             "gap_and_rate",
             "revolutions_at",
@@ -118,11 +123,11 @@ _TABLE: Final[Table] = {
         ),
     },
     "Controllers": {
-        "roles": ("Controller", "ControllerState", "StepLaw"),
-        "free_motion": ("NOT_FREE", "FreeLimits", "FreeMotion"),
+        "core.components.roles": ("Controller", "ControllerState", "StepLaw"),
+        "core.control.free_motion": ("NOT_FREE", "FreeLimits", "FreeMotion"),
     },
     "Contact and rest, the same for controllers and features": {
-        "contact": (
+        "core.control.contact": (
             "CONTACT_FORCE_N",
             "REST_SPEED_M_S",
             "REST_WINDOW_S",
@@ -134,28 +139,34 @@ _TABLE: Final[Table] = {
         ),
     },
     "Feature sets": {
-        "features": ("Features", "missing"),
-        "roles": ("FeatureSet",),
-        "compiled_features": (
+        "core.values.features": ("Features", "missing"),
+        "core.components.roles": ("FeatureSet",),
+        "core.components.compiled_features": (
             "CompiledExtraction",
             "CompiledFeatures",
             "TickColumns",
             "columns_of_ticks",
             "compiled_extraction",
         ),
-        "trace": ("ImageTrace", "SampleTrace", "Trace", "TraceRecorder", "trace_of"),
-        "units": ("in_words",),
+        "core.values.trace": ("ImageTrace", "SampleTrace", "Trace", "TraceRecorder", "trace_of"),
+        "core.values.units": ("in_words",),
     },
     "Classifiers": {
-        "decision_path": ("SplitTest", "leaf_reason", "path_reasons"),
-        "features": ("UNKNOWN", "FeatureTable", "Prediction", "table_of"),
-        "reasons": ("Contribution", "FeatureValue", "Reason", "contribution_reasons", "missing_feature"),
-        "roles": ("Classifier", "ClassifierConfig"),
-        "stored_values": ("LARGEST_SEED", "StoredValueError", "StoredValues"),
-        "tree": ("TreeNode",),
+        "core.learn.decision_path": ("SplitTest", "leaf_reason", "path_reasons"),
+        "core.values.features": ("UNKNOWN", "FeatureTable", "Prediction", "table_of"),
+        "core.values.reasons": (
+            "Contribution",
+            "FeatureValue",
+            "Reason",
+            "contribution_reasons",
+            "missing_feature",
+        ),
+        "core.components.roles": ("Classifier", "ClassifierConfig"),
+        "core.learn.stored_values": ("LARGEST_SEED", "StoredValueError", "StoredValues"),
+        "core.values.tree": ("TreeNode",),
     },
     "Data sets": {
-        "labelled": ("ControlFeatures", "Labelled"),
+        "core.learn.labelled": ("ControlFeatures", "Labelled"),
         "recording.labelled_recording": ("LabelledRecording", "UnreadableRecording"),
         "recording.readable": ("each_readable",),
         "recording.replayable": ("Recording",),
@@ -167,14 +178,14 @@ _TABLE: Final[Table] = {
         "testing.model_gripper": ("model_gripper", "drive"),
     },
     "Observers": {
-        "trial": ("GraspEvent", "RunInfo", "Trial", "event_name"),
+        "core.values.trial": ("GraspEvent", "RunInfo", "Trial", "event_name"),
     },
     "The tick of the runner, for a backend that runs it compiled": {
-        "binding": ("bind", "maker"),
-        "guard": ("GuardParams", "GuardState"),
-        "run_config": ("RunConfig",),
-        "runner": ("ended_by_itself", "overdue", "seconds_at_most", "tick_params"),
-        "tick": (
+        "core.control.binding": ("bind", "maker"),
+        "core.control.guard": ("GuardParams", "GuardState"),
+        "core.components.run_config": ("RunConfig",),
+        "core.grasp.runner": ("ended_by_itself", "overdue", "seconds_at_most", "tick_params"),
+        "core.control.tick": (
             *("Schedule", "TickParams", "TickState", "events_of", "first_state", "tick"),
             *(
                 "CALLED",
@@ -190,8 +201,8 @@ _TABLE: Final[Table] = {
         ),
     },
     "Compiling a function with all that it calls": {
-        "call_graph": ("NotCompilable", "fingerprint"),
-        "compiling": (
+        "core.compiling.call_graph": ("NotCompilable", "fingerprint"),
+        "core.compiling.compiling": (
             "CompileOptions",
             "Inlining",
             "compile_function",
@@ -201,14 +212,14 @@ _TABLE: Final[Table] = {
         ),
     },
     "Building other components, collecting what other plugins bring, and where to keep files": {
-        "config": ("create", "recipe_of"),
-        "plugins": ("collect",),
-        "user_folders": ("cache_folder",),
-        "whole_file": ("write_whole",),
-        "closed_paths": ("is_closed", "make_closed"),
+        "core.components.config": ("create", "recipe_of"),
+        "core.components.registry": ("collect",),
+        "core.files.user_folders": ("cache_folder",),
+        "core.files.whole_file": ("write_whole",),
+        "core.files.closed_paths": ("is_closed", "make_closed"),
     },
     "Errors": {
-        "errors": (
+        "core.values.errors": (
             "ConfigError",
             "DataDamaged",
             "DeviceLost",

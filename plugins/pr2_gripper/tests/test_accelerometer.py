@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from graspsense import load_pipeline
-from graspsense.core.runner import run_grasp
+from graspsense.core.grasp.runner import run_grasp
 from graspsense.plugin_api import RunConfig, Samples, create
 from graspsense.recording.export_trace import write_npz
 from graspsense.recording.reader import read_recorded

@@ -10,14 +10,14 @@ from typing import Any
 import pytest
 
 from graspsense.cli.main import main
-from graspsense.core.calibration import load_of, load_table
-from graspsense.core.calibration_files import (
+from graspsense.core.grasp.calibration import load_of, load_table
+from graspsense.core.grasp.calibration_files import (
     Calibration,
     calibration_path,
     read_calibration,
     write_calibration,
 )
-from graspsense.core.errors import ConfigError, DataDamaged
+from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense_pr2_gripper.backend import Pr2Backend
 from graspsense_pr2_gripper.config import Pr2Config
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from graspsense.core.runner import run_grasp
+from graspsense.core.grasp.runner import run_grasp
 from graspsense.plugin_api import Outcome, Phase, RunConfig, create
 from graspsense_pr2_gripper.backend import Pr2Backend
 from graspsense_pr2_gripper.config import FaultConfig, Pr2Config

@@ -13,7 +13,7 @@ from attrs import evolve
 from hypothesis import given
 from hypothesis import strategies as st
 
-from graspsense.core.runner import run_grasp
+from graspsense.core.grasp.runner import run_grasp
 from graspsense.plugin_api import EFFORT, Command, DeviceLost, Outcome, RunConfig, create
 from graspsense_pr2_gripper import link as links
 from graspsense_pr2_gripper.backend import Pr2Backend

@@ -15,9 +15,9 @@ import pytest
 
 import graspsense_pr2_gripper.plugin
 from graspsense.cli.main import main
-from graspsense.core.calibration_files import Calibration, calibration_path, write_calibration
-from graspsense.core.plugins import IsolatedPlugins
-from graspsense.core.plugins import registry as loader
+from graspsense.core.components.registry import IsolatedPlugins
+from graspsense.core.components.registry import plugins as loader
+from graspsense.core.grasp.calibration_files import Calibration, calibration_path, write_calibration
 from graspsense.plugin_api import NoDevice
 from graspsense_pr2_gripper import diagnosis, link, watching
 from graspsense_pr2_gripper.backend import device_numbers

@@ -12,8 +12,8 @@ import pytest
 from attrs import evolve
 
 from graspsense import load_pipeline
-from graspsense.core.dry_run import dry_run
-from graspsense.core.runner import Grasp, run_grasp
+from graspsense.core.grasp.dry_run import dry_run
+from graspsense.core.grasp.runner import Grasp, run_grasp
 from graspsense.plugin_api import ConfigError, GraspEvent, Outcome, Phase, RunConfig, create
 from graspsense_pr2_gripper.backend import Pr2Backend
 from graspsense_pr2_gripper.config import FaultConfig, Pr2Config

@@ -15,10 +15,10 @@ from attrs import evolve, fields
 from hypothesis import given
 from hypothesis import strategies as st
 
-from graspsense.core.errors import UnknownName
-from graspsense.core.plugins import IsolatedPlugins
-from graspsense.core.run_config import RunConfig
-from graspsense.core.runner import run_grasp
+from graspsense.core.components.registry import IsolatedPlugins
+from graspsense.core.components.run_config import RunConfig
+from graspsense.core.grasp.runner import run_grasp
+from graspsense.core.values.errors import UnknownName
 from graspsense.plugin_api import (
     APPROACH,
     EFFORT,

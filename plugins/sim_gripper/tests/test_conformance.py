@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import pytest
 
-from graspsense.core.plugins import installed
+from graspsense.core.components.registry import installed
 from graspsense.testing.conformance import checks_for
 from graspsense.testing.subject import package_of
 from graspsense_sim_gripper.conformance import check_terms

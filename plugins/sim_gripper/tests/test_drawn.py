@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from graspsense.core.errors import ConfigError
-from graspsense.core.run_config import RunConfig
+from graspsense.core.components.run_config import RunConfig
+from graspsense.core.values.errors import ConfigError
 from graspsense.plugin_api import create
 from graspsense_sim_gripper.batch.drawn import can_be_drawn
 from graspsense_sim_gripper.batch.job import Job, started

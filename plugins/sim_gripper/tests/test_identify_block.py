@@ -7,7 +7,7 @@ import re
 import pytest
 from identify import delayed
 
-from graspsense.core.identification import RecordedSqueeze
+from graspsense.core.components.identification import RecordedSqueeze
 from graspsense.plugin_api import ConfigError, RunConfig, create
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.identify.block import lag_of_block, with_fingertips_of_block

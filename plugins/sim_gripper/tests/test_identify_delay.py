@@ -10,7 +10,7 @@ from attrs import evolve
 from identify import delayed
 from squeezes import recorded
 
-from graspsense.core.identification import RecordedSqueeze
+from graspsense.core.components.identification import RecordedSqueeze
 from graspsense.plugin_api import RunConfig, create
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.identify.prepare import prepared

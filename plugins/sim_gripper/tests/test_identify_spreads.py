@@ -10,7 +10,7 @@ import pytest
 from attrs import evolve
 from squeezes import WIDTH_M, recorded
 
-from graspsense.core.identification import RecordedSqueeze
+from graspsense.core.components.identification import RecordedSqueeze
 from graspsense.plugin_api import RunConfig, create
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.dynamics.contact import PadCompliance

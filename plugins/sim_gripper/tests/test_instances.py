@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from graspsense.core.errors import UnknownName
+from graspsense.core.values.errors import UnknownName
 from graspsense.plugin_api import RunConfig, create
 from graspsense_sim_gripper.build import build, unverified_setup
 from graspsense_sim_gripper.config import SimConfig

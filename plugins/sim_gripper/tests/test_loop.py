@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from attrs import evolve, fields
 
-from graspsense.core.run_config import RunConfig
-from graspsense.core.runner import run_grasp
+from graspsense.core.components.run_config import RunConfig
+from graspsense.core.grasp.runner import run_grasp
 from graspsense.plugin_api import EFFORT, Command, Trace, bind, create, fingerprint
 from graspsense_sim_gripper.backend import SimBackend
 from graspsense_sim_gripper.batch import run_many

@@ -6,7 +6,7 @@ from math import inf
 import numpy as np
 import pytest
 
-from graspsense.core.run_config import RunConfig
+from graspsense.core.components.run_config import RunConfig
 from graspsense.plugin_api import EFFORT, RELEASE, Command, create, gap_and_rate, revolutions_at
 from graspsense_sim_gripper.batch import job, run_many
 from graspsense_sim_gripper.binding import bind_reachable

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from graspsense.core.run_config import RunConfig
-from graspsense.core.runner import run_grasp
-from graspsense.core.signals import Phase
+from graspsense.core.components.run_config import RunConfig
+from graspsense.core.grasp.runner import run_grasp
+from graspsense.core.values.signals import Phase
 from graspsense.plugin_api import create
 from graspsense_sim_gripper.backend import SimBackend
 from graspsense_sim_gripper.batch import run_many

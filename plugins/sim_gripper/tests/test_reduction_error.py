@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from graspsense.core.runner import run_grasp
+from graspsense.core.grasp.runner import run_grasp
 from graspsense.plugin_api import APPROACH, HOLD, SQUEEZE, STEADY, RunConfig, Trace, create
 from graspsense_sim_gripper.backend import SimBackend
 from graspsense_sim_gripper.config import SimConfig

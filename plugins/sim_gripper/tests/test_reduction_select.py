@@ -8,8 +8,8 @@ import pytest
 from attrs import evolve, frozen
 from selection import error_of, record_of
 
-from graspsense.core.checkpoints import with_checkpoints
-from graspsense.core.runner import run_grasp
+from graspsense.core.grasp.runner import run_grasp
+from graspsense.core.learn.checkpoints import with_checkpoints
 from graspsense.plugin_api import (
     HOLD,
     Channel,

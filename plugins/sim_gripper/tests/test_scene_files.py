@@ -14,8 +14,8 @@ from attrs import evolve
 from click.testing import CliRunner
 
 from graspsense.cli.main import cli
-from graspsense.core.run_config import RunConfig
-from graspsense.core.runner import run_grasp
+from graspsense.core.components.run_config import RunConfig
+from graspsense.core.grasp.runner import run_grasp
 from graspsense.plugin_api import ConfigError, UnknownName, create
 from graspsense_sim_gripper.backend import SimBackend
 from graspsense_sim_gripper.batch import run_many

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from graspsense.core.run_config import RunConfig
-from graspsense.core.runner import run_grasp
+from graspsense.core.components.run_config import RunConfig
+from graspsense.core.grasp.runner import run_grasp
 from graspsense.plugin_api import (
     Outcome,
     Phase,

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from graspsense.cli.model_table import print_without
-from graspsense.core.runner import run_grasp
+from graspsense.core.grasp.runner import run_grasp
 from graspsense.plugin_api import RunConfig, create
 from graspsense_sim_gripper.backend import SimBackend
 from graspsense_sim_gripper.config import SimConfig

@@ -13,9 +13,9 @@ from graspsense.cli.output import echo_json
 from graspsense.cli.terminal import echo, echo_table, talk
 
 if TYPE_CHECKING:
-    from graspsense.core.calibrating import Rig
-    from graspsense.core.calibration_files import Calibration
-    from graspsense.core.roles import DeviceInfo
+    from graspsense.core.grasp.calibrating import Rig
+    from graspsense.core.grasp.calibration_files import Calibration
+    from graspsense.core.values.device import DeviceInfo
 
 
 class _Setup(NamedTuple):
@@ -54,9 +54,9 @@ def calibrate() -> None:
 @_options
 def tare(images: int, replace: bool, as_json: bool, **asked: Any) -> None:
     """Store the zero of the pads: the mean of cell images with open fingers that touch nothing."""
-    from graspsense.core import calibration
-    from graspsense.core.calibrating import unloaded_images
-    from graspsense.core.calibration_files import stored_zero
+    from graspsense.core.grasp import calibration
+    from graspsense.core.grasp.calibrating import unloaded_images
+    from graspsense.core.grasp.calibration_files import stored_zero
 
     with _set_up(asked, replace) as setup:
         stored = stored_zero(setup.stored["tare"]) if "tare" in setup.stored else None
@@ -92,7 +92,7 @@ def load_cell(readings: str, replace: bool, as_json: bool, **asked: Any) -> None
 @_options
 def friction(gaps: int, narrowest_m: float, replace: bool, as_json: bool, **asked: Any) -> None:
     """Store the effort at which the fingers begin to move, closing and opening, over the stroke."""
-    from graspsense.core.calibrating import breakaways, unloaded_images
+    from graspsense.core.grasp.calibrating import breakaways, unloaded_images
 
     with _set_up(asked, replace) as setup:
         if setup.info.tare_images:
@@ -119,9 +119,9 @@ def _set_up(asked: Mapping[str, Any], replace: bool) -> Iterator[_Setup]:
     """
     import attrs
 
-    from graspsense.core.calibrating import Rig
-    from graspsense.core.calibration_files import UNCALIBRATED, calibration_path, calibrations_of
-    from graspsense.core.errors import ConfigError
+    from graspsense.core.grasp.calibrating import Rig
+    from graspsense.core.grasp.calibration_files import UNCALIBRATED, calibration_path, calibrations_of
+    from graspsense.core.values.errors import ConfigError
 
     settings = settings_of(**asked)
     component, config = settings.gripper.component, settings.gripper.config
@@ -148,7 +148,7 @@ def _set_up(asked: Mapping[str, Any], replace: bool) -> Iterator[_Setup]:
 def _store(setup: _Setup, kind: str, data: Mapping[str, Any], as_json: bool) -> None:
     from datetime import UTC, datetime
 
-    from graspsense.core.calibration_files import Calibration, calibration_path, write_calibration
+    from graspsense.core.grasp.calibration_files import Calibration, calibration_path, write_calibration
 
     made = Calibration(
         kind=kind,
@@ -170,8 +170,8 @@ def _store(setup: _Setup, kind: str, data: Mapping[str, Any], as_json: bool) -> 
 
 def _first_facing(setup: _Setup) -> int:
     """Return the number of the first cell on the gripping face, which its declaration states. Raises ConfigError."""
-    from graspsense.core.entries import TactileArray
-    from graspsense.core.errors import ConfigError
+    from graspsense.core.values.channel import TactileArray
+    from graspsense.core.values.errors import ConfigError
 
     for channel in setup.backend.channels:
         if channel.name == "pads" and isinstance(channel, TactileArray):
@@ -181,7 +181,7 @@ def _first_facing(setup: _Setup) -> int:
 
 def _counts_per_n(setup: _Setup) -> float:
     """Return the counts of the pad under one newton, which the gripper states. Raises ConfigError."""
-    from graspsense.core.errors import ConfigError
+    from graspsense.core.values.errors import ConfigError
 
     counts = setup.info.numbers.get("pad_counts_per_n")
     if counts is None:
@@ -193,8 +193,8 @@ def _tables(path: str, counts_per_n: float) -> dict[str, Any]:
     from math import isnan
     from pathlib import Path
 
-    from graspsense.core.calibration import load_table
-    from graspsense.core.errors import DataDamaged
+    from graspsense.core.grasp.calibration import load_table
+    from graspsense.core.values.errors import DataDamaged
     from graspsense.sources.csv_columns import CsvColumns
 
     columns = CsvColumns(Path(path))

@@ -21,8 +21,8 @@ from graspsense.cli.terminal import Style, echo_as_it_is, echo_entry, talk
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from graspsense.core.config import Settings
-    from graspsense.core.trial import Trial
+    from graspsense.core.components.config import Settings
+    from graspsense.core.values.trial import Trial
     from graspsense.store.collecting import Collection
     from graspsense.store.store import Store
 
@@ -73,9 +73,9 @@ def collect(
     or killed. Ctrl-C opens the gripper, stores a running grasp as aborted, and stops. With a simulated gripper, the
     label selects the object. Answers can come from a file.
     """
-    from graspsense.core.plugins import installed
-    from graspsense.core.target_value import value_label
-    from graspsense.core.wiring import check
+    from graspsense.core.components.registry import installed
+    from graspsense.core.learn.target_value import value_label
+    from graspsense.core.pipeline.wiring import check
     from graspsense.store.collecting import Collection, Wanted
     from graspsense.store.store import Store
 
@@ -123,7 +123,7 @@ def _run(collection: Collection, save: str, as_json: bool) -> None:
 
 def _show(word: str, trial: Trial) -> None:
     """Print the faults that were seen in a trial, what was felt, and what the model takes the object for."""
-    from graspsense.core.units import in_words
+    from graspsense.core.values.units import in_words
 
     for warning in trial.warnings:
         if warning != trial.reason:
@@ -147,7 +147,7 @@ def _show(word: str, trial: Trial) -> None:
 
 
 def _print_counts(save: str, collection: Collection, as_json: bool) -> None:
-    from graspsense.core.conformal import COVERAGE, units_lacking
+    from graspsense.core.learn.conformal import COVERAGE, units_lacking
 
     counts, each = collection.counts(), collection.wanted.each
     unit, lacking = units_lacking(collection.store.counts())
@@ -197,9 +197,9 @@ def _has_model(settings: Settings) -> bool:
 
     A pipeline can name the model that is to be trained on these trials.
     """
-    from graspsense.core.errors import ConfigError
-    from graspsense.core.model import model_for
-    from graspsense.core.plugins import installed
+    from graspsense.core.components.registry import installed
+    from graspsense.core.learn.model import model_for
+    from graspsense.core.values.errors import ConfigError
 
     try:
         model_for(settings, installed())
@@ -210,7 +210,7 @@ def _has_model(settings: Settings) -> bool:
 
 
 def _refuse_other_units(store: Store, values: tuple[str, ...]) -> None:
-    from graspsense.core.target_value import value_label
+    from graspsense.core.learn.target_value import value_label
     from graspsense.store.changes import refuse_other_units
 
     refuse_other_units(store, [value_label(text)[0] for text in values])

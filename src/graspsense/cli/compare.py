@@ -11,7 +11,7 @@ from graspsense.cli.sources import SOURCES, command_line, is_csv, learner_of, so
 from graspsense.cli.terminal import Style, echo, echo_entry, echo_table
 
 if TYPE_CHECKING:
-    from graspsense.core.entries import Role
+    from graspsense.core.components.entries import Role
     from graspsense.evaluation.ranking import Candidate, Ranking
 
 
@@ -125,8 +125,8 @@ def _coverage(candidate: Candidate) -> str:
 
 def _names(text: str, option: str, role: Role) -> tuple[str, ...]:
     """Return the names of components of a role that an option lists. Raises UsageError for an unknown one."""
-    from graspsense.core.errors import UnknownName
-    from graspsense.core.plugins import installed
+    from graspsense.core.components.registry import installed
+    from graspsense.core.values.errors import UnknownName
 
     names = tuple(dict.fromkeys(one.strip() for one in text.split(",") if one.strip()))
     if not names:

@@ -12,7 +12,7 @@ from graspsense.cli.output import echo_json
 from graspsense.cli.terminal import Style, echo, echo_as_it_is
 
 if TYPE_CHECKING:
-    from graspsense.core.config import Settings
+    from graspsense.core.components.config import Settings
 
 
 @click.group()
@@ -41,7 +41,7 @@ def show(name: str | None, as_json: bool, **asked: Any) -> None:
             }
         )
         return
-    from graspsense.core.config import to_toml
+    from graspsense.core.components.config import to_toml
 
     echo_as_it_is(to_toml(settings, origins=True), end="")
 
@@ -52,10 +52,10 @@ def show(name: str | None, as_json: bool, **asked: Any) -> None:
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def validate(name: str | None, as_json: bool, **asked: Any) -> None:
     """Check that the settings are valid and the components fit together, without opening anything."""
-    from graspsense.core.errors import ConfigError
-    from graspsense.core.model import model_for
-    from graspsense.core.plugins import installed
-    from graspsense.core.wiring import check
+    from graspsense.core.components.registry import installed
+    from graspsense.core.learn.model import model_for
+    from graspsense.core.pipeline.wiring import check
+    from graspsense.core.values.errors import ConfigError
 
     settings = _settings(name, asked)
     check(settings)

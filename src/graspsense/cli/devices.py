@@ -21,7 +21,7 @@ from graspsense.cli.terminal import echo, echo_table, state_style, talk
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def devices(timeout_s: float, as_json: bool) -> None:
     """List connected grippers."""
-    from graspsense.core.plugins import installed
+    from graspsense.core.components.registry import installed
 
     if timeout_s != timeout_s:
         raise click.BadParameter(

@@ -12,8 +12,8 @@ from graspsense.cli.output import echo_json
 from graspsense.cli.terminal import Style, echo, echo_as_it_is, echo_entry, state_style
 
 if TYPE_CHECKING:
-    from graspsense.core.entries import Finding
-    from graspsense.core.plugins import Diagnosis, Plugins
+    from graspsense.core.components.entries import Finding
+    from graspsense.core.components.registry import Diagnosis, Plugins
 
 EXIT_PROBLEM: Final = 1
 MARKS: Final = {"ok": "ok", "note": "note", "problem": "PROBLEM"}
@@ -38,8 +38,8 @@ def doctor(timeout_s: float, as_json: bool, **asked: Any) -> None:
     With --gripper and -o, it looks for that gripper (-o gripper.vendor_id=..., -o gripper.serial=...), and reports a
     problem if it is missing. Exit code 0: no problem; 1: a problem.
     """
-    from graspsense.core.garbage_collection import no_collection
-    from graspsense.core.plugins import Diagnosis, installed
+    from graspsense.core.components.registry import Diagnosis, installed
+    from graspsense.core.control.garbage_collection import no_collection
 
     plugins = installed()
     config = None
@@ -66,7 +66,7 @@ def _ourselves(plugins: Plugins) -> tuple[Finding, ...]:
     import platform
     from importlib.metadata import PackageNotFoundError, version
 
-    from graspsense.core.entries import Finding
+    from graspsense.core.components.entries import Finding
 
     found = [
         Finding("system", "ok", f"Python {platform.python_version()} on {platform.platform()}",

@@ -19,7 +19,7 @@ from graspsense.cli.output import echo_json
 from graspsense.cli.terminal import talk
 
 if TYPE_CHECKING:
-    from graspsense.core.emulated import EmulatedDevice
+    from graspsense.core.components.emulated import EmulatedDevice
 
 LOOK_S: Final = 0.5
 """How often it is looked whether the device still runs."""
@@ -56,9 +56,9 @@ def emulate(
     The command reads commands such as unplug and plug from its standard input, one per line; `help` lists them. The
     device disappears with the process.
     """
-    from graspsense.core.errors import ConfigError, suggestion
-    from graspsense.core.garbage_collection import present_objects_kept
-    from graspsense.core.plugins import installed
+    from graspsense.core.components.registry import installed
+    from graspsense.core.control.garbage_collection import present_objects_kept
+    from graspsense.core.values.errors import ConfigError, suggestion
 
     if gripper is not None:
         raise click.UsageError("the gripper is the argument: graspsense emulate NAME, without --gripper")
@@ -134,7 +134,7 @@ def _lines() -> Iterator[str]:
 
 
 def _do(device: EmulatedDevice, word: str, as_json: bool) -> None:
-    from graspsense.core.errors import suggestion
+    from graspsense.core.values.errors import suggestion
 
     if word == "help":
         for one, what in device.words.items():

@@ -21,8 +21,8 @@ from graspsense.cli.terminal import Style, echo, echo_entry, echo_table, talk
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from graspsense.core.checkpoints import CheckpointTrials
-    from graspsense.core.labelled import Labelled
+    from graspsense.core.learn.checkpoints import CheckpointTrials
+    from graspsense.core.learn.labelled import Labelled
     from graspsense.evaluation.checkpoints import EarlyRecognition
     from graspsense.evaluation.results import Evaluation, Measurement
 
@@ -70,8 +70,8 @@ def evaluate(
 ) -> None:
     """Measure and print."""
     from graspsense.cli.progress import ProgressLine
-    from graspsense.core.checkpoints import checkpoints_of
-    from graspsense.core.strict import plain
+    from graspsense.core.components.strict import plain
+    from graspsense.core.learn.checkpoints import checkpoints_of
     from graspsense.evaluation.checkpoints import early_recognition
     from graspsense.evaluation.evaluate import evaluate as measure
 
@@ -122,8 +122,8 @@ def _parts(
     labelled: Labelled, times: Sequence[float], target: str
 ) -> tuple[Labelled, tuple[CheckpointTrials, ...]]:
     """Return the trials, and the parts of them up to each checkpoint with the labels of the target."""
-    from graspsense.core.checkpoints import split_checkpoints
-    from graspsense.core.errors import ConfigError
+    from graspsense.core.learn.checkpoints import split_checkpoints
+    from graspsense.core.values.errors import ConfigError
 
     if not times:
         return labelled, ()

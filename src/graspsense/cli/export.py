@@ -29,7 +29,7 @@ def export(source: str, target: str, pictures: bool, as_json: bool) -> None:
     One grasp is a trial of a store, DIR#NUMBER, or a FILE.mcap. Its formats are .csv, .npz, .parquet,
     .mcap (a copy of the recording) and .toml (its settings). Existing files are never overwritten.
     """
-    from graspsense.core.errors import ConfigError
+    from graspsense.core.values.errors import ConfigError
     from graspsense.recording import export_trace
     from graspsense.recording.reader import read_recorded
     from graspsense.store import export_table

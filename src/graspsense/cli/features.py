@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from graspsense.core.labelled import Labelled
+    from graspsense.core.learn.labelled import Labelled
 
 
 @click.command(short_help="Extract the features of a store again.")
@@ -39,7 +39,7 @@ def features(source: str, options: tuple[str, ...], keep: str | None, overwrite:
     `train`, `predict` and `evaluate` take the same -o.
     """
     from graspsense.cli.progress import ProgressLine
-    from graspsense.core.errors import ConfigError
+    from graspsense.core.values.errors import ConfigError
     from graspsense.sources.trial_source import STORE
     from graspsense.store.dataset import labelled_store
 

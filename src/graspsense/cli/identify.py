@@ -15,7 +15,7 @@ from graspsense.cli.terminal import Style, echo, echo_entry, echo_table, talk
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from graspsense.core.identification import Identification, IdentifiedParameter
+    from graspsense.core.components.identification import Identification, IdentifiedParameter
 
 
 @click.command(short_help="Identify an object from recorded squeezes, as a scene of the simulator.")
@@ -75,9 +75,9 @@ def identify(
     `graspsense run --object FILE.toml` grasps the object in simulation.
     """
     from graspsense.cli.progress import ProgressLine
-    from graspsense.core.config import Flag, resolve
-    from graspsense.core.errors import ConfigError
-    from graspsense.core.roles import BatchBackend
+    from graspsense.core.components.config import Flag, resolve
+    from graspsense.core.components.roles import BatchBackend
+    from graspsense.core.values.errors import ConfigError
     from graspsense.recording.atomic_file import write_or_replace
     from graspsense.sources.squeezes import recorded_squeezes
 
@@ -110,7 +110,7 @@ def identify(
 
 def _print(out: str, result: Identification) -> None:
     """Print the identified object, the candidates, and what is not determined."""
-    from graspsense.core.identification import repeatability
+    from graspsense.core.components.identification import repeatability
 
     rms = [fit.rms_n for fit in result.fits]
     relative = [fit.residual for fit in result.fits]
@@ -161,7 +161,7 @@ def _percent(share: float) -> str:
 def _as_values(out: str, result: Identification) -> dict[str, Any]:
     from attrs import asdict
 
-    from graspsense.core.identification import repeatability
+    from graspsense.core.components.identification import repeatability
 
     def values(items: Sequence[Any]) -> list[dict[str, Any]]:
         return [asdict(one) for one in items]

@@ -15,7 +15,7 @@ from graspsense.cli.terminal import Style, echo, echo_as_it_is, echo_entry, echo
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from graspsense.core.config import Settings
+    from graspsense.core.components.config import Settings
     from graspsense.recording.labelled_recording import UnreadableRecording
     from graspsense.sources.import_sources import ImportedRecording
     from graspsense.sources.import_summary import ImportSummary
@@ -81,7 +81,7 @@ def import_(
     MANIFEST.toml names the files, their labels and their columns (docs/import.md). A FILE.csv is one grasp and needs
     --time, --gap and --force. KIND:NAME is a file of another reader, or the folder of a data set.
     """
-    from graspsense.core.errors import ConfigError, DataDamaged
+    from graspsense.core.values.errors import ConfigError, DataDamaged
     from graspsense.sources.import_sources import is_csv, recordings_to_import
     from graspsense.store.labels import labels_of
 
@@ -121,7 +121,7 @@ class _Chosen:
     """The settings of an import: those of the pipeline, and thresholds from the recordings where none is given."""
 
     def __init__(self, pipeline: str, options: Sequence[str]) -> None:
-        from graspsense.core.wiring import check
+        from graspsense.core.pipeline.wiring import check
 
         self._pipeline, self._options = pipeline, tuple(options)
         self._added: tuple[str, ...] = ()
@@ -147,8 +147,8 @@ class _Chosen:
         return self._resolved(recording.name)
 
     def _resolved(self, name: str) -> Settings:
-        from graspsense.core.config import Flag, ImplausibleSettings, resolve
-        from graspsense.core.errors import ConfigError
+        from graspsense.core.components.config import Flag, ImplausibleSettings, resolve
+        from graspsense.core.values.errors import ConfigError
 
         flags = (
             Flag("--gripper", "gripper.type", "replay"),
@@ -180,7 +180,7 @@ def _import(
     as_json: bool,
 ) -> None:
     """Import the recordings and print what became of each; those that cannot be replayed join `unreadable`."""
-    from graspsense.core.errors import ConfigError
+    from graspsense.core.values.errors import ConfigError
     from graspsense.recording.readable import error_of_all
 
     stored = _store(save, recordings, unreadable, chosen)
@@ -225,8 +225,8 @@ def _store(
 ) -> _Stored:
     """Store the recordings that the store does not have. Raises SaveFailed."""
     from graspsense.cli.progress import ProgressLine
-    from graspsense.core.errors import GraspsenseError
-    from graspsense.core.plugins import installed
+    from graspsense.core.components.registry import installed
+    from graspsense.core.values.errors import GraspsenseError
     from graspsense.recording.atomic_file import SaveFailed
     from graspsense.recording.labelled_recording import UnreadableRecording
     from graspsense.recording.readable import readable
@@ -285,9 +285,9 @@ def _show(
     from attrs import asdict
 
     from graspsense.cli.run import draw_grasp
-    from graspsense.core.errors import DataDamaged, PluginUnavailable
-    from graspsense.core.pipeline import grasp_with
-    from graspsense.core.plugins import installed
+    from graspsense.core.components.registry import installed
+    from graspsense.core.pipeline.pipeline import grasp_with
+    from graspsense.core.values.errors import DataDamaged, PluginUnavailable
     from graspsense.recording.readable import readable
     from graspsense.sources.dataset_recordings import handed_over
 
@@ -315,7 +315,7 @@ def _summary(recordings: Sequence[ImportedRecording]) -> ImportSummary:
 
 
 def _echo_summary(summary: ImportSummary) -> None:
-    from graspsense.core.units import display_unit
+    from graspsense.core.values.units import display_unit
 
     gap, factor = display_unit(summary.units.get("gap", "m"))
     force = summary.units.get("force_left", "N")

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Final
 from graspsense.cli.terminal import talk, terminal_width
 
 if TYPE_CHECKING:
-    from graspsense.core.signals import Command, Reading
-    from graspsense.core.trial import GraspEvent
+    from graspsense.core.values.events import GraspEvent
+    from graspsense.core.values.signals import Command, Reading
 
 BAR: Final = 24
 """Characters of the bar of the widest gap, where the terminal has room for it."""
@@ -66,6 +66,6 @@ def _newtons(force_n: float) -> str:
 
 
 def _phase_name(phase: int) -> str:
-    from graspsense.core.signals import Phase
+    from graspsense.core.values.signals import Phase
 
     return Phase(phase).name.lower()

@@ -17,8 +17,8 @@ import click
 
 from graspsense import __version__
 from graspsense.cli.terminal import Style, echo, echo_as_it_is, has_colour
-from graspsense.core.errors import GraspsenseError, PluginUnavailable, UnknownName, suggestion
-from graspsense.core.interrupts import ended_like_ctrl_c
+from graspsense.core.grasp.interrupts import ended_like_ctrl_c
+from graspsense.core.values.errors import GraspsenseError, PluginUnavailable, UnknownName, suggestion
 
 PROGRAM: Final = "graspsense"
 COMPLETION_VARIABLE: Final = "_GRASPSENSE_COMPLETE"
@@ -94,7 +94,7 @@ class Commands(click.Group):
 
 
 def _plugin_command(name: str) -> click.Command:
-    from graspsense.core.plugins import installed
+    from graspsense.core.components.registry import installed
 
     plugins = installed()
     added = plugins.commands()

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 import click
 
 if TYPE_CHECKING:
-    from graspsense.core.config import Settings
+    from graspsense.core.components.config import Settings
 
 CommandT = TypeVar("CommandT", bound=Callable[..., Any])
 
@@ -83,7 +83,7 @@ def settings_of(
     force: bool = False,
 ) -> Settings:
     """Return the settings that these options ask for. Raises ConfigError with every error at once."""
-    from graspsense.core.config import Flag, resolve
+    from graspsense.core.components.config import Flag, resolve
 
     flags = (
         Flag("--gripper", "gripper.type", gripper),

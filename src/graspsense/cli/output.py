@@ -22,7 +22,7 @@ def echo_json(value: object, long: bool = False) -> None:
     A long one comes in one line, which takes a fifth of the time.
     """
     # Imported here: what is imported above is loaded by `graspsense --help`.
-    from graspsense.core.json_values import json_ready
+    from graspsense.core.values.json_values import json_ready
 
     echo_as_it_is(
         json.dumps(json_ready(value), indent=None if long else 2, ensure_ascii=False, allow_nan=False)
@@ -70,7 +70,7 @@ def check_outputs(*paths: str | None, overwrite: bool, sources: Sequence[str] = 
     Two of them must not be the same file, none may be a file that the command reads, and without `overwrite` none may
     exist.
     """
-    from graspsense.core.errors import ConfigError
+    from graspsense.core.values.errors import ConfigError
 
     outputs: list[Path] = []
     for path in (Path(one) for one in paths if one is not None):

@@ -13,7 +13,7 @@ from graspsense.cli.output import echo_json
 from graspsense.cli.terminal import Style, echo, echo_entry, echo_table, state_style
 
 if TYPE_CHECKING:
-    from graspsense.core.plugins import Component, Plugins, PluginStatus
+    from graspsense.core.components.registry import Component, Plugins, PluginStatus
 
 
 @click.group()
@@ -25,7 +25,7 @@ def plugins() -> None:
 @click.option("--json", "as_json", is_flag=True, help="Print JSON: a list with one object per component.")
 def list_plugins(as_json: bool) -> None:
     """List all components and plugins, and report broken, outdated, slow and duplicate ones."""
-    from graspsense.core.plugins import installed
+    from graspsense.core.components.registry import installed
 
     loaded = installed()
     rows = _rows(loaded)
@@ -53,7 +53,7 @@ def list_plugins(as_json: bool) -> None:
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def show(name: str, as_json: bool) -> None:
     """Show a distribution or a component (NAME or DISTRIBUTION/NAME): hooks, keys, and why it fails."""
-    from graspsense.core.plugins import canonical, installed
+    from graspsense.core.components.registry import canonical, installed
 
     loaded = installed()
     statuses = [status for status in loaded.statuses if status.distribution == canonical(name)]
@@ -166,10 +166,10 @@ def new(name: str, roles: tuple[str, ...], folder: Path | None) -> None:
 @click.argument("distribution")
 def disable(distribution: str) -> None:
     """Switch the plugins of a distribution off: they are no longer imported."""
-    from graspsense.core.disabling import disabled_in_config, write_disabled
-    from graspsense.core.errors import UnknownName, suggestion
-    from graspsense.core.firstparty import DISTRIBUTION
-    from graspsense.core.plugins import canonical, installed_sources
+    from graspsense.core.components.disabling import disabled_in_config, write_disabled
+    from graspsense.core.components.firstparty import DISTRIBUTION
+    from graspsense.core.components.registry import canonical, installed_sources
+    from graspsense.core.values.errors import UnknownName, suggestion
 
     name = canonical(distribution)
     known = {source.distribution for source in installed_sources()} - {DISTRIBUTION}
@@ -186,9 +186,9 @@ def disable(distribution: str) -> None:
 @click.argument("distribution")
 def enable(distribution: str) -> None:
     """Switch the plugins of a distribution on again."""
-    from graspsense.core.disabling import disabled_in_config, write_disabled
-    from graspsense.core.errors import UnknownName
-    from graspsense.core.plugins import canonical
+    from graspsense.core.components.disabling import disabled_in_config, write_disabled
+    from graspsense.core.components.registry import canonical
+    from graspsense.core.values.errors import UnknownName
 
     name, names = canonical(distribution), {canonical(one) for one in disabled_in_config()}
     if name not in names:
@@ -199,8 +199,8 @@ def enable(distribution: str) -> None:
 
 def _settings(options: Sequence[str]) -> dict[str, Any]:
     """Return the keys that options like `-o port=/dev/ttyUSB0` set. Raises ConfigError."""
-    from graspsense.core.errors import ConfigError
-    from graspsense.core.layers import Merged, option_layers
+    from graspsense.core.components.layers import Merged, option_layers
+    from graspsense.core.values.errors import ConfigError
 
     layers, complaints = option_layers(options)
     if complaints:
@@ -215,7 +215,7 @@ def _settings(options: Sequence[str]) -> dict[str, Any]:
 
 def _rows(loaded: Plugins) -> list[dict[str, Any]]:
     """Return one row a component; one for a plugin without any; one for a component that is not installed."""
-    from graspsense.core.firstparty import SHIPPED
+    from graspsense.core.components.firstparty import SHIPPED
 
     advice: dict[str, tuple[str, ...]] = {}
     for status in loaded.statuses:
@@ -365,7 +365,7 @@ def _component_text(component: Component) -> str:
 
 def _declared(component: Component) -> Any:
     """Return the entry with what the class declares; the entry alone where the class cannot be used here."""
-    from graspsense.core.errors import PluginUnavailable
+    from graspsense.core.values.errors import PluginUnavailable
 
     try:
         return component.declared()
@@ -376,7 +376,7 @@ def _declared(component: Component) -> Any:
 def _key_lines(keys: dict[str, dict[str, Any]], indent: str) -> list[str]:
     from textwrap import wrap
 
-    from graspsense.core.config import key_facts
+    from graspsense.core.components.config import key_facts
 
     lines = []
     for key, declaration in keys.items():
@@ -393,8 +393,8 @@ def _key_lines(keys: dict[str, dict[str, Any]], indent: str) -> list[str]:
 
 def _keys(component: Component) -> tuple[dict[str, dict[str, Any]], str]:
     """Return the keys of a component's config, or why they cannot be told."""
-    from graspsense.core.errors import PluginUnavailable
-    from graspsense.core.strict import keys_of
+    from graspsense.core.components.strict import keys_of
+    from graspsense.core.values.errors import PluginUnavailable
 
     try:
         return keys_of(component.config_class()), ""

@@ -14,8 +14,8 @@ from graspsense.cli.terminal import Style, correct_style, echo, echo_entry, echo
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from graspsense.core.features import FeatureTable, Prediction
-    from graspsense.core.model import Model
+    from graspsense.core.learn.model import Model
+    from graspsense.core.values.features import FeatureTable, Prediction
 
 MOST_WITH_REASONS: Final = 1000
 """Largest number of trials whose predictions are given with reasons, which take about a millisecond each."""
@@ -37,9 +37,9 @@ MOST_WITH_REASONS: Final = 1000
 @click.option("--json", "as_json", is_flag=True, help="Print every prediction with its reasons as JSON.")
 def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
     """Predict and print."""
-    from graspsense.core.errors import ConfigError
-    from graspsense.core.model import load_model
-    from graspsense.core.plugins import installed
+    from graspsense.core.components.registry import installed
+    from graspsense.core.learn.model import load_model
+    from graspsense.core.values.errors import ConfigError
     from graspsense.evaluation.intervals import RecognitionRate
     from graspsense.evaluation.json_codec import to_json
     from graspsense.regression.model import is_regression
@@ -114,7 +114,7 @@ def _trials(
 
 
 def _print(predictions: Sequence[Prediction], labels: tuple[str, ...] | None) -> None:
-    from graspsense.core.features import percent
+    from graspsense.core.values.features import percent
 
     coverage = next((one.coverage for one in predictions if one.coverage is not None), None)
     sets = () if coverage is None else (f"{100 * coverage:.0f} % SET",)
@@ -131,8 +131,8 @@ def _print(predictions: Sequence[Prediction], labels: tuple[str, ...] | None) ->
 
 def _without_reasons(model: Model, table: FeatureTable) -> list[Prediction]:
     """Return the predictions of many trials in one call, without reasons."""
-    from graspsense.core.features import Prediction
-    from graspsense.core.temperature import at_temperature
+    from graspsense.core.learn.temperature import at_temperature
+    from graspsense.core.values.features import Prediction
 
     labels, shares = model.answers(table)
     calibrated = at_temperature(shares, model.temperature).tolist()
@@ -156,7 +156,7 @@ def _without_reasons(model: Model, table: FeatureTable) -> list[Prediction]:
 
 
 def _known(prediction: Prediction) -> bool:
-    from graspsense.core.features import UNKNOWN
+    from graspsense.core.values.features import UNKNOWN
 
     return prediction.label != UNKNOWN
 

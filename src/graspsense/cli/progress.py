@@ -8,7 +8,7 @@ from types import TracebackType
 from typing import Final
 
 from graspsense.cli.terminal import can_redraw, echo_as_it_is, echo_in_place, terminal_width
-from graspsense.core.printable import in_one_line
+from graspsense.core.values.printable import in_one_line
 
 FIRST_S: Final = 2.0
 AGAIN_S: Final = 0.2

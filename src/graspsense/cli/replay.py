@@ -11,7 +11,7 @@ from graspsense.cli.options import force_option
 from graspsense.cli.output import echo_json
 
 if TYPE_CHECKING:
-    from graspsense.core.config import Settings
+    from graspsense.core.components.config import Settings
 
 
 @click.command(short_help="Process a recording with a pipeline.")
@@ -43,10 +43,10 @@ def replay(
     example icub:FOLDER/full_vitamin_water_1.txt, or manifest:FILE.toml#3 for the third grasp of a manifest.
     """
     from graspsense.cli.run import draw_grasp, print_trial
-    from graspsense.core.pipeline import grasp_with
-    from graspsense.core.plugins import installed
-    from graspsense.core.trial import trial_as_json
-    from graspsense.core.wiring import check
+    from graspsense.core.components.registry import installed
+    from graspsense.core.pipeline.pipeline import grasp_with
+    from graspsense.core.pipeline.wiring import check
+    from graspsense.core.values.trial import trial_as_json
 
     settings = _settings(recording, pipeline, options, force)
     check(settings)
@@ -64,7 +64,7 @@ def replay(
 
 
 def _settings(recording: str, pipeline: str | None, options: tuple[str, ...], force: bool) -> Settings:
-    from graspsense.core.config import Flag, resolve
+    from graspsense.core.components.config import Flag, resolve
     from graspsense.sources.replay import kind_and_name, known_kinds
     from graspsense.store.trial_ref import recorded_settings
 

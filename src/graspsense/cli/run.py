@@ -26,11 +26,11 @@ from graspsense.cli.terminal import (
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from graspsense.core.config import Settings
-    from graspsense.core.features import Prediction
-    from graspsense.core.roles import DeviceInfo
-    from graspsense.core.runner import Sink
-    from graspsense.core.trial import Trial
+    from graspsense.core.components.config import Settings
+    from graspsense.core.grasp.runner import Sink
+    from graspsense.core.values.device import DeviceInfo
+    from graspsense.core.values.features import Prediction
+    from graspsense.core.values.trial import Trial
     from graspsense.experiments.condition import Conditions
 
 EXIT_ABORTED: Final = 4
@@ -76,8 +76,8 @@ def run(
     Without options, a simulated gripper squeezes a full, closed bottle. Exit codes: 0 the grasp ended by itself,
     whatever its outcome; 2 wrong settings; 3 device not found; 4 grasp aborted or device lost.
     """
-    from graspsense.core.trial import trial_as_json
-    from graspsense.core.wiring import check
+    from graspsense.core.pipeline.wiring import check
+    from graspsense.core.values.trial import trial_as_json
 
     if explain_model:
         options = (*options, "gripper.explain=true")
@@ -114,8 +114,8 @@ def run(
 
 def _grasped(settings: Settings, sinks: Sequence[Sink]) -> tuple[Trial, bool]:
     """Grasp, and return the trial and whether it was interrupted."""
-    from graspsense.core.pipeline import GraspInterrupted, grasp_with
-    from graspsense.core.plugins import installed
+    from graspsense.core.components.registry import installed
+    from graspsense.core.pipeline.pipeline import GraspInterrupted, grasp_with
 
     try:
         return grasp_with(settings, installed(), sinks=sinks), False
@@ -125,7 +125,7 @@ def _grasped(settings: Settings, sinks: Sequence[Sink]) -> tuple[Trial, bool]:
 
 def _exit(trial: Trial, interrupted: bool, problem: str) -> None:
     """End the command with an exit code if the trial was not stored, did not end by itself, or was interrupted."""
-    from graspsense.core.signals import Outcome
+    from graspsense.core.values.signals import Outcome
 
     if problem:
         talk(f"graspsense: {problem}")
@@ -199,7 +199,7 @@ def _kept(
 
     Unless `changed`, settings and gripper must be those of the newest grasp in the store. Raises ConfigError.
     """
-    from graspsense.core.plugins import installed
+    from graspsense.core.components.registry import installed
     from graspsense.store.comparable import check_device, check_settings, newest_grasp
     from graspsense.store.labels import labels_of
     from graspsense.store.record_grasp import record_grasp
@@ -276,7 +276,7 @@ def _print_prediction(prediction: Prediction) -> None:
 
 
 def _shown(value: float, unit: str, reason: str) -> str:
-    from graspsense.core.units import display_unit, with_unit
+    from graspsense.core.values.units import display_unit, with_unit
 
     if value != value:
         return f"{'-':>9}  ({reason})"
@@ -293,8 +293,8 @@ def effort_words(kinds: Sequence[str], least_n: float, most_n: float) -> str:
 
 
 def _say_what_would_be_done(settings: Settings, as_json: bool) -> None:
-    from graspsense.core.dry_run import dry_run
-    from graspsense.core.errors import GraspsenseError
+    from graspsense.core.grasp.dry_run import dry_run
+    from graspsense.core.values.errors import GraspsenseError
 
     why_not = "nothing emulates this gripper"
     try:
@@ -311,7 +311,7 @@ def _say_what_would_be_done(settings: Settings, as_json: bool) -> None:
         }
         echo_json(plan)
         return
-    from graspsense.core.config import toml_value
+    from graspsense.core.components.config import toml_value
 
     echo("would open, tare, close, hold and release with:")
     for table, component in settings.components.items():

@@ -12,8 +12,8 @@ from graspsense.cli.options import SEED, force_option
 
 if TYPE_CHECKING:
     from graspsense.cli.progress import ProgressLine
-    from graspsense.core.config import SelectedComponent, Settings
-    from graspsense.core.labelled import Labelled
+    from graspsense.core.components.config import SelectedComponent, Settings
+    from graspsense.core.learn.labelled import Labelled
 
 CommandT = TypeVar("CommandT", bound=Callable[..., Any])
 
@@ -139,8 +139,8 @@ def trials_of(
     Raises ConfigError, DataDamaged.
     """
     from graspsense.cli.terminal import talk
-    from graspsense.core.errors import ConfigError
-    from graspsense.core.strict import ValidationFailed, structured
+    from graspsense.core.components.strict import ValidationFailed, structured
+    from graspsense.core.values.errors import ConfigError
     from graspsense.sources.trial_source import TrialSource, kind_of, labelled_trials
 
     kind = kind_of(source)
@@ -230,7 +230,7 @@ def _refuse_misplaced(kind: str) -> None:
 
 
 def _settings(source: str, given: Mapping[str, Any], classifier: str | None) -> Settings:
-    from graspsense.core.config import Flag, resolve
+    from graspsense.core.components.config import Flag, resolve
     from graspsense.sources.identified import gripper_flags
 
     flags = gripper_flags(source)
@@ -246,11 +246,11 @@ def _settings(source: str, given: Mapping[str, Any], classifier: str | None) -> 
 
 def _alone(table: str, name: str, given: Mapping[str, Any], source: str) -> SelectedComponent:
     """Return a component outside of any pipeline, with the keys that options give it."""
-    from graspsense.core.config import SelectedComponent, build_plausible
-    from graspsense.core.entries import TABLE_OF_ROLE
-    from graspsense.core.errors import ConfigError
-    from graspsense.core.layers import Merged, option_layers
-    from graspsense.core.plugins import installed
+    from graspsense.core.components.config import SelectedComponent, build_plausible
+    from graspsense.core.components.entries import TABLE_OF_ROLE
+    from graspsense.core.components.layers import Merged, option_layers
+    from graspsense.core.components.registry import installed
+    from graspsense.core.values.errors import ConfigError
     from graspsense.sources.trial_source import STORE
     from graspsense.store.extract_again import CHANGEABLE
 

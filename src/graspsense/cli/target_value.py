@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from graspsense.cli.progress import ProgressLine
-    from graspsense.core.features import FeatureTable
-    from graspsense.core.labelled import Labelled
+    from graspsense.core.learn.labelled import Labelled
+    from graspsense.core.values.features import FeatureTable
     from graspsense.regression.model import PredictedValue, RegressionModel
     from graspsense.regression.results import RegressionEvaluation, RegressionMeasurement
 
@@ -64,7 +64,7 @@ def train_value(
 ) -> None:
     """Train a model of a number, write it, and print what it was trained on."""
     from graspsense.cli.progress import ProgressLine
-    from graspsense.core.conformal import COVERAGE
+    from graspsense.core.learn.conformal import COVERAGE
     from graspsense.evaluation.gathered_warnings import gathered_warnings
     from graspsense.regression.estimators import DEFAULT_ESTIMATOR
     from graspsense.regression.model import train_regression, write_regression
@@ -167,7 +167,7 @@ def _to_predict(
 ) -> tuple[FeatureTable, Sequence[float] | None, tuple[str, ...]]:
     """Return the features of the trials, the true numbers (None if they are not named), and notes."""
     from graspsense.cli.progress import ProgressLine
-    from graspsense.core.errors import ConfigError
+    from graspsense.core.values.errors import ConfigError
 
     if is_csv(source) and not given["target_value"] and not given["label"]:
         from graspsense.sources.features_csv import read_table

@@ -1,7 +1,7 @@
 """Text for people: tables, paragraphs and colour, fitted to the terminal that they are printed on.
 
 Everything that a command prints passes through here, and no character of it acts on the terminal: labels, notes and
-names of files come from data (`core/printable.py`). No text can look like several: its further lines are indented.
+names of files come from data (`core/values/printable.py`). No text can look like several: its further lines are indented.
 
 Where the output is not a terminal (a pipe, a file), nothing is coloured, wrapped or cut, so that programs can read it.
 `NO_COLOR` and `TERM=dumb` switch the colour off, and `COLUMNS` overrides the width of the terminal.
@@ -19,7 +19,7 @@ from typing import IO, Any, Final
 
 import click
 
-from graspsense.core.printable import in_one_line, printable
+from graspsense.core.values.printable import in_one_line, printable
 
 
 class Style(Enum):

@@ -212,7 +212,7 @@ def _drawn(path: Path, found: SimulationTrade, sensed: SensedTrade | None) -> li
 
 def write_text(path: str, text: str) -> None:
     """Write a page and say where it is. Raises ClickException if that is not possible."""
-    from graspsense.core.whole_file import write_whole
+    from graspsense.core.files.whole_file import write_whole
 
     try:
         write_whole(Path(path), text.encode())

@@ -20,8 +20,8 @@ from graspsense.cli.sources import (
 from graspsense.cli.terminal import echo, echo_as_it_is, echo_entry, talk
 
 if TYPE_CHECKING:
-    from graspsense.core.labelled import Labelled
-    from graspsense.core.model import Model
+    from graspsense.core.learn.labelled import Labelled
+    from graspsense.core.learn.model import Model
 
 
 @click.command(
@@ -67,9 +67,9 @@ def train(
     from attrs import evolve
 
     from graspsense.cli.progress import ProgressLine
-    from graspsense.core.checkpoints import checkpoints_of, split_checkpoints
-    from graspsense.core.model import train as trained
-    from graspsense.core.model import write_model
+    from graspsense.core.learn.checkpoints import checkpoints_of, split_checkpoints
+    from graspsense.core.learn.model import train as trained
+    from graspsense.core.learn.model import write_model
     from graspsense.evaluation.checkpoints import checkpoint_models
     from graspsense.evaluation.doubt import calibrated
     from graspsense.evaluation.gathered_warnings import gathered_warnings
@@ -157,7 +157,7 @@ def _say_trained(out: str, model: Model) -> None:
 
 def _refuse_single_scene(source: str) -> None:
     """Raise ConfigError for a single identified scene, before squeezes of it are simulated."""
-    from graspsense.core.errors import ConfigError
+    from graspsense.core.values.errors import ConfigError
     from graspsense.sources.identified import IDENTIFIED, identified_scenes
 
     scenes = identified_scenes(source) if source.startswith(IDENTIFIED) else ()
@@ -170,8 +170,8 @@ def _refuse_single_scene(source: str) -> None:
 
 def _with_target(labelled: Labelled, target: str) -> Labelled:
     """Return the trials with the labels that the target asks for. Raises ConfigError if a model cannot learn them."""
-    from graspsense.core.errors import ConfigError
-    from graspsense.core.labelled import class_of
+    from graspsense.core.learn.labelled import class_of
+    from graspsense.core.values.errors import ConfigError
 
     classes = sorted({class_of(label) for label in labelled.labels})
     if target == "state" and len(classes) > 1:

@@ -107,7 +107,7 @@ def change_value(
 
     `train`, `evaluate` and `report` use these numbers with --target-value.
     """
-    from graspsense.core.target_value import value_label
+    from graspsense.core.learn.target_value import value_label
     from graspsense.store import changes
 
     if (value is None) == (as_recorded is None):
@@ -194,8 +194,8 @@ def _change(refs: Sequence[str], change: Callable[[Store, Sequence[int]], None],
 
 def _refuse_contradiction(trial: StoredTrial, label: str) -> None:
     """Refuse a label that contradicts the object that was simulated. Raises ConfigError."""
-    from graspsense.core.config import settings_from
-    from graspsense.core.errors import ConfigError, GraspsenseError
+    from graspsense.core.components.config import settings_from
+    from graspsense.core.values.errors import ConfigError, GraspsenseError
     from graspsense.store.labels import agrees
 
     recorded: Mapping[str, Mapping[str, Any]] = trial.record.settings

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from attrs import frozen
 
-from graspsense.core.model import Model, checkpoint_model, train
+from graspsense.core.learn.model import Model, checkpoint_model, train
 from graspsense.evaluation.crossval import Pooled, cross_validate
 from graspsense.evaluation.doubt import calibrated, exchangeable_instances, held_out_members
 from graspsense.evaluation.folds import instance_held_out, stratified
@@ -17,9 +17,9 @@ from graspsense.evaluation.intervals import RecognitionRate, rate_of
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from graspsense.core.checkpoints import CheckpointTrials
-    from graspsense.core.config import SelectedComponent
-    from graspsense.core.labelled import Labelled
+    from graspsense.core.components.config import SelectedComponent
+    from graspsense.core.learn.checkpoints import CheckpointTrials
+    from graspsense.core.learn.labelled import Labelled
     from graspsense.evaluation.folds import Folds
 
 WHOLE: Final = "whole grasp"

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from attrs import frozen
 
-from graspsense.core.conformal import scores_of
-from graspsense.core.errors import ConfigError
-from graspsense.core.novelty import novelty_of
+from graspsense.core.learn.conformal import scores_of
+from graspsense.core.learn.novelty import novelty_of
+from graspsense.core.values.errors import ConfigError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from graspsense.core.features import FeatureTable
-    from graspsense.core.roles import Classifier
+    from graspsense.core.components.roles import Classifier
+    from graspsense.core.values.features import FeatureTable
     from graspsense.evaluation.folds import Folds
 
 

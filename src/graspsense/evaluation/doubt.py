@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from attrs import evolve, field, frozen
 
-from graspsense.core.conformal import COVERAGE, PredictionSets, sets_of
-from graspsense.core.errors import ConfigError
-from graspsense.core.temperature import at_temperature, temperature_of
+from graspsense.core.learn.conformal import COVERAGE, PredictionSets, sets_of
+from graspsense.core.learn.temperature import at_temperature, temperature_of
+from graspsense.core.values.errors import ConfigError
 from graspsense.evaluation.crossval import ClassifierFactory, FitRefused, Groups, Pooled, cross_validate
 from graspsense.evaluation.folds import instance_held_out, stratified
 from graspsense.evaluation.intervals import RecognitionRate
@@ -18,8 +18,8 @@ from graspsense.evaluation.intervals import RecognitionRate
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from graspsense.core.labelled import Labelled
-    from graspsense.core.model import Model
+    from graspsense.core.learn.labelled import Labelled
+    from graspsense.core.learn.model import Model
     from graspsense.evaluation.folds import Folds
 
 FOLDS: Final = 10

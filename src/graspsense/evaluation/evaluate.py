@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from attrs import frozen
 
-from graspsense.core.errors import ConfigError
-from graspsense.core.labelled import ControlFeatures, Labelled, Target, class_of
+from graspsense.core.learn.labelled import ControlFeatures, Labelled, Target, class_of
+from graspsense.core.values.errors import ConfigError
 from graspsense.evaluation.confusion import confusion
 from graspsense.evaluation.crossval import ClassifierFactory, FitRefused, Groups, Pooled, cross_validate
 from graspsense.evaluation.doubt import reliability, set_coverage
@@ -32,7 +32,7 @@ from graspsense.evaluation.results import CurvePoint, Evaluation, Measurement
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from graspsense.core.features import FeatureTable
+    from graspsense.core.values.features import FeatureTable
     from graspsense.evaluation.doubt import Reliability, SetCoverage
     from graspsense.evaluation.folds import Folds
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from graspsense.core.errors import ConfigError
+from graspsense.core.values.errors import ConfigError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -10,7 +10,7 @@ from typing import Any, Final, TypeVar
 
 import cattrs
 
-from graspsense.core.json_values import json_ready
+from graspsense.core.values.json_values import json_ready
 from graspsense.evaluation.intervals import RecognitionRate
 
 T = TypeVar("T")

@@ -14,15 +14,15 @@ from typing import TYPE_CHECKING, Final, Literal
 import numpy as np
 from attrs import frozen
 
-from graspsense.core.errors import ConfigError
+from graspsense.core.values.errors import ConfigError
 from graspsense.evaluation.crossval import ClassifierFactory, FitRefused, cross_validate
 from graspsense.evaluation.doubt import SetCoverage, exchangeable_instances, set_coverage
 from graspsense.evaluation.folds import in_order, instance_held_out, stratified
 from graspsense.evaluation.intervals import Difference, RecognitionRate, difference, rate_of
 
 if TYPE_CHECKING:
-    from graspsense.core.features import FeatureTable
-    from graspsense.core.labelled import Labelled
+    from graspsense.core.learn.labelled import Labelled
+    from graspsense.core.values.features import FeatureTable
     from graspsense.evaluation.folds import Folds
 
 MARGIN: Final = 0.02

@@ -7,9 +7,9 @@ from typing import Any
 
 from attrs import field, frozen
 
-from graspsense.core.labelled import Target
-from graspsense.core.notebook import sentence, table
-from graspsense.core.printable import in_one_line
+from graspsense.core.learn.labelled import Target
+from graspsense.core.values.printable import in_one_line
+from graspsense.core.values.short_html import sentence, table
 from graspsense.evaluation.confusion import Confusion
 from graspsense.evaluation.doubt import Reliability, SetCoverage
 from graspsense.evaluation.intervals import Difference, RecognitionRate

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, Final
 from attrs import frozen
 
 from graspsense import __version__
-from graspsense.core.errors import ConfigError, DataDamaged
-from graspsense.core.strict import plain
+from graspsense.core.components.strict import plain
+from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.evaluation.intervals import Difference
 from graspsense.experiments.experiment import PIPELINE_TABLES, shown
 from graspsense.experiments.results import EXPERIMENT, RESULTS, Results

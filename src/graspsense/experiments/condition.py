@@ -17,10 +17,10 @@ import numpy as np
 from attrs import asdict, evolve, fields_dict, frozen
 from numpy.typing import NDArray
 
-from graspsense.core.config import Settings
-from graspsense.core.errors import ConfigError
-from graspsense.core.features import Features
-from graspsense.core.roles import BatchBackend
+from graspsense.core.components.config import Settings
+from graspsense.core.components.roles import BatchBackend
+from graspsense.core.values.errors import ConfigError
+from graspsense.core.values.features import Features
 
 PPM: Final = 1e-6
 SCALES: Final[Mapping[str, float]] = {"m": 1e-3, "N": 1.0, "s": 0.05, "m/s": 1e-3, "N/s": 1.0}

@@ -12,14 +12,14 @@ from typing import Any, Final
 
 from attrs import evolve, field, frozen
 
-from graspsense.core.config import Settings, build_plausible, resolve
-from graspsense.core.entries import TABLE_OF_ROLE
-from graspsense.core.errors import ConfigError, GraspsenseError, UnknownName, suggestion
-from graspsense.core.layers import Layer, Merged, dotted, option_layers, read_toml
-from graspsense.core.limits import CASES
-from graspsense.core.model import worded
-from graspsense.core.plugins import installed
-from graspsense.core.strict import InvalidValue, ValidationFailed, plain, structured
+from graspsense.core.components.config import Settings, build_plausible, resolve
+from graspsense.core.components.entries import TABLE_OF_ROLE
+from graspsense.core.components.layers import Layer, Merged, dotted, option_layers, read_toml
+from graspsense.core.components.registry import installed
+from graspsense.core.components.strict import InvalidValue, ValidationFailed, plain, structured
+from graspsense.core.files.limits import CASES
+from graspsense.core.learn.model import worded
+from graspsense.core.values.errors import ConfigError, GraspsenseError, UnknownName, suggestion
 from graspsense.experiments.kinds import kind_of
 from graspsense.experiments.task import Task
 from graspsense.sources.identified import IDENTIFIED, identified_scenes

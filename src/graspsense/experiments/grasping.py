@@ -11,19 +11,19 @@ import numpy as np
 from attrs import evolve, field, frozen
 from attrs.validators import ge, le
 
-from graspsense.core.config import settings_from
-from graspsense.core.contact import CONTACT_FORCE_N
-from graspsense.core.errors import ConfigError
-from graspsense.core.roles import BatchBackend
-from graspsense.core.signals import Phase
-from graspsense.core.strict import structured
+from graspsense.core.components.config import settings_from
+from graspsense.core.components.roles import BatchBackend
+from graspsense.core.components.strict import structured
+from graspsense.core.control.contact import CONTACT_FORCE_N
+from graspsense.core.values.errors import ConfigError
+from graspsense.core.values.signals import Phase
 from graspsense.experiments.task_results import MOST_KEPT_GRASPS, GraspResult, GraspRow
 from graspsense.report.grasp_curve import GraspCurve, grasp_curve
 from graspsense.sources.simulated import plan_trials
 from graspsense.sources.trial_source import TrialSource, groups_of
 
 if TYPE_CHECKING:
-    from graspsense.core.trace import Trace
+    from graspsense.core.values.trace import Trace
 
 PAD: Final = slice(7, 22)
 """The fifteen cells of the gripping face."""

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from attrs import frozen
 
-from graspsense.core.errors import ConfigError, suggestion
+from graspsense.core.values.errors import ConfigError, suggestion
 
 TaskFunction = Callable[[Mapping[str, Any], int], Any]
 """Takes the parameters and the seed of a task. Returns its result, which depends on these two alone."""

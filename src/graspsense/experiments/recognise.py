@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 from attrs import field, frozen
 from attrs.validators import ge, le
 
-from graspsense.core.config import SelectedComponent, build, settings_from
-from graspsense.core.errors import ConfigError
-from graspsense.core.labelled import class_of
-from graspsense.core.plugins import installed
-from graspsense.core.strict import structured
+from graspsense.core.components.config import SelectedComponent, build, settings_from
+from graspsense.core.components.registry import installed
+from graspsense.core.components.strict import structured
+from graspsense.core.learn.labelled import class_of
+from graspsense.core.values.errors import ConfigError
 from graspsense.evaluation.evaluate import evaluate
 from graspsense.experiments.task_results import (
     MOST_KEPT_GRASPS,
@@ -25,10 +25,10 @@ from graspsense.report.grasp_curve import GraspCurve, grasp_curve
 from graspsense.sources.trial_source import TrialSource, labelled_trials
 
 if TYPE_CHECKING:
-    from graspsense.core.config import Settings
-    from graspsense.core.labelled import Labelled, Target
-    from graspsense.core.trace import Trace
-    from graspsense.core.tree import TreeNode
+    from graspsense.core.components.config import Settings
+    from graspsense.core.learn.labelled import Labelled, Target
+    from graspsense.core.values.trace import Trace
+    from graspsense.core.values.tree import TreeNode
     from graspsense.evaluation.results import Evaluation
 
 OTHER_TRIALS: Final = "other_trials"

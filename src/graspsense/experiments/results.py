@@ -22,9 +22,9 @@ from typing import Any, Final
 
 from attrs import evolve, frozen
 
-from graspsense.core.config import to_toml, toml_key, toml_value, without_followers
-from graspsense.core.errors import ConfigError, named
-from graspsense.core.strict import plain
+from graspsense.core.components.config import to_toml, toml_key, toml_value, without_followers
+from graspsense.core.components.strict import plain
+from graspsense.core.values.errors import ConfigError, named
 from graspsense.experiments.experiment import PipelineOf, Planned, read_experiment
 from graspsense.experiments.task import TaskResult
 from graspsense.experiments.versions import versions

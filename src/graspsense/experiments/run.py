@@ -7,8 +7,8 @@ from pathlib import Path
 
 from attrs import field, frozen
 
-from graspsense.core.errors import ConfigError
-from graspsense.core.interrupts import Interrupts
+from graspsense.core.grasp.interrupts import Interrupts
+from graspsense.core.values.errors import ConfigError
 from graspsense.experiments.executors.base import Executor, ExecutorLost
 from graspsense.experiments.experiment import Planned
 from graspsense.experiments.results import Results

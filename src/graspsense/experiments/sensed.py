@@ -21,10 +21,10 @@ import numpy as np
 from attrs import evolve, frozen
 from numpy.typing import NDArray
 
-from graspsense.core.config import SelectedComponent, Settings
-from graspsense.core.errors import ConfigError
-from graspsense.core.features import FeatureTable, table_of
-from graspsense.core.roles import BatchBackend, SimulationVariant
+from graspsense.core.components.config import SelectedComponent, Settings
+from graspsense.core.components.roles import BatchBackend, SimulationVariant
+from graspsense.core.values.errors import ConfigError
+from graspsense.core.values.features import FeatureTable, table_of
 from graspsense.evaluation.distribution import DistributionDistance, distribution_distance
 from graspsense.evaluation.equivalence import Equivalence, equivalence
 from graspsense.experiments.recognise import TEST_SEED_OFFSET

@@ -6,9 +6,9 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from graspsense.core.errors import PluginUnavailable
-from graspsense.core.trace_plot import MATPLOTLIB_HINT
+from graspsense.core.values.errors import PluginUnavailable
 from graspsense.report.simulation import axes_of, markdown_table
+from graspsense.report.trace_plot import MATPLOTLIB_HINT
 from graspsense.report.write import write_picture
 
 if TYPE_CHECKING:

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from attrs import evolve, fields_dict, frozen
 
-from graspsense.core.errors import ConfigError
-from graspsense.core.roles import BatchBackend, Grasped, SimulationVariant
+from graspsense.core.components.roles import BatchBackend, Grasped, SimulationVariant
+from graspsense.core.values.errors import ConfigError
 from graspsense.experiments.condition import SCALES
 from graspsense.experiments.versions import measured_on
 from graspsense.report.simulation import PEAK, TRACE, SimulationTrade, VariantPoint
@@ -21,9 +21,9 @@ from graspsense.report.simulation import PEAK, TRACE, SimulationTrade, VariantPo
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from graspsense.core.config import Settings
-    from graspsense.core.features import Features
-    from graspsense.core.trace import Trace
+    from graspsense.core.components.config import Settings
+    from graspsense.core.values.features import Features
+    from graspsense.core.values.trace import Trace
 
 SCENES: Final = (
     "odwalla:full_open",

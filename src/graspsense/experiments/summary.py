@@ -8,8 +8,8 @@ from typing import Any
 
 from attrs import field, frozen
 
-from graspsense.core.errors import ConfigError
-from graspsense.core.labelled import Target
+from graspsense.core.learn.labelled import Target
+from graspsense.core.values.errors import ConfigError
 from graspsense.evaluation.confusion import Confusion
 from graspsense.evaluation.intervals import RecognitionRate
 from graspsense.evaluation.over_seeds import MeanDifference, OverSeeds, mean_difference

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from attrs import field, frozen
 
-from graspsense.core.errors import FAILURES, DataDamaged, GraspsenseError, named
-from graspsense.core.json_values import json_text
+from graspsense.core.values.errors import FAILURES, DataDamaged, GraspsenseError, named
+from graspsense.core.values.json_values import json_text
 from graspsense.evaluation.json_codec import from_json, to_json
 from graspsense.experiments.kinds import kind_of
 from graspsense.experiments.versions import versions

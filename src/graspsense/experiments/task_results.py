@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Any, Final
 
 from attrs import field, frozen
 
-from graspsense.core.labelled import Target
-from graspsense.core.tree import TreeNode
+from graspsense.core.learn.labelled import Target
+from graspsense.core.values.tree import TreeNode
 from graspsense.evaluation.confusion import Confusion, confusion
 from graspsense.evaluation.intervals import RecognitionRate
 from graspsense.evaluation.results import Measurement
 from graspsense.report.grasp_curve import GraspCurve
 
 if TYPE_CHECKING:
-    from graspsense.core.labelled import Labelled
+    from graspsense.core.learn.labelled import Labelled
 
 
 MOST_KEPT_GRASPS: Final = 1000

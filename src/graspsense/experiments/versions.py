@@ -11,7 +11,7 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Final
 
 from graspsense import __version__
-from graspsense.core.plugins import installed
+from graspsense.core.components.registry import installed
 
 _LIBRARIES: Final = ("numpy", "scipy", "scikit-learn", "numba")
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from graspsense.core.errors import ConfigError, GraspsenseError
-from graspsense.core.whole_file import write_whole
+from graspsense.core.files.whole_file import write_whole
+from graspsense.core.values.errors import ConfigError, GraspsenseError
 
 
 class SaveFailed(GraspsenseError):

@@ -13,11 +13,11 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from graspsense.core.compiled_features import CompiledExtraction, TickColumns
-from graspsense.core.contact import CONTACT_FORCE_N
-from graspsense.core.features import Features, missing
-from graspsense.core.signals import APPROACH
-from graspsense.core.trace import Trace
+from graspsense.core.components.compiled_features import CompiledExtraction, TickColumns
+from graspsense.core.control.contact import CONTACT_FORCE_N
+from graspsense.core.values.features import Features, missing
+from graspsense.core.values.signals import APPROACH
+from graspsense.core.values.trace import Trace
 
 SPAN_S: Final = 0.5
 GUARD_S: Final = 0.1

@@ -8,12 +8,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final, TypedDict
 
-from graspsense.core.labelled import ControlFeatures
-from graspsense.core.plugins import installed
+from graspsense.core.components.registry import installed
+from graspsense.core.learn.labelled import ControlFeatures
 from graspsense.recording.before_contact import SPAN_S
 
 if TYPE_CHECKING:
-    from graspsense.core.features import FeatureTable
+    from graspsense.core.values.features import FeatureTable
 
 BEFORE_CONTACT: Final = f"the first {SPAN_S:g} s of the approach: gap, velocity, effort and pad forces"
 

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from graspsense.core.channels import as_json
-from graspsense.core.csv_text import csv_text
-from graspsense.core.entries import FastChannel
-from graspsense.core.trace import PAD_COLUMNS, TICK_COLUMNS, ImageTrace
+from graspsense.core.components.channels import as_json
+from graspsense.core.files.csv_text import csv_text
+from graspsense.core.values.channel import FastChannel
+from graspsense.core.values.trace import PAD_COLUMNS, TICK_COLUMNS, ImageTrace
 from graspsense.recording.atomic_file import write_new
 from graspsense.recording.layout import SIGNAL_TOPIC, TICK_FIELDS
 from graspsense.recording.parquet import parquet

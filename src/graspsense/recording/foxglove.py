@@ -20,8 +20,8 @@ from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 
 from graspsense import __version__
-from graspsense.core.entries import TactileArray
-from graspsense.core.errors import ConfigError
+from graspsense.core.values.channel import TactileArray
+from graspsense.core.values.errors import ConfigError
 from graspsense.recording.layout import CDR_HEADER, PADS_TOPIC, SIGNAL_TOPIC
 from graspsense.recording.reader import LARGEST_RECORD
 

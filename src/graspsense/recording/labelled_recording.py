@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from attrs import field, frozen
 
-from graspsense.core.errors import GraspsenseError
+from graspsense.core.values.errors import GraspsenseError
 from graspsense.recording.replayable import Recording
 
 

@@ -17,7 +17,7 @@ from typing import Any, Final
 
 from attrs import field, frozen
 
-from graspsense.core.signals import Frame, Image, Pads, Reading, Samples
+from graspsense.core.values.signals import Frame, Image, Pads, Reading, Samples
 
 VERSION: Final = 2
 """Version of this layout, stored in the metadata record `START` of every recording."""

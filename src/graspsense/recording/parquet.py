@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Final
 
-from graspsense.core.errors import PluginUnavailable
+from graspsense.core.values.errors import PluginUnavailable
 
 PARQUET_HINT: Final = (
     'Parquet needs pyarrow.\n  in a clone: pip install -e ".[parquet]"     published: '

@@ -11,11 +11,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from graspsense import __version__
-from graspsense.core.json_values import json_text
+from graspsense.core.values.json_values import json_text
 from graspsense.recording.checkout import checkout_state
 
 if TYPE_CHECKING:
-    from graspsense.core.config import Settings
+    from graspsense.core.components.config import Settings
 
 _WITH: Final = ("numpy", "scikit-learn", "mcap")
 

@@ -13,8 +13,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Final, TypeVar
 
-from graspsense.core.errors import ConfigError, DataDamaged, GraspsenseError, TooLarge, named
-from graspsense.core.plugins.registry import STRICT_VARIABLE
+from graspsense.core.components.registry.plugins import STRICT_VARIABLE
+from graspsense.core.values.errors import ConfigError, DataDamaged, GraspsenseError, TooLarge, named
 from graspsense.recording.labelled_recording import UnreadableRecording
 from graspsense.recording.unpacked import limit_words
 

@@ -16,13 +16,13 @@ from attrs import evolve, field, frozen
 from mcap.exceptions import McapError
 from mcap.records import Channel, Chunk, DataEnd, Footer, Header, McapRecord, Message, Metadata, Schema
 
-from graspsense.core.channels import declared_shape, further, no_signals, signal_type
-from graspsense.core.entries import Channel as DeclaredChannel
-from graspsense.core.entries import FastChannel, TactileArray
-from graspsense.core.errors import ConfigError, DataDamaged, TooLarge, named
-from graspsense.core.signals import Frame, Image, Pads, Phase, Reading, Samples, no_pads
-from graspsense.core.trace import SI_UNITS, Trace, trace_of
-from graspsense.core.trial import GraspEvent, event_from_json
+from graspsense.core.components.channels import declared_shape, further, no_signals, signal_type
+from graspsense.core.values.channel import Channel as DeclaredChannel
+from graspsense.core.values.channel import FastChannel, TactileArray
+from graspsense.core.values.errors import ConfigError, DataDamaged, TooLarge, named
+from graspsense.core.values.events import GraspEvent, event_from_json
+from graspsense.core.values.signals import Frame, Image, Pads, Phase, Reading, Samples, no_pads
+from graspsense.core.values.trace import SI_UNITS, Trace, trace_of
 from graspsense.recording.layout import (
     CDR_HEADER,
     DEVICE,

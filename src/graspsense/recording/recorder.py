@@ -20,9 +20,9 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, Final
 
-from graspsense.core.json_values import json_text
-from graspsense.core.signals import Command, Reading
-from graspsense.core.trial import GraspEvent, event_as_json
+from graspsense.core.values.events import GraspEvent, event_as_json
+from graspsense.core.values.json_values import json_text
+from graspsense.core.values.signals import Command, Reading
 from graspsense.recording.atomic_file import SaveFailed
 from graspsense.recording.layout import (
     EVENT,

@@ -12,10 +12,10 @@ from typing import Any, Final
 
 from attrs import field, frozen
 
-from graspsense.core.channels import declared_shape, further, shape_of
-from graspsense.core.entries import Channel
-from graspsense.core.errors import DataDamaged
-from graspsense.core.signals import Frame, Image, Reading, Samples
+from graspsense.core.components.channels import declared_shape, further, shape_of
+from graspsense.core.values.channel import Channel
+from graspsense.core.values.errors import DataDamaged
+from graspsense.core.values.signals import Frame, Image, Reading, Samples
 
 REPLAY_NOTE: Final = "a recording cannot react: the controller's commands have no effect on it"
 

@@ -17,23 +17,23 @@ from typing import TYPE_CHECKING, Any, Final, Literal, TypeVar, get_args
 from attrs import evolve, field, frozen
 
 from graspsense import __version__
-from graspsense.core.channels import as_json, from_json, further
-from graspsense.core.config import toml_key, toml_value
-from graspsense.core.entries import Channel, TactileArray
-from graspsense.core.errors import DataDamaged
-from graspsense.core.json_values import json_text
-from graspsense.core.signals import Outcome
-from graspsense.core.toml_text import toml_values
-from graspsense.core.trial import trial_as_json
+from graspsense.core.components.channels import as_json, from_json, further
+from graspsense.core.components.config import toml_key, toml_value
+from graspsense.core.files.toml_text import toml_values
+from graspsense.core.values.channel import Channel, TactileArray
+from graspsense.core.values.errors import DataDamaged
+from graspsense.core.values.json_values import json_text
+from graspsense.core.values.signals import Outcome
+from graspsense.core.values.trial import trial_as_json
 from graspsense.recording.before_contact import before_contact, contact_force_of
 from graspsense.recording.layout import DEVICE, RESULT, START, VERSION
 from graspsense.recording.provenance import provenance
 
 if TYPE_CHECKING:
-    from graspsense.core.config import Settings
-    from graspsense.core.features import Features
-    from graspsense.core.roles import DeviceInfo
-    from graspsense.core.trial import Trial
+    from graspsense.core.components.config import Settings
+    from graspsense.core.values.device import DeviceInfo
+    from graspsense.core.values.features import Features
+    from graspsense.core.values.trial import Trial
 
 T = TypeVar("T")
 Origin = Literal["run", "collect", "import"]

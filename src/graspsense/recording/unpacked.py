@@ -17,7 +17,7 @@ import lz4.frame
 import zstandard
 from attrs import define, field
 
-from graspsense.core.errors import ConfigError, TooLarge
+from graspsense.core.values.errors import ConfigError, TooLarge
 
 LIMIT_VARIABLE: Final = "GRASPSENSE_MAX_UNPACKED_MB"
 """If this environment variable is set, it is the limit in megabytes."""

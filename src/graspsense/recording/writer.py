@@ -19,7 +19,7 @@ from typing import Final
 from mcap.writer import CompressionType, Writer
 
 from graspsense import __version__
-from graspsense.core.whole_file import sync_folder
+from graspsense.core.files.whole_file import sync_folder
 from graspsense.recording.layout import CDR_HEADER, PADS_TOPIC, PART, TICK_SCHEMA, TICK_TOPIC, Topic
 from graspsense.recording.recording_info import RecordingInfo
 

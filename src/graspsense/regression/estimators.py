@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from graspsense.core.errors import ConfigError, suggestion
-from graspsense.core.features import LARGEST_VALUE
+from graspsense.core.values.errors import ConfigError, suggestion
+from graspsense.core.values.features import LARGEST_VALUE
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

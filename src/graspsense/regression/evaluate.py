@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from attrs import frozen
 
-from graspsense.core.conformal import COVERAGE, calibrated_threshold, units_needed
-from graspsense.core.errors import ConfigError
+from graspsense.core.learn.conformal import COVERAGE, calibrated_threshold, units_needed
+from graspsense.core.values.errors import ConfigError
 from graspsense.evaluation.folds import in_order, instance_held_out, stratified
 from graspsense.evaluation.gathered_warnings import gathered_warnings
 from graspsense.evaluation.intervals import MIN_INSTANCES, rate_of
@@ -23,7 +23,7 @@ from graspsense.regression.results import IntervalCoverage, RegressionEvaluation
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from graspsense.core.labelled import ControlFeatures, Labelled
+    from graspsense.core.learn.labelled import ControlFeatures, Labelled
     from graspsense.evaluation.folds import Folds
 
 INSTANCE_HELD_OUT: Final = "instance_held_out"
@@ -89,7 +89,7 @@ def evaluate_regression(
 def interval_radius(errors: NDArray[np.float64], instances: Sequence[str] | None) -> tuple[float | None, str]:
     """Return half the width of a prediction interval that held-out errors calibrate, or None with the reason.
 
-    The unit of exchangeability is the instance, as in the prediction sets of labels (`graspsense.core.conformal`).
+    The unit of exchangeability is the instance, as in the prediction sets of labels (`graspsense.core.learn.conformal`).
     """
     unit = "trials" if instances is None else "instances"
     units = np.array([str(i) for i in range(len(errors))] if instances is None else instances)

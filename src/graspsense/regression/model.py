@@ -17,20 +17,20 @@ import numpy as np
 from attrs import frozen
 
 from graspsense import __version__
-from graspsense.core.conformal import COVERAGE
-from graspsense.core.errors import ConfigError, DataDamaged
-from graspsense.core.features import FeatureTable
-from graspsense.core.json_values import json_ready
-from graspsense.core.model import REGRESSION_FORMAT, write_json_lines
-from graspsense.core.model_content import digest, model_bytes, parsed, sealed_content
-from graspsense.core.novelty import Novelty, novelty_of
-from graspsense.core.stored_values import LARGEST_SEED, StoredValues
-from graspsense.core.target_value import TargetValue
+from graspsense.core.learn.conformal import COVERAGE
+from graspsense.core.learn.model import REGRESSION_FORMAT, write_json_lines
+from graspsense.core.learn.model_content import digest, model_bytes, parsed, sealed_content
+from graspsense.core.learn.novelty import Novelty, novelty_of
+from graspsense.core.learn.stored_values import LARGEST_SEED, StoredValues
+from graspsense.core.learn.target_value import TargetValue
+from graspsense.core.values.errors import ConfigError, DataDamaged
+from graspsense.core.values.features import FeatureTable
+from graspsense.core.values.json_values import json_ready
 from graspsense.regression.estimators import ESTIMATORS, FittedRegression
 from graspsense.regression.evaluate import held_out_folds, held_out_predictions, interval_radius
 
 if TYPE_CHECKING:
-    from graspsense.core.labelled import Labelled
+    from graspsense.core.learn.labelled import Labelled
 
 VERSION: Final = 1
 FOLDS: Final = 10

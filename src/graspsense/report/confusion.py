@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from graspsense.core.errors import PluginUnavailable
-from graspsense.core.trace_plot import MATPLOTLIB_HINT
+from graspsense.core.values.errors import PluginUnavailable
+from graspsense.report.trace_plot import MATPLOTLIB_HINT
 from graspsense.report.write import write_picture
 
 if TYPE_CHECKING:

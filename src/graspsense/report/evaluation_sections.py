@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from html import escape
 
-from graspsense.core.tree import TreeNode
+from graspsense.core.values.tree import TreeNode
 from graspsense.evaluation.confusion import Confusion
 from graspsense.evaluation.doubt import Reliability, SetCoverage
 from graspsense.evaluation.intervals import percentage

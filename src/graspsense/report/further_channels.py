@@ -7,18 +7,18 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from graspsense.core.entries import Channel, FastChannel
-from graspsense.core.trace import SampleTrace
-from graspsense.core.trace_plot import contact_time, shown_from
-from graspsense.core.units import display_unit, without_underscores
+from graspsense.core.values.channel import Channel, FastChannel
+from graspsense.core.values.trace import SampleTrace
+from graspsense.core.values.units import display_unit, without_underscores
 from graspsense.report.heat import HeatScale, heat_rows
 from graspsense.report.html import figure
+from graspsense.report.moments import contact_time, shown_from
 from graspsense.report.svg import INKS, AxisScale, Picture, number, reaching
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from graspsense.core.trace import Floats, Trace
+    from graspsense.core.values.trace import Floats, Trace
 
 INTERVALS: Final = 150
 """A curve is drawn by the least and the greatest value of so many intervals, so that no peak is lost."""

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from attrs import frozen
 
-from graspsense.core.signals import Phase
+from graspsense.core.values.signals import Phase
 
 if TYPE_CHECKING:
-    from graspsense.core.trace import Trace
+    from graspsense.core.values.trace import Trace
 
 INSTANTS: Final = 240
 """Instants kept per grasp, equally spaced in ticks. The ticks around each change of phase are kept as well."""

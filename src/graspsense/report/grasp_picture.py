@@ -6,13 +6,13 @@ from pathlib import Path
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any, Final
 
-from graspsense.core.errors import ConfigError, PluginUnavailable
-from graspsense.core.trace_plot import MATPLOTLIB_HINT, draw_trace
-from graspsense.core.units import display_unit
+from graspsense.core.values.errors import ConfigError, PluginUnavailable
+from graspsense.core.values.units import display_unit
+from graspsense.report.trace_plot import MATPLOTLIB_HINT, draw_trace
 from graspsense.report.write import write_picture
 
 if TYPE_CHECKING:
-    from graspsense.core.trial import Trial
+    from graspsense.core.values.trial import Trial
 
 DPI: Final = 120
 """Pixels per inch: the picture is 1020 pixels wide and stays readable when a page scales it to 800."""

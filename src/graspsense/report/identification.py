@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from graspsense.core.identification import repeatability
+from graspsense.core.components.identification import repeatability
 from graspsense.report.html import Page, Section, bullets, figure, panels, paragraph, table
 from graspsense.report.svg import INKS, QUIET, WIDTH, AxisScale, Picture, reaching
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from graspsense.core.identification import (
+    from graspsense.core.components.identification import (
         Identification,
         IdentifiedParameter,
         PredictiveCheck,

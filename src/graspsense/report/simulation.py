@@ -9,8 +9,8 @@ from typing import Any, Final
 
 from attrs import asdict, frozen
 
-from graspsense.core.errors import PluginUnavailable
-from graspsense.core.trace_plot import MATPLOTLIB_HINT
+from graspsense.core.values.errors import PluginUnavailable
+from graspsense.report.trace_plot import MATPLOTLIB_HINT
 from graspsense.report.write import write_picture
 
 HEADER: Final = ("METHOD", "FIDELITY", "STEP OR ACCURACY", "MS A GRASP", "SET-UP, S")

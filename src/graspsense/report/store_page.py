@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Final
 
 from attrs import frozen
 
-from graspsense.core.config import SelectedComponent, select_component
-from graspsense.core.errors import ConfigError, DataDamaged
+from graspsense.core.components.config import SelectedComponent, select_component
+from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.evaluation.evaluate import evaluate
 from graspsense.recording.labelled_recording import UnreadableRecording
 from graspsense.recording.provenance import commit_text
@@ -35,7 +35,7 @@ from graspsense.store.dataset import labelled_store
 from graspsense.store.store import Store
 
 if TYPE_CHECKING:
-    from graspsense.core.labelled import Labelled, Target
+    from graspsense.core.learn.labelled import Labelled, Target
     from graspsense.evaluation.results import Evaluation
     from graspsense.store.changes import Change
     from graspsense.store.rows import StoredTrial, TrialSummary

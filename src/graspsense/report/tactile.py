@@ -11,16 +11,16 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from attrs import frozen
 
-from graspsense.core.entries import Channel, TactileArray
-from graspsense.core.moments import images_at, moments
-from graspsense.core.trace import ImageTrace
-from graspsense.core.units import display_unit, without_underscores
+from graspsense.core.values.channel import Channel, TactileArray
+from graspsense.core.values.trace import ImageTrace
+from graspsense.core.values.units import display_unit, without_underscores
 from graspsense.report.heat import COLOURS, HeatScale
 from graspsense.report.html import figure
+from graspsense.report.moments import images_at, moments
 from graspsense.report.svg import QUIET, Picture, number
 
 if TYPE_CHECKING:
-    from graspsense.core.trace import Floats, Trace
+    from graspsense.core.values.trace import Floats, Trace
 
 GAP: Final = 14.0
 """Between two maps of a picture."""

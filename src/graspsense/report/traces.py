@@ -8,9 +8,9 @@ from typing import Final
 
 from attrs import frozen
 
-from graspsense.core.labelled import class_of
-from graspsense.core.plugins import installed
-from graspsense.core.units import display_unit, in_words, without_underscores
+from graspsense.core.components.registry import installed
+from graspsense.core.learn.labelled import class_of
+from graspsense.core.values.units import display_unit, in_words, without_underscores
 from graspsense.report.grasp_curve import GraspCurve
 from graspsense.report.html import figure, folded, panels, table
 from graspsense.report.svg import DASHES, INKS, QUIET, TEXT, AxisScale, Picture, number, reaching

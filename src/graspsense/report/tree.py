@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 from graspsense.report.html import wide
 
 if TYPE_CHECKING:
-    from graspsense.core.tree import TreeNode
+    from graspsense.core.values.tree import TreeNode
 
 MOST: Final = 400
 """Largest number of nodes that are shown; the page says so if a tree has more."""

@@ -7,11 +7,11 @@ import warnings
 from pathlib import Path
 from typing import Any
 
-from graspsense.core.errors import ConfigError
-from graspsense.core.literal_text import show_literally
-from graspsense.core.whole_file import write_whole
+from graspsense.core.files.whole_file import write_whole
+from graspsense.core.values.errors import ConfigError
 from graspsense.recording.atomic_file import write_or_replace
 from graspsense.report.html import Page
+from graspsense.report.literal_text import show_literally
 
 
 def write_html(path: Path, page: Page) -> None:

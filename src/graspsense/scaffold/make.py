@@ -16,10 +16,10 @@ from typing import Final
 from attrs import frozen
 
 from graspsense import __version__
-from graspsense.core.entries import TABLE_OF_ROLE, Role
-from graspsense.core.errors import ConfigError, suggestion
-from graspsense.core.hookspecs import API
-from graspsense.core.plugins import canonical, installed, installed_sources
+from graspsense.core.components.entries import TABLE_OF_ROLE, Role
+from graspsense.core.components.hookspecs import API
+from graspsense.core.components.registry import canonical, installed, installed_sources
+from graspsense.core.values.errors import ConfigError, suggestion
 
 
 @frozen

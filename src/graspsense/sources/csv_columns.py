@@ -18,11 +18,11 @@ from typing import Final
 
 import numpy as np
 
-from graspsense.core.csv_text import text_of_cell
-from graspsense.core.errors import ConfigError, DataDamaged, listed, suggestion
-from graspsense.core.features import FeatureTable
-from graspsense.core.limits import CELLS, COLUMNS, LINE_CHARACTERS, TEXT_BYTES
-from graspsense.core.target_value import name_and_unit
+from graspsense.core.files.csv_text import text_of_cell
+from graspsense.core.files.limits import CELLS, COLUMNS, LINE_CHARACTERS, TEXT_BYTES
+from graspsense.core.learn.target_value import name_and_unit
+from graspsense.core.values.errors import ConfigError, DataDamaged, listed, suggestion
+from graspsense.core.values.features import FeatureTable
 from graspsense.recording.readable import not_opened, refuse_devices
 
 LONGEST_NAME: Final = 500

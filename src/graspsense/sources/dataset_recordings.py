@@ -8,8 +8,14 @@ from contextlib import contextmanager
 from itertools import islice
 from typing import Final
 
-from graspsense.core.errors import ComponentFailed, ConfigError, GraspsenseError, PluginUnavailable, named
-from graspsense.core.plugins import installed
+from graspsense.core.components.registry import installed
+from graspsense.core.values.errors import (
+    ComponentFailed,
+    ConfigError,
+    GraspsenseError,
+    PluginUnavailable,
+    named,
+)
 from graspsense.recording.labelled_recording import LabelledRecording, UnreadableRecording
 from graspsense.recording.readable import is_mistake, readable
 from graspsense.recording.replayable import Recording, check_recording

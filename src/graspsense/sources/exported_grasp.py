@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from graspsense.core.channels import from_json, further, signal_type
-from graspsense.core.entries import Channel, FastChannel, TactileArray
-from graspsense.core.signals import Frame, Image, Pads, Reading, no_pads
+from graspsense.core.components.channels import from_json, further, signal_type
+from graspsense.core.values.channel import Channel, FastChannel, TactileArray
+from graspsense.core.values.signals import Frame, Image, Pads, Reading, no_pads
 from graspsense.recording.readable import readable
 from graspsense.recording.replayable import REPLAY_NOTE, Recording
 from graspsense.sources.exported_grasp_tables import (

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from graspsense.core.channels import from_json, further
-from graspsense.core.csv_text import text_of_cell
-from graspsense.core.entries import Channel, FastChannel, TactileArray
-from graspsense.core.errors import ConfigError, DataDamaged
-from graspsense.core.limits import CELLS, CHANNEL_NUMBERS
+from graspsense.core.components.channels import from_json, further
+from graspsense.core.files.csv_text import text_of_cell
+from graspsense.core.files.limits import CELLS, CHANNEL_NUMBERS
+from graspsense.core.values.channel import Channel, FastChannel, TactileArray
+from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.recording.export_trace import beside, declared_beside
 from graspsense.recording.layout import PADS_TOPIC, SCALARS_TOPIC, SIGNAL_TOPIC, TICK_FIELDS
 from graspsense.sources.csv_columns import check_columns, check_lines, text_of

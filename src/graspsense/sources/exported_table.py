@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from attrs import evolve
 
-from graspsense.core.errors import DataDamaged
+from graspsense.core.values.errors import DataDamaged
 from graspsense.sources.csv_columns import CsvColumns, is_missing
 from graspsense.store.export_table import ABOUT, ABOUT_BEFORE, BEFORE, FIRST, VALUE
 from graspsense.store.store import NOT_ENDED
 from graspsense.store.time_recorded import order_recorded
 
 if TYPE_CHECKING:
-    from graspsense.core.features import FeatureTable
+    from graspsense.core.values.features import FeatureTable
 
 
 class ExportedTable:

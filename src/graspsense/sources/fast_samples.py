@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from graspsense.core.signals import Samples
+from graspsense.core.values.signals import Samples
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from graspsense.core.entries import FastChannel
+    from graspsense.core.values.channel import FastChannel
 
 
 def sample_blocks(

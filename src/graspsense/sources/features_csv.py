@@ -12,11 +12,11 @@ from pathlib import Path
 
 import numpy as np
 
-from graspsense.core.csv_text import csv_text
-from graspsense.core.errors import ConfigError, DataDamaged, listed
-from graspsense.core.features import UNKNOWN, FeatureTable
-from graspsense.core.labelled import Labelled
-from graspsense.core.target_value import TargetValue
+from graspsense.core.files.csv_text import csv_text
+from graspsense.core.learn.labelled import Labelled
+from graspsense.core.learn.target_value import TargetValue
+from graspsense.core.values.errors import ConfigError, DataDamaged, listed
+from graspsense.core.values.features import UNKNOWN, FeatureTable
 from graspsense.recording.atomic_file import write_or_replace
 from graspsense.recording.controls import Controls, controls
 from graspsense.sources.csv_columns import CsvColumns, is_missing

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from attrs import evolve, field, frozen
 
-from graspsense.core.channels import signal_type
-from graspsense.core.entries import Channel, FastChannel, TactileArray
-from graspsense.core.errors import DataDamaged
-from graspsense.core.signals import NO_PADS, Frame, Image, Reading, Samples
+from graspsense.core.components.channels import signal_type
+from graspsense.core.values.channel import Channel, FastChannel, TactileArray
+from graspsense.core.values.errors import DataDamaged
+from graspsense.core.values.signals import NO_PADS, Frame, Image, Reading, Samples
 from graspsense.recording.replayable import Recording
 
 if TYPE_CHECKING:

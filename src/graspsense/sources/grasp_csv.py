@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Final
 from urllib.parse import parse_qsl, urlencode
 
-from graspsense.core.errors import ConfigError, DataDamaged, suggestion
+from graspsense.core.values.errors import ConfigError, DataDamaged, suggestion
 from graspsense.recording.replayable import Recording
 from graspsense.sources.exported_grasp_tables import header_of, refuse_table_of_store
 from graspsense.sources.grasp_columns import checked_recording

@@ -22,8 +22,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from attrs import frozen
 
-from graspsense.core.errors import ConfigError, DataDamaged, suggestion
-from graspsense.core.signals import NO_PADS, Frame, Reading
+from graspsense.core.values.errors import ConfigError, DataDamaged, suggestion
+from graspsense.core.values.signals import NO_PADS, Frame, Reading
 from graspsense.recording.readable import not_opened
 from graspsense.recording.replayable import Recording
 

@@ -16,12 +16,12 @@ from typing import Any, Final
 
 import numpy as np
 
-from graspsense.core.errors import ConfigError, DataDamaged
-from graspsense.core.features import FeatureTable, table_of
-from graspsense.core.labelled import ControlFeatures, Labelled
-from graspsense.core.roles import FeatureSet
-from graspsense.core.signals import APPROACH
-from graspsense.core.trace import SI_UNITS, Trace, trace_of
+from graspsense.core.components.roles import FeatureSet
+from graspsense.core.learn.labelled import ControlFeatures, Labelled
+from graspsense.core.values.errors import ConfigError, DataDamaged
+from graspsense.core.values.features import FeatureTable, table_of
+from graspsense.core.values.signals import APPROACH
+from graspsense.core.values.trace import SI_UNITS, Trace, trace_of
 from graspsense.recording.controls import controls
 from graspsense.recording.labelled_recording import LabelledRecording, UnreadableRecording
 from graspsense.recording.readable import each_readable, error_of_all, note_on

@@ -11,8 +11,8 @@ from typing import Any, Final
 
 from attrs import frozen
 
-from graspsense.core.errors import ConfigError
-from graspsense.core.layers import Flag, read_toml
+from graspsense.core.components.layers import Flag, read_toml
+from graspsense.core.values.errors import ConfigError
 
 IDENTIFIED: Final = "identified:"
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from attrs import frozen
 
-from graspsense.core.channels import further
+from graspsense.core.components.channels import further
 from graspsense.recording.labelled_recording import LabelledRecording
 
 

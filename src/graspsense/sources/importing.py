@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 from attrs import evolve
 
-from graspsense.core.labelled import class_of
-from graspsense.core.pipeline import grasp_with
-from graspsense.core.signals import APPROACH, Reading
+from graspsense.core.learn.labelled import class_of
+from graspsense.core.pipeline.pipeline import grasp_with
+from graspsense.core.values.signals import APPROACH, Reading
 from graspsense.recording.atomic_file import SaveFailed
 from graspsense.recording.layout import DEVICE, RESULT, START, TICK, pads_numbers, pads_topic, signal_topics
 from graspsense.recording.replayable import content_sha256
@@ -20,9 +20,9 @@ from graspsense.recording.writer import RecordingWriter
 from graspsense.store.imported_contents import CONTENT, ImportedContents
 
 if TYPE_CHECKING:
-    from graspsense.core.config import Settings
-    from graspsense.core.plugins import Plugins
-    from graspsense.core.trial import Trial
+    from graspsense.core.components.config import Settings
+    from graspsense.core.components.registry import Plugins
+    from graspsense.core.values.trial import Trial
     from graspsense.recording.labelled_recording import LabelledRecording
     from graspsense.recording.replayable import Recording
     from graspsense.store.store import Store

@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from graspsense.core.errors import ComponentFailed, ConfigError, GraspsenseError, named
-from graspsense.core.features import Features, FeatureTable, table_of
-from graspsense.core.labelled import Labelled, class_of
-from graspsense.core.roles import FeatureSet
-from graspsense.core.signals import APPROACH
-from graspsense.core.trace import SI_UNITS, Trace, trace_of
+from graspsense.core.components.roles import FeatureSet
+from graspsense.core.learn.labelled import Labelled, class_of
+from graspsense.core.values.errors import ComponentFailed, ConfigError, GraspsenseError, named
+from graspsense.core.values.features import Features, FeatureTable, table_of
+from graspsense.core.values.signals import APPROACH
+from graspsense.core.values.trace import SI_UNITS, Trace, trace_of
 from graspsense.recording.before_contact import before_contact
 from graspsense.recording.controls import controls
 from graspsense.recording.labelled_recording import LabelledRecording, UnreadableRecording

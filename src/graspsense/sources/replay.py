@@ -11,12 +11,13 @@ from typing import Final, final
 from attrs import Attribute, frozen
 from attrs.validators import and_, instance_of
 
-from graspsense.core.entries import KINDS as COMMAND_KINDS
-from graspsense.core.entries import Channel
-from graspsense.core.errors import DeviceLost, GraspsenseError, RecordingEnded, suggestion
-from graspsense.core.roles import DeviceInfo, SensorBackend
-from graspsense.core.setting import NAMES_INPUT, setting
-from graspsense.core.signals import CHANNELS, EFFORT, Command, Pads, Reading
+from graspsense.core.components.entries import KINDS as COMMAND_KINDS
+from graspsense.core.components.roles import SensorBackend
+from graspsense.core.components.setting import NAMES_INPUT, setting
+from graspsense.core.values.channel import Channel
+from graspsense.core.values.device import DeviceInfo
+from graspsense.core.values.errors import DeviceLost, GraspsenseError, RecordingEnded, suggestion
+from graspsense.core.values.signals import CHANNELS, EFFORT, Command, Pads, Reading
 from graspsense.recording.readable import readable
 from graspsense.recording.replayable import Recording, check_recording
 from graspsense.sources.dataset_recordings import (

@@ -18,7 +18,7 @@ from urllib.parse import quote
 
 from attrs import field, frozen
 
-from graspsense.core.errors import DataDamaged, PluginUnavailable
+from graspsense.core.values.errors import DataDamaged, PluginUnavailable
 from graspsense.recording.readable import readable, refuse_devices
 from graspsense.recording.unpacked import Unpacked
 

@@ -27,11 +27,11 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from graspsense.core.calibration import Cells, edge_force, masked, pad_force, tare, zero_of
-from graspsense.core.channels import signal_type
-from graspsense.core.entries import Channel, FastChannel
-from graspsense.core.errors import ConfigError, DataDamaged, TareRefused
-from graspsense.core.signals import Frame, Pads, Reading, no_pads
+from graspsense.core.components.channels import signal_type
+from graspsense.core.grasp.calibration import Cells, edge_force, masked, pad_force, tare, zero_of
+from graspsense.core.values.channel import Channel, FastChannel
+from graspsense.core.values.errors import ConfigError, DataDamaged, TareRefused
+from graspsense.core.values.signals import Frame, Pads, Reading, no_pads
 from graspsense.recording.readable import readable
 from graspsense.recording.replayable import Recording
 from graspsense.recording.unpacked import Unpacked

@@ -16,16 +16,17 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 from attrs import Attribute, evolve, field, frozen
 
-from graspsense.core.checkpoints import with_checkpoints
-from graspsense.core.compiled_features import CompiledExtraction, both, compiled_extraction
-from graspsense.core.errors import ComponentFailed, ConfigError, named
-from graspsense.core.features import FeatureRows, Features
-from graspsense.core.labelled import Labelled, class_of
-from graspsense.core.limits import CLASSES
-from graspsense.core.roles import BatchBackend, DeviceInfo, FeatureSet
-from graspsense.core.runner import run_uninterrupted
-from graspsense.core.strict import plain
-from graspsense.core.wiring import check
+from graspsense.core.components.compiled_features import CompiledExtraction, both, compiled_extraction
+from graspsense.core.components.roles import BatchBackend, FeatureSet
+from graspsense.core.components.strict import plain
+from graspsense.core.files.limits import CLASSES
+from graspsense.core.grasp.runner import run_uninterrupted
+from graspsense.core.learn.checkpoints import with_checkpoints
+from graspsense.core.learn.labelled import Labelled, class_of
+from graspsense.core.pipeline.wiring import check
+from graspsense.core.values.device import DeviceInfo
+from graspsense.core.values.errors import ComponentFailed, ConfigError, named
+from graspsense.core.values.features import FeatureRows, Features
 from graspsense.recording.before_contact import (
     before_contact,
     before_contact_compiled,
@@ -34,9 +35,9 @@ from graspsense.recording.before_contact import (
 from graspsense.recording.controls import controls
 
 if TYPE_CHECKING:
-    from graspsense.core.config import Settings
-    from graspsense.core.roles import ObjectKind
-    from graspsense.core.trace import Trace
+    from graspsense.core.components.config import Settings
+    from graspsense.core.components.roles import ObjectKind
+    from graspsense.core.values.trace import Trace
 
 OBJECTS_PER_SEED: Final = 1000
 TRIALS_PER_SEED: Final = 1_000_000

@@ -7,10 +7,10 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from graspsense.core.errors import ConfigError, suggestion
-from graspsense.core.identification import RecordedSqueeze
-from graspsense.core.labelled import class_of
-from graspsense.core.layers import read_toml
+from graspsense.core.components.identification import RecordedSqueeze
+from graspsense.core.components.layers import read_toml
+from graspsense.core.learn.labelled import class_of
+from graspsense.core.values.errors import ConfigError, suggestion
 
 if TYPE_CHECKING:
     from graspsense.recording.reader import RecordedGrasp

@@ -9,17 +9,17 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 from attrs import evolve, fields_dict, frozen
 
-from graspsense.core.checkpoints import with_checkpoints
-from graspsense.core.errors import ConfigError, PluginUnavailable
-from graspsense.core.labelled import Labelled
-from graspsense.core.strict import ValidationFailed, structured
+from graspsense.core.components.strict import ValidationFailed, structured
+from graspsense.core.learn.checkpoints import with_checkpoints
+from graspsense.core.learn.labelled import Labelled
+from graspsense.core.values.errors import ConfigError, PluginUnavailable
 from graspsense.sources.identified import IDENTIFIED, gripper_flags, identified_scenes
 from graspsense.sources.simulated import Group, simulated
 
 if TYPE_CHECKING:
-    from graspsense.core.config import Settings
-    from graspsense.core.roles import FeatureSet
-    from graspsense.core.trace import Trace
+    from graspsense.core.components.config import Settings
+    from graspsense.core.components.roles import FeatureSet
+    from graspsense.core.values.trace import Trace
 
 SIMULATED: Final = "simulated"
 STORE: Final = "store:"
@@ -75,7 +75,7 @@ def load_trials(
     features; `keys` are the further fields of `TrialSource`, such as `label` or `objects`. Raises ConfigError,
     DataDamaged.
     """
-    from graspsense.core.config import resolve
+    from graspsense.core.components.config import resolve
 
     try:
         described = structured({**keys, "source": source}, TrialSource, source)
@@ -192,7 +192,7 @@ def _csv(source: TrialSource) -> Labelled:
 
 
 def _data_set(source: TrialSource, features: FeatureSet[Any]) -> Labelled:
-    from graspsense.core.plugins import installed
+    from graspsense.core.components.registry import installed
 
     name, _, folder = source.source.partition(":")
     if not folder:

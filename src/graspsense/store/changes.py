@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 from attrs import asdict, evolve, fields_dict, frozen
 
-from graspsense.core.errors import ConfigError
-from graspsense.core.target_value import name_and_unit
+from graspsense.core.learn.target_value import name_and_unit
+from graspsense.core.values.errors import ConfigError
 from graspsense.store.labels import word_of
 from graspsense.store.opening import damaged, decoded
 

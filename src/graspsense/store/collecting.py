@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Final
 
 from attrs import define, field, frozen
 
-from graspsense.core.errors import ConfigError, NoDevice
-from graspsense.core.signals import Outcome
+from graspsense.core.values.errors import ConfigError, NoDevice
+from graspsense.core.values.signals import Outcome
 from graspsense.recording.atomic_file import SaveFailed
 from graspsense.store.changes import set_aside
 from graspsense.store.comparable import check_device, check_settings, newest_grasp
@@ -24,11 +24,11 @@ from graspsense.store.rows import StoredTrial
 from graspsense.store.store import Store
 
 if TYPE_CHECKING:
-    from graspsense.core.config import Settings
-    from graspsense.core.plugins import Plugins
-    from graspsense.core.roles import DeviceInfo
-    from graspsense.core.runner import Sink
-    from graspsense.core.trial import Trial
+    from graspsense.core.components.config import Settings
+    from graspsense.core.components.registry import Plugins
+    from graspsense.core.grasp.runner import Sink
+    from graspsense.core.values.device import DeviceInfo
+    from graspsense.core.values.trial import Trial
 
 HELP: Final = (
     "keys: Enter grasps it, u undoes the last trial, r repeats the last trial, s skips this object, q stops, ? shows "

@@ -9,14 +9,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Final
 
-from graspsense.core.errors import ConfigError
-from graspsense.core.setting import CHANGES_NO_RESULT, settings_marked
+from graspsense.core.components.setting import CHANGES_NO_RESULT, settings_marked
+from graspsense.core.values.errors import ConfigError
 from graspsense.recording.provenance import recipe
 from graspsense.recording.trial_record import DeviceRecord, without_none
 
 if TYPE_CHECKING:
-    from graspsense.core.config import Settings
-    from graspsense.core.roles import DeviceInfo
+    from graspsense.core.components.config import Settings
+    from graspsense.core.values.device import DeviceInfo
     from graspsense.store.rows import StoredTrial
     from graspsense.store.store import Store
 

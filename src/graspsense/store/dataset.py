@@ -16,12 +16,12 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from attrs import evolve, fields_dict, frozen
 
-from graspsense.core.config import Flag
-from graspsense.core.errors import ConfigError, DataDamaged
-from graspsense.core.features import FeatureTable
-from graspsense.core.labelled import Labelled
-from graspsense.core.strict import plain
-from graspsense.core.target_value import TargetValue, values_of_labels
+from graspsense.core.components.config import Flag
+from graspsense.core.components.strict import plain
+from graspsense.core.learn.labelled import Labelled
+from graspsense.core.learn.target_value import TargetValue, values_of_labels
+from graspsense.core.values.errors import ConfigError, DataDamaged
+from graspsense.core.values.features import FeatureTable
 from graspsense.recording.controls import controls
 from graspsense.recording.provenance import recipe
 from graspsense.recording.readable import note_on, readable
@@ -37,7 +37,7 @@ from graspsense.store.time_recorded import order_recorded
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from graspsense.core.roles import FeatureSet
+    from graspsense.core.components.roles import FeatureSet
 
 Progress = Callable[[int, int], None]
 

@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, Any, Final
 
 from attrs import evolve, frozen
 
-from graspsense.core.checkpoints import with_checkpoints
-from graspsense.core.config import NONE, Flag, Settings, resolve, without_followers
-from graspsense.core.errors import ComponentFailed, ConfigError, DataDamaged, named
-from graspsense.core.layers import Layer
-from graspsense.core.runner import run_uninterrupted
-from graspsense.core.wiring import check
+from graspsense.core.components.config import NONE, Flag, Settings, resolve, without_followers
+from graspsense.core.components.layers import Layer
+from graspsense.core.grasp.runner import run_uninterrupted
+from graspsense.core.learn.checkpoints import with_checkpoints
+from graspsense.core.pipeline.wiring import check
+from graspsense.core.values.errors import ComponentFailed, ConfigError, DataDamaged, named
 from graspsense.recording.before_contact import before_contact, contact_force_of
 from graspsense.recording.labelled_recording import UnreadableRecording
 from graspsense.recording.readable import error_of_all, readable

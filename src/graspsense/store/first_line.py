@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from graspsense.core.errors import ConfigError, DataDamaged
-from graspsense.core.features import FeatureTable
-from graspsense.core.signals import CHANNELS, Frame
+from graspsense.core.values.errors import ConfigError, DataDamaged
+from graspsense.core.values.features import FeatureTable
+from graspsense.core.values.signals import CHANNELS, Frame
 from graspsense.recording.reader import read_first_frame
 
 if TYPE_CHECKING:

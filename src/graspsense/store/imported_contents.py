@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from typing import Final
 
-from graspsense.core.errors import ConfigError, DataDamaged
+from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.recording.reader import read_recorded
 from graspsense.recording.replayable import content_sha256
 from graspsense.store.store import Store

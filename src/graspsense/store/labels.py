@@ -5,11 +5,11 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Final
 
-from graspsense.core.errors import ConfigError
-from graspsense.core.features import UNKNOWN
+from graspsense.core.values.errors import ConfigError
+from graspsense.core.values.features import UNKNOWN
 
 if TYPE_CHECKING:
-    from graspsense.core.config import Settings
+    from graspsense.core.components.config import Settings
 
 _WORD: Final = re.compile(r"(?P<kind>[^\s:#,]+)(?P<state>:[^\s:#,]+)?(?P<number>#[^\s:#,]+)?")
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 from attrs import evolve, frozen
 
-from graspsense.core.interrupts import Interrupts
-from graspsense.core.pipeline import GraspInterrupted, grasp_with
+from graspsense.core.grasp.interrupts import Interrupts
+from graspsense.core.pipeline.pipeline import GraspInterrupted, grasp_with
 from graspsense.recording.atomic_file import SaveFailed
 from graspsense.recording.layout import DEVICE, RESULT, START
 from graspsense.recording.recorder import Recorder
@@ -16,11 +16,11 @@ from graspsense.recording.trial_record import Origin, TrialRecord
 from graspsense.store.store import Store
 
 if TYPE_CHECKING:
-    from graspsense.core.config import Settings
-    from graspsense.core.plugins import Plugins
-    from graspsense.core.roles import DeviceInfo
-    from graspsense.core.runner import Sink
-    from graspsense.core.trial import Trial
+    from graspsense.core.components.config import Settings
+    from graspsense.core.components.registry import Plugins
+    from graspsense.core.grasp.runner import Sink
+    from graspsense.core.values.device import DeviceInfo
+    from graspsense.core.values.trial import Trial
 
 
 @frozen(kw_only=True, eq=False)

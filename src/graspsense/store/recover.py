@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 from attrs import asdict, evolve, frozen
 
-from graspsense.core.config import build
-from graspsense.core.errors import FAILURES, ConfigError, DataDamaged, GraspsenseError
-from graspsense.core.features import Features
-from graspsense.core.plugins import installed
+from graspsense.core.components.config import build
+from graspsense.core.components.registry import installed
+from graspsense.core.values.errors import FAILURES, ConfigError, DataDamaged, GraspsenseError
+from graspsense.core.values.features import Features
 from graspsense.recording.atomic_file import SaveFailed
 from graspsense.recording.before_contact import before_contact, contact_force_of
 from graspsense.recording.layout import DEVICE, PART, START, TICK
@@ -29,7 +29,7 @@ from graspsense.store.opening import damaged
 from graspsense.store.store import Store, integrity
 
 if TYPE_CHECKING:
-    from graspsense.core.trace import Trace
+    from graspsense.core.values.trace import Trace
 
 CUT: Final = ".cut"
 RECOVERED: Final = "-recovered.mcap"

@@ -9,8 +9,8 @@ from typing import Any, Final
 
 from attrs import asdict, evolve, fields_dict, frozen
 
-from graspsense.core.errors import ConfigError
-from graspsense.core.json_values import json_text
+from graspsense.core.values.errors import ConfigError
+from graspsense.core.values.json_values import json_text
 from graspsense.recording.layout import DEVICE, START
 from graspsense.recording.provenance import recipe
 from graspsense.recording.recording_info import RecordingInfo

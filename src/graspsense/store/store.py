@@ -19,7 +19,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Final
 
-from graspsense.core.errors import ConfigError, DataDamaged, named
+from graspsense.core.values.errors import ConfigError, DataDamaged, named
 from graspsense.recording.atomic_file import SaveFailed
 from graspsense.recording.recording_info import RecordingInfo
 from graspsense.recording.trial_record import TrialRecord

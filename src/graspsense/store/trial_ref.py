@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from graspsense.core.config import NONE, without_followers
-from graspsense.core.errors import ConfigError, DataDamaged
-from graspsense.core.layers import Layer
+from graspsense.core.components.config import NONE, without_followers
+from graspsense.core.components.layers import Layer
+from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.recording.reader import RecordedGrasp, read_recorded
 from graspsense.recording.replayable import Recording
 from graspsense.store.store import Store

@@ -9,7 +9,7 @@ from typing import Any
 
 from attrs import frozen
 
-from graspsense.core.errors import DataDamaged, GraspsenseError
+from graspsense.core.values.errors import DataDamaged, GraspsenseError
 from graspsense.recording.layout import PART
 from graspsense.recording.reader import read_recorded
 from graspsense.store.changes import inconsistencies

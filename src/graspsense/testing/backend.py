@@ -10,15 +10,16 @@ from math import inf, isfinite, isnan, nan
 from statistics import fmean, median
 from typing import Any, Final
 
-from graspsense.core.channels import further, no_signals, shape_of
-from graspsense.core.config import create
-from graspsense.core.entries import KINDS, Channel, FastChannel, TactileArray
-from graspsense.core.errors import DeviceLost, NoDevice, RecordingEnded, TareRefused, named
-from graspsense.core.guard import GuardState, guard
-from graspsense.core.roles import SensorBackend
-from graspsense.core.run_config import RunConfig
-from graspsense.core.runner import run_uninterrupted
-from graspsense.core.signals import (
+from graspsense.core.components.channels import further, no_signals, shape_of
+from graspsense.core.components.config import create
+from graspsense.core.components.entries import KINDS
+from graspsense.core.components.roles import SensorBackend
+from graspsense.core.components.run_config import RunConfig
+from graspsense.core.control.guard import GuardState, guard
+from graspsense.core.grasp.runner import run_uninterrupted
+from graspsense.core.values.channel import Channel, FastChannel, TactileArray
+from graspsense.core.values.errors import DeviceLost, NoDevice, RecordingEnded, TareRefused, named
+from graspsense.core.values.signals import (
     CHANNELS,
     EFFORT,
     FORCE,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 from attrs import define, field, frozen
 
-from graspsense.core.errors import FAILURES, GraspsenseError, named
+from graspsense.core.values.errors import FAILURES, GraspsenseError, named
 
 if TYPE_CHECKING:
     from graspsense.testing.subject import Subject

@@ -11,8 +11,8 @@ from typing import Any, Final
 import numpy as np
 from attrs import evolve
 
-from graspsense.core.errors import DataDamaged, named
-from graspsense.core.features import FeatureTable, Prediction
+from graspsense.core.values.errors import DataDamaged, named
+from graspsense.core.values.features import FeatureTable, Prediction
 from graspsense.testing import component
 from graspsense.testing.checks import CheckFailed, checks_of, demand
 from graspsense.testing.damage import damaged_at, paths

@@ -7,9 +7,9 @@ from typing import Any, ClassVar, Final
 
 from attrs import define, field
 
-from graspsense.core.errors import PluginUnavailable, UnknownName
-from graspsense.core.plugins import Component, Plugins, installed
-from graspsense.core.strict import keys_of
+from graspsense.core.components.registry import Component, Plugins, installed
+from graspsense.core.components.strict import keys_of
+from graspsense.core.values.errors import PluginUnavailable, UnknownName
 from graspsense.testing import backend, classifier, controller, features, package
 from graspsense.testing.checks import Check, ConformanceReport, Result, outcome_of
 from graspsense.testing.subject import Package, Subject, package_of

@@ -8,13 +8,14 @@ from collections.abc import Iterator, Sequence
 from math import inf, isfinite, isinf, nan
 from typing import Any, Final, NamedTuple, get_type_hints
 
-from graspsense.core.channels import further, no_signals
-from graspsense.core.entries import KINDS, Channel
-from graspsense.core.errors import named
-from graspsense.core.free_motion import FreeMotion, free_motion_of
-from graspsense.core.run_config import RunConfig
-from graspsense.core.runner import run_uninterrupted
-from graspsense.core.signals import (
+from graspsense.core.components.channels import further, no_signals
+from graspsense.core.components.entries import KINDS
+from graspsense.core.components.run_config import RunConfig
+from graspsense.core.control.free_motion import FreeMotion, free_motion_of
+from graspsense.core.grasp.runner import run_uninterrupted
+from graspsense.core.values.channel import Channel
+from graspsense.core.values.errors import named
+from graspsense.core.values.signals import (
     APPROACH,
     EFFORT,
     HOLD,

@@ -9,11 +9,11 @@ from typing import Final
 import numpy as np
 from attrs import evolve
 
-from graspsense.core.compiled_features import columns_of_ticks, compiled_extraction
-from graspsense.core.errors import named
-from graspsense.core.features import Features
-from graspsense.core.signals import Phase
-from graspsense.core.trace import Trace
+from graspsense.core.components.compiled_features import columns_of_ticks, compiled_extraction
+from graspsense.core.values.errors import named
+from graspsense.core.values.features import Features
+from graspsense.core.values.signals import Phase
+from graspsense.core.values.trace import Trace
 from graspsense.testing import component
 from graspsense.testing.checks import CheckFailed, checks_of, demand
 from graspsense.testing.samples import (

@@ -5,10 +5,10 @@ from __future__ import annotations
 from math import inf
 from typing import Final, NamedTuple
 
-from graspsense.core.contact import RestState, at_rest, update_rest
-from graspsense.core.entries import KINDS
-from graspsense.core.roles import Controller
-from graspsense.core.signals import (
+from graspsense.core.components.entries import KINDS
+from graspsense.core.components.roles import Controller
+from graspsense.core.control.contact import RestState, at_rest, update_rest
+from graspsense.core.values.signals import (
     APPROACH,
     EFFORT,
     FORCE,

@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 from math import inf, nan
 from typing import Any, Final, NamedTuple
 
-from graspsense.core.roles import Controller
-from graspsense.core.signals import (
+from graspsense.core.components.roles import Controller
+from graspsense.core.values.signals import (
     APPROACH,
     EFFORT,
     FORCE,

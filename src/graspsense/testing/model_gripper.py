@@ -6,10 +6,11 @@ from collections.abc import Sequence
 from math import inf, nan
 from typing import TYPE_CHECKING, Any, Final
 
-from graspsense.core.channels import declared_shape, further, no_signals
-from graspsense.core.entries import Channel, FastChannel, TactileArray
-from graspsense.core.roles import Controller, DeviceInfo, SensorBackend
-from graspsense.core.signals import (
+from graspsense.core.components.channels import declared_shape, further, no_signals
+from graspsense.core.components.roles import Controller, SensorBackend
+from graspsense.core.values.channel import Channel, FastChannel, TactileArray
+from graspsense.core.values.device import DeviceInfo
+from graspsense.core.values.signals import (
     EFFORT,
     FORCE,
     POSITION,
@@ -24,7 +25,7 @@ from graspsense.core.signals import (
 )
 
 if TYPE_CHECKING:
-    from graspsense.core.runner import Grasp
+    from graspsense.core.grasp.runner import Grasp
 
 DT_S: Final = 1e-3
 OPEN_M: Final = 0.08
@@ -170,8 +171,8 @@ def drive(controller: Controller[Any], gripper: SensorBackend[Any]) -> Grasp:
     >>> drive(create("controller", "hybrid"), model_gripper(channels, "a soft object")).outcome.words
     'steady'
     """
-    from graspsense.core.run_config import RunConfig
-    from graspsense.core.runner import run_uninterrupted
+    from graspsense.core.components.run_config import RunConfig
+    from graspsense.core.grasp.runner import run_uninterrupted
 
     return run_uninterrupted(gripper, controller, RunConfig())
 

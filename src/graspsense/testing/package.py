@@ -19,17 +19,17 @@ from pathlib import Path
 from typing import Any, Final
 from urllib.parse import unquote, urlparse
 
-from graspsense.core.config import resolve
-from graspsense.core.entries import (
+from graspsense.core.components.config import resolve
+from graspsense.core.components.entries import (
     CommandEntry,
     ConformanceCheckEntry,
     DatasetEntry,
     ModelEntry,
     PipelineEntry,
 )
-from graspsense.core.errors import GraspsenseError, named
-from graspsense.core.plugins import SLOW_IMPORT_S, Resource
-from graspsense.core.wiring import check as check_wiring
+from graspsense.core.components.registry import SLOW_IMPORT_S, Resource
+from graspsense.core.pipeline.wiring import check as check_wiring
+from graspsense.core.values.errors import GraspsenseError, named
 from graspsense.testing.checks import Check, CheckFailed, CheckSkipped, checks_of, demand
 from graspsense.testing.component import ADVICE_ON_IMPORTS
 from graspsense.testing.samples import a_trial, an_event
@@ -63,7 +63,7 @@ def plugin_modules_are_light(package: Package) -> None:
     """Listing it imports neither numpy nor a driver, and takes no noticeable time."""
     code = (
         "import json, sys\n"
-        "import graspsense.core.plugins as p\n"
+        "import graspsense.core.components.registry as p\n"
         "found = p.installed()\n"
         "mine = [s for s in found.statuses if s.distribution == sys.argv[1]]\n"
         "took = max([s.import_s for s in mine] or [0.0])\n"

@@ -6,14 +6,16 @@ from collections.abc import Sequence
 from math import isfinite, nan
 from typing import Any, Final
 
-from graspsense.core.contact import CONTACT_FORCE_N
-from graspsense.core.entries import KINDS, Channel
-from graspsense.core.protection.effort_ceiling import effort_ceiling_n
-from graspsense.core.protection.touch import MOST_S
-from graspsense.core.roles import Controller, DeviceInfo, SensorBackend
-from graspsense.core.run_config import RunConfig
-from graspsense.core.runner import Grasp, run_grasp
-from graspsense.core.signals import EFFORT, FORCE, Command, Outcome, Pads, Reading
+from graspsense.core.components.entries import KINDS
+from graspsense.core.components.roles import Controller, SensorBackend
+from graspsense.core.components.run_config import RunConfig
+from graspsense.core.control.contact import CONTACT_FORCE_N
+from graspsense.core.grasp.protection.effort_ceiling import effort_ceiling_n
+from graspsense.core.grasp.protection.touch import MOST_S
+from graspsense.core.grasp.runner import Grasp, run_grasp
+from graspsense.core.values.channel import Channel
+from graspsense.core.values.device import DeviceInfo
+from graspsense.core.values.signals import EFFORT, FORCE, Command, Outcome, Pads, Reading
 from graspsense.testing.checks import CheckSkipped, demand
 from graspsense.testing.gentle import GentleController, kind_of
 from graspsense.testing.hostile import HOSTILE

@@ -10,14 +10,15 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from attrs import evolve, fields
 
-from graspsense.core.channels import further
-from graspsense.core.entries import Channel, FastChannel, TactileArray
-from graspsense.core.features import Features, FeatureTable
-from graspsense.core.roles import DeviceInfo
-from graspsense.core.signals import EFFORT, Command, Outcome, Pads, Phase
-from graspsense.core.signals import Frame as _Frame
-from graspsense.core.trace import PAD_COLUMNS, ImageTrace, SampleTrace, SignalTrace, Trace, trace_of
-from graspsense.core.trial import GraspEvent, RunInfo, Trial
+from graspsense.core.components.channels import further
+from graspsense.core.values.channel import Channel, FastChannel, TactileArray
+from graspsense.core.values.device import DeviceInfo
+from graspsense.core.values.events import GraspEvent
+from graspsense.core.values.features import Features, FeatureTable
+from graspsense.core.values.signals import EFFORT, Command, Outcome, Pads, Phase
+from graspsense.core.values.signals import Frame as _Frame
+from graspsense.core.values.trace import PAD_COLUMNS, ImageTrace, SampleTrace, SignalTrace, Trace, trace_of
+from graspsense.core.values.trial import RunInfo, Trial
 from graspsense.testing.model_gripper import CELLS, FIRST_PAD_CELL
 
 if TYPE_CHECKING:

@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Any, Final
 
 from attrs import define, field
 
-from graspsense.core.contact import CONTACT_FORCE_N
-from graspsense.core.errors import GraspsenseError, RecordingEnded
-from graspsense.core.garbage_collection import no_collection
-from graspsense.core.guard import GuardParams, GuardState, guard
-from graspsense.core.roles import DeviceInfo, SensorBackend
-from graspsense.core.signals import Command, Frame, Pads, Reading
+from graspsense.core.components.roles import SensorBackend
+from graspsense.core.control.contact import CONTACT_FORCE_N
+from graspsense.core.control.garbage_collection import no_collection
+from graspsense.core.control.guard import GuardParams, GuardState, guard
+from graspsense.core.values.device import DeviceInfo
+from graspsense.core.values.errors import GraspsenseError, RecordingEnded
+from graspsense.core.values.signals import Command, Frame, Pads, Reading
 from graspsense.testing.checks import CheckFailed
 from graspsense.testing.gentle import EFFORT_N, closing, kind_of
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from attrs import define, field
 
-from graspsense.core.config import build
-from graspsense.core.plugins import Component, Plugins, PluginStatus, Resource, canonical
+from graspsense.core.components.config import build
+from graspsense.core.components.registry import Component, Plugins, PluginStatus, Resource, canonical
 
 if TYPE_CHECKING:
     from graspsense.testing.session import Session

@@ -25,12 +25,14 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from graspsense.core.values.events import GraspEvent
+
 from graspsense.cli.main import main as graspsense
 from graspsense.cli.options import settings_of
-from graspsense.core.pipeline import grasp_with
-from graspsense.core.plugins import installed
-from graspsense.core.signals import Command, Outcome, Phase, Reading
-from graspsense.core.trial import GraspEvent, Trial
+from graspsense.core.components.registry import installed
+from graspsense.core.pipeline.pipeline import grasp_with
+from graspsense.core.values.signals import Command, Outcome, Phase, Reading
+from graspsense.core.values.trial import Trial
 from graspsense.plugin_api import DeviceLost, NoDevice, create
 from graspsense.store.record_grasp import record_grasp
 from graspsense.store.store import Store

@@ -41,7 +41,7 @@ def free_ticks(
     """Run the ticks of free motion that follow that of `frame`, and return where they end: at `at` if there are none.
 
     In these ticks no force changes, no cell image is taken or arrives, and the controller follows a law that needs
-    neither (see `graspsense.core.free_motion`). What they give is what `grasp` gives tick by tick, to the bit.
+    neither (see `graspsense.core.control.free_motion`). What they give is what `grasp` gives tick by tick, to the bit.
     """
     free, now = free_from(params.controller, at.controller, frame)
     if free.kind == CALLED or not _is_free(params, at, frame):

@@ -1,6 +1,6 @@
 """The loop of a whole grasp on preallocated buffers: in each tick the sensors, the controller and the plant.
 
-It gives the same trace as the runner (`graspsense.core.runner`) with the simulated backend, and can be compiled as a
+It gives the same trace as the runner (`graspsense.core.grasp.runner`) with the simulated backend, and can be compiled as a
 whole. `test_runner_plain_loop_and_compiled_loop_give_one_trace` verifies that both are equal, including the tare.
 """
 
@@ -342,7 +342,7 @@ def record(columns: Table, row: int, frame: Frame, command: float) -> None:
 def _tare(pads: PadBuffers, begin: int, end: int) -> None:
     """Set the zeros to the mean of the images from `begin` to before `end`, added in order of arrival.
 
-    The result is that of `graspsense.core.calibration.tare`, since every simulated cell has a reading.
+    The result is that of `graspsense.core.grasp.calibration.tare`, since every simulated cell has a reading.
     """
     for i in range(len(pads.left_zero)):
         left = pads.images[begin][0][i]

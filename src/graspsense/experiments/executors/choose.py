@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 
-from graspsense.core.errors import ConfigError, suggestion
+from graspsense.core.values.errors import ConfigError, suggestion
 from graspsense.experiments.executors.base import Executor
 
 NAMES = ("serial", "processes", "dask")

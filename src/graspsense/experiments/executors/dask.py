@@ -11,7 +11,7 @@ from contextlib import suppress
 from importlib import import_module
 from typing import Any, Final, Literal
 
-from graspsense.core.errors import ConfigError, PluginUnavailable, named
+from graspsense.core.values.errors import ConfigError, PluginUnavailable, named
 from graspsense.experiments.executors.base import ExecutorLost
 from graspsense.experiments.task import Task, TaskResult, run_task
 from graspsense.experiments.versions import differences, versions

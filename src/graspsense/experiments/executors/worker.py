@@ -15,7 +15,7 @@ def main() -> None:
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)
 
-    from graspsense.core.json_values import json_text
+    from graspsense.core.values.json_values import json_text
     from graspsense.experiments.task import run_task
     from graspsense.experiments.versions import versions
 

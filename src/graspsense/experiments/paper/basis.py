@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final, Literal
 
-from graspsense.core.figure_origins import given_claims
-from graspsense.core.roles import ObjectKind
-from graspsense.core.setting import fitted_defaults
+from graspsense.core.components.figure_origins import given_claims
+from graspsense.core.components.roles import ObjectKind
+from graspsense.core.components.setting import fitted_defaults
 from graspsense.experiments.experiment import ExperimentCase
 from graspsense.experiments.paper.cases import is_of
 from graspsense.experiments.summary import Summary

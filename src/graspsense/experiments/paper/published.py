@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 from attrs import field, frozen
 
-from graspsense.core.strict import structured
+from graspsense.core.components.strict import structured
 from graspsense.evaluation.confusion import Confusion
 from graspsense.evaluation.intervals import wilson
 

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from attrs import frozen
 
-from graspsense.core.strict import structured
+from graspsense.core.components.strict import structured
 from graspsense.experiments.task_results import ClassifierResult, RecognitionResult
 from graspsense.experiments.trade.costs import CostSettings
 from graspsense.experiments.trade.trade_task import (

@@ -7,8 +7,8 @@ from typing import Any, Literal
 
 from attrs import asdict, evolve, field, frozen
 
-from graspsense.core.errors import ConfigError
-from graspsense.core.strict import structured
+from graspsense.core.components.strict import structured
+from graspsense.core.values.errors import ConfigError
 from graspsense.experiments.recognise import EvaluationSettings, recognise
 from graspsense.experiments.task_results import RecognitionResult, TrialValues
 

@@ -9,10 +9,10 @@ import numpy as np
 from attrs import field, frozen
 from attrs.validators import max_len
 
-from graspsense.core.checkpoints import contact_of, until_checkpoint
-from graspsense.core.features import Features, table_of
-from graspsense.core.signals import Phase
-from graspsense.core.strict import structured
+from graspsense.core.components.strict import structured
+from graspsense.core.learn.checkpoints import contact_of, until_checkpoint
+from graspsense.core.values.features import Features, table_of
+from graspsense.core.values.signals import Phase
 from graspsense.experiments.task_results import ClassifierResult, RecognitionResult
 from graspsense.experiments.trade.costs import CostSettings
 from graspsense.experiments.trade.trade_task import (
@@ -28,7 +28,7 @@ from graspsense.experiments.trade.trade_task import (
 from graspsense.sources.simulated import simulated
 
 if TYPE_CHECKING:
-    from graspsense.core.trace import Trace
+    from graspsense.core.values.trace import Trace
 
 
 MOST_MOMENTS: Final = 100

@@ -16,8 +16,8 @@ import numpy as np
 from attrs import field, frozen
 from attrs.validators import ge, le
 
-from graspsense.core.config import settings_from
-from graspsense.core.strict import structured
+from graspsense.core.components.config import settings_from
+from graspsense.core.components.strict import structured
 from graspsense.evaluation.evaluate import INSTANCE_HELD_OUT
 from graspsense.evaluation.folds import instance_held_out
 from graspsense.experiments.task_results import ClassifierResult, RecognitionResult
@@ -35,9 +35,9 @@ from graspsense.sources.simulated import simulated
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from graspsense.core.config import SelectedComponent
-    from graspsense.core.features import FeatureTable
-    from graspsense.core.labelled import Labelled
+    from graspsense.core.components.config import SelectedComponent
+    from graspsense.core.learn.labelled import Labelled
+    from graspsense.core.values.features import FeatureTable
 
     Floats = NDArray[np.float64]
 

@@ -8,10 +8,10 @@ from typing import Any, Final
 from attrs import field, frozen
 from attrs.validators import ge
 
-from graspsense.core.config import SelectedComponent, settings_from
-from graspsense.core.errors import ConfigError
-from graspsense.core.labelled import Labelled, Target, class_of
-from graspsense.core.strict import structured
+from graspsense.core.components.config import SelectedComponent, settings_from
+from graspsense.core.components.strict import structured
+from graspsense.core.learn.labelled import Labelled, Target, class_of
+from graspsense.core.values.errors import ConfigError
 from graspsense.experiments.recognise import TEST_SEED_OFFSET
 from graspsense.experiments.task_results import ClassifierResult, RecognitionResult
 from graspsense.experiments.trade.costs import CostSettings

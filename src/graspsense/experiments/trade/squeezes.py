@@ -9,10 +9,10 @@ import numpy as np
 from attrs import field, frozen
 from attrs.validators import ge, le
 
-from graspsense.core.config import SelectedComponent
-from graspsense.core.errors import ConfigError
-from graspsense.core.labelled import Labelled, Target
-from graspsense.core.strict import structured
+from graspsense.core.components.config import SelectedComponent
+from graspsense.core.components.strict import structured
+from graspsense.core.learn.labelled import Labelled, Target
+from graspsense.core.values.errors import ConfigError
 from graspsense.evaluation.evaluate import INSTANCE_HELD_OUT
 from graspsense.evaluation.folds import instance_held_out
 from graspsense.experiments.task_results import ClassifierResult, RecognitionResult, TrialValues

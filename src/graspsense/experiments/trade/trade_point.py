@@ -9,7 +9,7 @@ from typing import Final, Literal
 
 from attrs import frozen
 
-from graspsense.core.labelled import class_of
+from graspsense.core.learn.labelled import class_of
 from graspsense.evaluation.over_seeds import MeanDifference
 from graspsense.experiments.findings import percent, span
 from graspsense.experiments.summary import ConditionResult

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from graspsense.core.config import SelectedComponent, build, settings_from
-from graspsense.core.labelled import Target, class_of
-from graspsense.core.plugins import installed
-from graspsense.core.strict import structured
+from graspsense.core.components.config import SelectedComponent, build, settings_from
+from graspsense.core.components.registry import installed
+from graspsense.core.components.strict import structured
+from graspsense.core.learn.labelled import Target, class_of
 from graspsense.evaluation.crossval import cross_validate
 from graspsense.evaluation.folds import stratified
 from graspsense.experiments.task_results import ClassifierResult, RecognitionResult
@@ -19,9 +19,9 @@ from graspsense.sources.trial_source import TrialSource, groups_of
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from graspsense.core.config import Settings
-    from graspsense.core.features import FeatureTable
-    from graspsense.core.labelled import Labelled
+    from graspsense.core.components.config import Settings
+    from graspsense.core.learn.labelled import Labelled
+    from graspsense.core.values.features import FeatureTable
     from graspsense.evaluation.folds import Folds
     from graspsense.sources.simulated import Group
 

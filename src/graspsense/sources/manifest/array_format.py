@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from graspsense.core.errors import DataDamaged
+from graspsense.core.values.errors import DataDamaged
 from graspsense.sources.manifest.mat_file import mat_variables
 from graspsense.sources.manifest.table import ColumnTable, Numbers
 from graspsense.sources.numpy_files import npy_array, npz_arrays

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from graspsense.core.errors import ConfigError, listed
+from graspsense.core.values.errors import ConfigError, listed
 from graspsense.sources.manifest.description import ReadManifest
 from graspsense.sources.manifest.expression import Expression, ExpressionError
 from graspsense.sources.manifest.table import ColumnTable, Numbers

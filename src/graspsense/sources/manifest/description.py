@@ -10,11 +10,11 @@ from typing import Any, Final, Literal
 
 from attrs import Attribute, frozen
 
-from graspsense.core.errors import ConfigError
-from graspsense.core.layers import read_toml
-from graspsense.core.limits import ENTRIES
-from graspsense.core.setting import setting
-from graspsense.core.strict import ValidationFailed, structured
+from graspsense.core.components.layers import read_toml
+from graspsense.core.components.setting import setting
+from graspsense.core.components.strict import ValidationFailed, structured
+from graspsense.core.files.limits import ENTRIES
+from graspsense.core.values.errors import ConfigError
 from graspsense.sources.manifest.expression import Expression, ExpressionError, parse
 from graspsense.sources.manifest.patterns import regular_expression
 

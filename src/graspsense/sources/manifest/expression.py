@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING, Any, Final, NoReturn
 import numpy as np
 from attrs import frozen
 
-from graspsense.core.errors import ConfigError, listed, suggestion
-from graspsense.core.limits import CELLS
+from graspsense.core.files.limits import CELLS
+from graspsense.core.values.errors import ConfigError, listed, suggestion
 from graspsense.sources.manifest.patterns import PatternError, wildcard
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from graspsense.core.errors import ConfigError, DataDamaged, listed
+from graspsense.core.values.errors import ConfigError, DataDamaged, listed
 from graspsense.recording.readable import readable
 from graspsense.sources.manifest.available import AvailableColumns, number_in
 from graspsense.sources.manifest.description import ReadManifest

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from attrs import frozen
 
-from graspsense.core.errors import ConfigError
+from graspsense.core.values.errors import ConfigError
 from graspsense.sources.csv_columns import CsvColumns, is_missing
 from graspsense.sources.manifest.description import ReadManifest
 from graspsense.sources.manifest.patterns import FileTemplate, PatternError, file_template

@@ -16,7 +16,7 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from graspsense.core.errors import DataDamaged
+from graspsense.core.values.errors import DataDamaged
 from graspsense.recording.readable import readable, refuse_devices
 from graspsense.recording.unpacked import Unpacked
 

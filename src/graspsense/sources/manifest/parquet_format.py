@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from graspsense.core.errors import PluginUnavailable
+from graspsense.core.values.errors import PluginUnavailable
 from graspsense.recording.parquet import PARQUET_HINT
 from graspsense.recording.readable import readable, refuse_devices
 from graspsense.recording.unpacked import Unpacked

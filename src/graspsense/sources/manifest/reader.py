@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from graspsense.core.errors import ConfigError, DataDamaged, listed
-from graspsense.core.limits import RECORDINGS
+from graspsense.core.files.limits import RECORDINGS
+from graspsense.core.values.errors import ConfigError, DataDamaged, listed
 from graspsense.recording.labelled_recording import LabelledRecording, UnreadableRecording
 from graspsense.recording.readable import each_readable, refuse_devices
 from graspsense.sources.grasp_columns import checked_recording

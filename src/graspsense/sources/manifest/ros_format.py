@@ -14,7 +14,7 @@ import numpy as np
 from mcap.records import Channel, Chunk, McapRecord, Message, Schema
 from numpy.typing import NDArray
 
-from graspsense.core.errors import ConfigError, DataDamaged, PluginUnavailable
+from graspsense.core.values.errors import ConfigError, DataDamaged, PluginUnavailable
 from graspsense.recording.mcap_records import records_in, records_of
 from graspsense.recording.readable import readable, refuse_devices
 from graspsense.recording.unpacked import Unpacked

@@ -8,8 +8,8 @@ from typing import Final
 
 import numpy as np
 
-from graspsense.core.errors import ConfigError, DataDamaged, listed
-from graspsense.core.signals import CHANNELS
+from graspsense.core.values.errors import ConfigError, DataDamaged, listed
+from graspsense.core.values.signals import CHANNELS
 from graspsense.sources.grasp_columns import GraspColumns
 from graspsense.sources.manifest.available import AvailableColumns
 from graspsense.sources.manifest.description import ReadManifest, samples_of

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from attrs import evolve
 
-from graspsense.core.errors import DataDamaged
-from graspsense.core.limits import SAMPLES
+from graspsense.core.files.limits import SAMPLES
+from graspsense.core.values.errors import DataDamaged
 from graspsense.sources.grasp_columns import GraspColumns, check_increasing
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ import numpy as np
 from attrs import evolve, field, frozen
 from numpy.typing import NDArray
 
-from graspsense.core.errors import DataDamaged
+from graspsense.core.values.errors import DataDamaged
 
 Numbers = NDArray[np.float64]
 

@@ -16,8 +16,8 @@ from typing import Final
 import numpy as np
 from attrs import define, field
 
-from graspsense.core.errors import DataDamaged
-from graspsense.core.limits import CELLS
+from graspsense.core.files.limits import CELLS
+from graspsense.core.values.errors import DataDamaged
 from graspsense.sources.csv_columns import check_columns, check_lines, is_missing, text_of
 from graspsense.sources.manifest.patterns import regular_expression
 from graspsense.sources.manifest.table import ColumnTable, Numbers

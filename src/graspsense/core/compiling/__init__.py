@@ -1,0 +1,1 @@
+"""Compiling a function with all it calls."""

@@ -1,0 +1,522 @@
+"""Settings: the components of a pipeline, and the value and the origin of each of their keys.
+
+Settings come in layers, each of which overrides those before: defaults of the config classes, the pipeline file with
+the files that it extends, an experiment, options (`-o a.b=VALUE`), named flags. The `type` of each table is resolved
+first. Then only the config class of the selected component is imported, and the rest of the table becomes its instance.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from textwrap import indent, wrap
+from typing import TYPE_CHECKING, Any, Final, cast
+
+from attrs import fields, frozen
+
+from graspsense import __version__
+from graspsense.core.components.entries import TABLE_OF_ROLE, Role
+from graspsense.core.components.layers import (
+    Flag,
+    Layer,
+    Merged,
+    dotted,
+    option_layers,
+    pipeline_layers,
+    read_layer,
+)
+from graspsense.core.components.registry import Component, Plugins, installed
+from graspsense.core.components.setting import followed_settings
+from graspsense.core.components.strict import (
+    InvalidValue,
+    ValidationFailed,
+    implausible_values,
+    keys_of,
+    plain,
+    shown,
+    structured,
+)
+from graspsense.core.files.toml_lines import KeyPath
+from graspsense.core.values.errors import ConfigError, PluginUnavailable, UnknownName, suggestion
+
+if TYPE_CHECKING:
+    from graspsense.core.components.run_config import RunConfig
+
+__all__ = [
+    "Flag",
+    "Layer",
+    "SelectedComponent",
+    "Settings",
+    "build",
+    "create",
+    "read_layer",
+    "recipe_of",
+    "resolve",
+    "select_component",
+    "settings_from",
+    "to_toml",
+    "without_followers",
+]
+
+NONE: Final = "none"
+"""The `type` of a classifier table for a pipeline without a classifier."""
+
+_ROLE_OF_TABLE: Final[dict[str, Role]] = {table: role for role, table in TABLE_OF_ROLE.items()}
+_TABLES: Final = (*_ROLE_OF_TABLE, "run")
+
+
+class ImplausibleSettings(ConfigError):
+    """Settings are allowed, but outside of their plausible ranges; `resolve(..., force=True)` accepts them."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(text)
+        self.add_note("Check the unit. If the value is meant, add --force (in Python force=True)")
+
+
+@frozen(eq=False)
+class SelectedComponent:
+    """A component that a pipeline selects, with its config."""
+
+    component: Component
+    config: Any
+
+    def create(self) -> Any:
+        """Return the component built from its config. Raises PluginUnavailable."""
+        return self.component.create(self.config)
+
+    @property
+    def declared(self) -> Any:
+        """Its entry with all that its class declares under this config. Raises PluginUnavailable."""
+        return self.component.declared(self.config)
+
+
+@frozen(eq=False, kw_only=True)
+class Settings:
+    """A resolved pipeline.
+
+    `values` holds every key of every table as plain values, including defaults, with the qualified name as `type`; a
+    key that is not set is None. `origins` gives the origin of each value: `default`, `lab.toml:7`, `-o` or the name
+    of a flag. `pipeline` is the name or path that the user gave.
+    """
+
+    pipeline: str
+    gripper: SelectedComponent
+    controller: SelectedComponent
+    features: SelectedComponent
+    classifier: SelectedComponent | None
+    run: RunConfig
+    values: dict[str, dict[str, Any]]
+    origins: dict[str, str]
+
+    @property
+    def chosen(self) -> tuple[SelectedComponent, ...]:
+        """Gripper, controller, features, and the classifier if there is one."""
+        return tuple(
+            one for one in (self.gripper, self.controller, self.features, self.classifier) if one is not None
+        )
+
+    def keys(self, table: str) -> dict[str, dict[str, Any]]:
+        """Return what each key of a table declares, as `keys_of` does."""
+        selected = next((one for one in self.chosen if one.component.table == table), None)
+        return keys_of(type(self.run if selected is None else selected.config))
+
+    @property
+    def components(self) -> dict[str, str]:
+        """The `distribution/name version` of each component, by table."""
+        return {
+            one.component.table: f"{one.component.qualified} {one.component.version}" for one in self.chosen
+        }
+
+
+def resolve(
+    pipeline: str = "default",
+    *,
+    plugins: Plugins | None = None,
+    experiment: Layer | None = None,
+    options: Sequence[str] = (),
+    flags: Sequence[Flag] = (),
+    force: bool = False,
+) -> Settings:
+    """Return the settings of a pipeline with options and flags.
+
+    `pipeline` is the name of a pipeline or the path of a `.toml` file; `options` are as typed after `-o`; `plugins`
+    are by default those of the process. `force` accepts values outside of their plausible ranges. Raises ConfigError
+    that lists all errors, each with its file and line; it is ImplausibleSettings if there are no others.
+    """
+    plugins = installed() if plugins is None else plugins
+    layers = pipeline_layers(pipeline, plugins)
+    if experiment is not None:
+        layers.append(experiment)
+    typed, complaints = option_layers(options)
+    layers += typed
+    layers += [flag.layer() for flag in flags]
+    return _resolved_layers(pipeline, layers, complaints, plugins, force=force)
+
+
+def settings_from(values: Mapping[str, Any], called: str, plugins: Plugins | None = None) -> Settings:
+    """Return the settings of complete tables, such as `Settings.values` or the content of a resolved file.
+
+    `called` is their name in errors. Raises ConfigError.
+    """
+    given = {
+        table: {key: one for key, one in keys.items() if one is not None} for table, keys in values.items()
+    }
+    plugins = installed() if plugins is None else plugins
+    # These values have been accepted before.
+    return _resolved_layers(called, [Layer.of(given, called)], [], plugins, force=True)
+
+
+def _resolved_layers(
+    pipeline: str, layers: Sequence[Layer], complaints: list[str], plugins: Plugins, *, force: bool
+) -> Settings:
+    """Return the settings of these layers, of which each overrides those before. Raises ConfigError."""
+    doubts: list[str] = []
+    layers = [_tables_only(layer, complaints) for layer in layers]
+
+    from graspsense.core.components.run_config import RunConfig
+
+    chosen: dict[str, SelectedComponent] = {}
+    values: dict[str, dict[str, Any]] = {}
+    origins: dict[str, str] = {}
+    run: RunConfig | None = None
+    for table in _TABLES:
+        cls: type
+        if table == "run":
+            component, cls, called = None, RunConfig, "[run]"
+            merged, followed = _merged(layers, table, None), frozenset[str]()
+        else:
+            found = _component(layers, table, plugins, complaints)
+            if found is None:
+                continue
+            component, cls = found
+            called = component.qualified
+            merged = _merged(layers, table, component)
+            if table == "controller" and "gripper" in chosen:
+                _choose_sent_kind(merged, component, chosen["gripper"])
+            followed = _follow(merged, cls, table, values)
+        config: Any
+        try:
+            config = structured({k: v for k, v in merged.values.items() if k != "type"}, cls, called)
+        except ValidationFailed as misfit:
+            complaints += [_complaint(merged, problem) for problem in misfit.under(table)]
+            continue
+        if not force:
+            of_table = [one for one in implausible_values(config) if one.path[0] not in followed]
+            doubts += [_complaint(merged, one.under(table)) for one in of_table]
+        if component is None:
+            run = config
+            values[table] = plain(config)
+        else:
+            chosen[table] = SelectedComponent(component, config)
+            values[table] = {"type": component.qualified, **plain(config)}
+        for path in _leaves(values[table], (table,)):
+            owner = merged.owner.get(path)
+            origins[dotted(path)] = owner.where(path) if owner else "default"
+    if complaints:
+        raise ConfigError(_listed([*complaints, *doubts]))
+    if doubts:
+        raise ImplausibleSettings(_listed(doubts))
+    return Settings(
+        pipeline=pipeline,
+        gripper=chosen["gripper"],
+        controller=chosen["controller"],
+        features=chosen["features"],
+        classifier=chosen.get("classifier"),
+        run=cast("RunConfig", run),
+        values=values,
+        origins=origins,
+    )
+
+
+def _complaint(merged: Merged, problem: InvalidValue) -> str:
+    """Return a problem of a key in one line, with the origin of its value."""
+    owner = merged.owner_of(problem.path)
+    return owner.complain(problem) if owner else f"{dotted(problem.path)}: {problem.text}"
+
+
+def _choose_sent_kind(merged: Merged, controller: Component, gripper: SelectedComponent) -> None:
+    """Set the key `sends` of a controller with several kinds of command, where nothing sets it."""
+    try:
+        entry = controller.declared()
+        accepted = getattr(gripper.component.entry, "accepts", None)
+        if accepted is None:
+            accepted = gripper.declared.accepts
+    except PluginUnavailable:
+        return  # The wiring check reports it.
+    if not entry.alternatives or "sends" in merged.values:
+        return
+    kind = next((one for one in (*entry.commands, *entry.alternatives) if one in accepted), None)
+    if kind is not None and kind not in entry.commands:
+        merged.values["sends"] = kind
+        merged.owner[controller.table, "sends"] = Layer.of(
+            {}, f"{gripper.component.qualified} accepts {kind}"
+        )
+
+
+def _follow(
+    merged: Merged, config_class: type, table: str, values: Mapping[str, Mapping[str, Any]]
+) -> frozenset[str]:
+    """Give the keys that follow a key of a table before this one, and are not set, its value; return these keys."""
+    given = set()
+    defaults = {field.name: field.default for field in fields(config_class)}
+    for key, path in followed_settings(config_class).items():
+        owner, _, name = path.partition(".")
+        value = values.get(owner, {}).get(name)
+        if key not in merged.values and value is not None and value != defaults[key]:
+            merged.values[key] = value
+            merged.owner[table, key] = Layer.of({}, path)
+            given.add(key)
+    return frozenset(given)
+
+
+def without_followers(
+    values: Mapping[str, Mapping[str, Any]], plugins: Plugins | None = None
+) -> dict[str, dict[str, Any]]:
+    """Return complete tables without the keys that follow another one and have its value.
+
+    Settings that are resolved from these tables and an option for the key that is followed are consistent again.
+    """
+    plugins = installed() if plugins is None else plugins
+    kept = {table: dict(keys) for table, keys in values.items()}
+    for table, keys in kept.items():
+        role, name = _ROLE_OF_TABLE.get(table), keys.get("type")
+        if role is None or not isinstance(name, str):
+            continue
+        with suppress(UnknownName, PluginUnavailable):
+            for key, path in followed_settings(plugins.find(role, name).config_class()).items():
+                owner, _, of = path.partition(".")
+                if key in keys and values.get(owner, {}).get(of) == keys[key]:
+                    del keys[key]
+    return kept
+
+
+def build(component: Component, values: Mapping[str, Any]) -> Any:
+    """Return the config of a component from plain values.
+
+    Raises ConfigError that lists all errors, and PluginUnavailable.
+    """
+    try:
+        return structured(values, component.config_class(), component.qualified)
+    except ValidationFailed as misfit:
+        lines = [f"{dotted((component.table, *one.path))}: {one.text}" for one in misfit.problems]
+        raise ConfigError(_listed(lines)) from None
+
+
+def build_plausible(component: Component, values: Mapping[str, Any], *, force: bool) -> Any:
+    """Return the config of a component like `build`, and refuse values out of their plausible ranges unless `force`.
+
+    Raises ConfigError, of which ImplausibleSettings is one, and PluginUnavailable.
+    """
+    config = build(component, values)
+    doubts = [] if force else implausible_values(config)
+    if doubts:
+        lines = [f"{dotted((component.table, *one.path))}: {one.text}" for one in doubts]
+        raise ImplausibleSettings(_listed(lines))
+    return config
+
+
+def create(role: Role, name: str, /, **config: Any) -> Any:
+    """Return a component by role and name. Its config is checked as strictly as one from a file.
+
+    Raises UnknownName, PluginUnavailable, ConfigError.
+
+    >>> create("controller", "hybrid", closing_speed_m_s=0.01).config.closing_speed_m_s
+    0.01
+    """
+    return select_component(role, name, **config).create()
+
+
+def select_component(role: Role, name: str, **config: Any) -> SelectedComponent:
+    """Return a component by role and name with its config, without constructing it. Raises like `create`."""
+    component = installed().find(role, name)
+    return SelectedComponent(component, build(component, config))
+
+
+def recipe_of(role: Role, part: Any) -> tuple[str, dict[str, Any]]:
+    """Return the name and the plain values from which `create` makes an equal component.
+
+    Raises UnknownName if no plugin declares its class, ConfigError if plain values cannot represent its config.
+    """
+    cls = type(part)
+    for component in installed().components(role):
+        # A component of another package is not imported for the comparison.
+        if component.entry.target.split(":")[0].split(".")[0] != cls.__module__.split(".")[0]:
+            continue
+        try:
+            same = component.component_class() is cls
+        except PluginUnavailable:
+            same = False
+        if same:
+            values = {key: one for key, one in plain(part.config).items() if one is not None}
+            if plain(build(component, values)) != plain(part.config):
+                raise ConfigError(f"{component.qualified}: its settings are not all plain values")
+            return component.qualified, values
+    raise UnknownName(f"{cls.__module__}.{cls.__qualname__} is not a {role} that a plugin declares")
+
+
+def to_toml(settings: Settings, origins: bool = False) -> str:
+    """Return a complete pipeline file, which extends nothing and resolves to the same values.
+
+    With `origins`, comments tell the meaning, unit, range and default of each key, and the origin of its value.
+    """
+    lines = [f"# Resolved by graspsense {__version__} from the pipeline {json.dumps(settings.pipeline)}."]
+    versions = {one.component.table: one.component.version for one in settings.chosen}
+    for table, values in settings.values.items():
+        lines += ["", f"[{table}]"]
+        declarations = settings.keys(table) if origins else {}
+        for key, value in values.items():
+            if key in declarations:
+                lines += ["", *_comments(declarations[key])]
+            line = (
+                f"{toml_key(key)} = {toml_value(value)}"
+                if value is not None
+                else f"# {toml_key(key)} is not set"
+            )
+            notes = [f"version {versions[table]}"] if key == "type" else []
+            if origins:
+                inside = {
+                    path: one for path, one in settings.origins.items() if _within(path, f"{table}.{key}")
+                }
+                notes += list(dict.fromkeys(inside.values()))
+            lines.append(f"{line:<40}  # {', '.join(notes)}" if notes else line)
+    return "\n".join(lines) + "\n"
+
+
+def _comments(declaration: Mapping[str, Any], name: str = "") -> list[str]:
+    """Return what a key declares as comment lines, also what the keys of a table declare."""
+    facts = "; ".join(key_facts(declaration))
+    text = " ".join(one for one in (name, declaration["meaning"], f"[{facts}]" if facts else "") if one)
+    lines = wrap(text, 98, initial_indent="# ", subsequent_indent="#   ") if text else []
+    for inner, one in declaration.get("keys", {}).items():
+        lines += _comments(one, f"{inner}:")
+    return lines
+
+
+def key_facts(declaration: Mapping[str, Any]) -> list[str]:
+    """Return unit, type, range and default of a key of `keys_of`, each in words."""
+    facts = [declaration["unit"], declaration["allowed"]]
+    if "|" in declaration["type"] and "'" in declaration["type"]:
+        facts.append(f"one of {declaration['type'].replace(' | ', ', ')}")
+    if declaration["plausible"]:
+        facts.append(f"plausible {declaration['plausible']}")
+    if declaration["required"]:
+        facts.append("must be given")
+    elif "keys" not in declaration:
+        default = declaration["default"]
+        facts.append("not set by default" if default is None else f"default {toml_value(default)}")
+    return [fact for fact in facts if fact]
+
+
+def _within(path: str, key: str) -> bool:
+    return path == key or path.startswith(f"{key}.")
+
+
+def toml_key(key: str) -> str:
+    """Return a key as TOML writes it."""
+    bare = key.isascii() and key.replace("-", "_").replace("_", "a").isalnum()
+    return key if bare else _toml_text(key)
+
+
+def toml_value(value: Any) -> str:
+    """Return a plain value as TOML writes it."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return _toml_text(value)
+    if isinstance(value, int | float):
+        return repr(value)
+    if isinstance(value, Mapping):
+        inner = (f"{toml_key(key)} = {toml_value(one)}" for key, one in value.items() if one is not None)
+        return "{ " + ", ".join(inner) + " }" if value else "{}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(toml_value(one) for one in value) + "]"
+    raise TypeError(f"{value!r} is not a TOML value")
+
+
+def _toml_text(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def _tables_only(layer: Layer, complaints: list[str]) -> Layer:
+    """Return the layer without keys that are not tables of a pipeline; add a complaint for each of them."""
+    values = {}
+    for key, value in layer.values.items():
+        if key not in _TABLES:
+            text = f"there is no table {key!r}.{suggestion(key, _TABLES)} There are: {', '.join(_TABLES)}"
+            complaints.append(layer.complain(InvalidValue((key,), text)))
+        elif not isinstance(value, Mapping):
+            advice = (
+                f": write {key}.type = {toml_value(value)}" if isinstance(value, str) and key != "run" else ""
+            )
+            complaints.append(
+                layer.complain(InvalidValue((key,), f"expected a table, found {shown(value)}{advice}"))
+            )
+        else:
+            values[key] = value
+    return Layer(label=layer.label, values=values, lines=layer.lines, typed=layer.typed, final=layer.final)
+
+
+def _component(
+    layers: Sequence[Layer], table: str, plugins: Plugins, complaints: list[str]
+) -> tuple[Component, type] | None:
+    """Return the component that a table selects, and its config class; None, perhaps with complaints, for none."""
+    role = _ROLE_OF_TABLE[table]
+    path = (table, "type")
+    setter = next((layer for layer in reversed(layers) if "type" in layer.values.get(table, {})), None)
+    users = [layer for layer in layers if table in layer.values]
+    if setter is None:
+        if users or table != "classifier":
+            names = ", ".join(one.name for one in plugins.components(role)) or "none"
+            where = f"{users[-1].where((table,))}: " if users else ""
+            kind = role.replace("-", " ")
+            complaints.append(f"{where}{table}.type is not given: name a {kind}. Known: {names}")
+        return None
+    name = setter.values[table]["type"]
+    if not isinstance(name, str):
+        complaints.append(setter.complain(InvalidValue(path, f"expected text, found {shown(name)}")))
+        return None
+    if table == "classifier" and name == NONE:
+        for layer in users:
+            for key in layer.values[table]:
+                if key != "type" and (layer.final or layer is setter):
+                    text = f'classifier.type is "{NONE}", so this key has no meaning'
+                    complaints.append(layer.complain(InvalidValue((table, key), text)))
+        return None
+    try:
+        component = plugins.find(role, name)
+        return component, component.config_class()
+    except (UnknownName, PluginUnavailable) as error:
+        complaints.append(setter.complain(InvalidValue(path, str(error))))
+        return None
+
+
+def _merged(layers: Sequence[Layer], table: str, component: Component | None) -> Merged:
+    """Merge the layers of one table, without keys of files that are for another component."""
+    merged = Merged()
+    named: str | None = None
+    for layer in layers:
+        values = layer.values.get(table)
+        if values is None:
+            continue
+        named = values.get("type", named)
+        other = component is not None and named not in (None, component.name, component.qualified)
+        if layer.final or not other:
+            merged.add((table,), values, layer)
+    return merged
+
+
+def _leaves(values: Mapping[str, Any], path: KeyPath) -> Iterator[KeyPath]:
+    for key, value in values.items():
+        if isinstance(value, Mapping) and value:
+            yield from _leaves(value, (*path, key))
+        else:
+            yield (*path, key)
+
+
+def _listed(complaints: Sequence[str]) -> str:
+    if len(complaints) == 1:
+        return complaints[0]
+    return "\n".join(
+        [f"{len(complaints)} errors in the settings:", *(indent(one, "  ") for one in complaints)]
+    )

@@ -1,0 +1,467 @@
+"""Entries: the declarations of components and resources that the hooks of a plugin return.
+
+Classes are named by import strings (`"package.module:Class"`), which are resolved at first use. Listing plugins
+therefore imports the entry modules only, and no driver.
+
+The entry of a component needs a name, a target and a summary. Everything else is declared by the class: its channels,
+units and kinds of command as class attributes, its config class as the parameter of its base class. An entry repeats
+none of that; a field that is given here is for a class that does not declare it.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from keyword import iskeyword
+from typing import TYPE_CHECKING, Any, Final, Literal
+
+from attrs import field, frozen
+from attrs.validators import and_, deep_iterable, ge, in_, instance_of, matches_re, min_len, optional
+
+from graspsense.core.values.errors import suggestion
+from graspsense.core.values.signals import CHANNELS, CommandKind
+
+if TYPE_CHECKING:
+    from attrs import Attribute
+
+Role = Literal["sensor-backend", "controller", "feature-set", "classifier"]
+
+TABLE_OF_ROLE: Final[dict[Role, str]] = {
+    "sensor-backend": "gripper",
+    "controller": "controller",
+    "feature-set": "features",
+    "classifier": "classifier",
+}
+"""The table of a pipeline file in which a component of each role is selected."""
+
+STATES: Final = ("ok", "note", "problem")
+"""The states of a finding."""
+
+KINDS: Final = tuple(kind.name.lower() for kind in CommandKind)
+"""The kinds of command as entries name them: effort, velocity, position, force."""
+
+
+def _known_kinds(entry: object, attribute: Attribute[Any], kinds: tuple[str, ...]) -> None:
+    for kind in kinds:
+        if kind not in KINDS:
+            raise ValueError(
+                f"'{attribute.name}' has the unknown command kind {kind!r}; there are {', '.join(KINDS)}."
+                f"{suggestion(str(kind), KINDS)}"
+            )
+
+
+def _distinct_channels(entry: object, attribute: Attribute[Any], channels: tuple[Channel, ...]) -> None:
+    names = [channel.name for channel in channels]
+    for name in names:
+        if names.count(name) > 1:
+            raise ValueError(f"'{attribute.name}' names channel {name!r} twice")
+
+
+def _is_name(entry: object, attribute: Attribute[Any], name: str) -> None:
+    if not re.fullmatch(r"[a-z][a-z0-9_-]*", name):
+        raise ValueError(
+            f"'{attribute.name}' is {name!r}: write small letters, digits, hyphens and underscores, a letter first, "
+            "without spaces, as in lab-hand"
+        )
+
+
+_IS_NAME: Final = [instance_of(str), _is_name]
+_IS_TARGET: Final = [instance_of(str), matches_re(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")]
+_IS_TARGET_OR_EMPTY: Final = [instance_of(str), matches_re(r"([A-Za-z_][\w.]*:[A-Za-z_]\w*)?")]
+_IS_RESOURCE: Final = [instance_of(str), matches_re(r"[A-Za-z_][\w.]*:[^/:][^:]*")]
+_ARE_KINDS: Final = optional(and_(instance_of(tuple), _known_kinds))
+
+
+@frozen
+class Channel:
+    """A signal that a backend provides or that a component requires: one number a tick.
+
+    `rate_hz` is the rate that a backend provides, or the least rate that a component requires (0: any rate). A name in
+    `signals.CHANNELS` must have the unit given there. A plugin may define further channels with units of its own,
+    which `Reading.signals` holds under their names. Raises ValueError for a wrong or missing unit, and for a name of a
+    further channel that cannot be the name of a field.
+    """
+
+    name: str = field(validator=_IS_NAME)
+    """The name of the channel."""
+    unit: str = field(validator=instance_of(str))
+    """Its unit."""
+    rate_hz: float = field(default=0.0, converter=float, validator=ge(0.0))
+    """The rate that a backend provides, or the least rate that a component requires (0: any rate)."""
+
+    def __attrs_post_init__(self) -> None:
+        unit = CHANNELS.get(self.name)
+        if self.name == "pads" and isinstance(self, TactileArray):
+            unit = None  # the cells of other fingertips have other units
+        if unit is not None and self.unit != unit:
+            raise ValueError(
+                f"channel {self.name!r} is in {unit}, not in {self.unit!r}: convert its numbers, and write {unit!r}"
+            )
+        if not self.unit:
+            raise ValueError(f"channel {self.name!r} is not one of {', '.join(CHANNELS)}: give it a unit")
+        if self.name not in CHANNELS and (not self.name.isidentifier() or iskeyword(self.name)):
+            raise ValueError(
+                f"channel {self.name!r} is read as reading.signals.{self.name}, which Python does not allow: write "
+                f"{re.sub(r'[^a-z0-9_]', '_', self.name)!r}"
+                if not iskeyword(self.name)
+                else f"channel {self.name!r} is a word of Python: choose another name"
+            )
+
+
+@frozen
+class TactileArray(Channel):
+    """An array of tactile cells. An image of it has one number for each cell.
+
+    The array named `pads` stands for both fingertips, whose images are `Reading.pads`; every other array has its
+    `Image` in `Reading.signals`. Its cells are given by `rows` and `columns` (row by row), by `positions_m`, or by
+    both. Raises ValueError if there is no cell, or if these do not have the same number of cells.
+    """
+
+    finger: str = field(default="", validator=instance_of(str), kw_only=True)
+    """The finger that carries it, in the maker's words; empty for `pads`, and where it is not on a finger."""
+    rows: int = field(default=0, validator=[instance_of(int), ge(0)], kw_only=True)
+    columns: int = field(default=0, validator=[instance_of(int), ge(0)], kw_only=True)
+    positions_m: tuple[tuple[float, float], ...] = field(default=(), kw_only=True)
+    """The place of each cell on its surface, along the finger and across it; NaN for a cell that is elsewhere."""
+    facing: tuple[bool, ...] = field(default=(), kw_only=True)
+    """Whether each cell faces the object; empty if all do."""
+
+    def __attrs_post_init__(self) -> None:
+        super().__attrs_post_init__()
+        grid, placed = self.rows * self.columns, len(self.positions_m)
+        if not self.cells or (grid and placed and grid != placed):
+            raise ValueError(
+                f"array {self.name!r} has {self.rows} rows, {self.columns} columns and {placed} positions: give rows "
+                "and columns, the position of each cell, or both with the same number of cells"
+            )
+        if self.facing and len(self.facing) != self.cells:
+            raise ValueError(
+                f"array {self.name!r} has {self.cells} cells, and 'facing' has {len(self.facing)} values"
+            )
+
+    @property
+    def cells(self) -> int:
+        """The number of cells."""
+        return self.rows * self.columns or len(self.positions_m)
+
+
+@frozen
+class FastChannel(Channel):
+    """A signal with several samples a tick, such as an acceleration.
+
+    `rate_hz` is the number of samples a second. `samples` is the largest number of new samples in one tick. `clock`
+    says what the samples are timed by: `device`, the clock of the frames, or `sensor`, an oscillator of its own, whose
+    rate is nominal. Raises ValueError where there is no sample or no axis.
+    """
+
+    samples: int = field(default=1, validator=[instance_of(int), ge(1)], kw_only=True)
+    axes: tuple[str, ...] = field(
+        default=("value",),
+        validator=and_(deep_iterable(instance_of(str), instance_of(tuple)), min_len(1)),
+        kw_only=True,
+    )
+    """The names of its axes: `("x", "y", "z")`."""
+    clock: Literal["device", "sensor"] = field(
+        default="device", validator=in_(("device", "sensor")), kw_only=True
+    )
+
+    def __attrs_post_init__(self) -> None:
+        super().__attrs_post_init__()
+        if self.name in CHANNELS:
+            raise ValueError(
+                f"channel {self.name!r} is part of a frame, so it has one value a tick: give another name"
+            )
+
+
+_ARE_CHANNELS: Final = optional(
+    and_(deep_iterable(instance_of(Channel), instance_of(tuple)), _distinct_channels)
+)
+
+
+@frozen
+class SensorBackendEntry:
+    """A gripper with its sensors. Its class declares its `channels`, and the kinds of command that it `accepts`."""
+
+    name: str = field(validator=_IS_NAME)
+    """The name by which it is selected, without spaces."""
+    target: str = field(validator=_IS_TARGET)
+    """The import string of the class, as in `"lab_hand.backend:LabHand"`."""
+    summary: str = field(validator=instance_of(str))
+    """What it is, in one line, for `plugins list`."""
+    needs: str = ""
+    """What to install or do if the target cannot be imported."""
+    config: str = field(default="", validator=_IS_TARGET_OR_EMPTY, kw_only=True)
+    """The import string of the config class; empty where the class names it as the parameter of its base class."""
+    channels: tuple[Channel, ...] | None = field(default=None, validator=_ARE_CHANNELS, kw_only=True)
+    """The channels that `read` delivers; None where the class declares them."""
+    accepts: tuple[str, ...] | None = field(default=None, validator=_ARE_KINDS, kw_only=True)
+    """The kinds of command that it accepts, any of effort, velocity, position, force; None where the class
+    declares them.
+    """
+
+
+@frozen
+class ControllerEntry:
+    """A control law. Its class declares the channels that it `requires`, and the kinds of `commands` that it sends."""
+
+    name: str = field(validator=_IS_NAME)
+    """The name by which it is selected, without spaces."""
+    target: str = field(validator=_IS_TARGET)
+    """The import string of the class, as in `"lab_hand.backend:LabHand"`."""
+    summary: str = field(validator=instance_of(str))
+    """What it is, in one line, for `plugins list`."""
+    needs: str = ""
+    """What to install or do if the target cannot be imported."""
+    config: str = field(default="", validator=_IS_TARGET_OR_EMPTY, kw_only=True)
+    """The import string of the config class; empty where the class names it as the parameter of its base class."""
+    requires: tuple[Channel, ...] | None = field(default=None, validator=_ARE_CHANNELS, kw_only=True)
+    """The channels that it needs; None where the class declares them."""
+    commands: tuple[str, ...] | None = field(default=None, validator=_ARE_KINDS, kw_only=True)
+    """The kinds of command that it may send, unless its config says otherwise by the key `sends`; None where
+    the class declares them.
+    """
+    alternatives: tuple[str, ...] | None = field(default=None, validator=_ARE_KINDS, kw_only=True)
+    """Command kinds that it can send instead, each alone.
+
+    Its config then has a key `sends` that names one kind of `commands` or `alternatives`. Where nothing sets the
+    key, it is the first of them that the gripper accepts.
+    """
+
+
+@frozen
+class Feature:
+    """A feature: its name, its SI unit (`1` where it has none), and in a few words what it measures.
+
+    With `width` it is the width of the object, as the gap between the fingers shows it: a classifier that has this
+    feature alone is the baseline that the whole set is compared with.
+    """
+
+    name: str = field(validator=instance_of(str))
+    """The name of the feature."""
+    unit: str = field(validator=instance_of(str))
+    """Its SI unit, `1` where it has none."""
+    meaning: str = field(validator=and_(instance_of(str), min_len(1)))
+    """What it measures, in a few words."""
+    width: bool = field(default=False, validator=instance_of(bool))
+    """Whether it is the width of the object, as the gap between the fingers shows it."""
+
+
+def _distinct_features(entry: object, attribute: Attribute[Any], features: tuple[Feature, ...]) -> None:
+    names = [feature.name for feature in features]
+    if len(set(names)) < len(names):
+        raise ValueError(f"'features' names one feature twice: {', '.join(names)}")
+    widths = [feature.name for feature in features if feature.width]
+    if len(widths) > 1:
+        raise ValueError(f"'features' marks {len(widths)} features as the width: {', '.join(widths)}")
+
+
+@frozen
+class FeatureSetEntry:
+    """A set of features. Its class declares the channels that it `requires`, and the `features` that it returns."""
+
+    name: str = field(validator=_IS_NAME)
+    """The name by which it is selected, without spaces."""
+    target: str = field(validator=_IS_TARGET)
+    """The import string of the class, as in `"lab_hand.backend:LabHand"`."""
+    summary: str = field(validator=instance_of(str))
+    """What it is, in one line, for `plugins list`."""
+    needs: str = ""
+    """What to install or do if the target cannot be imported."""
+    config: str = field(default="", validator=_IS_TARGET_OR_EMPTY, kw_only=True)
+    """The import string of the config class; empty where the class names it as the parameter of its base class."""
+    requires: tuple[Channel, ...] | None = field(default=None, validator=_ARE_CHANNELS, kw_only=True)
+    """The channels that it needs; None where the class declares them."""
+    features: tuple[Feature, ...] | None = field(
+        default=None,
+        validator=optional(and_(deep_iterable(instance_of(Feature), instance_of(tuple)), _distinct_features)),
+        kw_only=True,
+    )
+    """The features in the order in which they are returned; None where the class declares them."""
+
+    @property
+    def width(self) -> str | None:
+        """The name of the feature that is the width of the object; None where the set has none."""
+        return next((feature.name for feature in self.features or () if feature.width), None)
+
+
+@frozen
+class ClassifierEntry:
+    """A classifier: it learns from a table of features, and predicts the object and its state."""
+
+    name: str = field(validator=_IS_NAME)
+    """The name by which it is selected, without spaces."""
+    target: str = field(validator=_IS_TARGET)
+    """The import string of the class, as in `"lab_hand.backend:LabHand"`."""
+    summary: str = field(validator=instance_of(str))
+    """What it is, in one line, for `plugins list`."""
+    needs: str = ""
+    """What to install or do if the target cannot be imported."""
+    config: str = field(default="", validator=_IS_TARGET_OR_EMPTY, kw_only=True)
+    """The import string of the config class; empty where the class names it as the parameter of its base class."""
+
+
+@frozen
+class PipelineEntry:
+    """A pipeline file shipped inside a package: `resource` is `"package:path/inside/it.toml"`."""
+
+    name: str = field(validator=_IS_NAME)
+    """The name of the pipeline, for `--pipeline`."""
+    resource: str = field(validator=_IS_RESOURCE)
+    """The file in its package: `"package:path/inside/it.toml"`."""
+    summary: str = field(validator=instance_of(str))
+    """What the pipeline is for, in one line."""
+
+
+@frozen
+class ModelEntry:
+    """A trained model shipped inside a package: `resource` is `"package:path/inside/it.json"`."""
+
+    name: str = field(validator=_IS_NAME)
+    """The name of the model, for `classifier.model`."""
+    resource: str = field(validator=_IS_RESOURCE)
+    """The file in its package: `"package:path/inside/it.json"`."""
+    summary: str = field(validator=instance_of(str))
+    """What the model was trained on, in one line."""
+
+
+@frozen(kw_only=True)
+class DatasetEntry:
+    """A reader of recorded data, used as `name:FOLDER`.
+
+    It names a function `recordings(folder)` that yields a `LabelledRecording` for each grasp, and graspsense imports,
+    replays and evaluates them. A data set that has features of its own names a function `target` instead, or beside it:
+    `evaluate` then uses that. Raises ValueError if neither is given.
+    """
+
+    name: str = field(validator=_IS_NAME)
+    """The name before the colon in `name:FOLDER`."""
+    summary: str = field(validator=instance_of(str))
+    """What the data set is, in one line."""
+    recordings: str = field(default="", validator=_IS_TARGET_OR_EMPTY)
+    """The import string of the function `recordings(folder)`, as in `"lab_data.reader:recordings"`."""
+    target: str = field(default="", validator=_IS_TARGET_OR_EMPTY)
+    """The import string of a function `read(folder, features, *, unreliable)` that returns `Labelled`."""
+    needs: str = ""
+    """What to install or do if the functions cannot be imported."""
+
+    def __attrs_post_init__(self) -> None:
+        if not self.recordings and not self.target:
+            raise ValueError(
+                f"data set {self.name!r} names no function: give 'recordings', as in \"lab_data.reader:recordings\""
+            )
+
+
+@frozen
+class CommandEntry:
+    """A further subcommand of `graspsense`: `target` is a click command."""
+
+    name: str = field(validator=_IS_NAME)
+    """The name of the subcommand."""
+    target: str = field(validator=_IS_TARGET)
+    """The import string of the click command, as in `"lab_tool.cli:tool"`."""
+    summary: str = field(validator=instance_of(str))
+    """What the command does, in one line, for `graspsense --help`."""
+    needs: str = ""
+    """What to install or do if the target cannot be imported."""
+
+
+@frozen
+class EmulatorEntry:
+    """A device that software emulates on this machine: `graspsense emulate NAME`.
+
+    `name` is the sensor backend that drives the device. `target` is a function `emulate(config, wire, seed)` that
+    returns an `EmulatedDevice`; `config` is that of the backend in the pipeline that the user names.
+    """
+
+    name: str = field(validator=_IS_NAME)
+    """The sensor backend that drives the device."""
+    target: str = field(validator=_IS_TARGET)
+    """The import string of the function `emulate(config, wire, seed)`."""
+    summary: str = field(validator=instance_of(str))
+    """What is emulated, in one line."""
+    wires: tuple[str, ...] = field(validator=deep_iterable(and_(*_IS_NAME), instance_of(tuple)))
+    """The interfaces of the operating system that it can use, for `--wire`; the best one first."""
+    options: tuple[str, ...] = ()
+    """Settings that the user's options override, as in `("gripper.transport=emulated",)`."""
+    needs: str = ""
+    """What to install or do if the target cannot be imported."""
+
+
+@frozen
+class ConformanceCheckEntry:
+    """A check of what other plugins return from a hook that this plugin owns.
+
+    `hook` is the name of that hook. `target` is a function that takes a list of everything that the hook of one
+    distribution returned, and yields a sentence for each defect: what is wrong, and what to do. It is called by
+    `graspsense plugins check` for each distribution that implements the hook.
+    """
+
+    name: str = field(validator=_IS_NAME)
+    """The id of the check."""
+    target: str = field(validator=_IS_TARGET)
+    """The import string of the function that yields the defects."""
+    hook: str = field(validator=instance_of(str))
+    """The name of the hook whose results are checked."""
+    summary: str = field(validator=instance_of(str))
+    """What the check requires, in one line."""
+    needs: str = ""
+    """What to install or do if the target cannot be imported."""
+
+
+@frozen
+class FoundDevice:
+    """A device that a probe found: its backend, its serial number, and whether it can be opened."""
+
+    backend: str
+    """The sensor backend that drives the device."""
+    serial: str
+    """The serial number of the device."""
+    where: str
+    """Where it is connected, as in `/dev/hidraw0`."""
+    ready: bool
+    """Whether it can be opened now."""
+    advice: str = ""
+    """What to do if it cannot be opened."""
+
+
+def _a_state(entry: object, attribute: Attribute[Any], state: str) -> None:
+    if state not in STATES:
+        raise ValueError(f"'{attribute.name}' is {state!r}; there are {', '.join(STATES)}")
+
+
+@frozen
+class Finding:
+    """A result of `graspsense doctor`: the subject that was examined, its state, and what to do.
+
+    `state` is `ok`, `note` (not wrong, but worth knowing) or `problem`. `numbers` are measured values, whose names end
+    with their units: `rate_hz`.
+    """
+
+    subject: str = field(validator=instance_of(str))
+    """What was examined."""
+    state: Literal["ok", "note", "problem"] = field(validator=_a_state)
+    """`ok`, `note` (not wrong, but worth knowing) or `problem`."""
+    found: str = field(validator=instance_of(str))
+    """What was found, in words."""
+    advice: str = field(default="", validator=instance_of(str))
+    """What to do about a problem."""
+    numbers: Mapping[str, float | int | str | bool] = field(factory=dict)
+    """Measured values, whose names end with their units: `rate_hz`."""
+
+
+ComponentEntry = SensorBackendEntry | ControllerEntry | FeatureSetEntry | ClassifierEntry
+
+ENTRY_OF_ROLE: dict[Role, type] = {
+    "sensor-backend": SensorBackendEntry,
+    "controller": ControllerEntry,
+    "feature-set": FeatureSetEntry,
+    "classifier": ClassifierEntry,
+}
+
+DECLARED: Final[Mapping[Role, tuple[str, ...]]] = {
+    "sensor-backend": ("channels", "accepts"),
+    "controller": ("requires", "commands", "alternatives"),
+    "feature-set": ("requires", "features"),
+    "classifier": (),
+}
+"""What the class of a component declares by attributes, unless the entry has it."""

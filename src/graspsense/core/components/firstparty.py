@@ -1,0 +1,45 @@
+"""The distributions and models that this project ships, as plain strings; the only place in core that names them."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from attrs import frozen
+
+from graspsense.core.components.entries import Role
+
+DISTRIBUTION: Final = "graspsense"
+BUILTIN_MODULE: Final = "graspsense.plugins.builtin"
+"""The plugin module of the components of this distribution."""
+
+
+@frozen
+class Shipped:
+    """A distribution of this project: its folder in a clone, and its extra of `graspsense`."""
+
+    distribution: str
+    folder: str
+    extra: str
+
+    @property
+    def hint(self) -> str:
+        """The commands that install it, from a clone and from an index."""
+        return (
+            f"in a clone: pip install -e . -e ./plugins/{self.folder}"
+            f'     published: pip install "graspsense[{self.extra}]"'
+        )
+
+
+_PR2 = Shipped("graspsense-pr2-gripper", "pr2_gripper", "pr2")
+_SIM = Shipped("graspsense-sim-gripper", "sim_gripper", "sim")
+_C45 = Shipped("graspsense-c45", "c45", "c45")
+
+SHIPPED: Final[dict[tuple[Role, str], Shipped]] = {
+    ("sensor-backend", "pr2"): _PR2,
+    ("sensor-backend", "sim"): _SIM,
+    ("classifier", "c45"): _C45,
+}
+"""Components in other distributions of this project, for the hint if one is not installed."""
+
+MODELS: Final[dict[str, Shipped]] = {"default": _SIM}
+"""Models that this project ships, with their distributions."""

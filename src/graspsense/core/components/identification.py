@@ -1,0 +1,148 @@
+"""What `graspsense identify` passes to a simulator, and what comes back: an object, and what is known of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Final
+
+from attrs import field, frozen
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from graspsense.core.values.trace import Trace
+
+Progress = Callable[[str, int, int], None]
+"""Called with what is being done, how much of it is done, and how much there is."""
+
+
+@frozen(kw_only=True, eq=False)
+class RecordedSqueeze:
+    """A recorded grasp of an object that is to be identified.
+
+    `sha256` is the hash of its file or of its frames. `label` and `instance` are empty where they are not known.
+    `gripper` holds the settings of the gripper that it was recorded with, where the recording has them.
+    """
+
+    name: str
+    sha256: str
+    trace: Trace
+    label: str = ""
+    instance: str = ""
+    gripper: Mapping[str, Any] = field(factory=dict)
+    simulated: bool = False
+
+
+@frozen(kw_only=True)
+class IdentifiedParameter:
+    """A parameter with its 90 % interval, in SI units; `basis` says what the interval was computed from."""
+
+    name: str
+    unit: str
+    value: float
+    low: float
+    high: float
+    basis: str
+
+
+@frozen(kw_only=True)
+class CandidateScore:
+    """A candidate: its terms, its number of free parameters, and its error on data that it was not fitted to.
+
+    `error` is the rms residual over the peak force, of held-out recordings or held-out stretches. `verdict` says
+    why the candidate was chosen or not.
+    """
+
+    terms: str
+    parameters: int
+    error: float
+    fit_error: float
+    verdict: str
+    chosen: bool = False
+
+
+@frozen(kw_only=True)
+class Undetermined:
+    """A quantity that the recordings do not determine: why, and what would determine it."""
+
+    what: str
+    reason: str
+    remedy: str
+
+
+@frozen(kw_only=True, eq=False)
+class SqueezeFit:
+    """The fit of one recording: measured and fitted forces (N) at the times of the measurements."""
+
+    name: str
+    t_s: NDArray[Any]
+    compression_m: NDArray[Any]
+    measured_n: NDArray[Any]
+    fitted_n: NDArray[Any]
+    rms_n: float
+    peak_n: float
+
+    @property
+    def residual(self) -> float:
+        """The rms difference between fitted and measured force, relative to the peak."""
+        return self.rms_n / self.peak_n
+
+
+COMPARED: Final = 20
+"""Number of compressions at which squeezes are compared."""
+LEAST_COMPRESSION: Final = 0.1
+"""The smallest of them, relative to the largest compression that all squeezes reach."""
+
+
+def repeatability(fits: Sequence[SqueezeFit]) -> float:
+    """Return how much squeezes differ: the standard deviation of their loading force, relative to the mean peak.
+
+    The rms over compressions that all squeezes reach while they are loaded; NaN for a single squeeze. A fit cannot be
+    expected to be closer to a further squeeze than this.
+    """
+    import numpy as np
+
+    if len(fits) < 2:
+        return math.nan
+    deepest = min(float(np.max(one.compression_m)) for one in fits)
+    at = np.linspace(LEAST_COMPRESSION * deepest, deepest, COMPARED)
+    forces = []
+    for one in fits:
+        load = slice(0, int(np.argmax(one.compression_m)) + 1)
+        forces.append(np.interp(at, np.maximum.accumulate(one.compression_m[load]), one.measured_n[load]))
+    deviation = float(np.sqrt(np.mean(np.var(forces, axis=0, ddof=1))))
+    return deviation / float(np.mean([one.peak_n for one in fits]))
+
+
+@frozen(kw_only=True)
+class PredictiveCheck:
+    """A statistic of the recorded squeezes beside that of simulated ones.
+
+    `p` is the posterior predictive p-value: the share of simulated squeezes whose statistic is at least as large.
+    """
+
+    statistic: str
+    unit: str
+    recorded: tuple[float, ...]
+    simulated: tuple[float, ...]
+    p: float
+
+
+@frozen(kw_only=True, eq=False)
+class Identification:
+    """An object identified from recorded squeezes.
+
+    `scene` is the text of a scene file. `draws` has a row for each draw of the parameters, in their order.
+    """
+
+    label: str
+    scene: str
+    parameters: tuple[IdentifiedParameter, ...]
+    candidates: tuple[CandidateScore, ...]
+    undetermined: tuple[Undetermined, ...]
+    fits: tuple[SqueezeFit, ...]
+    checks: tuple[PredictiveCheck, ...] = ()
+    draws: NDArray[Any] | None = None
+    notes: tuple[str, ...] = ()
+    seconds: float = 0.0

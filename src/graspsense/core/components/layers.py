@@ -1,0 +1,261 @@
+"""The layers of settings: files that extend one another, options and flags."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from difflib import get_close_matches
+from importlib.resources.abc import Traversable
+from pathlib import Path
+from typing import Any
+
+from attrs import define, field, frozen
+
+from graspsense.core.components.registry import Plugins
+from graspsense.core.components.strict import InvalidValue, shown
+from graspsense.core.files.limits import SETTINGS_BYTES
+from graspsense.core.files.regular_file import first_bytes
+from graspsense.core.files.toml_lines import KeyPath, key_lines
+from graspsense.core.files.toml_text import TomlError, toml_values
+from graspsense.core.values.errors import ConfigError, UnknownName
+
+
+@frozen(eq=False, kw_only=True)
+class Layer:
+    """Values from one origin.
+
+    `label` names the origin; `typed` is what the user typed, for an origin that is not a file. A `final` layer applies
+    to the component that is selected in the end. Of any other layer, the keys of a table are dropped if a later layer
+    changes the `type` of the table.
+    """
+
+    label: str
+    values: Mapping[str, Any]
+    lines: Mapping[KeyPath, int] = field(factory=dict)
+    typed: str = ""
+    final: bool = False
+
+    @classmethod
+    def of(cls, values: Mapping[str, Any], label: str) -> Layer:
+        """Return a layer of values that are not from a file."""
+        return cls(label=label, values=values)
+
+    def where(self, path: KeyPath) -> str:
+        """Return the place of a key, with its line where there is one."""
+        for end in range(len(path), 0, -1):
+            if path[:end] in self.lines:
+                return f"{self.label}:{self.lines[path[:end]]}"
+        return self.label
+
+    def complain(self, problem: InvalidValue) -> str:
+        """Return a problem in one line: origin, key, text."""
+        if self.typed:
+            return f"{self.typed}: {problem.text}"
+        return f"{self.where(problem.path)}: {dotted(problem.path)}: {problem.text}"
+
+
+@frozen
+class Flag:
+    """A command-line flag that sets one key: `Flag("--gripper", "gripper.type", "pr2")`."""
+
+    name: str
+    key: str
+    value: Any
+
+    def layer(self) -> Layer:
+        """Return it as a layer."""
+        values = _nested(self.key.split("."), self.value)
+        return Layer(label=self.name, values=values, typed=f"{self.name} {self.value}", final=True)
+
+
+@define
+class Merged:
+    """The merged values of one table, and the layer that set each key last."""
+
+    values: dict[str, Any] = field(factory=dict)
+    owner: dict[KeyPath, Layer] = field(factory=dict)
+
+    def add(self, path: KeyPath, values: Mapping[str, Any], layer: Layer) -> None:
+        """Merge the values of a later layer; `path` is that of the table. Tables are merged, lists replaced."""
+        self._add(self.values, path, values, layer)
+
+    def _add(self, into: dict[str, Any], path: KeyPath, values: Mapping[str, Any], layer: Layer) -> None:
+        self.owner[path] = layer
+        for key, value in values.items():
+            here = (*path, key)
+            if isinstance(value, Mapping):
+                inner = into.get(key)
+                if not isinstance(inner, dict):
+                    inner = into[key] = {}
+                self._add(inner, here, value, layer)
+            else:
+                was_table = isinstance(into.get(key), dict)
+                into[key] = value
+                self.owner[here] = layer
+                if was_table:
+                    for below in [one for one in self.owner if one[: len(here)] == here and one != here]:
+                        del self.owner[below]
+
+    def owner_of(self, path: KeyPath) -> Layer | None:
+        """Return the layer that set this key, or the table that contains it; None for a default."""
+        for end in range(len(path), 0, -1):
+            if path[:end] in self.owner:
+                return self.owner[path[:end]]
+        return None
+
+
+def read_layer(path: str | os.PathLike[str]) -> Layer:
+    """Read a TOML file. Raises ConfigError if it is missing or is not TOML."""
+    return read_toml(Path(path), os.fspath(path), "configuration file")
+
+
+def pipeline_layers(pipeline: str, plugins: Plugins) -> list[Layer]:
+    """Return the layers of a pipeline; the first one extends nothing.
+
+    `pipeline` is a path that ends in `.toml`, or a name that a plugin provides. Raises ConfigError.
+    """
+    layers: list[Layer] = []
+    seen: list[tuple[object, str]] = []
+    asked, base, asker = pipeline, Path(), ""
+    while True:
+        source, label, base = _located(asked, base, asker, plugins)
+        identity = source.resolve() if isinstance(source, Path) else str(source)
+        if identity in (one for one, _ in seen):
+            names = " -> ".join([*(name for _, name in seen), label])
+            raise ConfigError(f"{asker}extends forms a circle: {names}")
+        seen.append((identity, label))
+        layer = read_toml(source, label, "pipeline file")
+        values = dict(layer.values)
+        extends = values.pop("extends", None)
+        layers.insert(0, Layer(label=label, values=values, lines=layer.lines))
+        if extends is None:
+            return layers
+        asker = f"{layer.where(('extends',))}: "
+        if not isinstance(extends, str):
+            raise ConfigError(
+                f"{asker}extends: expected the name of a pipeline or the path of a .toml file, "
+                f"found {shown(extends)}"
+            )
+        asked = extends
+
+
+def _located(asked: str, base: Path, asker: str, plugins: Plugins) -> tuple[Traversable, str, Path]:
+    """Return the file of a pipeline, its name in errors, and the folder that its `extends` is relative to."""
+    if asked.endswith(".toml"):
+        path = base / asked
+        return path, str(path), path.parent
+    try:
+        shipped = plugins.pipeline(asked)
+    except UnknownName as error:
+        hint = "\n  A file is given with its ending .toml"
+        if os.path.isfile(base / asked):  # of pathlib, it raises for a name that is too long
+            hint += f"; there is a file {str(base / asked)!r} without it: rename it"
+        elif os.path.isfile(base / f"{asked}.toml"):
+            hint += f": {base / asked}.toml"
+        raise UnknownName(f"{asker}{error}{hint}") from None
+    resource = shipped.file()
+    return (
+        resource,
+        f"pipeline {shipped.qualified}",
+        resource.parent if isinstance(resource, Path) else Path(),
+    )
+
+
+def read_toml(source: Traversable, label: str, what: str) -> Layer:
+    """Read a TOML file, which errors call `what` and `label`. Raises ConfigError."""
+    text = _settings_text(source, label, what)
+    try:
+        values = toml_values(text)
+    except TomlError as error:
+        line = f":{error.line}" if error.line else ""
+        column = f", column {error.column}" if error.column else ""
+        raise ConfigError(f"{label}{line}{column}: {error}") from None
+    return Layer(label=label, values=values, lines=key_lines(text))
+
+
+def _settings_text(source: Traversable, label: str, what: str) -> str:
+    """Return the text of a file of settings. Raises ConfigError."""
+    try:
+        data = first_bytes(source, SETTINGS_BYTES.most)
+    except FileNotFoundError:
+        raise ConfigError(f"no {what} {label!r}{_nearby(source)}") from None
+    except OSError as error:
+        raise ConfigError(f"cannot read the {what} {label!r}: {error.strerror or error}") from None
+    why = SETTINGS_BYTES.exceeded(len(data))
+    if why:
+        raise ConfigError(f"{label}: {why}")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        raise ConfigError(
+            f"{label}:{line}: not UTF-8 text (byte 0x{data[error.start]:02x}): "
+            "TOML files are UTF-8; is this the right file?"
+        ) from None
+
+
+def _nearby(missing: Traversable) -> str:
+    """Return the folder in which a file was sought, and the file there with the most similar name."""
+    if not isinstance(missing, Path):
+        return ""
+    folder = missing.absolute().parent
+    if not folder.is_dir():
+        return f": there is no folder {str(folder)!r}"
+    # Without the ending, which would make all names similar.
+    near = get_close_matches(missing.stem, [one.stem for one in folder.glob("*.toml")], n=1)
+    return f" in {folder}" + (f". Did you mean {near[0] + '.toml'!r}?" if near else "")
+
+
+def option_layers(options: Sequence[str]) -> tuple[list[Layer], list[str]]:
+    """Return a layer for each option `a.b=VALUE`, and a complaint for each malformed one.
+
+    VALUE is a TOML value; any other text is a string.
+    """
+    layers, complaints = [], []
+    for option in options:
+        key, equals, value = option.partition("=")
+        parts = _key_parts(key)
+        if not equals or not parts:
+            complaints.append(f"-o {option}: expected TABLE.KEY=VALUE, as in -o run.seed=3")
+            continue
+        values = _nested(parts, _toml_value(value))
+        layers.append(Layer(label="-o", values=values, typed=f"-o {option}", final=True))
+    return layers, complaints
+
+
+def _key_parts(key: str) -> list[str]:
+    try:
+        table: Any = toml_values(f"{key}=0")
+    except ValueError:
+        return []
+    parts = []
+    while isinstance(table, dict):
+        if len(table) != 1:
+            return []
+        part, table = next(iter(table.items()))
+        parts.append(part)
+    return parts
+
+
+def _toml_value(text: str) -> Any:
+    """Return the TOML value of this text, or the text itself unless it is exactly one value."""
+    try:
+        value = toml_values(f"value = {text}")["value"]
+        # Within brackets, a comment hides the end, and a second key is not TOML.
+        return value if len(toml_values(f"value = [{text}]")["value"]) == 1 else text
+    except TomlError:
+        return text
+
+
+def _nested(parts: Sequence[str], value: Any) -> dict[str, Any]:
+    for part in reversed(parts):
+        value = {part: value}
+    return dict(value)
+
+
+def dotted(path: Iterable[str | int]) -> str:
+    """Return a key in dotted form: `gripper.terms[2].stiffness`."""
+    text = ""
+    for part in path:
+        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part
+    return text

@@ -1,0 +1,114 @@
+"""Which plugins are installed, and which of them may be loaded. Nothing is imported here."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import re
+from collections.abc import Callable, Mapping
+from importlib.metadata import Distribution, distributions
+from typing import Final
+
+from attrs import define
+
+from graspsense import __version__
+from graspsense.core.components.disabling import config_file
+from graspsense.core.components.firstparty import BUILTIN_MODULE, DISTRIBUTION
+from graspsense.core.components.hookspecs import ENTRY_POINT_GROUP
+from graspsense.core.components.registry.parts import canonical
+from graspsense.core.values.errors import suggestion
+
+ALLOWED_VARIABLE: Final = "GRASPSENSE_PLUGINS"
+"""If this environment variable is set, only the distributions that it lists are loaded."""
+DISABLED_VARIABLE: Final = "GRASPSENSE_DISABLED_PLUGINS"
+
+
+@define
+class PluginSource:
+    """A plugin before it is loaded: its distribution, and the function that imports it."""
+
+    distribution: str
+    version: str
+    entry_point: str
+    module: str
+    load: Callable[[], object]
+    copies: tuple[str, ...] = ()
+    """Version and folder of each copy if the distribution is installed more than once."""
+
+
+def builtin_source() -> PluginSource:
+    """Return the plugin that is part of this distribution."""
+    return PluginSource(
+        DISTRIBUTION, __version__, "builtin", BUILTIN_MODULE, lambda: importlib.import_module(BUILTIN_MODULE)
+    )
+
+
+def installed_sources() -> list[PluginSource]:
+    """Return every entry point of the group `graspsense.plugins`, sorted and without duplicates."""
+    sources: dict[tuple[str, str], PluginSource] = {}
+    places: dict[tuple[str, str], dict[str, str]] = {}
+    for distribution in distributions():
+        for source in _sources_of(distribution):
+            key = (source.distribution, source.entry_point)
+            sources.setdefault(key, source)
+            # The real path, because lib64 can be a link to lib.
+            place = os.path.realpath(str(getattr(distribution, "_path", "")))
+            places.setdefault(key, {})[place] = f"{source.version} in {os.path.dirname(place)}"
+    for key, copies in places.items():
+        if len(copies) > 1:
+            sources[key].copies = tuple(copies.values())
+    return [sources[key] for key in sorted(sources)]
+
+
+def reason_not_to_load(distribution: str, environ: Mapping[str, str], disabled: set[str]) -> str:
+    """Return why the plugins of this distribution must not be loaded; empty if they may be."""
+    if distribution == DISTRIBUTION:
+        return ""
+    allowed = environ.get(ALLOWED_VARIABLE)
+    if allowed is not None and distribution not in _names(allowed):
+        return f"not in {ALLOWED_VARIABLE}"
+    if distribution in _names(environ.get(DISABLED_VARIABLE, "")):
+        return f"in {DISABLED_VARIABLE}"
+    if distribution in disabled:
+        return f"in {config_file()} (graspsense plugins enable {distribution})"
+    return ""
+
+
+def unknown_names(installed: set[str], environ: Mapping[str, str]) -> tuple[str, ...]:
+    """Return a sentence for each name in an environment variable that no installed distribution with plugins has."""
+    return tuple(
+        f"{variable} names {name}, and no plugin of that distribution is installed.{suggestion(name, installed)}"
+        for variable in (ALLOWED_VARIABLE, DISABLED_VARIABLE)
+        for name in sorted(_names(environ.get(variable, "")) - installed)
+    )
+
+
+def _sources_of(distribution: Distribution) -> list[PluginSource]:
+    text = distribution.read_text("entry_points.txt") or ""
+    if ENTRY_POINT_GROUP not in text:
+        return []  # most distributions: no metadata has to be parsed
+    name, version = _name_and_version(distribution)
+    try:
+        entry_points = distribution.entry_points.select(group=ENTRY_POINT_GROUP)
+    except Exception as error:
+        return [PluginSource(name, version, "?", "entry_points.txt", _raising(error))]
+    return [PluginSource(name, version, point.name, point.value, point.load) for point in entry_points]
+
+
+def _name_and_version(distribution: Distribution) -> tuple[str, str]:
+    """Return the canonical name and the version, from the name of the folder if the metadata lacks them."""
+    metadata = distribution.metadata
+    folder = str(getattr(distribution, "_path", "unknown")).replace("\\", "/").rpartition("/")[2]
+    name, _, version = folder.rpartition(".")[0].partition("-")
+    return canonical(metadata["Name"] or name), metadata["Version"] or version or "?"
+
+
+def _raising(error: Exception) -> Callable[[], object]:
+    def load() -> object:
+        raise error
+
+    return load
+
+
+def _names(text: str) -> set[str]:
+    return {canonical(name) for name in re.split(r"[,\s]+", text) if name}

@@ -1,0 +1,288 @@
+"""What a plugin brings, as the registry holds it: its status, its components and its resources.
+
+The code behind a component or resource is imported when a method asks for it, not before.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import inspect
+import re
+from abc import ABC, abstractmethod
+from importlib.resources import files
+from typing import TYPE_CHECKING, Any, Final, Generic, Literal, TypeVar
+
+import attrs
+from attrs import frozen
+
+from graspsense.core.components.entries import (
+    TABLE_OF_ROLE,
+    CommandEntry,
+    ComponentEntry,
+    ConformanceCheckEntry,
+    DatasetEntry,
+    EmulatorEntry,
+    Finding,
+    FoundDevice,
+    ModelEntry,
+    PipelineEntry,
+    Role,
+)
+from graspsense.core.components.registry.declaration import (
+    NotDeclared,
+    completed,
+    config_of,
+    declared_by,
+    left_out,
+)
+from graspsense.core.values.errors import FAILURES, PluginUnavailable
+
+if TYPE_CHECKING:
+    from importlib.resources.abc import Traversable
+
+EntryT = TypeVar(
+    "EntryT",
+    ComponentEntry,
+    PipelineEntry,
+    ModelEntry,
+    DatasetEntry,
+    CommandEntry,
+    EmulatorEntry,
+    ConformanceCheckEntry,
+)
+
+
+def canonical(distribution: str) -> str:
+    """Return the name of a distribution in its canonical spelling (PEP 503)."""
+    return re.sub(r"[-_.]+", "-", distribution).lower()
+
+
+@frozen
+class PluginStatus:
+    """One installed plugin: where it comes from, whether it is in use, and the reason if it is not."""
+
+    distribution: str
+    version: str
+    entry_point: str
+    module: str
+    state: Literal["loaded", "disabled", "broken"]
+    reason: str = ""
+    traceback: str = ""
+    hooks: tuple[str, ...] = ()
+    import_s: float = 0.0
+    """Processor time (s) that the import of its module took."""
+    advice: tuple[str, ...] = ()
+    """What to improve although the plugin works."""
+
+    @property
+    def absence(self) -> str:
+        """Lines that explain why the plugin is not in use, for a user who misses a name; empty for a loaded one."""
+        if self.state == "loaded":
+            return ""
+        what = f"failed to load: {self.reason}" if self.state == "broken" else f"disabled: {self.reason}"
+        return (
+            f"\n  {self.distribution} {self.version} is installed but {what}"
+            f"\n  (graspsense plugins show {self.distribution})"
+        )
+
+
+@frozen
+class Declared(ABC, Generic[EntryT]):
+    """Something that a plugin declares by an entry."""
+
+    entry: EntryT
+    distribution: str
+    version: str
+
+    @property
+    def name(self) -> str:
+        """The short name, which another distribution may use too."""
+        return self.entry.name
+
+    @property
+    def qualified(self) -> str:
+        """The unique name, `distribution/name`."""
+        return f"{self.distribution}/{self.entry.name}"
+
+    @property
+    @abstractmethod
+    def kind(self) -> str:
+        """What it is, in words: `sensor backend`, `data set`."""
+
+    def _import(self, target: str) -> Any:
+        """Return what an import string names. Raises PluginUnavailable."""
+        module, _, name = target.partition(":")
+        try:
+            return getattr(importlib.import_module(module), name)
+        except FAILURES as error:  # the import of a third party's module can raise anything
+            raise self._unavailable(f"{type(error).__name__}: {error}") from error
+
+    def _unavailable(self, why: str) -> PluginUnavailable:
+        needs = getattr(self.entry, "needs", "")
+        return PluginUnavailable(
+            f"{self.kind} {self.name!r} of {self.distribution} {self.version} cannot be used here: {why}"
+            + (f"\n  needs: {needs}" if needs else "")
+        )
+
+
+@frozen
+class Component(Declared[ComponentEntry]):
+    """A component that a plugin declares."""
+
+    role: Role
+
+    @property
+    def kind(self) -> str:
+        """The role in words."""
+        return self.role.replace("-", " ")
+
+    @property
+    def table(self) -> str:
+        """The table of a pipeline file in which it is selected."""
+        return TABLE_OF_ROLE[self.role]
+
+    def config_class(self) -> type:
+        """Import and return the attrs class of its config. Raises PluginUnavailable."""
+        config_class: Any
+        if self.entry.config:
+            config_class, name = self._import(self.entry.config), self.entry.config
+        else:
+            cls = self._any_class()
+            try:
+                config_class = config_of(cls, self._base())
+            except NotDeclared as error:
+                raise self._unavailable(str(error)) from error
+            name = f"{config_class.__module__}:{config_class.__qualname__}"
+        if not (isinstance(config_class, type) and attrs.has(config_class)):
+            raise self._unavailable(f"{name} is not an attrs class")
+        return config_class
+
+    def component_class(self) -> type:
+        """Import and return its class, a concrete subclass of the base class of its role. Raises PluginUnavailable."""
+        component_class: type[Any] = self._any_class()
+        base = self._base()
+        if inspect.isabstract(component_class):
+            lacking = ", ".join(sorted(component_class.__abstractmethods__))
+            raise self._unavailable(
+                f"{self.entry.target} does not implement {lacking}, which {base.__name__} of plugin_api requires",
+            )
+        return component_class
+
+    def create(self, config: object) -> Any:
+        """Return the component built from an instance of its config class."""
+        return self.component_class()(config)
+
+    def declared(self, config: object = None) -> Any:
+        """Return its entry with all that its class declares.
+
+        `config` is an instance of its config class, by default that of its defaults; the channels of a gripper may
+        depend on it. Raises PluginUnavailable if the class cannot be imported, or does not declare something.
+        """
+        if not left_out(self.entry, self.role):
+            return self.entry
+        cls = self.component_class()
+        part: Any = cls
+        if self.channels_vary():
+            if config is None:
+                with contextlib.suppress(TypeError, ValueError):
+                    config = self.config_class()()
+            part = cls if config is None else cls(config)
+        try:
+            return completed(self.entry, self.role, cls, self._base(), part)
+        except NotDeclared as error:
+            raise self._unavailable(str(error)) from error
+        except FAILURES as error:
+            raise self._unavailable(f"its channels raised {type(error).__name__}: {error}") from error
+
+    def channels_vary(self) -> bool:
+        """Return whether its channels depend on its settings. Raises PluginUnavailable."""
+        if self.role != "sensor-backend" or getattr(self.entry, "channels", None) is not None:
+            return False
+        return isinstance(inspect.getattr_static(self.component_class(), "channels"), property)
+
+    def declared_twice(self) -> tuple[str, ...]:
+        """Return what both its entry and its class declare. Raises PluginUnavailable."""
+        names = declared_by(self.component_class(), self._base(), self.role)
+        return tuple(name for name in names if getattr(self.entry, name) is not None)
+
+    def _base(self) -> type:
+        from graspsense.core.components import roles
+
+        return {
+            "sensor-backend": roles.SensorBackend,
+            "controller": roles.Controller,
+            "feature-set": roles.FeatureSet,
+            "classifier": roles.Classifier,
+        }[self.role]
+
+    def _any_class(self) -> Any:
+        """Import and return its class, which may lack methods."""
+        cls, base = self._import(self.entry.target), self._base()
+        if not (isinstance(cls, type) and issubclass(cls, base)):
+            raise self._unavailable(f"{self.entry.target} is not a subclass of {base.__name__}")
+        return cls
+
+
+@frozen
+class Resource(Declared[EntryT]):
+    """A pipeline, model, data set, command, emulator or conformance check that a plugin declares."""
+
+    @property
+    def kind(self) -> str:
+        """The kind of its entry in words."""
+        return _KIND_OF_ENTRY[type(self.entry)]
+
+    def load(self) -> Any:
+        """Import and return the target of an entry that is code. Raises PluginUnavailable."""
+        assert not isinstance(self.entry, PipelineEntry | ModelEntry), "pipelines and models are files"
+        return self._import(self.entry.target)
+
+    def recordings(self) -> Any:
+        """Import and return the function of a data set that yields its recordings. Raises PluginUnavailable."""
+        assert isinstance(self.entry, DatasetEntry), f"a {self.kind} has no recordings"
+        if not self.entry.recordings:
+            raise self._unavailable(
+                "its reader gives features, and no recordings that can be replayed or imported"
+            )
+        return self._import(self.entry.recordings)
+
+    def file(self) -> Traversable:
+        """Return the file of a pipeline or model. Raises PluginUnavailable if its package does not contain it."""
+        assert isinstance(self.entry, PipelineEntry | ModelEntry), f"a {self.kind} is code"
+        package, _, path = self.entry.resource.partition(":")
+        try:
+            file = files(package).joinpath(path)
+        except FAILURES as error:
+            raise self._unavailable(f"{type(error).__name__}: {error}") from error
+        if not file.is_file():
+            raise self._unavailable(f"there is no file {path!r} in the package {package!r}")
+        return file
+
+
+_KIND_OF_ENTRY: Final[dict[type, str]] = {
+    PipelineEntry: "pipeline",
+    ModelEntry: "model",
+    DatasetEntry: "data set",
+    CommandEntry: "command",
+    EmulatorEntry: "emulator",
+    ConformanceCheckEntry: "conformance check",
+}
+
+
+@frozen
+class Probe:
+    """The devices that one plugin found; `error` is the reason if it could not search."""
+
+    distribution: str
+    found: tuple[FoundDevice, ...] = ()
+    error: str = ""
+
+
+@frozen
+class Diagnosis:
+    """The findings of one plugin about its devices; `error` is the reason if it could not examine them."""
+
+    distribution: str
+    findings: tuple[Finding, ...] = ()
+    error: str = ""

@@ -1,0 +1,435 @@
+"""The plugins of a process: loading them, finding their parts by role and name, and calling their hooks.
+
+pluggy's own loader ends at the first plugin that fails, and drops the second of two distributions that use the same
+entry-point name. Nothing is loaded at `import graspsense`; the first call of `installed()` loads all plugins.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+import traceback
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Final, Literal, TypeVar
+
+from attrs import evolve
+
+from graspsense.core.components.disabling import disabled_in_config
+from graspsense.core.components.entries import (
+    ENTRY_OF_ROLE,
+    TABLE_OF_ROLE,
+    CommandEntry,
+    ConformanceCheckEntry,
+    DatasetEntry,
+    EmulatorEntry,
+    FeatureSetEntry,
+    Finding,
+    FoundDevice,
+    ModelEntry,
+    PipelineEntry,
+    Role,
+)
+from graspsense.core.components.firstparty import SHIPPED
+from graspsense.core.components.registry.discovery import (
+    PluginSource,
+    builtin_source,
+    installed_sources,
+    reason_not_to_load,
+    unknown_names,
+)
+from graspsense.core.components.registry.isolation import (
+    TRACE_VARIABLE,
+    HookCalls,
+    PluginRefused,
+    advice_on,
+    check_api,
+    error_text,
+    imported,
+)
+from graspsense.core.components.registry.parts import (
+    Component,
+    Diagnosis,
+    EntryT,
+    PluginStatus,
+    Probe,
+    Resource,
+    canonical,
+)
+from graspsense.core.values.errors import FAILURES, PluginUnavailable, UnknownName, suggestion
+
+if TYPE_CHECKING:
+    from graspsense.core.values.events import GraspEvent
+    from graspsense.core.values.trial import RunInfo, Trial
+
+STRICT_VARIABLE: Final = "GRASPSENSE_STRICT_PLUGINS"
+"""If this environment variable is 1, the error of a plugin that cannot be loaded is raised."""
+
+COMPONENT_HOOKS: Final[dict[str, Role]] = {
+    "graspsense_sensor_backends": "sensor-backend",
+    "graspsense_controllers": "controller",
+    "graspsense_feature_sets": "feature-set",
+    "graspsense_classifiers": "classifier",
+}
+RESOURCE_HOOKS: Final[dict[str, type]] = {
+    "graspsense_pipelines": PipelineEntry,
+    "graspsense_models": ModelEntry,
+    "graspsense_datasets": DatasetEntry,
+    "graspsense_commands": CommandEntry,
+    "graspsense_emulators": EmulatorEntry,
+    "graspsense_conformance_checks": ConformanceCheckEntry,
+}
+
+PartT = TypeVar("PartT", bound=Component | Resource[Any])
+
+
+class Plugins:
+    """The plugins of one process, and the only caller of hooks.
+
+    `statuses` lists every plugin that is installed, loaded or not. A plugin that cannot be loaded is listed there with
+    the reason and does not affect the others; with `GRASPSENSE_STRICT_PLUGINS=1` its error is raised instead.
+    """
+
+    def __init__(
+        self, sources: Iterable[PluginSource], environ: Mapping[str, str], disabled: Iterable[str] = ()
+    ) -> None:
+        self._hooks = HookCalls(trace=environ.get(TRACE_VARIABLE) == "1")
+        self._strict = environ.get(STRICT_VARIABLE) == "1"
+        self._statuses: list[PluginStatus] = []
+        self._loaded: list[tuple[PluginStatus, object]] = []
+        self._components: list[Component] = []
+        self._resources: list[Resource[Any]] = []
+        sources = list(sources)
+        self.unknown_names = unknown_names({source.distribution for source in sources}, environ)
+        """Distributions that an environment variable names and that are not installed, a sentence each."""
+        switched_off = {canonical(name) for name in disabled}
+        for source in sources:
+            reason = reason_not_to_load(source.distribution, environ, switched_off)
+            if reason:
+                self._statuses.append(_status(source, "disabled", reason))
+            else:
+                self._load(source)
+
+    @classmethod
+    def discover(cls) -> Plugins:
+        """Load the parts of graspsense itself, and every installed plugin that environment and config allow.
+
+        Raises ConfigError if the user's list of disabled plugins cannot be read.
+        """
+        return cls([builtin_source(), *installed_sources()], os.environ, disabled_in_config())
+
+    @property
+    def statuses(self) -> tuple[PluginStatus, ...]:
+        """Every installed plugin."""
+        return tuple(self._statuses)
+
+    def components(self, role: Role | None = None) -> tuple[Component, ...]:
+        """Return the components of this role, or all, in the order of role and name."""
+        order = list(ENTRY_OF_ROLE)
+        of_role = (part for part in self._components if role in (None, part.role))
+        return tuple(sorted(of_role, key=lambda part: (order.index(part.role), part.name, part.distribution)))
+
+    def feature_sets(self) -> tuple[FeatureSetEntry, ...]:
+        """Return what each feature set declares; one whose class cannot be imported is left out."""
+        entries = []
+        for component in self.components("feature-set"):
+            with contextlib.suppress(PluginUnavailable):
+                entries.append(component.declared())
+        return tuple(entries)
+
+    def find(self, role: Role, name: str) -> Component:
+        """Return the component called `name` or `distribution/name`.
+
+        Raises UnknownName if there is none, or if several distributions provide the short name.
+        """
+        hint = ""
+        wanted, _, short = name.rpartition("/")
+        shipped = SHIPPED.get((role, short))
+        present = {status.distribution for status in self._statuses}
+        if (
+            shipped
+            and canonical(wanted) in ("", shipped.distribution)
+            and shipped.distribution not in present
+        ):
+            hint = f"It is provided by {shipped.distribution}:\n  {shipped.hint}"
+        key = f"{TABLE_OF_ROLE[role]}.type"
+        return self._only(role.replace("-", " "), self.components(role), name, key, hint)
+
+    def pipelines(self) -> tuple[Resource[PipelineEntry], ...]:
+        """Return the pipeline files that plugins ship."""
+        return self._resources_of(PipelineEntry)
+
+    def models(self) -> tuple[Resource[ModelEntry], ...]:
+        """Return the trained models that plugins ship."""
+        return self._resources_of(ModelEntry)
+
+    def datasets(self) -> tuple[Resource[DatasetEntry], ...]:
+        """Return the readers of recorded data."""
+        return self._resources_of(DatasetEntry)
+
+    def commands(self) -> tuple[Resource[CommandEntry], ...]:
+        """Return the subcommands that plugins add."""
+        return self._resources_of(CommandEntry)
+
+    def emulators(self) -> tuple[Resource[EmulatorEntry], ...]:
+        """Return the devices that can be emulated."""
+        return self._resources_of(EmulatorEntry)
+
+    def conformance_checks(self) -> tuple[Resource[ConformanceCheckEntry], ...]:
+        """Return the checks that plugins contribute to the conformance kit."""
+        return self._resources_of(ConformanceCheckEntry)
+
+    def pipeline(self, name: str) -> Resource[PipelineEntry]:
+        """Return the pipeline of this short or qualified name. Raises UnknownName."""
+        return self._only("pipeline", self.pipelines(), name)
+
+    def model(self, name: str) -> Resource[ModelEntry]:
+        """Return the model of this short or qualified name. Raises UnknownName."""
+        return self._only("model", self.models(), name)
+
+    def dataset(self, name: str) -> Resource[DatasetEntry]:
+        """Return the reader of this short or qualified name. Raises UnknownName."""
+        return self._only("data set", self.datasets(), name)
+
+    def command(self, name: str) -> Resource[CommandEntry]:
+        """Return the subcommand of this short or qualified name. Raises UnknownName."""
+        return self._only("command", self.commands(), name)
+
+    def emulator(self, name: str) -> Resource[EmulatorEntry]:
+        """Return the emulator of this short or qualified name. Raises UnknownName."""
+        return self._only("emulator", self.emulators(), name)
+
+    def unknown(self, name: str) -> UnknownName:
+        """Return the error for a name that no distribution with plugins and no component has."""
+        known = sorted(
+            {
+                *(status.distribution for status in self._statuses),
+                *(component.name for component in self._components),
+            }
+        )
+        return UnknownName(
+            f"no plugin or component named {name!r}. Known: {', '.join(known)}.{suggestion(name, known)}"
+        )
+
+    def absences(self) -> str:
+        """Return lines on the installed plugins that are not in use, for a user who misses a name."""
+        lines = [status.absence for status in self._statuses]
+        return "".join([*lines, *(f"\n  {problem}" for problem in self.unknown_names)])
+
+    def probe_devices(self, timeout_s: float) -> tuple[Probe, ...]:
+        """Let every plugin search for its devices for at most `timeout_s` each; a failure is reported as its own."""
+        hook, probes = "graspsense_probe_devices", []
+        for status, plugin in self._implementing(hook):
+            try:
+                devices = self._hooks.entries(plugin, hook, FoundDevice, timeout_s=timeout_s)
+                probes.append(Probe(status.distribution, tuple(devices)))
+            except FAILURES as error:
+                probes.append(Probe(status.distribution, error=error_text(error)))
+        return tuple(probes)
+
+    def diagnose(self, config: object, timeout_s: float) -> tuple[Diagnosis, ...]:
+        """Let every plugin examine its devices, for about `timeout_s` each; a failure is reported as its own.
+
+        `config` is that of the gripper that the user named, or None.
+        """
+        hook, diagnoses = "graspsense_diagnose", []
+        for status, plugin in self._implementing(hook):
+            try:
+                findings = self._hooks.entries(plugin, hook, Finding, config=config, timeout_s=timeout_s)
+                diagnoses.append(Diagnosis(status.distribution, tuple(findings)))
+            except FAILURES as error:
+                diagnoses.append(Diagnosis(status.distribution, error=error_text(error)))
+        return tuple(diagnoses)
+
+    def run_starting(self, run: RunInfo) -> None:
+        """Notify the observers that a grasp is about to start."""
+        self._notify("graspsense_run_starting", run=run)
+
+    def grasp_event(self, run: RunInfo, event: GraspEvent) -> None:
+        """Notify the observers of a change of phase, or of an action of the guard."""
+        self._notify("graspsense_grasp_event", run=run, event=event)
+
+    def run_finished(self, run: RunInfo, trial: Trial) -> None:
+        """Notify the observers of the finished trial."""
+        self._notify("graspsense_run_finished", run=run, trial=trial)
+
+    def collect(self, hook: str, /, **arguments: Any) -> tuple[tuple[str, Any], ...]:
+        """Call a hook that a plugin owns; return (distribution, result) for each plugin that implements it.
+
+        The owner documents the hook; others implement it with `@hookimpl(optionalhook=True)`. A plugin whose
+        implementation raises is left out with a warning.
+        """
+        results: list[tuple[str, Any]] = []
+        for status, plugin in self._implementing(hook):
+            with self._hooks.isolated(status, hook):
+                results.extend(
+                    (status.distribution, result) for result in self._hooks.call(plugin, hook, **arguments)
+                )
+        return tuple(results)
+
+    def called(self, status: PluginStatus, hook: str, /, **arguments: Any) -> list[Any]:
+        """Call the implementation of one plugin, for a check of it; what it raises is raised.
+
+        Returns its result in a list, or an empty list for None.
+        """
+        (plugin,) = [plugin for known, plugin in self._loaded if known is status]
+        return self._hooks.call(plugin, hook, **arguments)
+
+    def _load(self, source: PluginSource) -> None:
+        try:
+            # The output of a plugin must not mix with JSON on the standard output.
+            with contextlib.redirect_stdout(sys.stderr):
+                plugin, cost = imported(source)
+                check_api(plugin, source)
+                status, components, resources = self._registered(plugin, source)
+        except FAILURES as error:
+            if self._strict:
+                error.add_note(
+                    f"while loading {source.entry_point} of {source.distribution} {source.version}"
+                )
+                raise
+            broken = _status(source, "broken", error_text(error))
+            self._statuses.append(evolve(broken, traceback="".join(traceback.format_exception(error))))
+            return
+        status = evolve(status, import_s=cost.processor_s, advice=advice_on(source, cost))
+        self._statuses.append(status)
+        self._loaded.append((status, plugin))
+        self._components += components
+        self._resources += resources
+
+    def _registered(
+        self, plugin: object, source: PluginSource
+    ) -> tuple[PluginStatus, list[Component], list[Resource[Any]]]:
+        """Register a plugin and return what it declares. Leaves nothing behind if it is refused."""
+        known_as = self._hooks.registered_as(plugin)
+        if known_as is not None:
+            raise PluginRefused(f"{source.module} is loaded already, as {known_as}")
+        try:
+            hooks = self._hooks.register(plugin, source)
+            components = [
+                Component(entry, source.distribution, source.version, role)
+                for hook, role in COMPONENT_HOOKS.items()
+                if hook in hooks
+                for entry in self._hooks.entries(plugin, hook, ENTRY_OF_ROLE[role])
+            ]
+            resources = [
+                Resource(entry, source.distribution, source.version)
+                for hook, kind in RESOURCE_HOOKS.items()
+                if hook in hooks
+                for entry in self._hooks.entries(plugin, hook, kind)
+            ]
+            _check_distinct([*self._components, *components])
+            _check_distinct([*self._resources, *resources])
+        except BaseException:
+            self._hooks.unregister(plugin)
+            raise
+        return evolve(_status(source, "loaded"), hooks=hooks), components, resources
+
+    def _implementing(self, hook: str) -> Iterator[tuple[PluginStatus, object]]:
+        return ((status, plugin) for status, plugin in self._loaded if hook in status.hooks)
+
+    def _notify(self, hook: str, **arguments: Any) -> None:
+        for status, plugin in self._implementing(hook):
+            with self._hooks.isolated(status, hook):
+                self._hooks.call(plugin, hook, **arguments)
+
+    def _resources_of(self, kind: type[EntryT]) -> tuple[Resource[EntryT], ...]:
+        of_kind = (resource for resource in self._resources if type(resource.entry) is kind)
+        return tuple(sorted(of_kind, key=lambda resource: (resource.name, resource.distribution)))
+
+    def _only(self, kind: str, known: Sequence[PartT], name: str, key: str = "", hint: str = "") -> PartT:
+        """Return the part among `known` with this name, or raise UnknownName.
+
+        `key` is the setting in which the qualified name belongs, `hint` replaces the list of known names.
+        """
+        wanted, _, short = name.rpartition("/")
+        matching = [
+            part
+            for part in known
+            if part.name == short and (not wanted or part.distribution == canonical(wanted))
+        ]
+        if len(matching) == 1:
+            return matching[0]
+        if matching:
+            providers = " and ".join(part.distribution for part in matching)
+            how = f"{key} = " if key else ""
+            raise UnknownName(
+                f'{kind} {name!r} is provided by {providers}; write {how}"{matching[0].qualified}"'
+            )
+        if hint:
+            raise UnknownName(f"no {kind} named {name!r}. {hint}")
+        names = sorted({part.qualified if wanted else part.name for part in known})
+        raise UnknownName(
+            f"no {kind} named {name!r}. Known: {', '.join(names) or 'none'}.{suggestion(name, names)}"
+            + self.absences()
+        )
+
+
+class IsolatedPlugins(Plugins):
+    """For tests: the parts of graspsense itself and the given plugins, without searching for others.
+
+    As a context manager it replaces the plugins of the process. A plugin that fails raises its error here.
+    """
+
+    def __init__(self, *plugins: object, builtins: bool = True) -> None:
+        super().__init__([builtin_source()] if builtins else [], {STRICT_VARIABLE: "1"})
+        self._outer: Plugins | None = None
+        for plugin in plugins:
+            self.add(plugin)
+
+    def add(self, plugin: object, distribution: str = "graspsense-test", version: str = "0.1") -> None:
+        """Load a module, or any object with hook implementations, as if that distribution had installed it."""
+        label = str(getattr(plugin, "__name__", type(plugin).__name__)).rpartition(".")[2]
+        taken = sum(status.distribution == canonical(distribution) for status in self._statuses)
+        self._load(
+            PluginSource(
+                canonical(distribution),
+                version,
+                f"{label}-{taken}" if taken else label,
+                label,
+                lambda: plugin,
+            )
+        )
+
+    def __enter__(self) -> IsolatedPlugins:
+        global _current
+        self._outer, _current = _current, self
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, tb: TracebackType | None
+    ) -> None:
+        global _current
+        _current = self._outer
+
+
+_current: Plugins | None = None
+
+
+def installed() -> Plugins:
+    """Return the plugins of this process, which the first call discovers and loads."""
+    global _current
+    if _current is None:
+        _current = Plugins.discover()
+    return _current
+
+
+def collect(hook: str, /, **arguments: Any) -> tuple[tuple[str, Any], ...]:
+    """Call a hook that a plugin owns in every plugin of this process; see `Plugins.collect`."""
+    return installed().collect(hook, **arguments)
+
+
+def _status(
+    source: PluginSource, state: Literal["loaded", "disabled", "broken"], reason: str = ""
+) -> PluginStatus:
+    return PluginStatus(source.distribution, source.version, source.entry_point, source.module, state, reason)
+
+
+def _check_distinct(parts: Sequence[Component | Resource[Any]]) -> None:
+    """Refuse a second part of one kind and one qualified name. Raises PluginRefused."""
+    seen = set()
+    for part in parts:
+        if (part.kind, part.qualified) in seen:
+            raise PluginRefused(f"{part.distribution} declares {part.kind} {part.name!r} twice")
+        seen.add((part.kind, part.qualified))

@@ -1,0 +1,96 @@
+"""The guard between a controller and a gripper: it limits commands, and stops the grasp if a command is not a number.
+
+It applies the limits of effort and speed of the gripper and of the command, turns NaN into a stop, and keeps the first
+closing of a real gripper slow and weak until a contact was detected. It counts the ticks in which it acts.
+"""
+
+from __future__ import annotations
+
+from math import inf
+from typing import NamedTuple
+
+from graspsense.core.values.signals import EFFORT, FORCE, POSITION, VELOCITY, Command, Frame
+
+
+class GuardParams(NamedTuple):
+    """Limits in N and m/s; `first_*` apply until the force on a pad reaches `contact_force_n` (`inf`: no limit)."""
+
+    effort_limit_n: float
+    speed_limit_m_s: float
+    first_effort_n: float
+    first_speed_m_s: float
+    contact_force_n: float
+
+
+class GuardState(NamedTuple):
+    """Whether a contact was detected, in how many ticks the guard acted, and whether it stopped the grasp."""
+
+    contact_seen: int
+    acted: int
+    stopped: int
+
+
+def limits_without_contact(params: GuardParams, state: GuardState) -> tuple[float, float]:
+    """Return the limits of effort (N) and speed (m/s) within which the guard changes nothing while no force changes."""
+    if state.contact_seen == 1:
+        return params.effort_limit_n, params.speed_limit_m_s
+    return min(params.effort_limit_n, params.first_effort_n), min(
+        params.speed_limit_m_s, params.first_speed_m_s
+    )
+
+
+def guard(
+    params: GuardParams, state: GuardState, frame: Frame, command: Command
+) -> tuple[Command, GuardState]:
+    """Return the limited command, and the state of the guard.
+
+    An effort in the direction in which the gap already moves at the speed limit becomes 0, so that friction brakes.
+    """
+    kind, value, effort_limit, speed_limit = command
+    contact_seen, acted, stopped = state
+    # A limit of NaN fails this comparison, remains NaN, and stops the grasp below.
+    if params.effort_limit_n < effort_limit:
+        effort_limit = params.effort_limit_n
+    if params.speed_limit_m_s < speed_limit:
+        speed_limit = params.speed_limit_m_s
+    if contact_seen == 0:
+        if frame.force_left_n >= params.contact_force_n or frame.force_right_n >= params.contact_force_n:
+            contact_seen = 1
+        else:
+            if params.first_effort_n < effort_limit:
+                effort_limit = params.first_effort_n
+            if params.first_speed_m_s < speed_limit:
+                speed_limit = params.first_speed_m_s
+    if stopped == 1 or value != value or not (effort_limit >= 0.0 and speed_limit >= 0.0):
+        halt = Command(EFFORT, 0.0, params.effort_limit_n, params.speed_limit_m_s)
+        return halt, GuardState(contact_seen, acted + 1, 1)
+
+    asked = value
+    if kind == EFFORT:
+        if value > effort_limit:
+            value = effort_limit
+        elif value < -effort_limit:
+            value = -effort_limit
+        velocity = frame.velocity_m_s
+        if (value > 0.0 and -velocity > speed_limit) or (value < 0.0 and velocity > speed_limit):
+            value = 0.0
+    elif kind == VELOCITY:
+        value = min(max(value, -speed_limit), speed_limit)
+    elif kind == FORCE:
+        value = min(max(value, 0.0), effort_limit)
+    elif kind == POSITION and value < inf:
+        value = max(value, 0.0)
+    else:
+        # An unknown kind, or a position out of reach, is treated like NaN.
+        halt = Command(EFFORT, 0.0, params.effort_limit_n, params.speed_limit_m_s)
+        return halt, GuardState(contact_seen, acted + 1, 1)
+    if value != asked:
+        acted += 1
+    elif kind == EFFORT:
+        # The value is within its limits, which have no further meaning for an effort.
+        if contact_seen != state.contact_seen:
+            state = GuardState(contact_seen, acted, 0)
+        return command, state
+    if contact_seen != state.contact_seen or acted != state.acted:
+        state = GuardState(contact_seen, acted, 0)
+    return Command(kind, value, effort_limit, speed_limit), state

@@ -1,0 +1,1 @@
+"""Files and their texts, read within limits and written whole."""

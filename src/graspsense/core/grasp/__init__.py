@@ -1,0 +1,1 @@
+"""One grasp with a gripper: the runner, the protection of gripper and object, and calibration."""

@@ -1,0 +1,146 @@
+"""Whether the motor does what it is commanded: as much, not more, and in the right direction."""
+
+from __future__ import annotations
+
+from collections import deque
+from math import nan
+from typing import Final, NamedTuple
+
+from graspsense.core.values.faults import Fault
+from graspsense.core.values.signals import APPROACH, EFFORT, FORCE, POSITION, Command, Frame
+
+DELAY_S: Final = 0.03
+"""Time within which the motor must follow a command: a command and its answer each take a few ticks."""
+PERIODS: Final = 3.0
+"""Periods of the frames that this and other times last at least."""
+ALLOWED_SHARE: Final = 0.25
+ALLOWED_N: Final = 1.5
+"""By how much the answered effort may differ from the commanded one."""
+STRONG_SHARE: Final = 0.5
+STRONG_N: Final = 3.0
+"""By how much an effort above the command ends the grasp."""
+LASTS_S: Final = 0.03
+"""Time for which a difference must last to be a fault of the motor."""
+STRONG_S: Final = 0.3
+"""Time for which a motor may answer somewhat more than its command before the grasp ends."""
+WEAK_S: Final = 0.5
+"""Time for which a motor may answer less than its command, which crushes nothing, before the grasp ends."""
+WRONG_WAY_M: Final = 0.003
+"""Travel against the command from which on the motor turns the wrong way round."""
+
+
+class Asked(NamedTuple):
+    """A command: its time (s), its effort (N, NaN for other kinds), and its direction (1 closes, -1 opens)."""
+
+    t_s: float
+    effort_n: float
+    direction: int
+
+
+def direction_of(command: Command, gap_m: float) -> int:
+    """Return 1 for a command that closes the fingers, -1 for one that opens them, and 0 for neither for certain."""
+    kind, value, _, _ = command
+    if kind in (EFFORT, FORCE):
+        strong = value > ALLOWED_N or value < -ALLOWED_N
+        return (1 if value > 0.0 else -1) if strong else 0
+    if kind == POSITION:
+        far = abs(value - gap_m) > WRONG_WAY_M
+        return (1 if value < gap_m else -1) if far else 0
+    return (value < 0.0) - (value > 0.0)
+
+
+def lasting(seconds: float, present: bool, dt_s: float) -> float:
+    """Return for how long (s) a difference has been there; it is forgotten at half the rate at which it is gathered.
+
+    A command that the guard switches on and off at a limit of the speed shows a difference in half of the ticks only.
+    """
+    return seconds + dt_s if present else max(seconds - 0.5 * dt_s, 0.0)
+
+
+class Motor:
+    """Compares the effort that the gripper reports with the commands, and the motion with their direction.
+
+    Only commands of an effort are compared with the answer. `reports_effort` says whether the frames have an effort at
+    all, and `rate_hz` is their rate.
+    """
+
+    def __init__(self, reports_effort: bool, rate_hz: float) -> None:
+        self._reports_effort = reports_effort
+        self._delay_s = max(DELAY_S, PERIODS / rate_hz)
+        self._lasts_s = max(LASTS_S, PERIODS / rate_hz)
+        self._commands: deque[Asked] = deque()
+        self._strong_s = self._weak_s = self._reversed_s = 0.0
+        self._wrong_way_s = 0.0
+        self._phase = -1
+        self._extreme_m = nan
+
+    def apply(self, frame: Frame, command: Command) -> None:
+        """Take the command that is applied after this frame."""
+        effort_n = command.value if command.kind == EFFORT else nan
+        self._commands.append(Asked(frame.t_s, effort_n, direction_of(command, frame.gap_m)))
+
+    def see(self, frame: Frame, phase: int) -> Fault | None:
+        """Take the frame of a tick and return a fault that it shows."""
+        commands = self._commands
+        while len(commands) > 1 and commands[1].t_s <= frame.t_s - self._delay_s:
+            commands.popleft()
+        if not commands or frame.t_s - commands[0].t_s < self._delay_s:
+            return None
+        turned = self._wrong_way(frame, phase)
+        if turned is not None or not self._reports_effort or frame.effort_n != frame.effort_n:
+            return turned
+        efforts = [asked.effort_n for asked in commands]
+        least, most = min(efforts), max(efforts)
+        # One command of another kind makes the sum no number.
+        return self._answer(frame, least, most) if sum(efforts) == sum(efforts) else None
+
+    def _answer(self, frame: Frame, least: float, most: float) -> Fault | None:
+        answered_n = frame.effort_n
+        # Beyond the commands away from zero, short of them, and on the other side of zero.
+        above_n = max(answered_n - max(most, 0.0), min(least, 0.0) - answered_n)
+        short_n = max(least - answered_n if least > 0.0 else 0.0, answered_n - most if most < 0.0 else 0.0)
+        asked_n = max(abs(least), abs(most))
+        reverse = (least > ALLOWED_N and answered_n < -ALLOWED_N) or (
+            most < -ALLOWED_N and answered_n > ALLOWED_N
+        )
+        self._reversed_s = lasting(self._reversed_s, reverse, frame.dt_s)
+        strong = above_n > ALLOWED_N + ALLOWED_SHARE * asked_n
+        self._strong_s = lasting(self._strong_s, strong, frame.dt_s)
+        weak = short_n > ALLOWED_N + ALLOWED_SHARE * asked_n
+        self._weak_s = lasting(self._weak_s, weak, frame.dt_s)
+        answer = f"it answers {answered_n:.1f} N to a command of {least if least > 0.0 else most:.1f} N"
+        if self._reversed_s > self._lasts_s:
+            return Fault("motor reversed", f"{answer}: check its wiring", ends=True, relaxes=True)
+        if self._strong_s > self._lasts_s:
+            ends = self._strong_s > STRONG_S or above_n > STRONG_N + STRONG_SHARE * asked_n
+            return Fault("motor too strong", f"{answer}: check its drive and its scale", ends=ends)
+        if self._weak_s > self._lasts_s:
+            ends = self._weak_s > max(WEAK_S, 2.0 * self._lasts_s)
+            return Fault("motor too weak", f"{answer}: check its supply and its limits", ends=ends)
+        return None
+
+    def _wrong_way(self, frame: Frame, phase: int) -> Fault | None:
+        """The fingers open while every recent command closes, or close while every one opens."""
+        directions = {asked.direction for asked in self._commands}
+        closes, opens = directions == {1}, directions == {-1}
+        if phase != self._phase or not (closes or opens) or self._extreme_m != self._extreme_m:
+            self._phase, self._extreme_m, self._wrong_way_s = phase, frame.gap_m, 0.0
+            return None
+        if closes:
+            self._extreme_m = min(self._extreme_m, frame.gap_m)
+            travel_m = frame.gap_m - self._extreme_m
+        else:
+            self._extreme_m = max(self._extreme_m, frame.gap_m)
+            travel_m = self._extreme_m - frame.gap_m
+        wrong = travel_m >= WRONG_WAY_M
+        self._wrong_way_s = self._wrong_way_s + frame.dt_s if wrong else 0.0
+        # An object that springs back may open fingers that squeeze it.
+        if self._wrong_way_s <= self._lasts_s or (closes and phase != APPROACH):
+            return None
+        moved, commanded = ("open", "closing") if closes else ("close", "opening")
+        return Fault(
+            "motor reversed",
+            f"the fingers {moved} by {travel_m * 1e3:.1f} mm under a {commanded} command: check its wiring",
+            ends=True,
+            relaxes=True,
+        )

@@ -1,0 +1,161 @@
+"""The protection of one grasp: it limits what a controller may command, and ends a grasp whose sensors or motor fail.
+
+It holds for every controller and every gripper that can hurt something (`DeviceInfo.harmless` is False), as far as the
+channels of the gripper allow. The runner passes each reading and each command through it, after the guard.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import inf
+from typing import Final
+
+from attrs import evolve
+
+from graspsense.core.components.roles import Controller
+from graspsense.core.components.run_config import RunConfig
+from graspsense.core.grasp.protection.cells import Fingertips
+from graspsense.core.grasp.protection.drift import Drift
+from graspsense.core.grasp.protection.effort_ceiling import effort_ceiling_n, limited
+from graspsense.core.grasp.protection.motor import Motor
+from graspsense.core.grasp.protection.reports import Reports
+from graspsense.core.grasp.protection.status import StatusWatch
+from graspsense.core.grasp.protection.stuck_force import StuckForce
+from graspsense.core.grasp.protection.touch import Touch
+from graspsense.core.values.device import DeviceInfo
+from graspsense.core.values.faults import Fault
+from graspsense.core.values.signals import (
+    APPROACH,
+    EFFORT,
+    FORCE,
+    HOLD,
+    SQUEEZE,
+    Command,
+    Frame,
+    Phase,
+    Reading,
+)
+
+RELEASE: Final = int(Phase.RELEASE)
+
+
+class Protection:
+    """Watches one grasp of a gripper under a controller.
+
+    `tell` is called with each fault at its first sight. `ending` is the fault that ends the grasp, once there is one.
+    `warnings` are the faults that were seen, in words, and `acted` is the number of commands that were limited.
+    """
+
+    def __init__(
+        self,
+        info: DeviceInfo,
+        controller: Controller[object],
+        run: RunConfig,
+        tell: Callable[[Fault], None],
+    ) -> None:
+        self._tell = tell
+        self._told: dict[str, Fault] = {}
+        self.ending: Fault | None = None
+        self.acted = 0
+        rates = {channel.name: channel.rate_hz for channel in info.channels}
+        self._ceiling_n = effort_ceiling_n(info, controller, run)
+        self._approach_n = max(self._ceiling_n, run.first_effort_n if run.first_effort_n < inf else 0.0)
+        self._relaxed = info.relaxed
+        opening_n = (
+            abs(info.opening.value) if info.opening is not None and info.opening.kind == EFFORT else 0.0
+        )
+        self._opening_n = max(self._ceiling_n, opening_n)
+        contact_n = controller.contact_force_n()
+        # Where only the entry of a plugin declares the channels, the frames show which there are.
+        self._declared = bool(rates)
+        self._has_pads = "force_left" in rates and "force_right" in rates
+        pads_hz = min(rates.get("force_left", 0.0), rates.get("force_right", 0.0))
+        self._touch, self._drift = Touch(contact_n, run.first_effort_n, pads_hz), Drift(contact_n)
+        self._stuck = StuckForce(pads_hz)
+        self._fingertips = Fingertips()
+        self._motor = Motor("effort" in rates, info.rate_hz)
+        self._status = StatusWatch(info.status_bits)
+        self._reports = Reports(info.rate_hz, rates.get("pads", 0.0))
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """The faults that were seen, each in a sentence."""
+        return tuple(fault.told for fault in self._told.values())
+
+    def limit(self, reading: Reading, phase: int, command: Command) -> Command:
+        """Take the reading of a tick and the command for it; return the command that may be applied.
+
+        If the reading shows a fault that ends the grasp, it is `ending`, and the command is the relaxing one. In the
+        release, only a motor that turns the wrong way ends it: the grasp is over, and its outcome stays.
+        """
+        frame = reading.frame
+        self._see(self._reports.see(reading, phase), phase)
+        for fault in self._status.see(frame, phase):
+            self._see(fault, phase)
+        self._see(self._motor.see(frame, phase), phase)
+        if not self._declared and frame.force_left_n == frame.force_left_n:
+            self._has_pads = True
+        if self._has_pads:
+            self._see_pads(reading, phase, command)
+        allowed = self._limited(phase, command)
+        self.acted += allowed.value != command.value
+        self._motor.apply(frame, allowed)
+        return allowed
+
+    def before_closing(self, frame: Frame) -> Fault | None:
+        """Return the fault for which the fingers must not close, if there is one."""
+        faults = self._status.before_closing(frame)
+        if self._has_pads:
+            faults += [fault for fault in self._fingertips.faults() if fault.ends]
+        for fault in faults:
+            self._see(fault)
+        return faults[0] if faults else None
+
+    def opens_wrongly(self, reading: Reading, command: Command) -> bool:
+        """Take a reading, and the command that opens the fingers at last; return whether the motor closes them."""
+        fault = self._motor.see(reading.frame, RELEASE)
+        self._see(fault, RELEASE)
+        self._motor.apply(reading.frame, command)
+        return fault is not None and fault.relaxes
+
+    def _see_pads(self, reading: Reading, phase: int, command: Command) -> None:
+        frame = reading.frame
+        closing = phase in (APPROACH, SQUEEZE, HOLD)
+        self._see(self._touch.see(frame, phase, command))
+        free = self._touch.free()
+        for fault in self._fingertips.see(reading.pads, free):
+            # Fingers that are open hurt nothing; before they close, `before_closing` refuses.
+            if closing or not fault.ends:
+                self._see(fault)
+        if phase == APPROACH and free:
+            for fault in self._drift.see(reading):
+                self._see(fault)
+        elif phase in (SQUEEZE, HOLD):
+            self._see(self._stuck.see(frame))
+
+    def _see(self, fault: Fault | None, phase: int = APPROACH) -> None:
+        if fault is None:
+            return
+        if phase == RELEASE and fault.ends and not fault.relaxes:
+            fault = evolve(fault, ends=False)
+        before = self._told.get(fault.name)
+        if before is None or (fault.ends and not before.ends):
+            self._told[fault.name] = fault
+            self._tell(fault)
+        if fault.ends and self.ending is None:
+            self.ending = fault
+
+    def _limited(self, phase: int, command: Command) -> Command:
+        if self.ending is not None:
+            return self._relaxed
+        closing_n = self._approach_n if phase == APPROACH else self._ceiling_n
+        if phase in (SQUEEZE, HOLD) and command.kind in (EFFORT, FORCE) and command.value > closing_n:
+            self._see(
+                Fault(
+                    "effort at its ceiling",
+                    f"the controller asks for more than {closing_n:.1f} N; run.effort_ceiling_n allows more",
+                )
+            )
+        if self._has_pads and phase in (APPROACH, SQUEEZE, HOLD):
+            closing_n = min(closing_n, self._touch.closing_limit_n())
+        return limited(command, closing_n, self._opening_n)

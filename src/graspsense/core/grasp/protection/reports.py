@@ -1,0 +1,76 @@
+"""Whether frames and cell images keep coming: a clock that stands still, lost frames, images that stop."""
+
+from __future__ import annotations
+
+from math import nan
+from typing import Final
+
+from graspsense.core.values.faults import Fault
+from graspsense.core.values.signals import APPROACH, HOLD, SQUEEZE, Reading
+
+STANDS_S: Final = 0.1
+"""Time, counted in frames of the declared rate, for which the clock of the gripper may stand still."""
+FEWEST_STILL: Final = 3
+"""Frames in a row that show a clock that stands still."""
+LOST_SHARE: Final = 0.02
+"""Share of lost frames from which on a person must know: derivatives of the force then change."""
+ENDS_SHARE: Final = 0.5
+"""Share of lost frames that ends the grasp: a controller that sees half of them does not control."""
+FEWEST: Final = 200
+"""Frames after which a share is told."""
+IMAGES_LATE: Final = 5.0
+"""Periods of the cell images without a new one after which the forces are out of date."""
+IMAGES_LATE_S: Final = 0.1
+"""The least time without a new image that ends a grasp."""
+
+
+class Reports:
+    """Watches the clock and the counters of a gripper with this rate of frames and of cell images (Hz; 0: none)."""
+
+    def __init__(self, rate_hz: float, images_hz: float) -> None:
+        self._period_s = 1.0 / rate_hz
+        self._images_late_s = max(IMAGES_LATE / images_hz, IMAGES_LATE_S) if images_hz > 0.0 else 0.0
+        self._stands = 0
+        self._frames = 0
+        self._expected = 0.0
+        self._counter = -1
+        self._image_t_s = nan
+
+    def see(self, reading: Reading, phase: int) -> Fault | None:
+        """Take the reading of a tick and return a fault that it shows."""
+        frame, pads, _ = reading
+        closing = phase in (APPROACH, SQUEEZE, HOLD)
+        if frame.dt_s > 0.0:
+            self._stands = 0
+        else:
+            self._stands += 1
+            if self._stands >= FEWEST_STILL and self._stands * self._period_s > STANDS_S:
+                return Fault(
+                    "clock stands still",
+                    f"the time of the gripper has not advanced in {self._stands} frames: speeds and time limits "
+                    "are not valid; restart the gripper",
+                    ends=True,
+                )
+        if pads.counter != self._counter or self._image_t_s != self._image_t_s:
+            self._counter, self._image_t_s = pads.counter, frame.t_s
+        elif closing and self._images_late_s > 0.0 and frame.t_s - self._image_t_s > self._images_late_s:
+            return Fault(
+                "cell images stopped",
+                f"no new cell image for {frame.t_s - self._image_t_s:.2f} s: the forces are out of date; check the "
+                "cables of the fingertips",
+                ends=True,
+            )
+        return self._lost(frame.dt_s) if closing else None
+
+    def _lost(self, dt_s: float) -> Fault | None:
+        self._frames += 1
+        self._expected += dt_s / self._period_s
+        lost = self._expected - self._frames
+        if self._frames < FEWEST or lost < LOST_SHARE * self._expected:
+            return None
+        return Fault(
+            "frames lost",
+            f"{lost / self._expected * 100:.0f} % of the frames are missing: rates and times are less exact; check the "
+            "connection and the load of this computer",
+            ends=lost >= ENDS_SHARE * self._expected,
+        )

@@ -1,0 +1,563 @@
+"""The runner: it opens the gripper, runs one grasp tick by tick, and leaves the gripper safe.
+
+A grasp opens the fingers, tares, closes under the controller, holds, and opens again. In each tick the runner reads a
+frame, computes the command and limits it, applies it, and passes the tick to the sinks. On every way out (end of the
+grasp, error, Ctrl-C) the gripper is commanded to open and then to relax, a lost gripper only to relax. It is then
+closed.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
+from math import ceil, inf
+from typing import TYPE_CHECKING, Any, Final, Protocol, runtime_checkable
+
+from attrs import evolve, frozen
+
+from graspsense.core.components.roles import Controller, SensorBackend
+from graspsense.core.components.run_config import RunConfig
+from graspsense.core.control.binding import bind, maker
+from graspsense.core.control.contact import RestState, at_rest, update_rest
+from graspsense.core.control.garbage_collection import no_collection
+from graspsense.core.control.guard import GuardParams, GuardState, guard
+from graspsense.core.control.plain_command import with_plain_commands
+from graspsense.core.control.tick import (
+    OPEN_SPEED_M_S,
+    OPEN_WINDOW_S,
+    RELEASE,
+    TARING,
+    Schedule,
+    TickParams,
+    TickState,
+    events_of,
+    first_state,
+    stopped,
+    tick,
+)
+from graspsense.core.grasp.interrupts import Interrupts
+from graspsense.core.grasp.protection.protection import Protection
+from graspsense.core.values.channel import Channel
+from graspsense.core.values.device import DeviceInfo
+from graspsense.core.values.errors import (
+    FAILURES,
+    DeviceLost,
+    GraspsenseError,
+    RecordingEnded,
+    TareRefused,
+    named,
+)
+from graspsense.core.values.events import EventSource, GraspEvent, event_name
+from graspsense.core.values.faults import Fault
+from graspsense.core.values.signals import (
+    APPROACH,
+    EFFORT,
+    HOLD,
+    RUNNING,
+    SQUEEZE,
+    Command,
+    Frame,
+    Outcome,
+    Pads,
+    Phase,
+    Reading,
+)
+from graspsense.core.values.trace import SI_UNITS, Trace, TraceRecorder
+
+if TYPE_CHECKING:
+    from graspsense.core.grasp.runner import Watcher
+
+
+class Sink(Protocol):
+    """A receiver of every tick, such as a terminal or a recorder. It must not block."""
+
+    def take(self, reading: Reading, phase: int, command: Command) -> None:
+        """Receive one tick."""
+
+
+@runtime_checkable
+class EventSink(Protocol):
+    """A sink that also receives the events of a grasp. It must not block."""
+
+    def event(self, event: GraspEvent) -> None:
+        """Receive one event."""
+
+
+@frozen(kw_only=True, eq=False)
+class Grasp:
+    """The result of the runner: the trace and the outcome. `warnings` are the faults that were seen, in words."""
+
+    trace: Trace
+    outcome: Outcome
+    reason: str
+    device: DeviceInfo
+    report: Mapping[str, Any]
+    counts: Mapping[str, int]
+    events: tuple[GraspEvent, ...]
+    seconds_simulated: float | None
+    seconds_wall: float
+    warnings: tuple[str, ...] = ()
+    interrupted: bool = False
+    """Whether the user asked for an end; a signal during the release leaves the outcome as it was."""
+
+
+def tick_params(info: DeviceInfo, controller: Controller[Any], run: RunConfig) -> TickParams:
+    """Return the parameters of one grasp of this gripper under this controller."""
+    real = info.clock == "device"
+    infinite = float("inf")
+    return TickParams(
+        schedule=Schedule(
+            opens=1 if info.opening is not None else 2 * info.has_release,
+            opening=info.opening if info.opening is not None else info.relaxed,
+            relaxed=info.relaxed,
+            tare_images=info.tare_images,
+            hold_s=run.hold_s,
+            opening_timeout_s=run.opening_timeout_s,
+        ),
+        guard=GuardParams(
+            effort_limit_n=info.effort_limit_n,
+            speed_limit_m_s=info.speed_limit_m_s,
+            first_effort_n=run.first_effort_n if real else infinite,
+            first_speed_m_s=run.first_speed_m_s if real else infinite,
+            contact_force_n=controller.contact_force_n(),
+        ),
+        law=controller.params(),
+    )
+
+
+def seconds_at_most(run: RunConfig) -> float:
+    """Return the longest time (s) of a grasp with opening, taring and release."""
+    return run.grasp_timeout_s + 3.0 * run.opening_timeout_s
+
+
+FRAME_PERIODS: Final = 3.0
+"""How many of its own periods a gripper may take for a frame, if that is longer than `run.frame_timeout_s`."""
+
+
+def frame_timeout_s(run: RunConfig, info: DeviceInfo) -> float:
+    """Return how long to wait for a frame: `run.frame_timeout_s`, or three periods of a gripper that is slower."""
+    return max(run.frame_timeout_s, FRAME_PERIODS / info.rate_hz)
+
+
+def no_frame(run: RunConfig, info: DeviceInfo) -> str:
+    """Return the message for a gripper that gave no frame for that long."""
+    return (
+        f"no frame from {info.name} for {frame_timeout_s(run, info) * 1e3:.0f} ms, although it declares "
+        f"{info.rate_hz:g} Hz: check its cable and power, then `graspsense devices`. run.frame_timeout_s sets how long "
+        "to wait"
+    )
+
+
+def overdue(run: RunConfig) -> str:
+    """Return the reason given for a grasp that took longer."""
+    return (
+        f"no end after {seconds_at_most(run):g} s of ticks: the controller did not end the grasp "
+        "(run.grasp_timeout_s)"
+    )
+
+
+def ended_by_itself(stopped: int, outcome: int) -> tuple[Outcome, str]:
+    """Return the outcome of a grasp that its controller or the guard ended, and the reason if it needs one.
+
+    `stopped`: that of the guard (`GuardState`); `outcome`: that of the controller.
+    """
+    if stopped:
+        return Outcome.ABORTED, "the controller commanded NaN, so the guard stopped the grasp"
+    try:
+        return Outcome(outcome), ""
+    except ValueError:
+        return (
+            Outcome.ABORTED,
+            f"the controller ended the grasp with the outcome {outcome!r}, which there is not",
+        )
+
+
+def run_grasp(
+    backend: SensorBackend[Any],
+    controller: Controller[Any],
+    run: RunConfig,
+    *,
+    sinks: Iterable[Sink] = (),
+    on_event: Callable[[GraspEvent], None] | None = None,
+    on_open: Callable[[DeviceInfo], None] | None = None,
+    watcher: Watcher | None = None,
+) -> Grasp:
+    """Run one grasp and return it, whatever its outcome.
+
+    `on_open` is called with the description of the opened gripper before any command; an exception from it ends the
+    run. `watcher` sees each tick and can end the squeeze, which the release follows as usual. Raises NoDevice if the
+    gripper cannot be opened. Every later failure is an outcome.
+    """
+    began = time.perf_counter()
+    with Interrupts() as interrupts:
+        try:
+            backend.expect(controller, run)
+            info = _opened(backend, run.seed)
+            if not info.channels:
+                info = evolve(info, channels=_declared(backend))
+            if on_open is not None:
+                on_open(info)
+            grasp = _Grasp(backend, controller, run, info, sinks, on_event, interrupts)
+            if watcher is not None:
+                grasp.watch_with(watcher)
+            with no_collection():
+                outcome, reason = grasp.drive()
+        except BaseException:
+            backend.close()
+            raise
+        # The trace must survive a backend that fails on closing.
+        try:
+            backend.close()
+        except FAILURES as error:
+            reason = f"the gripper could not be closed: {named(error)} ({reason or outcome.words})"
+            outcome = Outcome.ABORTED
+        # After closing, so that the report covers it.
+        report = _report_of(backend)
+    frames = grasp.recorder.frames
+    commands = backend.recorded_commands()
+    if commands is not None:
+        grasp.recorder.commands[:] = commands[: len(frames)]
+    return Grasp(
+        trace=grasp.recorder.trace(),
+        outcome=outcome,
+        reason=reason,
+        device=info,
+        report=report,
+        counts={"ticks": len(frames), "late": grasp.late, "guarded": grasp.guarded},
+        events=tuple(grasp.events),
+        seconds_simulated=grasp.seconds() if info.clock == "virtual" else None,
+        seconds_wall=time.perf_counter() - began,
+        warnings=() if grasp.protection is None else grasp.protection.warnings,
+        interrupted=grasp.interrupted or interrupts.count > 0,
+    )
+
+
+def _report_of(backend: SensorBackend[Any]) -> dict[str, Any]:
+    """Return the report of a gripper, or why it has none."""
+    try:
+        return dict(backend.report())
+    except FAILURES as error:
+        return {"report_failed": named(error)}
+
+
+def run_uninterrupted(
+    backend: SensorBackend[Any],
+    controller: Controller[Any],
+    run: RunConfig,
+    *,
+    on_event: Callable[[GraspEvent], None] | None = None,
+    on_open: Callable[[DeviceInfo], None] | None = None,
+) -> Grasp:
+    """Run one grasp as `run_grasp` does, for a caller that has no use for an interrupted one.
+
+    Raises KeyboardInterrupt, after the gripper was released, if the user asked for an end.
+    """
+    grasp = run_grasp(backend, controller, run, on_event=on_event, on_open=on_open)
+    if grasp.interrupted:
+        raise KeyboardInterrupt
+    return grasp
+
+
+def _opened(backend: SensorBackend[Any], seed: int) -> DeviceInfo:
+    """Open the gripper. An exception that is not ours names its class."""
+    name = f"{type(backend).__module__}.{type(backend).__qualname__}"
+    try:
+        info = backend.open(seed)
+    except GraspsenseError:
+        raise
+    except SystemExit as error:
+        raise DeviceLost(f"`open` of the gripper {name} raised {named(error)}") from error
+    except Exception as error:
+        error.add_note(f"`open` of the gripper {name} raised it")
+        raise
+    if not isinstance(info, DeviceInfo):
+        raise TypeError(
+            f"`open` of the gripper {name} returned {info!r}: return graspsense.plugin_api.DeviceInfo"
+        )
+    return info
+
+
+def _declared(backend: SensorBackend[Any]) -> tuple[Channel, ...]:
+    """Return the channels of an open gripper; none where the class does not declare them."""
+    try:
+        return tuple(backend.channels)
+    except NotImplementedError:
+        return ()
+
+
+class _Overdue(Exception):
+    """A grasp that took longer than the limit."""
+
+
+class _Grasp:
+    """The state of a running grasp, which the loop and the ways out of it share."""
+
+    def __init__(
+        self,
+        backend: SensorBackend[Any],
+        controller: Controller[Any],
+        run: RunConfig,
+        info: DeviceInfo,
+        sinks: Iterable[Sink],
+        on_event: Callable[[GraspEvent], None] | None,
+        interrupts: Interrupts,
+    ) -> None:
+        self.backend, self.run, self.info, self.on_event = backend, run, info, on_event
+        self.watcher: Watcher | None = None
+        self.stop_reason = ""
+        self.sinks, self.interrupts, self.interrupted = list(sinks), interrupts, False
+        self.step = type(controller).step
+        self.event_names = type(controller).events
+        self.params = tick_params(info, controller, run)
+        self.protection = None if info.harmless else Protection(info, controller, run, self._fault_seen)
+        self.state: TickState = first_state(controller.init())
+        self.recorder = TraceRecorder({**SI_UNITS, **info.units})
+        self.events: list[GraspEvent] = []
+        self.late = self.guarded = 0
+        self.first_t_s: float | None = None
+        self.last: Frame | None = None
+
+    def watch_with(self, watcher: Watcher) -> None:
+        """Let this watcher see the ticks from the contact on."""
+        self.watcher = watcher
+        watcher.begin(self.recorder, self.info, self._predicted)
+
+    def drive(self) -> tuple[Outcome, str]:
+        """Run the loop and return the outcome. The gripper was then commanded to open or relax."""
+        lost = False
+        try:
+            self._loop()
+            ending: tuple[Outcome, str] | None = None
+        except DeviceLost as error:
+            lost = True
+            ending = Outcome.DEVICE_LOST, str(error)
+        except RecordingEnded:
+            ending = self._recording_ended()
+        except (TareRefused, _Overdue) as error:
+            ending = Outcome.ABORTED, str(error)
+        except KeyboardInterrupt:
+            self.interrupted = True
+            ending = Outcome.ABORTED, "interrupted"
+        except FAILURES as error:
+            # A controller can raise anything; the gripper must still be released and the trace kept.
+            ending = Outcome.ABORTED, named(error)
+        finally:
+            self.interrupts.deferred = True
+            # A lost gripper may still receive commands, so it is commanded to relax.
+            fault = self._fault()
+            self._let_go(opens=not (lost or self.state.done or (fault is not None and fault.relaxes)))
+        if ending is None and fault is not None:
+            ending = fault.outcome, fault.told
+        if ending is None:
+            ending = ended_by_itself(self.state.guard.stopped, self.state.law.outcome)
+        failed = ending[0] in (Outcome.DEVICE_LOST, Outcome.ABORTED)
+        if self.stop_reason and not failed:
+            return Outcome.RECOGNISED, self.stop_reason
+        if self.state.law.outcome != RUNNING and failed:
+            before, unknown = ended_by_itself(0, self.state.law.outcome)
+            if not unknown:
+                ending = ending[0], f"{ending[1]} (after the grasp had ended: {before.words})"
+        return ending
+
+    def seconds(self) -> float:
+        """Return the time (s) from the first frame to the last, by the clock of the gripper."""
+        return 0.0 if self.last is None or self.first_t_s is None else self.last.t_s - self.first_t_s
+
+    def _loop(self) -> None:
+        read, apply, run = self.backend.read, self.backend.apply, self.run
+        step = with_plain_commands(self.step)
+        advance = bind(tick, step=step, events_told=events_of(self.step), TickState=maker(TickState))
+        params, record = self.params, self.recorder.add
+        on_device_clock = self.info.clock == "device"
+        late_s = run.late_periods / self.info.rate_hz if on_device_clock else float("inf")
+        timeout_s = frame_timeout_s(run, self.info)
+        state, phase, watcher = self.state, self.state.phase, self.state.guard
+        images: list[Pads] = []
+        newest = n_ticks = 0
+        most_ticks, leaps = self._most_ticks(), self._leaps()
+        while n_ticks < most_ticks:
+            n_ticks += 1
+            reading = read(timeout_s)
+            if reading is None:
+                raise DeviceLost(no_frame(run, self.info))
+            frame, pads, _ = reading
+            self.last = frame
+            if self.first_t_s is None:
+                self.first_t_s = frame.t_s
+            acted = self._acted(state)
+            command, state = advance(params, state, reading)
+            self.state = state
+            stepped, same_phase = phase != TARING, state.phase == phase
+            if not stepped and pads.counter > newest:
+                newest = pads.counter
+                images.append(pads)
+            if not same_phase:
+                if phase == TARING and not self._tared(images, frame):
+                    return
+                phase, newest = state.phase, pads.counter
+                self._event(frame.t_s, Phase(phase), Phase(phase).name.lower())
+            if state.guard is not watcher:
+                watcher = self._guard_event(frame, watcher, state.guard)
+            command = self._protected(reading, phase if stepped else TARING, command)
+            # The frame that ended the taring still has forces relative to the old zero.
+            recorded = phase >= APPROACH and stepped
+            if recorded:
+                self.late += frame.dt_s > late_s
+                self.guarded += self._acted(state) > acted
+            try:
+                apply(command)
+            finally:
+                # Also if the gripper is lost at this moment: the frame was measured.
+                if recorded:
+                    record(reading, phase, command)
+                if state.events:
+                    self._told(frame, phase, state.events)
+            if recorded:
+                if self.sinks:
+                    self._show(reading, phase, command)
+                if self.watcher is not None and phase < RELEASE and not state.done:
+                    state = self._watched(self.watcher, frame, state)
+            if state.done or watcher.stopped or self._fault() is not None:
+                return
+            if leaps and same_phase and phase != SQUEEZE and phase != HOLD:
+                n_ticks += self._leap(phase, reading, int(most_ticks - n_ticks))
+                state = self.state
+        raise _Overdue(overdue(run))
+
+    def _most_ticks(self) -> float:
+        """Return the number of ticks that a grasp may take; a recording ends by itself.
+
+        Ticks are counted, since the clock of a device may stand still, and the squeeze must end nevertheless.
+        """
+        return inf if self.info.opening is None else ceil(seconds_at_most(self.run) * self.info.rate_hz)
+
+    def _leaps(self) -> bool:
+        """Return whether the gripper is asked for ticks of free motion at once; watchers need only the squeeze."""
+        offers = type(self.backend).free_ticks is not SensorBackend.free_ticks
+        return offers and self.info.harmless and self.info.clock == "virtual"
+
+    def _leap(self, phase: int, before: Reading, most: int) -> int:
+        """Let the gripper run ticks of free motion at once, record and show them, and return their number.
+
+        The cell image of all of them is that of the reading before.
+        """
+        free = self.backend.free_ticks(self.params, self.state, before.frame, most)
+        if free is None:
+            return 0
+        self.state = free.state
+        if free.frames:
+            self.last = free.frames[-1]
+            self.recorder.extend(free.frames, phase, free.commands)
+        if self.sinks:
+            for frame, effort_n in zip(free.frames, free.commands, strict=True):
+                self._show(Reading(frame, before.pads), phase, Command(EFFORT, effort_n, inf, inf))
+        return free.n_ticks
+
+    def _show(self, reading: Reading, phase: int, command: Command) -> None:
+        """Pass a tick to the sinks. One that fails is dropped, because it must not change the outcome of a grasp."""
+        for sink in self.sinks:
+            try:
+                sink.take(reading, phase, command)
+            except FAILURES as error:
+                self.sinks = [other for other in self.sinks if other is not sink]
+                self._event(reading.frame.t_s, Phase(phase), f"{type(sink).__name__} failed: {named(error)}")
+
+    def _protected(self, reading: Reading, phase: int, command: Command) -> Command:
+        """Return the command that the protection allows, if this gripper can hurt something."""
+        return command if self.protection is None else self.protection.limit(reading, phase, command)
+
+    def _tared(self, images: list[Pads], frame: Frame) -> bool:
+        """Set the zero of the pads; return whether the fingers may close."""
+        self.backend.tare(images)
+        return self.protection is None or self.protection.before_closing(frame) is None
+
+    def _acted(self, state: TickState) -> int:
+        """Return the number of commands that guard and protection have limited so far."""
+        return state.guard.acted + (0 if self.protection is None else self.protection.acted)
+
+    def _fault(self) -> Fault | None:
+        """Return the fault that ended the grasp, if one did."""
+        return None if self.protection is None else self.protection.ending
+
+    def _fault_seen(self, fault: Fault) -> None:
+        """Log a fault of the gripper at its first sight."""
+        t_s = 0.0 if self.last is None else self.last.t_s
+        phase = Phase(max(self.state.phase, Phase.OPENING))
+        self._event(t_s, phase, f"{'fault' if fault.ends else 'warning'}: {fault.told}")
+
+    def _guard_event(self, frame: Frame, before: GuardState, now: GuardState) -> GuardState:
+        """Log an action of the guard at its first time, and return its state."""
+        if now.stopped and not before.stopped:
+            self._event(frame.t_s, Phase(self.state.phase), "guard: the controller commanded NaN")
+        elif now.acted and not before.acted:
+            self._event(frame.t_s, Phase(self.state.phase), "guard: a command was limited")
+        return now
+
+    def _told(self, frame: Frame, phase: int, events: int) -> None:
+        """Log the events that the controller told in this tick, one for each bit that is set."""
+        for i in range(events.bit_length()):
+            if events >> i & 1:
+                event = self._event(frame.t_s, Phase(phase), event_name(self.event_names, i), "controller")
+                self.recorder.events.append(event)
+
+    def _event(self, t_s: float, phase: Phase, what: str, source: EventSource = "runner") -> GraspEvent:
+        event = GraspEvent(t_s, phase, what, source)
+        self.events.append(event)
+        if self.on_event is not None:
+            self.on_event(event)
+        for sink in self.sinks:
+            if isinstance(sink, EventSink):
+                with suppress(*FAILURES):  # as with ticks, a failing sink must not change the outcome
+                    sink.event(event)
+        return event
+
+    def _watched(self, watcher: Watcher, frame: Frame, state: TickState) -> TickState:
+        """Return the state after this tick: that of a release if the watcher has a reason to stop the squeeze."""
+        self.stop_reason = watcher.watch(frame, state.phase)
+        if self.stop_reason:
+            self.state = state = stopped(self.params.schedule, state, frame)
+        return state
+
+    def _predicted(self, t_s: float, phase: int, what: str) -> None:
+        """Log a prediction that was made while the grasp goes on."""
+        self._event(t_s, Phase(phase), what, "model")
+
+    def _let_go(self, opens: bool) -> None:
+        """Open the fingers, then relax. A failure of one step must not prevent the next.
+
+        With `opens` false, because the fingers are open or frames no longer come, it only relaxes.
+        """
+        info, run = self.info, self.run
+        try:
+            if opens and info.opening is not None and self.state.phase >= APPROACH and self.last is not None:
+                still, began_s = RestState(self.last.t_s, self.last.gap_m), self.last.t_s
+                give_up = time.perf_counter() + run.opening_timeout_s
+                fresh = GuardState(1, 0, 0)
+                # After a second Ctrl-C, only relax.
+                while time.perf_counter() < give_up and self.interrupts.count < 2:
+                    command, fresh = guard(self.params.guard, fresh, self.last, info.opening)
+                    self.backend.apply(command)
+                    reading = self.backend.read(frame_timeout_s(run, info))
+                    if reading is None:
+                        break
+                    if self.protection is not None and self.protection.opens_wrongly(reading, command):
+                        break
+                    self.last = reading.frame
+                    frame = self.last
+                    still = update_rest(still, frame.t_s, frame.gap_m, OPEN_SPEED_M_S, OPEN_WINDOW_S)
+                    if at_rest(still, frame.t_s, OPEN_WINDOW_S) or (
+                        frame.t_s - began_s > run.opening_timeout_s
+                    ):
+                        break
+        except (KeyboardInterrupt, *FAILURES):
+            pass
+        with suppress(KeyboardInterrupt, *FAILURES):
+            self.backend.apply(info.relaxed)
+
+    def _recording_ended(self) -> tuple[Outcome, str]:
+        if self.state.law.outcome != RUNNING:
+            return ended_by_itself(self.state.guard.stopped, self.state.law.outcome)
+        if self.state.law.phase == SQUEEZE:
+            return Outcome.NEVER_STEADY, "the recording ended before the fingers came to rest"
+        return Outcome.NOTHING_THERE, "the recording ended before both pads were in contact"

@@ -1,0 +1,1 @@
+"""Models: training data, certainty, prediction sets, novelty, and their files."""

@@ -1,0 +1,183 @@
+"""Trials with labels: the data that a classifier is trained and evaluated on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Final, Literal
+
+from attrs import evolve, field, frozen
+
+from graspsense.core.files.limits import CLASSES, FEATURES
+from graspsense.core.learn.target_value import TargetValue
+from graspsense.core.values.errors import ConfigError, DataDamaged, suggestion
+from graspsense.core.values.features import LARGEST_VALUE, FeatureTable
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+Target = Literal["both", "class", "state"]
+TARGETS: Final[tuple[Target, ...]] = ("both", "class", "state")
+"""The part of a label `class:state` to predict: all of it, the class, or the state."""
+
+
+@frozen(kw_only=True, eq=False)
+class ControlFeatures:
+    """Other features of the same trials, evaluated as a baseline; `what` describes them in words.
+
+    `missing` is the most frequent reason why a trial has none of them, if any has none.
+    """
+
+    table: FeatureTable
+    what: str
+    missing: str = ""
+
+
+@frozen(kw_only=True, eq=False)
+class Labelled:
+    """Trials with their features and labels.
+
+    `labels` are `class:state`, or a class alone. `instances` identify the individual object of each trial
+    (`odwalla#3`); None if that was not recorded, with the reason in `no_instances`. `order` numbers the trials in the
+    order of recording. `before_contact` are features from before contact only, None with the reason in
+    `no_before_contact`; `first_line` are the numbers of the first frame alone, if the trials were imported; `width` is
+    the width alone. `variants` are further tables to evaluate. If rates on these
+    trials say nothing about other objects, `no_interval` is the reason, and they get no interval. `notes` tell what a
+    reader of a rate must know, `provenance` how the trials were made.
+
+    Raises ValueError if the columns differ in length, and ConfigError for more labels or features than the limits
+    `CLASSES` and `FEATURES` accept.
+    """
+
+    source: str
+    table: FeatureTable
+    labels: tuple[str, ...]
+    instances: tuple[str, ...] | None = None
+    no_instances: str = ""
+    no_interval: str = ""
+    order: tuple[int, ...] | None = None
+    no_order: str = ""
+    before_contact: ControlFeatures | None = None
+    no_before_contact: str = ""
+    first_line: ControlFeatures | None = None
+    width: ControlFeatures | None = None
+    no_width: str = ""
+    variants: Mapping[str, ControlFeatures] = field(factory=dict)
+    value: TargetValue | None = None
+    """A number to predict in place of the label; a trial without a label has an empty one."""
+    notes: tuple[str, ...] = ()
+    provenance: Mapping[str, Any] = field(factory=dict)
+
+    def __attrs_post_init__(self) -> None:
+        for name in ("labels", "instances", "order"):
+            column = getattr(self, name)
+            if column is not None and len(column) != len(self.table):
+                raise ValueError(
+                    f"{len(self.table)} trials and {len(column)} {name}: give one for each trial"
+                )
+        _refuse_too_large(self.table, self.source)
+        for control in (self.before_contact, self.first_line, self.width, *self.variants.values()):
+            if control is not None:
+                _refuse_too_large(control.table, self.source)
+        if self.value is not None:
+            _refuse_large_target(self.value, self.source)
+        labels = len(set(self.labels)) if self.value is None else 1
+        too_many = CLASSES.exceeded(labels) or FEATURES.exceeded(len(self.table.names))
+        if too_many:
+            raise ConfigError(f"{self.source} has {too_many}")
+
+    def __len__(self) -> int:
+        """Return the number of trials."""
+        return len(self.labels)
+
+    @property
+    def classes(self) -> tuple[str, ...]:
+        """The labels that occur, sorted."""
+        return tuple(sorted(set(self.labels)))
+
+    def rows(self, which: NDArray[np.int64]) -> Labelled:
+        """Return these trials, in this order."""
+        numbers = which.tolist()
+        return evolve(
+            self,
+            table=self.table.rows(which),
+            labels=_picked(self.labels, numbers),
+            instances=None if self.instances is None else _picked(self.instances, numbers),
+            order=None if self.order is None else _picked(self.order, numbers),
+            before_contact=_control_rows(self.before_contact, which),
+            first_line=_control_rows(self.first_line, which),
+            value=None
+            if self.value is None
+            else evolve(self.value, values=_picked(self.value.values, numbers)),
+            width=_control_rows(self.width, which),
+            variants={name: evolve(one, table=one.table.rows(which)) for name, one in self.variants.items()},
+        )
+
+    def of_class(self, name: str) -> Labelled:
+        """Return the trials of one class. Raises ConfigError if there are none."""
+        import numpy as np
+
+        of = np.array([class_of(label) == name for label in self.labels])
+        if not of.any():
+            known = sorted({class_of(label) for label in self.labels})
+            raise ConfigError(
+                f"no trial of class {name!r} in {self.source}. Known: {', '.join(known)}."
+                + suggestion(name, known)
+            )
+        return self.rows(np.flatnonzero(of))
+
+    def aimed(self, target: str) -> Labelled:
+        """Return the trials with one of `TARGETS` as labels.
+
+        Raises ConfigError if the labels have no state, DataDamaged for another target, which only a model can have.
+        """
+        if target not in TARGETS:
+            raise DataDamaged(
+                f"a model predicts one of {', '.join(TARGETS)}; the target of this one is {target!r}"
+            )
+        if target == "both":
+            return self
+        if target == "class":
+            return evolve(self, labels=tuple(class_of(label) for label in self.labels))
+        for label in self.labels:
+            if ":" not in label:
+                raise ConfigError(
+                    f"label {label!r} in {self.source} has no state: labels are CLASS:STATE, as in can:full_open. "
+                    "Choose --target both, which takes labels as they are"
+                )
+        return evolve(self, labels=tuple(label.partition(":")[2] for label in self.labels))
+
+
+def _refuse_too_large(table: FeatureTable, source: str) -> None:
+    """Raise DataDamaged for a number that nothing can be learned from, since its square is not finite."""
+    import numpy as np
+
+    large = np.abs(table.values) > LARGEST_VALUE
+    if large.any():
+        trial, column = (int(number) for number in np.argwhere(large)[0])
+        raise DataDamaged(
+            f"{source}: feature {table.names[column]!r} of trial {trial + 1} is {table.values[trial, column]:g}: the "
+            f"largest magnitude to learn from is {LARGEST_VALUE:g}. Correct it, or leave this feature out (--features)"
+        )
+
+
+def _refuse_large_target(target: TargetValue, source: str) -> None:
+    for trial, value in enumerate(target.values):
+        if abs(value) > LARGEST_VALUE:
+            raise DataDamaged(
+                f"{source}: {target.name!r} of trial {trial + 1} is {value:g}: the largest magnitude to predict is "
+                f"{LARGEST_VALUE:g}"
+            )
+
+
+def class_of(label: str) -> str:
+    """Return the class of a label `class:state`."""
+    return label.partition(":")[0]
+
+
+def _picked(column: Sequence[Any], numbers: Sequence[int]) -> tuple[Any, ...]:
+    return tuple(column[i] for i in numbers)
+
+
+def _control_rows(control: ControlFeatures | None, which: NDArray[np.int64]) -> ControlFeatures | None:
+    return None if control is None else evolve(control, table=control.table.rows(which))

@@ -1,0 +1,205 @@
+"""Novelty detection: whether a trial is unlike all training data, by one rule for every classifier.
+
+For each class and feature, the model has the range of the training trials. A trial is unlike a class if one of its
+features lies outside that range by more than `REACH` times the standard deviation of the feature within classes (pooled
+over the classes). It is *unknown* if it is unlike every class, or has no feature at all. Missing features are ignored.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from attrs import frozen
+
+from graspsense.core.learn.stored_values import StoredValues
+from graspsense.core.values.features import Features, FeatureTable
+from graspsense.core.values.reasons import FeatureValue, Reason
+from graspsense.core.values.units import in_words
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+REACH: Final = 3.0
+"""Distance from the range of a class, in standard deviations, up to which a trial is like the class."""
+_ROUNDING: Final = 1e-9
+"""Relative difference allowed to a feature that was constant in training."""
+_FARTHEST: Final = float(np.finfo(np.float64).max)
+"""A distance that overflows counts as this one: infinite is that of a trial without any feature in common."""
+_ROWS_AT_ONCE: Final = 4096
+
+
+@frozen(kw_only=True, eq=False)
+class Novelty:
+    """The ranges of the training trials.
+
+    `lowest` and `highest` have shape (classes, features), NaN for a feature that a class never had; `spread`, the
+    standard deviation within classes, has shape (features,), NaN if unknown.
+    """
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    classes: tuple[str, ...]
+    lowest: NDArray[np.float64]
+    highest: NDArray[np.float64]
+    spread: NDArray[np.float64]
+    featureless: bool
+    """Whether a training trial had no feature at all, so that such a trial is not new."""
+
+    def unlike(self, features: Features) -> Reason | None:
+        """Return why this trial is unlike every class, or None if it is like one of them."""
+        values = np.array([features[name] for name in self.names])
+        if np.isnan(values).all():
+            if self.featureless:
+                return None
+            reasons = "; ".join(sorted(set(features.reasons.values())))
+            return Reason(words=f"no feature is defined: {reasons}" if reasons else "no feature is defined")
+        outside = self._outside(values)
+        worst = _worst(outside)
+        k = int(np.argmin(worst))
+        if worst[k] <= REACH:
+            return None
+        if math.isinf(worst[k]):
+            return Reason(words="it has none of the features that the training trials had")
+        f = int(np.nanargmax(outside[k]))
+        unit = self.units[f]
+        low, high = (in_words(float(end[k, f]), unit) for end in (self.lowest, self.highest))
+        feature = FeatureValue(self.names[f], float(values[f]), unit)
+        return Reason(
+            words=f"{feature.words} is unlike everything trained on: "
+            f"the nearest, {self.classes[k]}, has {low} to {high}",
+            features=(feature,),
+        )
+
+    def unlike_rows(self, table: FeatureTable) -> NDArray[np.bool_]:
+        """Return for each trial of a table whether it is unlike every class."""
+        values = table.columns(self.names).values
+        unlike = np.empty(len(values), dtype=np.bool_)
+        for start in range(0, len(values), _ROWS_AT_ONCE):
+            some = values[start : start + _ROWS_AT_ONCE]
+            outside = _worst(self._outside(some[:, np.newaxis, :]))
+            unlike[start : start + len(some)] = outside.min(axis=1) > REACH
+        unlike[np.isnan(values).all(axis=1)] = not self.featureless
+        return unlike
+
+    def closeness(self, table: FeatureTable, classes: Sequence[str]) -> NDArray[np.float64]:
+        """Return how close each trial is to the middle of each of these classes, shape (trials, classes).
+
+        It is 1 / (1 + distance) of the feature that is farthest from the middle of the range, in standard deviations.
+        Without a feature in common it is 0.
+        """
+        values = table.columns(self.names).values
+        columns = [self.classes.index(name) for name in classes]
+        result = np.empty((len(values), len(columns)))
+        for start in range(0, len(values), _ROWS_AT_ONCE):
+            some = values[start : start + _ROWS_AT_ONCE]
+            result[start : start + len(some)] = 1.0 / (
+                1.0 + _worst(self._from_middle(some[:, np.newaxis, :]))[:, columns]
+            )
+        return result
+
+    def _outside(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the distance of each value from the range of each class, in standard deviations; NaN if unknown."""
+        with np.errstate(invalid="ignore", over="ignore"):
+            outside: NDArray[np.float64] = np.maximum(
+                np.maximum(self.lowest - values, values - self.highest), 0.0
+            )
+            return np.minimum(outside / self._scale(values), _FARTHEST)
+
+    def _from_middle(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the distance of each value from the middle of the range of each class, as `_outside` does."""
+        with np.errstate(invalid="ignore", over="ignore"):
+            away: NDArray[np.float64] = np.abs(values - 0.5 * (self.lowest + self.highest))
+            return np.minimum(away / self._scale(values), _FARTHEST)
+
+    def _scale(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the standard deviations; for a feature that was constant in training, what rounding may change."""
+        rounding = _ROUNDING * np.maximum(np.abs(values), np.finfo(np.float64).tiny / _ROUNDING)
+        scale: NDArray[np.float64] = np.where(self.spread > 0.0, self.spread, rounding)
+        return scale
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the ranges as values that JSON represents exactly; an unknown one is None."""
+        return {
+            "reach": REACH,
+            "featureless": self.featureless,
+            "spread": _plain(self.spread),
+            "ranges": {
+                label: [_plain(self.lowest[k]), _plain(self.highest[k])]
+                for k, label in enumerate(self.classes)
+            },
+        }
+
+
+def novelty_of(table: FeatureTable, labels: Sequence[str]) -> Novelty:
+    """Return the ranges of these training trials."""
+    values = table.values
+    classes = tuple(sorted(set(labels)))
+    given = np.array(labels)
+    lowest = np.full((len(classes), len(table.names)), np.nan)
+    highest = lowest.copy()
+    squares, freedom = np.zeros(len(table.names)), np.zeros(len(table.names))
+    for k, label in enumerate(classes):
+        rows = values[given == label]
+        for f in range(len(table.names)):
+            known = rows[~np.isnan(rows[:, f]), f]
+            if len(known):
+                lowest[k, f], highest[k, f] = known.min(), known.max()
+                squares[f] += float(((known - known.mean()) ** 2).sum())
+                freedom[f] += len(known) - 1
+    with np.errstate(invalid="ignore", divide="ignore"):
+        spread = np.sqrt(squares / freedom)
+    for f in np.flatnonzero(freedom == 0).tolist():
+        # With one trial in each class, the differences between classes are the only measure of spread.
+        known = values[~np.isnan(values[:, f]), f]
+        spread[f] = float(known.std()) if len(known) else math.nan
+    return Novelty(
+        names=table.names,
+        units=table.units,
+        classes=classes,
+        lowest=lowest,
+        highest=highest,
+        spread=spread,
+        featureless=bool(np.isnan(values).all(axis=1).any()),
+    )
+
+
+def novelty_from(
+    names: Sequence[str], units: Sequence[str], values: object, place: str = "unknown"
+) -> Novelty:
+    """Return the ranges that `to_json` described; `place` is their field in the file. Raises DataDamaged."""
+    kept = StoredValues(values, place)
+    if kept.number("reach") != REACH:
+        raise kept.refusal("reach", f"the rule for unknown trials has another one; this version has {REACH}")
+    ranges = kept.table("ranges")
+    classes = tuple(ranges)
+    ends = np.empty((2, len(classes), len(names)))
+    for k, label in enumerate(classes):
+        ends[:, k, :] = ranges.numbers(label, (2, len(names)), missing=True)
+    lowest, highest = ends
+    if (np.isnan(lowest) != np.isnan(highest)).any() or (lowest > highest).any():
+        raise kept.refusal("ranges", "a feature has one end only, or its highest value is below the lowest")
+    spread = kept.numbers("spread", (len(names),), missing=True, least=0.0)
+    if (np.isnan(spread) & ~np.isnan(lowest).all(axis=0)).any():
+        raise kept.refusal("spread", "it is missing for a feature that has a range")
+    return Novelty(
+        names=tuple(names),
+        units=tuple(units),
+        classes=classes,
+        lowest=lowest,
+        highest=highest,
+        spread=spread,
+        featureless=kept.flag("featureless"),
+    )
+
+
+def _worst(outside: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the maximum along the last axis, ignoring NaN; infinite if all are NaN."""
+    known = ~np.isnan(outside)
+    return np.where(known.any(axis=-1), np.where(known, outside, -1.0).max(axis=-1), np.inf)
+
+
+def _plain(values: NDArray[np.float64]) -> list[float | None]:
+    return [None if math.isnan(v) else v for v in values.tolist()]

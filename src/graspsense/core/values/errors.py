@@ -1,0 +1,108 @@
+"""The errors that a user can meet. Their messages say what was found, what is allowed, and what to do.
+
+Each class has the exit code of the command line. A grasp that fails is not an error but an `Outcome` (see
+`graspsense.core.values.signals`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from difflib import get_close_matches
+from itertools import islice
+from typing import Final
+
+MOST_NAMED: Final = 24
+"""Limit on the names that an error lists."""
+_LONGEST_NAME: Final = 100
+_MOST_COMPARED: Final = 1000
+
+
+class GraspsenseError(Exception):
+    """Base class of all errors for the user; `exit_code` is that of the command line."""
+
+    exit_code = 70
+
+
+class ConfigError(GraspsenseError):
+    """A pipeline, experiment or option that cannot be used as written."""
+
+    exit_code = 2
+
+
+class UnknownName(ConfigError):
+    """A name that is unknown, or that several distributions provide."""
+
+
+class WiringError(ConfigError):
+    """Two components that do not fit together."""
+
+
+class PluginUnavailable(ConfigError):
+    """A component whose code cannot be imported here."""
+
+
+class ComponentFailed(GraspsenseError):
+    """A component of a plugin raised an exception that its contract does not allow."""
+
+
+class NoDevice(GraspsenseError):
+    """The gripper is not connected."""
+
+    exit_code = 3
+
+
+class DeviceLost(GraspsenseError):
+    """The gripper was open and no longer responds."""
+
+    exit_code = 4
+
+
+class TareRefused(GraspsenseError):
+    """The pads cannot be zeroed now: loaded, silent or unsteady."""
+
+    exit_code = 4
+
+
+class DataDamaged(GraspsenseError):
+    """A file whose content is not what its format requires."""
+
+    exit_code = 5
+
+
+FAILURES: Final = (Exception, SystemExit)
+"""What the code of a plugin can raise, apart from KeyboardInterrupt, which is the user's.
+
+SystemExit is a failure of the plugin too: it must not end the program, nor lose what was measured.
+"""
+
+
+class TooLarge(DataDamaged):
+    """A file that unpacks to more than is allowed; `graspsense.recording.unpacked` has the limit."""
+
+
+class RecordingEnded(Exception):
+    """A replayed recording has no further frame. The runner turns this into an outcome."""
+
+
+def named(error: BaseException) -> str:
+    """Return an exception in words: `ZeroDivisionError: float division by zero`."""
+    return f"{type(error).__name__}: {error}"
+
+
+def suggestion(found: str, allowed: Iterable[str]) -> str:
+    """Return `" Did you mean 'x'?"` for the nearest allowed name, or an empty string."""
+    if len(found) > _LONGEST_NAME:
+        return ""
+    comparable = sorted(islice((name for name in allowed if len(name) <= _LONGEST_NAME), _MOST_COMPARED))
+    near = get_close_matches(found, comparable, n=1, cutoff=0.5)
+    return f" Did you mean {near[0]!r}?" if near else ""
+
+
+def listed(names: Sequence[str]) -> str:
+    """Return names with commas between them, at most `MOST_NAMED` of them, and how many more there are.
+
+    >>> listed(["t", "gap"])
+    't, gap'
+    """
+    more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
+    return ", ".join(names[:MOST_NAMED]) + more

@@ -1,0 +1,252 @@
+"""Features, tables of features, and predictions: the values that pass between a feature set and a classifier."""
+
+from __future__ import annotations
+
+import math
+from array import array
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Final
+
+from attrs import field, frozen
+
+from graspsense.core.values.errors import listed
+from graspsense.core.values.printable import in_one_line
+from graspsense.core.values.reasons import Reason
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+LARGEST_VALUE: Final = 1e100
+"""The largest magnitude of a number to learn from: the squares of its differences, and their sums, are still finite."""
+
+
+@frozen(kw_only=True)
+class Features:
+    """Named numbers extracted from one trace.
+
+    A feature that is not defined for this trace is NaN, and `reasons` gives the reason. NaN means *missing*.
+    """
+
+    names: tuple[str, ...]
+    values: tuple[float, ...]
+    units: tuple[str, ...]
+    reasons: Mapping[str, str] = field(factory=dict)
+
+    def __attrs_post_init__(self) -> None:
+        if not len(self.names) == len(self.values) == len(self.units):
+            raise ValueError(
+                f"{len(self.names)} names, {len(self.values)} values and {len(self.units)} units: "
+                "give one of each a feature"
+            )
+        # A batch makes thousands of these: a finite sum has only finite values.
+        if math.isfinite(sum(self.values)):
+            return
+        for name, value in zip(self.names, self.values, strict=True):
+            if math.isinf(value):
+                raise ValueError(
+                    f"feature {name!r} is {value}: give NaN with a reason where it is not defined"
+                )
+            if math.isnan(value) and not self.reasons.get(name):
+                raise ValueError(f"feature {name!r} is NaN without a reason: add one to `reasons`")
+
+    def __repr__(self) -> str:
+        from graspsense.core.values.units import quantity
+
+        each = zip(self.names, self.values, self.units, strict=True)
+        words = ", ".join(f"{name} {quantity(value, unit)}" for name, value, unit in each)
+        return in_one_line(f"<Features: {words or 'none'}>")
+
+    def _repr_html_(self) -> str:
+        from graspsense.report.notebook import features_html
+
+        return features_html(self)
+
+    def __getitem__(self, name: str) -> float:
+        """Return the value of one feature; KeyError names the known ones."""
+        try:
+            return self.values[self.names.index(name)]
+        except ValueError:
+            raise KeyError(f"no feature {name!r}; there are {listed(self.names)}") from None
+
+    def as_dict(self) -> dict[str, float | None]:
+        """Return name to value, with None for a missing one (JSON has no NaN)."""
+        return {n: None if math.isnan(v) else v for n, v in zip(self.names, self.values, strict=True)}
+
+
+@frozen(kw_only=True, eq=False)
+class FeatureTable:
+    """Features of many trials: `values` has shape (trials, features), NaN is missing."""
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    values: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        """Return the number of trials."""
+        return len(self.values)
+
+    def rows(self, which: NDArray[np.int64] | NDArray[np.bool_]) -> FeatureTable:
+        """Return the table of these trials, by number or by a mask."""
+        return FeatureTable(names=self.names, units=self.units, values=self.values[which])
+
+    def columns(self, names: Sequence[str]) -> FeatureTable:
+        """Return the table of these features, in this order. KeyError names the known ones."""
+        places = {name: i for i, name in enumerate(self.names)}
+        for name in names:
+            if name not in places:
+                raise KeyError(f"no feature {name!r}; there are {listed(self.names)}")
+        which = [places[name] for name in names]
+        return FeatureTable(
+            names=tuple(names), units=tuple(self.units[i] for i in which), values=self.values[:, which]
+        )
+
+    def row(self, i: int, reason: str = "missing in the table") -> Features:
+        """Return the features of one trial; a table keeps no reasons, so each missing one has this."""
+        values = tuple(float(v) for v in self.values[i])
+        absent = missing((n for n, v in zip(self.names, values, strict=True) if math.isnan(v)), reason)
+        return Features(names=self.names, values=values, units=self.units, reasons=absent)
+
+
+class FeatureRows:
+    """Collects the features of trials for a table, and keeps their numbers only."""
+
+    def __init__(self) -> None:
+        self._first: Features | None = None
+        self._values = array("d")
+        self._n = 0
+
+    def add(self, features: Features) -> None:
+        """Add a trial. Raises ValueError if its features differ from those of the first one in names or units."""
+        first = self._first = self._first or features
+        if features.names != first.names or features.units != first.units:
+            raise ValueError(
+                f"trials disagree: {features.names} in {features.units} beside {first.names} in {first.units}"
+            )
+        self._values.extend(features.values)
+        self._n += 1
+
+    def table(self) -> FeatureTable:
+        """Return the table of the trials added so far. Raises ValueError if there are none."""
+        import numpy as np
+
+        if self._first is None:
+            raise ValueError("a table needs at least one trial")
+        values = np.array(self._values, dtype=np.float64).reshape(self._n, len(self._first.names))
+        return FeatureTable(names=self._first.names, units=self._first.units, values=values)
+
+
+def table_of(rows: Iterable[Features]) -> FeatureTable:
+    """Return the table of these features, one row for each; a classifier explains one trial by a table of one row.
+
+    Raises ValueError if they differ in names or units.
+
+    >>> table_of([Features(names=("p_first",), values=(0.05,), units=("m",))]).values
+    array([[0.05]])
+    """
+    collected = FeatureRows()
+    for row in rows:
+        collected.add(row)
+    return collected.table()
+
+
+def _texts(items: Iterable[str]) -> tuple[str, ...]:
+    return tuple(items)
+
+
+def _reasons(items: Iterable[Reason | str]) -> tuple[Reason, ...]:
+    return tuple(one if isinstance(one, Reason) else Reason(words=one) for one in items)
+
+
+@frozen(kw_only=True)
+class Prediction:
+    """The prediction of a classifier for one trial.
+
+    `label` is a class, or `unknown` for a trial far outside the training data. `probabilities` sum to 1; they are empty
+    if the model could not be applied. `because` has the reasons (`Reason`) in words and units; a text that is given
+    becomes a reason without values. `model` describes in one line what the model was trained on. `support` is None, or
+    two numbers of training trials from which the probability of the label was computed: those with the label, and all
+    of those in the leaf of the tree, or among the nearest. `prediction_set` has the labels that cannot be ruled out,
+    the most probable first: it contains the true label of a new object with the probability `coverage`. It is empty,
+    and `coverage` None, if the model is not calibrated or the trial is unknown. `calibrated` says whether the
+    probabilities agree with rates in held-out trials (`graspsense.core.learn.temperature`).
+    """
+
+    label: str
+    probabilities: Mapping[str, float]
+    because: tuple[Reason, ...] = field(converter=_reasons)
+    warnings: tuple[str, ...] = field(default=(), converter=_texts)
+    model: str = ""
+    support: tuple[float, float] | None = None
+    prediction_set: tuple[str, ...] = field(default=(), converter=_texts)
+    coverage: float | None = None
+    calibrated: bool = False
+
+    @property
+    def set_in_words(self) -> str:
+        """The set with its coverage, such as `full_open or empty_open, 90 %`; empty without a set."""
+        if self.coverage is None:
+            return ""
+        return f"{' or '.join(self.prediction_set)}, {percent(self.coverage)}"
+
+    @property
+    def certainty(self) -> float | None:
+        """How certain the label is, as a probability below 1; None without probabilities.
+
+        A share of few training trials overstates it: 6 of 6 does not mean that the next one is certain. Unless the
+        probabilities are calibrated, such a share is therefore corrected by the rule of succession, (with the label
+        + 1) / (all + 2), which gives 88 % for 6 of 6.
+        """
+        if self.support is not None and not self.calibrated:
+            with_label, trials = self.support
+            return (with_label + 1) / (trials + 2)
+        return self.probabilities.get(self.label)
+
+    @property
+    def certainty_in_words(self) -> str:
+        """The certainty with what it rests on, such as `about 88 %: 6 of 6 training trials`; empty without any."""
+        if self.certainty is None:
+            return ""
+        if self.support is None:
+            return f"{percent(self.certainty)} by the model"
+        with_label, trials = self.support
+        about = percent(self.certainty).removeprefix("over ")
+        return f"about {about}: {with_label:.4g} of {trials:.4g} training trials"
+
+    def as_json(self) -> dict[str, Any]:
+        """Return label, probabilities, set and reasons as `--json` prints them."""
+        return {
+            "label": self.label,
+            "probabilities": dict(self.probabilities),
+            "support": None if self.support is None else list(self.support),
+            "prediction_set": list(self.prediction_set),
+            "coverage": self.coverage,
+            "calibrated": self.calibrated,
+            "because": [one.as_json() for one in self.because],
+        }
+
+    def __repr__(self) -> str:
+        certainty = f", {self.certainty_in_words}" if self.certainty_in_words else ""
+        return in_one_line(f"<Prediction: {self.label}{certainty}>")
+
+    def _repr_html_(self) -> str:
+        from graspsense.report.notebook import prediction_html
+
+        return prediction_html(self)
+
+
+UNKNOWN = "unknown"
+
+
+def percent(probability: float) -> str:
+    """Return a probability in per cent. No model is certain, so that 1 is `over 99 %`."""
+    return "over 99 %" if probability > 0.995 else f"{100 * probability:.0f} %"
+
+
+def missing(names: Iterable[str], reason: str) -> dict[str, str]:
+    """Return one reason for each of these features.
+
+    >>> missing(("f_steady", "df_dt"), "no pad felt 0.5 N")
+    {'f_steady': 'no pad felt 0.5 N', 'df_dt': 'no pad felt 0.5 N'}
+    """
+    return dict.fromkeys(names, reason)

@@ -1,0 +1,290 @@
+"""The trace of a grasp: measurements, phases and commands as arrays over its ticks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import chain
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from attrs import define, evolve, field, frozen
+
+from graspsense.core.values.signals import CHANNELS, NO_PADS, Command, Frame, Image, Pads, Reading, Samples
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from graspsense.core.values.events import GraspEvent
+
+    Floats = NDArray[np.float64]
+    Integers = NDArray[np.int64]
+
+SI_UNITS: Final[Mapping[str, str]] = {"t": "s", **CHANNELS}
+
+_FRAME_COLUMNS: Final = Frame._fields
+TICK_COLUMNS: Final = (*(name for name in _FRAME_COLUMNS if name != "dt_s"), "phase", "command")
+BLOCK: Final = 512
+"""Frames that are converted at once. In a thread beside a control loop, a conversion holds the interpreter lock."""
+PAD_COLUMNS: Final = ("pad_t_s", "pad_left", "pad_right")
+
+
+@frozen(eq=False, kw_only=True)
+class ImageTrace:
+    """The images of a tactile array: their times (m,), and the cells (m, number of cells)."""
+
+    t_s: Floats
+    cells: Floats
+
+    def until(self, t_s: float) -> ImageTrace:
+        """Return the images that are not later than `t_s`."""
+        m = int(np.searchsorted(self.t_s, t_s, side="right"))
+        return ImageTrace(t_s=self.t_s[:m], cells=self.cells[:m])
+
+
+@frozen(eq=False, kw_only=True)
+class SampleTrace:
+    """The samples of a fast channel: their times (s,), and the values (s, number of axes).
+
+    `lost` is the number of samples that the sensor took and that did not arrive. The time of a sample before the
+    last of its tick is computed: the samples between two ticks are taken as equally spaced.
+    """
+
+    t_s: Floats
+    values: Floats
+    lost: int = 0
+
+    def until(self, t_s: float) -> SampleTrace:
+        """Return the samples that are not later than `t_s`."""
+        m = int(np.searchsorted(self.t_s, t_s, side="right"))
+        return SampleTrace(t_s=self.t_s[:m], values=self.values[:m], lost=self.lost)
+
+
+SignalTrace = Any
+"""The values of a further channel over a grasp: an array (n,) of numbers, an `ImageTrace`, or a `SampleTrace`."""
+
+
+@frozen(eq=False, kw_only=True)
+class Trace:
+    """A finished or running grasp as arrays: `n` ticks, and `m` cell images with times of their own.
+
+    The columns of ticks have shape (n,): `phase` holds the numbers of `Phase`, `command` the value commanded after
+    the tick. `pad_t_s` has shape (m,), `pad_left` and `pad_right` have shape (m, cells), raw. A channel that
+    the gripper lacks is NaN throughout. `units` gives the unit of each channel and of `t`: SI for a gripper, possibly
+    others for a recording (`{"t": "frame"}`). `signals` holds the further channels of the gripper by name: an
+    array (n,) of a channel with one number a tick, an `ImageTrace` of a tactile array, a `SampleTrace` of a fast
+    channel. `events` are those that the controller told, in order.
+    """
+
+    t_s: Floats
+    gap_m: Floats
+    velocity_m_s: Floats
+    effort_n: Floats
+    force_left_n: Floats
+    force_right_n: Floats
+    edge_left_n: Floats
+    edge_right_n: Floats
+    status: Integers
+    phase: Integers
+    command: Floats
+    pad_t_s: Floats
+    pad_left: Floats
+    pad_right: Floats
+    units: Mapping[str, str] = field(factory=lambda: dict(SI_UNITS))
+    signals: Mapping[str, SignalTrace] = field(factory=dict)
+    events: tuple[GraspEvent, ...] = ()
+
+    def __len__(self) -> int:
+        """Return the number of ticks."""
+        return len(self.t_s)
+
+    def __repr__(self) -> str:
+        from graspsense.report.notebook import trace_words
+
+        return f"<Trace: {trace_words(self)}>"
+
+    def _repr_html_(self) -> str:
+        from graspsense.core.values.short_html import sentence
+        from graspsense.report.notebook import arrays_html, samples_html, trace_svg, trace_words
+
+        return sentence(trace_words(self)) + trace_svg(self) + samples_html(self) + arrays_html(self)
+
+    def plot(self) -> tuple[Any, Any]:
+        """Draw the trace and return the axes of the forces and of the gap.
+
+        Below them are the fast channels over time, and the cells of every tactile array at contact, peak and rest.
+        These are matplotlib's, so that a notebook shows them and a script can add to them: `axes[0].figure` is the
+        figure. Raises PluginUnavailable without matplotlib, which the extra `plot` installs.
+        """
+        from graspsense.report.trace_plot import plot
+
+        return plot(self)
+
+    def until(self, t_s: float) -> Trace:
+        """Return the trace up to time `t_s`: every tick and image that is not later."""
+        n = int(np.searchsorted(self.t_s, t_s, side="right"))
+        m = int(np.searchsorted(self.pad_t_s, t_s, side="right"))
+        cut: dict[str, Any] = {name: getattr(self, name)[:n] for name in TICK_COLUMNS}
+        cut.update({name: getattr(self, name)[:m] for name in PAD_COLUMNS})
+        signals = {
+            name: value[:n] if isinstance(value, np.ndarray) else value.until(t_s)
+            for name, value in self.signals.items()
+        }
+        events = tuple(event for event in self.events if event.t_s <= t_s)
+        return evolve(self, **cut, signals=signals, events=events)
+
+
+@define(eq=False)
+class TraceRecorder:
+    """Collects the ticks of a running grasp; `trace()` returns those collected so far."""
+
+    units: Mapping[str, str] = field(factory=lambda: dict(SI_UNITS))
+    frames: list[Frame] = field(factory=list, init=False)
+    phases: list[int] = field(factory=list, init=False)
+    commands: list[float] = field(factory=list, init=False)
+    images: list[Pads] = field(factory=list, init=False)
+    signals: list[Any] = field(factory=list, init=False)
+    events: list[GraspEvent] = field(factory=list, init=False)
+    _blocks: tuple[Floats, ...] = field(default=(), init=False)
+    """The frames that were converted to numbers before, in whole blocks."""
+    pads: Pads = field(default=NO_PADS, init=False)
+    """The last image, which has as many cells also before the first one."""
+
+    def add(self, reading: Reading, phase: int, command: Command) -> None:
+        """Add one tick, and its cell image if the counter of the image is new."""
+        frame, pads, signals = reading
+        self.frames.append(frame)
+        self.pads = pads
+        if signals:
+            self.signals.append(signals)
+        self.phases.append(phase)
+        self.commands.append(command.value)
+        images = self.images
+        if pads.counter and (not images or images[-1].counter != pads.counter):
+            images.append(pads)
+
+    def extend(self, frames: Sequence[Frame], phase: int, commands: Sequence[float]) -> None:
+        """Add ticks of one phase without a new cell image, of a gripper without further channels."""
+        self.frames.extend(frames)
+        self.phases.extend([phase] * len(frames))
+        self.commands.extend(commands)
+
+    def trace(self) -> Trace:
+        """Return the trace of the ticks collected so far."""
+        trace = self.first_ticks(len(self.frames), len(self.images))
+        if not self.images:
+            none = np.empty((0, len(self.pads.left)))
+            trace = evolve(trace, pad_left=none, pad_right=none.copy())
+        return evolve(trace, events=tuple(self.events))
+
+    def first_ticks(self, n: int, m: int) -> Trace:
+        """Return the trace of the first `n` ticks with the first `m` images, without events.
+
+        A thread may call it while ticks are added: the lists only grow. Blocks of frames are converted once.
+        """
+        blocks = self._blocks
+        missing = self.frames[len(blocks) * BLOCK : n - n % BLOCK]
+        self._blocks = blocks = (*blocks, *_blocks_of(missing))
+        whole = blocks[: n // BLOCK]
+        return _trace_from(
+            [*whole, *_blocks_of(self.frames[len(whole) * BLOCK : n])],
+            self.phases[:n],
+            self.commands[:n],
+            self.images[:m],
+            self.units,
+            self.signals[:n],
+        )
+
+
+def trace_of(
+    frames: Sequence[Frame],
+    phases: Sequence[int],
+    commands: Sequence[float],
+    images: Sequence[Pads],
+    units: Mapping[str, str] = SI_UNITS,
+    signals: Sequence[Any] = (),
+) -> Trace:
+    """Return the trace of these ticks and images. `frames`, `phases` and `commands` must have the same length.
+
+    `signals` are the values of `Reading.signals` in each tick, if the gripper has further channels.
+    """
+    return _trace_from(_blocks_of(frames), phases, commands, images, units, signals)
+
+
+def _blocks_of(frames: Sequence[Frame]) -> list[Floats]:
+    """Return the numbers of the frames, a row each, in arrays of at most `BLOCK` rows."""
+    width = len(_FRAME_COLUMNS)
+    blocks = []
+    for start in range(0, len(frames), BLOCK):
+        block = frames[start : start + BLOCK]
+        numbers = np.fromiter(chain.from_iterable(block), dtype=np.float64, count=len(block) * width)
+        blocks.append(numbers.reshape(len(block), width))
+    return blocks
+
+
+def _trace_from(
+    blocks: Sequence[Floats],
+    phases: Sequence[int],
+    commands: Sequence[float],
+    images: Sequence[Pads],
+    units: Mapping[str, str],
+    signals: Sequence[Any],
+) -> Trace:
+    table = np.concatenate(blocks) if blocks else np.empty((0, len(_FRAME_COLUMNS)))
+    columns: dict[str, Any] = {
+        name: np.ascontiguousarray(table[:, i]) for i, name in enumerate(_FRAME_COLUMNS) if name != "dt_s"
+    }
+    columns["status"] = columns["status"].astype(np.int64)
+    return Trace(
+        **columns,
+        phase=np.array(phases, dtype=np.int64),
+        command=np.array(commands, dtype=np.float64),
+        pad_t_s=np.array([image.t_s for image in images], dtype=np.float64),
+        pad_left=_rows([image.left for image in images]),
+        pad_right=_rows([image.right for image in images]),
+        units=dict(units),
+        signals=signals_of(signals),
+    )
+
+
+def signals_of(ticks: Sequence[Any]) -> dict[str, SignalTrace]:
+    """Return the trace of each further channel, given the values of `Reading.signals` in each tick."""
+    names = ticks[0]._fields if ticks else ()
+    return {name: _signal([tick[i] for tick in ticks]) for i, name in enumerate(names)}
+
+
+def _signal(values: Sequence[Any]) -> SignalTrace:
+    if isinstance(values[0], Image):
+        counters = [0, *(image.counter for image in values)]
+        images = [image for image, last in zip(values, counters, strict=False) if image.counter != last]
+        return ImageTrace(
+            t_s=np.array([image.t_s for image in images], dtype=np.float64),
+            cells=_rows([image.cells for image in images]),
+        )
+    if isinstance(values[0], Samples):
+        return _samples([block for block in values if block.new])
+    return np.array(values, dtype=np.float64)
+
+
+def _samples(blocks: Sequence[Samples]) -> SampleTrace:
+    """Return the samples of these blocks, each with a time between that of its block and that of the one before."""
+    times: list[float] = []
+    lost = 0
+    spacing = 0.0
+    if len(blocks) > 1:
+        spacing = (blocks[1].t_s - blocks[0].t_s) / max(blocks[1].counter - blocks[0].counter, 1)
+    for i, block in enumerate(blocks):
+        if i:
+            new = max(block.counter - blocks[i - 1].counter, 1)
+            lost += new - block.new
+            spacing = (block.t_s - blocks[i - 1].t_s) / new
+        times += [block.t_s - spacing * back for back in range(block.new - 1, -1, -1)]
+    return SampleTrace(
+        t_s=np.array(times, dtype=np.float64),
+        values=_rows([row for block in blocks for row in block.values[: block.new]]),
+        lost=lost,
+    )
+
+
+def _rows(rows: Sequence[Sequence[float]]) -> Floats:
+    """Return rows of equal length as an array with two dimensions, also where there is none."""
+    return np.array(rows, dtype=np.float64).reshape(len(rows), len(rows[0]) if rows else 0)

@@ -1,0 +1,147 @@
+"""The result of a grasp: the trial, with the settings that made it, and its events."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Literal
+
+from attrs import field, frozen
+
+from graspsense.core.values.printable import in_one_line
+from graspsense.core.values.signals import Outcome, Phase
+
+if TYPE_CHECKING:
+    from graspsense.core.values.device import DeviceInfo
+    from graspsense.core.values.features import CheckpointPrediction, Features, Prediction
+    from graspsense.core.values.trace import Trace
+
+
+@frozen(kw_only=True)
+class RunInfo:
+    """A grasp before it starts: names and versions of the components, the resolved settings, the seed."""
+
+    components: Mapping[str, str]
+    settings: Mapping[str, Any]
+    seed: int
+    labels: Mapping[str, str] = field(factory=dict)
+
+
+EventSource = Literal["runner", "controller", "model"]
+"""What an event of a grasp comes from."""
+
+
+@frozen
+class GraspEvent:
+    """An event of a grasp: its time (s), the phase, and a sentence.
+
+    `source` is `runner` for a change of phase, an action of the guard or a sink that failed, and `controller` for an
+    event that the controller told; `what` is then the name of the event, one of `Controller.events`. It is `model` for
+    a prediction while the grasp goes on.
+    """
+
+    t_s: float
+    phase: Phase
+    what: str
+    source: EventSource = "runner"
+
+
+def event_name(names: Sequence[str], number: int) -> str:
+    """Return the name of the event of a controller with this number, given its `events`."""
+    return names[number] if number < len(names) else f"event {number}"
+
+
+@frozen(kw_only=True, eq=False)
+class Trial:
+    """One grasp: trace, features, prediction, labels, and every setting, version and seed that made it.
+
+    `reason` explains the outcome if this is needed. `device` describes the gripper as it was opened. `report` holds
+    the counters of the gripper, and the true values if it is simulated. `counts` are those of the runner: ticks, late
+    frames, actions of the guard. `checkpoints` are the predictions while the grasp went on. With the outcome
+    `recognised`, the last of them ended the squeeze: it is the prediction, and its features are those of the trial.
+    `warnings` are faults of pads, motor and connection that were seen in the grasp, each in a sentence.
+    """
+
+    run: RunInfo
+    trace: Trace
+    outcome: Outcome
+    reason: str
+    features: Features
+    prediction: Prediction | None
+    device: DeviceInfo
+    report: Mapping[str, Any]
+    counts: Mapping[str, int]
+    events: tuple[GraspEvent, ...]
+    seconds_simulated: float | None
+    seconds_wall: float
+    checkpoints: tuple[CheckpointPrediction, ...] = ()
+    warnings: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        parts = [self.outcome.words, *self.run.labels.values(), f"{len(self.trace)} ticks"]
+        if self.prediction is not None:
+            parts.append(f"predicted {self.prediction.label}")
+        return in_one_line(f"<Trial: {', '.join(parts)}>")
+
+    def _repr_html_(self) -> str:
+        from graspsense.report.notebook import trial_html
+
+        return trial_html(self)
+
+
+def trial_as_json(trial: Trial) -> dict[str, Any]:
+    """Return the trial without its trace as `graspsense run --json` prints it; a missing feature is None."""
+    features, prediction, device = trial.features, trial.prediction, trial.device
+    return {
+        "outcome": trial.outcome.words,
+        "reason": trial.reason,
+        "warnings": list(trial.warnings),
+        "features": features.as_dict(),
+        "units": dict(zip(features.names, features.units, strict=True)),
+        "reasons": dict(features.reasons),
+        "prediction": None if prediction is None else _prediction_as_json(prediction),
+        "checkpoints": [
+            {"after_s": one.after_s, "t_s": one.t_s, **_prediction_as_json(one.prediction)}
+            for one in trial.checkpoints
+        ],
+        "components": dict(trial.run.components),
+        "seed": trial.run.seed,
+        "labels": dict(trial.run.labels),
+        "device": {
+            "name": device.name,
+            "serial": device.serial,
+            "firmware": device.firmware,
+            "clock": device.clock,
+            "rate_hz": device.rate_hz,
+            "calibration": dict(device.calibration),
+            "notes": list(device.notes),
+        },
+        "report": dict(trial.report),
+        "counts": dict(trial.counts),
+        "events": [event_as_json(event) for event in trial.events],
+        "seconds_simulated": trial.seconds_simulated,
+        "seconds_wall": trial.seconds_wall,
+    }
+
+
+def _prediction_as_json(prediction: Prediction) -> dict[str, Any]:
+    return {**prediction.as_json(), "warnings": list(prediction.warnings), "model": prediction.model}
+
+
+def event_as_json(event: GraspEvent) -> dict[str, Any]:
+    """Return an event as JSON values."""
+    return {
+        "t_s": event.t_s,
+        "phase": event.phase.name.lower(),
+        "what": event.what,
+        "source": event.source,
+    }
+
+
+def event_from_json(value: Mapping[str, Any]) -> GraspEvent:
+    """Return the event of `event_as_json`; without a source it is of the runner. Raises KeyError, ValueError."""
+    source: EventSource = "runner"
+    if value.get("source") == "controller":
+        source = "controller"
+    elif value.get("source") == "model":
+        source = "model"
+    return GraspEvent(float(value["t_s"]), Phase[str(value["phase"]).upper()], str(value["what"]), source)

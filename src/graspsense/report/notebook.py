@@ -1,0 +1,233 @@
+"""What a notebook shows of a value: short HTML that takes its colours from the notebook, light or dark."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from html import escape
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from graspsense.core.values.features import percent
+from graspsense.core.values.trace import SampleTrace
+from graspsense.core.values.units import display_unit, in_words, without_underscores
+from graspsense.report.moments import array_images, contact_time, images_at, moments, phase_spans, shown_from
+
+if TYPE_CHECKING:
+    from graspsense.core.values.features import Features, Prediction
+    from graspsense.core.values.trace import Floats, Trace
+    from graspsense.core.values.trial import Trial
+
+WIDTH, HEIGHT, LEFT_MARGIN, PANEL = 560.0, 264.0, 48.0, 92.0
+POINTS: Final = 300
+"""Largest number of points of a line."""
+LEAST_SHOWN: Final = 0.005
+"""A class that is less probable than this is not listed."""
+INKS: Final = ("#3b8ad9", "#d9772b", "#8a8a8a")
+"""Left pad, right pad, gap: each stands out from white and from black."""
+PHASE_INKS: Final = {"squeeze": "#e8963c", "hold": "#4caf6a", "release": "#9a9a9a"}
+
+
+def quantity(value: float, unit: str) -> str:
+    """Return a value in a person's unit, lengths in mm: `57.86 mm`."""
+    return "missing" if math.isnan(value) else in_words(value, unit)
+
+
+def sentence(text: str, *, strong: bool = False) -> str:
+    """Return a line of plain text."""
+    return f"<div>{'<strong>' if strong else ''}{escape(text)}{'</strong>' if strong else ''}</div>"
+
+
+def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Return a table of plain texts."""
+    head = "".join(f'<th style="text-align:left">{escape(cell)}</th>' for cell in header)
+    body = "".join(
+        "<tr>" + "".join(f'<td style="text-align:left">{escape(cell)}</td>' for cell in row) + "</tr>"
+        for row in rows
+    )
+    return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+
+
+def features_html(features: Features) -> str:
+    """Return the features as a table, each missing one with its reason."""
+    rows = [
+        (name, quantity(value, unit), features.reasons.get(name, ""))
+        for name, value, unit in zip(features.names, features.values, features.units, strict=True)
+    ]
+    if not features.reasons:
+        return table(("feature", "value"), [row[:2] for row in rows])
+    return table(("feature", "value", "why it is missing"), rows)
+
+
+def prediction_html(prediction: Prediction) -> str:
+    """Return the label, the most probable classes, the reasons and the warnings."""
+    known = ((label, share) for label, share in prediction.probabilities.items() if share >= LEAST_SHOWN)
+    likely = sorted(known, key=lambda pair: -pair[1])[:5]
+    certainty = f", {prediction.certainty_in_words}" if prediction.certainty_in_words else ""
+    parts = [sentence(f"predicted: {prediction.label}{certainty}", strong=True)]
+    if prediction.set_in_words:
+        parts.append(sentence(f"set: {prediction.set_in_words}"))
+    if likely:
+        parts.append(table(("class", "probability"), [(label, percent(share)) for label, share in likely]))
+    parts += [sentence(reason.words) for reason in prediction.because]
+    parts += [sentence(f"warning: {warning}") for warning in prediction.warnings]
+    if prediction.model:
+        parts.append(sentence(f"model: {prediction.model}"))
+    return "".join(parts)
+
+
+def trial_html(trial: Trial) -> str:
+    """Return outcome, warnings, curve, features and prediction of a trial."""
+    labels = ", ".join(f"{key} {value}" for key, value in trial.run.labels.items())
+    reason = f": {trial.reason}" if trial.reason else ""
+    parts = [sentence(f"{trial.outcome.words}{reason}" + f" ({labels})" * bool(labels), strong=True)]
+    parts += [sentence(f"warning: {warning}") for warning in trial.warnings]
+    parts += [
+        trace_svg(trial.trace),
+        samples_html(trial.trace),
+        arrays_html(trial.trace),
+        features_html(trial.features),
+    ]
+    if trial.prediction is not None:
+        parts.append(prediction_html(trial.prediction))
+    components = ", ".join(trial.run.components.values())
+    parts.append(sentence(f"{trial.device.name}, seed {trial.run.seed}: {components}"))
+    return "".join(parts)
+
+
+def trace_svg(trace: Trace) -> str:
+    """Return pad forces and gap over time, with the phases behind them."""
+    start = shown_from(trace)
+    contact = contact_time(trace) or 0.0
+    t = trace.t_s[start:] - contact
+    shown, factor = display_unit(trace.units["gap"])
+    forces = [trace.force_left_n[start:], trace.force_right_n[start:]]
+    top, bottom = 24.0, 24.0 + PANEL + 22.0
+    parts = [
+        f'<text x="{LEFT_MARGIN}" y="14" fill="currentColor">force, {escape(trace.units["force_left"])}: '
+        f'<tspan fill="{INKS[0]}">left pad</tspan>, <tspan fill="{INKS[1]}">right pad</tspan></text>',
+        f'<text x="{LEFT_MARGIN}" y="{bottom - 6}" fill="currentColor">gap, {escape(shown)}</text>',
+        *_phases(trace, start, t, top, bottom + PANEL),
+        *_panel(t, forces, INKS[:2], top, least=1.0),
+        *_panel(t, [factor * trace.gap_m[start:]], INKS[2:], bottom),
+        *_time_labels(t, bottom + PANEL + 26, trace.units["t"]),
+    ]
+    return (
+        f'<svg viewBox="0 0 {WIDTH:g} {HEIGHT:g}" role="img" aria-label="{escape(trace_words(trace))}" '
+        f'style="max-width:{WIDTH:g}px;font:11px sans-serif" xmlns="http://www.w3.org/2000/svg">'
+        f"{''.join(parts)}</svg>"
+    )
+
+
+def arrays_html(trace: Trace) -> str:
+    """Return the cells of every tactile array at contact, peak and rest: a row for each moment, darker for more."""
+    times = moments(trace)
+    parts = []
+    for name, images in array_images(trace).items():
+        shown = images_at(images, 1.0, times)
+        known = np.concatenate(
+            [cells[np.isfinite(cells)] for cells in shown.values.values()] or [np.empty(0)]
+        )
+        if not len(known):
+            continue
+        low, high = float(known.min()), float(known.max())
+        cell = min(16.0, (WIDTH - LEFT_MARGIN) / images.cells.shape[1])
+        change = "change since before contact" if shown.relative else "values"
+        words = f"{name}: {change}, by cell, {low:.4g} to {high:.4g}"
+        drawn = [f'<text x="0" y="11" fill="currentColor">{escape(words)}</text>']
+        for row, (moment, cells) in enumerate(shown.values.items()):
+            y = 18.0 + 14.0 * row
+            drawn.append(f'<text x="0" y="{y + 10:g}" fill="currentColor">{moment}</text>')
+            drawn += [
+                f'<rect x="{LEFT_MARGIN + k * cell:.1f}" y="{y:g}" width="{cell:.1f}" height="13" fill="{INKS[0]}" '
+                f'fill-opacity="{(value - low) / ((high - low) or 1.0):.2f}" stroke="#8a8a8a" stroke-width="0.3"/>'
+                for k, value in enumerate(cells.tolist())
+                if math.isfinite(value)
+            ]
+        parts.append(_svg(drawn, 18.0 + 14.0 * len(shown.values) + 2.0, words))
+    return "".join(parts)
+
+
+def samples_html(trace: Trace) -> str:
+    """Return each fast channel over time, a line for each axis."""
+    parts = []
+    start = float(trace.t_s[shown_from(trace)]) if len(trace) else 0.0
+    for name, signal in trace.signals.items():
+        if isinstance(signal, SampleTrace) and len(signal.t_s):
+            shown = signal.t_s >= start
+            t, values = signal.t_s[shown] - (contact_time(trace) or 0.0), signal.values[shown]
+            if len(t):
+                words = f"{without_underscores(name)}, {signal.values.shape[1]} axes"
+                drawn = [f'<text x="{LEFT_MARGIN}" y="14" fill="currentColor">{escape(words)}</text>']
+                drawn += _panel(
+                    t, list(values.T), [INKS[k % len(INKS)] for k in range(values.shape[1])], 24.0
+                )
+                parts.append(_svg(drawn, 24.0 + PANEL + 6.0, words))
+    return "".join(parts)
+
+
+def _svg(drawn: Sequence[str], height: float, words: str) -> str:
+    return (
+        f'<svg viewBox="0 0 {WIDTH:g} {height:g}" role="img" aria-label="{escape(words)}" '
+        f'style="display:block;max-width:{WIDTH:g}px;font:11px sans-serif" xmlns="http://www.w3.org/2000/svg">'
+        f"{''.join(drawn)}</svg>"
+    )
+
+
+def trace_words(trace: Trace) -> str:
+    """Return a trace in a line: its ticks, its time, its largest force and its range of gaps."""
+    if len(trace) == 0:
+        return "no ticks"
+    words = [f"{len(trace)} ticks", f"{float(trace.t_s[-1] - trace.t_s[0]):.4g} {trace.units['t']}"]
+    forces = np.concatenate([trace.force_left_n, trace.force_right_n])
+    if not np.isnan(forces).all():
+        words.append(f"forces to {quantity(float(np.nanmax(forces)), trace.units['force_left'])}")
+    if not np.isnan(trace.gap_m).all():
+        low, high = float(np.nanmin(trace.gap_m)), float(np.nanmax(trace.gap_m))
+        words.append(f"gap {quantity(low, trace.units['gap'])} to {quantity(high, trace.units['gap'])}")
+    return ", ".join(words)
+
+
+def _x(t: Floats, value: float) -> float:
+    span = float(t[-1] - t[0]) or 1.0
+    return LEFT_MARGIN + (WIDTH - LEFT_MARGIN - 8.0) * (value - float(t[0])) / span
+
+
+def _panel(
+    t: Floats, lines: Sequence[Floats], inks: Sequence[str], top: float, least: float = 0.0
+) -> Iterable[str]:
+    """Yield the lines of one panel, and the values at its lower and upper edge. `least`: its least upper edge."""
+    known = np.concatenate([line[~np.isnan(line)] for line in lines])
+    low, high = (float(known.min()), max(float(known.max()), least)) if len(known) else (0.0, 1.0)
+    for value, y in ((high, top + 8.0), (low, top + PANEL)):
+        yield f'<text x="{LEFT_MARGIN - 5}" y="{y:g}" text-anchor="end" fill="currentColor">{value:.3g}</text>'
+    every = np.linspace(0, len(t) - 1, min(len(t), POINTS)).round().astype(int)
+    for line, ink, dash in zip(lines, inks, ("", ' stroke-dasharray="5 3"', ""), strict=False):
+        points = [
+            f"{_x(t, float(t[k])):.1f},{top + PANEL * (high - float(line[k])) / ((high - low) or 1.0):.1f}"
+            for k in every
+            if not np.isnan(line[k])
+        ]
+        if points:
+            yield f'<polyline points="{" ".join(points)}" fill="none" stroke="{ink}" stroke-width="1.6"{dash}/>'
+
+
+def _phases(trace: Trace, start: int, t: Floats, top: float, bottom: float) -> Iterable[str]:
+    for phase, begin, end in phase_spans(t, trace.phase[start:]):
+        name, left, right = phase.name.lower(), _x(t, begin), _x(t, end)
+        if name in PHASE_INKS:
+            yield (
+                f'<rect x="{left:.1f}" y="{top:g}" width="{right - left:.1f}" height="{bottom - top:g}" '
+                f'fill="{PHASE_INKS[name]}" fill-opacity="0.18"><title>{name}</title></rect>'
+            )
+        if right - left > 7.0 * len(name):
+            middle = 0.5 * (left + right)
+            yield f'<text x="{middle:.1f}" y="{bottom + 13:g}" text-anchor="middle" fill="currentColor">{name}</text>'
+
+
+def _time_labels(t: Floats, y: float, unit: str) -> Iterable[str]:
+    if len(t):
+        for value, anchor in ((float(t[0]), "start"), (float(t[-1]), "end")):
+            text = f"{value:.3g} {escape(unit)}"
+            yield f'<text x="{_x(t, value):.1f}" y="{y:g}" text-anchor="{anchor}" fill="currentColor">{text}</text>'

@@ -1,0 +1,146 @@
+"""The drawing of a trace with matplotlib: forces, gap and fast channels over time, and the tactile arrays."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from graspsense.core.values.errors import PluginUnavailable
+from graspsense.core.values.signals import Phase
+from graspsense.core.values.trace import SampleTrace
+from graspsense.core.values.units import display_unit, without_underscores
+from graspsense.report.literal_text import show_literally
+
+if TYPE_CHECKING:
+    from graspsense.core.values.trace import Floats, ImageTrace, Integers, Trace
+
+MATPLOTLIB_HINT: Final = (
+    'a picture needs matplotlib: pip install "graspsense[plot]", or pip install matplotlib'
+)
+BEFORE_CONTACT_S: Final = 0.8
+"""How much of the approach is shown where time is in seconds: the rest is motion through free air."""
+PHASE_COLOURS: Final = {Phase.APPROACH: "#e9eff6", Phase.SQUEEZE: "#fbdcb4", Phase.HOLD: "#c9e6cf"}
+OTHER_PHASE: Final = "#f3f3f3"
+LEAST_NAMED: Final = 0.05
+"""A phase that lasts less than this share of the grasp is shaded but not named."""
+LEFT, RIGHT, GAP = "#0b5fa5", "#b3400a", "#3d3d3d"
+
+
+def plot(trace: Trace) -> tuple[Any, Any]:
+    """Draw a trace in a new figure of pyplot and return its axes. Raises PluginUnavailable without matplotlib."""
+    try:
+        from matplotlib import pyplot
+    except ImportError as error:
+        raise PluginUnavailable(f"{MATPLOTLIB_HINT} ({error})") from error
+    from graspsense.report.moments import array_images
+
+    arrays = array_images(trace)
+    fast = {
+        name: signal
+        for name, signal in trace.signals.items()
+        if isinstance(signal, SampleTrace) and len(signal.t_s)
+    }
+    heights = [2.2, 2.2, *[1.6] * len(fast), *[1.1] * len(arrays)]
+    figure, rows = pyplot.subplots(
+        len(heights), 1, figsize=(6.4, sum(heights)), layout="constrained", height_ratios=heights
+    )
+    force, gap, *others = rows
+    gap.sharex(force)
+    draw_trace(trace, force, gap)
+    for axes, (name, signal) in zip(others, fast.items(), strict=False):
+        axes.sharex(force)
+        _draw_samples(trace, axes, name, signal)
+    for axes, (name, images) in zip(others[len(fast) :], arrays.items(), strict=True):
+        figure.colorbar(_draw_array(trace, axes, name, images), ax=axes)
+    show_literally(figure)
+    return force, gap
+
+
+def _draw_samples(trace: Trace, axes: Any, name: str, signal: SampleTrace) -> None:
+    """Draw each axis of a fast channel over time."""
+    zero = contact_time(trace) or 0.0
+    begin = trace.t_s[shown_from(trace)]
+    shown = signal.t_s >= begin
+    axes.plot(signal.t_s[shown] - zero, signal.values[shown], lw=0.6)
+    axes.set_ylabel(without_underscores(name), fontsize=8)
+
+
+def _draw_array(trace: Trace, axes: Any, name: str, images: ImageTrace) -> Any:
+    """Draw the cells of an array at contact, peak and rest, a row each; return the picture for its colour bar."""
+    from graspsense.report.moments import images_at, moments
+
+    shown = images_at(images, 1.0, moments(trace))
+    values = np.array(list(shown.values.values())) if shown.values else images.cells[-1:]
+    picture = axes.imshow(values, aspect="auto", interpolation="nearest", cmap="Blues")
+    axes.xaxis.get_major_locator().set_params(integer=True)
+    axes.set_yticks(range(len(values)), list(shown.values) or ["last"])
+    change = "change since before contact, by cell" if shown.relative else "values, by cell"
+    axes.set_title(f"{name}: {change}", fontsize=8, loc="left")
+    return picture
+
+
+def draw_trace(trace: Trace, force: Any, gap: Any) -> None:
+    """Draw the pad forces and the gap into two axes of matplotlib that share the axis of time."""
+    contact = contact_time(trace)
+    zero = 0.0 if contact is None else contact
+    start = shown_from(trace)
+    t = trace.t_s[start:] - zero
+    force.plot(t, trace.force_left_n[start:], color=LEFT, lw=1.6, label="left pad")
+    force.plot(t, trace.force_right_n[start:], color=RIGHT, lw=1.6, ls="--", label="right pad")
+    force.set_ylabel(f"force, {trace.units['force_left']}")
+    # Noise alone does not fill the axis.
+    force.set_ylim(top=max(force.get_ylim()[1], 1.0))
+    force.legend(loc="upper left", fontsize=8, framealpha=0.9)
+    force.tick_params(labelbottom=False)
+    shown, factor = display_unit(trace.units["gap"])
+    gap.plot(t, factor * trace.gap_m[start:], color=GAP, lw=1.6)
+    gap.set_ylabel(f"gap, {shown}")
+    gap.set_xlabel(f"{'time' if contact is None else 'time since contact'}, {trace.units['t']}")
+    for axes in (force, gap):
+        _shade_phases(axes, t, trace.phase[start:], named=axes is force)
+        axes.margins(x=0.0)
+        axes.grid(color="white", lw=0.8)
+        axes.set_axisbelow(True)
+
+
+def contact_time(trace: Trace) -> float | None:
+    """Return when both pads touched, where the phase changes from approach to squeeze; None if they never did."""
+    squeezed = np.flatnonzero(trace.phase == int(Phase.SQUEEZE))
+    return float(trace.t_s[squeezed[0]]) if len(squeezed) else None
+
+
+def shown_from(trace: Trace) -> int:
+    """Return the first tick that is drawn: shortly before contact where there is one, else the first."""
+    contact = contact_time(trace)
+    if contact is None or trace.units["t"] != "s":
+        return 0
+    return int(np.searchsorted(trace.t_s, contact - BEFORE_CONTACT_S))
+
+
+def phase_spans(t: Floats, phases: Integers) -> list[tuple[Phase, float, float]]:
+    """Return each phase in turn with the times at which it begins and ends."""
+    if len(t) == 0:
+        return []
+    starts = [0, *(np.flatnonzero(np.diff(phases)) + 1).tolist()]
+    ends = [*starts[1:], len(t) - 1]
+    return [
+        (Phase(int(phases[start])), float(t[start]), float(t[end]))
+        for start, end in zip(starts, ends, strict=True)
+    ]
+
+
+def _shade_phases(axes: Any, t: Floats, phases: Integers, *, named: bool) -> None:
+    """Shade each phase behind the lines; `named`: write its name above it."""
+    for phase, begin, end in phase_spans(t, phases):
+        axes.axvspan(begin, end, color=PHASE_COLOURS.get(phase, OTHER_PHASE), lw=0.0, zorder=0)
+        if named and end - begin >= LEAST_NAMED * float(t[-1] - t[0]):
+            axes.text(
+                0.5 * (begin + end),
+                1.02,
+                phase.name.lower(),
+                transform=axes.get_xaxis_transform(),
+                ha="center",
+                va="bottom",
+                fontsize=8,
+            )
