@@ -33,12 +33,14 @@ from graspsense_mujoco_gripper.catalogue import catalogue, thing_named
 from graspsense_mujoco_gripper.config import MujocoConfig
 from graspsense_mujoco_gripper.drive import ActuatorDrive, Travel, instability, test_move
 from graspsense_mujoco_gripper.gripper_file import read_gripper
-from graspsense_mujoco_gripper.measurement import ForceGauge, GapGauge, between_fingers, cells_of
+from graspsense_mujoco_gripper.measurement import ForceGauge, GapGauge, between_fingers, cells_of, geoms_of
 from graspsense_mujoco_gripper.model import OBJ, compiled, gripper_spec, identifier, read_spec
 
 PREFIX: Final = "thing/"
 """Before each name of the thing in the combined model."""
 OPENING_M_S: Final = 0.1
+DEEPEST_M: Final = 1e-3
+"""A thing that begins deeper in a finger is refused."""
 SWING, MOST_SWINGS = 0.1, 20
 """The loop counts as unstable if the effort changes its sign above this share of its limit more often than this."""
 MASS_SPREAD, FRICTION_SPREAD, PLACE_SPREAD_M = 0.1, 0.15, 0.001
@@ -119,8 +121,10 @@ class MujocoGripper(SensorBackend[MujocoConfig]):
         mujoco.mj_forward(model, data)
         self._model, self._travel, self._generator = model, travel, generator
         self._gauge = GapGauge(model, self._gripper.gap)
-        self._left = ForceGauge(model, self._gripper.left, -1.0)
-        self._right = ForceGauge(model, self._gripper.right, 1.0)
+        things = {k for k in range(model.ngeom) if _is_thing(model, int(model.geom_bodyid[k]))}
+        left, right = self._gripper.left, self._gripper.right
+        self._left = ForceGauge(model, left, things | geoms_of(model, right), -1.0)
+        self._right = ForceGauge(model, right, things | geoms_of(model, left), 1.0)
         self._cells = cells_of(model, self._gripper)
         self._sensors = [
             int(model.sensor_adr[identifier(model, OBJ.mjOBJ_SENSOR, one.sensor, "sensor")])
@@ -141,12 +145,17 @@ class MujocoGripper(SensorBackend[MujocoConfig]):
 
     def _check_start(self, data: mujoco.MjData) -> None:
         """Raise ConfigError where the thing is in the fingers at the start."""
-        deepest = min((data.contact[k].dist for k in range(data.ncon)), default=0.0)
-        if deepest < -1e-3 and self._left.force_n(data, self._travel.axis) != 0.0:
+        contacts = [data.contact[k] for k in range(data.ncon)]
+        within = [one.dist for one in contacts if sum(map(self._of_thing, one.geom)) == 1]
+        deepest = min(within, default=0.0)
+        if deepest < -DEEPEST_M:
             raise ConfigError(
                 f"{self.config.object} is wider than the opening of {self._travel.open_m * 1e3:.1f} mm: it penetrates "
                 f"a finger by {-deepest * 1e3:.1f} mm at the start. Choose a smaller thing"
             )
+
+    def _of_thing(self, geom: int) -> bool:
+        return _is_thing(self._model, int(self._model.geom_bodyid[geom]))
 
     def _described(self) -> DeviceInfo:
         limit = self._drive.effort_limit_n
@@ -263,7 +272,7 @@ def _vary(model: mujoco.MjModel, generator: np.random.Generator) -> None:
     friction = float(np.exp(generator.normal(0.0, FRICTION_SPREAD)))
     offset = float(generator.normal(0.0, PLACE_SPREAD_M))
     for k in range(model.nbody):
-        if (mujoco.mj_id2name(model, OBJ.mjOBJ_BODY, k) or "").startswith(PREFIX):
+        if _is_thing(model, k):
             model.body_mass[k] *= factor
             model.body_inertia[k] *= factor
             if model.body_parentid[k] == 0:
@@ -273,9 +282,13 @@ def _vary(model: mujoco.MjModel, generator: np.random.Generator) -> None:
                     address = int(model.jnt_qposadr[joint])
                     model.qpos0[address : address + 3] += offset * axis
     for k in range(model.ngeom):
-        if (mujoco.mj_id2name(model, OBJ.mjOBJ_GEOM, k) or "").startswith(PREFIX):
+        if _is_thing(model, int(model.geom_bodyid[k])):
             model.geom_friction[k] *= friction
     mujoco.mj_setConst(model, mujoco.MjData(model))
+
+
+def _is_thing(model: mujoco.MjModel, body: int) -> bool:
+    return (mujoco.mj_id2name(model, OBJ.mjOBJ_BODY, body) or "").startswith(PREFIX)
 
 
 def _rotated_x(quaternion: NDArray[np.float64]) -> NDArray[np.float64]:

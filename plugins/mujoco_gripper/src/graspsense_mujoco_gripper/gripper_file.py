@@ -53,22 +53,23 @@ class Gap:
 
 @frozen(kw_only=True)
 class Finger:
-    """A finger: the geoms that touch things, and where its force comes from.
+    """A finger: what touches things, named by geoms or by the bodies that have them, and where its force comes from.
 
-    Without `sensor` the force is the sum of the contact forces on the geoms along the closing direction; with it, the
+    Without `sensor` the force is the sum of the contact forces on these geoms along the closing direction; with it, the
     value of a touch sensor, or of a force sensor along that direction. `array` names a tactile sensor with `rows` times
     `columns` cells (the plugin `mujoco.sensor.touch_grid`).
     """
 
-    geoms: tuple[str, ...]
+    geoms: tuple[str, ...] = ()
+    bodies: tuple[str, ...] = ()
     sensor: str = ""
     array: str = ""
     rows: int = 0
     columns: int = 0
 
     def __attrs_post_init__(self) -> None:
-        if not self.geoms:
-            raise ValueError("geoms is empty: name the geoms of the finger that touch things")
+        if not self.geoms and not self.bodies:
+            raise ValueError("name the geoms of the finger that touch things, or the bodies that have them")
         if bool(self.array) != (self.rows > 0 and self.columns > 0):
             raise ValueError("an array has rows and columns: give array, rows and columns together")
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Set
 
 import mujoco
 import numpy as np
@@ -43,10 +43,15 @@ class GapGauge:
 
 
 class ForceGauge:
-    """Measures the force (N) that closes one finger on a thing; positive where it presses."""
+    """Measures the force (N) that closes one finger on a thing; positive where it presses.
 
-    def __init__(self, model: mujoco.MjModel, finger: Finger, side: float) -> None:
-        self.geoms = frozenset(identifier(model, OBJ.mjOBJ_GEOM, name, "geom") for name in finger.geoms)
+    `touched` are the geoms that it can press on: those of things and of the other finger. Contacts with other parts of
+    the gripper do not count.
+    """
+
+    def __init__(self, model: mujoco.MjModel, finger: Finger, touched: Set[int], side: float) -> None:
+        self._touched = touched
+        self.geoms = geoms_of(model, finger)
         self._model, self._side = model, side
         self._sensor = -1
         if finger.sensor:
@@ -74,8 +79,9 @@ class ForceGauge:
         total, wrench = 0.0, np.zeros(6)
         for k in range(data.ncon):
             contact = data.contact[k]
-            first, second = contact.geom[0] in self.geoms, contact.geom[1] in self.geoms
-            if first == second:
+            one, other = int(contact.geom[0]), int(contact.geom[1])
+            second = other in self.geoms and one in self._touched
+            if not second and not (one in self.geoms and other in self._touched):
                 continue
             mujoco.mj_contactForce(self._model, data, k, wrench)
             # The frame's first row is the normal, from the first geom to the second; the force acts on the second.
@@ -121,7 +127,7 @@ def closing_axis(model: mujoco.MjModel, data: mujoco.MjData, gripper: GripperFil
     if gripper.closing:
         axis = np.asarray(gripper.closing, float)
     else:
-        left, right = (_middle(model, data, finger.geoms) for finger in (gripper.left, gripper.right))
+        left, right = _faces(model, data, gripper)
         axis = right - left
     length = float(np.linalg.norm(axis))
     if not length > 1e-9:
@@ -133,11 +139,30 @@ def closing_axis(model: mujoco.MjModel, data: mujoco.MjData, gripper: GripperFil
 
 def between_fingers(model: mujoco.MjModel, data: mujoco.MjData, gripper: GripperFile) -> Floats:
     """Return the point in the middle of both fingers."""
-    left, right = (_middle(model, data, finger.geoms[:1]) for finger in (gripper.left, gripper.right))
+    left, right = _faces(model, data, gripper)
     return (left + right) / 2.0
 
 
-def _middle(model: mujoco.MjModel, data: mujoco.MjData, names: Sequence[str]) -> Floats:
-    ids = [identifier(model, OBJ.mjOBJ_GEOM, name, "geom") for name in names]
-    middle: Floats = np.mean([data.geom_xpos[k] for k in ids], axis=0)
-    return middle
+def _faces(model: mujoco.MjModel, data: mujoco.MjData, gripper: GripperFile) -> tuple[Floats, Floats]:
+    """Return where the left and the right finger touch things: what the gap is measured between, or their geoms."""
+    gap = gripper.gap
+    if gap.sites:
+        left, right = (data.site_xpos[identifier(model, OBJ.mjOBJ_SITE, name, "site")] for name in gap.sites)
+    elif gap.geoms:
+        left, right = (data.geom_xpos[identifier(model, OBJ.mjOBJ_GEOM, name, "geom")] for name in gap.geoms)
+    else:
+        left, right = (
+            np.mean([data.geom_xpos[k] for k in geoms_of(model, finger)], axis=0)
+            for finger in (gripper.left, gripper.right)
+        )
+    return left, right
+
+
+def geoms_of(model: mujoco.MjModel, finger: Finger) -> frozenset[int]:
+    """Return the numbers of the geoms of a finger that can touch."""
+    geoms = {identifier(model, OBJ.mjOBJ_GEOM, name, "geom") for name in finger.geoms}
+    for name in finger.bodies:
+        body = identifier(model, OBJ.mjOBJ_BODY, name, "body")
+        first = int(model.body_geomadr[body])
+        geoms |= set(range(first, first + int(model.body_geomnum[body])))
+    return frozenset(geoms)

@@ -63,6 +63,7 @@ def identifier(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str, what: str)
 
 def _count(model: mujoco.MjModel, kind: mujoco.mjtObj) -> int:
     counts = {
+        mujoco.mjtObj.mjOBJ_BODY: model.nbody,
         mujoco.mjtObj.mjOBJ_SITE: model.nsite,
         mujoco.mjtObj.mjOBJ_GEOM: model.ngeom,
         mujoco.mjtObj.mjOBJ_JOINT: model.njnt,
