@@ -21,6 +21,7 @@ from graspsense.core.components.entries import TactileArray as TactileArray
 from graspsense.core.components.setting import CHANGES_NO_RESULT as CHANGES_NO_RESULT
 from graspsense.core.components.setting import NAMES_INPUT as NAMES_INPUT
 from graspsense.core.components.setting import setting as setting
+from graspsense.core.components.toml_kinds import refuse_other_kind as refuse_other_kind
 from graspsense.core.files.toml_text import TomlError as TomlError
 from graspsense.core.files.toml_text import toml_values as toml_values
 from graspsense.core.components.figure_origins import fitted_results as fitted_results
