@@ -268,8 +268,7 @@ class TestChangeOfType:
             complaint(
                 write(BASE), options=["gripper.port=b"], flags=[Flag("--gripper", "gripper.type", "other")]
             )
-            == "-o gripper.port=b: lab-parts/other has no key 'port'. "
-            "Did you mean 'transport'? It has: transport"
+            == "-o gripper.port=b: lab-parts/other has no key 'port'. It is a key of gripper.type = \"hand\""
         )
 
     def test_the_same_type_under_its_qualified_name_keeps_the_keys(self, plugins, write):
@@ -353,8 +352,8 @@ seed = true
         == """\
 15 errors in the settings:
   -o nonsense: expected TABLE.KEY=VALUE, as in -o run.seed=3
-  lab.toml:12: controler: there is no table 'controler'. Did you mean 'controller'? \
-There are: gripper, controller, features, classifier, run
+  lab.toml:12: controler: a pipeline has no table 'controler'. Did you mean 'controller'? \
+It has: gripper, controller, features, classifier, run
   lab.toml:1: gripper: lab-parts/hand needs the key 'port', which is not given
   lab.toml:3: gripper.rate_hz: expected a number, found '100 Hz' (text): \
 give the number alone, in the unit that the key ends with, or SI

@@ -125,7 +125,7 @@ def test_resume_does_what_is_missing_and_nothing_else(file, tmp_path):
     (results.folder / "results" / lost).unlink()
     (results.folder / "results" / broken).write_text('{"key": "cut o')
 
-    with pytest.raises(ConfigError, match="--resume"):
+    with pytest.raises(ConfigError, match="resume=True"):
         run_experiment(planned, results, Serial)
     account = run_experiment(planned, results, Serial, resume=True)
 

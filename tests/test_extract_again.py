@@ -132,9 +132,10 @@ def test_the_command_compares_and_keeps(folder, run, tmp_path):
     assert read_labelled(kept, "label").table.columns(["p_first"]).values[0, 0] == gap_at(0.2)
 
 
-def test_a_store_is_asked_for(folder, run):
-    code, _, err = run("features", folder, "-o", "features.force=left")
-    assert (code, "write store:DIR" in err) == (2, True)
+def test_a_store_is_asked_for(folder, run, tmp_path):
+    code, _, err = run("features", tmp_path / "none", "-o", "features.force=left")
+    assert (code, "there is no store" in err) == (2, True)
+    assert run("features", folder, "-o", "features.force=left")[0] == 0
 
 
 def test_train_uses_the_features_of_its_options(folder, run, tmp_path):

@@ -35,7 +35,7 @@ def test_names_units_labels_and_the_width(csv):
     assert found.labels == ("a", "b") * 4
     assert found.width is not None
     assert found.instances is None
-    assert found.no_instances == "no column names the instance (--instance COLUMN)"
+    assert found.no_instances == "no column names the instance (instance=COLUMN)"
 
 
 @pytest.mark.parametrize("separator", [",", ";", "\t"])
@@ -129,7 +129,7 @@ def test_counters_and_texts_are_no_features_unless_asked_for(csv):
 
     found = read_labelled(path, "what")
     assert found.table.names == ("p",)
-    assert any("trial, time (use --features to include them)" in note for note in found.notes)
+    assert any("trial, time (use columns to include them)" in note for note in found.notes)
     assert any("have no numbers: comment" in note for note in found.notes)
     assert read_labelled(path, "what", features=["trial", "p"]).table.names == ("trial", "p")
 
@@ -141,9 +141,7 @@ def test_constant_and_empty_columns_are_noted(csv):
     )
 
     assert "constant, and so without information: same" in found.notes
-    assert (
-        "not used, because they have no values: empty, void (use --features to include them)" in found.notes
-    )
+    assert "not used, because they have no values: empty, void (use columns to include them)" in found.notes
     assert found.table.names == ("p", "same")
 
 

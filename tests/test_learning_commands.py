@@ -289,7 +289,9 @@ def test_a_feature_set_that_raises_on_simulated_grasps_is_named(run, monkeypatch
 
     monkeypatch.setattr(ChittaFeatures, "extract", lambda self, trace: 1 / 0)
     objects = "can:full_open,can:empty_open"
-    code, _, err = run("evaluate", "simulated", "--objects", objects, "--instances", "1", "--trials", "2")
+    code, _, err = run(
+        *("evaluate", "simulated", "--objects", objects, "--instances", "1", "--trials", "2", "--folds", "2")
+    )
 
     assert code == 70
     assert (

@@ -11,6 +11,7 @@ from html.parser import HTMLParser
 from importlib.resources import files
 from itertools import pairwise
 
+import kept
 import pytest
 import wayward
 from kept import keep
@@ -31,7 +32,7 @@ from graspsense.report.matrix import confusion_table
 from graspsense.report.rates import RateRow, rate_scale, rates_over, rates_picture
 from graspsense.report.store_page import store_page
 from graspsense.report.svg import GRID, GROUND, INKS, QUIET, TEXT, AxisScale
-from graspsense.report.verdict import headline
+from graspsense.report.verdict import headline, verdict
 from graspsense.store.store import Store
 
 VOID = {"meta", "br", "hr", "img", "input", "link"}
@@ -296,6 +297,63 @@ def test_the_page_of_a_store(tmp_path, capsys):
     assert "Trial 3: can:full_open, steady" in found.text
     assert "one line per grasp" in found.text
     assert "All trials" in found.text
+    # The newest trial of each label is drawn; the other small curves can be chosen.
+    boxes = [one for one in found.all("input") if one.get("type") == "checkbox"]
+    assert [one["value"] for one in boxes] == [str(k) for k in range(8, 0, -1)]
+    assert [one["value"] for one in boxes if "checked" in one] == ["8", "7"]
+    lines = [one for one in found.all("polyline") if "data-trial" in one]
+    assert {one["data-trial"] for one in lines if "class" not in one} == {"8", "7"}
+
+
+def test_the_warnings_of_a_trial_are_on_its_page(tmp_path):
+    from attrs import evolve
+
+    from graspsense.recording.recording_info import RecordingInfo
+
+    with Store.open(tmp_path / "trials") as store:
+        record = kept.ended()
+        result = evolve(record.result, details={"warnings": ["left fingertip stuck: check its cable"]})
+        path = store.new_recording(record.made_at)
+        kept.write_recording(path, 120, evolve(record, result=result))
+        store.add(evolve(record, result=result), RecordingInfo.of(path, 120, 3), complete=True)
+    page = store_page(str(tmp_path / "trials")).html()
+
+    assert '<ul class="warning"><li>left fingertip stuck: check its cable</li></ul>' in page
+
+
+def test_evaluate_writes_a_page_and_replaces_none_of_a_store(tmp_path, capsys):
+    folder = tmp_path / "trials"
+    with Store.open(folder) as store:
+        for k in range(8):
+            keep(store, ["can:full_open", "can:empty_open"][k % 2], values=(0.066, 5.0 + k % 2))
+    command = ["evaluate", str(folder), "--folds", "2", "--report"]
+    with pytest.raises(SystemExit) as ended:
+        main([*command, str(tmp_path / "page")])
+    found = Reader((tmp_path / "page" / "report.html").read_text())
+    with pytest.raises(SystemExit) as refused:
+        main([*command, str(folder)])
+
+    assert not ended.value.code
+    assert refused.value.code == 2
+    assert not (folder / "report.html").exists()
+    for part in ("Controls", "Confusion matrix", "Features", "graspsense evaluate"):
+        assert part in found.text
+    assert "8 of 8" in found.text
+    assert "report.html" in capsys.readouterr().err
+
+
+def test_words_in_backticks_are_code_and_names_cannot_make_elements():
+    page = Page(kind="k", title="t", question="", answer="use `run --object <b>`").html()
+    assert "use <code>run --object &lt;b&gt;</code>" in page
+
+
+def test_long_names_are_wrapped_within_a_picture():
+    name = "closing speed 10 mm/s, probing force 20 N, rest window 0.2 s, a classifier"
+    rows = [RateRow(name=name, rate=0.8, interval=None) for _ in range(2)]
+    for picture in (rates_picture(rows, "c"), rates_over({name: list(enumerate(rows))}, "x", "c")):
+        texts = re.findall(r"<text[^>]*>([^<]*)</text>", picture)
+        assert max(map(len, texts)) < 60
+        assert name in " ".join(texts)
 
 
 def test_features_have_their_unit_and_meaning_from_their_plugin(page):
@@ -310,13 +368,10 @@ def test_features_have_their_unit_and_meaning_from_their_plugin(page):
         )
 
 
-@pytest.mark.parametrize(
-    ("rate", "words"),
-    [(0.5, "is not shown to be more than the 50 by guessing"), (0.95, ", against 50 by guessing")],
-)
-def test_the_headline_of_an_evaluation_compares_with_guessing(rate, words):
-    right = round(rate * 100)
-    found = Evaluation(
+def evaluated(right, difference, width=None):
+    """Return an evaluation of 100 trials, compared with guessing, and with the width alone where that is given."""
+    controls = {"majority_class": Measurement(what="w", rate=RecognitionRate(50, 100), difference=difference)}
+    return Evaluation(
         classifier="x/c45 1",
         target="both",
         source="s",
@@ -328,21 +383,45 @@ def test_the_headline_of_an_evaluation_compares_with_guessing(rate, words):
         confusion=confusion(["a"], ["a"]),
         by_class={},
         protocols={},
-        controls={
-            "majority_class": Measurement(
-                what="w",
-                rate=RecognitionRate(50, 100),
-                difference=Difference(rate - 0.5, (rate - 0.6, rate - 0.4)),
-            )
-        },
+        controls={**controls, **({} if width is None else {"width_only": width})},
         learning_curve=(),
         unknown=RecognitionRate(1, 100),
         warnings=(),
         notes=(),
     )
 
-    assert headline(found).startswith(f"{right} of 100 grasps tell the object and its state")
+
+@pytest.mark.parametrize(
+    ("rate", "words"),
+    [(0.5, "is not shown to be more than the 50 by guessing"), (0.95, ", against 50 by guessing")],
+)
+def test_the_headline_of_an_evaluation_compares_with_guessing(rate, words):
+    right = round(rate * 100)
+    found = evaluated(right, Difference(rate - 0.5, (rate - 0.6, rate - 0.4)))
+
+    assert headline(found).startswith(f"{right} of 100 grasps tell the object and its state ({right} of 100)")
     assert headline(found).endswith(words)
+
+
+@pytest.mark.parametrize(
+    ("difference", "words"),
+    [
+        (Difference(0.3, (0.2, 0.4)), "better than always"),
+        (Difference(-0.3, (-0.4, -0.2)), "worse than always"),
+        (Difference(0.0, (-0.01, 0.01)), "agrees with always"),
+        (Difference(0.1, (-0.2, 0.4)), "cannot be told"),
+        (Difference(0.1, None, "2 instances"), "cannot be told: 2 instances"),
+    ],
+)
+def test_a_verdict_says_one_of_three_things(difference, words):
+    assert words in verdict(evaluated(60, difference))
+
+
+def test_no_verdict_comes_from_a_control_of_two_trials():
+    few = Measurement(what="w", rate=RecognitionRate(2, 2), difference=Difference(-0.4, (-0.6, -0.2)))
+    told = verdict(evaluated(60, Difference(0.3, (0.2, 0.4)), few))
+
+    assert "100.0 % of 2 of 100 trials, too few to say" in told
 
 
 def test_the_page_of_a_store_that_cannot_be_judged(tmp_path):

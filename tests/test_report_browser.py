@@ -19,10 +19,12 @@ from graspsense.experiments.results import Results
 from graspsense.experiments.run import run_experiment
 from graspsense.experiments.summary import summarise
 from graspsense.report.further_channels import channel_figures
+from graspsense.report.grasp_curve import GraspCurve
 from graspsense.report.html import Page, Section, bullets, facts, panels
 from graspsense.report.matrix import confusion_table
 from graspsense.report.rates import RateRow, rates_over, rates_picture
 from graspsense.report.tactile import tactile_figures
+from graspsense.report.trial_curves import trial_curves
 
 pytestmark = pytest.mark.browser
 
@@ -301,3 +303,36 @@ def test_the_colours_of_a_heat_map_differ_in_light_dark_and_print(browser, pages
         seen.append(browser.run(colour))
 
     assert seen == ["rgb(8, 60, 110)", "rgb(182, 217, 245)", "rgb(8, 60, 110)"]
+
+
+def test_boxes_choose_which_trials_are_drawn_over_each_other(browser, tmp_path):
+    curves = [
+        GraspCurve(
+            label=("can:full", "can:empty")[k % 2],
+            trial=k,
+            t_s=(-0.2, 0.0, 0.5),
+            gap_mm=(70.0, 66.0, 64.0),
+            force_n=(0.0, 1.0, 5.0 + k),
+            phase=("approach", "squeeze", "hold"),
+        )
+        for k in range(5, 0, -1)
+    ]
+    page = Page(kind="k", title="t", question="q?", answer="a.", sections=(trial_curves(curves),))
+    (tmp_path / "page.html").write_text(page.html())
+    browser.show(tmp_path / "page.html", 400)
+    shown = (
+        "[...new Set([...document.querySelectorAll('[data-trial]')]"
+        ".filter((one) => getComputedStyle(one).display !== 'none').map((one) => one.dataset.trial))]"
+    )
+
+    assert sorted(browser.run(shown)) == ["4", "5"]
+    browser.run("document.querySelector('.small input[value=\"2\"]').click()")
+    browser.run("document.querySelector('.small input[value=\"5\"]').click()")
+    assert sorted(browser.run(shown)) == ["2", "4"]
+
+
+def test_on_a_phone_each_cell_of_a_table_stands_with_its_heading(browser, pages):
+    browser.show(pages["long"], 390)
+    cell = "document.querySelector('#claims tbody td:nth-child(4)')"
+    assert browser.run(f"getComputedStyle({cell}, '::before').content") == '"measured, N: "'
+    assert browser.run("document.querySelector('#claims .wide').scrollWidth") <= 390

@@ -120,7 +120,7 @@ def test_an_implausible_value_is_refused_with_its_place_and_what_is_plausible(tm
     assert str(refused.value) == (
         f"{file}:3: controller.closing_speed_m_s: 10 m/s is not plausible: the plausible range is 0.0001 to 0.2 m/s"
     )
-    assert "--force" in refused.value.__notes__[0]
+    assert "force=True" in refused.value.__notes__[0]
     assert resolve(str(file), force=True).values["controller"]["closing_speed_m_s"] == 10.0
     with pytest.raises(ImplausibleSettings):
         load_pipeline(file)

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from graspsense.evaluation.equivalence import verdict_on
 from graspsense.experiments.executors.serial import Serial
 from graspsense.experiments.experiment import read_experiment
 from graspsense.experiments.page import findings_of
@@ -57,16 +58,54 @@ def test_a_cheap_case_is_recommended_only_if_it_is_shown_to_lose_little():
     assert "above those of all cheaper cases; not for a robot." in found.text
 
 
-def test_seeds_that_tell_nothing_give_no_advice():
+def test_where_no_difference_is_shown_the_cheapest_is_taken_and_that_is_said():
     best = case("strong", 2.0, 0.70, 0.95, 0.80, 0.99)
-    other = case("weak", 1.0, 0.95, 0.70, 0.90, 0.75)
-    for cases in ([other, best], [case("weak", 1.0, 0.8), case("strong", 2.0, 0.9)]):
-        points = trade_points(cases, True)
-        found = advise(points, "Force", "N")
-        assert found.recommended is None
-        assert "inconclusive" in found.text
-        assert found.cells[2] == "inconclusive"
-        assert [point.on_front for point in points] == ["yes", "not decided"]
+    other = case("weak", 1.0, 0.95, 0.70, 0.90, 0.77)
+    points = trade_points([other, best], True)
+    found = advise(points, "Force", "N")
+    assert (found.recommended.name, found.shown) == ("weak", False)
+    assert "no difference to the best is shown; take the cheapest, weak" in found.text
+    assert "100 grasps of each of 4 seeds" in found.text
+    assert found.cells[2] == "weak, no difference shown"
+    assert [point.on_front for point in points] == ["yes", "not decided"]
+
+
+def test_a_case_that_is_the_cheapest_and_the_best_is_not_called_better():
+    cheap, dear = case("weak", 1.0, 0.90, 0.91, 0.90, 0.92), case("strong", 2.0, 0.90, 0.90, 0.91, 0.91)
+    found = advise(trade_points([cheap, dear], True), "Force", "N")
+    assert (found.recommended.name, found.loss) == ("weak", None)
+    assert "take the cheapest" in found.text
+    assert "highest" not in found.text
+
+
+def test_a_case_that_lost_much_is_not_taken_because_few_seeds_show_nothing():
+    best, poor = case("strong", 2.0, 0.90, 0.95), case("weak", 1.0, 0.50, 0.90)
+    found = advise(trade_points([poor, best], True), "Force", "N")
+    assert (found.recommended.name, found.shown) == ("strong", False)
+    assert "no cheaper case comes within 5 points, although 2 seeds do not show" in found.text
+    assert found.cells[2] == "strong"
+
+
+def test_a_single_seed_recommends_nothing():
+    found = advise(trade_points([case("weak", 1.0, 0.8), case("strong", 2.0, 0.9)], True), "Force", "N")
+    assert found.recommended is None
+    assert "cannot be told" in found.text
+    assert found.cells[2] == "cannot be told"
+
+
+@pytest.mark.parametrize(
+    ("interval", "says"),
+    [
+        ((-0.01, 0.015), "agrees"),
+        ((0.001, 0.015), "agrees"),
+        ((0.01, 0.2), "differs"),
+        ((-0.2, -0.03), "differs"),
+        ((-0.1, 0.3), "cannot be told"),
+        (None, "cannot be told"),
+    ],
+)
+def test_an_interval_says_one_of_three_things(interval, says):
+    assert verdict_on(interval) == says
 
 
 def test_the_front_takes_intervals_into_account_and_a_high_value_may_be_the_cheap_one():

@@ -32,6 +32,7 @@ _TABLE: Final[Table] = {
         ),
         "core.components.setting": ("CHANGES_NO_RESULT", "NAMES_INPUT", "setting"),
         "core.components.strict": ("ValidationFailed", "structured"),
+        "core.components.toml_kinds": ("refuse_other_kind",),
         "core.files.toml_text": ("TomlError", "toml_values"),
         "core.components.figure_origins": ("fitted_results", "given_claims", "gives"),
     },

@@ -23,6 +23,7 @@ from graspsense.core.components.setting import NAMES_INPUT as NAMES_INPUT
 from graspsense.core.components.setting import setting as setting
 from graspsense.core.components.strict import ValidationFailed as ValidationFailed
 from graspsense.core.components.strict import structured as structured
+from graspsense.core.components.toml_kinds import refuse_other_kind as refuse_other_kind
 from graspsense.core.files.toml_text import TomlError as TomlError
 from graspsense.core.files.toml_text import toml_values as toml_values
 from graspsense.core.components.figure_origins import fitted_results as fitted_results

@@ -76,6 +76,12 @@ def test_lost_reports_are_told_and_a_quarter_of_them_ends_the_grasp(drop, outcom
     assert any(warning.startswith("reports lost") for warning in grasp.warnings)
 
 
+def test_a_pad_that_grows_numb_in_the_squeeze_is_told():
+    faults = FaultConfig(pad_fault="numb", pad_side="left", pad_at_s=3.3)
+    grasp = gripper_faults.grasped(gripper_faults.controller_named("hybrid"), faults)
+    assert any(warning.startswith("pads disagree") for warning in grasp.warnings)
+
+
 def test_a_pad_that_is_known_to_be_bad_refuses_the_grasp():
     faults = FaultConfig(pad_fault="absent", pad_side="right")
     grasp = gripper_faults.grasped(gripper_faults.controller_named("hybrid"), faults)
@@ -93,4 +99,7 @@ def test_a_picture_and_a_notebook_show_the_reason_and_the_warnings() -> None:
     options = ["gripper.type=pr2", "gripper.transport=emulated", *(f"gripper.faults.{one}" for one in faults)]
     trial = load_pipeline(options=options).grasp()
     assert "left fingertip stuck" in _words(trial)[0]
+    assert any(
+        line.startswith("Object: ") and line.endswith(f"seed {trial.run.seed}") for line in _words(trial)
+    )
     assert "left fingertip stuck" in trial._repr_html_()

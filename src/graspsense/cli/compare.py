@@ -7,7 +7,16 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from graspsense.cli.output import echo_json, file_to_write_as
-from graspsense.cli.sources import SOURCES, command_line, is_csv, learner_of, source_options, trials_of
+from graspsense.cli.sources import (
+    SOURCES,
+    command_line,
+    folds_option,
+    is_csv,
+    learner_of,
+    source_argument,
+    source_options,
+    trials_of,
+)
 from graspsense.cli.terminal import Style, echo, echo_entry, echo_table
 
 if TYPE_CHECKING:
@@ -25,7 +34,7 @@ if TYPE_CHECKING:
 
     {SOURCES}""",
 )
-@click.argument("source")
+@source_argument
 @click.option(
     "--classifiers",
     metavar="NAMES",
@@ -34,7 +43,7 @@ if TYPE_CHECKING:
     help="Comma-separated classifiers.",
 )
 @click.option("--feature-sets", metavar="NAMES", help="Comma-separated feature sets; not for a CSV. [chitta]")
-@click.option("--folds", type=int, default=10, show_default=True, help="Number of folds.")
+@folds_option
 @click.option("--out", metavar="FILE.html", callback=file_to_write_as(".html"), help="Write a page as well.")
 @source_options
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
@@ -69,7 +78,10 @@ def compare(
         else:
             trials = {
                 name: trials_of(
-                    source, progress, {**given, "options": (*given["options"], f"features.type={name}")}
+                    source,
+                    progress,
+                    {**given, "options": (*given["options"], f"features.type={name}")},
+                    folds=folds,
                 )
                 for name in sets
             }

@@ -7,12 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from graspsense.cli.output import check_outputs, echo_json, file_to_write, file_to_write_as
+from graspsense.cli.output import check_outputs, echo_json, file_to_write, file_to_write_as, page_to_write
 from graspsense.cli.sources import (
     SOURCES,
     checkpoints_option,
     classifier_option,
+    command_line,
+    folds_option,
     learner_of,
+    source_argument,
     source_options,
     trials_of,
 )
@@ -21,6 +24,7 @@ from graspsense.cli.terminal import Style, echo, echo_entry, echo_table, talk
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from graspsense.core.components.config import SelectedComponent
     from graspsense.core.learn.checkpoints import CheckpointTrials
     from graspsense.core.learn.labelled import Labelled
     from graspsense.evaluation.checkpoints import EarlyRecognition
@@ -36,7 +40,7 @@ if TYPE_CHECKING:
 
     {SOURCES}""",
 )
-@click.argument("source")
+@source_argument
 @click.option(
     "--target",
     type=click.Choice(["both", "class", "state"]),
@@ -44,10 +48,11 @@ if TYPE_CHECKING:
     show_default=True,
     help="What is recognised: whole labels, classes, or the states within each class.",
 )
-@click.option("--folds", type=int, default=10, show_default=True, help="Number of folds.")
+@folds_option
 @click.option(
     "--png", metavar="FILE.png", callback=file_to_write_as(".png"), help="Draw the confusion matrix."
 )
+@click.option("--report", metavar="DIR", help="Write the page DIR/report.html as well.")
 @click.option(
     "--keep", metavar="FILE", callback=file_to_write, help="Write the features of all trials as a CSV file."
 )
@@ -61,6 +66,7 @@ def evaluate(
     target: str,
     folds: int,
     png: str | None,
+    report: str | None,
     keep: str | None,
     overwrite: bool,
     checkpoints: str | None,
@@ -76,24 +82,24 @@ def evaluate(
     from graspsense.evaluation.evaluate import evaluate as measure
 
     check_outputs(keep, overwrite=overwrite, sources=[source])
+    page = None if report is None else page_to_write(report)
     times = checkpoints_of(checkpoints)
     if given["target_value"]:
+        if page is not None:
+            raise click.UsageError("--report is for labels, and not for --target-value")
         from graspsense.cli.target_value import evaluate_value
 
         evaluate_value(source, classifier, folds, keep, as_json, given)
         return
     learner = learner_of(source, classifier, given)
     with ProgressLine() as progress:
-        labelled = trials_of(source, progress, given, times)
+        labelled = trials_of(source, progress, given, times, folds)
         labelled, parts = _parts(labelled, times, target)
         if keep:
-            from graspsense.sources.features_csv import write_labelled
-
-            write_labelled(Path(keep), labelled)
+            _keep(keep, labelled)
         evaluation = measure(
             learner,
             labelled,
-            classifier=f"{learner.component.qualified} {learner.component.version}",
             target=target,  # type: ignore[arg-type]
             folds=folds,
             seed=given["seed"],
@@ -102,11 +108,9 @@ def evaluate(
         )
         early = early_recognition(learner, parts, folds=folds, seed=given["seed"]) if parts else None
     if png:
-        from graspsense.report.confusion import confusion_png
-
-        title = f"{evaluation.source}\n{evaluation.protocol}: {evaluation.headline.words}"
-        confusion_png(evaluation.confusion, title, Path(png))
-        talk(f"drawn in {png}")
+        _draw(evaluation, Path(png))
+    if page is not None:
+        _write_page(page, evaluation, learner, labelled)
     if as_json:
         from graspsense.evaluation.json_codec import to_json
 
@@ -116,6 +120,29 @@ def evaluate(
         _print(evaluation)
         if early is not None:
             _print_early(early)
+
+
+def _keep(keep: str, labelled: Labelled) -> None:
+    from graspsense.sources.features_csv import write_labelled
+
+    write_labelled(Path(keep), labelled)
+
+
+def _draw(evaluation: Evaluation, path: Path) -> None:
+    from graspsense.report.confusion import confusion_png
+
+    title = f"{evaluation.source}\n{evaluation.protocol}: {evaluation.headline.words}"
+    confusion_png(evaluation.confusion, title, path)
+    talk(f"drawn in {path}")
+
+
+def _write_page(path: Path, evaluation: Evaluation, learner: SelectedComponent, labelled: Labelled) -> None:
+    from graspsense.report.evaluation_page import evaluation_page
+    from graspsense.report.write import write_html
+
+    command = command_line(("report", "as_json", "png", "keep", "overwrite"))
+    write_html(path, evaluation_page(evaluation, learner, labelled, command))
+    talk(f"page in {path}")
 
 
 def _parts(

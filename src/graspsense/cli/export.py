@@ -7,11 +7,12 @@ from pathlib import Path
 import click
 
 from graspsense.cli.output import echo_json
+from graspsense.cli.sources import named_store
 from graspsense.cli.terminal import echo
 
 
 @click.command(short_help="Export trials or a recording.")
-@click.argument("source", metavar="DIR|DIR#NUMBER|FILE.mcap")
+@click.argument("source", metavar="DIR|DIR#NUMBER|FILE.mcap", callback=named_store)
 @click.option(
     "--to",
     "target",
@@ -35,7 +36,7 @@ def export(source: str, target: str, pictures: bool, as_json: bool) -> None:
     from graspsense.store import export_table
     from graspsense.store.trial_ref import stored_grasp
 
-    path, source = Path(target), source.removeprefix("store:")
+    path = Path(target)
     table = Path(source).is_dir()
     writers = export_table.WRITERS if table else export_trace.WRITERS
     if path.suffix not in writers:

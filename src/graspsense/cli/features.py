@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from graspsense.cli.output import check_outputs, echo_json, file_to_write
+from graspsense.cli.sources import named_store
 from graspsense.cli.terminal import echo, echo_entry, echo_table
 
 if TYPE_CHECKING:
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
 
 @click.command(short_help="Extract the features of a store again.")
-@click.argument("source", metavar="store:DIR")
+@click.argument("source", metavar="DIR", callback=named_store)
 @click.option(
     "-o",
     "options",
@@ -39,20 +40,14 @@ def features(source: str, options: tuple[str, ...], keep: str | None, overwrite:
     `train`, `predict` and `evaluate` take the same -o.
     """
     from graspsense.cli.progress import ProgressLine
-    from graspsense.core.values.errors import ConfigError
-    from graspsense.sources.trial_source import STORE
     from graspsense.store.dataset import labelled_store
+    from graspsense.store.naming import STORE
 
-    if not source.startswith(STORE):
-        raise ConfigError(
-            f"{source!r} is not a store: write store:DIR. For one recording there is `graspsense replay`"
-        )
     check_outputs(keep, overwrite=overwrite)
-    folder = source.removeprefix(STORE)
-    before = labelled_store(folder)
+    before = labelled_store(source)
     with ProgressLine() as progress:
         after = labelled_store(
-            folder, options, progress=lambda done, total: progress("extracting features", done, total)
+            source, options, progress=lambda done, total: progress("extracting features", done, total)
         )
     if keep:
         from graspsense.sources.features_csv import write_labelled
@@ -62,7 +57,7 @@ def features(source: str, options: tuple[str, ...], keep: str | None, overwrite:
     if as_json:
         echo_json(
             {
-                "source": source,
+                "source": f"{STORE}{source}",
                 "options": list(options),
                 "trials": len(after),
                 "features": rows,

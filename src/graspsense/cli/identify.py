@@ -10,6 +10,7 @@ import click
 
 from graspsense.cli.options import force_option
 from graspsense.cli.output import check_outputs, echo_json, file_to_write_as
+from graspsense.cli.sources import named_source
 from graspsense.cli.terminal import Style, echo, echo_entry, echo_table, talk
 
 if TYPE_CHECKING:
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
 
 @click.command(short_help="Identify an object from recorded squeezes, as a scene of the simulator.")
-@click.argument("sources", nargs=-1, required=True, metavar="RECORDING|store:DIR...")
+@click.argument("sources", nargs=-1, required=True, metavar="RECORDING|store:DIR...", callback=named_source)
 @click.option(
     "--out", metavar="FILE.toml", callback=file_to_write_as(".toml"), required=True, help="File of the scene."
 )

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 from attrs import frozen
 
-from graspsense.cli.output import echo_json
+from graspsense.cli.output import echo_json, file_to_write_as
+from graspsense.cli.sources import named_source
 from graspsense.cli.terminal import Style, echo, echo_as_it_is, echo_entry, echo_table
 
 if TYPE_CHECKING:
@@ -29,10 +30,17 @@ FEW: Final = 3
 
 
 @click.command("import", short_help="Import recordings of other programs.")
-@click.argument("sources", nargs=-1, required=True, metavar="FILE.csv|MANIFEST.toml|KIND:NAME...")
+@click.argument(
+    "sources", nargs=-1, required=True, metavar="FILE.csv|MANIFEST.toml|KIND:NAME...", callback=named_source
+)
 @click.option("--save", metavar="DIR", help="Store for the trials.")
 @click.option("--check", is_flag=True, help="Only print what was understood, and draw one grasp.")
-@click.option("--plot", metavar="FILE.png", help="--check: the picture.  [default: import-check.png]")
+@click.option(
+    "--plot",
+    metavar="FILE.png",
+    callback=file_to_write_as(".png"),
+    help="--check: the picture.  [default: import-check.png]",
+)
 @click.option("--label", metavar="CLASS:STATE", help="Label of the object: can:full_open#2.")
 @click.option("--time", metavar="EXPRESSION", help='CSV: time. In ms: --time "STAMP [ms]".')
 @click.option("--gap", metavar="EXPRESSION", help='CSV: gap. In mm: --gap "60 - POS [mm]".')

@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import sys
 import traceback
+import warnings
 from collections.abc import Sequence
 from contextlib import suppress
 from importlib import import_module
@@ -16,7 +17,9 @@ from typing import Any, Final, NoReturn
 import click
 
 from graspsense import __version__
-from graspsense.cli.terminal import Style, echo, echo_as_it_is, has_colour
+from graspsense.cli.terminal import Style, echo, echo_as_it_is, has_colour, talk
+from graspsense.core.compiling.compile_notice import tell_compiling
+from graspsense.core.components.caller import command_line
 from graspsense.core.grasp.interrupts import ended_like_ctrl_c
 from graspsense.core.values.errors import GraspsenseError, PluginUnavailable, UnknownName, suggestion
 
@@ -130,7 +133,8 @@ def cli(ctx: click.Context) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run the command line and exit with its code; no argument means the process's own."""
-    with ended_like_ctrl_c():
+    with ended_like_ctrl_c(), command_line(), warnings.catch_warnings():
+        warnings.showwarning = _Notes()
         code = _exit_code(list(sys.argv[1:] if arguments is None else arguments))
     sys.exit(code)
 
@@ -141,6 +145,7 @@ def _exit_code(arguments: list[str]) -> int:
         from click.shell_completion import shell_complete
 
         return shell_complete(cli, {}, PROGRAM, COMPLETION_VARIABLE, instruction)
+    tell_compiling(talk)
     try:
         with cli.make_context(PROGRAM, arguments) as ctx:
             if not has_colour(sys.stdout):
@@ -171,9 +176,26 @@ def _exit_code(arguments: list[str]) -> int:
     except SystemExit as error:
         if next((one for one in arguments if not one.startswith("-")), "") not in COMMANDS:
             raise  # the command of a plugin may choose its exit code
-        return _report(_plugin_exit(error), as_json="--json" in arguments)
+        return _report(_plugin_exit(error), arguments)
     except Exception as error:
-        return _report(error, as_json="--json" in arguments)
+        return _report(error, arguments)
+
+
+class _Notes:
+    """Shows each warning of a library once as a note, without the line of its source."""
+
+    def __init__(self) -> None:
+        self._told: set[str] = set()
+
+    def __call__(
+        self, message: Warning | str, category: type[Warning], filename: str, *_place: object, **_more: object
+    ) -> None:
+        from graspsense.evaluation.gathered_warnings import in_words
+
+        words = in_words(message, category, filename)
+        if words not in self._told:
+            self._told.add(words)
+            talk(f"note: {words}")
 
 
 def _plugin_exit(error: SystemExit) -> PluginUnavailable:
@@ -187,8 +209,9 @@ def _plugin_exit(error: SystemExit) -> PluginUnavailable:
     return unusable
 
 
-def _report(error: Exception, as_json: bool) -> int:
+def _report(error: Exception, arguments: Sequence[str]) -> int:
     """Tell of an error, on stderr and with --json on stdout too, and return the exit code."""
+    as_json = "--json" in arguments
     if isinstance(error, GraspsenseError):
         message, code = str(error), error.exit_code
     elif isinstance(error, click.ClickException):
@@ -200,18 +223,23 @@ def _report(error: Exception, as_json: bool) -> int:
         message, code = f"{error.strerror or error}{place}", EXIT_USAGE
     else:
         message, code = f"{type(error).__name__}: {error}", EXIT_BUG
-    talk = "\n  ".join([message, *getattr(error, "__notes__", ())])
+    notes = list(getattr(error, "__notes__", ()))
+    if code == EXIT_USAGE:
+        from graspsense.cli.wrong_use import advice
+
+        notes = [*advice(error, arguments), *notes]
+    told = "\n  ".join([message, *notes])
     if code == EXIT_BUG and not isinstance(error, GraspsenseError):
-        talk = f"internal error: {talk}\n  This is a bug, ours or a plugin's."
+        told = f"internal error: {told}\n  This is a bug, ours or a plugin's."
         if os.environ.get(TRACEBACK_VARIABLE) != "1":
-            talk += f" Run it again with {TRACEBACK_VARIABLE}=1 to see where it happened."
+            told += f" Run it again with {TRACEBACK_VARIABLE}=1 to see where it happened."
     if os.environ.get(TRACEBACK_VARIABLE) == "1":
-        talk = "".join(traceback.format_exception(error)) + talk
+        told = "".join(traceback.format_exception(error)) + told
     with suppress(OSError):  # the terminal may have gone
-        if talk.startswith("Traceback"):
-            echo_as_it_is(talk, err=True)
+        if told.startswith("Traceback"):
+            echo_as_it_is(told, err=True)
         else:
-            echo(f"{PROGRAM}: {talk}", Style.BAD, indent=2, err=True)
+            echo(f"{PROGRAM}: {told}", Style.BAD, indent=2, err=True)
     if as_json:
         from graspsense.cli.output import echo_json
 

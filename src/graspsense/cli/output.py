@@ -64,6 +64,26 @@ def file_to_write_as(ending: str) -> Callable[[click.Context, click.Parameter, s
     return checked
 
 
+def page_to_write(folder: str) -> Path:
+    """Return the path of the page in a folder, which is made; refuse it before the work if it cannot be written.
+
+    Raises UsageError, also where it would replace the page of a store or of an experiment.
+    """
+    from graspsense.experiments.results import EXPERIMENT
+    from graspsense.store.opening import FILE
+
+    path = Path(folder)
+    if any((path / name).is_file() for name in (FILE, EXPERIMENT)):
+        raise click.UsageError(f"{folder} has a page of its own, that of its trials: name another folder")
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=path) as probe:
+            probe.write(bytes(_PROBE_BYTES))
+    except OSError as error:
+        raise click.UsageError(f"{folder} cannot be written: {error.strerror}") from error
+    return path / "report.html"
+
+
 def check_outputs(*paths: str | None, overwrite: bool, sources: Sequence[str] = ()) -> None:
     """Raise ConfigError if these files cannot be the outputs of a command.
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from graspsense.cli.output import echo_json
-from graspsense.cli.sources import SOURCES, is_csv, source_options, trials_of
+from graspsense.cli.sources import SOURCES, is_csv, source_argument, source_options, trials_of
 from graspsense.cli.terminal import Style, correct_style, echo, echo_entry, echo_table, prediction_style
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ MOST_WITH_REASONS: Final = 1000
     {SOURCES}""",
 )
 @click.argument("model")
-@click.argument("source")
+@source_argument
 @source_options
 @click.option("--json", "as_json", is_flag=True, help="Print every prediction with its reasons as JSON.")
 def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
@@ -44,6 +44,7 @@ def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
     from graspsense.evaluation.json_codec import to_json
     from graspsense.regression.model import is_regression
 
+    _refuse_swapped(model, source)
     if is_regression(model):
         from graspsense.cli.target_value import predict_value
 
@@ -94,6 +95,17 @@ def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
         echo_entry("warning", text, Style.CAUTION)
     for text in notes:
         echo_entry("note", text)
+
+
+def _refuse_swapped(model: str, source: str) -> None:
+    """Raise UsageError if the source was named first and the model second."""
+    from graspsense.core.components.registry import installed
+
+    models = {one.name for one in installed().models()}
+    if not model.endswith(".json") and model not in models and (source.endswith(".json") or source in models):
+        raise click.UsageError(
+            f"{model} is not a model, and {source} is one. The model comes first: graspsense predict {source} {model}"
+        )
 
 
 def _trials(

@@ -7,13 +7,14 @@ from pathlib import Path
 import click
 
 from graspsense.cli.output import echo_json
+from graspsense.cli.sources import named_store
 from graspsense.cli.terminal import echo, talk
 
 EXIT_DAMAGED = 5
 
 
 @click.command(short_help="Complete recordings of a killed program.")
-@click.argument("source", metavar="DIR|FILE")
+@click.argument("source", metavar="DIR|FILE", callback=named_store)
 @click.option("--out", metavar="FILE", help="With a FILE: file for the recovered recording.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result for each file as JSON.")
 def recover(source: str, out: str | None, as_json: bool) -> None:

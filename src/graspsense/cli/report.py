@@ -8,11 +8,12 @@ import click
 
 from graspsense.cli.options import SEED
 from graspsense.cli.output import echo_json
+from graspsense.cli.sources import folds_option, named_store
 from graspsense.cli.terminal import Style, echo, echo_as_it_is, warn
 
 
 @click.command(short_help="Write the report page of a store or an experiment.")
-@click.argument("folder", metavar="DIR")
+@click.argument("folder", metavar="DIR", callback=named_store)
 @click.option("--out", metavar="DIR", help="Folder for report.html.  [default: DIR]")
 @click.option(
     "--classifier", metavar="NAME", default="c45", show_default=True, help="Store: classifier to evaluate."
@@ -24,7 +25,7 @@ from graspsense.cli.terminal import Style, echo, echo_as_it_is, warn
     show_default=True,
     help="Store: what is recognised, as in `evaluate`.",
 )
-@click.option("--folds", type=int, default=10, show_default=True, help="Store: number of folds.")
+@folds_option
 @click.option("--seed", type=SEED, default=0, show_default=True, help="Store: seed of the folds.")
 @click.option(
     "--grasp", type=int, metavar="NUMBER", help="Store: trial to plot over time.  [default: the newest]"

@@ -25,7 +25,7 @@ SOURCES: Final = """\b
       FILE.csv     a feature table, one line per trial;
                    --label names the column of the label
       NAME:FOLDER  a data set of a plugin, such as icub:FOLDER
-      store:DIR    the labelled trials of a store
+      store:DIR    the labelled trials of a store, or DIR alone
       simulated    grasps of the simulated gripper
       identified:FILE.toml,...  simulated grasps of objects that
                    `graspsense identify` has identified
@@ -114,6 +114,32 @@ def classifier_option(command: CommandT) -> CommandT:
     )(command)
 
 
+def source_argument(command: CommandT) -> CommandT:
+    """Add the argument SOURCE; the folder of a store needs no `store:`."""
+    return click.argument("source", callback=named_source)(command)
+
+
+def named_source(_ctx: click.Context, _param: click.Parameter, value: Any) -> Any:
+    """Callback of the argument for one source or several: a store by its folder becomes `store:DIR`."""
+    from graspsense.store.naming import as_source
+
+    return tuple(map(as_source, value)) if isinstance(value, tuple) else as_source(value)
+
+
+def named_store(_ctx: click.Context, _param: click.Parameter, value: str) -> str:
+    """Callback of the argument for the folder of a store, which may be named as `store:DIR` as well."""
+    from graspsense.store.naming import store_folder
+
+    return store_folder(value)
+
+
+def folds_option(command: CommandT) -> CommandT:
+    """Add --folds."""
+    return click.option(
+        "--folds", type=click.IntRange(min=2), default=10, show_default=True, help="Number of folds."
+    )(command)
+
+
 def checkpoints_option(command: CommandT) -> CommandT:
     """Add --checkpoints; `checkpoints_of` reads its text."""
     return click.option(
@@ -131,17 +157,21 @@ def is_csv(source: str) -> bool:
 
 
 def trials_of(
-    source: str, progress: ProgressLine, given: Mapping[str, Any], checkpoints_s: Sequence[float] = ()
+    source: str,
+    progress: ProgressLine,
+    given: Mapping[str, Any],
+    checkpoints_s: Sequence[float] = (),
+    folds: int | None = None,
 ) -> Labelled:
     """Return the trials of a source, or of one class of it; `given` holds the options of `source_options`.
 
-    With `checkpoints_s` (s after the contact), they have the features of `CheckpointFeatures`.
+    With `checkpoints_s` (s after the contact), they have the features of `CheckpointFeatures`. More `folds` than
+    simulated trials are refused before the first grasp.
     Raises ConfigError, DataDamaged.
     """
-    from graspsense.cli.terminal import talk
     from graspsense.core.components.strict import ValidationFailed, structured
     from graspsense.core.values.errors import ConfigError
-    from graspsense.sources.trial_source import TrialSource, kind_of, labelled_trials
+    from graspsense.sources.trial_source import TrialSource, groups_of, kind_of, labelled_trials
 
     kind = kind_of(source)
     _refuse_misplaced(kind)
@@ -167,8 +197,11 @@ def trials_of(
         raise ConfigError(
             "\n".join(f"--{_dashed(one.path[0])}: {one.text}" for one in misfit.problems)
         ) from None
-    if kind == SIMULATED:
-        talk("grasping; where the simulator can be compiled, the first seconds go into that")
+    if kind == SIMULATED and folds is not None:
+        from graspsense.evaluation.folds import check_folds
+        from graspsense.sources.simulated import number_of_trials
+
+        check_folds(number_of_trials(_settings(source, given, None), groups_of(described)), folds)
     return labelled_trials(
         described,
         settings=lambda: _settings(source, given, None),
@@ -246,13 +279,14 @@ def _settings(source: str, given: Mapping[str, Any], classifier: str | None) -> 
 
 def _alone(table: str, name: str, given: Mapping[str, Any], source: str) -> SelectedComponent:
     """Return a component outside of any pipeline, with the keys that options give it."""
-    from graspsense.core.components.config import SelectedComponent, build_plausible
+    from graspsense.core.components.config import SelectedComponent, build_plausible, default_paths
     from graspsense.core.components.entries import TABLE_OF_ROLE
-    from graspsense.core.components.layers import Merged, option_layers
+    from graspsense.core.components.layers import Merged, option_layers, typed_path
+    from graspsense.core.components.nearest_key import nearest_path
     from graspsense.core.components.registry import installed
     from graspsense.core.values.errors import ConfigError
-    from graspsense.sources.trial_source import STORE
     from graspsense.store.extract_again import CHANGEABLE
+    from graspsense.store.naming import STORE
 
     layers, complaints = option_layers(given["options"])
     merged = Merged()
@@ -261,7 +295,9 @@ def _alone(table: str, name: str, given: Mapping[str, Any], source: str) -> Sele
         for key, values in layer.values.items():
             if key not in tables or not isinstance(values, dict):
                 known = " and ".join((", ".join(f"[{one}]" for one in tables[:-1]), f"[{tables[-1]}]"))
-                complaints.append(f"{layer.typed}: here only keys of {known} have a meaning")
+                near = nearest_path(".".join(map(str, typed_path(layer))), default_paths(tables))
+                meant = f" Did you mean {near!r}?" if near else ""
+                complaints.append(f"{layer.typed}: here only keys of {known} have a meaning.{meant}")
             elif key == table:
                 merged.add((), values, layer)
     if complaints:

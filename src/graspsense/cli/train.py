@@ -14,6 +14,7 @@ from graspsense.cli.sources import (
     classifier_option,
     command_line,
     learner_of,
+    source_argument,
     source_options,
     trials_of,
 )
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
 
     {SOURCES}""",
 )
-@click.argument("source")
+@source_argument
 @click.option(
     "--out", metavar="FILE.json", callback=file_to_write_as(".json"), required=True, help="File of the model."
 )

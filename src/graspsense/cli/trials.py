@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 import click
 
 from graspsense.cli.output import echo_json
+from graspsense.cli.sources import named_store
 from graspsense.cli.terminal import echo, echo_table
 
 if TYPE_CHECKING:
@@ -34,7 +35,7 @@ def trials() -> None:
 
 
 @trials.command("list")
-@click.argument("folder", metavar="DIR")
+@click.argument("folder", metavar="DIR", callback=named_store)
 @click.option("--label", metavar="CLASS:STATE", help="Only trials with this label.")
 @click.option("--aside/--not-aside", default=None, help="Only trials that are set aside, or only the others.")
 @click.option("--limit", type=click.IntRange(min=1), default=50, show_default=True, help="Number of trials.")
@@ -141,7 +142,7 @@ def restore(refs: Sequence[str], why: str, as_json: bool) -> None:
 
 
 @trials.command("history")
-@click.argument("source", metavar="DIR|DIR#NUMBER")
+@click.argument("source", metavar="DIR|DIR#NUMBER", callback=named_store)
 @_JSON
 def show_history(source: str, as_json: bool) -> None:
     """Print the changes of all trials of the store DIR, or of one trial, the oldest first."""

@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from graspsense.cli.output import echo_json
+from graspsense.cli.sources import named_store
 from graspsense.cli.terminal import Style, echo, echo_entry
 
 EXIT_DAMAGED = 5
@@ -14,7 +15,7 @@ EXIT_UNREAD = 2
 
 
 @click.command(short_help="Check a store or a recording for damage.")
-@click.argument("source", metavar="DIR|FILE")
+@click.argument("source", metavar="DIR|FILE", callback=named_store)
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def verify(source: str, as_json: bool) -> None:
     """Check the store DIR with all its recordings, or one recording FILE.

@@ -74,6 +74,10 @@ def cross_validate(
     With `share`, training uses about that share of the training trials of each label, at least one. Raises FitRefused
     if the classifier cannot learn from the training trials of a fold.
     """
+    if np.isnan(table.values).all():
+        raise FitRefused(
+            f"no feature is defined in any of the {len(table)} trials: there is nothing to learn from"
+        )
     predicted = [""] * len(labels)
     all_classes = tuple(sorted(set(labels)))
     probabilities = np.full((len(labels), len(all_classes)), np.nan)

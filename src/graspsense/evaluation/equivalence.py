@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 from attrs import frozen
@@ -18,6 +18,18 @@ from attrs import frozen
 MARGIN: Final = 0.02
 """Rates that differ by less than this are equivalent: 2 percentage points."""
 LEVEL: Final = 0.05
+Verdict = Literal["agrees", "differs", "cannot be told"]
+
+
+def verdict_on(interval: tuple[float, float] | None, margin: float = MARGIN) -> Verdict:
+    """Return what the interval of a difference of two rates says of it; None: there is no interval.
+
+    `agrees`: every value of the interval is smaller than the margin. `differs`: it does not contain zero. A difference
+    that is both agrees: it is shown, and too small to matter.
+    """
+    if interval is not None and -margin < interval[0] and interval[1] < margin:
+        return "agrees"
+    return "cannot be told" if interval is None or interval[0] <= 0.0 <= interval[1] else "differs"
 
 
 @frozen(kw_only=True)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from attrs import frozen
 
+from graspsense.core.components.config import select_component
 from graspsense.core.learn.labelled import ControlFeatures, Labelled, Target, class_of
 from graspsense.core.values.errors import ConfigError
 from graspsense.evaluation.confusion import confusion
@@ -47,10 +48,10 @@ Progress = Callable[[str, int, int], None]
 
 
 def evaluate(
-    learner: ClassifierFactory,
+    learner: ClassifierFactory | str,
     labelled: Labelled,
     *,
-    classifier: str,
+    classifier: str = "",
     target: Target = "both",
     folds: int = 10,
     seed: int = 0,
@@ -62,10 +63,16 @@ def evaluate(
 ) -> Evaluation:
     """Cross-validate a classifier on labelled trials, with controls and learning curve unless these are switched off.
 
-    `target` selects what is recognised: the label as it is (`both`), the class, or the state within each class.
-    `permutations` is how often the labels are shuffled. Raises ConfigError if there is only one label, or if there are
-    too few trials.
+    `learner` is the name of a classifier, or what makes one; `classifier` is its name in the result, by default that
+    of the learner. `target` selects what is recognised: the label as it is (`both`), the class, or the state within
+    each class. `permutations` is how often the labels are shuffled. Raises ConfigError if there is only one label, or
+    if there are too few trials.
     """
+    if isinstance(learner, str):
+        learner = select_component("classifier", learner)
+    component = getattr(learner, "component", None)
+    if not classifier:
+        classifier = f"{component.qualified} {component.version}" if component else type(learner).__name__
     notes = list(labelled.notes)
     trials = _trials_for(labelled, target, notes)
     evaluator = _Evaluator(learner, trials, target, folds, seed, progress, notes)
@@ -462,8 +469,9 @@ class _Evaluator:
             if self._difference(pooled.right(self.labels), majority_correct, rows).is_positive:
                 majority = float(np.mean([majority_correct[i] for i in rows]))
                 self.warnings.append(
-                    f"{percentage(control.rate.rate)} are recognised from {when} ({control.what}); the most "
-                    f"frequent label alone gives {percentage(majority)}. The recording itself reveals the labels"
+                    f"{percentage(control.rate.rate)} of {control.rate.n} trials are recognised from {when} "
+                    f"({control.what}); the most frequent label alone gives {percentage(majority)}. "
+                    "The recording itself reveals the labels"
                 )
 
     def _warn_of_width(self, control: Measurement, headline: _Headline) -> None:
@@ -471,8 +479,9 @@ class _Evaluator:
         by = control.difference
         if control.rate is not None and by is not None and by.interval is not None and not by.is_positive:
             self.warnings.append(
-                f"the width alone reaches {percentage(control.rate.rate)}, and the rate of {headline.protocol} is not "
-                f"shown to be higher (by {by.words}): the squeeze is not shown to add anything"
+                f"the width alone reaches {percentage(control.rate.rate)} of {control.rate.n} trials, and the rate of "
+                f"{headline.protocol} is not shown to be higher (by {by.words}): the squeeze is not "
+                "shown to add anything"
             )
 
     def _warn_of_leaks(self, controls: Mapping[str, Measurement]) -> None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from graspsense.core.components.caller import option
 from graspsense.core.values.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -21,7 +22,7 @@ def stratified(labels: Sequence[str], k: int, seed: int) -> Folds:
 
     Raises ConfigError for fewer than two folds, or fewer trials than folds.
     """
-    _check(len(labels), k)
+    check_folds(len(labels), k)
     rng = np.random.default_rng(seed)
     folds = np.zeros(len(labels), dtype=np.int64)
     assigned = 0
@@ -39,11 +40,11 @@ def instance_held_out(labels: Sequence[str], instances: Sequence[str], k: int, s
     Instances are stratified by the most frequent label of their trials. If there are fewer instances than folds,
     there are as many folds as instances.
     """
-    _check(len(labels), k)
+    check_folds(len(labels), k)
     rng = np.random.default_rng(seed)
     objects = sorted(set(instances))
     k = min(k, len(objects))
-    _check(len(labels), k)
+    check_folds(len(labels), k)
     instance_of = np.array(instances)
     main = [
         commonest([label for label, instance in zip(labels, instances, strict=True) if instance == name])
@@ -59,7 +60,7 @@ def instance_held_out(labels: Sequence[str], instances: Sequence[str], k: int, s
 
 def in_order(labels: Sequence[str], order: Sequence[int], k: int) -> Folds:
     """Split the trials of each label into `k` consecutive blocks in the order of recording."""
-    _check(len(labels), k)
+    check_folds(len(labels), k)
     folds = np.zeros(len(labels), dtype=np.int64)
     when = np.array(order)
     for _, rows in _by_label(labels):
@@ -80,8 +81,11 @@ def _by_label(labels: Sequence[str]) -> list[tuple[str, NDArray[np.int64]]]:
     return [(str(label), np.flatnonzero(given == label)) for label in np.unique(given)]
 
 
-def _check(n: int, k: int) -> None:
+def check_folds(n: int, k: int) -> None:
+    """Raise ConfigError if `n` trials cannot be split into `k` folds."""
     if k < 2:
         raise ConfigError(f"{k} fold{'' if k == 1 else 's'}: cross validation needs at least 2")
     if n < k:
-        raise ConfigError(f"{n} trials cannot be split into {k} folds: give more trials, or fewer --folds")
+        raise ConfigError(
+            f"{n} trials cannot be split into {k} folds: give more trials, or fewer folds ({option('folds')})"
+        )

@@ -6,6 +6,10 @@ import warnings
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
+from typing import Final
+
+_LIBRARIES: Final = ("sklearn", "numpy", "scipy", "interpret", "pycatch22")
 
 
 @contextmanager
@@ -16,11 +20,15 @@ def gathered_warnings(notes: list[str]) -> Iterator[None]:
         try:
             yield
         finally:
-            counts = Counter((one.category.__name__, _first_line(str(one.message))) for one in caught)
-    for (category, message), n in counts.items():
-        notes.append(f"{category}, {n} time{'' if n == 1 else 's'}: {message}")
+            counts = Counter(in_words(one.message, one.category, one.filename) for one in caught)
+    for words, n in counts.items():
+        notes.append(words if n == 1 else f"{words} ({n} times)")
 
 
-def _first_line(text: str) -> str:
-    """Return the first line; later ones are advice to programmers."""
-    return next(iter(text.strip().splitlines()), "").rstrip(".: ")
+def in_words(message: Warning | str, category: type[Warning], filename: str) -> str:
+    """Return a warning in one line for a user; further lines of it are advice to programmers."""
+    if category.__name__ == "ConvergenceWarning":
+        return "a classifier was still improving when its iterations ended: more of them can raise its rate"
+    first = next(iter(str(message).strip().splitlines()), "").rstrip(".: ")
+    library = next((name for name in _LIBRARIES if name in Path(filename).parts), "")
+    return f"{library} remarks: {first}" if library else first

@@ -18,6 +18,7 @@ from graspsense.core.values.errors import ConfigError
 from graspsense.evaluation.crossval import ClassifierFactory, FitRefused, cross_validate
 from graspsense.evaluation.doubt import SetCoverage, exchangeable_instances, set_coverage
 from graspsense.evaluation.folds import in_order, instance_held_out, stratified
+from graspsense.evaluation.gathered_warnings import gathered_warnings
 from graspsense.evaluation.intervals import Difference, RecognitionRate, difference, rate_of
 
 if TYPE_CHECKING:
@@ -148,7 +149,8 @@ def rank(
             progress(f"{learner} with {name}", done, len(pairs))
         wanted = {headline: protocols[headline]} if name == BEFORE_CONTACT else protocols
         try:
-            measured[learner, name] = _measured(learners[learner], tables[name], first, wanted, seed)
+            with gathered_warnings(notes):
+                measured[learner, name] = _measured(learners[learner], tables[name], first, wanted, seed)
         except FitRefused as refusal:
             notes.append(f"{learner} with {name}: {refusal}")
     for key, answers in (outside or {}).items():
@@ -162,7 +164,7 @@ def rank(
         protocol=headline,
         trials=len(first),
         candidates=_ranked(measured, headline, first),
-        notes=(*first.notes, *notes),
+        notes=(*first.notes, *dict.fromkeys(notes)),
     )
 
 

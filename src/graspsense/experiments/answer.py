@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from graspsense.evaluation.equivalence import MARGIN, Verdict, verdict_on
 from graspsense.evaluation.over_seeds import MeanDifference
 from graspsense.experiments.summary import ConditionResult, Summary
 from graspsense.report.verdict import in_hundred
@@ -23,10 +24,14 @@ def answer(summary: Summary) -> str:
         return f"{_capitalised(best.name)} recognises {recognises} in {_rate(best)} of {sample}."
     if len({condition.rate.mean for condition in conditions}) == 1:
         return (
-            f"All {len(conditions)} cases recognise {recognises} equally well: in {_rate(best)} of {sample}."
+            f"All {len(conditions)} cases recognise {recognises} equally often: in {_rate(best)} of {sample}."
         )
-    text = f"{_capitalised(best.name)} is best: it recognises {recognises} in {_rate(best)} of {sample}."
-    return f"{text} {_comparison(conditions, best)}"
+    told = {
+        "differs": f"{_capitalised(best.name)} is better than {_worst(conditions).name}: it recognises",
+        "agrees": f"All cases agree within {100 * MARGIN:g} points: {best.name} recognises",
+        "cannot be told": f"Whether a case is better cannot be told. {_capitalised(best.name)} recognises",
+    }[_verdict(conditions, best)]
+    return f"{told} {recognises} in {_rate(best)} of {sample}. {_comparison(conditions, best)}"
 
 
 def headline(summary: Summary) -> str:
@@ -36,24 +41,32 @@ def headline(summary: Summary) -> str:
     target = summary.conditions[0].target
     conditions = [condition for condition in summary.conditions if condition.target == target]
     best = max(conditions, key=lambda condition: condition.rate.mean)
-    worst = min(conditions, key=lambda condition: condition.rate.mean)
+    worst = _worst(conditions)
     recognises = TARGETS[best.recognised]
-    told = f"{in_hundred(best.rate.mean)} grasps tell {recognises}"
+    told = f"{in_hundred(best.rate.mean)} grasps tell {recognises} ({_sample(best)})"
     if len(conditions) == 1:
         return told
-    gap = best.minus(worst, comparisons=len(conditions) - 1)
-    if gap is not None:
-        differs = gap.interval[0] > 0.0
-    else:
-        low, high = best.rate.interval, worst.rate.interval
-        differs = low is not None and high is not None and high[1] < low[0]
-    if differs:
+    if _verdict(conditions, best) == "differs":
         name = _capitalised(best.name)
-        return f"{name} is best: {told}, against {in_hundred(worst.rate.mean)} with {worst.name}"
+        return f"{name} has the highest rate: {told}, against {in_hundred(worst.rate.mean)} with {worst.name}"
     span = in_hundred(best.rate.mean)
     if f"{100 * worst.rate.mean:.0f}" != f"{100 * best.rate.mean:.0f}":
         span = f"{100 * worst.rate.mean:.0f} to {span}"
-    return f"No case is shown to be better than the others: {span} grasps tell {recognises}"
+    return f"No case is shown to be better than the others: {span} grasps tell {recognises} ({_sample(best)})"
+
+
+def _worst(conditions: Sequence[ConditionResult]) -> ConditionResult:
+    return min(conditions, key=lambda condition: condition.rate.mean)
+
+
+def _verdict(conditions: Sequence[ConditionResult], best: ConditionResult) -> Verdict:
+    """Return whether the highest and the lowest rate differ, corrected for the number of cases."""
+    worst = _worst(conditions)
+    gap = best.minus(worst, comparisons=len(conditions) - 1)
+    if gap is not None:
+        return verdict_on(gap.interval)
+    low, high = best.rate.interval, worst.rate.interval
+    return "differs" if low is not None and high is not None and high[1] < low[0] else "cannot be told"
 
 
 def _comparison(conditions: Sequence[ConditionResult], best: ConditionResult) -> str:
@@ -62,19 +75,17 @@ def _comparison(conditions: Sequence[ConditionResult], best: ConditionResult) ->
     change = None if ends is None else ends[1].minus(ends[0])
     if ends is not None and change is not None:
         return f"From {ends[0].name} to {ends[1].name} the rate changes by {_points(change)}."
-    worst = min(conditions, key=lambda condition: condition.rate.mean)
-    gap = best.minus(worst)
+    worst = _worst(conditions)
+    gap = best.minus(worst, comparisons=len(conditions) - 1)
     name = _capitalised(worst.name)
     if gap is not None:
-        return f"{name} is worst, with {_rate(worst)}; the difference is {_points(gap)}."
+        return f"{name} has the lowest rate, {_rate(worst)}; the difference is {_points(gap)}."
     low, high = best.rate.interval, worst.rate.interval
     if low is None or high is None:
-        return f"{name} is worst, with {_rate(worst)}; without intervals the difference may be chance."
+        return f"{name} has the lowest rate, {_rate(worst)}; without intervals the difference may be chance."
     if high[1] >= low[0]:
-        return (
-            f"{name} is worst, with {_rate(worst)}; as the intervals overlap, the difference may be chance."
-        )
-    return f"{name} is worst, with {_rate(worst)}."
+        return f"{name} has the lowest rate, {_rate(worst)}; as the intervals overlap, the difference may be chance."
+    return f"{name} has the lowest rate, {_rate(worst)}."
 
 
 def _sample(condition: ConditionResult) -> str:

@@ -33,7 +33,8 @@ def comparison_page(comparison: ExperimentComparison) -> Page:
         answer=comparison.answer,
         headline=comparison.headline,
         beside=paragraph(text)
-        + bullets([*failure_lines(comparison), *([SIMULATED] if simulated else [])], "warning"),
+        + bullets(failure_lines(comparison), "warning")
+        + bullets([SIMULATED] if simulated else [], "notes"),
         sections=(_settings(comparison), _rates(comparison), _differences(comparison), _made_of(comparison)),
     )
 

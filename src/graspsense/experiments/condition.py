@@ -86,7 +86,7 @@ def conditions(
     if not grippers:
         raise ConfigError(
             f"gripper {settings.gripper.component.qualified} has no parameters that can be changed: choose a simulated "
-            "gripper, as in --gripper sim"
+            "gripper, as in gripper.type = 'sim'"
         )
     rows = {}
     for k, (name, gripper) in enumerate(grippers.items()):

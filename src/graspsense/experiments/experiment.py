@@ -6,17 +6,19 @@ import itertools
 import math
 import os
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, Final
 
 from attrs import evolve, field, frozen
 
-from graspsense.core.components.config import Settings, build_plausible, resolve
+from graspsense.core.components.config import Settings, build_plausible, default_paths, resolve
 from graspsense.core.components.entries import TABLE_OF_ROLE
-from graspsense.core.components.layers import Layer, Merged, dotted, option_layers, read_toml
+from graspsense.core.components.layers import Layer, Merged, dotted, option_layers, read_toml, typed_path
+from graspsense.core.components.nearest_key import key_paths
 from graspsense.core.components.registry import installed
-from graspsense.core.components.strict import InvalidValue, ValidationFailed, plain, structured
+from graspsense.core.components.strict import InvalidValue, ValidationFailed, keys_of, plain, structured
 from graspsense.core.files.limits import CASES
 from graspsense.core.learn.model import worded
 from graspsense.core.values.errors import ConfigError, GraspsenseError, UnknownName, suggestion
@@ -195,15 +197,27 @@ def read_experiment(
     try:
         experiment = structured(values, Experiment, "an experiment")
     except ValidationFailed as misfit:
+        known = _known_paths(values)
         for problem in misfit.problems:
             owner = merged.owner_of(problem.path) or layer
-            complaints.append(owner.complain(problem))
+            if owner.typed and problem.known is not None:
+                problem = evolve(problem, path=typed_path(owner))
+            complaints.append(owner.complain(problem, known))
         experiment = None
     if experiment is None or complaints:
         raise ConfigError("\n".join(complaints))
     if experiment.parts:
         return _of_parts(name, experiment, layer, within, force=force)
     return _Plan(name, experiment, layer, force=force).planned()
+
+
+def _known_paths(values: Mapping[str, Any]) -> list[str]:
+    """Return the paths of the keys that the tables of an experiment can have, for one that is misspelt."""
+    paths = [*key_paths(keys_of(TrialSource), "data"), *key_paths(keys_of(TrialSource), "test")]
+    with suppress(GraspsenseError):
+        kind = kind_of(str(values.get("kind", "recognise")))
+        paths += key_paths(keys_of(kind.keys_class()), "judge")
+    return [*paths, *default_paths(PIPELINE_TABLES)]
 
 
 def _of_parts(
@@ -512,7 +526,7 @@ def _found(asked: str) -> tuple[Layer, Path | None, str]:
     """Return the content of the file of an experiment, the folder that its paths are relative to, and its name."""
     if asked.endswith(".toml"):
         path = Path(asked).expanduser()
-        return read_toml(path, asked, "experiment file"), path.parent, path.stem
+        return read_toml(path, asked, "experiment"), path.parent, path.stem
     known = shipped()
     if asked not in known:
         hint = (
@@ -524,7 +538,7 @@ def _found(asked: str) -> tuple[Layer, Path | None, str]:
             f"no experiment named {asked!r}. Known: {', '.join(known)}.{suggestion(asked, known)}"
             f"\n  An experiment of your own is a file: write its name with .toml{hint}"
         )
-    return read_toml(known[asked], f"experiment {asked}", "experiment file"), None, asked
+    return read_toml(known[asked], f"experiment {asked}", "experiment"), None, asked
 
 
 def _located(values: Mapping[str, Any], base: Path | None) -> dict[str, Any]:

@@ -51,7 +51,7 @@ def grasp(params: Mapping[str, Any], seed: int) -> GraspResult:
     backend = settings.gripper.create()
     if not isinstance(backend, BatchBackend):
         raise ConfigError(
-            "experiments of kind grasp need a gripper that simulates batches, such as --gripper sim"
+            "experiments of kind grasp need a gripper that simulates batches, such as gripper.type = 'sim'"
         )
     feature_set = settings.features.create()
     backend.expect_features(feature_set)

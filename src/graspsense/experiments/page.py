@@ -63,7 +63,7 @@ def experiment_page(summary: Summary, results: Results) -> Page:
             question=one.question,
             answer=found.answer,
             headline=found.headline,
-            beside=_failures(summary) + bullets([SIMULATED], "warning"),
+            beside=_failures(summary) + bullets([SIMULATED], "notes"),
             sections=(*found.page_sections(), _made_of(summary, results)),
         )
     best = best_condition(summary)
@@ -123,9 +123,8 @@ def _beside(summary: Summary, best: ConditionResult | None) -> str:
         "95 of 100 such experiments."
     )
     warnings = list(dict.fromkeys(best.first.warnings))
-    if best.simulated:
-        warnings.append(SIMULATED)
-    return paragraph(text) + _failures(summary) + bullets(warnings, "warning")
+    notes = [SIMULATED] if best.simulated else []
+    return paragraph(text) + _failures(summary) + bullets(warnings, "warning") + bullets(notes, "notes")
 
 
 def _first_result(summary: Summary, condition: ConditionResult) -> RecognitionResult | None:

@@ -22,6 +22,7 @@ from typing import Any, Final
 
 from attrs import evolve, frozen
 
+from graspsense.core.components.caller import option
 from graspsense.core.components.config import to_toml, toml_key, toml_value, without_followers
 from graspsense.core.components.strict import plain
 from graspsense.core.values.errors import ConfigError, named
@@ -133,14 +134,16 @@ class Results:
             lock = os.open(self.folder / LOCK, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o644)
         except OSError as error:
             raise SaveFailed(
-                f"cannot write to {self.folder}: {error.strerror}. Name another --out"
+                f"cannot write to {self.folder}: {error.strerror}. Name another folder "
+                f"({option('out', python='Results')})"
             ) from error
         try:
             try:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except OSError:
                 raise ConfigError(
-                    f"another run is writing to {self.folder}: wait for it, or name another --out"
+                    f"another run is writing to {self.folder}: wait for it, or name another folder "
+                    f"({option('out', python='Results')})"
                 ) from None
             yield
         finally:

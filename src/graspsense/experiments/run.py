@@ -7,6 +7,7 @@ from pathlib import Path
 
 from attrs import field, frozen
 
+from graspsense.core.components.caller import option
 from graspsense.core.grasp.interrupts import Interrupts
 from graspsense.core.values.errors import ConfigError
 from graspsense.experiments.executors.base import Executor, ExecutorLost
@@ -63,7 +64,7 @@ def refuse_store(folder: Path) -> None:
     if (folder / STORE_FILE).exists():
         raise ConfigError(
             f"{folder} is a store of trials, and the page of an experiment would replace its own: name another "
-            "folder by --out"
+            f"folder ({option('out', python='Results')})"
         )
 
 
@@ -88,8 +89,9 @@ def run_experiment(
     with results.alone():
         if results.any() and not resume:
             raise ConfigError(
-                f"there are results in {results.folder} already. --resume does what is missing there; "
-                "another --out begins anew"
+                f"there are results in {results.folder} already. {option('resume', python='resume=True')} does "
+                f"what is missing there; "
+                f"another folder ({option('out', python='Results')}) begins anew"
             )
         known = {
             key: one for key, one in results.of([task.key for task in tasks]).items() if one.state == "done"

@@ -30,6 +30,8 @@ from graspsense.evaluation.equivalence import Equivalence, equivalence
 from graspsense.experiments.recognise import TEST_SEED_OFFSET
 from graspsense.sources.simulated import Group, SimulationPlan, plan_trials
 
+TIME_MARGIN: Final = 1.25
+"""Ratio of two times up to which no difference is concluded: batches of the same variant differ by as much."""
 LIMIT: Final = 0.1
 """Distance of distributions, in standard deviations, below which a variant of no stated accuracy is equivalent."""
 
@@ -76,9 +78,15 @@ class SensedTrade:
 
     @property
     def coarsest(self) -> SensedPoint | None:
-        """The fastest variant whose recognition is equivalent to that of the reference; None if there is none."""
+        """The variant to take: among the fastest that are equivalent to the reference, the nearest to it."""
         equal = [one for one in self.points if one.equivalence is not None and one.equivalence.is_equivalent]
-        return min(equal, key=lambda one: one.seconds, default=None)
+        if not equal:
+            return None
+        fastest = min(one.seconds for one in equal)
+        # Times that differ by less are not told apart, and of those the nearest to the reference is taken.
+        return min(
+            (one for one in equal if one.seconds <= TIME_MARGIN * fastest), key=lambda one: one.largest.upper
+        )
 
 
 @frozen

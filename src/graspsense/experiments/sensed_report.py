@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from graspsense.core.values.errors import PluginUnavailable
+from graspsense.experiments.sensed import TIME_MARGIN
 from graspsense.report.simulation import axes_of, markdown_table
 from graspsense.report.trace_plot import MATPLOTLIB_HINT
 from graspsense.report.write import write_picture
@@ -63,8 +64,9 @@ def conclusion(trade: SensedTrade) -> str:
     margin, least = f"{100 * tests[0].margin:g} points", min(test.power for test in tests)
     best = trade.coarsest
     found = (
-        f"The fastest variant whose recognition is equivalent to that of the reference within {margin} is: "
-        f"{best.name}, {1e3 * best.seconds:.3g} ms a grasp."
+        f"Take {best.name}, {1e3 * best.seconds:.3g} ms a grasp: its recognition is equivalent to that of the "
+        f"reference within {margin}. No equivalent variant is faster by more than {100 * (TIME_MARGIN - 1):.0f} %, "
+        "below which times are not told apart, and of those it is the nearest to the reference."
         if best is not None
         else f"With {len(trade.seeds)} seeds, no variant is shown to be equivalent to the reference within {margin}."
     )

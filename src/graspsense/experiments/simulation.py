@@ -56,7 +56,7 @@ def trade_simulation(
     if not variants:
         raise ConfigError(
             f"gripper {settings.gripper.component.qualified} has no accuracy to trade for time: choose a simulated "
-            "one, as in --gripper sim"
+            "one, as in gripper.type = 'sim'"
         )
     names = [scene for scene in scenes for _ in seeds]
     all_seeds = [seed for _ in scenes for seed in seeds]

@@ -8,6 +8,7 @@ from typing import Any
 
 from attrs import field, frozen
 
+from graspsense.core.components.caller import option
 from graspsense.core.learn.labelled import Target
 from graspsense.core.values.errors import ConfigError
 from graspsense.evaluation.confusion import Confusion
@@ -268,5 +269,5 @@ def unreadable_lines(summary: Summary) -> list[str]:
     shown = "; ".join(summary.unreadable[:5])
     return [
         f"{len(summary.unreadable)} results cannot be read and are not included: {shown}. The same experiment with "
-        "--resume computes them again"
+        f"{option('resume', python='resume=True')} computes them again"
     ]

@@ -20,6 +20,7 @@ from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 
 from graspsense import __version__
+from graspsense.core.components.caller import option
 from graspsense.core.values.channel import TactileArray
 from graspsense.core.values.errors import ConfigError
 from graspsense.recording.layout import CDR_HEADER, PADS_TOPIC, SIGNAL_TOPIC
@@ -85,7 +86,7 @@ def with_pictures(grasp: RecordedGrasp) -> bytes:
     """
     of_topic = _pictures(grasp)
     if not of_topic:
-        raise ConfigError(f"{grasp.path} has no tactile images: export it without --pictures")
+        raise ConfigError(f"{grasp.path} has no tactile images: export it without {option('pictures')}")
     out = io.BytesIO()
     writer = Writer(out, compression=CompressionType.ZSTD, enable_data_crcs=True)
     writer.start(profile="ros2", library=f"graspsense {__version__}")

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from attrs import frozen
 
+from graspsense.core.components.caller import option
 from graspsense.core.learn.conformal import COVERAGE, calibrated_threshold, units_needed
 from graspsense.core.values.errors import ConfigError
 from graspsense.evaluation.folds import in_order, instance_held_out, stratified
@@ -49,7 +50,9 @@ def evaluate_regression(
     check_estimator(estimator)
     target = labelled.value
     if target is None:
-        raise ConfigError(f"{labelled.source} has no number to predict: name it with --target-value")
+        raise ConfigError(
+            f"{labelled.source} has no number to predict: name it with {option('target_value', python='value')}"
+        )
     if len(set(target.values)) < 2:
         raise ConfigError(
             f"every trial of {labelled.source} has the same {target.name}: there is nothing to predict"

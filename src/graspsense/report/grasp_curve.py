@@ -15,6 +15,9 @@ if TYPE_CHECKING:
 INSTANTS: Final = 240
 """Instants kept per grasp, equally spaced in ticks. The ticks around each change of phase are kept as well."""
 
+BEFORE_S: Final = -0.3
+"""Time before the contact from which curves that are compared are drawn."""
+
 
 @frozen(kw_only=True)
 class GraspCurve:
@@ -45,6 +48,12 @@ class GraspCurve:
             phase=self.phase[:end],
             time_unit=self.time_unit,
         )
+
+    @property
+    def shown_times(self) -> list[float]:
+        """The times from shortly before contact on; before that, the fingers move through free space."""
+        known = [t for t in self.t_s if t is not None]
+        return [t for t in known if t >= BEFORE_S] or known
 
     @property
     def time_words(self) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 from pathlib import Path
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any, Final
@@ -27,7 +28,8 @@ LINE_IN: Final = 0.18
 def require_picture(path: Path) -> None:
     """Check before a grasp that its picture can be written to `path`.
 
-    Raises PluginUnavailable without matplotlib, ConfigError for another suffix than `.png` or a missing folder.
+    Raises PluginUnavailable without matplotlib, ConfigError for another suffix than `.png`, and for a folder that is
+    missing or cannot be written to.
     """
     try:
         import matplotlib  # noqa: F401
@@ -41,6 +43,10 @@ def require_picture(path: Path) -> None:
         raise ConfigError(f"the picture is a PNG file: name it {path.with_suffix('.png')}, not {path}")
     if not path.parent.is_dir():
         raise ConfigError(f"the picture cannot be written to {path}: there is no folder {path.parent}")
+    try:
+        tempfile.TemporaryFile(dir=path.parent).close()
+    except OSError as error:
+        raise ConfigError(f"the picture cannot be written to {path}: {error.strerror}") from error
 
 
 def grasp_png(trial: Trial, path: Path) -> None:
@@ -66,10 +72,12 @@ def grasp_png(trial: Trial, path: Path) -> None:
 
 
 def _words(trial: Trial) -> list[str]:
-    """Return outcome, warnings, features and prediction, line by line."""
+    """Return what was grasped, outcome, warnings, features and prediction with its set, line by line."""
     features, prediction = trial.features, trial.prediction
     reason = f": {trial.reason}" if trial.reason else ""
+    held = trial.run.settings.get("gripper", {}).get("object") or trial.run.labels.get("label", "not known")
     lines = [f"Outcome: {trial.outcome.words}{reason}"]
+    lines += [f"Object: {held.strip().splitlines()[0]}, seed {trial.run.seed}"]
     lines += [f"Warning: {warning}" for warning in trial.warnings if warning != trial.reason]
     lines += ["", "Features"]
     for name, value, unit in zip(features.names, features.values, features.units, strict=True):
@@ -80,8 +88,12 @@ def _words(trial: Trial) -> list[str]:
     if prediction is None:
         return [*lines, "Prediction: none, the pipeline has no classifier"]
     certainty = f" ({prediction.certainty_in_words})" if prediction.certainty_in_words else ""
-    lines += ["Prediction", f"   {prediction.label}{certainty}", "", "because"]
-    lines += [f"   {reason.words}" for reason in prediction.because]
+    lines += ["Prediction", f"   {prediction.label}{certainty}"]
+    if prediction.set_in_words:
+        lines += [f"   set: {prediction.set_in_words}"]
+    lines += ["", "because", *(f"   {reason.words}" for reason in prediction.because)]
+    if prediction.warnings:
+        lines += ["", *(f"Warning: {one}" for one in prediction.warnings)]
     if trial.report.get("simulated"):
         lines += ["", "simulated gripper and object"]
     return lines

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import re
 from collections.abc import Collection, Sequence
 from functools import cache
 from html import escape
@@ -51,7 +52,7 @@ class Page:
             f"{one.body}</section>"
             for one in self.sections
         )
-        question = f'<p class="question">{escape(self.question)}</p>' if self.question else ""
+        question = f'<p class="question">{inline(self.question)}</p>' if self.question else ""
         kind = f"{self.kind}: {self.title}" if self.headline else self.kind
         style, script = _resource("page.css"), _resource("page.js")
         digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
@@ -63,10 +64,10 @@ class Page:
             f"style-src 'unsafe-inline'; script-src 'sha256-{digest}'; img-src data:\">\n"
             f'<meta name="generator" content="graspsense {__version__}">\n'
             f"<title>{escape(self.title)} – graspsense</title>\n<style>{style}</style>\n</head>\n<body>\n"
-            f'<header><p class="kind">{escape(kind)}</p>{question}<h1>{escape(self.headline or self.title)}</h1>'
+            f'<header><p class="kind">{escape(kind)}</p>{question}<h1>{inline(self.headline or self.title)}</h1>'
             "</header>\n"
             f'<main>\n<section id="answer" class="answer" aria-labelledby="answer-h"><h2 id="answer-h">Answer</h2>'
-            f'<p class="sentence">{escape(self.answer)}</p>{self.beside}</section>\n'
+            f'<p class="sentence">{inline(self.answer)}</p>{self.beside}</section>\n'
             f'<nav aria-label="On this page"><ul>{links}</ul></nav>\n{sections}\n</main>\n'
             f"<footer><p>Made by graspsense {__version__}. This page loads nothing from elsewhere. "
             '<span class="hint">A click on a heading sorts a table. Pictures show values under the pointer; drag '
@@ -75,19 +76,27 @@ class Page:
         )
 
 
+def inline(text: str) -> str:
+    """Return plain text as HTML; what is between backticks is shown as code."""
+    return _CODE.sub(r"<code>\1</code>", escape(text))
+
+
+_CODE: Final = re.compile("`([^`\n]+)`")
+
+
 def paragraph(text: str, kind: str = "") -> str:
     """Return a paragraph of plain text."""
-    return f"<p{_class(kind)}>{escape(text)}</p>"
+    return f"<p{_class(kind)}>{inline(text)}</p>"
 
 
 def bullets(items: Sequence[str], kind: str = "") -> str:
     """Return a list of plain texts; an empty text if there are none."""
-    return f"<ul{_class(kind)}>{''.join(f'<li>{escape(one)}</li>' for one in items)}</ul>" if items else ""
+    return f"<ul{_class(kind)}>{''.join(f'<li>{inline(one)}</li>' for one in items)}</ul>" if items else ""
 
 
 def figure(picture: str, caption: str) -> str:
     """Return a picture with a caption of plain text."""
-    return f"<figure>{picture}<figcaption>{escape(caption)}</figcaption></figure>"
+    return f"<figure>{picture}<figcaption>{inline(caption)}</figcaption></figure>"
 
 
 def panels(figures: Sequence[str]) -> str:
@@ -115,7 +124,7 @@ def table(
     """Return a table of plain texts, the first cell of a row its heading; columns from `numbers` on are numbers.
 
     Cells of the columns `verdicts` get a mark and a colour, if they are among the words of `VERDICTS`. The table can be
-    sorted and filtered, and scrolls sideways if it is too wide.
+    sorted and filtered. It scrolls sideways if it is too wide, and on a phone each row stands by itself.
     """
     kinds = [' class="n"' if k >= numbers and k not in verdicts else "" for k in range(len(header))]
     head = "".join(
@@ -123,9 +132,9 @@ def table(
     )
     body = "".join(
         "<tr>"
-        + f'<th scope="row">{escape(row[0])}</th>'
+        + f'<th scope="row">{inline(row[0])}</th>'
         + "".join(
-            f"<td{kinds[k]}>{marked(one) if k in verdicts else escape(one)}</td>"
+            f"<td{kinds[k]}>{marked(one) if k in verdicts else inline(one)}</td>"
             for k, one in enumerate(row[1:], start=1)
         )
         + "</tr>"
@@ -154,7 +163,7 @@ def marked(words: str) -> str:
     """Return words that say whether something holds, with a mark and a colour; other words as they are."""
     known = VERDICTS.get(words)
     if known is None:
-        return escape(words)
+        return inline(words)
     mark, kind = known
     return f'<span class="{kind}">{mark} {escape(words)}</span>'
 
@@ -169,7 +178,7 @@ def wide(label: str, body: str) -> str:
 
 def facts(pairs: Sequence[tuple[str, str]]) -> str:
     """Return a description list from pairs of a term and its description."""
-    return f"<dl>{''.join(f'<dt>{escape(k)}</dt><dd>{escape(v)}</dd>' for k, v in pairs)}</dl>"
+    return f"<dl>{''.join(f'<dt>{escape(k)}</dt><dd>{inline(v)}</dd>' for k, v in pairs)}</dl>"
 
 
 def _class(kind: str) -> str:

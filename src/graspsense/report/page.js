@@ -19,6 +19,8 @@ const compared = (a, b) => {
 };
 for (const table of document.querySelectorAll("table.rows")) {
   const body = table.tBodies[0], heads = [...table.tHead.rows[0].cells];
+  // On a phone each row stands by itself, and each cell with the heading of its column.
+  for (const row of body.rows) heads.forEach((head, column) => { row.cells[column].dataset.head = head.textContent; });
   heads.forEach((head, column) => {
     const button = made("button", "", head.textContent);
     button.type = "button";
@@ -47,6 +49,12 @@ for (const table of document.querySelectorAll("table.rows")) {
     count.textContent = words.length ? `${shown} of ${body.rows.length} rows` : "";
   });
   table.parentElement.before(label);
+}
+// Small curves: the boxes choose which trials are drawn over each other.
+for (const choose of document.querySelectorAll(".choose")) {
+  choose.addEventListener("change", ({target}) => {
+    for (const line of choose.querySelectorAll(`[data-trial="${target.value}"]`)) line.classList.toggle("left-out", !target.checked);
+  });
 }
 addEventListener("beforeprint", () => document.querySelectorAll("details").forEach((one) => { one.open = true; }));
 
@@ -130,7 +138,7 @@ class Plot {
   lines(x) {
     const found = [];
     for (const {element, places} of this.items) {
-      if (!element.dataset.name || !element.hasAttribute("points")) continue;
+      if (!element.dataset.name || !element.hasAttribute("points") || element.classList.contains("left-out")) continue;
       let near = null;
       for (const place of places) {
         const px = this.place(place)[0];

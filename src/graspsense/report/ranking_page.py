@@ -20,7 +20,7 @@ def ranking_page(ranking: Ranking, command: str) -> Page:
         question=f"Which classifier recognises most, with which features, on {ranking.source}?",
         answer=ranking.verdict,
         headline=f"{best.name} recognises most: {in_hundred(rate)} grasps",
-        beside=bullets(ranking.notes, "warning"),
+        beside=bullets(ranking.notes, "notes"),
         sections=(_rates(ranking), _differences(ranking), _sets(ranking), _made_of(ranking, command)),
     )
 

@@ -9,7 +9,19 @@ from typing import Final
 from attrs import frozen
 
 from graspsense.report.html import facts, figure, table
-from graspsense.report.svg import DASHES, GRID, INKS, QUIET, AxisScale, Picture, number, reaching
+from graspsense.report.svg import (
+    DASHES,
+    GRID,
+    INKS,
+    LINE,
+    QUIET,
+    WIDTH,
+    AxisScale,
+    Picture,
+    lines_within,
+    number,
+    reaching,
+)
 
 
 @frozen(kw_only=True)
@@ -37,6 +49,8 @@ class RateRow:
 
 
 ROW: Final = 34
+LEGEND: Final = 15.0
+"""Height of a name in a legend."""
 STEP: Final = 5.0
 """Ends of a rate axis are multiples of this, in per cent."""
 NEARLY_WHOLE: Final = 80.0
@@ -64,22 +78,26 @@ def draw_breaks(picture: Picture, scale: AxisScale, x: float, y: float, *, uprig
     for end, place, cut in ((0, scale.start, scale.low > 0.0), (1, scale.end, scale.high < 100.0)):
         if cut:
             shift = 5.0 * (1 if end else -1)
-            at = (x, place - shift) if upright else (place + shift, y)
+            # Within the upper end of an upright axis, above which its title stands.
+            at = (x, place + 5.0) if upright else (place + shift, y)
             picture.break_mark(*at, upright=upright)
 
 
 def rates_picture(rows: Sequence[RateRow], caption: str) -> str:
     """Return a figure with a row for each rate: its name, a mark, and a bar for its interval."""
-    bottom = 6.0 + ROW * len(rows)
+    named = [lines_within(f"{row.name}: {100 * row.rate:.1f} %", WIDTH - 16) for row in rows]
+    tops = [ROW * k + LINE * sum(len(lines) - 1 for lines in named[:k]) for k in range(len(rows) + 1)]
+    bottom = 6.0 + tops[-1]
     picture = Picture(bottom + 34)
     scale = rate_scale(rows, 16.0, picture.width - 16)
     picture.x_axis(scale, 4, bottom, rate_axis_title(scale))
     draw_breaks(picture, scale, 0.0, bottom, upright=False)
-    for k, row in enumerate(rows):
-        picture.text(8, 17.0 + ROW * k, f"{row.name}: {100 * row.rate:.1f} %", bold=row.strong)
+    for row, lines, top in zip(rows, named, tops, strict=False):
+        for k, line in enumerate(lines):
+            picture.text(8, 17.0 + top + LINE * k, line, bold=row.strong)
     with picture.plot(scale, None, 4, bottom):
         for k, row in enumerate(rows):
-            y = 27.0 + ROW * k
+            y = 27.0 + tops[k + 1] - ROW
             ink = INKS[0] if row.strong else INKS[7]
             if row.interval is not None:
                 low, high = (scale(100 * one) for one in row.interval)
@@ -94,7 +112,8 @@ def rates_over(
     series: Mapping[str, Sequence[tuple[float, RateRow]]], axis: str, caption: str, guess: float | None = None
 ) -> str:
     """Return a figure of rates against a number, one line per series; `guess` is the rate of guessing."""
-    picture = Picture(262 + 15 * len(series))
+    legends = [lines_within(name, WIDTH - 80) for name in series]
+    picture = Picture(262 + LEGEND * len(series) + LINE * sum(len(lines) - 1 for lines in legends))
     xs = [x for points in series.values() for x, _ in points]
     x_scale = reaching(xs, 44, picture.width - 14)
     y_scale = rate_scale([row for points in series.values() for _, row in points], 215, 24)
@@ -107,11 +126,11 @@ def rates_over(
     if guess is not None and y_scale.low <= 100 * guess <= y_scale.high:
         y = y_scale(100 * guess)
         picture.line([(36, y), (picture.width - 8, y)], QUIET, dash="3 3")
-        picture.text(picture.width - 8, y - 4, "always the commonest label", at="end", ink=QUIET)
+        caption += f" The dashed line is always guessing the most frequent label, {100 * guess:.0f} %."
     elif guess is not None:
         where = "below" if 100 * guess < y_scale.low else "above"
         caption += f" Always guessing the most frequent label, {100 * guess:.0f} %, is {where} the axis."
-    told = []
+    told, y = [], 262.0
     for k, (name, points) in enumerate(series.items()):
         ink, dash = INKS[k % len(INKS)], DASHES[k % len(DASHES)]
         drawn = sorted(points, key=lambda point: point[0])
@@ -120,15 +139,17 @@ def rates_over(
         places = [(x_scale(x) + shift, y_scale(100 * row.rate)) for x, row in drawn]
         with picture.plot(x_scale, y_scale, 24, 215):
             picture.line(places, ink, width=2, dash=dash)
-            for (x, y), (_, row) in zip(places, drawn, strict=True):
+            for (x, place), (_, row) in zip(places, drawn, strict=True):
                 if row.interval is not None:
                     low, high = (y_scale(100 * one) for one in row.interval)
                     picture.line([(x, low), (x, high)], ink, width=2)
-                picture.mark(x, y, ink, k, words=f"{row.name}: {row.words}")
-        y = 262.0 + 15 * k
+                picture.mark(x, place, ink, k, words=f"{row.name}: {row.words}")
         picture.line([(40, y - 4), (66, y - 4)], ink, width=2, dash=dash)
         picture.mark(53, y - 4, ink, k)
-        picture.text(72, y, name)
+        for line in legends[k]:
+            picture.text(72, y, line)
+            y += LINE
+        y += LEGEND - LINE
         told.append(f"{name}: " + ", ".join(f"{number(x)}: {row.words}" for x, row in drawn))
     return figure(
         picture.svg(f"Recognition rate against {axis}, with 95 % intervals. {'; '.join(told)}"), caption

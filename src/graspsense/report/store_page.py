@@ -8,40 +8,38 @@ from typing import TYPE_CHECKING, Final
 
 from attrs import frozen
 
-from graspsense.core.components.config import SelectedComponent, select_component
+from graspsense.core.components.config import select_component
 from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.evaluation.evaluate import evaluate
 from graspsense.recording.labelled_recording import UnreadableRecording
 from graspsense.recording.provenance import commit_text
 from graspsense.recording.readable import note_on, readable
 from graspsense.recording.reader import read_recorded
-from graspsense.report.evaluation_sections import (
-    code,
-    confusion_section,
-    controls_section,
-    doubt_section,
-    tree_section,
-)
+from graspsense.report.evaluation_page import beside, features_section, result_sections
+from graspsense.report.evaluation_sections import code
 from graspsense.report.further_channels import channel_figures
 from graspsense.report.grasp_curve import GraspCurve, grasp_curve
 from graspsense.report.html import Page, Section, bullets, facts, folded, pair, panels, paragraph, table
-from graspsense.report.rates import RateRow
 from graspsense.report.tactile import tactile_figures
-from graspsense.report.traces import features_by_class, features_table, one_grasp, traces_by_class
+from graspsense.report.traces import features_table, one_grasp, traces_by_class
+from graspsense.report.trial_curves import trial_curves
 from graspsense.report.verdict import headline, verdict
-from graspsense.report.wording import TARGETS, control_words, protocol_words
+from graspsense.report.wording import TARGETS
 from graspsense.store.changes import history
 from graspsense.store.dataset import labelled_store
 from graspsense.store.store import Store
 
 if TYPE_CHECKING:
-    from graspsense.core.learn.labelled import Labelled, Target
+    from graspsense.core.learn.labelled import Target
     from graspsense.evaluation.results import Evaluation
     from graspsense.store.changes import Change
     from graspsense.store.rows import StoredTrial, TrialSummary
 
 GRASPS: Final = 3
 """Grasps of each label that are drawn over each other."""
+CURVES: Final = 60
+"""Largest number of trials that are shown as small curves."""
+NO_LABEL: Final = "no label"
 LISTED: Final = 200
 """Largest number of trials in the list at the end; the newest are listed."""
 Progress = Callable[[str, int, int], None]
@@ -86,7 +84,6 @@ def store_page(
         evaluation = evaluate(
             learner,
             labelled,
-            classifier=f"{learner.component.qualified} {learner.component.version}",
             target=target,
             folds=folds,
             seed=seed,
@@ -97,10 +94,12 @@ def store_page(
         problem = str(error)
     sections: list[Section] = []
     if evaluation is not None and labelled is not None:
-        sections += _evaluation_sections(evaluation, learner, labelled, classifier, seed)
+        sections += result_sections(evaluation, learner, labelled)
     sections += _measurement_sections(trial, curves, unreadable)
+    if curves:
+        sections.append(trial_curves(curves[:CURVES]))
     if labelled is not None:
-        sections.append(_features_section(labelled))
+        sections.append(features_section(labelled))
     sections.append(_provenance(folder, listed, trial, counts, changes))
     return Page(
         kind="Store of trials",
@@ -108,7 +107,7 @@ def store_page(
         question=f"Can a gripper recognise {TARGETS[target]} by touch?",
         answer=_answer(evaluation, sum(count.trials for count in counts), problem),
         headline="" if evaluation is None else headline(evaluation),
-        beside=_beside(evaluation, labelled, target),
+        beside="" if evaluation is None or labelled is None else beside(evaluation, labelled),
         sections=tuple(sections),
     )
 
@@ -136,16 +135,16 @@ def _trial_counts(store: Store) -> list[_TrialCount]:
 
 
 def _curves(store: Store) -> tuple[list[GraspCurve], list[UnreadableRecording]]:
-    """Return the newest complete grasps of each label, and those among them whose recordings cannot be read."""
+    """Return the newest complete grasps and the newest of each label, newest first, and those that cannot be read."""
     rows = store.query(
-        """SELECT label, id, recording FROM trial
-        WHERE complete = 1 AND set_aside IS NULL AND label IS NOT NULL ORDER BY label, id DESC"""
+        """SELECT coalesce(label, ''), id, recording FROM trial
+        WHERE complete = 1 AND set_aside IS NULL ORDER BY id DESC"""
     )
     count: Counter[str] = Counter()
     curves: list[GraspCurve] = []
     unreadable: list[UnreadableRecording] = []
     for label, number, recording in rows:
-        if count[label] >= GRASPS:
+        if len(curves) >= CURVES and (count[label] >= GRASPS or not label):
             continue
         try:
             with readable(f"trial {number} of {store.folder}"):
@@ -154,8 +153,17 @@ def _curves(store: Store) -> tuple[list[GraspCurve], list[UnreadableRecording]]:
             unreadable.append(UnreadableRecording(source=f"trial {number}", error=error))
             continue
         count[label] += 1
-        curves.append(grasp_curve(trace, label, number))
+        curves.append(grasp_curve(trace, label or NO_LABEL, number).until_release())
     return curves, unreadable
+
+
+def _newest_of_labels(curves: Sequence[GraspCurve]) -> list[GraspCurve]:
+    """Return the newest grasps of each label, the labels in alphabetical order."""
+    of: dict[str, list[GraspCurve]] = {}
+    for curve in curves:
+        if curve.label != NO_LABEL:
+            of.setdefault(curve.label, []).append(curve)
+    return [curve for label in sorted(of) for curve in of[label][:GRASPS]]
 
 
 def _answer(evaluation: Evaluation | None, total: int, problem: str) -> str:
@@ -165,64 +173,12 @@ def _answer(evaluation: Evaluation | None, total: int, problem: str) -> str:
     return verdict(evaluation)
 
 
-def _beside(evaluation: Evaluation | None, labelled: Labelled | None, target: Target) -> str:
-    if evaluation is None or labelled is None:
-        return ""
-    guess = evaluation.controls["majority_class"].rate
-    guessing = (
-        f" Always guessing the most frequent label is right in {100 * guess.rate:.0f} %." if guess else ""
-    )
-    text = (
-        "A gripper closes two fingers with force sensors on an object that it cannot see into. Each grasp gives a few "
-        f"numbers ({', '.join(labelled.table.names)}), from which a classifier learns {TARGETS[target]}. There are "
-        f"{len(evaluation.confusion.labels)} possible answers.{guessing} Every grasp is classified by "
-        f"{protocol_words(evaluation.protocol)}. A 95 % interval contains the true rate in 95 of 100 such collections."
-    )
-    warnings = list(evaluation.warnings)
-    if labelled.provenance.get("simulated"):
-        warnings.append("some of these grasps are simulated, with a model of gripper and objects")
-    return paragraph(text) + bullets(warnings, "warning")
-
-
-def _evaluation_sections(
-    evaluation: Evaluation, learner: SelectedComponent, labelled: Labelled, classifier: str, seed: int
-) -> list[Section]:
-    """Return the controls, the confusion matrix, and a tree if the classifier grows one."""
-    head = evaluation.headline
-    rows = [
-        RateRow(name=classifier, rate=head.rate, interval=head.interval, what="the answer above", strong=True)
-    ]
-    missing = []
-    for name, measured in {**evaluation.protocols, **evaluation.controls}.items():
-        title, purpose = control_words(name, measured.what)
-        if measured.rate is None:
-            missing.append(f"{title}: not measured ({measured.reason})")
-        elif name != evaluation.protocol:
-            interval = measured.rate.interval
-            rows.append(RateRow(name=title, rate=measured.rate.rate, interval=interval, what=purpose))
-    title = f"{classifier}: {evaluation.confusion.n} predictions"
-    sections = [
-        controls_section(rows, missing, classifier),
-        confusion_section((title, evaluation.confusion)),
-    ]
-    if evaluation.sets is not None and evaluation.reliability is not None:
-        sections.append(doubt_section(evaluation.sets, evaluation.reliability))
-    if evaluation.target != "state":
-        trials = labelled.aimed(evaluation.target)
-        fitted = learner.create()
-        fitted.fit(trials.table, trials.labels, seed)
-        nodes = fitted.tree()
-        if nodes is not None:
-            sections.append(tree_section(nodes, f"{classifier} grows on all of these grasps"))
-    return sections
-
-
 def _measurement_sections(
     trial: StoredTrial, curves: Sequence[GraspCurve], unreadable: Sequence[UnreadableRecording]
 ) -> list[Section]:
     """Return one grasp over time with its features, and some grasps of each label drawn over each other."""
     summary = trial.summary
-    label = summary.label or "no label"
+    label = summary.label or NO_LABEL
     further = ""
     try:
         recorded = read_recorded(trial.recording)
@@ -236,29 +192,20 @@ def _measurement_sections(
         body = paragraph(f"The recording of trial {summary.id} cannot be shown: {error}")
     features = trial.result.features
     values = features_table(f"Features of trial {summary.id}", features.features, features.values)
-    sections = [Section(id="grasp", title="One grasp, from the approach to rest", body=pair(body, values))]
+    warnings = [str(one) for one in trial.result.details.get("warnings") or ()]
+    body = bullets(warnings, "warning") + pair(body, values)
+    sections = [Section(id="grasp", title="One grasp, from the approach to rest", body=body)]
     if further:
         sections.append(
             Section(id="signals", title="The same grasp: tactile arrays and further channels", body=further)
         )
-    if curves:
+    newest = _newest_of_labels(curves)
+    if newest:
         text = f"The newest grasps of each label, at most {GRASPS}, drawn over each other."
         notes = note_on(unreadable, len(curves) + len(unreadable))
-        body = paragraph(text) + traces_by_class(curves) + bullets(notes, "warning")
+        body = paragraph(text) + traces_by_class(newest) + bullets(notes, "warning")
         sections.append(Section(id="traces", title="Force and gap over time", body=body))
     return sections
-
-
-def _features_section(labelled: Labelled) -> Section:
-    body = paragraph(
-        "Each dot is one grasp. The bar spans the first to the third quartile, with the median across it. Labels "
-        "that lie apart here can be distinguished."
-    ) + features_by_class(
-        list(zip(labelled.table.names, labelled.table.units, strict=True)),
-        labelled.labels,
-        [[None if v != v else v for v in row] for row in labelled.table.values.tolist()],
-    )
-    return Section(id="features", title="Features", body=body)
 
 
 def _provenance(

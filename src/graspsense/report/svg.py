@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from html import escape
+from textwrap import wrap
 from typing import Final
 
 from attrs import define, field, frozen
@@ -67,6 +68,17 @@ def number(value: float) -> str:
     return text.replace("-", "−") if text != "-0" else "0"
 
 
+CHARACTER: Final = 0.56
+"""Mean width of a character over the font size, rather too wide than too narrow."""
+LINE: Final = 13.0
+"""Distance of two lines of text."""
+
+
+def lines_within(words: str, room: float, size: float = SIZE) -> list[str]:
+    """Return the lines of a text that is at most `room` wide; a long word is broken."""
+    return wrap(words, max(int(room / (CHARACTER * size)), 8), break_on_hyphens=False) or [""]
+
+
 @define
 class Picture:
     """An SVG picture under construction."""
@@ -96,13 +108,17 @@ class Picture:
         width: float = 1.5,
         dash: str = "",
         name: str = "",
+        more: str = "",
     ) -> None:
-        """Draw a line through these points; the values of a line with a `name` are read out on a page."""
+        """Draw a line through these points; the values of a line with a `name` are read out on a page.
+
+        `more` are further attributes.
+        """
         path = " ".join(f"{x:.2f},{y:.2f}" for x, y in points)
         dashes = f' stroke-dasharray="{dash}"' if dash else ""
         named = f' data-name="{escape(name)}"' if name else ""
         self.parts.append(
-            f'<polyline points="{path}" fill="none" stroke="{ink}" stroke-width="{width:g}"{dashes}{named}/>'
+            f'<polyline points="{path}" fill="none" stroke="{ink}" stroke-width="{width:g}"{dashes}{named}{more}/>'
         )
 
     def band(self, left: float, right: float, top: float, bottom: float, fill: str) -> None:

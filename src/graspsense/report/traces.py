@@ -13,10 +13,12 @@ from graspsense.core.learn.labelled import class_of
 from graspsense.core.values.units import display_unit, in_words, without_underscores
 from graspsense.report.grasp_curve import GraspCurve
 from graspsense.report.html import figure, folded, panels, table
-from graspsense.report.svg import DASHES, INKS, QUIET, TEXT, AxisScale, Picture, number, reaching
+from graspsense.report.svg import DASHES, INKS, QUIET, SIZE, TEXT, AxisScale, Picture, number, reaching
 
 STATES: Final = 8
 """Largest number of line styles in one picture."""
+LABEL: Final = 26
+"""Characters of a label beside a picture in one line."""
 DRAWN: Final = 150
 """Largest number of dots per label. If there are more trials, every n-th is drawn."""
 PHASES: Final = {
@@ -34,7 +36,7 @@ def traces_by_class(grasps: Sequence[GraspCurve]) -> str:
     classes: dict[str, list[GraspCurve]] = {}
     for grasp in grasps:
         classes.setdefault(class_of(grasp.label), []).append(grasp)
-    times = [t for grasp in grasps for t in _shown_times(grasp)]
+    times = [t for grasp in grasps for t in grasp.shown_times]
     if not times:
         return ""
     axes = _Axes(
@@ -44,7 +46,7 @@ def traces_by_class(grasps: Sequence[GraspCurve]) -> str:
             gap
             for grasp in grasps
             for t, gap in zip(grasp.t_s, grasp.gap_mm, strict=True)
-            if gap is not None and t is not None and t >= min(_shown_times(grasp))
+            if gap is not None and t is not None and t >= min(grasp.shown_times)
         ],
     )
     return panels([_traces(name, of, axes) for name, of in sorted(classes.items())])
@@ -57,15 +59,6 @@ class _Axes:
     times: tuple[float, float]
     forces: Sequence[float]
     gaps: Sequence[float]
-
-
-def _shown_times(grasp: GraspCurve) -> list[float]:
-    """Return the times from shortly before contact on; before that, the fingers move through free space."""
-    known = [t for t in grasp.t_s if t is not None]
-    return [t for t in known if t >= BEFORE_S] or known
-
-
-BEFORE_S: Final = -0.3
 
 
 LEGEND_TOP: Final = 348.0
@@ -212,15 +205,16 @@ def _feature(
         if value is not None:
             of[label].append(factor * value)
     missing = sum(value is None for value in column)
-    left = 12 + 6.1 * max(map(len, of))
-    bottom = 34.0 + 19 * len(of)
+    left = 12 + 6.1 * max(len(line) for label in of for line in _label_lines(label))
+    pitch = 19 if all(len(label) <= LABEL for label in of) else 24
+    bottom = 34.0 + pitch * len(of)
     picture = Picture(bottom + 34)
     scale = reaching([v for values in of.values() for v in values], min(left, 165), picture.width - 12)
     picture.text(2, 14, title, bold=True, size=13)
     picture.x_axis(scale, 24, bottom, shown or "value")
     classes = list(dict.fromkeys(map(class_of, of)))
     rows = [
-        _feature_row(picture, scale, 38.0 + 19 * k, label, sorted(values), classes.index(class_of(label)))
+        _feature_row(picture, scale, 38.0 + pitch * k, label, sorted(values), classes.index(class_of(label)))
         for k, (label, values) in enumerate(of.items())
     ]
     medians = "; ".join(f"{row[0]} {row[3]}" for row in rows if row[3])
@@ -236,7 +230,15 @@ def _feature_row(
     picture: Picture, scale: AxisScale, y: float, label: str, values: Sequence[float], colour: int
 ) -> tuple[str, ...]:
     """Draw the trials of one label, and return its row of the table."""
-    picture.text(scale.start - 6, y + 4, _short(label), at="end")
+    lines = _label_lines(label)
+    for k, line in enumerate(lines):
+        picture.text(
+            scale.start - 6,
+            y + 4 + 10 * (k - (len(lines) - 1) / 2),
+            line,
+            at="end",
+            size=SIZE - len(lines) + 1,
+        )
     if not values:
         picture.text(scale.start + 4, y + 4, "missing in all", ink=QUIET)
         return (label, "0", "", "", "")
@@ -251,8 +253,17 @@ def _feature_row(
     return (label, str(len(values)), *(f"{value:.4g}" for value in (low, middle, high)))
 
 
-def _short(label: str) -> str:
-    return label if len(label) <= 26 else label[:25] + "…"
+def _label_lines(label: str) -> list[str]:
+    """Return a label in one line, or in two if it is long: the class and the state."""
+    if len(label) <= LABEL:
+        return [label]
+    name, colon, state = label.partition(":")
+    if not colon or max(len(name), len(state)) > LABEL:
+        name, state = label[:LABEL], label[LABEL:]
+    return [
+        name + colon * (state != label[LABEL:]),
+        state if len(state) <= LABEL else f"{state[: LABEL - 1]}…",
+    ]
 
 
 def _quantile(ordered: Sequence[float], share: float) -> float:

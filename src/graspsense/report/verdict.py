@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Final
+
+from graspsense.evaluation.equivalence import MARGIN, verdict_on
 from graspsense.evaluation.intervals import percentage, percentages
 from graspsense.evaluation.results import Evaluation, Measurement
 from graspsense.report.wording import TARGETS
+
+LEAST_TRIALS: Final = 10
+"""Trials of a control below which nothing is concluded from it."""
 
 
 def verdict(evaluation: Evaluation) -> str:
@@ -12,13 +18,16 @@ def verdict(evaluation: Evaluation) -> str:
     sentences = [_rate(evaluation), _against_guessing(evaluation.controls.get("majority_class"))]
     sentences.append(_before_contact(evaluation))
     sentences.append(_first_line(evaluation))
-    sentences.append(_width(evaluation.controls.get("width_only")))
+    sentences.append(_width(evaluation.controls.get("width_only"), evaluation.headline.n))
     return " ".join(filter(None, sentences))
 
 
 def headline(evaluation: Evaluation) -> str:
     """Return the result as a person would say it, for the head of a page."""
-    told = f"{in_hundred(evaluation.headline.rate)} grasps tell {TARGETS[evaluation.target]}"
+    told = (
+        f"{in_hundred(evaluation.headline.rate)} grasps tell {TARGETS[evaluation.target]} "
+        f"({evaluation.headline.correct} of {evaluation.headline.n})"
+    )
     majority = evaluation.controls.get("majority_class")
     if majority is None or majority.rate is None:
         return told
@@ -52,9 +61,15 @@ def _against_guessing(majority: Measurement | None) -> str:
     if majority is None or majority.rate is None or majority.difference is None:
         return ""
     guessing = f"always giving the most frequent label ({percentage(majority.rate.rate)})"
-    if majority.difference.is_positive:
-        return f"This is better than {guessing}."
-    return f"This is not shown to be better than {guessing}."
+    interval = majority.difference.interval
+    if interval is None:
+        return f"Whether this is better than {guessing} cannot be told: {majority.difference.no_interval}."
+    told = {
+        "differs": f"This is {'better' if majority.difference.is_positive else 'worse'} than {guessing}.",
+        "agrees": f"This agrees with {guessing} within {100 * MARGIN:g} points.",
+        "cannot be told": f"This is not shown to be better than {guessing}: it cannot be told from so few trials.",
+    }
+    return told[verdict_on(interval)]
 
 
 def _before_contact(evaluation: Evaluation) -> str:
@@ -64,9 +79,11 @@ def _before_contact(evaluation: Evaluation) -> str:
     if control.rate is None or majority is None or majority.rate is None:
         why = "" if control.rate is not None else f": {control.reason}"
         return f"Whether the recording reveals the labels before contact was not measured{why}."
-    before = percentage(control.rate.rate)
+    before = f"{percentage(control.rate.rate)}{_among(control, evaluation.headline.n)}"
     if any("from before contact" in warning for warning in evaluation.warnings):
         return f"But {before} are recognised before any contact: the recording reveals the labels, so do not trust it."
+    if control.rate.n < LEAST_TRIALS <= evaluation.headline.n:
+        return f"Before contact {before} are recognised, too few to say what that means."
     if control.difference is not None and control.difference.interval is None:
         return f"Before contact {before} are recognised, on too few instances to say what that means."
     return f"Before contact {before} are recognised, so the recording does not explain the rate."
@@ -82,12 +99,25 @@ def _first_line(evaluation: Evaluation) -> str:
     return ""
 
 
-def _width(control: Measurement | None) -> str:
+def _among(control: Measurement, trials: int) -> str:
+    """Return of how many trials the rate of a control is, where that is not all of them."""
+    return (
+        "" if control.rate is None or control.rate.n == trials else f" of {control.rate.n} of {trials} trials"
+    )
+
+
+def _width(control: Measurement | None, trials: int) -> str:
     if control is None:
         return ""
     if control.rate is None or control.difference is None:
         return "How much of it the width alone explains was not measured."
-    width = f"The width alone gives {percentage(control.rate.rate)}"
+    width = f"The width alone gives {percentage(control.rate.rate)}{_among(control, trials)}"
+    if control.rate.n < LEAST_TRIALS <= trials:
+        return f"{width}, too few to say what the squeeze adds."
+    if control.difference.interval is None:
+        return f"{width}; what the squeeze adds cannot be told: {control.difference.no_interval}."
     if control.difference.is_positive:
         return f"{width}; the squeeze adds {100 * control.difference.value:.1f} points."
+    if verdict_on(control.difference.interval) == "agrees":
+        return f"{width}: the squeeze adds nothing, within {100 * MARGIN:g} points."
     return f"{width}: the squeeze is not shown to add anything."

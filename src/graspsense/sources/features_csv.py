@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from graspsense.core.components.caller import option
 from graspsense.core.files.csv_text import csv_text
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.learn.target_value import TargetValue
@@ -65,7 +66,7 @@ def read_labelled(
         table=table,
         labels=tuple(labels),
         instances=instances,
-        no_instances="no column names the instance (--instance COLUMN)",
+        no_instances=f"no column names the instance ({option('instance', 'COLUMN')})",
         order=ranks,
         no_order=no_order,
         **_controls(table, columns, before, export),
@@ -85,7 +86,7 @@ def _controls(
         table,
         columns.table(list(before)) if before else None,
         before_what=f"only {', '.join(before)}",
-        no_before="no columns are named as known before contact (--before COLUMNS)",
+        no_before=f"no columns are named as known before contact ({option('before', 'COLUMNS')})",
     )
 
 
@@ -138,7 +139,9 @@ def write_labelled(path: Path, labelled: Labelled) -> None:
 
 def _labels(columns: CsvColumns, label: str | None) -> list[str]:
     if label is None:
-        raise ConfigError(f"which column of {columns.path} holds the label? Name it: --label COLUMN")
+        raise ConfigError(
+            f"which column of {columns.path} holds the label? Name it: {option('label', 'COLUMN')}"
+        )
     labels = columns.complete_column(label, "the label")
     if len(set(labels)) > max(2, len(labels) // 2):
         raise ConfigError(
@@ -201,11 +204,12 @@ def _feature_names(columns: CsvColumns, reserved: set[str], notes: list[str]) ->
     if counters:
         notes.append(
             "not used, because they increase with every line as a counter or a time does: "
-            f"{listed(counters)} (use --features to include them)"
+            f"{listed(counters)} (use {option('features', python='columns')} to include them)"
         )
     if blank:
         notes.append(
-            f"not used, because they have no values: {listed(blank)} (use --features to include them)"
+            f"not used, because they have no values: {listed(blank)} "
+            f"(use {option('features', python='columns')} to include them)"
         )
     if texts:
         notes.append(f"not used, because they have no numbers: {listed(texts)}")

@@ -16,6 +16,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from graspsense.core.components.caller import option
 from graspsense.core.components.roles import FeatureSet
 from graspsense.core.learn.labelled import ControlFeatures, Labelled
 from graspsense.core.values.errors import ConfigError, DataDamaged
@@ -58,7 +59,7 @@ def read_dataset(folder: str, features: FeatureSet[Any], *, unreliable: bool = F
     if not paths:
         raise ConfigError(
             f"all grasps in {folder} are of {UNRELIABLE}, which the author calls unreliable: include them with "
-            "--unreliable"
+            f"{option('unreliable', python='unreliable=True')}"
         )
     total = len(paths)
     paths, grasps, unreadable = _readable(paths)
@@ -74,7 +75,7 @@ def read_dataset(folder: str, features: FeatureSet[Any], *, unreliable: bool = F
     if left_out:
         notes.append(
             f"{len(left_out)} grasps of {UNRELIABLE} left out: their author calls them unreliable "
-            "(include them with --unreliable)"
+            f"(include them with {option('unreliable', python='unreliable=True')})"
         )
     without = int(np.isnan(table.values).all(axis=1).sum())
     if without:

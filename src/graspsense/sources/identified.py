@@ -11,6 +11,7 @@ from typing import Any, Final
 
 from attrs import frozen
 
+from graspsense.core.components.caller import option
 from graspsense.core.components.layers import Flag, read_toml
 from graspsense.core.values.errors import ConfigError
 
@@ -68,7 +69,7 @@ def _scene(name: str) -> IdentifiedScene:
     if not isinstance(gripper, dict):
         raise ConfigError(
             f"{name} has no table [identified]: `graspsense identify` writes it. Scenes of your own are simulated by "
-            f"`simulated --objects {name}`"
+            f"the source `simulated` with {option('objects', name)}"
         )
     numbers = {str(key): float(value) for key, value in gripper.items() if isinstance(value, int | float)}
     return IdentifiedScene(path=str(path), label=str(identified.get("label") or path.stem), gripper=numbers)

@@ -27,6 +27,7 @@ from graspsense.sources.dataset_recordings import (
     numbered_recording,
 )
 from graspsense.sources.icub import read_recording
+from graspsense.store.naming import as_source
 
 
 def _mcap(name: str) -> Recording:
@@ -99,6 +100,7 @@ def read_named(kind: str, name: str) -> Recording:
 
 def kind_and_name(recording: str) -> tuple[str, str]:
     """Return what stands before and behind the colon; a file that ends in `.mcap` needs no kind."""
+    recording = as_source(recording)
     kind, colon, name = recording.partition(":")
     if recording.endswith(".mcap") and kind not in KINDS:
         return "mcap", recording

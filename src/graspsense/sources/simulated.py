@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 from attrs import Attribute, evolve, field, frozen
 
+from graspsense.core.components.caller import option
 from graspsense.core.components.compiled_features import CompiledExtraction, both, compiled_extraction
 from graspsense.core.components.roles import BatchBackend, FeatureSet
 from graspsense.core.components.strict import plain
@@ -127,7 +128,7 @@ class Group:
         known = {**{name: name for name in _full_names(self.objects, kinds)}, **self.named}
         if any("#" in name for name in (*known, *known.values())):
             raise ConfigError(
-                "name objects without an instance (#3) here: --instances is the number of instances"
+                f"name objects without an instance (#3) here: {option('instances')} is the number of instances"
             )
         if too_many := CLASSES.exceeded(len(known)):
             raise ConfigError(f"the objects to simulate: {too_many}")
@@ -177,7 +178,9 @@ def _checked_groups(
     groups = tuple(group.with_defaults(kinds) for group in groups)
     if kinds and not any(group.objects or group.named for group in groups):
         names = ", ".join(kind.name for kind in kinds)
-        raise ConfigError(f"no kind of object of this gripper is a default: name --objects, any of {names}")
+        raise ConfigError(
+            f"no kind of object of this gripper is a default: name {option('objects')}, any of {names}"
+        )
     trials = sum(group.number(kinds) for group in groups)
     if not 1 <= trials <= TRIALS_PER_SEED:
         raise ConfigError(f"{trials} trials: give at least 1 and at most {TRIALS_PER_SEED} in total")
@@ -292,8 +295,8 @@ def simulated_objects(settings: Settings) -> Sequence[ObjectKind]:
     if not kinds:
         raise ConfigError(
             f"gripper {settings.gripper.component.qualified} declares no objects that it can simulate, so it was not "
-            "opened. Simulated trials need a simulated gripper, such as --gripper sim; `graspsense collect` records "
-            "trials of a real gripper"
+            "opened. Simulated trials need a simulated gripper, as in gripper.type = 'sim'; `graspsense collect` "
+            "records trials of a real gripper"
         )
     return kinds
 

@@ -5,17 +5,16 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
+from graspsense.core.components.caller import option
 from graspsense.core.components.identification import RecordedSqueeze
-from graspsense.core.components.layers import read_toml
 from graspsense.core.learn.labelled import class_of
 from graspsense.core.values.errors import ConfigError, suggestion
+from graspsense.store.naming import STORE, as_source
 
 if TYPE_CHECKING:
     from graspsense.recording.reader import RecordedGrasp
-
-STORE: Final = "store:"
 
 
 def recorded_squeezes(sources: Sequence[str], name: str | None = None) -> tuple[RecordedSqueeze, ...]:
@@ -32,7 +31,7 @@ def recorded_squeezes(sources: Sequence[str], name: str | None = None) -> tuple[
         known = sorted({*labels, *map(class_of, labels)})
         squeezes = [one for one in squeezes if one.label and name in (one.label, class_of(one.label))]
         if not squeezes:
-            there_are = ", ".join(known) or "none has a label; leave out --class"
+            there_are = ", ".join(known) or "none has a label; leave out the name"
             raise ConfigError(
                 f"no recording has the label or the class {name!r}. Known: {there_are}."
                 + suggestion(name, known)
@@ -40,8 +39,9 @@ def recorded_squeezes(sources: Sequence[str], name: str | None = None) -> tuple[
         labels = sorted({one.label for one in squeezes})
     if len(labels) > 1:
         raise ConfigError(
-            f"the recordings are of {len(labels)} objects, and a scene describes one. Name it: --class "
-            f"{labels[0]} (there are {', '.join(labels)})"
+            f"the recordings are of {len(labels)} objects, and a scene describes one. Name it: "
+            f"{option('class', labels[0], python='name')} "
+            f"(there are {', '.join(labels)})"
         )
     for squeeze in squeezes:
         _refuse_other_units(squeeze)
@@ -49,6 +49,7 @@ def recorded_squeezes(sources: Sequence[str], name: str | None = None) -> tuple[
 
 
 def _of_source(source: str) -> Iterator[RecordedSqueeze]:
+    source = as_source(source)
     if source.startswith(STORE) and "#" not in source:
         yield from _of_store(source.removeprefix(STORE))
     elif source.endswith(".mcap"):
@@ -58,19 +59,7 @@ def _of_source(source: str) -> Iterator[RecordedSqueeze]:
         grasp = read_recorded(path)
         yield _of_grasp(grasp, path.name, hashlib.sha256(path.read_bytes()).hexdigest())
     else:
-        _refuse_scene(source)
         yield from _of_import(source)
-
-
-def _refuse_scene(source: str) -> None:
-    """Raise ConfigError for a scene in the place of a recording."""
-    path = Path(source).expanduser()
-    if path.suffix != ".toml":
-        return
-    if read_toml(path, source, "manifest").values.keys() & {"width_m", "terms"}:
-        raise ConfigError(
-            f"{source} is a scene, not a recording: name the recordings, as in {STORE}DIR, and the scene with --out"
-        )
 
 
 def _of_store(folder: str) -> Iterator[RecordedSqueeze]:

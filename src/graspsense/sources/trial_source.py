@@ -7,14 +7,18 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal
 
-from attrs import evolve, fields_dict, frozen
+from attrs import evolve, field, fields_dict, frozen
 
+from graspsense.core.components.caller import option
+from graspsense.core.components.layers import read_toml
 from graspsense.core.components.strict import ValidationFailed, structured
+from graspsense.core.components.toml_kinds import KINDS, toml_kind
 from graspsense.core.learn.checkpoints import with_checkpoints
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.values.errors import ConfigError, PluginUnavailable
 from graspsense.sources.identified import IDENTIFIED, gripper_flags, identified_scenes
 from graspsense.sources.simulated import Group, simulated
+from graspsense.store.naming import STORE, as_source
 
 if TYPE_CHECKING:
     from graspsense.core.components.config import Settings
@@ -22,7 +26,12 @@ if TYPE_CHECKING:
     from graspsense.core.values.trace import Trace
 
 SIMULATED: Final = "simulated"
-STORE: Final = "store:"
+_OF_TOML: Final = {
+    "pipeline": "Trials are simulated with it by the source `simulated` and this pipeline",
+    "scene": "Trials of it are simulated by the source `simulated` and this file among the objects",
+    "experiment": "Run it: graspsense experiment FILE",
+    "manifest": "Its recordings are the source manifest:FILE",
+}
 Kind = Literal["CSV", "data set", "simulated"]
 
 
@@ -34,7 +43,7 @@ class TrialSource(Group):
     data set with its folder (`icub:FOLDER`, `store:DIR`).
     """
 
-    source: str = SIMULATED
+    source: str = field(default=SIMULATED, converter=as_source)
     only: str | None = None
     """Use the trials of this class only."""
     groups: tuple[Group, ...] = ()
@@ -94,6 +103,8 @@ def load_trials(
 
 NOT_READ: Final = (".npz", ".arff", ".parquet")
 """Endings of the tables that `graspsense export` writes for other programs, and that are not read as trials."""
+OF_RECORDINGS: Final = (".mcap", ".bag", ".db3", ".npy", ".mat", ".h5")
+"""Endings of files of recordings, which are imported before there is anything to learn from."""
 
 
 def kind_of(source: str) -> Kind:
@@ -105,6 +116,15 @@ def kind_of(source: str) -> Kind:
             f"{source} is not read as a table of trials: name the store as store:DIR, or a table of it as FILE.csv "
             "(graspsense export DIR --to FILE.csv)"
         )
+    if source.lower().endswith(OF_RECORDINGS) and Path(source).is_file():
+        raise ConfigError(
+            f"{source} is a recording, not a source of labelled trials: graspsense import {source} --save DIR --label "
+            "CLASS:STATE makes a trial of it"
+        )
+    if source.lower().endswith(".toml") and Path(source).is_file():
+        found = toml_kind(read_toml(Path(source), source, "TOML").values)
+        called = KINDS[found].called if found else "a TOML file"
+        raise ConfigError(f"{source} is {called}, not a source of trials. {_OF_TOML.get(found, '')}".rstrip())
     if source.lower().endswith((".csv", ".tsv", ".txt")) or Path(source).is_file():
         return "CSV"
     if ":" in source:
@@ -179,7 +199,9 @@ def _csv(source: TrialSource) -> Labelled:
     from graspsense.sources.features_csv import read_labelled
 
     if not source.label and source.value is None:
-        raise ConfigError(f"which column of {source.source} holds the label? Name it: --label COLUMN")
+        raise ConfigError(
+            f"which column of {source.source} holds the label? Name it: {option('label', 'COLUMN')}"
+        )
     return read_labelled(
         Path(source.source),
         source.label,

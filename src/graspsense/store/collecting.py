@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Final
 
 from attrs import define, field, frozen
 
+from graspsense.core.components.caller import option
 from graspsense.core.values.errors import ConfigError, NoDevice
 from graspsense.core.values.signals import Outcome
 from graspsense.recording.atomic_file import SaveFailed
@@ -51,7 +52,7 @@ class Wanted:
     def __attrs_post_init__(self) -> None:
         if not self.words:
             raise ConfigError(
-                "nothing to collect: name the objects, as in --labels can:full_open,can:empty_open"
+                f"nothing to collect: name the objects, as in {option('labels', 'can:full_open,can:empty_open')}"
             )
         if len(set(self.words)) < len(self.words):
             raise ConfigError(f"a label is named twice: {', '.join(self.words)}")

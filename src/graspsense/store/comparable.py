@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Final
 
+from graspsense.core.components.caller import option
 from graspsense.core.components.setting import CHANGES_NO_RESULT, settings_marked
 from graspsense.core.values.errors import ConfigError
 from graspsense.recording.provenance import recipe
@@ -85,5 +86,5 @@ def _refusal(what: str, store: Store, before: StoredTrial, differences: Sequence
     lines = "".join(f"\n  {line}" for line in differences)
     return (
         f"the {what} differ from trial {before.summary.id} of the store in {store.folder}:{lines}\n"
-        "  Restore them, use another store, or add --changed if this is intended"
+        f"  Restore them, use another store, or add {option('changed', python='changed=True')} if this is intended"
     )

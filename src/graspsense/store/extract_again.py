@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 from attrs import evolve, frozen
 
-from graspsense.core.components.config import NONE, Flag, Settings, resolve, without_followers
+from graspsense.core.components.config import NONE, Flag, Settings, default_paths, resolve, without_followers
 from graspsense.core.components.layers import Layer
+from graspsense.core.components.nearest_key import nearest_path
 from graspsense.core.grasp.runner import run_uninterrupted
 from graspsense.core.learn.checkpoints import with_checkpoints
 from graspsense.core.pipeline.wiring import check
@@ -112,12 +113,18 @@ def extract_again(
     )
 
 
+def _meant(option: str) -> str:
+    path = option.partition("=")[0].strip()
+    near = nearest_path(path, default_paths(sorted(CHANGEABLE)))
+    return f"did you mean {near!r}? " if near else ""
+
+
 def _refuse_other_tables(options: Sequence[str]) -> None:
     for option in options:
         table = option.partition(".")[0].strip()
         if table not in CHANGEABLE:
             raise ConfigError(
-                f"-o {option}: a stored grasp can be evaluated again with other keys of "
+                f"-o {option}: {_meant(option)}a stored grasp can be evaluated again with other keys of "
                 f"{', '.join(f'[{one}]' for one in CHANGEABLE)} only; its gripper is the recording"
             )
 

@@ -23,6 +23,7 @@ from graspsense.core.values.errors import ConfigError, DataDamaged, named
 from graspsense.recording.atomic_file import SaveFailed
 from graspsense.recording.recording_info import RecordingInfo
 from graspsense.recording.trial_record import TrialRecord
+from graspsense.store.naming import store_folder
 from graspsense.store.opening import (
     BUSY_S,
     FILE,
@@ -75,7 +76,7 @@ class Store:
 
         Raises SaveFailed if it cannot be written, ConfigError if its version is newer, DataDamaged.
         """
-        folder = Path(folder).expanduser()
+        folder = Path(store_folder(folder)).expanduser()
         try:
             (folder / RECORDINGS).mkdir(parents=True, exist_ok=True)
         except OSError as error:
@@ -104,7 +105,7 @@ class Store:
 
         Raises ConfigError if there is no store or its version is newer, DataDamaged.
         """
-        folder = Path(folder).expanduser()
+        folder = Path(store_folder(folder)).expanduser()
         path = folder / FILE
         if not path.is_file():
             raise ConfigError(f"there is no store in {folder}: it has no file {FILE}")

@@ -7,6 +7,7 @@ from graspsense.core.components.layers import Layer
 from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.recording.reader import RecordedGrasp, read_recorded
 from graspsense.recording.replayable import Recording
+from graspsense.store.naming import store_folder
 from graspsense.store.store import Store
 
 
@@ -15,7 +16,7 @@ def parse_trial_ref(text: str) -> tuple[str, int]:
     folder, mark, number = text.rpartition("#")
     if not mark or not folder or not number.isdecimal() or len(number) > 18:
         raise ConfigError(f"{text!r} is not a trial of a store: write DIR#NUMBER, as in trials#12")
-    return folder, int(number)
+    return store_folder(folder), int(number)
 
 
 def stored_grasp(ref: str) -> RecordedGrasp:

@@ -208,7 +208,7 @@ def _setup(
 
 
 def check_fit(config: SimConfig, spec: ObjectSpec, width_m: float, offset_m: float) -> None:
-    """Raise ConfigError if an instance of a scene file does not fit between the open fingers, or has no width."""
+    """Raise ConfigError if an instance of a scene file does not fit between the fingers, or has no width or terms."""
     where = spec.file
     needed_m = width_m + 2.0 * abs(offset_m)
     if where and width_m <= 0.0:
@@ -218,6 +218,10 @@ def check_fit(config: SimConfig, spec: ObjectSpec, width_m: float, offset_m: flo
         raise ConfigError(
             f"{where}: {what}: {width_m:g} m wide and {offset_m:g} m off the centre, it needs "
             f"{needed_m:g} m, and the fingers open to {config.open_gap_m:g} m (gripper.open_gap_m)"
+        )
+    if where and not spec.terms:
+        raise ConfigError(
+            f"{where}: terms: there are none, so nothing resists the fingers: add a table [[terms]] for each law"
         )
 
 

@@ -39,6 +39,7 @@ from graspsense.core.compiling.call_graph import (
     plain_function,
     times_read,
 )
+from graspsense.core.compiling.compile_notice import compiling_begins
 from graspsense.core.compiling.compiled_code_folder import folder_of_source
 from graspsense.core.control.binding import bind
 from graspsense.core.control.garbage_collection import no_collection
@@ -230,6 +231,7 @@ class _Compilation:
                 "`compile_function`: call that again"
             )
         now.copies.update(copies_if_inlined(function, self.options.replacements))
+        compiling_begins(function.__name__, sum(len(code.co_code) for code in now.copies))
         now._bind_called(function, named)
 
     def _key(self, function: types.FunctionType, role: str) -> str:

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, Final, cast
 from attrs import fields, frozen
 
 from graspsense import __version__
+from graspsense.core.components.caller import option
 from graspsense.core.components.entries import TABLE_OF_ROLE, Role
 from graspsense.core.components.layers import (
     Flag,
@@ -25,7 +26,9 @@ from graspsense.core.components.layers import (
     option_layers,
     pipeline_layers,
     read_layer,
+    typed_path,
 )
+from graspsense.core.components.nearest_key import key_paths
 from graspsense.core.components.registry import Component, Plugins, installed
 from graspsense.core.components.setting import followed_settings
 from graspsense.core.components.strict import (
@@ -38,7 +41,7 @@ from graspsense.core.components.strict import (
     structured,
 )
 from graspsense.core.files.toml_lines import KeyPath
-from graspsense.core.values.errors import ConfigError, PluginUnavailable, UnknownName, suggestion
+from graspsense.core.values.errors import ConfigError, PluginUnavailable, UnknownName
 
 if TYPE_CHECKING:
     from graspsense.core.components.run_config import RunConfig
@@ -71,7 +74,7 @@ class ImplausibleSettings(ConfigError):
 
     def __init__(self, text: str) -> None:
         super().__init__(text)
-        self.add_note("Check the unit. If the value is meant, add --force (in Python force=True)")
+        self.add_note(f"Check the unit. If the value is meant, add {option('force', python='force=True')}")
 
 
 @frozen(eq=False)
@@ -154,6 +157,15 @@ def resolve(
     return _resolved_layers(pipeline, layers, complaints, plugins, force=force)
 
 
+def default_paths(tables: Sequence[str]) -> list[str]:
+    """Return the paths of the keys that these tables of the default pipeline have, for a key that is misspelt."""
+    try:
+        settings = resolve()
+    except ConfigError:
+        return []
+    return [path for table in tables for path in key_paths(settings.keys(table), table)]
+
+
 def settings_from(values: Mapping[str, Any], called: str, plugins: Plugins | None = None) -> Settings:
     """Return the settings of complete tables, such as `Settings.values` or the content of a resolved file.
 
@@ -168,14 +180,15 @@ def settings_from(values: Mapping[str, Any], called: str, plugins: Plugins | Non
 
 
 def _resolved_layers(
-    pipeline: str, layers: Sequence[Layer], complaints: list[str], plugins: Plugins, *, force: bool
+    pipeline: str, layers: Sequence[Layer], malformed: Sequence[str], plugins: Plugins, *, force: bool
 ) -> Settings:
     """Return the settings of these layers, of which each overrides those before. Raises ConfigError."""
-    doubts: list[str] = []
-    layers = [_tables_only(layer, complaints) for layer in layers]
-
     from graspsense.core.components.run_config import RunConfig
 
+    doubts: list[str] = []
+    complaints: list[_Complaint] = list(malformed)
+    classes: dict[str, type] = {}
+    layers = [_tables_only(layer, complaints) for layer in layers]
     chosen: dict[str, SelectedComponent] = {}
     values: dict[str, dict[str, Any]] = {}
     origins: dict[str, str] = {}
@@ -189,21 +202,20 @@ def _resolved_layers(
             found = _component(layers, table, plugins, complaints)
             if found is None:
                 continue
-            component, cls = found
-            called = component.qualified
+            (component, cls), called = found, found[0].qualified
             merged = _merged(layers, table, component)
             if table == "controller" and "gripper" in chosen:
                 _choose_sent_kind(merged, component, chosen["gripper"])
             followed = _follow(merged, cls, table, values)
-        config: Any
+        classes[table] = cls
         try:
-            config = structured({k: v for k, v in merged.values.items() if k != "type"}, cls, called)
+            config: Any = structured({k: v for k, v in merged.values.items() if k != "type"}, cls, called)
         except ValidationFailed as misfit:
-            complaints += [_complaint(merged, problem) for problem in misfit.under(table)]
+            complaints += [(merged.owner_of(one.path), one) for one in misfit.under(table)]
             continue
         if not force:
-            of_table = [one for one in implausible_values(config) if one.path[0] not in followed]
-            doubts += [_complaint(merged, one.under(table)) for one in of_table]
+            of_table = [one.under(table) for one in implausible_values(config) if one.path[0] not in followed]
+            doubts += [_in_a_line(merged.owner_of(one.path), one) for one in of_table]
         if component is None:
             run = config
             values[table] = plain(config)
@@ -214,7 +226,7 @@ def _resolved_layers(
             owner = merged.owner.get(path)
             origins[dotted(path)] = owner.where(path) if owner else "default"
     if complaints:
-        raise ConfigError(_listed([*complaints, *doubts]))
+        raise ConfigError(_listed([*_told(complaints, classes, plugins), *doubts]))
     if doubts:
         raise ImplausibleSettings(_listed(doubts))
     return Settings(
@@ -229,10 +241,38 @@ def _resolved_layers(
     )
 
 
-def _complaint(merged: Merged, problem: InvalidValue) -> str:
-    """Return a problem of a key in one line, with the origin of its value."""
-    owner = merged.owner_of(problem.path)
-    return owner.complain(problem) if owner else f"{dotted(problem.path)}: {problem.text}"
+_Complaint = str | tuple[Layer | None, InvalidValue]
+"""What is wrong in words, or a value with the layer that set it."""
+
+
+def _told(complaints: Sequence[_Complaint], classes: Mapping[str, type], plugins: Plugins) -> list[str]:
+    """Return what is wrong, line by line; a key that is unknown may mean one of any table."""
+    known = [path for table, cls in classes.items() for path in key_paths(keys_of(cls), table)]
+    return [
+        one if isinstance(one, str) else _in_a_line(one[0], _with_owners(one[1], plugins), known)
+        for one in complaints
+    ]
+
+
+def _in_a_line(owner: Layer | None, problem: InvalidValue, known: Sequence[str] = ()) -> str:
+    """Return a problem of a key in one line, with the origin of its value; `known` are the paths of all keys."""
+    return owner.complain(problem, known) if owner else f"{dotted(problem.path)}: {problem.words(known)}"
+
+
+def _with_owners(problem: InvalidValue, plugins: Plugins) -> InvalidValue:
+    """Return the problem of an unknown key with the other components that have it."""
+    table, *inner = map(str, problem.path)
+    role = _ROLE_OF_TABLE.get(table)
+    if problem.known is None or role is None:
+        return problem
+    path, names = ".".join(inner), []
+    for component in plugins.components(role):
+        with suppress(PluginUnavailable):
+            if path in key_paths(keys_of(component.config_class()), ""):
+                names.append(toml_value(component.name))
+    if not names:
+        return problem
+    return InvalidValue(problem.path, f"{problem.what} It is a key of {table}.type = {' or '.join(names)}")
 
 
 def _choose_sent_kind(merged: Merged, controller: Component, gripper: SelectedComponent) -> None:
@@ -438,13 +478,13 @@ def _toml_text(text: str) -> str:
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
-def _tables_only(layer: Layer, complaints: list[str]) -> Layer:
+def _tables_only(layer: Layer, complaints: list[_Complaint]) -> Layer:
     """Return the layer without keys that are not tables of a pipeline; add a complaint for each of them."""
     values = {}
     for key, value in layer.values.items():
         if key not in _TABLES:
-            text = f"there is no table {key!r}.{suggestion(key, _TABLES)} There are: {', '.join(_TABLES)}"
-            complaints.append(layer.complain(InvalidValue((key,), text)))
+            path = typed_path(layer) if layer.typed else (key,)
+            complaints.append((layer, InvalidValue(path, f"a pipeline has no table {key!r}.", _TABLES)))
         elif not isinstance(value, Mapping):
             advice = (
                 f": write {key}.type = {toml_value(value)}" if isinstance(value, str) and key != "run" else ""
@@ -458,7 +498,7 @@ def _tables_only(layer: Layer, complaints: list[str]) -> Layer:
 
 
 def _component(
-    layers: Sequence[Layer], table: str, plugins: Plugins, complaints: list[str]
+    layers: Sequence[Layer], table: str, plugins: Plugins, complaints: list[_Complaint]
 ) -> tuple[Component, type] | None:
     """Return the component that a table selects, and its config class; None, perhaps with complaints, for none."""
     role = _ROLE_OF_TABLE[table]

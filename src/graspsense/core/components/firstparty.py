@@ -41,5 +41,31 @@ SHIPPED: Final[dict[tuple[Role, str], Shipped]] = {
 }
 """Components in other distributions of this project, for the hint if one is not installed."""
 
+
+@frozen
+class Example:
+    """A distribution of this project that is an example, installed from a clone only: its folder in `examples`."""
+
+    distribution: str
+    folder: str
+
+    @property
+    def hint(self) -> str:
+        """The command that installs it."""
+        return f"in a clone: pip install -e ./examples/{self.folder}"
+
+
+_ROBOTIQ = Example("graspsense-robotiq-2f85", "robotiq_2f85")
+_CURVE = Example("graspsense-grasp-curve", "grasp_curve")
+
+EXAMPLES: Final[dict[tuple[Role, str], Example]] = {
+    ("sensor-backend", "robotiq-2f85"): _ROBOTIQ,
+    ("controller", "close-until-stopped"): _ROBOTIQ,
+    ("feature-set", "chitta-without-pads"): _ROBOTIQ,
+    ("feature-set", "grasp-curve"): _CURVE,
+    ("feature-set", "chitta-and-curve"): _CURVE,
+}
+"""Components of the examples, for the hint if one is not installed."""
+
 MODELS: Final[dict[str, Shipped]] = {"default": _SIM}
 """Models that this project ships, with their distributions."""

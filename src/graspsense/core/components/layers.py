@@ -13,6 +13,7 @@ from attrs import define, field, frozen
 
 from graspsense.core.components.registry import Plugins
 from graspsense.core.components.strict import InvalidValue, shown
+from graspsense.core.components.toml_kinds import KINDS, refuse_other_kind
 from graspsense.core.files.limits import SETTINGS_BYTES
 from graspsense.core.files.regular_file import first_bytes
 from graspsense.core.files.toml_lines import KeyPath, key_lines
@@ -47,11 +48,12 @@ class Layer:
                 return f"{self.label}:{self.lines[path[:end]]}"
         return self.label
 
-    def complain(self, problem: InvalidValue) -> str:
-        """Return a problem in one line: origin, key, text."""
+    def complain(self, problem: InvalidValue, known: Iterable[str] = ()) -> str:
+        """Return a problem in one line: origin, key, text; `known` are the paths of the keys that there are."""
         if self.typed:
-            return f"{self.typed}: {problem.text}"
-        return f"{self.where(problem.path)}: {dotted(problem.path)}: {problem.text}"
+            return f"{self.typed}: {problem.words(known)}"
+        key = f"{dotted(problem.path)}: " if problem.path else ""
+        return f"{self.where(problem.path)}: {key}{problem.words(known)}"
 
 
 @frozen
@@ -106,7 +108,7 @@ class Merged:
 
 def read_layer(path: str | os.PathLike[str]) -> Layer:
     """Read a TOML file. Raises ConfigError if it is missing or is not TOML."""
-    return read_toml(Path(path), os.fspath(path), "configuration file")
+    return read_toml(Path(path), os.fspath(path), "configuration")
 
 
 def pipeline_layers(pipeline: str, plugins: Plugins) -> list[Layer]:
@@ -124,7 +126,7 @@ def pipeline_layers(pipeline: str, plugins: Plugins) -> list[Layer]:
             names = " -> ".join([*(name for _, name in seen), label])
             raise ConfigError(f"{asker}extends forms a circle: {names}")
         seen.append((identity, label))
-        layer = read_toml(source, label, "pipeline file")
+        layer = read_toml(source, label, "pipeline")
         values = dict(layer.values)
         extends = values.pop("extends", None)
         layers.insert(0, Layer(label=label, values=values, lines=layer.lines))
@@ -162,7 +164,10 @@ def _located(asked: str, base: Path, asker: str, plugins: Plugins) -> tuple[Trav
 
 
 def read_toml(source: Traversable, label: str, what: str) -> Layer:
-    """Read a TOML file, which errors call `what` and `label`. Raises ConfigError."""
+    """Read a TOML file, which errors call `label`; `what` is its kind, as in `KINDS`, or any other word.
+
+    Raises ConfigError, also for a file of another kind.
+    """
     text = _settings_text(source, label, what)
     try:
         values = toml_values(text)
@@ -170,6 +175,8 @@ def read_toml(source: Traversable, label: str, what: str) -> Layer:
         line = f":{error.line}" if error.line else ""
         column = f", column {error.column}" if error.column else ""
         raise ConfigError(f"{label}{line}{column}: {error}") from None
+    if what in KINDS:
+        refuse_other_kind(values, what, label)
     return Layer(label=label, values=values, lines=key_lines(text))
 
 
@@ -178,9 +185,9 @@ def _settings_text(source: Traversable, label: str, what: str) -> str:
     try:
         data = first_bytes(source, SETTINGS_BYTES.most)
     except FileNotFoundError:
-        raise ConfigError(f"no {what} {label!r}{_nearby(source)}") from None
+        raise ConfigError(f"no {what} file {label!r}{_nearby(source)}") from None
     except OSError as error:
-        raise ConfigError(f"cannot read the {what} {label!r}: {error.strerror or error}") from None
+        raise ConfigError(f"cannot read the {what} file {label!r}: {error.strerror or error}") from None
     why = SETTINGS_BYTES.exceeded(len(data))
     if why:
         raise ConfigError(f"{label}: {why}")
@@ -209,8 +216,12 @@ def _nearby(missing: Traversable) -> str:
 def option_layers(options: Sequence[str]) -> tuple[list[Layer], list[str]]:
     """Return a layer for each option `a.b=VALUE`, and a complaint for each malformed one.
 
-    VALUE is a TOML value; any other text is a string.
+    VALUE is a TOML value; any other text is a string. Raises ConfigError if the options are one text.
     """
+    if isinstance(options, str):
+        raise ConfigError(
+            f"options: expected a list of texts, as in [{options!r}], found the text {options!r}"
+        )
     layers, complaints = [], []
     for option in options:
         key, equals, value = option.partition("=")
@@ -221,6 +232,16 @@ def option_layers(options: Sequence[str]) -> tuple[list[Layer], list[str]]:
         values = _nested(parts, _toml_value(value))
         layers.append(Layer(label="-o", values=values, typed=f"-o {option}", final=True))
     return layers, complaints
+
+
+def typed_path(layer: Layer) -> KeyPath:
+    """Return the path of the key that an option sets."""
+    path: list[str] = []
+    values: Any = layer.values
+    while isinstance(values, Mapping) and len(values) == 1:
+        ((key, values),) = values.items()
+        path.append(key)
+    return tuple(path)
 
 
 def _key_parts(key: str) -> list[str]:

@@ -115,7 +115,7 @@ class SensorBackend(ABC, Generic[ConfigT]):
         """
         raise ConfigError(
             f"{type(self).__name__} grasps real objects, so it cannot be given the object {name!r}. "
-            "Choose a simulated gripper, as in --gripper sim"
+            "Choose a simulated gripper, as in gripper.type = 'sim'"
         )
 
     def expect(self, controller: Controller[Any], run: RunConfig) -> None:
@@ -268,7 +268,7 @@ class BatchBackend(SensorBackend[ConfigT]):
         """
         del squeezes, progress, block
         raise ConfigError(
-            f"{type(self).__name__} cannot identify an object from recordings. --gripper sim can"
+            f"{type(self).__name__} cannot identify an object from recordings. gripper.type = 'sim' can"
         )
 
     def perturbed(self, scenes: Sequence[str], share: float) -> Mapping[str, BatchBackend[Any]]:

@@ -18,6 +18,7 @@ import attrs
 import cattrs
 from attrs import frozen
 
+from graspsense.core.components.nearest_key import did_you_mean
 from graspsense.core.components.setting import declared, implausible
 from graspsense.core.files.toml_lines import KeyPath
 from graspsense.core.files.toml_text import LARGEST_INTEGER
@@ -36,14 +37,28 @@ MOST_UNKNOWN: Final = 20
 
 @frozen
 class InvalidValue:
-    """A defect of the value at `path`."""
+    """A defect of the value at `path`; `known` has the keys that there are, where the defect is an unknown key."""
 
     path: KeyPath
-    text: str
+    what: str
+    known: tuple[str, ...] | None = None
+
+    @property
+    def text(self) -> str:
+        """The defect in words."""
+        return self.words()
+
+    def words(self, elsewhere: Iterable[str] = ()) -> str:
+        """Return the defect in words; an unknown key may mean one of the paths `elsewhere`."""
+        if self.known is None:
+            return self.what
+        path = ".".join(map(str, self.path))
+        listed = ", ".join(self.known) or "none"
+        return f"{self.what}{did_you_mean(path, self.known, elsewhere)} It has: {listed}"
 
     def under(self, key: str | int) -> InvalidValue:
         """Return the defect of the value at this path below `key`."""
-        return InvalidValue((key, *self.path), self.text)
+        return attrs.evolve(self, path=(key, *self.path))
 
 
 class ValidationFailed(Exception):
@@ -68,7 +83,11 @@ def structured(values: Mapping[str, Any], cls: type[ConfigT], called: str) -> Co
     attrs.resolve_types(cls)  # type: ignore[type-var]
     fields = {one.alias: one for one in attrs.fields(cls) if one.init}  # type: ignore[arg-type]
     unknown = [key for key in values if key not in fields]
-    problems = [InvalidValue((key,), _unknown(key, fields, called)) for key in unknown[:MOST_UNKNOWN]]
+    names = tuple(sorted(fields))
+    problems = [
+        InvalidValue((key,), f"{called} has no key {key[:LONGEST_SHOWN]!r}.", names)
+        for key in unknown[:MOST_UNKNOWN]
+    ]
     if len(unknown) > MOST_UNKNOWN:
         text = f"{called} has {len(unknown) - MOST_UNKNOWN} more keys that are not known"
         problems.append(InvalidValue((unknown[MOST_UNKNOWN],), text))
@@ -195,11 +214,6 @@ def _words(error: BaseException) -> str:
     )
 
 
-def _unknown(key: str, known: Iterable[str], called: str) -> str:
-    names = sorted(known)
-    return f"{called} has no key {key[:LONGEST_SHOWN]!r}.{suggestion(key, names)} It has: {', '.join(names) or 'none'}"
-
-
 def shown(value: object) -> str:
     """Return a value with its kind, for an error."""
     if isinstance(value, bool):
@@ -294,8 +308,20 @@ def _union(value: object, cls: Any) -> Any:
     wanted = [misfit for member, misfit in misfits if member is not type(None)]
     if len(wanted) == 1:
         raise wanted[0]
-    names = [getattr(one, "__name__", str(one)) for one in members if one is not type(None)]
-    raise _expected(f"one of the kinds {', '.join(names)}", value)
+    raise _expected(" or ".join(_in_words(one) for one in members if one is not type(None)), value)
+
+
+def _in_words(kind: Any) -> str:
+    """Return what a value of a type is, for a user who knows TOML and not Python."""
+    if cast(Any, get_origin(kind)) is Literal:
+        return f"one of {', '.join(map(repr, get_args(kind)))}"
+    origin = get_origin(kind) or kind
+    if origin in (list, tuple, Sequence):
+        return "a list"
+    if origin in (dict, Mapping) or attrs.has(origin):
+        return "a table"
+    words = {bool: "true or false", int: "a whole number", float: "a number"}
+    return words.get(kind, "text")
 
 
 def _sequence(value: object, cls: Any) -> Any:

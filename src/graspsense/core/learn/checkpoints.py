@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from attrs import evolve, frozen
 
+from graspsense.core.components.caller import option
 from graspsense.core.components.roles import FeatureSet
 from graspsense.core.files.limits import CHECKPOINTS
 from graspsense.core.learn.labelled import ControlFeatures, Labelled
@@ -166,7 +167,7 @@ def split_checkpoints(labelled: Labelled, checkpoints_s: Sequence[float]) -> tup
     if _at(USED_TIME, None) not in table.names:
         raise ConfigError(
             f"{labelled.source} gives features and not the traces of its trials, so nothing is known of a part of a "
-            "grasp: leave out --checkpoints, or use simulated grasps"
+            f"grasp: leave out {option('checkpoints', python='checkpoints_s')}, or use simulated grasps"
         )
     names = [name for name in table.names if "@" not in name]
     parts = []

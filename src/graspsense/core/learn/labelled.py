@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 from attrs import evolve, field, frozen
 
+from graspsense.core.components.caller import option
 from graspsense.core.files.limits import CLASSES, FEATURES
 from graspsense.core.learn.target_value import TargetValue
 from graspsense.core.values.errors import ConfigError, DataDamaged, suggestion
@@ -143,7 +144,7 @@ class Labelled:
             if ":" not in label:
                 raise ConfigError(
                     f"label {label!r} in {self.source} has no state: labels are CLASS:STATE, as in can:full_open. "
-                    "Choose --target both, which takes labels as they are"
+                    f"Choose {option('target', 'both')}, which takes labels as they are"
                 )
         return evolve(self, labels=tuple(label.partition(":")[2] for label in self.labels))
 
@@ -157,7 +158,8 @@ def _refuse_too_large(table: FeatureTable, source: str) -> None:
         trial, column = (int(number) for number in np.argwhere(large)[0])
         raise DataDamaged(
             f"{source}: feature {table.names[column]!r} of trial {trial + 1} is {table.values[trial, column]:g}: the "
-            f"largest magnitude to learn from is {LARGEST_VALUE:g}. Correct it, or leave this feature out (--features)"
+            f"largest magnitude to learn from is {LARGEST_VALUE:g}. Correct it, or leave this feature out "
+            f"({option('features', python='columns')})"
         )
 
 

@@ -81,7 +81,7 @@ def values_of_labels(name: str, labels: Sequence[Mapping[str, str]], where: str)
         )
         raise ConfigError(
             f"no trial of {where} has a value {name!r}. {have}{suggestion(name, sorted(known))} A trial gets one "
-            "when it is recorded: collect --value, or a column of the manifest of an import"
+            "when it is recorded: `graspsense collect --value`, or a column of the manifest of an import"
         )
     if len(units) > 1:
         said = ", ".join(unit or "none" for unit in units)

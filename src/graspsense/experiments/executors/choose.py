@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 
+from graspsense.core.components.caller import option
 from graspsense.core.values.errors import ConfigError, suggestion
 from graspsense.experiments.executors.base import Executor
 
@@ -18,7 +19,7 @@ def chosen(asked: str | None, workers: int | None = None) -> Callable[[], Execut
     """
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     if workers is not None and workers < 1:
-        raise ConfigError(f"--workers {workers}: give at least 1")
+        raise ConfigError(f"{option('workers', str(workers))}: give at least 1")
     number = workers or cores
     name, _, address = (asked or ("processes" if number > 1 else "serial")).partition(":")
     if name not in NAMES or (address and name != "dask"):

@@ -11,6 +11,7 @@ from contextlib import suppress
 from importlib import import_module
 from typing import Any, Final, Literal
 
+from graspsense.core.components.caller import option
 from graspsense.core.values.errors import ConfigError, PluginUnavailable, named
 from graspsense.experiments.executors.base import ExecutorLost
 from graspsense.experiments.task import Task, TaskResult, run_task
@@ -74,7 +75,8 @@ class DaskCluster:
                 cause = cause.__cause__
             raise ConfigError(
                 f"no local Dask cluster can be started here: {named(error)} ({named(cause)}). Dask needs shared memory "
-                "(/dev/shm) and sockets of this machine. Use --executor processes, or name a running scheduler"
+                f"(/dev/shm) and sockets of this machine. Use {option('executor', 'processes')}, or name a running "
+                "scheduler"
             ) from error
 
     @property

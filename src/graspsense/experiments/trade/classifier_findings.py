@@ -103,12 +103,16 @@ def _text(base: ConditionResult, classifiers: Sequence[_Comparison], reduced: Se
     rate = f"{percent(base.rate.mean)} ({span(base.rate.interval)})"
     better = [f"{one.name} ({one.points} points)" for one in classifiers if one.is_better]
     needed = [f"{one.name.removeprefix(WITHOUT)} ({one.points} points)" for one in reduced if one.is_worse]
+    if len(base.by_seed) < 2:
+        return (
+            f"{base.classifier} recognises {rate}. With one seed, it cannot be told which classifiers differ."
+        )
     if better:
         text = f"Compared with {base.classifier} ({rate}), these classifiers are better: {', '.join(better)}."
     else:
-        text = f"No classifier is measurably better than {base.classifier} ({rate})."
+        text = f"No classifier is shown to be better than {base.classifier} ({rate})."
     if needed:
         text += f" Leaving out one of these features lowers the rate: {', '.join(needed)}."
     elif reduced:
-        text += " Leaving out any single feature does not measurably lower the rate."
+        text += " No single feature is shown to lower the rate where it is left out."
     return text

@@ -95,11 +95,13 @@ def _picture(series: Mapping[str, Sequence[TradePoint]], axis: str, title: str) 
     for k, (target, points) in enumerate(series.items()):
         ink = INKS[k % len(INKS)]
         on_front = sorted((point for point in points if point.on_front != "no"), key=lambda point: point.cost)
-        line = [(x(point.cost), y(100 * point.condition.rate.mean)) for point in on_front]
+        # Each target is shifted, so that equal rates at the same cost do not hide each other.
+        shift = 5.0 * (k - (len(series) - 1) / 2)
+        line = [(x(point.cost) + shift, y(100 * point.condition.rate.mean)) for point in on_front]
         with picture.plot(x, y, 24, 215):
             picture.line(line, ink, dash=DASHES[k % len(DASHES)])
             for point in points:
-                place = x(point.cost)
+                place = x(point.cost) + shift
                 interval = point.condition.rate.interval
                 if interval is not None:
                     low, high = (y(100 * rate) for rate in interval)

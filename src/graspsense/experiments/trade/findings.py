@@ -13,24 +13,13 @@ from graspsense.experiments.trade.sequential_findings import compare_sequential
 from graspsense.experiments.trade.trade_point import Advice
 from graspsense.report.wording import TARGETS
 
-NOTES: Final = {
-    "trade_noise": "Noise: above about 25 counts, a cell at the edge exceeds the threshold of a side impact (100 "
-    "counts) "
-    "through noise alone, and the controller ends the grasp. This causes the fall of the rate; the noise of the "
-    "features does not.",
-    "trade_next": "Next squeeze: the width alone rarely gives a sure answer, so one squeeze is almost always needed. "
-    "A second squeeze costs about a second for opening and closing. It adds little information, because the object "
-    "is in the same place and its stiffness blurs all squeezes in the same way.",
-    "trade_time": "Duration: before rest, p_first is the only known feature. The rate therefore rises as more grasps "
-    "come to rest.",
-    "trade_joint": "Speed, force, rest and squeezes: whole bottles are held out. A squeeze costs a complete approach, "
-    "and ends when the speed was below its limit for the rest window.",
-}
-"""Explanations that the tables do not contain, by experiment."""
+RULE: Final = (
+    "Recommended is the cheapest case that comes within 5 points of the best and is not shown to be worse, at 95 %, "
+    "corrected for the number of cases. Where no difference is shown, that is said, and the cheapest is taken."
+)
+"""The rule of all recommendations."""
 ONE_PROTOCOL: Final = (
-    "Each container is used in all of its states. If it is used in one state only, a container that is in training and "
-    "test gives its state away, and rates in stratified folds are higher (see the results of the paper). Section III.E "
-    "of the paper does not tell which was done."
+    "Each container is used in all of its states; the paper does not tell whether its bottles were."
 )
 
 
@@ -54,7 +43,7 @@ def findings(summary: Summary) -> Findings:
     controls = _controls_table(summary, titles)
     if controls is not None:
         tables.append(controls)
-    notes = [ONE_PROTOCOL, *(note for part, note in NOTES.items() if part in parts)]
+    notes = [ONE_PROTOCOL]
     if "trade_force" in reports:
         table, reasons = damage_table()
         tables.append(table)
@@ -119,8 +108,10 @@ def _headline(advice: Sequence[Advice]) -> str:
     parts = [
         f"to recognise {one.recognises}, "
         + (
-            "the result is inconclusive"
+            "it cannot be told which case to take"
             if one.recommended is None
+            else f"no difference is shown; take the cheapest, {one.recommended.name}"
+            if one.best_is_cheapest or (one.loss is not None and not one.shown)
             else f"{one.recommended.name} {'is best' if one.recommended is one.best else 'is enough'}"
         )
         for one in advice
@@ -143,8 +134,6 @@ def _advice_table(advice: Sequence[Advice]) -> FoundTable:
             "points below the best",
         ),
         rows=tuple(one.cells for one in advice),
-        note="Recommended is the cheapest case that loses less than 5 points against the best, at 95 %, corrected for "
-        "the number of cases; or the best one, if it is better than all cheaper ones. Otherwise the result is "
-        "inconclusive.",
-        numbers=3,
+        note=RULE,
+        numbers=4,
     )

@@ -10,7 +10,7 @@ from graspsense.experiments.findings import FoundTable, percent, span
 from graspsense.experiments.summary import ConditionResult
 from graspsense.experiments.trade.cost_findings import Report
 from graspsense.experiments.trade.next_squeeze import fixed_name
-from graspsense.experiments.trade.trade_point import TradePoint, mean_cost, trade_points
+from graspsense.experiments.trade.trade_point import ENOUGH, TradePoint, mean_cost, trade_points
 
 Saved = tuple[float, tuple[float, float]]
 
@@ -26,7 +26,7 @@ def compare_sequential(
         if point.condition is not fixed:
             difference, saved = point.condition.minus(fixed), _seconds_minus(point.condition, fixed)
         rows.append(_cells(point, difference, saved))
-        as_good = difference is not None and difference.value >= 0.0
+        as_good = difference is not None and difference.interval[0] > -ENOUGH
         if point.name.startswith("sequential") and as_good and saved is not None and saved[1][1] < 0.0:
             faster.append((point, saved))
     header = (
@@ -51,8 +51,8 @@ def _text(fixed: ConditionResult, fixed_n: float, faster: Sequence[tuple[TradePo
     seconds = mean_cost(fixed)
     if not faster:
         return (
-            f"A single squeeze of {fixed_n:g} N recognises {rate} in {seconds:.2f} s from contact. Choosing the "
-            "next squeeze does not reach this rate in less time, at any threshold."
+            f"A single squeeze of {fixed_n:g} N recognises {rate} in {seconds:.2f} s from contact. No threshold of "
+            "choosing the next squeeze is shown to reach this rate in less time."
         )
     point, (value, (low, high)) = min(faster, key=lambda pair: pair[1][0])
     return (

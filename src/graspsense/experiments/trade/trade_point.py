@@ -10,6 +10,7 @@ from typing import Final, Literal
 from attrs import frozen
 
 from graspsense.core.learn.labelled import class_of
+from graspsense.evaluation.equivalence import verdict_on
 from graspsense.evaluation.over_seeds import MeanDifference
 from graspsense.experiments.findings import percent, span
 from graspsense.experiments.summary import ConditionResult
@@ -44,10 +45,11 @@ class TradePoint:
 
 @frozen(kw_only=True)
 class Advice:
-    """The recommended case for one target, or None if the seeds do not decide.
+    """The recommended case for one target, or None if a single seed allows no comparison.
 
     `best` has the highest rate. `loss` is its rate minus that of the recommended case, corrected for all comparisons
-    with it; None if the recommended case is the best. `caution` is stated with every recommendation.
+    with it; None if the recommended case is the best. `shown` is whether the seeds show the loss to be small enough, or
+    the best to be above all cheaper cases. `caution` is stated with every recommendation.
     """
 
     title: str
@@ -56,6 +58,7 @@ class Advice:
     best: TradePoint
     loss: MeanDifference | None = None
     caution: str = ""
+    shown: bool = True
     best_is_cheapest: bool = False
 
     @property
@@ -68,21 +71,36 @@ class Advice:
     @property
     def text(self) -> str:
         """The recommendation in a sentence."""
-        to = f"To recognise {self.recognises}"
+        grasps, seeds = self.best.condition.rate.n, len(self.best.condition.by_seed)
+        to = f"To recognise {self.recognises}, from {grasps} grasps of each of {seeds} seeds"
         best = f"{self.best.name} at {self.best.cost:.3g} {self.axis}"
         caution = f"; {self.caution}" if self.caution else ""
         if self.recommended is None:
-            seeds = len(self.best.condition.by_seed)
             return (
-                f"{to}, the result is inconclusive: {best} has the highest rate, {self.best.rate_text}, but {seeds} "
-                f"seed{'' if seeds == 1 else 's'} show neither that a cheaper case is within 5 points of it nor that "
-                f"all are worse. No case is recommended{caution}."
+                f"{to}, it cannot be told which case to take: {best} has the highest rate, {self.best.rate_text}, and "
+                f"a single seed has no interval of a difference{caution}."
+            )
+        if self.loss is None and self.best_is_cheapest:
+            return (
+                f"{to}, no difference is shown; take the cheapest, {best}. Its rate is {self.best.rate_text}, and no "
+                f"case is shown to be better{caution}."
             )
         if self.loss is None:
-            why = "no case is cheaper" if self.best_is_cheapest else "it is above those of all cheaper cases"
+            why = (
+                "it is above those of all cheaper cases"
+                if self.shown
+                else f"no cheaper case comes within {100 * ENOUGH:g} points, although {seeds} seeds do not show that "
+                "all of them are worse"
+            )
             return f"{to}, use {best}: its rate is the highest, {self.best.rate_text}, and {why}{caution}."
         value, (low, high) = self.loss.value, self.loss.interval
         chosen = f"{self.recommended.name} at {self.recommended.cost:.3g} {self.axis}"
+        if not self.shown:
+            return (
+                f"{to}, no difference to the best is shown; take the cheapest, {chosen}. It has "
+                f"{self.recommended.rate_text}, and the best, {best}, {self.best.rate_text}. The loss is "
+                f"{100 * value:.1f} points ({100 * low:.1f} to {100 * high:.1f}){caution}."
+            )
         return (
             f"{to}, {chosen} is good enough: it has {self.recommended.rate_text}. The best, {best}, has "
             f"{self.best.rate_text}. The loss is {100 * value:.1f} points ({100 * low:.1f} to {100 * high:.1f}), below "
@@ -94,12 +112,14 @@ class Advice:
         """The row of a table."""
         best = percent(self.best.condition.rate.mean)
         if self.recommended is None:
-            return (self.title, self.recognises, "inconclusive", "", "", best, "")
+            return (self.title, self.recognises, "cannot be told", "", "", best, "")
         loss = "0" if self.loss is None else f"{100 * self.loss.value:.1f}"
         return (
             self.title,
             self.recognises,
-            self.recommended.name + (" (see the caution)" if self.caution else ""),
+            self.recommended.name
+            + (", no difference shown" if self.best_is_cheapest or (self.loss and not self.shown) else "")
+            + (" (see the caution)" if self.caution else ""),
             f"{self.recommended.cost:.3g} {self.axis}",
             percent(self.recommended.condition.rate.mean),
             best,
@@ -144,25 +164,28 @@ def mean_cost(condition: ConditionResult) -> float:
 
 
 def advise(points: Sequence[TradePoint], title: str, axis: str, caution: str = "") -> Advice:
-    """Return the cheapest case that is good enough; `points` are ordered from the cheapest.
+    """Return the cheapest case that comes within `ENOUGH` of the best; `points` are ordered from the cheapest.
 
-    The best case is recommended only if it is better than every cheaper one. Differences are corrected for the number
-    of cases that are compared with the best.
+    Its loss is below `ENOUGH`, and it is not shown to be worse; the advice says whether the loss is shown to be so
+    small, or no difference is shown. Differences are corrected for the number of cases that are compared with the best.
     """
     best = max(points, key=lambda point: point.condition.rate.mean)
     cheaper = list(itertools.takewhile(lambda point: point is not best, points))
     losses = [best.condition.minus(point.condition, max(len(points) - 1, 1)) for point in cheaper]
     for point, loss in zip(cheaper, losses, strict=True):
-        if loss is not None and loss.interval[1] < ENOUGH:
-            return Advice(title=title, axis=axis, recommended=point, best=best, loss=loss, caution=caution)
-    decided = all(loss is not None and loss.interval[0] > 0.0 for loss in losses)
-    decided = decided and best.condition.minus(best.condition) is not None
+        if loss is not None and loss.value < ENOUGH and verdict_on(loss.interval, ENOUGH) != "differs":
+            shown = loss.interval[1] < ENOUGH
+            return Advice(
+                title=title, axis=axis, recommended=point, best=best, loss=loss, caution=caution, shown=shown
+            )
+    compared = best.condition.minus(best.condition) is not None
     return Advice(
         title=title,
         axis=axis,
-        recommended=best if decided else None,
+        recommended=best if compared else None,
         best=best,
         caution=caution,
+        shown=bool(cheaper) and all(loss is not None and loss.interval[0] > 0.0 for loss in losses),
         best_is_cheapest=not cheaper,
     )
 

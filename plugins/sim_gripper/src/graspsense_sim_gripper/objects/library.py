@@ -135,11 +135,9 @@ def find(name: str) -> ObjectSpec:
     kind, _, state = name.partition(":")
     states = [n.partition(":")[2] for n in known if n.startswith(f"{kind}:")]
     if kind in known:
-        raise UnknownName(f"object {kind!r} has no states, but {name!r} names one. Write --object {kind}")
+        raise UnknownName(f"object {kind!r} has no states, but {name!r} names one. Write {kind}")
     if states and not state:
-        raise UnknownName(
-            f"object {kind!r} needs a state: {', '.join(states)}. Write --object {kind}:{states[0]}"
-        )
+        raise UnknownName(f"object {kind!r} needs a state: {', '.join(states)}. Write {kind}:{states[0]}")
     if states:
         raise UnknownName(
             f"object {kind!r} has no state {state!r}. Known: {', '.join(states)}.{suggestion(state, states)}"

@@ -13,7 +13,15 @@ from typing import Any, Final, NamedTuple
 from attrs import field, fields_dict, frozen
 from attrs.validators import ge, gt, in_, le
 
-from graspsense.plugin_api import ConfigError, TomlError, UnknownName, gives, suggestion, toml_values
+from graspsense.plugin_api import (
+    ConfigError,
+    TomlError,
+    UnknownName,
+    gives,
+    refuse_other_kind,
+    suggestion,
+    toml_values,
+)
 from graspsense_sim_gripper.objects.identified import check_identified
 from graspsense_sim_gripper.terms.registry import find_term, in_order
 from graspsense_sim_gripper.terms.term import not_dented
@@ -199,6 +207,7 @@ def parse_scene(text: str, name: str, where: str) -> ObjectSpec:
         line = f" in line {error.line}" if error.line else ""
         why = str(error).removeprefix("not TOML: ")
         raise ConfigError(f"{where}: is not valid TOML{line}: {why}") from error
+    refuse_other_kind(table, "scene", where)
     problems: list[str] = []
     values = {"name": name, "file": where, **_scene_values(table, problems)}
     terms = _scene_terms(table.get("terms", []), problems)

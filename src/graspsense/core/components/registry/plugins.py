@@ -31,7 +31,7 @@ from graspsense.core.components.entries import (
     PipelineEntry,
     Role,
 )
-from graspsense.core.components.firstparty import SHIPPED
+from graspsense.core.components.firstparty import EXAMPLES, SHIPPED
 from graspsense.core.components.registry.discovery import (
     PluginSource,
     builtin_source,
@@ -145,7 +145,7 @@ class Plugins:
         """
         hint = ""
         wanted, _, short = name.rpartition("/")
-        shipped = SHIPPED.get((role, short))
+        shipped = SHIPPED.get((role, short)) or EXAMPLES.get((role, short))
         present = {status.distribution for status in self._statuses}
         if (
             shipped

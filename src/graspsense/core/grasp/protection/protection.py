@@ -18,6 +18,7 @@ from graspsense.core.grasp.protection.cells import Fingertips
 from graspsense.core.grasp.protection.drift import Drift
 from graspsense.core.grasp.protection.effort_ceiling import effort_ceiling_n, limited
 from graspsense.core.grasp.protection.motor import Motor
+from graspsense.core.grasp.protection.pad_balance import PadBalance
 from graspsense.core.grasp.protection.reports import Reports
 from graspsense.core.grasp.protection.status import StatusWatch
 from graspsense.core.grasp.protection.stuck_force import StuckForce
@@ -71,7 +72,7 @@ class Protection:
         self._has_pads = "force_left" in rates and "force_right" in rates
         pads_hz = min(rates.get("force_left", 0.0), rates.get("force_right", 0.0))
         self._touch, self._drift = Touch(contact_n, run.first_effort_n, pads_hz), Drift(contact_n)
-        self._stuck = StuckForce(pads_hz)
+        self._stuck, self._balance = StuckForce(pads_hz), PadBalance()
         self._fingertips = Fingertips()
         self._motor = Motor("effort" in rates, info.rate_hz)
         self._status = StatusWatch(info.status_bits)
@@ -132,6 +133,8 @@ class Protection:
                 self._see(fault)
         elif phase in (SQUEEZE, HOLD):
             self._see(self._stuck.see(frame))
+            if phase == HOLD:
+                self._see(self._balance.see(frame))
 
     def _see(self, fault: Fault | None, phase: int = APPROACH) -> None:
         if fault is None:

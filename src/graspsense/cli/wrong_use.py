@@ -1,0 +1,67 @@
+"""What a user probably meant who typed a command that is refused."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from pathlib import Path
+
+import click
+
+
+def advice(error: Exception, arguments: Sequence[str]) -> list[str]:
+    """Return what to type instead of these arguments of the program, which were refused with this error."""
+    found = list(_split_options(arguments))
+    context = getattr(error, "ctx", None)
+    if not found and isinstance(error, click.UsageError) and context is not None:
+        found = list(_misplaced_words(context, arguments))
+    return found
+
+
+def _split_options(arguments: Sequence[str]) -> Iterator[str]:
+    """Yield the option for each `-o KEY VALUE` and `-o KEY= VALUE`, whose value belongs behind a `=`."""
+    for place, word in enumerate(arguments[:-2]):
+        key, *after = arguments[place + 1 : place + 4]
+        value = after[1] if after[0] == "=" and len(after) > 1 else after[0]
+        if word != "-o" or key.startswith("-") or value.startswith("-o"):
+            continue
+        if "=" not in key or key.endswith("="):
+            yield f"Write -o {key.rstrip('=')}={value.removeprefix('=')}, without a blank"
+
+
+def _misplaced_words(context: click.Context, arguments: Sequence[str]) -> Iterator[str]:
+    """Yield the option for each word that is no argument of the command, but may be the value of an option."""
+    command = context.command
+    options = {name for one in command.params if isinstance(one, click.Option) for name in one.opts}
+    words = (
+        list(arguments[arguments.index(str(context.info_name)) + 1 :])
+        if context.info_name in arguments
+        else []
+    )
+    with suppress(click.UsageError):
+        _, left, _ = command.make_parser(context).parse_args(words)
+        for word in left:
+            option = _option_for(word)
+            if option == "--object" and "--labels" in options:
+                option = "--labels"
+            if option in options and word[:1].isalpha():
+                yield f"Write {option} {word}"
+
+
+def _option_for(word: str) -> str:
+    """Return the option whose value this word probably is."""
+    if word.endswith(".toml"):
+        from graspsense.core.components.layers import read_layer
+        from graspsense.core.components.toml_kinds import toml_kind
+        from graspsense.core.values.errors import GraspsenseError
+
+        with suppress(GraspsenseError):
+            return "--object" if toml_kind(read_layer(Path(word)).values) == "scene" else "--pipeline"
+        return "--pipeline"
+    if "=" in word:
+        return "-o"
+    from graspsense.core.components.registry import installed
+
+    if word in {one.name for one in installed().components("sensor-backend")}:
+        return "--gripper"
+    return "--pipeline" if word in {one.name for one in installed().pipelines()} else "--object"

@@ -1,0 +1,30 @@
+"""How whoever calls gives an option: `--label COLUMN` to a command, `label=COLUMN` to a function."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+_commands = 0
+
+
+@contextmanager
+def command_line() -> Iterator[None]:
+    """Have messages inside this context name options as commands take them."""
+    global _commands
+    _commands += 1
+    try:
+        yield
+    finally:
+        _commands -= 1
+
+
+def option(name: str, value: str = "", *, python: str = "") -> str:
+    """Return an option as the caller gives it; `python` is its name as an argument, where that is another one.
+
+    >>> option("label", "COLUMN")
+    'label=COLUMN'
+    """
+    if _commands:
+        return f"--{name.replace('_', '-')}{f' {value}' if value else ''}"
+    return f"{python or name}{f'={value}' if value else ''}"

@@ -1,0 +1,77 @@
+"""Which kind of TOML file was named, so that a file in the place of another kind is told as such."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Final, NamedTuple
+
+from graspsense.core.components.entries import TABLE_OF_ROLE
+from graspsense.core.values.errors import ConfigError
+
+
+class TomlKind(NamedTuple):
+    """A kind of TOML file.
+
+    `called` is what it is, `place` what can be named where it is expected; `marks` are keys by which it is recognised,
+    `needed` those of which it must have one; `use` is a command that takes it.
+    """
+
+    called: str
+    place: str
+    marks: frozenset[str]
+    needed: frozenset[str]
+    use: str
+
+
+_PIPELINE: Final = frozenset({"extends", "run", *TABLE_OF_ROLE.values()})
+KINDS: Final[Mapping[str, TomlKind]] = {
+    "pipeline": TomlKind(
+        "a pipeline", "a pipeline", _PIPELINE, _PIPELINE, "graspsense run --pipeline {file}"
+    ),
+    "scene": TomlKind(
+        "a scene",
+        "a scene",
+        frozenset({"width_m", "terms", "mass_kg", "patch", "share", "friction", "offset_m", "identified"}),
+        frozenset({"width_m"}),
+        "graspsense run --object {file}",
+    ),
+    "experiment": TomlKind(
+        "an experiment",
+        "an experiment",
+        frozenset({"title", "question", "kind", "parts", "seeds", "sweep", "data", "judge", "variants"})
+        | (_PIPELINE - {"extends", "classifier"}),
+        frozenset({"title"}),
+        "graspsense experiment {file}",
+    ),
+    "manifest": TomlKind(
+        "a manifest",
+        "a recording, nor a manifest of recordings",
+        frozenset({"files", "list", "time", "gap", "force", "left", "right", "label", "rate_hz", "zero"}),
+        frozenset({"files", "list"}),
+        "graspsense import {file} --check",
+    ),
+}
+
+
+def toml_kind(values: Mapping[str, Any], expected: str = "") -> str:
+    """Return the kind of file that these top-level keys are of: the one that knows most of them.
+
+    It is `expected` where another kind fits no better, and also where none knows a key; without it, that is empty.
+    """
+
+    def fit(name: str) -> tuple[int, bool, bool]:
+        kind = KINDS[name]
+        return len(kind.marks & values.keys()), bool(kind.needed & values.keys()), name == expected
+
+    best = max(KINDS, key=fit)
+    return best if KINDS[best].marks & values.keys() else expected
+
+
+def refuse_other_kind(values: Mapping[str, Any], expected: str, file: str) -> None:
+    """Raise ConfigError if the content of a TOML file is that of another kind than expected."""
+    found = toml_kind(values, expected)
+    if found != expected:
+        kind = KINDS[found]
+        raise ConfigError(
+            f"{file} is {kind.called}, not {KINDS[expected].place}. Use it as in: {kind.use.format(file=file)}"
+        )

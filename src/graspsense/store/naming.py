@@ -1,0 +1,33 @@
+"""How a user names a store: by its folder, by `store:` and its folder, or by its SQLite file."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Final
+
+from graspsense.store.opening import FILE
+
+STORE: Final = "store:"
+
+
+def store_folder(text: str | os.PathLike[str]) -> str:
+    """Return the folder of a store, however it is named: `store:trials`, `trials`, `trials/store.sqlite`.
+
+    >>> store_folder("store:trials")
+    'trials'
+    """
+    name = os.fspath(text)
+    if name.startswith(STORE) and not Path(name).exists():
+        name = name.removeprefix(STORE)
+    path = Path(name).expanduser()
+    return str(path.parent) if path.name == FILE and path.is_file() else name
+
+
+def as_source(text: str) -> str:
+    """Return a source of trials or recordings with `store:` before the folder of a store; others as they are."""
+    folder, mark, number = text.partition("#")
+    if text.startswith(STORE):
+        return text
+    folder = store_folder(folder)
+    return f"{STORE}{folder}{mark}{number}" if (Path(folder).expanduser() / FILE).is_file() else text

@@ -1,0 +1,46 @@
+"""The answer of an experiment and the headline above it say the same, and of how many grasps."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import pytest
+
+from graspsense.experiments.answer import answer, headline
+from graspsense.experiments.summary import ConditionResult
+from graspsense.experiments.task_results import ClassifierResult
+
+
+def condition(name, *rates, n=100):
+    """Return a case with these rates of its seeds."""
+
+    def of(rate):
+        predicted = ["can:full"] * round(rate * n) + ["can:empty"] * (n - round(rate * n))
+        return ClassifierResult.of("c45", "both", "stratified_10_fold", ["can:full"] * n, predicted)
+
+    return ConditionResult(
+        case=SimpleNamespace(name=name, part="", learners=(), at={"force": name}),
+        classifier="c45",
+        target="both",
+        by_seed={seed: of(rate) for seed, rate in enumerate(rates)},
+        simulated=True,
+    )
+
+
+@pytest.mark.parametrize(
+    ("weak", "strong", "told", "above"),
+    [
+        ((0.50, 0.52, 0.51), (0.90, 0.91, 0.92), "20 N is better than 17 N", "highest rate"),
+        ((0.90, 0.91, 0.90), (0.905, 0.91, 0.91), "agree within 2 points", "No case is shown"),
+        ((0.50, 0.90, 0.70), (0.95, 0.60, 0.80), "cannot be told", "No case is shown"),
+        ((0.80,), (0.82,), "cannot be told", "No case is shown"),
+    ],
+)
+def test_an_answer_is_one_of_three_and_its_headline_agrees(weak, strong, told, above):
+    summary = SimpleNamespace(conditions=(condition("17 N", *weak, n=200), condition("20 N", *strong, n=200)))
+
+    assert told in answer(summary)
+    assert above in headline(summary)
+    for text in (answer(summary), headline(summary)):
+        assert "200 simulated grasps" in text
+        assert "best" not in text

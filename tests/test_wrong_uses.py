@@ -1,0 +1,221 @@
+"""What a user is told who types something else than what is meant: the words of each error lead to the right ones."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+from attrs import fields
+from hypothesis import given
+from hypothesis import strategies as st
+from kept import keep
+
+from graspsense import evaluate, load_pipeline, load_trials
+from graspsense.cli.main import main
+from graspsense.core.compiling import compile_notice
+from graspsense.core.components.config import resolve
+from graspsense.core.components.firstparty import EXAMPLES
+from graspsense.core.components.nearest_key import nearest_path
+from graspsense.core.components.strict import ValidationFailed, structured
+from graspsense.core.components.toml_kinds import KINDS, toml_kind
+from graspsense.core.learn.labelled import Labelled
+from graspsense.core.values.errors import ConfigError
+from graspsense.core.values.features import FeatureTable
+from graspsense.experiments.experiment import Experiment
+from graspsense.sources.manifest.description import Manifest
+from graspsense.store.naming import as_source, store_folder
+from graspsense.store.store import Store
+
+FILES = {
+    "pipe.toml": 'extends = "default"\n[controller]\nprobing_force_n = 15.0\n',
+    "scene.toml": 'width_m = 0.06\n[[terms]]\ntype = "elastic"\nk1_n_m = 2000.0\n',
+    "ex.toml": 'title = "x"\n[sweep]\n"controller.probing_force_n" = [17.0]\n',
+    "man.toml": 'files = "{label}.csv"\ntime = "t"\ngap = "g"\n',
+}
+
+
+@pytest.fixture
+def run(capsys, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    for name, text in FILES.items():
+        (tmp_path / name).write_text(text)
+
+    def run(*arguments):
+        with pytest.raises(SystemExit) as ended:
+            main([str(one) for one in arguments])
+        out, err = capsys.readouterr()
+        return ended.value.code or 0, out, err
+
+    return run
+
+
+@pytest.mark.parametrize(
+    ("typed", "meant"),
+    [
+        ("run -o probing_force_n=17", "'controller.probing_force_n'"),
+        ("run -o controler.probing_forc_n=17", "'controller.probing_force_n'"),
+        ("run -o gripper.probing_force_n=17", "'controller.probing_force_n'"),
+        ("run --gripper pr2 -o gripper.drop=0.2", "'gripper.faults.drop'"),
+        ("run -o gripper.transport=emulated", 'gripper.type = "pr2"'),
+        ("evaluate simulated -o probing_force_n=17", "'controller.probing_force_n'"),
+        ("experiment ex.toml -o trials=2 --dry-run", "'data.trials'"),
+        ("experiment ex.toml -o probing_force_n=17 --dry-run", "'controller.probing_force_n'"),
+        ("run -o controller.probing_force_n 17", "-o controller.probing_force_n=17"),
+        ("run -o controller.probing_force_n= 17", "-o controller.probing_force_n=17"),
+        ("run -o controller.probing_force_n = 17", "-o controller.probing_force_n=17"),
+        ("import a.csv --check -o run.seed 17", "-o run.seed=17"),
+        ("run can:empty_open", "--object can:empty_open"),
+        ("run scene.toml", "--object scene.toml"),
+        ("run pipe.toml", "--pipeline pipe.toml"),
+        ("run pr2", "--gripper pr2"),
+        ("collect can:empty_open", "--labels can:empty_open"),
+        ("run --pipeline scene.toml", "run --object scene.toml"),
+        ("run --object pipe.toml", "run --pipeline pipe.toml"),
+        ("run --pipeline ex.toml", "experiment ex.toml"),
+        ("experiment pipe.toml", "run --pipeline pipe.toml"),
+        ("import scene.toml --check", "run --object scene.toml"),
+        ("config validate man.toml", "import man.toml --check"),
+        ("evaluate man.toml", "manifest:"),
+        ("evaluate pipe.toml", "simulated"),
+        ("predict simulated default", "predict default simulated"),
+        ("run --gripper robotiq-2f85", "pip install -e ./examples/robotiq_2f85"),
+        ("run -o features.type=grasp-curve", "pip install -e ./examples/grasp_curve"),
+        ("evaluate x.csv", "--label COLUMN"),
+    ],
+)
+def test_the_right_words_are_told(run, typed, meant):
+    code, _, err = run(*typed.split())
+    assert code == 2
+    assert meant in err
+    assert "Traceback" not in err
+
+
+@given(st.text("abcdef_.", min_size=1, max_size=30), st.lists(st.text("abcdef_.", min_size=1), min_size=1))
+def test_the_nearest_path_is_one_that_there_is_and_a_known_path_is_its_own(found, known):
+    assert nearest_path(found, known) in ("", *known)
+    assert nearest_path(known[0], known).rpartition(".")[2] == known[0].rpartition(".")[2]
+
+
+def test_a_kind_of_file_is_recognised_by_keys_that_it_has():
+    assert KINDS["experiment"].marks <= {one.name for one in fields(Experiment)}
+    assert KINDS["manifest"].marks <= {one.name for one in fields(Manifest)}
+    assert toml_kind({"features": {}}, "pipeline") == "pipeline"
+    assert toml_kind({"nonsense": 1}, "scene") == "scene"
+
+
+def test_every_component_of_an_example_is_known_by_its_folder():
+    for (_, name), example in EXAMPLES.items():
+        plugin = Path(__file__).parents[1] / "examples" / example.folder
+        assert f'name="{name}"' in next(plugin.glob("src/*/plugin.py")).read_text()
+        assert f'name = "{example.distribution}"' in (plugin / "pyproject.toml").read_text()
+
+
+def test_a_scene_without_terms_is_refused(run, tmp_path):
+    (tmp_path / "bare.toml").write_text("width_m = 0.06\n")
+    code, _, err = run("run", "--object", "bare.toml")
+    assert (code, "[[terms]]" in err) == (2, True)
+
+
+def test_a_value_of_several_types_is_asked_for_in_words():
+    with pytest.raises(ValidationFailed) as refused:
+        structured({"title": "x", "seeds": "a"}, Experiment, "an experiment")
+    (problem,) = refused.value.problems
+    assert "a whole number or a list" in problem.text
+
+
+@pytest.mark.parametrize("name", ["{}", "store:{}", "{}/store.sqlite"])
+def test_a_store_may_be_named_in_every_way(run, tmp_path, name):
+    folder = tmp_path / "trials"
+    with Store.open(folder) as store:
+        for k in range(12):
+            label = ("can:full_open", "can:empty_open")[k % 2]
+            keep(store, label, values=(0.066 + 0.001 * (k % 3), 5.0 + k % 2))
+    named = name.format(folder)
+    assert store_folder(named) == str(folder)
+    assert as_source(named) == f"store:{folder}"
+    assert len(load_trials(named)) == 12
+    for command in (
+        ("verify", named),
+        ("trials", "list", named),
+        ("evaluate", named, "--folds", "2"),
+        ("compare", named, "--folds", "2", "--classifiers", "c45,tree"),
+        ("train", named, "--out", "model.json"),
+        ("predict", "model.json", named),
+        ("export", named, "--to", "table.csv"),
+        ("report", named, "--folds", "2", "--out", "page"),
+        ("recover", named),
+    ):
+        assert run(*command)[0] == 0, command
+
+
+def test_folds_are_refused_before_the_first_grasp(run, monkeypatch):
+    monkeypatch.setattr("graspsense.sources.trial_source.simulated", lambda *_, **__: pytest.fail("grasped"))
+    few = ("simulated", "--objects", "can:full_open,can:empty_open", "--instances", "1", "--trials", "1")
+    for command in (("evaluate", *few), ("compare", *few)):
+        code, _, err = run(*command, "--folds", "40")
+        assert (code, "2 trials cannot be split into 40 folds" in err) == (2, True)
+        assert run(*command, "--folds", "1")[0] == 2
+
+
+def test_options_in_python_are_a_list():
+    for ask in (load_pipeline, resolve):
+        with pytest.raises(ConfigError, match="a list of texts"):
+            ask(options="run.seed=3")
+
+
+def test_an_error_in_python_names_arguments_and_not_options_of_commands(tmp_path):
+    (tmp_path / "x.csv").write_text("what,a\nx,1\ny,2\n")
+    with pytest.raises(ConfigError) as refused:
+        load_trials(str(tmp_path / "x.csv"))
+    assert "label=COLUMN" in str(refused.value)
+    assert "--" not in str(refused.value)
+
+
+def some_trials(values):
+    labels = tuple(("a", "b")[k % 2] for k in range(len(values)))
+    table = FeatureTable(names=("f",), units=("N",), values=np.array(values, float).reshape(-1, 1))
+    return Labelled(source="trials", table=table, labels=labels)
+
+
+def test_the_classifier_of_an_evaluation_is_named_once():
+    found = evaluate("c45", some_trials([1.0, 2.0] * 6), folds=2, permutations=1)
+    assert found.classifier.startswith("graspsense-c45/c45 ")
+    assert found.headline.rate == 1.0
+
+
+def test_trials_without_any_feature_have_no_rate():
+    with pytest.raises(ConfigError, match="no feature is defined in any of the 12 trials"):
+        evaluate("c45", some_trials([np.nan] * 12), folds=2)
+
+
+def test_a_long_compilation_is_told_and_a_short_one_is_not():
+    told = []
+    before = compile_notice._said
+    compile_notice.tell_compiling(told.append)
+    try:
+        compile_notice.compiling_begins("stored_grasp", 60_000)
+        compile_notice.compiling_begins("seed_state", 1_000)
+    finally:
+        compile_notice.tell_compiling(before)
+    (line,) = told
+    assert "compiling stored grasp" in line
+    assert "60 s" in line
+
+
+def test_a_warning_of_a_library_is_a_note_in_one_line(run, monkeypatch):
+    from graspsense.cli import main as program
+
+    def noisy(*_):
+        warnings.warn_explicit("raw words\nadvice to programmers", UserWarning, "/x/sklearn/base.py", 7)
+        raise ConfigError("then this")
+
+    monkeypatch.setattr(program.cli, "make_context", noisy)
+    with warnings.catch_warnings():
+        warnings.simplefilter("always")
+        code, _, err = run("devices")
+    assert code == 2
+    assert "note: sklearn remarks: raw words" in err
+    assert "base.py" not in err
+    assert "advice" not in err
