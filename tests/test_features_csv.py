@@ -72,7 +72,7 @@ def test_what_counts_as_missing(csv, gap):
         (
             GOOD.replace("a,0.05,6", "a,0.05", 1),
             DataDamaged,
-            "line 2: 2 values, but the header names 3 columns",
+            "line 2: 2 values, but there are 3 columns",
         ),
         (
             GOOD.replace("a,0.05,6", "a,wide,6", 1),

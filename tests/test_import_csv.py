@@ -108,7 +108,7 @@ def test_a_name_that_makes_no_sense_is_told(squeeze, query, says):
     ("line", "says"),
     [
         ("5000;1;1;1;x", "line 4: the time goes from .* it must increase"),
-        ("5002;;1;1;x", r"line 4: the gap is missing"),
+        ("5002;inf;1;1;x", r"line 4: the gap is missing or infinite"),
         ("5002;wide;1;1;x", r"opening \(gap\) is not a column of numbers: line 4 has 'wide'"),
         ("5002;1;1;1", "line 4: 4 values, but there are 5 columns"),
     ],

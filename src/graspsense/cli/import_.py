@@ -25,6 +25,7 @@ LISTED: Final = 20
 """Largest number of unreadable recordings whose errors are printed; `--json` lists all."""
 TIMEOUTS: Final = ("move_timeout_s", "steady_timeout_s")
 """Settings of a controller that would end a grasp before its recording does."""
+PICTURE: Final = "import-check.png"
 FEW: Final = 3
 """Largest number of recordings that are printed one by one."""
 
@@ -35,6 +36,7 @@ FEW: Final = 3
 )
 @click.option("--save", metavar="DIR", help="Store for the trials.")
 @click.option("--check", is_flag=True, help="Only print what was understood, and draw one grasp.")
+@click.option("--suggest", metavar="FILE.toml", help="Write a manifest for the folder SOURCES, to correct.")
 @click.option(
     "--plot",
     metavar="FILE.png",
@@ -73,6 +75,7 @@ def import_(
     sources: tuple[str, ...],
     save: str | None,
     check: bool,
+    suggest: str | None,
     plot: str | None,
     label: str | None,
     time: str | None,
@@ -89,10 +92,14 @@ def import_(
     MANIFEST.toml names the files, their labels and their columns (docs/import.md). A FILE.csv is one grasp and needs
     --time, --gap and --force. KIND:NAME is a file of another reader, or the folder of a data set.
     """
-    from graspsense.core.values.errors import ConfigError, DataDamaged
+    from graspsense.cli.import_check import show_files, suggest_manifest
+    from graspsense.core.values.errors import ConfigError, DataDamaged, GraspsenseError
     from graspsense.sources.import_sources import is_csv, recordings_to_import
     from graspsense.store.labels import labels_of
 
+    if suggest is not None:
+        suggest_manifest(sources, suggest)
+        return
     given = _columns({"time": time, "gap": gap, "effort": effort, "velocity": velocity}, forces)
     for source in sources:
         if given and not is_csv(source):
@@ -106,12 +113,17 @@ def import_(
     if label is not None:
         labels_of(label)  # what is not a label is refused as such, before any file is read
     chosen = _Chosen(pipeline, options)
-    recordings, unreadable = recordings_to_import(sources, given, label)
+    try:
+        recordings, unreadable = recordings_to_import(sources, given, label)
+    except GraspsenseError:
+        if check and not given and show_files(sources, plot or PICTURE, as_json):
+            return
+        raise
     if not recordings:
         raise ConfigError(f"{', '.join(sources)}: no recordings")
     chosen.fit(recordings)
     if save is None or check:
-        _show(recordings, unreadable, chosen, Path(plot or "import-check.png"), as_json)
+        _show(recordings, unreadable, chosen, Path(plot or PICTURE), as_json)
     else:
         _import(save, recordings, unreadable, chosen, as_json)
     if unreadable:
@@ -292,6 +304,7 @@ def _show(
     """Print what was understood of the recordings, and draw one of them."""
     from attrs import asdict
 
+    from graspsense.cli.import_check import echo_channels
     from graspsense.cli.run import draw_grasp
     from graspsense.core.components.registry import installed
     from graspsense.core.pipeline.pipeline import grasp_with
@@ -305,6 +318,7 @@ def _show(
         echo_json({**asdict(summary), "unreadable": failed, "thresholds": chosen.words})
     else:
         _echo_summary(summary)
+        echo_channels(summary.measured)
         echo_entry("thresholds", chosen.words.partition(": ")[2])
         _echo_notices(summary, err=False)
     middle = recordings[len(recordings) // 2]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final, TypedDict
 
 from graspsense.core.components.registry import installed
 from graspsense.core.learn.labelled import ControlFeatures
-from graspsense.recording.before_contact import SPAN_S
+from graspsense.recording.before_contact import NAMES, SPAN_S
 
 if TYPE_CHECKING:
     from graspsense.core.values.features import FeatureTable
@@ -45,11 +45,19 @@ def controls(
     `before_contact` holds features of the same trials from before contact, None with the reason in `no_before`.
     `before_what` says what these are, and `before_missing` why a trial has none of them. `first_line` holds the numbers
     of the first frame of trials that were imported. `width_meaning` says what the width means in these data. The width
-    is the feature that an installed feature set declares as such.
+    is the feature that an installed feature set declares as such, unless the gap does not change.
     """
     name = width_feature(table.names)
-    width = None
-    if name is not None:
+    width, no_width = None, "none of the features is declared to be the width"
+    if (
+        name is not None
+        and before_contact is not None
+        and _is_gap_at_start(table.columns([name]), before_contact)
+    ):
+        no_width = (
+            f"{name} is the gap at the start in every trial: the gap does not change, so it tells no width"
+        )
+    elif name is not None:
         what = f"{name} alone" + (f": {width_meaning}" if width_meaning else "")
         width = ControlFeatures(table=table.columns([name]), what=what)
     return Controls(
@@ -59,8 +67,22 @@ def controls(
         no_before_contact=no_before if before_contact is None else "",
         first_line=None if first_line is None else ControlFeatures(table=first_line, what=FIRST_LINE),
         width=width,
-        no_width="" if width is not None else "none of the features is declared to be the width",
+        no_width="" if width is not None else no_width,
     )
+
+
+def without_width(found: Controls, why: str) -> Controls:
+    """Return controls without the width of the object, with the reason."""
+    return Controls(**{**found, "width": None, "no_width": why})
+
+
+def _is_gap_at_start(width: FeatureTable, before: FeatureTable) -> bool:
+    """Return whether the gap at the contact is exactly that at the start in every trial with an approach."""
+    if NAMES[0] not in before.names:
+        return False
+    start, gap = before.columns([NAMES[0]]).values, width.values
+    known = (start == start) & (gap == gap)
+    return bool(known.any()) and bool((start[known] == gap[known]).all())
 
 
 def width_feature(names: Sequence[str]) -> str | None:

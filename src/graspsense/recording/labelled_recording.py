@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from attrs import field, frozen
 
 from graspsense.core.values.errors import GraspsenseError
+from graspsense.core.values.label_text import label_text
 from graspsense.recording.replayable import Recording
 
 
@@ -23,8 +24,8 @@ class LabelledRecording:
 
     recording: Recording
     source: str
-    label: str = ""
-    instance: str = ""
+    label: str = field(default="", converter=label_text)
+    instance: str = field(default="", converter=label_text)
     recorded_at: str = ""
     order: float | None = None
     values: Mapping[str, float] = field(factory=dict)

@@ -25,6 +25,7 @@ DEFAULT_LIMIT_MB: Final = 512
 """An hour of a gripper at 1 kHz, or 60 million numbers of another program."""
 _MB: Final = 1_000_000
 _PIECE: Final = 1 << 20
+_GZIP: Final = zlib.MAX_WBITS | 16
 
 
 def limit_mb() -> int:
@@ -64,7 +65,7 @@ class Unpacked:
         self.total += size
 
     def unpack(self, compression: str, data: bytes) -> bytes:
-        """Return what compressed data holds; `compression` is `zstd`, `lz4`, `bz2`, `zlib` or empty.
+        """Return what compressed data holds; `compression` is `zstd`, `lz4`, `bz2`, `zlib`, `gzip` or empty.
 
         Raises TooLarge, ValueError, and what the library raises on damaged data.
         """
@@ -89,14 +90,17 @@ def _pieces_of(decompressor: Any, data: bytes) -> Iterator[bytes]:
         yield part
 
 
-def _pieces_of_zlib(data: bytes) -> Iterator[bytes]:
-    stream = zlib.decompressobj()
-    while not stream.eof:
-        part = stream.decompress(data, _PIECE)
-        data = stream.unconsumed_tail
-        if not part and not data:
-            raise ValueError("the compressed data ends early")
-        yield part
+def _pieces_of_zlib(data: bytes, window: int = zlib.MAX_WBITS) -> Iterator[bytes]:
+    """Yield what the data holds; a file of gzip may hold several streams one after the other."""
+    while data:
+        stream = zlib.decompressobj(window)
+        while not stream.eof:
+            part = stream.decompress(data, _PIECE)
+            data = stream.unconsumed_tail
+            if not part and not data:
+                raise ValueError("the compressed data ends early")
+            yield part
+        data = stream.unused_data if window == _GZIP else b""
 
 
 def _pieces_of_zstd(data: bytes) -> Iterator[bytes]:
@@ -111,6 +115,7 @@ def _pieces_of_zstd(data: bytes) -> Iterator[bytes]:
 
 _PIECES: Final[Mapping[str, Callable[[bytes], Iterator[bytes]]]] = {
     "zlib": _pieces_of_zlib,
+    "gzip": lambda data: _pieces_of_zlib(data, _GZIP),
     "zstd": _pieces_of_zstd,
     "lz4": lambda data: _pieces_of(lz4.frame.LZ4FrameDecompressor(), data),
     "bz2": lambda data: _pieces_of(bz2.BZ2Decompressor(), data),

@@ -16,9 +16,10 @@ from graspsense.core.files.csv_text import text_of_cell
 from graspsense.core.files.limits import CELLS, CHANNEL_NUMBERS
 from graspsense.core.values.channel import Channel, FastChannel, TactileArray
 from graspsense.core.values.errors import ConfigError, DataDamaged
+from graspsense.core.values.written_numbers import NotNumbers, columns_of_numbers
 from graspsense.recording.export_trace import beside, declared_beside
 from graspsense.recording.layout import PADS_TOPIC, SCALARS_TOPIC, SIGNAL_TOPIC, TICK_FIELDS
-from graspsense.sources.csv_columns import check_columns, check_lines, text_of
+from graspsense.sources.text_table import check_columns, check_lines, text_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -145,8 +146,15 @@ def _columns(path: Path) -> Columns:
         check_columns(path, names)
         if too_many := CELLS.exceeded(text.count("\n") * len(names)):
             raise DataDamaged(f"{path}: {too_many}")
-        values = [[float(cell) if cell else float("nan") for cell in row] for row in rows]
-        table = np.array(values, dtype=np.float64).reshape(len(values), len(names))
+        cells = list(zip(*rows, strict=True)) or [()] * len(names)
+        columns = columns_of_numbers(
+            {text_of_cell(name): column for name, column in zip(names, cells, strict=True)}
+        )
     except (ValueError, csv.Error) as error:
         raise DataDamaged(f"{path} is not as `graspsense export` writes it: {error}") from error
-    return {text_of_cell(name): table[:, i] for i, name in enumerate(names)}
+    numbers: Columns = {}
+    for name, found in columns.items():
+        if isinstance(found, NotNumbers):
+            raise DataDamaged(f"{path}, line {found.row + 2}: {name} is {found.words}")
+        numbers[name] = found
+    return numbers

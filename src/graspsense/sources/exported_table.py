@@ -10,7 +10,8 @@ import numpy as np
 from attrs import evolve
 
 from graspsense.core.values.errors import DataDamaged
-from graspsense.sources.csv_columns import CsvColumns, is_missing
+from graspsense.core.values.label_text import is_missing_label
+from graspsense.sources.csv_columns import CsvColumns
 from graspsense.store.export_table import ABOUT, ABOUT_BEFORE, BEFORE, FIRST, VALUE
 from graspsense.store.store import NOT_ENDED
 from graspsense.store.time_recorded import order_recorded
@@ -38,7 +39,7 @@ class ExportedTable:
         rows = list(range(len(columns)))
         if label is not None:
             cells = columns.column(label, "the label")
-            rows = _kept(rows, [not is_missing(cell) for cell in cells], "they have no label", notes)
+            rows = _kept(rows, [not is_missing_label(cell) for cell in cells], "they have no label", notes)
         ended = [outcome not in NOT_ENDED for outcome in columns.cells["outcome"]]
         rows = _kept(rows, ended, "they did not end by themselves", notes)
         if "complete" in self.about:
@@ -65,7 +66,7 @@ class ExportedTable:
         else:
             keys = ("recorded_at", "order")
             labels = [
-                json.dumps({key: cells[key][i] for key in keys if not is_missing(cells[key][i])})
+                json.dumps({key: cells[key][i] for key in keys if not is_missing_label(cells[key][i])})
                 for i in range(len(self.columns))
             ]
         return order_recorded(cells["made_at"], cells["origin"], labels)

@@ -18,9 +18,11 @@ from graspsense.core.learn.labelled import Labelled
 from graspsense.core.learn.target_value import TargetValue
 from graspsense.core.values.errors import ConfigError, DataDamaged, listed
 from graspsense.core.values.features import UNKNOWN, FeatureTable
+from graspsense.core.values.label_text import is_missing_label, label_text
+from graspsense.core.values.written_numbers import is_missing
 from graspsense.recording.atomic_file import write_or_replace
 from graspsense.recording.controls import Controls, controls
-from graspsense.sources.csv_columns import CsvColumns, is_missing
+from graspsense.sources.csv_columns import CsvColumns
 from graspsense.sources.exported_table import ExportedTable, exported
 
 
@@ -46,16 +48,16 @@ def read_labelled(
     Raises ConfigError if a column does not exist or cannot be a label, DataDamaged if the file is not a valid table.
     """
     columns = CsvColumns(path)
-    notes: list[str] = []
+    notes = list(columns.notes)
     export = exported(columns)
     if export is not None:
         label = label or "label"
         export.keep_complete_trials(label if value is None else None, notes)
-        if instance is None and not any(map(is_missing, columns.cells["instance"])):
+        if instance is None and not any(map(is_missing_label, columns.cells["instance"])):
             instance = "instance"
         features = features or export.features
     target = None if value is None else _target(columns, value, export, notes)
-    labels = _labels(columns, label) if target is None else _texts(columns, label)
+    labels = _labels(columns, label, notes) if target is None else _texts(columns, label)
     instances = None if instance is None else tuple(columns.complete_column(instance, "the instance"))
     reserved = {name for name in (label, instance, order, value) if name}
     table = _feature_table(columns, features, reserved, notes)
@@ -137,12 +139,17 @@ def write_labelled(path: Path, labelled: Labelled) -> None:
     write_or_replace(path, csv_text([[*extra, *headings], *rows]).encode())
 
 
-def _labels(columns: CsvColumns, label: str | None) -> list[str]:
+def _labels(columns: CsvColumns, label: str | None, notes: list[str]) -> list[str]:
     if label is None:
         raise ConfigError(
             f"which column of {columns.path} holds the label? Name it: {option('label', 'COLUMN')}"
         )
-    labels = columns.complete_column(label, "the label")
+    written = columns.complete_column(label, "the label")
+    labels = [label_text(one) for one in written]
+    if words := sorted({one for one in labels if is_missing(one)}):
+        notes.append(f"taken as labels, not as missing ones: {listed(words)}")
+    if len(set(written)) > len(set(labels)):
+        notes.append("labels that differ in invisible characters, or as 1 and 1.0 do, count as one")
     if len(set(labels)) > max(2, len(labels) // 2):
         raise ConfigError(
             f"column {label!r} of {columns.path} has {len(set(labels))} different values in {len(labels)} trials, so "
@@ -190,8 +197,10 @@ def _feature_table(
 def _feature_names(columns: CsvColumns, reserved: set[str], notes: list[str]) -> list[str]:
     """Return the columns of numbers that are neither reserved nor counters. Raises ConfigError, DataDamaged."""
     names, texts, counters, blank = [], [], [], []
+    if columns.index:
+        notes.append(f"not used, because it is the index that pandas wrote: {columns.index}")
     for name in columns.names:
-        if name in reserved:
+        if name in reserved or name == columns.index:
             continue
         if columns.is_blank(name) and not columns.units[name]:
             blank.append(name)

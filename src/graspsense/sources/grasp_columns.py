@@ -20,14 +20,16 @@ if TYPE_CHECKING:
 
     Numbers = NDArray[np.float64]
 
+LARGE_LOSS: Final = 0.05
+"""Share of the samples beyond which leaving them out is told as a warning, and not advised."""
 PLAUSIBLE: Final = {
-    "gap": (-0.05, 0.5, "m", "mm"),
-    "force": (-2000.0, 2000.0, "N", "mN"),
-    "effort": (-5000.0, 5000.0, "N", "mN"),
-    "velocity": (-5.0, 5.0, "m/s", "mm/s"),
-    "time between samples": (0.0, 1.0, "s", "ms"),
+    "gap": (-0.05, 0.5, "m", {"mm": 1e-3, "um": 1e-6}),
+    "force": (-2000.0, 2000.0, "N", {"mN": 1e-3}),
+    "effort": (-5000.0, 5000.0, "N", {"mN": 1e-3}),
+    "velocity": (-5.0, 5.0, "m/s", {"mm/s": 1e-3}),
+    "time between samples": (0.0, 1.0, "s", {"ms": 1e-3, "us": 1e-6, "ns": 1e-9}),
 }
-"""Quantity to its plausible range, the unit of that, and the unit that a column out of range is most likely in."""
+"""Quantity to its plausible range, the unit of that, and the units that a column out of range is most likely in."""
 
 
 @frozen(kw_only=True, eq=False)
@@ -53,6 +55,8 @@ class GraspColumns:
     """Those of `arrays` that are the samples of a fast channel."""
     units: Mapping[str, str] = field(factory=dict)
     notes: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+    """What looks wrong, found while the columns were read."""
     lines: NDArray[np.int64] | None = None
     """The line of each sample in a text file."""
 
@@ -88,12 +92,34 @@ class GraspColumns:
         )
 
 
+def without_missing(columns: GraspColumns) -> GraspColumns:
+    """Return the samples that have a time, a gap and both forces; all of them if most lack one."""
+    needed = (columns.t_s, columns.gap_m, columns.left_n, columns.right_n)
+    known: NDArray[np.bool_] = np.logical_and.reduce([~np.isnan(one) for one in needed])
+    if known.all() or 2 * int(known.sum()) < len(known):
+        return columns
+    return only(columns, known, f"without a number ({columns.place(int(np.argmin(known)))})")
+
+
+def only(columns: GraspColumns, kept: NDArray[np.bool_], what: str) -> GraspColumns:
+    """Return the samples that are kept, with a note on the others, and a warning if they are many."""
+    lost = int((~kept).sum())
+    words = f"{lost} samples {what} were dropped, of {len(kept)}"
+    large = lost > LARGE_LOSS * len(kept)
+    rows = columns.rows(kept)
+    return evolve(
+        rows, notes=(*rows.notes, words), warnings=(*rows.warnings, words) if large else rows.warnings
+    )
+
+
 @np.errstate(all="ignore")  # what is infinite, or too large, is refused in words
 def checked_recording(columns: GraspColumns, *, rate_hz: float | None = None) -> Recording:
     """Return the recording that these columns are; `rate_hz` is that of a single sample.
 
-    Raises DataDamaged if a value is missing, if the time does not increase, or if a value is in another unit.
+    Samples without a number are left out, with a note. Raises DataDamaged if most have none, if the time does not
+    increase, or if a value is in another unit.
     """
+    columns = without_missing(columns)
     steps = _time_steps(columns, rate_hz)
     _check_complete(columns)
     _check_plausible(columns, "gap", "gap", columns.gap_m)
@@ -134,9 +160,34 @@ def check_increasing(columns: GraspColumns) -> None:
         before, after = columns.t_s[k].item(), columns.t_s[k + 1].item()
         raise DataDamaged(
             f"{columns.source}, {columns.place(k + 1)}: the time goes from {before!r} to {after!r}; it must increase. "
-            'If rows are repeated, write duplicates = "drop" in the manifest; if they come from several grasps, split '
-            "the file"
+            + _advice_on_times(columns.t_s)
         )
+
+
+def _advice_on_times(t_s: Numbers) -> str:
+    """Return what to do about times that do not increase, as far as it would help: it is tried on these times."""
+    split = 'If the rows come from several grasps, split the file by a column: split = "COLUMN"'
+    steps = np.diff(t_s)
+    if bool((steps < 0.0).any()) or not t_s[-1] > t_s[0]:
+        return split
+    new = 1 + int((steps > 0.0).sum())
+    lost = len(t_s) - new
+    if lost <= LARGE_LOSS * len(t_s):
+        return (
+            f'If rows are repeated, write duplicates = "drop" in the manifest, which leaves out {lost} of {len(t_s)}. '
+            + split
+        )
+    stamps, begins = np.unique(t_s, return_index=True)
+    whole = (
+        slice(1, None) if len(stamps) > 2 else slice(None)
+    )  # the first stamp may have begun before the recording
+    rate_hz = float(np.ptp(begins[whole]) / np.ptp(stamps[whole]))
+    resolution = float(np.diff(stamps).min())
+    return (
+        f"The times are stamps with a resolution of {resolution:g} s, and {lost} of {len(t_s)} rows have that of the "
+        f"row before, so no row is a repetition. If the rows were taken at a steady rate, leave out time and write "
+        f"rate_hz = {rate_hz:.3g}"
+    )
 
 
 def _check_complete(columns: GraspColumns) -> None:
@@ -155,15 +206,24 @@ def _check_plausible(columns: GraspColumns, quantity: str, unit_of: str, *values
     """Raise DataDamaged if a value is far from those of any gripper, as it is in another unit."""
     if columns.units.get(unit_of, "") or not values:
         return
-    low, high, unit, other = PLAUSIBLE[quantity]
+    low, high, unit, others = PLAUSIBLE[quantity]
     every = np.concatenate(values)
     extreme = float(every[int(np.argmax(np.maximum(every - high, low - every)))])
-    if not low <= extreme <= high:
-        counts = ", in counts [counts]" if quantity == "force" else ""
-        raise DataDamaged(
-            f"{columns.source}: the {quantity} reaches {extreme:g} {unit}, which no gripper has. Plausible is "
-            f"{low:g} to {high:g} {unit}. If the column is in {other}, write its unit behind it: [{other}]{counts}"
-        )
+    if low <= extreme <= high:
+        return
+    advice = [
+        f"in {one}, write its unit behind it: [{one}]"
+        for one, f in others.items()
+        if low <= f * extreme <= high
+    ]
+    advice = advice[:1] or ["in another unit, multiply it by its factor"]
+    if quantity == "force":
+        advice += ["in counts [counts]"]
+        advice += ["in gram-force [gf]"] if bool((every == np.round(every)).all()) else []
+    raise DataDamaged(
+        f"{columns.source}: the {quantity} reaches {extreme:g} {unit}, which no gripper has. Plausible is "
+        f"{low:g} to {high:g} {unit}. If the column is {', '.join(advice)}"
+    )
 
 
 def _units(units: Mapping[str, str]) -> dict[str, str]:

@@ -87,7 +87,7 @@ def _expression(table: ColumnTable, quantity: str, text: str) -> Expression:
     known = (*table.numbers, *table.texts)
     if text in known or (star and name in known):
         name, text = (text, f"'{text}'") if text in known else (name, f"'{name}'*{factor}")
-        if name in table.texts:
+        if name in table.texts and name not in table.numbers:
             where = table.not_numbers.get(name, f"it has {table.texts[name][0][:40]!r}")
             raise DataDamaged(f"{table.source}: {name} ({quantity}) is not a column of numbers: {where}")
     try:

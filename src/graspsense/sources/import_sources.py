@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -9,6 +10,7 @@ from pathlib import Path
 from attrs import evolve, frozen
 
 from graspsense.core.values.errors import ConfigError
+from graspsense.recording.export_trace import declared_beside
 from graspsense.recording.labelled_recording import LabelledRecording, UnreadableRecording
 from graspsense.recording.readable import each_readable, error_of_all
 from graspsense.sources.dataset_recordings import (
@@ -19,9 +21,10 @@ from graspsense.sources.dataset_recordings import (
 )
 from graspsense.sources.grasp_csv import named
 from graspsense.sources.replay import KINDS, kind_and_name, read_named
+from graspsense.sources.text_table import JSON_LINES, text_suffix
 from graspsense.store.labels import labels_of
 
-CSV_SUFFIXES = (".csv", ".tsv", ".txt")
+CSV_SUFFIXES = (".csv", ".tsv", ".txt", *JSON_LINES)
 KIND_OF = {".npz": "npz", ".parquet": "parquet", ".mcap": "mcap", ".bag": "rosbag"}
 """The kind of a file whose name has no kind before it, by its ending."""
 
@@ -37,7 +40,15 @@ class ImportedRecording:
 
 def is_csv(source: str) -> bool:
     """Return whether a source is a CSV file whose columns options name."""
-    return source.lower().endswith(CSV_SUFFIXES) and ":" not in source
+    return text_suffix(Path(source)) in CSV_SUFFIXES and ":" not in source
+
+
+def is_plain_file(source: str) -> bool:
+    """Return whether a source is a file of samples, or a bag, of another program."""
+    path = Path(source).expanduser()
+    if os.path.isdir(path):
+        return os.path.isfile(path / "metadata.yaml")
+    return os.path.isfile(path) and path.suffix.lower() != ".toml" and not declared_beside(path).exists()
 
 
 def recordings_to_import(

@@ -2,14 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from attrs import frozen
 
 from graspsense.core.components.channels import further
+from graspsense.core.values.signals import Frame, Image, Samples
+from graspsense.core.values.trace import SI_UNITS
 from graspsense.recording.labelled_recording import LabelledRecording
+from graspsense.sources.channel_facts import ChannelFacts, channel_facts, together
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from graspsense.recording.replayable import Recording
+
+    Numbers = NDArray[np.float64]
+
+CHANNEL_OF: Final = {
+    "gap_m": "gap",
+    "effort_n": "effort",
+    "force_left_n": "force_left",
+    "force_right_n": "force_right",
+}
+"""Field of a frame to the channel that it is."""
 
 
 @frozen(kw_only=True)
@@ -44,6 +62,8 @@ class ImportSummary:
     """How the first recording came about."""
     notices: tuple[tuple[str, int], ...]
     """What looks wrong, and in how many recordings."""
+    measured: tuple[ChannelFacts, ...]
+    """What the samples of each channel show, in all recordings together; lengths in m."""
 
 
 def summary_of(recordings: Sequence[LabelledRecording]) -> ImportSummary:
@@ -65,7 +85,34 @@ def summary_of(recordings: Sequence[LabelledRecording]) -> ImportSummary:
         recorded=(times[0], times[-1]) if times[0] else None,
         notes=first.notes,
         notices=tuple(sorted(notices.items(), key=lambda one: -one[1])),
+        measured=_measured([one.recording for one in recordings]),
     )
+
+
+def _measured(recordings: Sequence[Recording]) -> tuple[ChannelFacts, ...]:
+    parts: dict[str, list[ChannelFacts]] = {}
+    for recording in recordings:
+        units = {**SI_UNITS, **recording.units, **{one.name: one.unit for one in recording.channels}}
+        t_s = np.array([reading.frame.t_s for reading in recording.readings])
+        for name, values in _series(recording):
+            facts = channel_facts(name, units.get(name, "1"), values, t_s)
+            parts.setdefault(name, []).append(facts)
+    return tuple(map(together, parts.values()))
+
+
+def _series(recording: Recording) -> Iterator[tuple[str, Numbers]]:
+    """Yield the values of each channel that the recording has: those of the frame, numbers, and images."""
+    frames = np.array([reading.frame for reading in recording.readings], dtype=np.float64)
+    for k, field in enumerate(Frame._fields):
+        name = CHANNEL_OF.get(field)
+        if name is not None and np.isfinite(frames[:, k]).any():
+            yield name, frames[:, k]
+    for channel in further(recording.channels):
+        values = [getattr(reading.signals, channel.name) for reading in recording.readings]
+        if isinstance(values[0], Image):
+            yield channel.name, np.array([one.cells for one in values], dtype=np.float64)
+        elif not isinstance(values[0], Samples):
+            yield channel.name, np.array(values, dtype=np.float64)
 
 
 def _label(label: str, recordings: Sequence[LabelledRecording]) -> LabelSummary:

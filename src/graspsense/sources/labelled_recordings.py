@@ -19,7 +19,7 @@ from graspsense.core.values.features import Features, FeatureTable, table_of
 from graspsense.core.values.signals import APPROACH
 from graspsense.core.values.trace import SI_UNITS, Trace, trace_of
 from graspsense.recording.before_contact import before_contact
-from graspsense.recording.controls import controls
+from graspsense.recording.controls import Controls, controls, without_width
 from graspsense.recording.labelled_recording import LabelledRecording, UnreadableRecording
 from graspsense.recording.readable import each_readable, error_of_all, note_on
 from graspsense.recording.replayable import Recording
@@ -72,9 +72,7 @@ def labelled_recordings(kind: str, place: str, features: FeatureSet[Any]) -> Lab
         no_instances="the data set does not say which trials are of the same object",
         order=order,
         no_order="" if order is not None else "the data set does not say when each trial was recorded",
-        **controls(
-            table, table_of(before), before_missing=_why_missing(before), first_line=_first_lines(facts)
-        ),
+        **_controls(table, before, facts),
         notes=tuple(notes),
         provenance={"simulated": False},
     )
@@ -129,6 +127,22 @@ def _first_lines(facts: Sequence[LabelledRecording]) -> FeatureTable:
     values = np.array([numbers_of(one.recording.readings[0].frame) for one in facts], dtype=np.float64)
     values[np.isinf(values)] = np.nan
     return FeatureTable(names=NAMES, units=UNITS, values=values)
+
+
+def _controls(
+    table: FeatureTable, before: Sequence[Features], facts: Sequence[LabelledRecording]
+) -> Controls:
+    found = controls(
+        table, table_of(before), before_missing=_why_missing(before), first_line=_first_lines(facts)
+    )
+    if any(map(_gap_changes, facts)):
+        return found
+    return without_width(found, "the gap does not change in any recording, so it tells no width")
+
+
+def _gap_changes(one: LabelledRecording) -> bool:
+    first = one.recording.readings[0].frame.gap_m
+    return any(reading.frame.gap_m != first for reading in one.recording.readings)
 
 
 def _why_missing(before: Sequence[Features]) -> str:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 from graspsense.core.values.errors import ConfigError
 from graspsense.core.values.features import UNKNOWN
+from graspsense.core.values.label_text import label_text
 
 if TYPE_CHECKING:
     from graspsense.core.components.config import Settings
@@ -19,7 +20,7 @@ def labels_of(word: str) -> dict[str, str]:
 
     Raises ConfigError if the text is not such a label.
     """
-    match = _WORD.fullmatch(word)
+    match = _WORD.fullmatch(label_text(word))
     if match is None:
         raise ConfigError(
             f"{word!r} is not a label: write CLASS:STATE, as in can:full_open, or can:full_open#2 for the second can. "

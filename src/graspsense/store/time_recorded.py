@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from typing import Final
 
+from graspsense.core.values.written_numbers import plain_number
+
 RECORDED_AT: Final = "recorded_at"
 """Key of the labels of an imported trial: the time at which it was recorded, in ISO 8601."""
 ORDER: Final = "order"
@@ -23,7 +25,7 @@ def order_recorded(
     """
     stated = [_labels(text) for text in labels]
     if set(origins) == {"import"} and all(ORDER in one and RECORDED_AT not in one for one in stated):
-        numbers = [_number(one[ORDER]) for one in stated]
+        numbers = [plain_number(str(one[ORDER])) for one in stated]
         known = [number for number in numbers if number is not None]
         if len(known) == len(numbers):
             return _positions(known), ""
@@ -70,11 +72,3 @@ def _time(text: str) -> float | None:
         return (time if time.tzinfo is not None else time.replace(tzinfo=UTC)).timestamp()
     except (TypeError, ValueError, OverflowError):
         return None
-
-
-def _number(text: str) -> float | None:
-    try:
-        number = float(text)
-    except (TypeError, ValueError):
-        return None
-    return number if number - number == 0.0 else None

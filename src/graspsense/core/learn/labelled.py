@@ -6,12 +6,14 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 from attrs import evolve, field, frozen
+from attrs.converters import optional
 
 from graspsense.core.components.caller import option
 from graspsense.core.files.limits import CLASSES, FEATURES
 from graspsense.core.learn.target_value import TargetValue
 from graspsense.core.values.errors import ConfigError, DataDamaged, suggestion
 from graspsense.core.values.features import LARGEST_VALUE, FeatureTable
+from graspsense.core.values.label_text import label_text
 
 if TYPE_CHECKING:
     import numpy as np
@@ -34,6 +36,15 @@ class ControlFeatures:
     missing: str = ""
 
 
+def _label_texts(labels: Sequence[str]) -> tuple[str, ...]:
+    """Return the labels; those that look the same get the same text, and others stay as they are."""
+    forms: dict[str, set[str]] = {}
+    for label in set(labels):
+        forms.setdefault(label_text(label), set()).add(label)
+    same = {label: text for text, written in forms.items() if len(written) > 1 for label in written}
+    return tuple(same.get(label, label) for label in labels)
+
+
 @frozen(kw_only=True, eq=False)
 class Labelled:
     """Trials with their features and labels.
@@ -52,8 +63,8 @@ class Labelled:
 
     source: str
     table: FeatureTable
-    labels: tuple[str, ...]
-    instances: tuple[str, ...] | None = None
+    labels: tuple[str, ...] = field(converter=_label_texts)
+    instances: tuple[str, ...] | None = field(default=None, converter=optional(_label_texts))
     no_instances: str = ""
     no_interval: str = ""
     order: tuple[int, ...] | None = None

@@ -12,6 +12,7 @@ from typing import Final
 from attrs import frozen
 
 from graspsense.core.values.errors import ConfigError, suggestion
+from graspsense.core.values.written_numbers import plain_number
 
 RESERVED: Final = ("label", "instance", "order", "recorded_at", "operator")
 """Labels of a trial that are not numbers to predict."""
@@ -94,8 +95,4 @@ def values_of_labels(name: str, labels: Sequence[Mapping[str, str]], where: str)
 
 def number_of(cell: object) -> float | None:
     """Return the finite number that a text is, or None."""
-    try:
-        number = float(str(cell))
-    except ValueError:
-        return None
-    return number if math.isfinite(number) else None
+    return plain_number(str(cell))

@@ -1,59 +1,172 @@
-"""NPY, NPZ and MAT files as tables."""
+"""Files of named arrays as tables: NPY, NPZ, MAT and HDF5.
+
+Which arrays belong to a grasp is told by a pattern of their names (`arrays` of a manifest). What the axes of an array
+of three dimensions mean is told by `axes`. Without it, the axes are grasps, times and columns, and the user is asked to
+confirm that, unless another array that the manifest uses has a number for each place along the first or last axis.
+"""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+from attrs import evolve, frozen
 
-from graspsense.core.values.errors import DataDamaged
+from graspsense.core.files.limits import RECORDINGS
+from graspsense.core.values.errors import ConfigError, DataDamaged, listed
+from graspsense.sources.manifest.description import AXES, TIME
+from graspsense.sources.manifest.hdf5_file import hdf5_arrays
 from graspsense.sources.manifest.mat_file import mat_variables
+from graspsense.sources.manifest.patterns import file_template
 from graspsense.sources.manifest.table import ColumnTable, Numbers
 from graspsense.sources.numpy_files import npy_array, npz_arrays
 
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
-def read_npy(path: Path) -> list[ColumnTable]:
-    """Return the table in an NPY file: rows are times, columns are c1, c2 and so on.
+    Arrays = Mapping[str, NDArray[Any]]
 
-    An array of three dimensions has one grasp for each index of the first. Raises ConfigError, TooLarge, DataDamaged.
+READERS: Final = {
+    ".npz": npz_arrays,
+    ".mat": mat_variables,
+    **dict.fromkeys((".h5", ".hdf5", ".hdf"), hdf5_arrays),
+}
+ARRAY_SUFFIXES: Final = (".npy", *READERS)
+COLUMN: Final = "column"
+"""The field of `arrays` that names the column which an array is."""
+GRASP: Final = "grasp"
+_ALONE: Final = ""
+"""Name of an array without one."""
+
+
+@frozen(kw_only=True)
+class ArrayRules:
+    """What a manifest says of arrays: the pattern of their names, the meaning of axes, and the columns that it uses."""
+
+    pattern: str = ""
+    axes: tuple[str, ...] = ()
+    used: Collection[str] = ()
+
+
+def arrays_in(path: Path) -> dict[str, NDArray[Any]]:
+    """Return the arrays in a file by their names; the one of an NPY file has an empty name.
+
+    Raises PluginUnavailable, ConfigError, TooLarge, DataDamaged.
     """
+    suffix = path.suffix.lower()
+    return dict(_npy(path) if suffix == ".npy" else READERS[suffix](path))
+
+
+def read_arrays(path: Path, rules: ArrayRules = ArrayRules()) -> list[ColumnTable]:
+    """Return the tables in a file of arrays: each array is a column, or several.
+
+    Raises PluginUnavailable, ConfigError, TooLarge, DataDamaged.
+    """
+    return [
+        table.with_fields(fields)
+        for fields, group in _groups(path, arrays_in(path), rules.pattern)
+        for table in _grasps(path, group, rules)
+    ]
+
+
+def _npy(path: Path) -> Arrays:
     array = npy_array(path)
     if not array.size:
         raise DataDamaged(f"{path}: an array of the shape {array.shape} has no numbers")
     if array.dtype.names:
-        return [_of_arrays(path, {name: _float(path, array[name]) for name in array.dtype.names})]
-    values = _float(path, array)
-    if values.ndim == 3:
-        return [
-            ColumnTable(source=f"{path.name}, index {i}", numbers=_columns(one), fields={"part": str(i)})
-            for i, one in enumerate(values)
-        ]
-    if values.ndim not in (1, 2):
-        raise DataDamaged(f"{path}: an array of {values.ndim} dimensions is not a table")
-    return [ColumnTable(source=path.name, numbers=_columns(values.reshape(len(values), -1)))]
+        return {name: array[name] for name in array.dtype.names}
+    if array.dtype.kind not in "fiub":
+        raise DataDamaged(f"{path} holds values of type {array.dtype}, which are not numbers")
+    if array.ndim not in (1, 2, 3):
+        raise DataDamaged(f"{path}: an array of {array.ndim} dimensions is not a table")
+    return {_ALONE: array}
 
 
-def read_npz(path: Path) -> list[ColumnTable]:
-    """Return the table in an NPZ file: each array is a column, or several.
+def _groups(path: Path, arrays: Arrays, pattern: str) -> Iterator[tuple[dict[str, str], Arrays]]:
+    """Yield the arrays of each grasp with its facts. Arrays that the pattern does not name belong to every grasp."""
+    if not pattern:
+        yield {}, arrays
+        return
+    template = file_template(pattern)
+    groups: dict[tuple[tuple[str, str], ...], dict[str, NDArray[Any]]] = {}
+    common = {}
+    for name, array in arrays.items():
+        fields = template.fields(name)
+        if fields is None:
+            common[name] = array
+            continue
+        column = fields.pop(COLUMN, _ALONE)
+        groups.setdefault(tuple(fields.items()), {})[column] = array
+    if not groups:
+        raise ConfigError(
+            f"{path}: no array matches arrays = {pattern!r}. There are: {listed(tuple(arrays))}"
+        )
+    if too_many := RECORDINGS.exceeded(len(groups)):
+        raise DataDamaged(f"{path}: {too_many}")
+    for facts, group in groups.items():
+        yield dict(facts), {**common, **group}
 
-    Raises ConfigError, TooLarge, DataDamaged.
-    """
-    return [_of_arrays(path, npz_arrays(path))]
+
+def _grasps(path: Path, arrays: Arrays, rules: ArrayRules) -> Iterator[ColumnTable]:
+    """Yield a table for each grasp in these arrays. Raises ConfigError, DataDamaged."""
+    solid = {name: array for name, array in arrays.items() if array.ndim == 3 and array.dtype.kind in "fiub"}
+    axes, question = rules.axes, ""
+    if solid and not axes and not _have_a_time(arrays, rules.used):
+        axes = (GRASP, TIME, COLUMN)
+        name, shape = next((name, array.shape) for name, array in solid.items())
+        question = (
+            f"the array {name or path.name} of the shape {shape} is read as {shape[0]} grasps of {shape[1]} samples of "
+            f'{shape[2]} columns. Confirm it with axes = "grasp, time, column", or say what its axes are: grasp, time, '
+            "row, column"
+        )
+    if not solid or not axes:
+        yield _of_arrays(path, arrays)
+        return
+    turned = {name: _in_order(array, axes) for name, array in solid.items()}
+    others = {name: array for name, array in arrays.items() if name not in solid}
+    if GRASP not in axes:
+        yield _of_arrays(path, {**others, **turned}, rows=next(iter(turned.values())).shape[0])
+        return
+    grasps, times = next(iter(turned.values())).shape[:2]
+    if not grasps * times:
+        raise DataDamaged(f"{path} has an array of {grasps} grasps of {times} samples")
+    if too_many := RECORDINGS.exceeded(grasps):
+        raise DataDamaged(f"{path}: {too_many}")
+    for k in range(grasps):
+        part = {name: array[k] for name, array in turned.items() if array.shape[0] == grasps}
+        for name, array in others.items():
+            of_grasp = array.ndim and array.shape[0] == grasps and array.size > 1
+            part[name] = array[k] if of_grasp and (array.ndim > 1 or grasps != times) else array
+        table = _of_arrays(path, part, rows=times)
+        yield evolve(
+            table,
+            source=f"{path.name}, index {k}",
+            fields={"part": str(k), **table.fields},
+            warnings=(question,) if question else (),
+        )
 
 
-def read_mat(path: Path) -> list[ColumnTable]:
-    """Return the table in a MAT file of version 4 to 7: each numeric variable is a column, or several.
-
-    Raises ConfigError, TooLarge, DataDamaged.
-    """
-    return [_of_arrays(path, mat_variables(path))]
+def _in_order(array: NDArray[Any], axes: Sequence[str]) -> NDArray[Any]:
+    """Return an array with its axes in the order of `AXES`."""
+    return np.transpose(array, [axes.index(one) for one in AXES if one in axes])
 
 
-def _of_arrays(path: Path, arrays: Mapping[str, Any]) -> ColumnTable:
-    """Return the table of these arrays. The length that most of them share is the number of rows."""
+def _have_a_time(arrays: Arrays, used: Collection[str]) -> bool:
+    """Return whether an array that is used has a number for each place along the first or the last axis of another."""
+    ends = {
+        length for array in arrays.values() if array.ndim == 3 for length in (array.shape[0], array.shape[-1])
+    }
+    flat = [
+        array for name, array in arrays.items() if name in used and array.ndim in (1, 2) and array.size > 1
+    ]
+    return any(ends & set(array.shape) for array in flat)
+
+
+def _of_arrays(path: Path, arrays: Arrays, rows: int = 0) -> ColumnTable:
+    """Return the table of these arrays. The length that most of them share is the number of rows if none is given."""
     numeric = {
         name: array
         for name, array in arrays.items()
@@ -62,38 +175,42 @@ def _of_arrays(path: Path, arrays: Mapping[str, Any]) -> ColumnTable:
         and array.ndim in (1, 2, 3)
         and array.size > 1
     }
+    if set(arrays) == {_ALONE}:
+        numeric = {_ALONE: arrays[_ALONE]}
     if not numeric:
         raise DataDamaged(
             f"{path} has no array of numbers with one to three dimensions. It has: {', '.join(arrays)}"
         )
-    # The rows of an array of three dimensions are along its first axis, or along its last one as MATLAB users write it.
-    lengths = Counter(
-        length for array in numeric.values() for length in {array.shape[0], array.shape[-1]} if length > 1
-    )
-    rows = max(lengths, key=lambda length: (lengths[length], length))
-    columns, shapes = {}, {}
+    if not rows:
+        rows = len(numeric[_ALONE]) if _ALONE in numeric else _common_length(numeric)
+    columns: dict[str, Numbers] = {}
+    shapes = {}
     for name, array in numeric.items():
-        if rows in (array.shape[0], array.shape[-1]):
-            values = np.asarray(
-                array if array.shape[0] == rows else np.moveaxis(array, -1, 0), dtype=np.float64
-            )
-            if values.ndim == 3:
-                shapes[name] = (values.shape[1], values.shape[2])
-            values = values.reshape(rows, -1)
+        if rows not in (array.shape[0], array.shape[-1]):
+            continue
+        values = np.asarray(array if array.shape[0] == rows else np.moveaxis(array, -1, 0), dtype=np.float64)
+        if values.ndim == 3:
+            shapes[name] = (values.shape[1], values.shape[2])
+        values = values.reshape(rows, -1)
+        if name:
             columns[name] = values[:, 0] if values.shape[1] == 1 else values
+        if not name or (len(numeric) == 1 and values.shape[1] > 1):
+            columns |= {f"c{k + 1}": values[:, k] for k in range(values.shape[1])}
     scalars = {
         name: str(array.reshape(-1)[0])
         for name, array in arrays.items()
-        if isinstance(array, np.ndarray) and array.size == 1 and array.dtype.kind in "fiubU"
+        if isinstance(array, np.ndarray | np.generic)
+        and array.size == 1
+        and array.dtype.kind in "fiubU"
+        and name
     }
     return ColumnTable(source=path.name, numbers=columns, shapes=shapes, fields=scalars)
 
 
-def _columns(values: Numbers) -> dict[str, Numbers]:
-    return {f"c{k + 1}": values[:, k] for k in range(values.shape[1])} if values.ndim == 2 else {"c1": values}
-
-
-def _float(path: Path, array: Any) -> Numbers:
-    if array.dtype.kind not in "fiub":
-        raise DataDamaged(f"{path} holds values of type {array.dtype}, which are not numbers")
-    return np.asarray(array, dtype=np.float64)
+def _common_length(arrays: Arrays) -> int:
+    # The rows of an array of three dimensions are along its first axis, or along its last one as MATLAB users write it.
+    lengths = Counter(
+        length for array in arrays.values() for length in {array.shape[0], array.shape[-1]} if length > 1
+    )
+    most: int = max(lengths, key=lambda length: (lengths[length], length))
+    return most

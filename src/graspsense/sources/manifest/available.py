@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
 
 from graspsense.core.values.errors import ConfigError, listed
+from graspsense.core.values.written_numbers import number_in
 from graspsense.sources.manifest.description import ReadManifest
 from graspsense.sources.manifest.expression import Expression, ExpressionError
 from graspsense.sources.manifest.table import ColumnTable, Numbers
@@ -37,9 +37,22 @@ class AvailableColumns(dict[str, Any]):
         """Return the value of the first expression whose columns exist and its unit, None if there are none."""
         if not parts:
             return None
-        chosen = next((one for one in parts if self.has(one)), parts[0])
+        chosen = self.chosen(parts)
         values = self.computed(key, lambda: chosen.numbers(self, len(self.table)))
-        return self._in_si(key, values, chosen.unit, quantity)
+        return self._in_si(key, values, self.unit(chosen, quantity), quantity)
+
+    def chosen(self, parts: Sequence[Expression]) -> Expression:
+        """Return the first expression whose columns exist, or the first if there is none."""
+        return next((one for one in parts if self.has(one)), parts[0])
+
+    def unit(self, expression: Expression, quantity: str) -> str:
+        """Return the unit behind an expression, or the one that the file states for a column on its own."""
+        stated = self.stated(expression)
+        return expression.unit or (stated if stated in (*TO_SI[quantity], "counts") else "")
+
+    def stated(self, expression: Expression) -> str:
+        """Return the unit that the file states for an expression that is a column, empty if there is none."""
+        return self.table.units.get(expression.column, "")
 
     def has(self, expression: Expression) -> bool:
         """Return whether all columns of an expression exist."""
@@ -54,7 +67,7 @@ class AvailableColumns(dict[str, Any]):
         try:
             return compute()
         except ExpressionError as error:
-            texts = [name for name in self.table.texts if repr(name) in str(error)]
+            texts = [name for name in self.table.texts if name not in self and repr(name) in str(error)]
             lines = self.table.not_numbers
             words = [f"{name} ({lines[name]})" if name in lines else name for name in texts]
             aside = f"\n    columns of text, which are not numbers: {listed(words)}" if texts else ""
@@ -71,12 +84,3 @@ class AvailableColumns(dict[str, Any]):
         raise ConfigError(
             f"{self.manifest.place}: {key}: the unit {unit!r} is not known. There are {', '.join(factors)}"
         )
-
-
-def number_in(text: str) -> float | None:
-    """Return the finite number that a text is, None if it is none."""
-    try:
-        number = float(text)
-    except ValueError:
-        return None
-    return number if math.isfinite(number) else None

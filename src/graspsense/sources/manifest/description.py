@@ -16,10 +16,13 @@ from graspsense.core.components.strict import ValidationFailed, structured
 from graspsense.core.files.limits import ENTRIES
 from graspsense.core.values.errors import ConfigError
 from graspsense.sources.manifest.expression import Expression, ExpressionError, parse
-from graspsense.sources.manifest.patterns import regular_expression
+from graspsense.sources.manifest.patterns import file_template, regular_expression
 
 Text = str | tuple[str, ...]
 """An expression, or several of which the first is used whose columns exist."""
+TIME: Final = "time"
+AXES: Final = ("grasp", TIME, "row", "column")
+"""What an axis of an array of three dimensions can be."""
 QUANTITIES: Final = ("time", "gap", "force", "left", "right", "effort", "velocity")
 _AMOUNT: Final = re.compile(r"(?P<number>\d+(?:\.\d+)?)\s*(?P<unit>samples?|s|ms)")
 
@@ -32,6 +35,24 @@ def _is_amount(_config: object, _attribute: Attribute[str], value: str) -> None:
     if value and _AMOUNT.fullmatch(value) is None:
         raise ValueError(
             f'{value!r} is neither a number of samples nor of seconds: write "10 samples" or "0.2 s"'
+        )
+
+
+def _is_template(_config: object, _attribute: Attribute[str], value: str) -> None:
+    file_template(value)
+
+
+def axes_of(text: str) -> tuple[str, ...]:
+    """Return the axes that a text such as `grasp, time, column` names."""
+    return tuple(text.replace(",", " ").split())
+
+
+def _is_axes(_config: object, _attribute: Attribute[str], value: str) -> None:
+    axes = axes_of(value)
+    if value and not (len(axes) == len(set(axes)) == 3 and set(axes) <= {*AXES} and TIME in axes):
+        raise ValueError(
+            f'{value!r} does not name three axes: write "grasp, time, column", or "time, row, column", in the order '
+            "of the file"
         )
 
 
@@ -56,6 +77,16 @@ class Manifest:
     split: str = setting(
         default="",
         meaning='How a file is split: a column with a value for each grasp, "force" to find the squeezes, or "rows".',
+    )
+    arrays: str = setting(
+        default="",
+        validator=_is_template,
+        meaning="Pattern of the names of the arrays in a file, as of `files`; `{column}` names the column.",
+    )
+    axes: str = setting(
+        default="",
+        validator=_is_axes,
+        meaning='What the axes of an array of three dimensions are: "grasp, time, column" or "time, row, column".',
     )
     time: Text = setting(default=(), meaning="Time.")
     rate_hz: float = setting(
@@ -196,6 +227,7 @@ def _contradictions(keys: Manifest) -> list[tuple[tuple[str, ...], str]]:
         and not keys.list
         and not any("{label" in one for one in _patterns(keys))
         and "?P<label>" not in keys.start
+        and "{label" not in keys.arrays
     ):
         found.append((("label",), 'no label: write label = "{field}", or {label} in the pattern of files'))
     return found

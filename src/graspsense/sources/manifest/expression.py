@@ -70,6 +70,16 @@ class Expression:
     unit: str
     tree: ast.expr
 
+    @property
+    def column(self) -> str:
+        """The name of the column that it is, empty if it computes something."""
+        return _name_in(self.tree) if isinstance(self.tree, ast.Name | ast.Constant) else ""
+
+    @property
+    def names(self) -> frozenset[str]:
+        """The names and patterns of columns in it."""
+        return frozenset(map(_name_in, _names(self.tree)))
+
     def columns(self, known: Sequence[str]) -> tuple[str, ...]:
         """Return which of these columns it uses. Raises ExpressionError if it names one that is not among them."""
         return tuple(

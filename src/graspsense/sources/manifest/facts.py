@@ -11,8 +11,10 @@ from typing import Final
 import numpy as np
 
 from graspsense.core.values.errors import ConfigError, DataDamaged, listed
+from graspsense.core.values.label_text import label_text
+from graspsense.core.values.written_numbers import number_in
 from graspsense.recording.readable import readable
-from graspsense.sources.manifest.available import AvailableColumns, number_in
+from graspsense.sources.manifest.available import AvailableColumns
 from graspsense.sources.manifest.description import ReadManifest
 from graspsense.sources.manifest.files import NamedFile
 from graspsense.sources.manifest.table import ColumnTable
@@ -46,7 +48,7 @@ def _given(manifest: ReadManifest, key: str, table: ColumnTable) -> str:
 
 def label_of(manifest: ReadManifest, table: ColumnTable) -> str:
     """Return the label of a grasp, with `_` for spaces. Raises ConfigError, DataDamaged."""
-    text = _NOT_IN_LABELS.sub("_", _given(manifest, "label", table).strip())
+    text = _NOT_IN_LABELS.sub("_", label_text(_given(manifest, "label", table)))
     if not text:
         raise ConfigError(f"{manifest.place}: {table.source} has no label")
     return text
@@ -54,7 +56,7 @@ def label_of(manifest: ReadManifest, table: ColumnTable) -> str:
 
 def instance_of(manifest: ReadManifest, table: ColumnTable) -> str:
     """Return what identifies the individual object, empty if that is not known. Raises ConfigError, DataDamaged."""
-    return _NOT_IN_LABELS.sub("_", _given(manifest, "instance", table).strip()).replace(":", "_")
+    return _NOT_IN_LABELS.sub("_", label_text(_given(manifest, "instance", table))).replace(":", "_")
 
 
 def order_of(manifest: ReadManifest, table: ColumnTable) -> float | None:

@@ -10,7 +10,8 @@ from pathlib import Path
 from attrs import frozen
 
 from graspsense.core.values.errors import ConfigError
-from graspsense.sources.csv_columns import CsvColumns, is_missing
+from graspsense.core.values.label_text import is_missing_label
+from graspsense.sources.csv_columns import CsvColumns
 from graspsense.sources.manifest.description import ReadManifest
 from graspsense.sources.manifest.patterns import FileTemplate, PatternError, file_template
 
@@ -40,7 +41,7 @@ def files_of(manifest: ReadManifest) -> list[NamedFile]:
     found = list(_listed(manifest)) if keys.list else list(_matching(manifest))
     if not found:
         patterns = (keys.files,) if isinstance(keys.files, str) else keys.files
-        some = [name for name, _ in _tree(manifest.base)][:5]
+        some = [name for name, _ in tree_below(manifest.base)][:5]
         raise ConfigError(
             f"{manifest.place}: no file in {manifest.base} matches {' or '.join(map(repr, patterns))}. "
             + (f"It contains, for example: {', '.join(some)}" if some else "The folder is empty")
@@ -50,7 +51,7 @@ def files_of(manifest: ReadManifest) -> list[NamedFile]:
 
 def _matching(manifest: ReadManifest) -> Iterator[NamedFile]:
     templates = _templates(manifest)
-    for name, path in _tree(manifest.base):
+    for name, path in tree_below(manifest.base):
         if path.name == manifest.place.name and path.resolve() == manifest.place.resolve():
             continue
         try:
@@ -71,7 +72,7 @@ def _templates(manifest: ReadManifest) -> list[FileTemplate]:
         raise ConfigError(f"{manifest.place}: files: {error}") from None
 
 
-def _tree(base: Path) -> Iterator[tuple[str, Path]]:
+def tree_below(base: Path) -> Iterator[tuple[str, Path]]:
     """Yield every file below a folder by its path from there; the folder of a ROS 2 bag counts as a file."""
     found = []
     for folder, folders, names in os.walk(base):
@@ -98,7 +99,7 @@ def _listed(manifest: ReadManifest) -> Iterator[NamedFile]:
         row = {
             one: cells[k]
             for one, cells in columns.cells.items()
-            if one != "file" and not is_missing(cells[k])
+            if one != "file" and not is_missing_label(cells[k])
         }
         path, where = manifest.base / name, f"{place}, line {columns.lines[k]}"
         rows, problem = None, "" if os.path.exists(path) else f"{where}: there is no file {path}"

@@ -1,4 +1,4 @@
-"""MAT files of version 4 to 7: their variables that are full arrays of numbers or one line of text.
+"""MAT files: their variables that are full arrays of numbers or one line of text.
 
 The reader of scipy ends the process on some damaged files, so this is one of our own. Nothing is allocated before its
 size was compared with the bytes that are there and with the limit. The format is that of MathWorks, "MAT-File Format".
@@ -16,9 +16,9 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from graspsense.core.values.errors import DataDamaged
 from graspsense.recording.readable import readable, refuse_devices
 from graspsense.recording.unpacked import Unpacked
+from graspsense.sources.manifest.hdf5_file import hdf5_arrays
 
 _HEADER_BYTES: Final = 128
 _MATRIX: Final = 14
@@ -57,10 +57,8 @@ def mat_variables(path: Path) -> dict[str, NDArray[Any]]:
         if order is None:
             raise ValueError("it has no header")
         (version,) = struct.unpack_from(f"{order}H", data, _HEADER_BYTES - 4)
-        if version >> 8 == 2:
-            raise DataDamaged(
-                f"{path} is a MAT file of version 7.3, which is HDF5. Save it in MATLAB with: save(NAME, '-v7')"
-            )
+        if version >> 8 == 2:  # version 7.3
+            return hdf5_arrays(path, "\n  or save the file in MATLAB with: save(NAME, '-v7')")
         found = {}
         for element in _elements(data[_HEADER_BYTES:], order):
             if element.kind == _COMPRESSED:

@@ -11,6 +11,8 @@ from typing import Any, Final
 import numpy as np
 
 from graspsense.core.values.errors import PluginUnavailable
+from graspsense.core.values.written_numbers import NotNumbers, columns_of_numbers
+from graspsense.core.values.written_times import seconds_since_first
 from graspsense.recording.parquet import PARQUET_HINT
 from graspsense.recording.readable import readable, refuse_devices
 from graspsense.recording.unpacked import Unpacked
@@ -41,7 +43,9 @@ def read_parquet(path: Path) -> list[ColumnTable]:
             values = _numbers(column)
             if values is None:
                 texts[name] = _texts(path, column)
-                continue
+                values = seconds_since_first(texts[name])
+                if values is None:
+                    continue
             if values.ndim == 3:
                 shapes[name] = (values.shape[1], values.shape[2])
             numbers[name] = values.reshape(len(values), -1) if values.ndim > 2 else values
@@ -96,10 +100,11 @@ def _numbers(column: Any) -> Numbers | None:
 
 def _numbers_of_texts(column: Any) -> Numbers | None:
     whole = column.unify_dictionaries().combine_chunks()
-    try:
-        known = np.array([float("nan"), *whole.dictionary.to_pylist()], dtype=np.float64)
-    except (TypeError, ValueError):
+    words = whole.dictionary.to_pylist()
+    found = columns_of_numbers({"": [one.strip() for one in words if isinstance(one, str)]})[""]
+    if isinstance(found, NotNumbers) or len(found) < len(words):
         return None
+    known = np.concatenate(([np.nan], found))
     places: Numbers = known[whole.indices.cast("int64").fill_null(-1).to_numpy(zero_copy_only=False) + 1]
     return places
 

@@ -15,13 +15,16 @@ from graspsense.core.values.errors import ConfigError, DataDamaged, listed
 from graspsense.recording.labelled_recording import LabelledRecording, UnreadableRecording
 from graspsense.recording.readable import each_readable, refuse_devices
 from graspsense.sources.grasp_columns import checked_recording
-from graspsense.sources.manifest.description import ReadManifest, read_manifest
+from graspsense.sources.manifest.array_format import ARRAY_SUFFIXES, ArrayRules, read_arrays
+from graspsense.sources.manifest.description import QUANTITIES, ReadManifest, axes_of, read_manifest
 from graspsense.sources.manifest.facts import instance_of, label_of, order_of, recorded_at_of, values_of
 from graspsense.sources.manifest.files import NamedFile, files_of
 from graspsense.sources.manifest.notices import notices_of
+from graspsense.sources.manifest.raw_tables import BAG_SUFFIXES, PARQUET_SUFFIXES, TEXT_SUFFIXES
 from graspsense.sources.manifest.samples import samples
 from graspsense.sources.manifest.steps import cut_at, resampled, squeezes
 from graspsense.sources.manifest.table import ColumnTable
+from graspsense.sources.text_table import text_suffix
 
 
 def read_recordings(place: str) -> Iterator[LabelledRecording | UnreadableRecording]:
@@ -85,27 +88,26 @@ def grasps_in(manifest: ReadManifest, file: NamedFile, table: ColumnTable) -> It
 def _format(manifest: ReadManifest, path: Path) -> Callable[[Path], list[ColumnTable]]:
     """Return the function that reads a file of this suffix. Raises ConfigError."""
     suffix = path.suffix.lower()
-    if suffix in (".csv", ".tsv", ".txt", ".dat", ".data", ""):
+    if text_suffix(path) in (*TEXT_SUFFIXES, ""):
         if path.is_dir():
             return _bag(manifest)
         from graspsense.sources.manifest.text_format import read_text
 
         return lambda file: read_text(file, manifest.keys.start)
-    if suffix in (".npy", ".npz", ".mat"):
-        from graspsense.sources.manifest import array_format
-
-        return {".npy": array_format.read_npy, ".npz": array_format.read_npz, ".mat": array_format.read_mat}[
-            suffix
-        ]
-    if suffix in (".parquet", ".pq"):
+    if suffix in ARRAY_SUFFIXES:
+        parts = [one for quantity in QUANTITIES for one in manifest.expressions[quantity]]
+        used = frozenset(name for one in parts for name in one.names)
+        rules = ArrayRules(pattern=manifest.keys.arrays, axes=axes_of(manifest.keys.axes), used=used)
+        return lambda file: read_arrays(file, rules)
+    if suffix in PARQUET_SUFFIXES:
         from graspsense.sources.manifest.parquet_format import read_parquet
 
         return read_parquet
-    if suffix in (".bag", ".mcap", ".db3"):
+    if suffix in BAG_SUFFIXES:
         return _bag(manifest)
     raise ConfigError(
-        f"{path}: no reader for {suffix} files. There are text files (.csv, .tsv, .txt, .dat), .npy, .npz, .mat, "
-        ".parquet, .mcap and ROS bags"
+        f"{path}: no reader for {suffix} files. There are text files (.csv, .tsv, .txt, .dat, .jsonl), .npy, .npz, "
+        ".mat, .h5, .parquet, .mcap and ROS bags"
     )
 
 

@@ -144,3 +144,33 @@ def _numbers_in(value: Any, name: str) -> Iterator[tuple[str, Any]]:
             yield here, inner.astype(np.float64)
         elif hasattr(inner, "__dataclass_fields__") and field != "header":
             yield from _numbers_in(inner, here)
+
+
+def read_topics(path: Path) -> list[ColumnTable]:
+    """Return a table for each topic with numbers in a bag or an MCAP file, with the times of its own messages.
+
+    Raises as `read_bag`.
+    """
+    messages: dict[str, list[tuple[int, dict[str, Any]]]] = {}
+    kept = Unpacked(path)
+    for topic, t_ns, message in _messages(path, ()):
+        found = dict(_numbers_in(message, topic))
+        kept.add(sum(_NUMBER_BYTES + 8 * np.size(one) for one in found.values()))
+        if found:
+            messages.setdefault(topic, []).append((t_ns, found))
+    if not messages:
+        raise DataDamaged(f"{path} has no messages with numbers")
+    clock = max(messages, key=lambda topic: len(messages[topic]))
+    since_ns = _since_first(path, messages, clock)
+    tables = []
+    for topic, rows in messages.items():
+        order = np.argsort(since_ns[topic], kind="stable")
+        numbers: dict[str, Numbers] = {}
+        for name, example in rows[0][1].items():
+            width = np.size(example)
+            if all(np.size(one.get(name, ())) == width for _, one in rows):
+                values = np.array([rows[k][1][name] for k in order], dtype=np.float64).reshape(len(rows), -1)
+                numbers[name] = values[:, 0] if width == 1 else values
+        t_s: Numbers = since_ns[topic][order].astype(np.float64) * 1e-9
+        tables.append(ColumnTable(source=topic, numbers=numbers, t_s=t_s))
+    return tables

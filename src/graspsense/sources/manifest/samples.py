@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator, Sequence
 from keyword import iskeyword
 from typing import Final
 
@@ -10,14 +11,25 @@ import numpy as np
 
 from graspsense.core.values.errors import ConfigError, DataDamaged, listed
 from graspsense.core.values.signals import CHANNELS
-from graspsense.sources.grasp_columns import GraspColumns
-from graspsense.sources.manifest.available import AvailableColumns
+from graspsense.sources.grasp_columns import GraspColumns, without_missing
+from graspsense.sources.manifest.available import TO_SI, AvailableColumns
 from graspsense.sources.manifest.description import ReadManifest, samples_of
+from graspsense.sources.manifest.expression import Expression
 from graspsense.sources.manifest.steps import without_duplicates
 from graspsense.sources.manifest.table import ColumnTable, Numbers
 
 EARLIEST_STAMP_S: Final = 1e6
 """A first time beyond this is a stamp of a clock, and times are counted from it."""
+EARLIEST_DATE_S: Final = 946_684_800.0
+"""The year 2000, in seconds since 1970."""
+LATEST_DATE_S: Final = 4_102_444_800.0
+"""The year 2100, in seconds since 1970."""
+GRAM_FORCE: Final = {
+    **dict.fromkeys(("g", "gram", "grams", "gramm", "weight"), "gf"),
+    **dict.fromkeys(("kg", "kilogram", "kilograms"), "kgf"),
+    **dict.fromkeys(("lb", "lbs", "pounds"), "lbf"),
+}
+"""Units of mass, and names, with the force that a scale means by them."""
 _NAME: Final = re.compile(r"[a-z][a-z0-9_]*")
 _TAKEN: Final = frozenset({*CHANNELS, "force", "t"})
 
@@ -28,15 +40,16 @@ def samples(manifest: ReadManifest, table: ColumnTable) -> GraspColumns:
     keys, found = manifest.keys, AvailableColumns(manifest, table)
     if not len(table):
         raise DataDamaged(f"{table.source} has no rows")
-    notes = [f"{len(table)} samples of {table.source}"]
-    t_s = _times(manifest, table, found)
+    notes = [f"{len(table)} samples of {table.source}", *table.notes]
+    t_s, time_notes = _times(manifest, table, found)
+    notes += time_notes
     scalars, arrays, units = _channels(manifest, table, found)
     zero = samples_of(keys.zero, t_s) if keys.zero else 0
     if zero:
         notes.append(f"zero of the forces: the mean of the first {zero} samples")
         for name, values in (*scalars.items(), *arrays.items()):
             if name not in manifest.fast and units.get(name, "") in ("N", "counts"):
-                values -= values[:zero].mean(axis=0)
+                values -= np.nanmean(values[:zero], axis=0)
     found.update(scalars)
     found.update(arrays)
     expressions = manifest.expressions
@@ -52,8 +65,8 @@ def samples(manifest: ReadManifest, table: ColumnTable) -> GraspColumns:
         )
     left_n, right_n = left[0].copy(), right[0].copy()
     if zero:
-        left_n -= left_n[:zero].mean()
-        right_n -= right_n[:zero].mean()
+        left_n -= np.nanmean(left_n[:zero])
+        right_n -= np.nanmean(right_n[:zero])
     notes += _folds(manifest)
     effort = found.value("effort", expressions["effort"], "effort")
     velocity = found.value("velocity", expressions["velocity"], "velocity")
@@ -76,9 +89,37 @@ def samples(manifest: ReadManifest, table: ColumnTable) -> GraspColumns:
             "t": "" if _has_time(manifest, table, found) else "sample",
         },
         notes=tuple(notes),
+        warnings=(*table.warnings, *_doubtful_units(manifest, found)),
         lines=table.lines,
     )
-    return without_duplicates(columns) if keys.duplicates == "drop" else columns
+    whole = without_missing(columns)
+    return without_duplicates(whole) if keys.duplicates == "drop" else whole
+
+
+def _doubtful_units(manifest: ReadManifest, found: AvailableColumns) -> Iterator[str]:
+    """Yield a sentence for each quantity whose unit the file states otherwise than the manifest."""
+    for key, parts in manifest.expressions.items():
+        quantity = "force" if key in ("left", "right") else key
+        chosen = found.chosen(parts) if parts else None
+        if chosen is None or not found.has(chosen):
+            continue
+        stated = found.stated(chosen)
+        if quantity == "force" and (grams := _gram_force(chosen, stated, tuple(found))):
+            yield (
+                f"{key}: the unit or the name of the column is that of a mass, as of a scale: for gram-force write "
+                f'{key} = "{chosen.text} [{grams}]"'
+            )
+        elif stated and chosen.unit and stated != chosen.unit and stated in TO_SI[quantity]:
+            yield f"{key}: the manifest says [{chosen.unit}], and the file states {stated}"
+
+
+def _gram_force(expression: Expression, stated: str, known: Sequence[str]) -> str:
+    """Return the unit of force that a scale means, where the unit or a name says that it is one; else an empty text."""
+    said = (expression.unit or stated).lower()
+    if said:
+        return GRAM_FORCE.get(said, "")
+    names = " ".join(expression.columns(known)).lower()
+    return next((GRAM_FORCE[word] for word in re.findall("[a-z]+", names) if word in GRAM_FORCE), "")
 
 
 def _folds(manifest: ReadManifest) -> list[str]:
@@ -96,19 +137,23 @@ def _has_time(manifest: ReadManifest, table: ColumnTable, found: AvailableColumn
     )
 
 
-def _times(manifest: ReadManifest, table: ColumnTable, found: AvailableColumns) -> Numbers:
-    """Return the time of each row (s), from 0 on. Raises ConfigError."""
+def _times(
+    manifest: ReadManifest, table: ColumnTable, found: AvailableColumns
+) -> tuple[Numbers, tuple[str, ...]]:
+    """Return the time of each row (s), from 0 on, and what was chosen for it, in words. Raises ConfigError."""
     parts = manifest.expressions["time"]
     missing = not any(map(found.has, parts))
     given = None if missing and manifest.keys.rate_hz else found.value("time", parts, "time")
     if given is not None:
-        return _from_start(given[0])
+        unit = "" if found.unit(found.chosen(parts), "time") else _unit_since_1970(given[0])
+        notes = (f"the time is in {unit} since 1970",) if unit else ()
+        return _from_start(given[0]) * TO_SI["time"].get(unit, 1.0), notes
     if table.t_s is not None:
-        return _from_start(table.t_s)
+        return _from_start(table.t_s), ()
     if manifest.keys.rate_hz:
-        return np.arange(len(table)) / manifest.keys.rate_hz
+        return np.arange(len(table)) / manifest.keys.rate_hz, ()
     if len(table) == 1:
-        return np.zeros(1)
+        return np.zeros(1), ()
     columns = listed(tuple(table.numbers))
     raise ConfigError(
         f'{manifest.place}: {table.source} has no time: write time = "COLUMN [ms]", or rate_hz = 100 where there is no '
@@ -119,6 +164,14 @@ def _times(manifest: ReadManifest, table: ColumnTable, found: AvailableColumns) 
 def _from_start(t_s: Numbers) -> Numbers:
     """Return times (s), counted from the first one where they are stamps of a clock such as seconds since 1970."""
     return t_s - t_s[0] if abs(float(t_s[0])) > EARLIEST_STAMP_S else t_s
+
+
+def _unit_since_1970(times: Numbers) -> str:
+    """Return the unit in which these numbers are times of this century, empty if that is s, or if they are none."""
+    for unit in ("ms", "us", "ns"):
+        if EARLIEST_DATE_S <= float(times[0]) * TO_SI["time"][unit] < LATEST_DATE_S:
+            return unit
+    return ""
 
 
 def _channels(
@@ -138,7 +191,7 @@ def _channels(
         if name in manifest.fast:
             values = values.reshape(len(values), -1)
         (scalars if values.ndim == 1 else arrays)[name] = values
-        units[name] = expression.unit or "1"
+        units[name] = expression.unit or found.stated(expression) or "1"
     return scalars, arrays, units
 
 

@@ -10,7 +10,7 @@ from attrs import evolve
 
 from graspsense.core.files.limits import SAMPLES
 from graspsense.core.values.errors import DataDamaged
-from graspsense.sources.grasp_columns import GraspColumns, check_increasing
+from graspsense.sources.grasp_columns import GraspColumns, check_increasing, only
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -31,10 +31,7 @@ def without_duplicates(columns: GraspColumns) -> GraspColumns:
     dropped = len(new) - int(new.sum())
     if not dropped:
         return columns
-    kept = columns.rows(new)
-    return evolve(
-        kept, notes=(*kept.notes, f"{dropped} samples with the time of the one before were dropped")
-    )
+    return only(columns, new, "with the time of the one before")
 
 
 @np.errstate(all="ignore")

@@ -33,6 +33,12 @@ class ColumnTable:
     t_s: Numbers | None = None
     lines: NDArray[np.int64] | None = None
     """The line of each row in a text file."""
+    units: Mapping[str, str] = field(factory=dict)
+    """The unit of a column where the file states it: in its name, or in a line of units."""
+    notes: tuple[str, ...] = ()
+    """What was left out of the file, or chosen, on reading it."""
+    warnings: tuple[str, ...] = ()
+    """What has to be confirmed, or looks wrong."""
     not_numbers: Mapping[str, str] = field(factory=dict)
     """For a column of text that begins with a number: its first line with another text, in words."""
 

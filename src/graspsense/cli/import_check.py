@@ -1,0 +1,137 @@
+"""What `graspsense import` tells of files before they are imported: their channels, and a manifest for them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from graspsense.cli.output import echo_json
+from graspsense.cli.terminal import Style, echo, echo_as_it_is, echo_entry, echo_table, talk
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from graspsense.sources.channel_facts import ChannelFacts
+    from graspsense.sources.manifest.understood import UnderstoodFile
+
+
+def show_files(sources: Sequence[str], picture: str, as_json: bool) -> bool:
+    """Print what can be told of files for which neither columns nor a manifest are given, and draw the first.
+
+    Returns False if the sources are other ones, or cannot be read. Raises ConfigError for the picture.
+    """
+    from attrs import asdict
+
+    from graspsense.core.values.errors import GraspsenseError
+    from graspsense.sources.import_sources import is_plain_file
+    from graspsense.sources.manifest.understood import understood_file
+
+    if not all(map(is_plain_file, sources)):
+        return False
+    try:
+        files = [understood_file(Path(source).expanduser()) for source in sources]
+    except GraspsenseError:
+        return False
+    if as_json:
+        echo_json(
+            [
+                {**asdict(one, filter=lambda field, _: field.name != "courses"), "path": str(one.path)}
+                for one in files
+            ]
+        )
+    else:
+        for one in files:
+            _echo_file(one)
+    _draw(files[0], Path(picture))
+    return True
+
+
+def suggest_manifest(sources: Sequence[str], name: str) -> None:
+    """Write a manifest for a folder, and print it with what reading it says. Raises ConfigError, SaveFailed."""
+    from graspsense.recording.atomic_file import write_new
+    from graspsense.sources.manifest.suggestion import suggested_manifest
+
+    if len(sources) != 1:
+        raise click.UsageError("--suggest is for one folder with recordings")
+    path, folder = Path(name).expanduser(), Path(sources[0]).expanduser()
+    if path.suffix != ".toml":
+        raise click.UsageError(f"--suggest {name}: a manifest is a file FILE.toml")
+    found = suggested_manifest(folder, path.parent)
+    write_new(path, found.text.encode())
+    echo_as_it_is(found.text)
+    talk(
+        f"written to {path}, from {found.example}. Correct the lines that say `check`, then: graspsense import "
+        f"{path} --check"
+    )
+
+
+def echo_channels(channels: Sequence[ChannelFacts]) -> None:
+    """Print a table of channels."""
+    from graspsense.core.values.units import display_unit
+
+    header = (
+        "Channel",
+        "Unit",
+        "Samples",
+        "Missing",
+        "Range",
+        "Resolution",
+        "Rate, Hz",
+        "Longest gap, s",
+        "Age, s",
+    )
+    rows = []
+    for one in channels:
+        unit, factor = display_unit(one.unit)
+        rows.append(
+            (
+                one.name,
+                unit or "unknown",
+                str(one.samples),
+                str(one.missing),
+                "none"
+                if one.low is None or one.high is None
+                else f"{factor * one.low:.4g} to {factor * one.high:.4g}",
+                "none" if one.resolution is None else f"{factor * one.resolution:.3g}",
+                _shown(one.rate_hz),
+                _shown(one.longest_gap_s),
+                _shown(one.age_s),
+            )
+        )
+    echo()
+    echo_table(header, rows)
+
+
+def _shown(value: float | None) -> str:
+    return "unknown" if value is None else f"{value:.4g}"
+
+
+def _echo_file(one: UnderstoodFile) -> None:
+    echo_entry("file", str(one.path))
+    for note in one.notes:
+        echo_entry("", note)
+    echo_channels(one.channels)
+    echo()
+    if one.force:
+        echo_entry("squeezes", f"{len(one.squeezes)} in {one.force}")
+    else:
+        echo_entry("squeezes", "no channel is known to be a force")
+    for line in one.suggested:
+        echo_entry("" if line is not one.suggested[0] else "most likely", line)
+    echo("To import it, name its columns (--time, --gap, --force) or write a manifest: --suggest FILE.toml")
+
+
+def _draw(one: UnderstoodFile, picture: Path) -> None:
+    from graspsense.core.values.errors import PluginUnavailable
+    from graspsense.report.channels_picture import channels_png
+
+    changing = {facts.name for facts in one.channels if facts.resolution is not None}
+    forces = one.force.split(", ")
+    courses = {name: one.courses[name] for name in (*forces, *one.courses) if name in changing}
+    try:
+        channels_png(picture, courses, one.squeezes)
+        talk(f"picture written to {picture}")
+    except PluginUnavailable as error:
+        echo(f"no picture: {error}", Style.CAUTION, err=True)

@@ -1,0 +1,29 @@
+"""The text of a label, so that labels which look the same are the same."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from typing import Final
+
+MISSING_LABELS: Final = frozenset({"", "nan", "?"})
+"""What stands for a missing label. `none`, `null` and `NA` are labels."""
+_WHOLE: Final = re.compile(r"(?<![^:#])([-+]?[0-9]+)[.,]0+(?![^:#])")
+
+
+def label_text(text: str) -> str:
+    r"""Return a label without invisible characters, in the composed form of Unicode, and whole numbers without `.0`.
+
+    >>> label_text("cafe\u0301\u200b "), label_text("1.0"), label_text("can:1.0"), label_text("1.5")
+    ('café', '1', 'can:1', '1.5')
+    """
+    if not text.isascii():
+        text = unicodedata.normalize("NFC", text)
+        text = "".join(sign for sign in text if unicodedata.category(sign) not in ("Cf", "Cc"))
+        text = "".join(" " if unicodedata.category(sign) == "Zs" else sign for sign in text)
+    return _WHOLE.sub(r"\1", text.strip())
+
+
+def is_missing_label(text: str) -> bool:
+    """Return whether the text of a cell stands for a missing label."""
+    return label_text(text).lower() in MISSING_LABELS

@@ -1,0 +1,239 @@
+"""Numbers as programs write them. How a column is written is decided from all of its rows.
+
+`1,000` is a thousand to one program and one to another. A cell alone cannot tell, so a column has one *notation*: the
+decimal point, the decimal point with commas between thousands, or the decimal comma (with points between thousands). A
+column whose cells fit no common notation is refused with the row, and so is one that two notations would read with
+different values, unless the rest of the file decides.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Final
+
+from attrs import frozen
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    Numbers = NDArray[np.float64]
+
+POINT: Final = 1
+THOUSANDS: Final = 2
+COMMA: Final = 4
+_EVERY: Final = POINT | THOUSANDS | COMMA
+_NOTATIONS: Final = (POINT, THOUSANDS, COMMA)
+
+MISSING: Final = frozenset(
+    (
+        *("", "nan", "na", "n/a", "null", "none", "?", "-", "--", "---"),
+        *("#n/a", "#div/0!", "#value!", "#ref!", "#num!", "#null!", "#name?", "1.#qnan", "1.#ind", "-1.#ind"),
+    )
+)
+"""What stands for a missing number, in small letters."""
+_LONGEST_MISSING: Final = max(map(len, MISSING))
+
+_SIGN, _EXPONENT = "[-+\u2212]?", "(?:[eEdD][-+]?[0-9]+)?"
+_WITH_POINT: Final = re.compile(rf"{_SIGN}(?:(?P<whole>[0-9]+)(?:\.[0-9]*)?|\.[0-9]+){_EXPONENT}")
+_WITH_COMMA: Final = re.compile(rf"{_SIGN}[0-9]*,[0-9]+{_EXPONENT}")
+_COMMA_GROUPS: Final = re.compile(rf"{_SIGN}[1-9][0-9]{{0,2}}(?:,[0-9]{{3}})+(?:\.[0-9]*)?{_EXPONENT}")
+_POINT_GROUPS: Final = re.compile(rf"{_SIGN}[1-9][0-9]{{0,2}}(?:\.[0-9]{{3}})+(?:,[0-9]*)?{_EXPONENT}")
+_OTHER_GROUPS: Final = re.compile(
+    rf"{_SIGN}[1-9][0-9]{{0,2}}(?:[ '\u2019\u00a0\u2009\u202f][0-9]{{3}})+(?:[.,][0-9]*)?{_EXPONENT}"
+)
+_GROUP_SIGNS: Final = re.compile("[ '\u2019\u00a0\u2009\u202f]")
+_INFINITE: Final = re.compile("[-+]?inf(?:inity)?", re.IGNORECASE)
+_PLAIN: Final = re.compile(r"[0-9+\-.eE]*")
+_TO_PYTHON: Final = str.maketrans("dD\u2212", "ee-")
+
+
+@frozen
+class NotNumbers:
+    """Why a column is not a column of numbers: the index of the first cell that does not fit, and the reason."""
+
+    row: int
+    cell: str
+    why: str
+    """What follows behind the cell: `which is not a number`."""
+
+    @property
+    def words(self) -> str:
+        """The cell and the reason."""
+        return f"{self.cell[:40]!r}, {self.why}"
+
+
+def is_missing(cell: str) -> bool:
+    """Return whether the text of a cell stands for a missing number."""
+    return len(cell) <= _LONGEST_MISSING and cell.lower() in MISSING
+
+
+def is_number(cell: str) -> bool:
+    """Return whether a text is a number in any notation."""
+    return _notations(cell) != 0
+
+
+def plain_number(text: str) -> float | None:
+    """Return the finite number that a text with a decimal point is, None if it is none.
+
+    >>> plain_number("2.5e-3"), plain_number("1_000"), plain_number("1,5"), plain_number("inf")
+    (0.0025, None, None, None)
+    """
+    text = text.strip()
+    number = float(text.translate(_TO_PYTHON)) if _WITH_POINT.fullmatch(text) else math.inf
+    return number if math.isfinite(number) else None
+
+
+def number_in(text: str) -> float | None:
+    """Return the finite number that a text on its own is, None if it is none or can be read as two different ones."""
+    cell = text.strip()
+    if not cell or is_missing(cell):
+        return None
+    found = columns_of_numbers({"": [cell]})[""]
+    return None if isinstance(found, NotNumbers) or not math.isfinite(found[0]) else float(found[0])
+
+
+def columns_of_numbers(columns: Mapping[str, Sequence[str]]) -> dict[str, Numbers | NotNumbers]:
+    """Return the numbers of each column of a file, NaN where missing, or why it has none.
+
+    >>> {name: found.tolist() for name, found in columns_of_numbers({"N": ["0", "1,5"], "mm": ["2", "1.000"]}).items()}
+    {'N': [0.0, 1.5], 'mm': [2.0, 1000.0]}
+    """
+    fits = {name: _common(cells) for name, cells in columns.items()}
+    certain = [one.notations for one in fits.values() if isinstance(one, _Fit)]
+    points = any(not one & COMMA for one in certain)
+    commas = any(one == COMMA for one in certain)
+    of_file = (COMMA if commas else 0) | (THOUSANDS if points else 0)
+    return {
+        name: one if isinstance(one, NotNumbers) else _read(columns[name], one, of_file)
+        for name, one in fits.items()
+    }
+
+
+@frozen(eq=False)
+class _Fit:
+    """The notations that every cell of a column fits, and the numbers in the notation with points if all are plain."""
+
+    notations: int
+    values: Numbers | None = None
+
+
+def _common(cells: Sequence[str]) -> _Fit | NotNumbers:
+    """Return the notations that every cell fits, or why there is none."""
+    together = "".join(cells)
+    values = _floats(cells) if _PLAIN.fullmatch(together) else None
+    if values is not None:
+        grouped = (
+            all("." not in cell or _POINT_GROUPS.fullmatch(cell) for cell in cells)
+            if "." in together
+            else True
+        )
+        return _Fit(POINT | COMMA if grouped else POINT, values)
+    common = _EVERY
+    for row, cell in enumerate(cells):
+        if is_missing(cell):
+            continue
+        fits = _notations(cell)
+        if not fits:
+            return NotNumbers(row, cell, "which is not a number")
+        common &= fits
+    return _Fit(common) if common else _mixed(cells)
+
+
+def _mixed(cells: Sequence[str]) -> NotNumbers:
+    """Return which cell is written in another way than most."""
+    fits = [_EVERY if is_missing(cell) else _notations(cell) for cell in cells]
+    usual = max(_NOTATIONS, key=lambda notation: sum(1 for one in fits if one & notation))
+    row = next(k for k, one in enumerate(fits) if not one & usual)
+    advice = {
+        POINT: "write a decimal point",
+        THOUSANDS: "the other cells have a decimal point and commas between thousands",
+        COMMA: "the other cells have a decimal comma",
+    }[usual]
+    return NotNumbers(row, cells[row], f"which is not a number ({advice})")
+
+
+def _read(cells: Sequence[str], fit: _Fit, of_file: int) -> Numbers | NotNumbers:
+    """Return the numbers; `of_file` holds COMMA and THOUSANDS where other columns prove decimal commas or points."""
+    common = fit.notations
+    if common & POINT:
+        # `1.500` is 1500 where all other columns have decimal commas.
+        grouped = common & COMMA and of_file & COMMA and any("." in cell for cell in cells)
+        if not grouped:
+            return _values(cells, POINT) if fit.values is None else fit.values
+        if of_file == COMMA:
+            return _values(cells, COMMA)
+    elif common == THOUSANDS | COMMA:
+        if of_file == COMMA:
+            return _values(cells, COMMA)
+        if of_file == THOUSANDS or _are_thousands(cells):
+            return _values(cells, THOUSANDS)
+    else:
+        return _values(cells, common)
+    row = next(k for k, cell in enumerate(cells) if "," in cell or "." in cell)
+    readings = " or ".join(f"{_values([cells[row]], one)[0]:.15g}" for one in _NOTATIONS if common & one)
+    return NotNumbers(
+        row, cells[row], f"which can be {readings}: write a decimal point, and nothing between thousands"
+    )
+
+
+def _are_thousands(cells: Sequence[str]) -> bool:
+    """Return whether commas before three digits separate thousands, since the cells without one would have one too.
+
+    A program that writes three decimals writes them in every cell, and one that leaves out zeros leaves out the last.
+    """
+    plain = [cell for cell in cells if "," not in cell and not is_missing(cell)]
+    return bool(plain) and (
+        any(cell.endswith("0") for cell in cells if "," in cell)
+        or any(len(cell.lstrip("+-\u2212")) == 3 for cell in plain)
+    )
+
+
+def _values(cells: Sequence[str], notation: int) -> Numbers:
+    import numpy as np
+
+    numbers = [math.nan if is_missing(cell) else _number(cell, notation) for cell in cells]
+    return np.array(numbers, dtype=np.float64)
+
+
+def _floats(cells: Sequence[str]) -> Numbers | None:
+    """Return cells with only digits, signs, points and exponents as numbers; None if one of them is none."""
+    import numpy as np
+
+    try:
+        return np.array(list(map(float, cells)), dtype=np.float64)
+    except ValueError:
+        return None
+
+
+def _number(cell: str, notation: int) -> float:
+    if _INFINITE.fullmatch(cell):
+        return float(cell)
+    if _OTHER_GROUPS.fullmatch(cell):
+        cell = _GROUP_SIGNS.sub("", cell)
+    if notation == THOUSANDS:
+        cell = cell.replace(",", "")
+    elif notation == COMMA:
+        cell = cell.replace(".", "").replace(",", ".")
+    return float(cell.translate(_TO_PYTHON))
+
+
+def _notations(cell: str) -> int:
+    """Return the notations in which a cell is a number."""
+    if _OTHER_GROUPS.fullmatch(cell):
+        return COMMA if "," in cell else POINT if "." in cell else POINT | COMMA
+    if match := _WITH_POINT.fullmatch(cell):
+        found = POINT
+        if len(match["whole"] or "") <= 3:  # a thousand would have a comma
+            found |= THOUSANDS
+        if "." not in cell or _POINT_GROUPS.fullmatch(cell):
+            found |= COMMA
+        return found
+    found = 0
+    if _WITH_COMMA.fullmatch(cell) or _POINT_GROUPS.fullmatch(cell):
+        found |= COMMA
+    if _COMMA_GROUPS.fullmatch(cell):
+        found |= THOUSANDS
+    return found or (_EVERY if _INFINITE.fullmatch(cell) else 0)

@@ -1,0 +1,91 @@
+"""What the samples of a channel show: rate, gaps, range, resolution, and how old a value gets."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from attrs import frozen
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Numbers = NDArray[np.float64]
+
+_ROUNDING: Final = 1e-9
+"""Share of the range of a channel below which the step between two values is one of rounding."""
+
+
+@frozen(kw_only=True)
+class ChannelFacts:
+    """What the samples of a channel show. Times are in s; those and the rate are None where no times are known."""
+
+    name: str
+    unit: str
+    samples: int
+    missing: int
+    """Samples without a number."""
+    low: float | None
+    high: float | None
+    """The range of its values; None if it has none."""
+    resolution: float | None
+    """The least step between two of its values, None if it has a single value."""
+    rate_hz: float | None
+    longest_gap_s: float | None
+    """The longest time between two samples."""
+    age_s: float | None
+    """The longest time for which a value stays the same, or none comes: how old the value gets."""
+
+
+def channel_facts(
+    name: str, unit: str, values: Numbers, t_s: Numbers | None = None, end_s: float | None = None
+) -> ChannelFacts:
+    """Return the facts of a channel with the values (n,) or (n, k); `end_s` is when the recording ends."""
+    known = values[np.isfinite(values)]
+    gaps = np.diff(t_s) if t_s is not None and len(t_s) > 1 else None
+    return ChannelFacts(
+        name=name,
+        unit=unit,
+        samples=len(values),
+        missing=int(len(values) - np.isfinite(values.reshape(len(values), -1)).all(axis=1).sum()),
+        low=float(known.min()) if len(known) else None,
+        high=float(known.max()) if len(known) else None,
+        resolution=_resolution(known),
+        rate_hz=None if gaps is None or not np.median(gaps) > 0.0 else 1.0 / float(np.median(gaps)),
+        longest_gap_s=None if gaps is None else float(gaps.max()),
+        age_s=None if gaps is None else _age_s(values, t_s, end_s),
+    )
+
+
+def together(parts: Sequence[ChannelFacts]) -> ChannelFacts:
+    """Return the facts of the same channel in several recordings: the extremes, and the median rate."""
+    rates = [one.rate_hz for one in parts if one.rate_hz is not None]
+    return ChannelFacts(
+        name=parts[0].name,
+        unit=parts[0].unit,
+        samples=sum(one.samples for one in parts),
+        missing=sum(one.missing for one in parts),
+        low=min((one.low for one in parts if one.low is not None), default=None),
+        high=max((one.high for one in parts if one.high is not None), default=None),
+        resolution=min((one.resolution for one in parts if one.resolution is not None), default=None),
+        rate_hz=float(np.median(rates)) if rates else None,
+        longest_gap_s=max(
+            (one.longest_gap_s for one in parts if one.longest_gap_s is not None), default=None
+        ),
+        age_s=max((one.age_s for one in parts if one.age_s is not None), default=None),
+    )
+
+
+def _resolution(known: Numbers) -> float | None:
+    steps = np.diff(np.unique(known))
+    steps = steps[steps > _ROUNDING * max(float(np.ptp(known)), 1e-300)] if len(steps) else steps
+    return float(steps.min()) if len(steps) else None
+
+
+def _age_s(values: Numbers, t_s: Numbers | None, end_s: float | None) -> float:
+    assert t_s is not None
+    rows = values.reshape(len(values), -1)
+    changed = (rows[1:] != rows[:-1]).any(axis=1)
+    times = np.concatenate((t_s[:1], t_s[1:][changed], [t_s[-1] if end_s is None else max(end_s, t_s[-1])]))
+    return float(np.diff(times).max())

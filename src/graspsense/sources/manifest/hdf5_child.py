@@ -1,0 +1,85 @@
+"""Copy the arrays of an HDF5 file into an NPZ file: `python hdf5_child.py FILE OUT.npz MOST_BYTES`.
+
+A damaged file can end the process in the HDF5 library, so this is a program of its own. It imports nothing of
+graspsense. What a file names outside of itself is not followed: external links, external storage, virtual datasets.
+"""
+
+from __future__ import annotations
+
+import sys
+import zipfile
+from collections.abc import Iterator
+from typing import Any
+
+import h5py
+import numpy as np
+
+MOST_OBJECTS = 100_000
+DEEPEST = 32
+
+
+def datasets(group: Any, name: str, seen: set[Any], depth: int) -> Iterator[tuple[str, Any]]:
+    """Yield the datasets of a group with their paths, each group once."""
+    for key in group:
+        if len(seen) > MOST_OBJECTS or depth > DEEPEST:
+            raise ValueError(
+                f"it has more than {MOST_OBJECTS} objects, or groups nested deeper than {DEEPEST}"
+            )
+        if not isinstance(group.get(key, getlink=True), h5py.HardLink) or key in ("#refs#", "#subsystem#"):
+            continue
+        found = group[key]
+        address = h5py.h5o.get_info(found.id).addr
+        path = f"{name}/{key}" if name else key
+        if isinstance(found, h5py.Group) and address not in seen:
+            seen.add(address)
+            yield from datasets(found, path, seen, depth + 1)
+        elif isinstance(found, h5py.Dataset):
+            seen.add(path)
+            yield path, found
+
+
+def arrays(path: str, name: str, found: Any, left: int) -> Iterator[tuple[str, Any]]:
+    """Yield the arrays of numbers or texts in a dataset. Raises OverflowError if it has more bytes than are left."""
+    if found.shape is None or found.is_virtual or found.external or found.ndim > 3:
+        return
+    kind = found.dtype.kind
+    text = h5py.check_string_dtype(found.dtype) is not None
+    if kind not in "fiubV" and not text:
+        return
+    if found.size * found.dtype.itemsize > left:
+        raise OverflowError
+    values = found[()]
+    if text:
+        yield name, np.array(found.asstr()[()], dtype=np.str_)
+    elif found.dtype.names:
+        yield from (
+            (f"{name}.{one}", values[one]) for one in found.dtype.names if values[one].dtype.kind in "fiub"
+        )
+    elif kind != "V":
+        matlab = found.attrs.get("MATLAB_class", b"")
+        if matlab == b"char":
+            yield name, np.array("".join(map(chr, np.ravel(values, order="F").tolist())))
+        else:
+            yield name, np.asarray(values).T if matlab else np.asarray(values)
+
+
+def main(path: str, out: str, most: int) -> None:
+    """Copy the arrays. Exits with a message if the file is not HDF5, or too large."""
+    left = most
+    with h5py.File(path, "r") as file, zipfile.ZipFile(out, "w") as archive:
+        for name, found in datasets(file, "", {h5py.h5o.get_info(file.id).addr}, 0):
+            for member, values in arrays(path, name, found, left):
+                left -= values.nbytes
+                if left < 0:
+                    raise OverflowError
+                with archive.open(f"{member}.npy", "w", force_zip64=True) as copy:
+                    np.lib.format.write_array(copy, np.asanyarray(values, order="C"), allow_pickle=False)
+
+
+if __name__ == "__main__":
+    try:
+        main(sys.argv[1], sys.argv[2], int(sys.argv[3]))
+    except OverflowError:
+        sys.exit(3)
+    except (OSError, ValueError, RuntimeError, KeyError, TypeError, MemoryError) as error:
+        sys.exit(f"{type(error).__name__}: {error}")

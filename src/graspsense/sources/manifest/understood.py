@@ -1,0 +1,111 @@
+"""What can be told of a file without a manifest: its channels, and the squeezes in the most likely force."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from attrs import frozen
+
+from graspsense.core.values.errors import DataDamaged
+from graspsense.sources.channel_facts import ChannelFacts, channel_facts
+from graspsense.sources.column_guess import TO_S, force_columns, guesses, time_column
+from graspsense.sources.grasp_columns import GraspColumns
+from graspsense.sources.manifest.raw_tables import raw_tables
+from graspsense.sources.manifest.steps import squeezes
+from graspsense.sources.manifest.table import ColumnTable
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Numbers = NDArray[np.float64]
+
+
+@frozen(kw_only=True, eq=False)
+class UnderstoodFile:
+    """The channels of a file, their courses (times in s, values), and begin and end of each squeeze (s)."""
+
+    path: Path
+    tables: int
+    channels: tuple[ChannelFacts, ...]
+    courses: dict[str, tuple[Numbers, Numbers]]
+    squeezes: tuple[tuple[float, float], ...]
+    force: str
+    """The channel that the squeezes were found in, empty if none is known to be a force."""
+    notes: tuple[str, ...]
+    suggested: tuple[str, ...]
+    """Lines of a manifest for it, most likely."""
+
+
+def understood_file(path: Path) -> UnderstoodFile:
+    """Return what can be told of a file. Raises ConfigError, TooLarge, DataDamaged."""
+    tables = raw_tables(path)
+    topics = len({table.source for table in tables}) > 1 and tables[0].t_s is not None
+    shown = tables if topics else tables[:1]
+    timed = [(table, *_times(table)) for table in shown]
+    ends = [t_s[-1] for _, t_s, known in timed if known and len(t_s)]
+    channels, courses = [], {}
+    for table, t_s, known in timed:
+        for name, values in table.numbers.items():
+            unit = table.units.get(name, "")
+            channels.append(
+                channel_facts(name, unit, values, t_s if known else None, max(ends, default=None))
+            )
+            courses[name] = (t_s, values if values.ndim == 1 else values.sum(axis=1))
+    force, found = _squeezes(timed)
+    likely = [one for table in shown for one in guesses(table) if one.value and one.key != "rate_hz"]
+    return UnderstoodFile(
+        path=path,
+        tables=len(tables),
+        channels=tuple(channels),
+        courses=courses,
+        squeezes=found,
+        force=force,
+        notes=tables[0].notes + tables[0].warnings,
+        suggested=tuple(f'{one.key} = "{one.value}"' for one in likely),
+    )
+
+
+def _times(table: ColumnTable) -> tuple[Numbers, bool]:
+    """Return the times of the rows (s) and True, or their numbers and False if no time is known."""
+    if table.t_s is not None:
+        return table.t_s, True
+    name = time_column(table)
+    if name is None:
+        return np.arange(len(table), dtype=np.float64), False
+    guess = next(one for one in guesses(table) if one.key == "time")
+    unit = guess.value.rpartition("[")[2].rstrip("]") if guess.value.endswith("]") else ""
+    values = table.numbers[name]
+    factor = TO_S.get(unit, 1.0) if unit else TO_S[_unit_since_1970(float(values[0]))]
+    return (values - values[0]) * factor, True
+
+
+def _unit_since_1970(value: float) -> str:
+    return "ns" if value > 1e17 else "us" if value > 1e14 else "ms" if value > 1e11 else "s"
+
+
+def _squeezes(
+    timed: Sequence[tuple[ColumnTable, Numbers, bool]],
+) -> tuple[str, tuple[tuple[float, float], ...]]:
+    """Return the most likely force, and begin and end of each time (s) at which an object is held."""
+    for table, t_s, _ in timed:
+        names = force_columns(table, time_column(table))
+        if not names or len(t_s) < 2:
+            continue
+        parts = [np.abs(table.numbers[name]).reshape(len(table), -1).sum(axis=1) for name in names]
+        force = np.nan_to_num(np.sum(parts, axis=0))
+        columns = GraspColumns(source=table.source, t_s=t_s, gap_m=force, left_n=force, right_n=force)
+        try:
+            found = squeezes(columns)
+        except DataDamaged:
+            return names[0], ()
+        return ", ".join(names), tuple(_held(one) for one in found)
+    return "", ()
+
+
+def _held(columns: GraspColumns) -> tuple[float, float]:
+    force = columns.force_n
+    held = columns.t_s[force > float(force.min()) + 0.2 * float(np.ptp(force))]
+    return float(held[0]), float(held[-1])

@@ -1,0 +1,487 @@
+"""Text files as tables: where the table begins, what separates its columns, how they are called, and its cells.
+
+A table may be preceded by lines about the instrument, by `sep=;`, or by comments (`#`, `%`), and its names may be
+followed by a line with units. Its names can stand in a comment, as `numpy.savetxt` writes them. A file with one JSON
+object a line is a table too. Whatever is left out is told in a note.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+from attrs import frozen
+
+from graspsense.core.files.limits import CELLS, COLUMNS, LINE_CHARACTERS, TEXT_BYTES
+from graspsense.core.values.errors import ConfigError, DataDamaged
+from graspsense.core.values.written_numbers import is_missing, is_number
+from graspsense.recording.readable import not_opened, readable, refuse_devices
+from graspsense.recording.unpacked import Unpacked
+
+LONGEST_NAME: Final = 500
+"""Limit on the characters of the name of a column."""
+JSON_LINES: Final = (".jsonl", ".ndjson")
+"""Endings of files with one JSON object a line."""
+GZIP: Final = ".gz"
+UNITS: Final = frozenset((
+    "s", "sec", "secs", "seconds", "ms", "msec", "us", "\u00b5s", "\u03bcs", "ns", "min", "m", "cm", "mm",
+    "um", "\u00b5m", "\u03bcm", "in", "inch", "n", "mn", "kn", "g", "gram", "grams", "kg", "gf", "kgf", "lb",
+    "lbf", "v", "mv", "a", "ma", "hz", "khz", "c", "\u00b0c", "degc", "k", "deg", "\u00b0", "rad", "%", "-",
+    "1", "pa", "kpa", "mpa", "bar", "psi", "nm", "n\u00b7m", "n*m", "m/s", "cm/s", "mm/s", "m/s2", "m/s^2",
+    "m/s\u00b2", "rad/s", "deg/s", "counts", "count", "raw", "adc", "a.u.", "au", "step", "steps",
+))  # fmt: skip
+"""What stands in a line of units, in small letters."""
+SPELLED_UNITS: Final = {
+    **dict.fromkeys(("sec", "secs", "second", "seconds"), "s"),
+    **dict.fromkeys(("msec", "millisecond", "milliseconds"), "ms"),
+    **dict.fromkeys(("\u00b5s", "\u03bcs", "microsecond", "microseconds"), "us"),
+    **dict.fromkeys(("meter", "meters", "metre", "metres"), "m"),
+    **dict.fromkeys(("millimeter", "millimeters", "millimetre", "millimetres"), "mm"),
+    **dict.fromkeys(("\u00b5m", "\u03bcm", "micrometer", "micrometers", "micrometre", "micrometres"), "um"),
+    **dict.fromkeys(("newton", "newtons"), "N"),
+    **dict.fromkeys(("count", "raw", "adc"), "counts"),
+    "inch": "in",
+}
+"""Units as they are spelled out, in small letters, with the sign that stands for them here."""
+_LINE_ENDS: Final = "\n\r\v\f\x1c\x1d\x1e\x85\u2028\u2029"
+"""The characters at which `str.splitlines` divides a text."""
+_COMMENTS: Final = ("#", "%")
+_SEPARATOR_LINE: Final = re.compile(r'"?sep=([;,\t|])"?\s*')
+_SAMPLED: Final = 400
+"""Lines from which the separator and the kinds of the columns are found."""
+_SAMPLED_CELLS: Final = 100_000
+_FIXED_ROWS: Final = 50
+"""Rows with the same number of decimals from which a last number with fewer is one that was cut off."""
+_MOST_JSON_PARTS: Final = 8
+"""Depth of lists and objects in a JSON line."""
+
+Line = tuple[int, str]
+Row = tuple[int, list[str]]
+
+
+@frozen(kw_only=True, eq=False)
+class TextTable:
+    """The cells of a table as text. A column without a name has an empty one; `units` are those of a line of units."""
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    columns: tuple[Sequence[str], ...]
+    lines: tuple[int, ...]
+    """The line of each row."""
+    notes: tuple[str, ...] = ()
+    named_in: int = 0
+    """The line with the names, 0 if there is none."""
+
+
+def read_lines(path: Path) -> tuple[list[Line], bool]:
+    """Return the lines of a text file with their numbers, and whether the last one ends as the others do.
+
+    Raises ConfigError, TooLarge, DataDamaged.
+    """
+    text = text_of(path)
+    check_lines(path, text)
+    return list(enumerate(re.split("\r\n|[\r\n]", text), 1)), not text or text.endswith(("\n", "\r"))
+
+
+def table_of(path: Path, lines: Sequence[Line], *, ended: bool = True) -> TextTable:
+    """Return the table in these lines of a file, which may have no rows; `ended`: the last line is known to be whole.
+
+    Raises DataDamaged with the line that does not fit.
+    """
+    if text_suffix(path) in JSON_LINES:
+        return _json_table(path, lines, ended)
+    return _Layout(path, lines).table(ended)
+
+
+def text_suffix(path: Path) -> str:
+    """Return the ending of a name in small letters, without that of a compression."""
+    name = path.name.lower().removesuffix(GZIP)
+    return Path(name).suffix
+
+
+class _Layout:
+    """How the lines of a file are laid out."""
+
+    def __init__(self, path: Path, lines: Sequence[Line]) -> None:
+        self.path = path
+        self.notes: list[str] = []
+        written = [(number, line) for number, line in lines if line.strip()]
+        given = _SEPARATOR_LINE.fullmatch(written[0][1]) if written else None
+        if given:
+            written = written[1:]
+        self.comments = [one for one in written if one[1].lstrip().startswith(_COMMENTS)]
+        plain = [one for one in written if not one[1].lstrip().startswith(_COMMENTS)]
+        self.separator = given[1] if given else _separator([line for _, line in _sample(plain)])
+        self.rows = list(self._checked(self._rows(plain)))
+
+    def table(self, ended: bool) -> TextTable:
+        """Return the table. Raises DataDamaged."""
+        if not self.rows:
+            return TextTable(names=(), units=(), columns=(), lines=())
+        names, units, begin, line = self._header()
+        check_columns(self.path, names)
+        rows = self.rows[begin:]
+        rows = self._without_repeats(rows, names, units)
+        names, rows = self._without_blank_end(names, rows)
+        rows = self._without_cut(rows, len(names), ended)
+        for number, row in rows:
+            if len(row) != len(names):
+                raise DataDamaged(
+                    f"{self.path}, line {number}: {len(row)} values, but there are {len(names)} columns"
+                )
+        later = [number for number, _ in self.comments if rows and number > rows[0][0]]
+        if later:
+            self.notes.append(_lines_words(later, "comments"))
+        return TextTable(
+            names=tuple(names),
+            units=tuple((units or [""] * len(names))[: len(names)]),
+            columns=tuple(zip(*(row for _, row in rows), strict=True)) if rows else ((),) * len(names),
+            lines=tuple(number for number, _ in rows),
+            notes=tuple(self.notes),
+            named_in=line,
+        )
+
+    def _rows(self, lines: Sequence[Line]) -> Iterator[Row]:
+        """Yield the cells of each line; a cell in quotes may go over several lines. Raises DataDamaged."""
+        if self.separator == " ":
+            for number, line in lines:
+                yield number, line.split()
+            return
+        reader = csv.reader((line + "\n" for _, line in lines), delimiter=self.separator, strict=True)
+        try:
+            for row in reader:
+                yield lines[reader.line_num - 1][0], list(map(str.strip, row))
+        except (csv.Error, ValueError) as error:
+            number = lines[max(0, min(reader.line_num, len(lines)) - 1)][0]
+            raise DataDamaged(f"{self.path}, line {number}: {error}") from None
+
+    def _checked(self, rows: Iterator[Row]) -> Iterator[Row]:
+        """Yield the rows that are not empty. Raises DataDamaged for too many cells, before they are kept."""
+        cells, most, widest = 0, CELLS.most, COLUMNS.most
+        for number, row in rows:
+            if not any(row):
+                continue
+            cells += len(row)
+            if len(row) > widest or cells > most:
+                too_many = COLUMNS.exceeded(len(row)) or CELLS.exceeded(cells)
+                raise DataDamaged(f"{self.path}, line {number}: {too_many}")
+            yield number, row
+
+    def _header(self) -> tuple[list[str], list[str] | None, int, int]:
+        """Return the names, the units if a line has them, the first row behind both, and the line of the names."""
+        sample = _sample([row for _, row in self.rows])
+        width = max(Counter(map(len, sample)).items(), key=lambda one: (one[1], one[0]))[0]
+        sample = sample[: max(2, _SAMPLED_CELLS // width)]
+        numeric = _numeric_columns(sample, width)
+        data = next((k for k, (_, row) in enumerate(self.rows) if _is_data(row, width, numeric)), None)
+        first = self.rows[0][1]
+        if data is None or (data == 1 and len(first) > 1):
+            return first, None, 1, self.rows[0][0]
+        if data == 0:
+            named = self._names_in_comment(width)
+            if named is not None:
+                return named[1], None, 0, named[0]
+            if all(is_number(cell) or is_missing(cell) for cell in first):
+                return [f"c{k}" for k in range(1, width + 1)], None, 0, 0
+            return first, None, 1, self.rows[0][0]
+        return self._later_header(data, width, numeric)
+
+    def _later_header(
+        self, data: int, width: int, numeric: frozenset[int]
+    ) -> tuple[list[str], list[str] | None, int, int]:
+        """Return the same where `data` rows come before the numbers. Raises DataDamaged if none of them has names."""
+        texts = [
+            set() if k in numeric else {row[k] for _, row in self.rows[data:] if k < len(row)}
+            for k in range(width)
+        ]
+        able = [k for k in range(data) if _can_be_names(self.rows[k][1], width, texts)]
+        units: list[str] | None = None
+        if len(able) > 1 and able[-1] == able[-2] + 1 and _are_units(self.rows[able[-1]][1]):
+            units = [cell.strip("[]()") for cell in self.rows[able.pop()][1]]
+        elif able and able[-1] + 1 < data and _are_units(self.rows[able[-1] + 1][1]):
+            units = [cell.strip("[]()") for cell in self.rows[able[-1] + 1][1]]
+        if not able:
+            number, row = self.rows[data]
+            if all(len(one) == 1 for _, one in self.rows[:data]):
+                self.notes.append(
+                    f"{data} lines before the numbers are left out, and none of them names the columns"
+                )
+                return [f"c{k}" for k in range(1, width + 1)], None, data, 0
+            raise DataDamaged(
+                f"{self.path}: the numbers begin in line {number} with {len(row)} values, and no line before it names "
+                f"{width} columns. If line {self.rows[data - 1][0]} is to be left out and the names stand in the next "
+                'line, say so in a manifest: start = "a text in that line"'
+            )
+        names = able[-1]
+        if names:
+            before = [number for number, _ in self.rows[:names]]
+            self.notes.append(
+                f"the names of the columns are those of line {self.rows[names][0]}; "
+                + _lines_words(before, "lines before them")
+            )
+        return self.rows[names][1], units, names + (2 if units else 1), self.rows[names][0]
+
+    def _names_in_comment(self, width: int) -> tuple[int, list[str]] | None:
+        """Return the names that the last comment before the first row has, with its line; None if it has none."""
+        before = [(number, line) for number, line in self.comments if number < self.rows[0][0]]
+        if not before:
+            return None
+        number, line = before[-1]
+        text = line.strip().lstrip("#% ")
+        cells = (
+            text.split() if self.separator == " " else [cell.strip() for cell in text.split(self.separator)]
+        )
+        named = len(cells) == width and len(set(cells)) == width and not any(map(is_number, cells))
+        return (number, cells) if named and all(cells) else None
+
+    def _without_repeats(
+        self, rows: list[Row], names: Sequence[str], units: Sequence[str] | None
+    ) -> list[Row]:
+        """Return the rows that are not the header again."""
+        header = list(names)
+        again = [number for number, row in rows if row == header]
+        if not again or all(map(is_number, header)):
+            return rows
+        self.notes.append(_lines_words(again, "repeated headers"))
+        return [one for one in rows if one[1] != header and not (units and _are_units(one[1]))]
+
+    def _without_blank_end(self, names: list[str], rows: list[Row]) -> tuple[list[str], list[Row]]:
+        """Return names and rows without a last column that a separator at the end of the lines makes."""
+        n = len(names)
+        if rows and all(len(row) == n + 1 and not row[-1] for _, row in rows):
+            return names, [(number, row[:-1]) for number, row in rows]
+        while (
+            len(names) > 1
+            and not names[-1]
+            and all(len(row) < len(names) or not row[len(names) - 1] for _, row in rows)
+        ):
+            names = names[:-1]
+        if len(names) < n:
+            rows = [(number, row[: len(names)] if len(row) <= n else row) for number, row in rows]
+        return names, rows
+
+    def _without_cut(self, rows: list[Row], width: int, ended: bool) -> list[Row]:
+        """Return the rows without a last one that was cut off while it was written."""
+        if ended or len(rows) < 2:
+            return rows
+        number, last = rows[-1]
+        others = {_decimals(row[-1]) for _, row in rows[:-1] if len(row) == width}
+        fixed = len(rows) > _FIXED_ROWS and len(others) == 1
+        shorter = fixed and -1 < _decimals(last[-1]) < max(others)
+        if len(last) >= width and not shorter:
+            return rows
+        self.notes.append(f"line {number} is cut off, and left out")
+        return rows[:-1]
+
+
+def _json_table(path: Path, lines: Sequence[Line], ended: bool) -> TextTable:
+    """Return the table of a file with one JSON object a line. Raises DataDamaged."""
+    written = [(number, line) for number, line in lines if line.strip()]
+    rows: list[dict[str, str]] = []
+    names: dict[str, None] = {}
+    notes: list[str] = []
+    for k, (number, line) in enumerate(written):
+        try:
+            value = json.loads(line, parse_float=str, parse_int=str)
+            if not isinstance(value, dict):
+                raise DataDamaged(f"{path}, line {number}: not a JSON object in braces")
+            row = dict(_cells_of(value, "", 0))
+        except (ValueError, RecursionError) as error:
+            if k and k == len(written) - 1 and not ended:
+                notes.append(f"line {number} is cut off, and left out")
+                break
+            raise DataDamaged(f"{path}, line {number}: not a JSON object: {error}") from None
+        names |= dict.fromkeys(row)
+        rows.append(row)
+        if k == 0:
+            check_columns(path, list(names))
+        if too_many := COLUMNS.exceeded(len(names)) or CELLS.exceeded(len(rows) * len(names)):
+            raise DataDamaged(f"{path}: {too_many}")
+    check_columns(path, list(names))
+    return TextTable(
+        names=tuple(names),
+        units=("",) * len(names),
+        columns=tuple([row.get(name, "") for row in rows] for name in names),
+        lines=tuple(number for number, _ in written[: len(rows)]),
+        notes=tuple(notes),
+        named_in=written[0][0] if written else 0,
+    )
+
+
+def _cells_of(value: Any, name: str, depth: int) -> Iterator[tuple[str, str]]:
+    """Yield the name and the text of each value in a JSON value: `pads.left`, `taxels.0`."""
+    if depth > _MOST_JSON_PARTS:
+        raise ValueError(f"it is nested deeper than {_MOST_JSON_PARTS}")
+    parts: Mapping[str, Any] | None = None
+    if isinstance(value, dict):
+        parts = value
+    elif isinstance(value, list):
+        parts = {str(k): one for k, one in enumerate(value)}
+    if parts is None:
+        yield (
+            name,
+            "" if value is None else str(int(value)) if isinstance(value, bool) else str(value).strip(),
+        )
+        return
+    for key, one in parts.items():
+        yield from _cells_of(one, f"{name}.{key}" if name else key, depth + 1)
+
+
+def _sample(lines: Sequence[Any]) -> list[Any]:
+    """Return lines from the beginning, and from everywhere."""
+    half = _SAMPLED // 2
+    return [*lines[:half], *lines[half :: max(1, (len(lines) - half) // half)]]
+
+
+def _separator(lines: Sequence[str]) -> str:
+    """Return what separates the cells of these lines: a semicolon, a tab, a comma, or any number of spaces.
+
+    It gives most lines the same number of cells, and the first line as many if any does.
+    """
+    widths = {one: _width(lines, one) for one in (";", "\t", ",", "|", " ")}
+    agreeing = {one: count for one, (width, count) in widths.items() if width > 1}
+    if agreeing.get(" ", 0) >= agreeing.get(",", 1) and _commas_are_within_numbers(lines):
+        agreeing.pop(",", None)
+    able = [one for one, count in agreeing.items() if count >= 0.9 * max(agreeing.values())]
+    fitting = [one for one in able if _width(lines[:1], one)[0] == widths[one][0]]
+    return next(iter(fitting or able), " ")
+
+
+def _commas_are_within_numbers(lines: Sequence[str]) -> bool:
+    """Return whether spaces separate numbers with commas, as in `1,5 2,5`, in most lines."""
+    numbers = sum(all(is_number(word) or is_missing(word) for word in line.split()) for line in lines)
+    return 2 * numbers >= len(lines)
+
+
+def _width(lines: Sequence[str], separator: str) -> tuple[int, int]:
+    """Return the most frequent number of cells of a line, and how many lines have it."""
+    widths: Counter[int] = Counter()
+    for line in lines:
+        try:
+            cells = line.split() if separator == " " else next(csv.reader([line], delimiter=separator), [])
+        except (csv.Error, ValueError):
+            continue
+        widths[len(cells)] += 1
+    return max(widths.items(), key=lambda one: one[1], default=(1, 0))
+
+
+def _numeric_columns(rows: Sequence[Sequence[str]], width: int) -> frozenset[int]:
+    """Return which columns have numbers in most rows of this width."""
+    numbers, known = Counter[int](), Counter[int]()
+    for row in rows:
+        if len(row) == width:
+            for k, cell in enumerate(row):
+                if not is_missing(cell):
+                    known[k] += 1
+                    numbers[k] += is_number(cell)
+    return frozenset(k for k in range(width) if numbers[k] * 2 >= known[k] > 0)
+
+
+def _is_data(row: Sequence[str], width: int, numeric: frozenset[int]) -> bool:
+    """Return whether a row has a number where numbers are expected, and nothing else there."""
+    if len(row) != width:
+        return False
+    there = [row[k] for k in numeric if not is_missing(row[k])]
+    return bool(there) and all(map(is_number, there))
+
+
+def _can_be_names(row: Sequence[str], width: int, texts: Sequence[set[str]]) -> bool:
+    """Return whether a row can name so many columns: different texts, and none that a column of text has below."""
+    cells = row[:-1] if len(row) == width + 1 and not row[-1] else row
+    named = [cell for cell in cells if cell]
+    return (
+        width - 1 <= len(cells) <= width
+        and len(named) >= max(len(cells) - 1, 1)
+        and not any(map(is_number, named))
+        and (2 * len(set(named)) > len(named) or _are_units(cells))
+        and not any(cell in texts[k] for k, cell in enumerate(cells) if cell)
+    )
+
+
+def _are_units(row: Sequence[str]) -> bool:
+    """Return whether most cells of a row are units, or stand in brackets as units do."""
+    named = [cell for cell in row if cell]
+    units = [cell for cell in named if is_unit(cell.strip("[]()")) or cell[0] + cell[-1] in ("[]", "()")]
+    return bool(named) and 2 * len(units) > len(named)
+
+
+def is_unit(text: str) -> bool:
+    """Return whether a text is a unit."""
+    return text.lower() in UNITS or text.lower() in SPELLED_UNITS
+
+
+def _decimals(cell: str) -> int:
+    """Return the digits behind the decimal point of a number, -1 for another text."""
+    return len(cell.partition(".")[2]) if is_number(cell) and "e" not in cell.lower() else -1
+
+
+def _lines_words(numbers: Sequence[int], what: str) -> str:
+    some = ", ".join(map(str, numbers[:4])) + (", ..." if len(numbers) > 4 else "")
+    return f"left out: {len(numbers)} {what} (line {some})"
+
+
+def check_lines(path: Path, text: str) -> None:
+    """Raise DataDamaged if a line of the text is too long, or if there are too many of them."""
+    if too_many := CELLS.exceeded(sum(map(text.count, _LINE_ENDS))):
+        raise DataDamaged(f"{path}: {too_many}")
+    most = LINE_CHARACTERS.most
+    if len(text) <= most:
+        return
+    start = number = 0
+    for number, match in enumerate(re.finditer("\r\n|[\r\n]", text), 1):
+        if match.start() - start > most:
+            raise DataDamaged(f"{path}, line {number}: {LINE_CHARACTERS.exceeded(match.start() - start)}")
+        start = match.end()
+    if too_long := LINE_CHARACTERS.exceeded(len(text) - start):
+        raise DataDamaged(f"{path}, line {number + 1}: {too_long}")
+
+
+def check_columns(path: Path, names: Sequence[str]) -> None:
+    """Raise DataDamaged if a table has too many columns, or one with a name that is too long."""
+    if too_many := COLUMNS.exceeded(len(names)):
+        raise DataDamaged(f"{path}: {too_many}")
+    for number, name in enumerate(names, 1):
+        if len(name) > LONGEST_NAME:
+            raise DataDamaged(
+                f"{path}: the name of column {number} has {len(name)} characters, and at most {LONGEST_NAME} are "
+                f"accepted: {name[:40]!r}..."
+            )
+
+
+def text_of(path: Path) -> str:
+    """Return the text of a file in UTF-8, unpacked if it is compressed by gzip.
+
+    Raises ConfigError if it cannot be read, TooLarge, and DataDamaged if it is not text.
+    """
+    refuse_devices(path)
+    most = TEXT_BYTES.most
+    try:
+        with path.open("rb") as file:
+            data = file.read(most + 1)
+            size = len(data) if len(data) <= most else max(path.stat().st_size, len(data))
+    except OSError as error:
+        raise not_opened(path, error) from error
+    except ValueError as error:
+        raise ConfigError(f"{path} cannot be read: {error}") from error
+    if data.startswith(b"\x1f\x8b"):
+        with readable(path, "a file compressed by gzip"):
+            data = Unpacked(path).unpack("gzip", data)
+            size = max(size, len(data))
+    if too_large := TEXT_BYTES.exceeded(size):
+        raise DataDamaged(f"{path}: {too_large}")
+    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
+        raise DataDamaged(f"{path} is UTF-16: save it as UTF-8")
+    if b"\0" in data:
+        raise DataDamaged(f"{path} contains zero bytes: it is not a text file")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        raise DataDamaged(
+            f"{path}, line {line}: byte 0x{data[error.start]:02x} is not UTF-8: save the file as UTF-8"
+        ) from None

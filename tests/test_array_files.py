@@ -1,0 +1,215 @@
+"""Files of named arrays: which arrays belong to a grasp, what the axes of a solid array mean, and HDF5."""
+
+import os
+import subprocess
+import sys
+
+import h5py
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+from graspsense.cli.main import main
+from graspsense.core.values.errors import ConfigError, DataDamaged, TooLarge
+from graspsense.recording.labelled_recording import UnreadableRecording
+from graspsense.sources.manifest.hdf5_file import hdf5_arrays
+from graspsense.sources.manifest.reader import read_recordings
+from graspsense.sources.trial_source import load_trials
+
+N = 120
+T_S = np.arange(N) * 0.01
+GAP = np.where(T_S < 0.6, 0.08 - 0.05 * T_S, 0.05)
+FORCE = np.maximum(0.0, T_S - 0.6) * 5.0
+
+
+def recordings(folder, text):
+    (folder / "m.toml").write_text(text)
+    return list(read_recordings(str(folder / "m.toml")))
+
+
+def peaks(found):
+    return [max(reading.frame.force_left_n for reading in one.recording.readings) for one in found]
+
+
+def solid(grasps=3):
+    return np.stack([np.column_stack([T_S, GAP, (k + 1) * FORCE]) for k in range(grasps)])
+
+
+COLUMNS = 'time = "c1"\ngap = "c2"\nforce = "c3"\n'
+
+
+@pytest.mark.parametrize("ending", ["npy", "npz", "mat", "h5"])
+def test_an_array_of_three_dimensions_is_read_alike_in_every_file_and_asked_about(ending, tmp_path):
+    path = tmp_path / f"jar.{ending}"
+    if ending == "npy":
+        np.save(path, solid())
+    elif ending == "npz":
+        np.savez(path, data=solid(), kind=np.array([3, 4, 5]))
+    elif ending == "mat":
+        savemat(path, {"data": solid()})
+    else:
+        with h5py.File(path, "w") as file:
+            file["data"] = solid()
+    text = f'files = "{{label}}.{ending}"\norder = "{{part}}"\n{COLUMNS}'
+    found = recordings(tmp_path, text)
+    assert peaks(found) == pytest.approx([FORCE.max() * k for k in (1, 2, 3)])
+    assert [one.order for one in found] == [0, 1, 2]
+    assert all(any("axes" in notice for notice in one.notices) for one in found)
+    confirmed = recordings(tmp_path, text + 'axes = "grasp, time, column"\n')
+    assert peaks(confirmed) == peaks(found)
+    assert not any("axes" in notice for one in confirmed for notice in one.notices)
+    if ending == "npz":
+        numbered = recordings(
+            tmp_path, text.replace("{label}", "jar") + 'label = "kind{kind}"\naxes = "grasp, time, column"'
+        )
+        assert [one.label for one in numbered] == ["kind3", "kind4", "kind5"]
+
+
+def test_the_order_of_the_axes_is_that_of_the_manifest(tmp_path):
+    np.save(tmp_path / "jar.npy", np.transpose(solid(), (2, 0, 1)))
+    found = recordings(tmp_path, f'files = "{{label}}.npy"\naxes = "column, grasp, time"\n{COLUMNS}')
+    assert peaks(found) == pytest.approx([FORCE.max() * k for k in (1, 2, 3)])
+    images = np.random.default_rng(0).normal(size=(4, 5, N))
+    np.savez(tmp_path / "cup.npz", gap=GAP, force=FORCE, palm=images)
+    text = 'files = "{label}.npz"\nrate_hz = 100\ngap = "gap"\nforce = "force"\nchannels = { palm = "palm [counts]" }\n'
+    for given in (text, text + 'axes = "row, column, time"\n'):
+        (one,) = recordings(tmp_path, given)
+        assert (one.recording.channels[0].rows, one.recording.channels[0].columns) == (4, 5)
+        assert one.recording.readings[7].signals.palm.cells == pytest.approx(images[:, :, 7].reshape(-1))
+    with pytest.raises(ConfigError, match="does not name three axes"):
+        recordings(tmp_path, text + 'axes = "time, width, column"\n')
+
+
+@pytest.mark.parametrize("ending", ["mat", "npz"])
+def test_hundreds_of_named_arrays_are_told_apart_by_a_pattern(ending, tmp_path):
+    names = [(label, k) for label in ("jar", "tin_can") for k in range(1, 101)]
+    parts = {f"{label}_{k}_gap": GAP for label, k in names}
+    parts |= {f"{label}_{k}_force": k * FORCE / 10.0 for label, k in names}
+    save = savemat if ending == "mat" else lambda path, given: np.savez(path, **given)
+    save(tmp_path / f"all.{ending}", {**parts, "t": T_S})
+    text = f'files = "all.{ending}"\narrays = "{{label}}_{{order:d}}_{{column}}"\n'
+    text += 'time = "t"\ngap = "gap"\nforce = "force"\n'
+    found = recordings(tmp_path, text)
+    assert len(found) == 200
+    assert {one.label for one in found} == {"jar", "tin_can"}
+    by_order = sorted(
+        (one.order, peak) for one, peak in zip(found, peaks(found), strict=True) if one.label == "jar"
+    )
+    assert [peak for _, peak in by_order] == pytest.approx([k * FORCE.max() / 10.0 for k in range(1, 101)])
+    (refused,) = recordings(tmp_path, text.replace("{label}_", "grasp_{label}_"))
+    assert isinstance(refused, UnreadableRecording)
+    assert "arrays" in str(refused.error)
+
+
+def test_arrays_without_a_column_have_numbered_columns(tmp_path):
+    savemat(tmp_path / "all.mat", {f"jar_{k}": solid()[k] for k in range(3)})
+    found = recordings(tmp_path, f'files = "all.mat"\narrays = "{{label}}_{{order:d}}"\n{COLUMNS}')
+    assert peaks(found) == pytest.approx([FORCE.max() * k for k in (1, 2, 3)])
+
+
+def test_groups_of_hdf5_are_grasps(tmp_path):
+    with h5py.File(tmp_path / "all.h5", "w") as file:
+        for k in (1, 2):
+            group = file.create_group(f"trials/jar_{k}")
+            group.create_dataset("pose/gap", data=GAP * 1e3, compression="gzip")
+            group["force"] = k * FORCE
+            group["who"] = "Ann"
+    text = """
+        files = "all.h5"
+        arrays = "trials/{label}_{order:d}/**/{column}"
+        rate_hz = 100
+        gap = "gap [mm]"
+        force = "force"
+        instance = "{who}"
+        """
+    found = recordings(tmp_path, text)
+    assert peaks(found) == pytest.approx([FORCE.max(), 2 * FORCE.max()])
+    assert {one.instance for one in found} == {"Ann"}
+
+
+def test_a_mat_file_of_version_7_3_is_read_in_the_axes_of_matlab(tmp_path):
+    with h5py.File(tmp_path / "jar.mat", "w", userblock_size=512) as file:
+        for name, values in {"gap": GAP[None], "data": solid()[1]}.items():
+            file.create_dataset(name, data=values.T).attrs["MATLAB_class"] = np.bytes_("double")
+        file.create_dataset("kind", data=np.array([[106], [97]], dtype=np.uint16)).attrs["MATLAB_class"] = (
+            np.bytes_("char")
+        )
+    with (tmp_path / "jar.mat").open("r+b") as file:
+        file.write(b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM")
+    found = recordings(
+        tmp_path, 'files = "*.mat"\nlabel = "{kind}"\nrate_hz = 100\ngap = "gap"\nforce = "data[2]"\n'
+    )
+    assert [one.label for one in found] == ["ja"]
+    assert peaks(found) == pytest.approx([2 * FORCE.max()])
+
+
+def test_nothing_outside_of_an_hdf5_file_is_read(tmp_path):
+    np.ones(100).tofile(tmp_path / "secret.bin")
+    with h5py.File(tmp_path / "other.h5", "w") as other:
+        other["secret"] = np.ones(100)
+    layout = h5py.VirtualLayout((100,), dtype="f8")
+    layout[:] = h5py.VirtualSource(str(tmp_path / "other.h5"), "secret", (100,))
+    path = tmp_path / "jar.h5"
+    with h5py.File(path, "w") as file:
+        file["gap"] = GAP
+        file["away"] = h5py.ExternalLink(str(tmp_path / "other.h5"), "secret")
+        file["loop"] = h5py.SoftLink("/")
+        file["around"] = file["/"]
+        file.create_virtual_dataset("virtual", layout)
+        file.create_dataset("outside", (100,), "f8", external=[(str(tmp_path / "secret.bin"), 0, 800)])
+    assert list(hdf5_arrays(path)) == ["gap"]
+
+
+def test_a_damaged_or_large_hdf5_file_is_told_by_its_name(tmp_path, monkeypatch):
+    path = tmp_path / "jar.h5"
+    with h5py.File(path, "w") as file:
+        file.create_dataset("gap", data=np.zeros(3_000_000), compression="gzip")
+    monkeypatch.setenv("GRASPSENSE_MAX_UNPACKED_MB", "1")
+    with pytest.raises(TooLarge, match=r"jar\.h5"):
+        hdf5_arrays(path)
+    monkeypatch.delenv("GRASPSENSE_MAX_UNPACKED_MB")
+    whole = path.read_bytes()
+    for damaged in (whole[: len(whole) // 2], b"\x89HDF\r\n\x1a\n" + os.urandom(500), b"nothing"):
+        path.write_bytes(damaged)
+        with pytest.raises(DataDamaged, match=r"jar\.h5"):
+            hdf5_arrays(path)
+
+
+def test_a_reader_that_is_killed_by_a_file_is_an_error_of_the_file(tmp_path, monkeypatch):
+    path = tmp_path / "jar.h5"
+    path.write_bytes(b"")
+    monkeypatch.setattr(subprocess, "run", _run_that_dies(subprocess.run))
+    with pytest.raises(DataDamaged, match=r"jar\.h5.*-9"):
+        hdf5_arrays(path)
+
+
+def _run_that_dies(run):
+    def killed(command, **given):
+        return run([sys.executable, "-c", "import os, signal; os.kill(os.getpid(), signal.SIGKILL)"], **given)
+
+    return killed
+
+
+@pytest.mark.parametrize("gaps", [("0.06", "0.06"), ("0.05", "0.06")])
+def test_a_gap_that_does_not_change_is_no_width(gaps, tmp_path):
+    for label, gap in zip("ab", gaps, strict=True):
+        np.savez(tmp_path / f"{label}.npz", data=solid(4)[:, :, [0, 2]], nominal=np.full((4, N), float(gap)))
+    text = 'files = "{label}.npz"\naxes = "grasp, time, column"\ntime = "data[0]"\ngap = "nominal"\nforce = "data[1]"\n'
+    (tmp_path / "m.toml").write_text(text)
+    found = load_trials(f"manifest:{tmp_path / 'm.toml'}")
+    assert len(found) == 8
+    assert found.width is None
+    assert "no width" in found.no_width
+
+
+def test_a_store_of_recordings_with_a_constant_gap_has_no_width(tmp_path):
+    for label, gap in (("a", 0.05), ("b", 0.06)):
+        np.savez(tmp_path / f"{label}.npz", data=solid(4)[:, :, [0, 2]], nominal=np.full((4, N), gap))
+    text = 'files = "{label}.npz"\naxes = "grasp, time, column"\ntime = "data[0]"\ngap = "nominal"\nforce = "data[1]"\n'
+    (tmp_path / "m.toml").write_text(text)
+    with pytest.raises(SystemExit) as ended:
+        main(["import", str(tmp_path / "m.toml"), "--save", str(tmp_path / "store")])
+    assert ended.value.code == 0
+    found = load_trials(f"store:{tmp_path / 'store'}")
+    assert found.width is None
+    assert "no width" in found.no_width

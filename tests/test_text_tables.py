@@ -1,0 +1,288 @@
+"""Text files as instruments and programs write them: in recordings and in tables of trials."""
+
+import gzip
+import json
+
+import numpy as np
+import pytest
+
+from graspsense.cli.main import main
+from graspsense.core.learn.labelled import Labelled
+from graspsense.core.values.errors import DataDamaged
+from graspsense.sources.features_csv import read_labelled
+from graspsense.sources.grasp_csv import named, read_squeeze
+from graspsense.sources.manifest.reader import read_recordings
+from graspsense.store.labels import labels_of
+
+N = 200
+T_S = np.arange(N) * 0.01
+GAP_MM = np.where(T_S < 1.0, 80.0 - 30.0 * T_S, 50.0 - 1.5 * (1.0 - np.exp(-(T_S - 1.0) / 0.1)))
+FORCE_N = np.maximum(0.0, 50.0 - GAP_MM) * 6.0
+ROWS = [
+    f"{t:.3f},{gap:.4f},{force:.4f},{1.02 * force:.4f}"
+    for t, gap, force in zip(T_S, GAP_MM, FORCE_N, strict=True)
+]
+HEADER = "t,pos,f1,f2"
+
+
+def spoiled(row, text):
+    return [HEADER, *ROWS[:row], text, *ROWS[row + 1 :]]
+
+
+def stamped(write, rows=ROWS):
+    return [HEADER, *(f"{write(k)},{row.partition(',')[2]}" for k, row in enumerate(rows))]
+
+
+def iso(k):
+    """Return a time in CET, and from 03:00 on in CEST: the clock jumps, the instant does not."""
+    second = 59.0 + k * 0.01
+    if second < 60.0:
+        return f"2026-03-29T01:59:{second:09.6f}+01:00"
+    return f"2026-03-29T03:00:{second - 60.0:09.6f}+02:00"
+
+
+def read(path, **columns):
+    given = {"time": ["t"], "gap": ["pos [mm]"], "force": ["f1", "f2"], **columns}
+    return read_squeeze(named(str(path), given))
+
+
+def times(recording):
+    return [reading.frame.t_s for reading in recording.readings]
+
+
+DECIMAL_COMMAS = [row.replace(",", ";").replace(".", ",") for row in ROWS]
+VARIANTS = {
+    "preamble": ["Instrument: X", "Date: 2026-01-01", "", HEADER, *ROWS],
+    "preamble of many cells": ["Units: N,,,", "Readings: Continuous,,,", "Travel Unit: mm,,,", HEADER, *ROWS],
+    "preamble of two cells": ["Serial,17", "Operator,Ann", HEADER, *ROWS],
+    "units": [HEADER, "s,mm,N,N", *ROWS],
+    "units in words": [HEADER, "sec,millimeter,Newton,Newton", *ROWS],
+    "bars": [line.replace(",", "|") for line in [HEADER, *ROWS]],
+    "units in brackets": [HEADER, "[s],[mm],(N),(N)", *ROWS],
+    "preamble and units": ["Instrument: X", "", HEADER, "s,mm,N,N", *ROWS],
+    "separator": ["sep=,", HEADER, *ROWS],
+    "separator of Excel": ["sep=;", HEADER.replace(",", ";"), *DECIMAL_COMMAS],
+    "repeated header": [HEADER, *ROWS[:90], HEADER, *ROWS[90:]],
+    "repeated header and units": [HEADER, "s,mm,N,N", *ROWS[:90], HEADER, "s,mm,N,N", *ROWS[90:]],
+    "numpy": ["# t,pos,f1,f2", *ROWS],
+    "numpy with spaces": ["# made by a logger", "# t pos f1 f2", *(row.replace(",", " ") for row in ROWS)],
+    "blank end": [HEADER + ",", *(row + "," for row in ROWS)],
+    "blank end of the rows": [HEADER, *(row + "," for row in ROWS)],
+    "pandas": ["," + HEADER, *(f"{k},{row}" for k, row in enumerate(ROWS))],
+    "quoted": ['"t","pos","f1","f2"', *(",".join(f'"{cell}"' for cell in row.split(",")) for row in ROWS)],
+    "decimal commas": [HEADER.replace(",", ";"), *DECIMAL_COMMAS],
+    "tabs and decimal commas": [line.replace(";", "\t") for line in ["t;pos;f1;f2", *DECIMAL_COMMAS]],
+    "a semicolon in a text": ["t,pos,f1,f2,note", *(row + ",a;b" for row in ROWS)],
+    "Fortran": [HEADER, *(row.replace("0.0000", "0.0000D+00") for row in ROWS)],
+    "zones": stamped(iso),
+    "times of the day": stamped(lambda k: f"23:58:{k * 0.01:09.6f}"),
+    "milliseconds": stamped(lambda k: 1774749599000 + 10 * k),
+    "nanoseconds": stamped(lambda k: 1774749599000000000 + 10_000_000 * k),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("lines", VARIANTS.values(), ids=VARIANTS.keys())
+def test_a_recording_is_read_as_instruments_write_it(lines, tmp_path):
+    path = tmp_path / "jar.csv"
+    path.write_text("\n".join(lines) + "\n")
+    found = read(path)
+    assert times(found) == pytest.approx(T_S, abs=1e-6)
+    frames = [reading.frame for reading in found.readings]
+    assert [frame.gap_m for frame in frames] == pytest.approx(GAP_MM * 1e-3, abs=1e-7)
+    assert [frame.force_left_n for frame in frames] == pytest.approx(FORCE_N, abs=1e-3)
+
+
+def test_compressed_text_and_json_lines_are_read(tmp_path):
+    compressed = tmp_path / "jar.csv.gz"
+    compressed.write_bytes(gzip.compress("\n".join([HEADER, *ROWS]).encode()))
+    assert times(read(compressed)) == pytest.approx(T_S)
+    objects = [dict(zip(("t", "pos"), row.split(",")[:2], strict=True)) for row in ROWS]
+    lines = [
+        json.dumps({**one, "pads": {"left": f, "both": [f, 2 * f]}})
+        for one, f in zip(objects, FORCE_N, strict=True)
+    ]
+    path = tmp_path / "jar.jsonl"
+    path.write_text("\n".join(lines) + '\n{"t": 2.0, "po')
+    found = read(path, force=["pads.left".join("''"), "'pads.both.1'"])
+    assert times(found) == pytest.approx(T_S)
+    assert found.readings[-1].frame.force_right_n == pytest.approx(2 * FORCE_N[-1])
+    assert [note for note in found.notes if "line 201 is cut off" in note]
+    path.write_text("\n".join([*lines[:5], "[1]", *lines[5:]]))
+    with pytest.raises(DataDamaged, match="line 6"):
+        read(path)
+
+
+def test_a_compressed_text_has_the_limits_of_a_text(tmp_path, monkeypatch):
+    path = tmp_path / "jar.csv.gz"
+    path.write_bytes(gzip.compress(b"1,2,3,4\n" * 500_000))
+    monkeypatch.setenv("GRASPSENSE_MAX_UNPACKED_MB", "1")
+    with pytest.raises(DataDamaged, match="unpacks to"):
+        read(path)
+    path.write_bytes(path.read_bytes()[:50])
+    monkeypatch.delenv("GRASPSENSE_MAX_UNPACKED_MB")
+    with pytest.raises(DataDamaged, match="gzip"):
+        read(path)
+
+
+@pytest.mark.parametrize(
+    ("lines", "end", "left", "note"),
+    [
+        (spoiled(150, "1.500,48.5,NaN,NaN"), "\n", 199, r"1 samples without a number \(line 152\)"),
+        (spoiled(150, "1.500,48.5,--,#DIV/0!"), "\n", 199, "line 152"),
+        ([HEADER, *ROWS[:-1], ROWS[-1][:9]], "", 199, "line 201 is cut off"),
+        ([HEADER, *ROWS[:-1], ROWS[-1][:-2]], "", 199, "line 201 is cut off"),
+        ([HEADER, *ROWS], "", 200, ""),
+        ([HEADER, *ROWS[:20], ROWS[20][:-1]], "", 21, ""),
+        ([HEADER, *ROWS[:50], "# paused", *ROWS[50:]], "\n", 200, r"1 comments \(line 52\)"),
+    ],
+)
+def test_what_is_left_out_is_told_and_the_recording_is_kept(lines, end, left, note, tmp_path):
+    path = tmp_path / "jar.csv"
+    path.write_text("\n".join(lines) + end)
+    found = read(path)
+    assert len(found.readings) == left
+    assert any(__import__("re").search(note, one) for one in found.notes) or not note
+
+
+def recordings(folder, lines, text=""):
+    (folder / "jar.csv").write_text("\n".join(lines) + "\n")
+    keys = 'files = "{label}.csv"\ntime = "t"\ngap = "pos [mm]"\nleft = "f1"\nright = "f2"\n'
+    (folder / "m.toml").write_text(text or keys)
+    return list(read_recordings(str(folder / "m.toml")))
+
+
+def test_a_large_loss_is_a_warning(tmp_path):
+    half = [row if k % 4 else row.rpartition(",")[0] + ",nan" for k, row in enumerate(ROWS)]
+    (found,) = recordings(tmp_path, [HEADER, *half])
+    assert [notice for notice in found.notices if "50 samples" in notice]
+    (few,) = recordings(tmp_path, spoiled(150, "1.500,48.5,NaN,NaN"))
+    assert few.notices == ()
+    (most,) = recordings(
+        tmp_path, [HEADER, *(row.rpartition(",")[0] + ",nan" for row in ROWS[:150]), *ROWS[150:]]
+    )
+    assert "line 2" in str(most.error)
+
+
+def test_advice_on_repeated_times_is_tried_first(tmp_path):
+    coarse = stamped(lambda k: int(k * 0.05))
+    (refused,) = recordings(tmp_path, coarse)
+    assert "rate_hz = 20" in str(refused.error)
+    assert "drop" not in str(refused.error)
+    keys = 'files = "{label}.csv"\nrate_hz = 20\ngap = "pos [mm]"\nforce = "f1"\n'
+    (advised,) = recordings(tmp_path, coarse, keys)
+    assert times(advised.recording)[-1] == pytest.approx(199 / 20)
+    (dropped,) = recordings(tmp_path, coarse, keys.replace("rate_hz = 20", 'time = "t"\nduplicates = "drop"'))
+    assert [notice for notice in dropped.notices if "190 samples" in notice]
+    (repeated,) = recordings(tmp_path, [HEADER, *ROWS[:50], ROWS[49], *ROWS[50:]])
+    assert 'duplicates = "drop"' in str(repeated.error)
+
+
+def test_a_column_in_two_notations_is_refused_with_its_row(tmp_path):
+    mixed = [row if k != 150 else '1.500,48.5,"8,5",8.6' for k, row in enumerate(ROWS)]
+    (refused,) = recordings(tmp_path, [HEADER, *mixed])
+    assert all(word in str(refused.error) for word in ("jar.csv", "line 152", "f1", "8,5"))
+
+
+@pytest.mark.parametrize("heading", ["load (g)", "load_grams", "Weight"])
+def test_gram_force_is_proposed(heading, tmp_path):
+    lines = [f"t,pos,{heading}", *(row.rpartition(",")[0] for row in ROWS)]
+    keys = f"""files = "{{label}}.csv"\ntime = "t"\ngap = "pos [mm]"\nforce = "'{heading}'"\n"""
+    (found,) = recordings(tmp_path, lines, keys)
+    assert [notice for notice in found.notices if "[gf]" in notice]
+
+
+def test_units_that_the_file_states_are_used_or_compared(tmp_path):
+    keys = 'files = "{label}.csv"\ntime = "t"\ngap = "pos"\nforce = "f1 [mN]"\n'
+    (found,) = recordings(tmp_path, [HEADER, "s,mm,N,N", *ROWS], keys)
+    assert found.recording.readings[0].frame.gap_m == pytest.approx(0.08)
+    assert [notice for notice in found.notices if "[mN]" in notice and "states N" in notice]
+
+
+def test_numbers_without_a_header_in_reach_ask_for_the_line(tmp_path):
+    (refused,) = recordings(tmp_path, ["a,b", "a,b", "a,b", *ROWS])
+    assert 'start = "' in str(refused.error)
+
+
+# Tables of trials.
+
+TRIALS = [f"{'ab'[k % 2]},{k % 5}.25,{(7 * k) % 11}.5" for k in range(12)]
+
+
+def trials(folder, lines, **given):
+    path = folder / "trials.csv"
+    path.write_text("\n".join(lines) + "\n")
+    return read_labelled(path, "what", **given)
+
+
+@pytest.mark.parametrize(
+    "lines",
+    [
+        ["what,p,q", *TRIALS],
+        ["what;p;q", *(one.replace(",", ";").replace(".", ",") for one in TRIALS)],
+        [",what,p,q", *(f"{k},{one}" for k, one in enumerate(TRIALS))],
+        [",what,p,q", *(f"{(5 * k) % 12},{one}" for k, one in enumerate(TRIALS))],
+        ["Unnamed: 0,what,p,q", *(f"{k},{one}" for k, one in enumerate(TRIALS))],
+        ["# what,p,q", *TRIALS],
+        ["sep=,", "what,p,q", *TRIALS],
+        ["made by a program", "", "what,p,q", *TRIALS],
+        ["what,p,q", *TRIALS[:5], "what,p,q", *TRIALS[5:]],
+        ["what,p,q", *(one.replace(".5", "00.5") for one in TRIALS)],
+    ],
+)
+def test_a_table_of_trials_is_read_by_the_same_rules(lines, tmp_path):
+    found = trials(tmp_path, lines)
+    assert found.table.names == ("p", "q")
+    assert found.labels == ("a", "b") * 6
+    assert found.table.values[:, 0].tolist() == [k % 5 + 0.25 for k in range(12)]
+
+
+def test_thousands_are_the_same_number_in_evaluate_as_in_import(tmp_path):
+    lines = ["what\tp", *(f"{'ab'[k % 2]}\t{250 * k * k % 3700:,}" for k in range(12))]
+    assert trials(tmp_path, lines).table.values[:, 0].tolist() == [250 * k * k % 3700 for k in range(12)]
+
+
+def test_words_for_a_missing_number_are_labels(tmp_path):
+    lines = ["what,p,q", *(one.replace("a,", "none,").replace("b,", "NA,") for one in TRIALS)]
+    assert trials(tmp_path, lines).labels == ("none", "NA") * 6
+    with pytest.raises(DataDamaged, match="line 2"):
+        trials(tmp_path, ["what,p,q", *(one.replace("a,", ",") for one in TRIALS)])
+
+
+def test_labels_that_look_the_same_are_the_same(tmp_path):
+    same = ["cafe\u0301", "caf\u00e9", "caf\u00e9\u200b", "\ufeffcaf\u00e9", "caf\u00e9\u00a0", "caf\u00e9"]
+    lines = ["what,p,q", *(f"{same[k // 2] if k % 2 else '1.0' if k % 4 else '1'},{k},2" for k in range(12))]
+    found = trials(tmp_path, lines, features=["p"])
+    assert found.classes == ("1", "caf\u00e9")
+    assert labels_of("cafe\u0301:1.0#2") == {"label": "caf\u00e9:1", "instance": "caf\u00e9#2"}
+    assert isinstance(found, Labelled)
+
+
+def test_evaluate_and_train_read_what_pandas_wrote(tmp_path, capsys):
+    path = tmp_path / "trials.csv"
+    path.write_text("\n".join([",what,p,q", *(f"{k},{one}" for k, one in enumerate(TRIALS))]) + "\n")
+    for command in (["evaluate", str(path)], ["train", str(path), "--out", str(tmp_path / "m.json")]):
+        with pytest.raises(SystemExit) as ended:
+            main([*command, "--label", "what"])
+        assert ended.value.code == 0, capsys.readouterr().err
+    assert "index" not in json.dumps(json.loads((tmp_path / "m.json").read_text())["features"])
+
+
+def test_words_for_a_missing_number_are_labels_of_recordings_too(tmp_path):
+    lines = [f"{HEADER},what", *(f"{row},{'NA' if k < 100 else 'none'}" for k, row in enumerate(ROWS))]
+    keys = 'files = "*.csv"\nsplit = "what"\nlabel = "{what}"\ntime = "t"\ngap = "pos [mm]"\nforce = "f1"\n'
+    assert [one.label for one in recordings(tmp_path, lines, keys)] == ["NA", "none"]
+
+
+def test_decimal_commas_that_occur_late_and_thousands_are_read(tmp_path):
+    late = [
+        "t;pos;f1",
+        *(f"{10 * k};80;0" for k in range(60)),
+        *(f"{600 + 10 * k};49,5;{k},5" for k in range(40)),
+    ]
+    keys = 'files = "{label}.csv"\ntime = "t [ms]"\ngap = "pos [mm]"\nforce = "f1"\n'
+    (found,) = recordings(tmp_path, late, keys)
+    assert found.recording.readings[-1].frame.force_left_n == 39.5
+    assert found.recording.readings[-1].frame.gap_m == pytest.approx(0.0495)
+    counts = ["t\tpos\tf1", *(f"{10 * k}\t80\t{25 * k:,}" for k in range(100))]
+    (found,) = recordings(tmp_path, counts, keys.replace('"f1"', '"f1 [counts]"'))
+    assert found.recording.readings[-1].frame.force_left_n == 2475

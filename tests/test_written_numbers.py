@@ -1,0 +1,89 @@
+"""Numbers as programs write them: how a column is written is decided from all of its rows."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from graspsense.core.values.written_numbers import NotNumbers, columns_of_numbers, number_in, plain_number
+
+
+def numbers(*cells, **others):
+    return columns_of_numbers({"x": cells, **others})["x"]
+
+
+@pytest.mark.parametrize(
+    ("cells", "values"),
+    [
+        (["0", "1.5", "1.500"], [0, 1.5, 1.5]),
+        (["975", "1,000", "2,475"], [975, 1000, 2475]),
+        (["0", "1,234,567", "12.5"], [0, 1234567, 12.5]),
+        (["80"] * 60 + ["49,5"], [80] * 60 + [49.5]),
+        (["1.234,5", "0,25"], [1234.5, 0.25]),
+        (["0,500", "1,250"], [0.5, 1.25]),
+        (["1000", "1,250"], [1000, 1.25]),
+        (["1 234.5", "1'000", "12\u202f000"], [1234.5, 1000, 12000]),
+        (["1.5D-03", "\u22122", "+3e2"], [0.0015, -2, 300]),
+        (["1", "", "NA", "--", "#N/A", "#DIV/0!", "NaN"], [1] + [math.nan] * 6),
+        (["inf", "-Infinity"], [math.inf, -math.inf]),
+    ],
+)
+def test_a_column_has_one_notation(cells, values):
+    assert numbers(*cells).tolist() == pytest.approx(values, nan_ok=True)
+
+
+@pytest.mark.parametrize(
+    ("cells", "row"),
+    [
+        (["1.5", "0.25", "3,5"], 2),
+        (["1,5", "2.5", "3,25", "4,5"], 1),
+        (["1", "2", "1_0"], 2),
+        (["1", "0x10"], 1),
+        (["1", "\u0661"], 1),
+        (["1", "12 N"], 1),
+        (["1,2,3"], 0),
+        (["1,00,000"], 0),
+        (["12.5", "1,5", "1,234.5"], 1),
+    ],
+)
+def test_what_fits_no_common_notation_is_refused_with_its_row(cells, row):
+    found = numbers(*cells)
+    assert isinstance(found, NotNumbers)
+    assert (found.row, found.cell) == (row, cells[row])
+
+
+def test_the_other_columns_decide_what_a_column_alone_does_not():
+    cells = ["1,250", "1,300"]
+    alone = numbers(*cells)
+    assert isinstance(alone, NotNumbers)
+    assert "1250 or 1.25" in alone.why
+    assert numbers(*cells, other=["49,5", "1"]).tolist() == [1.25, 1.3]
+    assert numbers(*cells, other=["0.01", "1"]).tolist() == [1250, 1300]
+    assert isinstance(numbers(*cells, other=["0.01", "1"], third=["0,5", "1"]), NotNumbers)
+    assert numbers("1.500", "2.000", other=["49,5", "1"]).tolist() == [1500, 2000]
+    assert numbers("1.500", "2.000").tolist() == [1.5, 2.0]
+
+
+@given(st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=1), st.sampled_from([".", ","]))
+def test_what_a_program_writes_is_read_to_the_bit(values, sign):
+    cells = [repr(value).replace(".", sign) for value in values]
+    found = numbers(*cells, other=[f"0{sign}5"] * len(cells))
+    assert found.tolist() == values
+
+
+@given(st.lists(st.integers(-(10**9), 10**9), min_size=1))
+def test_thousands_are_never_read_as_ones(values):
+    found = numbers(*(f"{value:,}" for value in values))
+    if isinstance(found, NotNumbers):  # only where no cell tells, as in a single 1,234
+        assert "which can be" in found.why
+    else:
+        assert np.array_equal(found, values)
+
+
+def test_a_number_on_its_own():
+    assert [number_in(text) for text in ("0,5", "1.5", "1,000", "x", "nan", "inf", "")] == [0.5, 1.5] + [
+        None
+    ] * 5
+    assert [plain_number(text) for text in ("1.5", " 2 ", "0,5", "1_0")] == [1.5, 2.0, None, None]
