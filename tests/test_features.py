@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from traces import made_trace
 
 from graspsense.core.components.compiled_features import TickColumns, columns_of_ticks, compiled_extraction
+from graspsense.core.grasp.gap_resolution import gap_resolution, gap_resolution_by_sample
 from graspsense.core.values.signals import Phase
 from graspsense.core.values.trace import SI_UNITS
 from graspsense.core.values.units import in_words
@@ -222,3 +223,69 @@ def test_a_held_grasp_without_rest_or_contact_has_the_same_reasons_without_its_r
         whole = missing_of(made_trace(rows, phases=phases))
         assert whole == missing_of(made_trace(rows[:101], phases=phases[:101]))
         assert any(why in reason for reason in whole[1].values())
+
+
+def coarse_squeeze(rate_hz, step_m, hold_s, measured_hz=1e9):
+    """Closing at 8 mm/s, a squeeze of 2.4 mm to 8 N in 3 s, and a hold; the gap in steps, and measured so often."""
+    times = np.arange(0.0, 4.5 + hold_s, 1.0 / rate_hz)
+    seen = np.floor(times * measured_hz + 1e-6) / measured_hz
+    gap = np.interp(seen, [0.0, 1.5, 4.5], [0.076, 0.064, 0.0616])
+    gap = np.round(gap / step_m) * step_m if step_m else gap
+    force = np.interp(times, [1.5, 4.5], [0.0, 8.0])
+    return made_trace(zip(gap.tolist(), force.tolist(), force.tolist(), strict=True), dt=1.0 / rate_hz)
+
+
+@pytest.mark.parametrize("rate_hz", [10.0, 45.0, 1000.0])
+@pytest.mark.parametrize("step_m", [5e-5, 1e-4, 2e-4])
+def test_a_coarse_gap_that_repeats_a_number_is_not_at_rest(rate_hz, step_m):
+    f = FEATURES.extract(coarse_squeeze(rate_hz, step_m, hold_s=3.0))
+    assert f["f_steady"] == pytest.approx(8.0)
+    # The gap moves by a step within its resolution: at 0.8 mm/s, two steps are told apart.
+    assert f["delta_t"] == pytest.approx(2.77, abs=0.1 + 2 * step_m / 8e-4)
+
+
+def test_a_gap_that_is_measured_less_often_than_its_rows_is_not_at_rest_between():
+    f = FEATURES.extract(coarse_squeeze(1000.0, 0.0, hold_s=1.5, measured_hz=10.0))
+    assert f["f_steady"] == pytest.approx(8.0)
+
+
+@pytest.mark.parametrize(("step_m", "hold_s"), [(1e-4, 0.0), (1e-4, 0.5), (1e-3, 3.0)])
+def test_a_rest_that_a_coarse_gap_cannot_show_is_said_to_be_unresolved(step_m, hold_s):
+    f = FEATURES.extract(coarse_squeeze(45.0, step_m, hold_s))
+    assert f["p_first"] == pytest.approx(0.064, abs=1e-3)
+    assert math.isnan(f["f_steady"])
+    assert "rest not resolved" in f.reasons["f_steady"]
+
+
+@given(
+    st.lists(
+        st.tuples(
+            st.sampled_from([0.001, 0.01]), st.sampled_from([0.0, 0.0, -1e-4, 1e-4, -2e-4, -1e-17, math.nan])
+        ),
+        min_size=1,
+        max_size=60,
+    ),
+    st.integers(0, 59),
+)
+def test_the_resolution_of_a_gap_is_the_same_sample_by_sample(steps, contact):
+    times = np.cumsum([dt for dt, _ in steps])
+    gaps = 0.05 + np.array([0.0 if dx != dx else dx for _, dx in steps]).cumsum()
+    gaps[[dx != dx for _, dx in steps]] = math.nan
+    contact = min(contact, len(steps) - 1)
+    expected = gap_resolution(times, gaps, contact)
+    assert gap_resolution_by_sample(times, gaps, contact, len(gaps)) == expected
+
+
+@pytest.mark.parametrize(("rate_hz", "seen"), [(10.0, False), (45.0, True), (1000.0, True)])
+def test_a_contact_between_two_samples_is_said_to_be_unresolved(rate_hz, seen):
+    """A squeeze of 60 ms: at 10 Hz nothing tells when it began."""
+    times = np.arange(0.0, 4.0, 1.0 / rate_hz)
+    gap = np.interp(times, [0.0, 1.53, 1.59], [0.08, 0.06, 0.058])
+    force = np.interp(times, [1.53, 1.59], [0.0, 8.0])
+    rows = zip(gap.tolist(), force.tolist(), force.tolist(), strict=True)
+    f = FEATURES.extract(made_trace(rows, dt=1.0 / rate_hz))
+    assert f["f_steady"] == pytest.approx(8.0)
+    assert f["p_steady"] == pytest.approx(0.058, abs=1e-4)
+    assert math.isfinite(f["delta_t"]) == seen
+    if not seen:
+        assert all("contact not resolved" in f.reasons[name] for name in ("delta_t", "dp_dt", "df_dt"))

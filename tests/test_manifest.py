@@ -17,6 +17,7 @@ from graspsense.core.values.trace import signals_of
 from graspsense.recording.labelled_recording import UnreadableRecording
 from graspsense.recording.reader import read_recorded
 from graspsense.sources.dataset_recordings import readable_or_not
+from graspsense.sources.trial_source import load_trials
 from graspsense.store.store import Store
 
 RATE_HZ = 100.0
@@ -405,6 +406,29 @@ def test_squeezes_are_found_from_the_force(tmp_path):
     assert [one.source for one in found] == [f"jar.csv, squeeze {k}" for k in (1, 2, 3)]
 
 
+@pytest.mark.parametrize(
+    ("spoilt", "value"), [("force", 1e6), ("force", np.nan), ("force", np.inf), ("gap", 900.0), ("time", 0.0)]
+)
+@pytest.mark.parametrize("samples", [1, 40])
+def test_a_fault_in_one_squeeze_is_of_that_squeeze(tmp_path, spoilt, value, samples):
+    gap, force = squeezing()
+    columns = {
+        "gap": np.concatenate([gap, gap[::-1]] * 6),
+        "force": np.concatenate([force, force[::-1]] * 6),
+        "time": np.arange(3600) / RATE_HZ,
+    }
+    columns[spoilt][1480 : 1480 + samples] = value  # at the peak of the third of six
+    pandas_csv(
+        tmp_path / "jar.csv", {"t": columns["time"], "gap": columns["gap"] * 1e3, "F": columns["force"]}
+    )
+    found = list(readable_or_not("manifest", str(manifest(tmp_path, PLAIN + 'split = "force"'))))
+    assert [one.source for one in found] == [f"jar.csv, squeeze {k}" for k in range(1, 7)]
+    bad = [k for k, one in enumerate(found, 1) if isinstance(one, UnreadableRecording)]
+    assert bad == ([] if np.isnan(value) else [3])  # samples without a number are left out
+    good = [one for k, one in enumerate(found, 1) if k != 3]
+    assert all(column(one, "force_left_n").max() == pytest.approx(20.0) for one in good)
+
+
 def test_a_grasp_is_cut_at_its_release(tmp_path):
     _, force = squeezing()
     force[250:] = 0.0
@@ -594,3 +618,149 @@ def test_where_no_file_can_be_read_the_first_error_is_told(tmp_path, capsys):
     assert code == 2
     assert "none of 3 recordings can be read. The first: " in " ".join(err.split())
     assert not list(tmp_path.glob("*.png"))
+
+
+# Recordings without a gap, with one finger or five, and with three components a cell.
+
+
+def force_only(folder, labels=("soft", "hard"), count=8):
+    """Squeezes of a glove with two sensors: forces that rise, hold, and fall, in two kinds."""
+    rng = np.random.default_rng(0)
+    for k in range(count):
+        rise = 4.0 if k % 2 else 10.0
+        force = np.clip((T_S - 0.8) * rise, 0.0, 8.0) * (T_S < 2.5)
+        noise = rng.normal(0.0, 0.02, (2, len(T_S)))
+        columns = {"t": T_S, "a": force + noise[0], "b": 0.8 * force + noise[1]}
+        pandas_csv(folder / f"{labels[k % 2]}_{k}.csv", columns)
+    return manifest(folder, 'files = "{label}_{order:d}.csv"\ntime = "t"\nleft = "a"\nright = "b"')
+
+
+def test_a_recording_without_a_gap_is_a_trial_of_its_force(tmp_path, capsys):
+    place = force_only(tmp_path)
+    code, out, err = run(capsys, "import", place, "--save", tmp_path / "trials")
+    assert (code, err) == (0, "")
+    assert "8 force only" in out
+    with Store.read(tmp_path / "trials") as store:
+        (one, *_) = store.page(limit=100)
+        stored = store.trial(one.id)
+    result = read_recorded(stored.recording).record().result
+    assert result.outcome == "force only"
+    assert "no gap" in result.reason
+    for features, needed in (
+        ("chitta", ()),
+        ("quantiles", ("contact_time", "high_force_whole_max", "low_force_rate_second_max")),
+        ("curve", ("peak_force", "loading_time", "load_t50", "relaxation", "hold_t50", "pad_difference")),
+    ):
+        for source in (f"store:{tmp_path / 'trials'}", f"manifest:{place}"):
+            table = load_trials(source, options=[f"features.type={features}"]).table
+            known = [
+                name
+                for name, column in zip(table.names, table.values.T, strict=True)
+                if np.isfinite(column).any()
+            ]
+            assert set(needed) <= set(known)
+            assert not [name for name in known if "gap" in name or "stiff" in name or name.startswith("p_")]
+
+
+def test_the_squeeze_without_a_gap_ends_where_its_force_falls(tmp_path):
+    found = load_trials(f"manifest:{force_only(tmp_path)}", options=["features.type=curve"])
+    table, labels = found.table, found.labels
+    held = table.values[np.array([label == "soft" for label in labels]), table.names.index("hold_t75")]
+    assert held == pytest.approx(0.9 * 8.0, rel=0.02)  # the mean of both pads
+
+
+def test_cells_of_three_components(tmp_path):
+    """An array of rows, columns and components of cells: forces along x, y and z."""
+    gap, force = squeezing()
+    cells = np.zeros((300, 2, 3, 3))
+    cells[..., 0], cells[..., 2] = 0.6 * force[:, None, None], 0.8 * force[:, None, None]
+    np.savez(tmp_path / "jar.npz", t=T_S, gap=gap, cells=cells)
+    (one,) = recordings(
+        tmp_path,
+        """
+        files = "{label}.npz"
+        time = "t"
+        gap = "gap"
+        left = "sum(norm3(cells))"
+        right = "sum(cells[2::3])"
+        channels = { cells = "cells [N]" }
+        """,
+    )
+    assert column(one, "force_left_n") == pytest.approx(6 * force)
+    assert column(one, "force_right_n") == pytest.approx(6 * 0.8 * force)
+    (channel,) = one.recording.channels
+    assert (channel.rows, channel.columns) == (2, 9)
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_one_finger_stands_for_both_pads(tmp_path, side):
+    gap, force = squeezing()
+    pandas_csv(tmp_path / "jar.csv", {"t": T_S, "gap": gap, "F": force})
+    (one,) = recordings(tmp_path, f'files = "{{label}}.csv"\ntime = "t"\ngap = "gap"\n{side} = "F"')
+    assert column(one, "force_left_n") == pytest.approx(force)
+    assert column(one, "force_right_n") == pytest.approx(force)
+    assert any("both pads" in note for note in one.recording.notes)
+
+
+def test_most_grasps_too_wide_is_an_error_that_stores_nothing(tmp_path, capsys):
+    gap, force = squeezing()
+    for k in range(5):
+        pandas_csv(tmp_path / f"jar_{k}.csv", {"t": T_S, "gap": gap, "F": force * (1.0 + 0.1 * k)})
+    place = manifest(tmp_path, 'files = "{label}_{order:d}.csv"\ntime = "t"\ngap = "gap"\nforce = "F"')
+    for options in (("--check",), ("--save", tmp_path / "trials")):
+        code, _, err = run(capsys, "import", place, *options, "-o", "controller.too_wide_m=0.05")
+        assert code == 2
+        assert "5 of 5 recordings end as too wide" in err
+        assert "controller.too_wide_m=0" in err
+    assert not (tmp_path / "trials").exists()
+    code, out, _ = run(capsys, "import", place, "--check")
+    assert code == 0
+    assert "5 steady" in out
+
+
+def test_features_after_the_end_that_the_controller_saw(tmp_path, capsys):
+    """A squeeze that rests, and is released long after: the whole recording counts, as for a data set."""
+    gap, force = squeezing()
+    there, back = np.concatenate([gap, np.full(400, gap[-1]), gap[::-1]]), force[-1]
+    forces = np.concatenate([force, np.full(400, back), force[::-1]])
+    pandas_csv(tmp_path / "jar_1.csv", {"t": np.arange(1000) / RATE_HZ, "gap": there, "F": forces})
+    place = manifest(tmp_path, 'files = "{label}_{order:d}.csv"\ntime = "t"\ngap = "gap"\nforce = "F"')
+    run(capsys, "import", place, "--save", tmp_path / "trials", "-o", "features.type=curve")
+    stored = load_trials(f"store:{tmp_path / 'trials'}").table
+    whole = load_trials(f"manifest:{place}", options=["features.type=curve"]).table
+    assert np.isfinite(stored.values[0, stored.names.index("hysteresis")])
+    assert stored.values[0] == pytest.approx(whole.values[0], nan_ok=True)
+
+
+@pytest.mark.parametrize("resample_hz", [0, 30, 100, 1000])
+def test_rest_is_found_on_a_coarse_gap_at_any_rate(tmp_path, capsys, resample_hz):
+    """A squeeze of 2.4 mm in 3 s and a hold of 1.5 s, in steps of 0.1 mm at 45 Hz."""
+    times = np.arange(270) / 45.0
+    gap = np.round(np.interp(times, [0.0, 1.5, 4.5], [76.0, 64.0, 61.6]), 1)
+    for k in range(4):
+        force = np.interp(times, [1.5, 4.5], [0.0, 6.0 + k])
+        pandas_csv(tmp_path / f"jar_{k}.csv", {"t": times, "mm": gap, "F": force})
+    place = manifest(
+        tmp_path,
+        f'files = "{{label}}_{{order:d}}.csv"\ntime = "t"\ngap = "mm [mm]"\nforce = "F"\nresample_hz = {resample_hz}',
+    )
+    code, out, _ = run(capsys, "import", place, "--save", tmp_path / "trials")
+    assert code == 0
+    assert "rest_window_s" in out
+    assert "steps of 0.1 mm" in out
+    for source in (f"store:{tmp_path / 'trials'}", f"manifest:{place}"):
+        table = load_trials(source).table
+        assert table.values[:, table.names.index("f_steady")] == pytest.approx([6.0, 7.0, 8.0, 9.0], rel=0.05)
+
+
+def test_features_that_are_extracted_again_are_of_the_whole_recording(tmp_path, capsys):
+    """As at the import: another feature set sees the release that is long after the rest."""
+    gap, force = squeezing()
+    there = np.concatenate([gap, np.full(400, gap[-1]), gap[::-1]])
+    forces = np.concatenate([force, np.full(400, force[-1]), force[::-1]])
+    pandas_csv(tmp_path / "jar_1.csv", {"t": np.arange(1000) / RATE_HZ, "gap": there, "F": forces})
+    place = manifest(tmp_path, 'files = "{label}_{order:d}.csv"\ntime = "t"\ngap = "gap"\nforce = "F"')
+    run(capsys, "import", place, "--save", tmp_path / "trials")
+    again = load_trials(f"store:{tmp_path / 'trials'}", options=["features.type=curve"]).table
+    whole = load_trials(f"manifest:{place}", options=["features.type=curve"]).table
+    assert again.values[0] == pytest.approx(whole.values[0], nan_ok=True)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from graspsense.core.control.contact import REST_SPEED_M_S, REST_WINDOW_S, first_rest
+from graspsense.core.control.contact import CONTACT_FORCE_N, REST_SPEED_M_S, REST_WINDOW_S, first_rest
 from graspsense.core.values.signals import NO_PADS, Frame, Reading
 from graspsense.recording.replayable import Recording
 from graspsense.sources.noise_thresholds import thresholds_for
@@ -85,8 +85,126 @@ def test_forces_that_are_no_more_than_noise_are_doubted():
     assert "check the unit and the zero" in chosen.words
 
 
-def test_recordings_in_other_units_keep_the_defaults():
-    assert thresholds_for([squeeze(peak_n=0.5, units={"gap": "deg"})]).settings == {}
+def in_units(one, units, force=1.0, gap=1.0, time=1.0, offset=0.0):
+    """The recording with its numbers in other units; `offset` is the force of a sensor without a load."""
+    names = {"force": ("force_left", "force_right"), "gap": ("gap",), "t": ("t",)}
+    readings = tuple(
+        reading._replace(
+            frame=reading.frame._replace(
+                t_s=reading.frame.t_s * time,
+                gap_m=reading.frame.gap_m * gap,
+                force_left_n=reading.frame.force_left_n * force + offset,
+                force_right_n=reading.frame.force_right_n * force + offset,
+            )
+        )
+        for reading in one.readings
+    )
+    renamed = {name: unit for quantity, unit in units.items() for name in names[quantity]}
+    return evolve(one, readings=readings, units=renamed)
+
+
+@pytest.mark.parametrize(
+    ("factors", "units"),
+    [
+        ({"force": 250.0, "offset": 2000.0}, {"force": "counts"}),
+        ({"gap": 1000.0}, {"gap": "deg"}),
+        ({"force": 250.0, "time": 100.0}, {"force": "counts", "t": "sample"}),
+        ({"force": 1e-3, "gap": 40.0, "time": 100.0}, {"force": "V", "gap": "V", "t": "sample"}),
+    ],
+    ids=["counts", "degrees", "samples", "all"],
+)
+def test_thresholds_follow_from_recordings_in_any_unit(factors, units):
+    """The same squeezes in other units have the contact at the same time, and come to rest."""
+    recordings = [in_units(squeeze(step_s=0.01, seed=k), **factors, units=units) for k in range(5)]
+    settings = {key.partition(".")[2]: value for key, value in thresholds_for(recordings).settings.items()}
+    speed = settings.get("rest_speed_m_s", REST_SPEED_M_S)
+    window = settings.get("rest_window_s", REST_WINDOW_S)
+    for one in recordings:
+        times, gap, left, right = (
+            np.array([getattr(reading.frame, name) for reading in one.readings])
+            for name in ("t_s", "gap_m", "force_left_n", "force_right_n")
+        )
+        at = int((np.minimum(left, right) >= settings.get("contact_force_n", CONTACT_FORCE_N)).argmax())
+        assert 1.0 < at * 0.01 < 1.1
+        since, _ = first_rest(times[at:], gap[at:], np.ones(len(times) - at, dtype=bool), speed, window)
+        assert (at + since) * 0.01 == pytest.approx(1.5, abs=0.05)
+        if "gap" in units:
+            assert settings["closed_gap_m"] < gap.min()
+            assert settings["too_wide_m"] < 0.0
+
+
+def test_a_data_set_that_counts_frames_keeps_the_defaults():
+    """Its metres and newtons are nominal, and were chosen for these thresholds."""
+    frames = [in_units(squeeze(peak_n=0.5, step_s=0.1), {"t": "frame"}, time=10.0)]
+    assert thresholds_for(frames).settings == {}
+
+
+def coarse(one, step_m):
+    return evolve(one, readings=tuple(
+        reading._replace(frame=reading.frame._replace(gap_m=round(reading.frame.gap_m / step_m) * step_m))
+        for reading in one.readings
+    ))  # fmt: skip
+
+
+def slow_squeeze(hold_s, step_s=0.0222, seed=0):
+    """Closing at 8 mm/s, and a squeeze of 2.4 mm to 8 N in 3 s."""
+    rng = np.random.default_rng(seed)
+    times = np.arange(0.0, 4.5 + hold_s, step_s)
+    gap = np.interp(times, [0.0, 1.5, 4.5], [0.076, 0.064, 0.0616])
+    force = np.interp(times, [1.5, 4.5], [0.0, 8.0]) + 0.004 * rng.normal(size=len(times))
+    frames = [
+        Frame(t, step_s, g, 0.0, nan, f, f, nan, nan, 0)
+        for t, g, f in zip(times.tolist(), gap.tolist(), force.tolist(), strict=True)
+    ]
+    readings = tuple(Reading(frame, NO_PADS) for frame in frames)
+    return Recording(name="slow", rate_hz=1.0 / step_s, readings=readings)
+
+
+@pytest.mark.parametrize("step_s", [0.0222, 0.1])
+@pytest.mark.parametrize(("step_m", "hold_s"), [(1e-4, 1.5), (1e-4, 0.8), (5e-5, 1.0)])
+def test_the_window_of_rest_is_that_of_a_step_of_the_gap(step_s, step_m, hold_s):
+    recordings = [coarse(slow_squeeze(hold_s, step_s, seed=k), step_m) for k in range(5)]
+    chosen = thresholds_for(recordings)
+    speed = chosen.settings.get("controller.rest_speed_m_s", REST_SPEED_M_S)
+    window = chosen.settings.get("controller.rest_window_s", REST_WINDOW_S)
+    assert speed < 0.4e-3, "half the speed of the squeeze"
+    if 8e-4 * step_s < step_m:  # the gap repeats its numbers
+        assert speed * window >= step_m
+        assert "steps of" in chosen.words
+    for one in recordings:
+        times, gap, force = (
+            np.array([getattr(reading.frame, name) for reading in one.readings])
+            for name in ("t_s", "gap_m", "force_left_n")
+        )
+        k = int((force > 0.625).argmax())
+        _, shown = first_rest(times[k:], gap[k:], np.ones(len(times) - k, dtype=bool), speed, window)
+        assert force[k + shown] == pytest.approx(8.0, rel=0.05)
+
+
+def test_a_window_that_is_given_decides_the_speed():
+    recordings = [coarse(slow_squeeze(1.5, seed=k), 1e-4) for k in range(3)]
+    settings = thresholds_for(recordings, {}, {"rest_window_s": 0.3}).settings
+    assert settings["controller.rest_window_s"] == 0.3
+    assert settings["controller.rest_speed_m_s"] == pytest.approx(1e-4 / 0.3, rel=0.1)
+
+
+@pytest.mark.parametrize("step_s", [0.1, 0.05])
+def test_the_contact_force_at_a_low_rate_is_not_that_of_a_steep_rise(step_s):
+    for peak_n in (8.0, 0.5):
+        recordings = [squeeze(peak_n=peak_n, step_s=step_s, seed=k) for k in range(5)]
+        force = thresholds_for(recordings).settings.get("controller.contact_force_n", 0.625)
+        assert 0.03 < force <= 0.2 * peak_n
+
+
+def test_an_object_of_two_millimetres_is_not_nothing():
+    whole = squeeze()
+    readings = tuple(
+        reading._replace(frame=reading.frame._replace(gap_m=reading.frame.gap_m - 0.0535))
+        for reading in whole.readings
+    )
+    chosen = thresholds_for([evolve(whole, readings=readings)])
+    assert chosen.settings["controller.closed_gap_m"] < 0.0015
+    assert "closed_gap_m" in chosen.words
 
 
 def test_slow_recordings_whose_gap_is_still_at_rest_keep_the_thresholds_of_rest():

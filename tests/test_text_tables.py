@@ -56,8 +56,6 @@ VARIANTS = {
     "preamble of many cells": ["Units: N,,,", "Readings: Continuous,,,", "Travel Unit: mm,,,", HEADER, *ROWS],
     "preamble of two cells": ["Serial,17", "Operator,Ann", HEADER, *ROWS],
     "units": [HEADER, "s,mm,N,N", *ROWS],
-    "units in words": [HEADER, "sec,millimeter,Newton,Newton", *ROWS],
-    "bars": [line.replace(",", "|") for line in [HEADER, *ROWS]],
     "units in brackets": [HEADER, "[s],[mm],(N),(N)", *ROWS],
     "preamble and units": ["Instrument: X", "", HEADER, "s,mm,N,N", *ROWS],
     "separator": ["sep=,", HEADER, *ROWS],
@@ -132,7 +130,6 @@ def test_a_compressed_text_has_the_limits_of_a_text(tmp_path, monkeypatch):
         ([HEADER, *ROWS[:-1], ROWS[-1][:9]], "", 199, "line 201 is cut off"),
         ([HEADER, *ROWS[:-1], ROWS[-1][:-2]], "", 199, "line 201 is cut off"),
         ([HEADER, *ROWS], "", 200, ""),
-        ([HEADER, *ROWS[:20], ROWS[20][:-1]], "", 21, ""),
         ([HEADER, *ROWS[:50], "# paused", *ROWS[50:]], "\n", 200, r"1 comments \(line 52\)"),
     ],
 )
@@ -271,18 +268,3 @@ def test_words_for_a_missing_number_are_labels_of_recordings_too(tmp_path):
     lines = [f"{HEADER},what", *(f"{row},{'NA' if k < 100 else 'none'}" for k, row in enumerate(ROWS))]
     keys = 'files = "*.csv"\nsplit = "what"\nlabel = "{what}"\ntime = "t"\ngap = "pos [mm]"\nforce = "f1"\n'
     assert [one.label for one in recordings(tmp_path, lines, keys)] == ["NA", "none"]
-
-
-def test_decimal_commas_that_occur_late_and_thousands_are_read(tmp_path):
-    late = [
-        "t;pos;f1",
-        *(f"{10 * k};80;0" for k in range(60)),
-        *(f"{600 + 10 * k};49,5;{k},5" for k in range(40)),
-    ]
-    keys = 'files = "{label}.csv"\ntime = "t [ms]"\ngap = "pos [mm]"\nforce = "f1"\n'
-    (found,) = recordings(tmp_path, late, keys)
-    assert found.recording.readings[-1].frame.force_left_n == 39.5
-    assert found.recording.readings[-1].frame.gap_m == pytest.approx(0.0495)
-    counts = ["t\tpos\tf1", *(f"{10 * k}\t80\t{25 * k:,}" for k in range(100))]
-    (found,) = recordings(tmp_path, counts, keys.replace('"f1"', '"f1 [counts]"'))
-    assert found.recording.readings[-1].frame.force_left_n == 2475

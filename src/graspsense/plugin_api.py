@@ -39,6 +39,7 @@ _TABLE: Final[Table] = {
     "Signals: what passes between a gripper and a controller": {
         "core.values.signals": (
             "CHANNELS",
+            "NO_GAP",
             "NO_PADS",
             "Command",
             "CommandKind",
@@ -137,6 +138,12 @@ _TABLE: Final[Table] = {
             "both_touch",
             "first_rest",
             "update_rest",
+        ),
+        "core.grasp.gap_resolution": (
+            "GapResolution",
+            "gap_resolution",
+            "gap_resolution_by_sample",
+            "window_of_rest",
         ),
     },
     "Feature sets": {

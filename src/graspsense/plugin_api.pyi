@@ -32,6 +32,7 @@ from graspsense.core.components.figure_origins import gives as gives
 
 # Signals: what passes between a gripper and a controller
 from graspsense.core.values.signals import CHANNELS as CHANNELS
+from graspsense.core.values.signals import NO_GAP as NO_GAP
 from graspsense.core.values.signals import NO_PADS as NO_PADS
 from graspsense.core.values.signals import Command as Command
 from graspsense.core.values.signals import CommandKind as CommandKind
@@ -131,6 +132,10 @@ from graspsense.core.control.contact import at_rest as at_rest
 from graspsense.core.control.contact import both_touch as both_touch
 from graspsense.core.control.contact import first_rest as first_rest
 from graspsense.core.control.contact import update_rest as update_rest
+from graspsense.core.grasp.gap_resolution import GapResolution as GapResolution
+from graspsense.core.grasp.gap_resolution import gap_resolution as gap_resolution
+from graspsense.core.grasp.gap_resolution import gap_resolution_by_sample as gap_resolution_by_sample
+from graspsense.core.grasp.gap_resolution import window_of_rest as window_of_rest
 
 # Feature sets
 from graspsense.core.values.features import Features as Features

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -14,7 +15,7 @@ from graspsense.cli.sources import named_source
 from graspsense.cli.terminal import Style, echo, echo_as_it_is, echo_entry, echo_table
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from graspsense.core.components.config import Settings
     from graspsense.recording.labelled_recording import UnreadableRecording
@@ -114,7 +115,8 @@ def import_(
         labels_of(label)  # what is not a label is refused as such, before any file is read
     chosen = _Chosen(pipeline, options)
     try:
-        recordings, unreadable = recordings_to_import(sources, given, label)
+        with chosen.doubted():
+            recordings, unreadable = recordings_to_import(sources, given, label)
     except GraspsenseError:
         if check and not given and show_files(sources, plot or PICTURE, as_json):
             return
@@ -141,24 +143,54 @@ class _Chosen:
     """The settings of an import: those of the pipeline, and thresholds from the recordings where none is given."""
 
     def __init__(self, pipeline: str, options: Sequence[str]) -> None:
+        from graspsense.core.components.config import ImplausibleSettings
         from graspsense.core.pipeline.wiring import check
 
         self._pipeline, self._options = pipeline, tuple(options)
         self._added: tuple[str, ...] = ()
+        self._any_unit = False
+        self._doubt: ImplausibleSettings | None = None
         self.words = ""
-        self._settings = self._resolved(
-            "csv:the first recording"
-        )  # a mistake in them is told before files are read
+        # A mistake in them is told before files are read.
+        try:
+            self._settings = self._resolved("csv:the first recording")
+        except ImplausibleSettings as doubt:  # unless the recordings are in other units
+            self._doubt, self._any_unit = doubt, True
+            self._settings = self._resolved("csv:the first recording")
         check(self._settings)
 
-    def fit(self, recordings: Sequence[ImportedRecording]) -> None:
-        """Choose the thresholds that are not given."""
-        from graspsense.sources.noise_thresholds import thresholds_for
+    @contextmanager
+    def doubted(self) -> Iterator[None]:
+        """Tell a doubt about the settings if the recordings cannot be read, whose units would have decided it."""
+        from graspsense.core.values.errors import GraspsenseError
 
+        try:
+            yield
+        except GraspsenseError:
+            self._refuse_doubt()
+            raise
+
+    def _refuse_doubt(self) -> None:
+        from graspsense.core.values.errors import ConfigError
+
+        if self._doubt is not None:  # whose own advice, --force, names a column here
+            raise ConfigError(str(self._doubt))
+
+    def fit(self, recordings: Sequence[ImportedRecording]) -> None:
+        """Choose the thresholds that are not given. Raises ConfigError for implausible ones in SI units."""
+        from graspsense.sources.noise_thresholds import THRESHOLDS, thresholds_for
+
+        self._any_unit = any(one.labelled.recording.units for one in recordings)
+        if not self._any_unit:
+            self._refuse_doubt()
         controller = self._settings.values.get("controller", {})
         timeouts: dict[str, float] = {key: controller[key] for key in TIMEOUTS if key in controller}
-        found = thresholds_for([one.labelled.recording for one in recordings], timeouts)
-        open_keys = {key for key in found.settings if self._settings.origins.get(key) == "default"}
+        is_open = {key for key in controller if self._settings.origins.get(f"controller.{key}") == "default"}
+        given: dict[str, float] = {
+            key: controller[key] for key in THRESHOLDS if key in controller and key not in is_open
+        }
+        found = thresholds_for([one.labelled.recording for one in recordings], timeouts, given)
+        open_keys = {key for key in found.settings if key.partition(".")[2] in is_open}
         self.words = found.words if open_keys or not found.settings else "thresholds: those that are given"
         self._added = tuple(f"{key}={found.settings[key]!r}" for key in sorted(open_keys))
 
@@ -167,17 +199,14 @@ class _Chosen:
         return self._resolved(recording.name)
 
     def _resolved(self, name: str) -> Settings:
-        from graspsense.core.components.config import Flag, ImplausibleSettings, resolve
-        from graspsense.core.values.errors import ConfigError
+        from graspsense.core.components.config import Flag, resolve
 
         flags = (
             Flag("--gripper", "gripper.type", "replay"),
             Flag("SOURCE", "gripper.recording", name),
         )
-        try:
-            return resolve(self._pipeline, options=(*self._added, *self._options), flags=flags)
-        except ImplausibleSettings as error:  # whose advice, --force, names a column here
-            raise ConfigError(str(error)) from None
+        options = (*self._added, *self._options)
+        return resolve(self._pipeline, options=options, flags=flags, force=self._any_unit)
 
 
 @frozen
@@ -202,7 +231,9 @@ def _import(
     """Import the recordings and print what became of each; those that cannot be replayed join `unreadable`."""
     from graspsense.core.values.errors import ConfigError
     from graspsense.recording.readable import error_of_all
+    from graspsense.sources.import_outcomes import outcomes_of, refuse_too_wide
 
+    refuse_too_wide(outcomes_of(recordings, chosen.settings), chosen.settings(recordings[0]))
     stored = _store(save, recordings, unreadable, chosen)
     if not stored.kept and not stored.refused:
         raise error_of_all(unreadable)
@@ -301,7 +332,7 @@ def _show(
     picture: Path,
     as_json: bool,
 ) -> None:
-    """Print what was understood of the recordings, and draw one of them."""
+    """Print what was understood of the recordings, and draw one of them. Raises ConfigError if most are too wide."""
     from attrs import asdict
 
     from graspsense.cli.import_check import echo_channels
@@ -311,15 +342,19 @@ def _show(
     from graspsense.core.values.errors import DataDamaged, PluginUnavailable
     from graspsense.recording.readable import readable
     from graspsense.sources.dataset_recordings import handed_over
+    from graspsense.sources.import_outcomes import outcomes_of, refuse_too_wide
 
-    summary = _summary(recordings)
+    summary, outcomes = _summary(recordings), outcomes_of(recordings, chosen.settings)
+    ends = {outcome.words: count for outcome, count in outcomes.most_common()}
     if as_json:
         failed = [one.line for one in unreadable]
-        echo_json({**asdict(summary), "unreadable": failed, "thresholds": chosen.words})
+        echo_json({**asdict(summary), "unreadable": failed, "thresholds": chosen.words, "outcomes": ends})
     else:
         _echo_summary(summary)
         echo_channels(summary.measured)
         echo_entry("thresholds", chosen.words.partition(": ")[2])
+        tried = "" if outcomes.total() == len(recordings) else f" (of {outcomes.total()} that were tried)"
+        echo_entry("outcomes", ", ".join(f"{count} {words}" for words, count in ends.items()) + tried)
         _echo_notices(summary, err=False)
     middle = recordings[len(recordings) // 2]
     try:
@@ -328,6 +363,7 @@ def _show(
         draw_grasp(trial, picture)
     except (DataDamaged, PluginUnavailable) as error:
         echo(f"no picture: {error}", Style.CAUTION, err=True)
+    refuse_too_wide(outcomes, chosen.settings(recordings[0]))
 
 
 def _summary(recordings: Sequence[ImportedRecording]) -> ImportSummary:

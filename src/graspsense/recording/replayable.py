@@ -27,7 +27,7 @@ class Recording:
     `units` names the units that are not SI units. `notes` are sentences that a reader of the result needs.
     `rate_hz` is the number of frames per unit of time. `commands` are the values that were commanded after each frame,
     if they are known, and `has_release` states whether the recording goes on until the fingers are open again.
-    `channels` are its tactile arrays and further channels.
+    `channels` are its tactile arrays and further channels. `notices` are sentences on what looks wrong.
     """
 
     name: str
@@ -38,6 +38,7 @@ class Recording:
     commands: tuple[float, ...] | None = None
     has_release: bool = False
     channels: tuple[Channel, ...] = ()
+    notices: tuple[str, ...] = ()
 
 
 def check_recording(recording: Recording) -> None:

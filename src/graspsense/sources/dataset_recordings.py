@@ -19,6 +19,7 @@ from graspsense.core.values.errors import (
 from graspsense.recording.labelled_recording import LabelledRecording, UnreadableRecording
 from graspsense.recording.readable import is_mistake, readable
 from graspsense.recording.replayable import Recording, check_recording
+from graspsense.sources.recording_notices import with_notices
 
 _NUMBERED: Final = re.compile(r"(?P<place>.+)#(?P<number>[1-9]\d{0,8})", re.DOTALL)
 
@@ -63,15 +64,15 @@ def readable_or_not(kind: str, place: str) -> Iterator[LabelledRecording | Unrea
 
 
 def _checked(one: LabelledRecording | UnreadableRecording) -> LabelledRecording | UnreadableRecording:
-    """Return the recording, or why it cannot be used."""
+    """Return the recording with all that looks wrong in it, or why it cannot be used."""
     if isinstance(one, UnreadableRecording):
         return one
     try:
         with readable(one.source):
             check_recording(one.recording)
+            return with_notices(one)
     except GraspsenseError as error:
         return UnreadableRecording(source=str(one.source), error=error)
-    return one
 
 
 @contextmanager

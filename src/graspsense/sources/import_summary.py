@@ -138,4 +138,6 @@ def _label(label: str, recordings: Sequence[LabelledRecording]) -> LabelSummary:
 
 def _range(values: Any) -> tuple[Any, Any]:
     array = np.asarray(values)
+    if np.isnan(array).all():
+        return np.nan, np.nan
     return np.nanmin(array).item(), np.nanmax(array).item()

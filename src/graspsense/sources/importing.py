@@ -11,17 +11,22 @@ from attrs import evolve
 
 from graspsense.core.learn.labelled import class_of
 from graspsense.core.pipeline.pipeline import grasp_with
-from graspsense.core.values.signals import APPROACH, Reading
+from graspsense.core.values.errors import FAILURES
+from graspsense.core.values.signals import Reading
 from graspsense.recording.atomic_file import SaveFailed
+from graspsense.recording.held_phases import with_phases_of
 from graspsense.recording.layout import DEVICE, RESULT, START, TICK, pads_numbers, pads_topic, signal_topics
 from graspsense.recording.replayable import content_sha256
 from graspsense.recording.trial_record import TrialRecord
 from graspsense.recording.writer import RecordingWriter
+from graspsense.sources.labelled_recordings import trace_of_recording
 from graspsense.store.imported_contents import CONTENT, ImportedContents
 
 if TYPE_CHECKING:
     from graspsense.core.components.config import Settings
     from graspsense.core.components.registry import Plugins
+    from graspsense.core.values.features import Features
+    from graspsense.core.values.trace import Trace
     from graspsense.core.values.trial import Trial
     from graspsense.recording.labelled_recording import LabelledRecording
     from graspsense.recording.replayable import Recording
@@ -59,6 +64,8 @@ def import_recording(
     about = {CONTENT: sha256, "source": labelled.source}
     record = evolve(record, provenance={**record.provenance, **about})
     trial = grasp_with(settings, plugins, labels=labels)
+    trace = with_phases_of(trace_of_recording(labelled.recording), trial.trace)
+    trial = evolve(trial, features=_features(settings, trace, trial))
     record = record.with_device(trial.device).with_result(trial)
     path = store.new_recording(record.made_at)
     try:
@@ -66,7 +73,7 @@ def import_recording(
         try:
             file.metadata(START, record.section(START))
             file.metadata(DEVICE, record.section(DEVICE))
-            _write_readings(file, labelled.recording, trial.trace.phase.tolist())
+            _write_readings(file, labelled.recording, trace.phase.tolist())
             file.metadata(RESULT, record.section(RESULT))
             recording = file.finish()
         except BaseException:
@@ -79,14 +86,21 @@ def import_recording(
     return trial, number
 
 
+def _features(settings: Settings, trace: Trace, trial: Trial) -> Features:
+    """Return the features of the whole recording, also of what is after the end that the controller saw."""
+    try:
+        features: Features = settings.features.create().extract(trace)
+    except FAILURES:
+        return trial.features
+    return features
+
+
 def _write_readings(file: RecordingWriter, recording: Recording, phases: Sequence[int]) -> None:
-    """Write all readings, each with the phase that the controller was in; the last one holds after its end."""
+    """Write all readings, each with its phase."""
     counter = 0
     pads_number = -1
     sources: list[tuple[int, struct.Struct, Callable[[Reading], tuple[Any, ...] | None]]] | None = None
-    after = len(recording.readings) - len(phases)
-    every_phase = [*phases, *[phases[-1] if phases else APPROACH] * after]
-    for reading, phase in zip(recording.readings, every_phase, strict=True):
+    for reading, phase in zip(recording.readings, phases, strict=True):
         frame, pads, signals = reading
         if pads.counter != counter:
             counter = pads.counter

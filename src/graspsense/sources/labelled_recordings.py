@@ -11,8 +11,10 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from attrs import evolve
 
 from graspsense.core.components.roles import FeatureSet
+from graspsense.core.learn.checkpoints import with_checkpoints
 from graspsense.core.learn.labelled import Labelled, class_of
 from graspsense.core.values.errors import ComponentFailed, ConfigError, GraspsenseError, named
 from graspsense.core.values.features import Features, FeatureTable, table_of
@@ -24,20 +26,28 @@ from graspsense.recording.labelled_recording import LabelledRecording, Unreadabl
 from graspsense.recording.readable import each_readable, error_of_all, note_on
 from graspsense.recording.replayable import Recording
 from graspsense.sources.dataset_recordings import readable_or_not
+from graspsense.sources.noise_thresholds import THRESHOLDS, thresholds_for
 from graspsense.store.first_line import NAMES, UNITS, numbers_of
 
 
-def labelled_recordings(kind: str, place: str, features: FeatureSet[Any]) -> Labelled:
+def labelled_recordings(
+    kind: str, place: str, features: FeatureSet[Any], checkpoints_s: Sequence[float] = ()
+) -> Labelled:
     """Return the labelled recordings of a data set; a note counts those that cannot be read.
 
-    Raises ConfigError if there are none, and the first error if none can be read.
+    Where force or gap are not in SI units, the thresholds of the features follow from the recordings, and a note says
+    which they are. Raises ConfigError if there are none, and the first error if none can be read.
     """
     facts: list[LabelledRecording] = []
     rows: list[Features] = []
     before: list[Features] = []
     unreadable: list[UnreadableRecording] = []
     unlabelled = 0
-    for one in readable_or_not(kind, place):
+    read = list(readable_or_not(kind, place))
+    known = [one.recording for one in read if isinstance(one, LabelledRecording)]
+    fitted, threshold_notes = _fitted(features, known)
+    features = with_checkpoints(fitted, checkpoints_s)
+    for one in read:
         if isinstance(one, UnreadableRecording):
             unreadable.append(one)
         elif not one.label:
@@ -57,7 +67,7 @@ def labelled_recordings(kind: str, place: str, features: FeatureSet[Any]) -> Lab
     table = table_of(rows)
     notes = note_on(unreadable, len(facts) + len(unreadable) + unlabelled)
     notes += [f"{unlabelled} recordings without a label are left out"] if unlabelled else []
-    notes += _counted(one.notices for one in facts)
+    notes += [*_counted(one.notices for one in facts), *threshold_notes]
     units = {unit for one in facts for unit in one.recording.units.values()}
     if units:
         notes.append(f"units that are not SI units: {', '.join(sorted(units))}")
@@ -76,6 +86,22 @@ def labelled_recordings(kind: str, place: str, features: FeatureSet[Any]) -> Lab
         notes=tuple(notes),
         provenance={"simulated": False},
     )
+
+
+def _fitted(features: FeatureSet[Any], recordings: Sequence[Recording]) -> tuple[FeatureSet[Any], list[str]]:
+    """Return the features with thresholds from recordings in other units than SI, where they have the defaults."""
+    if not any({"gap", "force_left"} & one.units.keys() for one in recordings):
+        return features, []
+    config, default = features.config, type(features.config)()
+    keys = [key for key in THRESHOLDS if hasattr(config, key)]
+    given = {key: getattr(config, key) for key in keys if getattr(config, key) != getattr(default, key)}
+    found = thresholds_for(recordings, {}, given)
+    chosen = {
+        key: found.settings[f"controller.{key}"]
+        for key in keys
+        if key not in given and f"controller.{key}" in found.settings
+    }
+    return (type(features)(evolve(config, **chosen)), [found.words]) if chosen else (features, [])
 
 
 def _features_of(recording: Recording, features: FeatureSet[Any]) -> tuple[tuple[Features, Features]]:

@@ -1,18 +1,23 @@
-"""Thresholds of contact and rest for recordings of other programs, from the noise of these recordings.
+"""Thresholds of contact and rest for recordings of other programs, from these recordings.
 
-The default thresholds are those of the PR2 gripper. They stay unless the recordings require others: where contact would
-be found in the noise, or not in most recordings, or rest never. A time-out that would end a grasp before its recording
+The default thresholds are those of the PR2 gripper, in SI units. They stay unless the recordings require others: where
+contact would be found in the noise, or not in most recordings, or rest never, or where the gap is too coarse for them.
+A recording in another unit, such as counts, has no defaults. A time-out that would end a grasp before its recording
 does is extended. What is chosen here is the same for all recordings of an import, so that features are comparable.
 
 The noise of a force is its scatter in the first third of the time before it reaches a fifth of its peak. In a recording
 that begins in contact, or whose force grows from the beginning, it is that of its second differences, as is the noise
 of the gap. Scatter is the median absolute deviation times 1.4826, which is the standard deviation of normal noise; the
 second difference of independent noise has sqrt(6) times its standard deviation.
+
+The window of rest is the time in which the rest speed makes the least step that the gap shows. If most recordings do
+not hold so long, the speed is raised until they do, at most to a quarter of the speed of the squeeze.
 """
 
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Final
 
@@ -20,12 +25,18 @@ import numpy as np
 from attrs import frozen
 
 from graspsense.core.control.contact import CONTACT_FORCE_N, REST_SPEED_M_S, REST_WINDOW_S, first_rest
+from graspsense.core.grasp.gap_resolution import MARGIN, MEASURED, gap_resolution
+from graspsense.core.values.signals import NO_GAP
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from graspsense.recording.replayable import Recording
 
+THRESHOLDS: Final[tuple[str, ...]] = ("contact_force_n", "rest_speed_m_s", "rest_window_s")
+"""The settings of controllers and features that are chosen here, and that a user may give instead."""
+SAMPLE: Final = "sample"
+"""The unit of time of a recording without a clock."""
 _NORMAL: Final = 1.4826
 _FORCE_SIGMAS: Final = 5.0
 """A contact threshold is at least so many standard deviations above the mean force without contact."""
@@ -33,16 +44,33 @@ _GAP_SIGMAS: Final = 6.0
 _EARLY_SHARE: Final = 0.2
 """Share of the peak force up to which a force counts as without contact."""
 _FEW: Final = 5
-"""Number of samples that scatter is computed from at least, and that a window of rest has at least."""
+"""Number of samples that scatter is computed from at least, and that a window of rest has at least in noise."""
+_PRESSED: Final = 0.9
+"""Share of the peak force from which on a gap is nearly at rest."""
 _REACHING: Final = 0.75
 """Share of the recordings that must reach the default contact force on both pads, or come to rest, so that it stays."""
 _LEAST_FORCE_N, _MOST_FORCE_N = 0.01, 20.0
-_SLOW_SHARE: Final = 0.1
-"""A rest speed is at most this share of the mean closing speed, so that closing is not taken for rest."""
-_MOST_WINDOW_S: Final = 1.0
+_TYPICAL: Final = 0.05
+"""Share of the peak force at which contact is where no default fits."""
+_SLOW_SHARE, _SQUEEZE_SHARE = 0.1, 0.25
+"""A rest speed is at most the second share of the speed of the squeeze, which must not be taken for rest; where it is
+not known, the first share of the mean speed."""
+_STILL_SHARE: Final = 0.01
+"""The rest speed as a share of the speed of closing, where the gap is not in metres."""
+_FASTER: Final = 1.5
+"""Factor from one rest speed that is tried to the next."""
+_MOST_WINDOW_S: Final = 5.0
 _MOST_TIMEOUT_S: Final = 600.0
 _SOON_M: Final = 0.001
 """Travel within which a contact counts as too wide an object by default, although a recording may begin close to it."""
+_CLOSED_M: Final = 0.003
+"""Gap at which the fingers count as closed by default, although an object can be thinner."""
+_CRUSH_SHARE: Final = 0.025
+"""Travel of a crush as a share of the range of the gap, where it is not in metres: 2 of 80 mm by default."""
+_SLIP_SHARE: Final = 0.05
+"""Time of a slip as a share of the duration, where time is not in seconds."""
+_MOST_TRIED: Final = 200
+"""Number of recordings on which a rest speed is tried."""
 
 
 @frozen(kw_only=True)
@@ -57,51 +85,99 @@ class Thresholds:
 
 
 def thresholds_for(
-    recordings: Sequence[Recording], timeouts_s: Mapping[str, float] | None = None
+    recordings: Sequence[Recording],
+    timeouts_s: Mapping[str, float] | None = None,
+    given: Mapping[str, float] | None = None,
 ) -> Thresholds:
     """Return the thresholds of contact and rest that these recordings need.
 
-    `timeouts_s` are the time-outs of the controller, by their keys. Recordings that are not in SI units keep the
-    defaults.
+    `timeouts_s` are the time-outs of the controller, and `given` the thresholds that a user gave, by their keys.
+    Recordings in other units than most are left out; those of a data set that counts time in frames, whose metres and
+    newtons are nominal, keep the defaults.
     """
-    in_si = [one for one in recordings if not one.units and len(one.readings) > _FEW]
-    if not in_si:
+    long_enough = [one for one in recordings if len(one.readings) > _FEW]
+    if not long_enough:
         return Thresholds(settings={}, words="thresholds of contact and rest: the defaults")
-    measured = [_Noise.of(one) for one in in_si]
-    force, force_words = _contact_force(measured)
-    rest, rest_words = _rest(measured)
-    contact_n = force.get("controller.contact_force_n", CONTACT_FORCE_N)
-    close = sum(_touches_soon(one, contact_n) for one in in_si)
-    times, times_words = _timeouts(in_si, timeouts_s or {})
-    settings = {**force, **rest, **times, **({"controller.too_wide_m": 0.0} if close else {})}
+    units = Counter(tuple(sorted(one.units.items())) for one in long_enough).most_common(1)[0][0]
+    used = [one for one in long_enough if tuple(sorted(one.units.items())) == units]
+    scale = _Scale.of(dict(units))
+    if scale.is_nominal:
+        return Thresholds(settings={}, words="thresholds of contact and rest: the defaults")
+    measured = [_Noise.of(one, scale) for one in used]
+    force, force_words = _contact_force(measured, scale)
+    contact = (given or {}).get("contact_force_n", force.get("controller.contact_force_n", CONTACT_FORCE_N))
+    rest, rest_words = _rest(measured, scale, contact, given or {})
+    times, times_words = _timeouts(used, timeouts_s or {}, scale)
+    ends, ends_words = _ends(measured, scale, contact)
+    settings = {**force, **rest, **times, **ends}
+    seen = _seen(measured, scale)
     if not settings:
-        return Thresholds(
-            settings={}, words="thresholds of contact and rest: the defaults, which fit the noise"
-        )
-    close_words = (
-        f"too_wide_m 0 m ({close} of {len(in_si)} recordings touch within {_SOON_M * 1e3:g} mm of their beginning)"
-        if close
-        else ""
-    )
-    words = "; ".join(filter(None, (force_words, rest_words, times_words, close_words)))
-    return Thresholds(settings=settings, words=f"thresholds chosen from the recordings: {words}")
+        words = f"thresholds of contact and rest: the defaults, which fit the noise ({scale.defaults}{seen})"
+        return Thresholds(settings={}, words=words)
+    words = "; ".join(filter(None, (force_words, rest_words, times_words, ends_words)))
+    return Thresholds(settings=settings, words=f"thresholds chosen from the recordings: {words}{seen}")
+
+
+@frozen
+class _Scale:
+    """The units of the recordings: `N`, `m` and `s`, or others."""
+
+    force: str
+    gap: str
+    t: str
+
+    @classmethod
+    def of(cls, units: Mapping[str, str]) -> _Scale:
+        return cls(units.get("force_left", "N"), units.get("gap", "m"), units.get("t", "s"))
+
+    @property
+    def is_nominal(self) -> bool:
+        """Whether force and gap are in SI units, but time is counted by a data set."""
+        return (self.force, self.gap) == ("N", "m") and self.t not in ("s", SAMPLE)
+
+    @property
+    def speed(self) -> str:
+        return f"{self.gap}/{self.t}"
+
+    @property
+    def has_rest(self) -> bool:
+        """Whether the default thresholds of rest have a meaning."""
+        return (self.gap, self.t) == ("m", "s")
+
+    @property
+    def defaults(self) -> str:
+        return f"contact {CONTACT_FORCE_N:g} N, rest below {REST_SPEED_M_S:g} m/s within {REST_WINDOW_S:g} s"
 
 
 @frozen(kw_only=True)
 class _Noise:
-    """What one recording says: forces in N, gap in m, times in s."""
+    """What one recording says, in its own units."""
 
-    free_force_n: float
+    times: NDArray[np.float64]
+    gap: NDArray[np.float64]
+    both: NDArray[np.float64]
+    """The force that both pads feel."""
+    baseline: float
+    """The force without contact."""
+    free_force: float
     """The largest force that noise without contact explains, over both pads."""
-    peak_force_n: float
+    peak_force: float
     """The largest force that both pads reach at the same time."""
-    gap_m: float
-    """The distance within which a gap at rest stays."""
-    step_s: float
-    closing_m_s: float
+    noise: float
+    """The distance within which a gap at rest stays by its noise."""
+    step: float
+    """The least step of a coarse gap."""
+    period: float
+    """The time between measurements of the gap if rows repeat it."""
+    sampled: float
+    """The time between samples."""
+    closing: float
+    """The mean speed of the whole recording."""
+    squeezing: float
+    """The mean speed from a fifth of the peak force to all of it; 0 if the gap hardly moves."""
 
     @classmethod
-    def of(cls, recording: Recording) -> _Noise:
+    def of(cls, recording: Recording, scale: _Scale) -> _Noise:
         """Measure the noise of a recording."""
         frames = [reading.frame for reading in recording.readings]
         times, gap, left, right = (
@@ -109,92 +185,252 @@ class _Noise:
             for name in ("t_s", "gap_m", "force_left_n", "force_right_n")
         )
         both = np.fmin(left, right)
+        known = not np.isnan(both).all()
+        peak = float(np.nanmax(both)) if known else 0.0
+        baseline = 0.0 if scale.force == "N" else _baseline(both)
+        loaded = _loaded(both, baseline)
+        resolution = gap_resolution(times, gap, loaded)
         duration = float(times[-1] - times[0])
         return cls(
-            free_force_n=max(_free_force(left), _free_force(right)),
-            peak_force_n=float(np.nanmax(both)) if not np.isnan(both).all() else 0.0,
-            gap_m=_gap_at_rest(times, gap, both),
-            step_s=float(np.median(np.diff(times))),
-            closing_m_s=(float(np.nanmax(gap) - np.nanmin(gap)) / duration if duration > 0.0 else 0.0),
+            times=times,
+            gap=gap,
+            both=both,
+            baseline=baseline,
+            free_force=max(_free_force(left, baseline), _free_force(right, baseline)),
+            peak_force=peak,
+            noise=_gap_at_rest(gap, both),
+            step=resolution.step_m,
+            period=resolution.period_s,
+            sampled=float(np.median(np.diff(times))),
+            closing=(float(np.fmax.reduce(gap) - np.fmin.reduce(gap)) / duration if duration > 0.0 else 0.0),
+            squeezing=_squeezing_speed(times, gap, both, loaded),
         )
 
+    def rests(self, contact: float, speed: float, window: float) -> bool:
+        """Return whether it comes to rest after both pads have touched, with these thresholds."""
+        touched = np.flatnonzero(self.both >= contact)
+        if not len(touched):
+            return False
+        k = int(touched[0])
+        shows = np.ones(len(self.gap) - k, dtype=np.bool_)
+        return first_rest(self.times[k:], self.gap[k:], shows, speed, window) is not None
 
-def _contact_force(measured: Sequence[_Noise]) -> tuple[dict[str, float], str]:
+
+def _contact_force(measured: Sequence[_Noise], scale: _Scale) -> tuple[dict[str, float], str]:
     """Return the contact threshold if the default does not fit, and why."""
-    needed = float(np.quantile([one.free_force_n for one in measured], 0.9))
-    peaks = [one.peak_force_n for one in measured]
-    if needed <= CONTACT_FORCE_N <= float(np.quantile(peaks, 1.0 - _REACHING, method="lower")):
+    si = scale.force == "N"
+    base = float(np.median([one.baseline for one in measured]))
+    needed = float(np.quantile([one.free_force for one in measured], 0.9))
+    peaks = [one.peak_force for one in measured]
+    if si and needed <= CONTACT_FORCE_N <= float(np.quantile(peaks, 1.0 - _REACHING, method="lower")):
         return {}, ""
     # Nine of ten recordings must reach the threshold by a factor of two.
-    most = 0.5 * float(np.quantile(peaks, 0.1))
-    typical = 0.05 * float(np.median(peaks))
-    chosen = max(needed, min(typical, most), _LEAST_FORCE_N)
-    chosen = min(_rounded_up(chosen), _MOST_FORCE_N)
-    doubt = (
-        "" if chosen <= 2.0 * most else ", which many recordings hardly reach: check the unit and the zero"
-    )
+    reached = float(np.quantile(peaks, 0.1)) - base
+    most = 0.5 * reached
+    typical = _TYPICAL * (float(np.median(peaks)) - base)
+    above = max(needed - base, min(typical, most), _LEAST_FORCE_N if si else 0.0)
+    chosen = base + (min(_rounded_up(above), _MOST_FORCE_N) if si else _rounded_up(above))
+    if chosen <= 0.0:  # a force below zero throughout
+        chosen = _LEAST_FORCE_N
+    doubt = "" if above <= 2.0 * most else ", which many recordings hardly reach: check the unit and the zero"
+    default = f"default {CONTACT_FORCE_N:g} N" if si else f"there is no default in {scale.force}"
     words = (
-        f"contact_force_n {chosen:g} N (without contact the force reaches {needed:.2g} N, and 9 of 10 recordings reach "
-        f"{2.0 * most:.2g} N; default {CONTACT_FORCE_N:g} N){doubt}"
+        f"contact_force_n {chosen:g} {scale.force} (without contact the force reaches {needed:.2g} {scale.force}, and "
+        f"9 of 10 recordings reach {reached + base:.2g} {scale.force}; {default}){doubt}"
     )
     return {"controller.contact_force_n": chosen}, words
 
 
-def _rest(measured: Sequence[_Noise]) -> tuple[dict[str, float], str]:
+def _rest(
+    measured: Sequence[_Noise], scale: _Scale, contact: float, given: Mapping[str, float]
+) -> tuple[dict[str, float], str]:
     """Return the rest speed and window if the defaults do not fit, and why."""
-    travel = float(np.quantile([one.gap_m for one in measured], _REACHING))
-    step = float(np.median([one.step_s for one in measured]))
+    noise = float(np.quantile([one.noise for one in measured], _REACHING))
+    step = float(np.quantile([one.step for one in measured], 0.9))
+    period = float(np.quantile([one.period for one in measured], 0.9))
+    sampled = float(np.median([one.sampled for one in measured]))
+    closing = float(np.median([one.closing for one in measured]))
+    squeezing = [one.squeezing for one in measured if one.squeezing > 0.0]
+    slowest = _SQUEEZE_SHARE * float(np.median(squeezing)) if squeezing else _SLOW_SHARE * closing
+    default_speed = REST_SPEED_M_S if scale.has_rest else _STILL_SHARE * closing
+    default_window = max(
+        REST_WINDOW_S if scale.t == "s" else 0.0, 0.0 if scale.has_rest else MEASURED * sampled
+    )
+    if not default_speed > 0.0:  # the gap does not move, or there is none
+        return ({} if scale.has_rest else _never(measured)), ""
+    travel = max(noise, MARGIN * step)
     # Between samples that are further apart than the window, the gap may move for as long as they are apart.
-    if travel <= REST_SPEED_M_S * max(REST_WINDOW_S, step):
+    fits = travel <= default_speed * max(default_window, sampled) and MEASURED * period <= default_window
+    if scale.has_rest and fits:
         return {}, ""
-    window = max(REST_WINDOW_S, _rounded_up(_FEW * step)) if _FEW * step > REST_WINDOW_S else REST_WINDOW_S
-    slow = max(_SLOW_SHARE * float(np.median([one.closing_m_s for one in measured])), REST_SPEED_M_S)
-    if travel > slow * window:
-        window = min(_rounded_up(travel / slow), _MOST_WINDOW_S)
-    speed = max(_rounded_up(travel / window), REST_SPEED_M_S)
+    least = max(default_window, MEASURED * period, _FEW * sampled if noise and not step else 0.0)
+    speed = given.get("rest_speed_m_s", default_speed)
+    if "rest_window_s" in given:
+        least = given["rest_window_s"]
+        speed = max(speed, travel / least)
+    tried = measured[:: math.ceil(len(measured) / _MOST_TRIED)]
+    candidates = [speed]
+    while "rest_speed_m_s" not in given and candidates[-1] * _FASTER <= max(slowest, speed):
+        candidates.append(candidates[-1] * _FASTER)
+    if "rest_window_s" in given:
+        del candidates[1:]
+    # Steps of a coarse gap pass for noise while it moves, so the step alone is tried first.
+    travels = sorted({MARGIN * step, travel}) if step else [travel]
+    pairs = [(v, _window(x / v, least, scale)) for x in travels for v in map(_rounded_up, candidates)]
+    resting = [sum(one.rests(contact, *pair) for one in tried) for pair in pairs]
+    enough = _REACHING * sum(bool((one.both >= contact).any()) for one in tried)
+    chosen = next((k for k, count in enumerate(resting) if count >= enough), int(np.argmax(resting)))
+    speed, window = pairs[chosen]
+    default = (
+        f"default {REST_SPEED_M_S:g} m/s within {REST_WINDOW_S:g} s"
+        if scale.has_rest
+        else f"there is no default in {scale.speed}"
+    )
     words = (
-        f"rest_speed_m_s {speed:g} m/s within rest_window_s {window:g} s (a gap at rest varies by "
-        f"{travel * 1e3:.2g} mm, samples are {step * 1e3:.3g} ms apart; default {REST_SPEED_M_S:g} m/s "
-        f"within {REST_WINDOW_S:g} s)"
+        f"rest_speed_m_s {speed:g} {scale.speed} within rest_window_s {window:g} {scale.t}, in which "
+        f"{resting[chosen]} of {len(tried)} recordings come to rest (a gap at rest varies by "
+        f"{_length(max(noise, step), scale)}; {default})"
     )
     return {"controller.rest_speed_m_s": speed, "controller.rest_window_s": window}, words
 
 
+def _window(needed: float, least: float, scale: _Scale) -> float:
+    window = max(least, _rounded_up(needed))
+    return min(window, max(_MOST_WINDOW_S, least)) if scale.t == "s" else window
+
+
+def _never(measured: Sequence[_Noise]) -> dict[str, float]:
+    """Return a window that no recording is long enough for: a gap that was not recorded shows no rest."""
+    longest = max(float(one.times[-1] - one.times[0]) for one in measured)
+    return {"controller.rest_window_s": _rounded_up(2.0 * longest)}
+
+
+def _ends(measured: Sequence[_Noise], scale: _Scale, contact: float) -> tuple[dict[str, float], str]:
+    """Return what keeps a recorded squeeze from being taken for one that failed, and why."""
+    least = min(float(np.fmin.reduce(one.gap)) for one in measured)
+    span = max(float(np.fmax.reduce(one.gap)) for one in measured) - least
+    chosen: dict[str, float] = {}
+    if scale.gap != "m":
+        chosen = {
+            "controller.too_wide_m": -max(span, 1.0),
+            "controller.closed_gap_m": least - max(span, 1.0),
+            "controller.crush_travel_m": _CRUSH_SHARE * span or 1.0,
+        }
+        words = (
+            "no gap was recorded"
+            if scale.gap == NO_GAP
+            else f"nothing is too wide, closed or crushed by a gap in {scale.gap}"
+        )
+    else:
+        travels = [_travel(one, contact) for one in measured]
+        close = sum(travel < _SOON_M for travel in travels)
+        thin = sum(_is_thin(one, contact) for one in measured)
+        parts = []
+        if close:
+            grown = -min(0.0, *travels)
+            wide = -_rounded_up(grown) if grown else 0.0
+            chosen["controller.too_wide_m"] = wide
+            parts.append(
+                f"too_wide_m {wide:g} m ({close} of {len(measured)} recordings touch within {_SOON_M * 1e3:g} mm of "
+                "their beginning)"
+            )
+        if thin:
+            chosen["controller.closed_gap_m"] = round(least - _SOON_M, 6)
+            parts.append(
+                f"closed_gap_m {chosen['controller.closed_gap_m']:g} m (in {thin} of {len(measured)} recordings both "
+                f"pads feel an object in a gap of {_CLOSED_M * 1e3:g} mm or less)"
+            )
+        words = "; ".join(parts)
+    if scale.t != "s":
+        duration = float(np.median([one.times[-1] - one.times[0] for one in measured]))
+        chosen["controller.slip_time_s"] = max(_SLIP_SHARE * duration, 1.0)
+    return chosen, words
+
+
+def _seen(measured: Sequence[_Noise], scale: _Scale) -> str:
+    """Return in words how finely the gap was measured."""
+    step = float(np.quantile([one.step for one in measured], 0.9))
+    period = float(np.quantile([one.period for one in measured], 0.9))
+    sampled = float(np.median([one.sampled for one in measured]))
+    unit = "ms" if scale.t == "s" else scale.t
+    factor = 1e3 if scale.t == "s" else 1.0
+    words = f"; samples are {factor * sampled:.3g} {unit} apart"
+    if step:
+        words += f", the gap has steps of {_length(step, scale)}"
+    return words + (f", it is measured every {factor * period:.3g} {unit}" if period else "")
+
+
+def _length(length: float, scale: _Scale) -> str:
+    return f"{length * 1e3:.2g} mm" if scale.gap == "m" else f"{length:.2g} {scale.gap}"
+
+
 def _timeouts(
-    recordings: Sequence[Recording], timeouts_s: Mapping[str, float]
+    recordings: Sequence[Recording], timeouts_s: Mapping[str, float], scale: _Scale
 ) -> tuple[dict[str, float], str]:
     """Return the time-outs that are shorter than a recording, extended to the longest one, and why."""
     longest = max(one.readings[-1].frame.t_s - one.readings[0].frame.t_s for one in recordings)
-    limit = min(_rounded_up(longest), _MOST_TIMEOUT_S)
+    limit = min(_rounded_up(longest), _MOST_TIMEOUT_S) if scale.t == "s" else _rounded_up(longest)
     chosen = {f"controller.{key}": limit for key, value in timeouts_s.items() if value < longest}
     if not chosen:
         return {}, ""
     keys = " and ".join(key for key, value in timeouts_s.items() if value < longest)
-    return chosen, f"{keys} {limit:g} s (recordings last up to {longest:.3g} s)"
+    return chosen, f"{keys} {limit:g} {scale.t} (recordings last up to {longest:.3g} {scale.t})"
 
 
-def _touches_soon(recording: Recording, contact_force_n: float) -> bool:
-    """Return whether both pads touch after the first sample, but within `_SOON_M` of travel."""
-    frames = [reading.frame for reading in recording.readings]
-    for k, frame in enumerate(frames):
-        if frame.force_left_n >= contact_force_n and frame.force_right_n >= contact_force_n:
-            return k > 0 and frames[0].gap_m - frame.gap_m < _SOON_M
-    return False
+def _travel(one: _Noise, contact: float) -> float:
+    """Return how far the gap has closed when both pads touch; infinite if never, or from the first sample on."""
+    touched = np.flatnonzero(one.both >= contact)
+    return float(one.gap[0] - one.gap[touched[0]]) if len(touched) and touched[0] else math.inf
 
 
-def _free_force(force: NDArray[np.float64]) -> float:
+def _is_thin(one: _Noise, contact: float) -> bool:
+    """Return whether both pads feel an object in a gap in which the fingers count as closed."""
+    return bool((one.gap[one.both >= contact] <= _CLOSED_M).any())
+
+
+def _loaded(force: NDArray[np.float64], baseline: float) -> int:
+    """Return the first sample with a fifth of the peak force."""
+    if np.isnan(force).all():
+        return 0
+    return int((force >= baseline + _EARLY_SHARE * (np.nanmax(force) - baseline)).argmax())
+
+
+def _squeezing_speed(
+    times: NDArray[np.float64], gap: NDArray[np.float64], force: NDArray[np.float64], loaded: int
+) -> float:
+    """Return the mean speed of the gap from a fifth of the peak force to 95 % of it; 0 if it does not close."""
+    if np.isnan(force).all():
+        return 0.0
+    top = int((force >= 0.95 * np.nanmax(force)).argmax())
+    if not top > loaded:
+        return 0.0
+    closed = float(gap[loaded] - gap[top])
+    return max(closed, 0.0) / float(times[top] - times[loaded]) if closed == closed else 0.0
+
+
+def _baseline(force: NDArray[np.float64]) -> float:
+    """Return the force without contact of a sensor whose zero is not known: that of the first samples below a fifth."""
+    known = force[~np.isnan(force)]
+    if not len(known):
+        return 0.0
+    early = known[: max(int((known >= known.min() + _EARLY_SHARE * np.ptp(known)).argmax()), 1)]
+    return float(np.median(early[: max(len(early) // 3, _FEW)]))
+
+
+def _free_force(force: NDArray[np.float64], baseline: float) -> float:
     """Return the largest force that noise without contact explains."""
     known = force[~np.isnan(force)]
     if len(known) <= _FEW:
-        return 0.0
-    reached = known >= _EARLY_SHARE * known.max()
+        return baseline
+    reached = known >= baseline + _EARLY_SHARE * (known.max() - baseline)
     early = known[: int(reached.argmax())] if reached.any() else known
     # The last part of a recording that begins close to the object is already a squeeze.
     early = early[: max(len(early) // 3, _FEW)]
     if len(early) < _FEW or _rises(early):
-        return _FORCE_SIGMAS * _scatter_of_differences(known)
+        return baseline + _FORCE_SIGMAS * _scatter_of_differences(known)
     middle = float(np.median(early))
-    return abs(middle) + _FORCE_SIGMAS * _NORMAL * float(np.median(np.abs(early - middle)))
+    scatter = _FORCE_SIGMAS * _NORMAL * float(np.median(np.abs(early - middle)))
+    return abs(middle) + scatter if baseline == 0.0 else middle + scatter
 
 
 def _rises(force: NDArray[np.float64]) -> bool:
@@ -204,37 +440,15 @@ def _rises(force: NDArray[np.float64]) -> bool:
     return growth > _FORCE_SIGMAS * _scatter_of_differences(force)
 
 
-def _gap_at_rest(times_s: NDArray[np.float64], gap: NDArray[np.float64], force: NDArray[np.float64]) -> float:
-    """Return the distance within which a gap at rest stays: its noise, or one step of a coarse encoder.
-
-    It is 0 for an encoder that repeats its numbers, if the default thresholds find the rest of the squeeze: the second
-    differences of its steps are motion, not noise.
-    """
-    known = gap[~np.isnan(gap)]
-    if len(known) <= _FEW:
+def _gap_at_rest(gap: NDArray[np.float64], force: NDArray[np.float64]) -> float:
+    """Return the distance within which a gap at rest stays by its noise, which shows best where the force is large."""
+    known = np.isfinite(gap)
+    if not np.isnan(force).all():
+        pressed = known & (force >= _PRESSED * np.nanmax(force))
+        known = pressed if np.count_nonzero(pressed) > 2 * _FEW else known
+    if np.count_nonzero(known) <= _FEW:
         return 0.0
-    steps = np.abs(np.diff(known))
-    moved = steps[steps > 0.0]
-    if len(moved) < len(steps) and _comes_to_rest(times_s, gap, force):
-        return 0.0
-    coarse = 1.5 * float(np.median(moved)) if len(moved) and 2 * len(moved) <= len(steps) else 0.0
-    return max(_GAP_SIGMAS * _scatter_of_differences(known), coarse)
-
-
-def _comes_to_rest(
-    times_s: NDArray[np.float64], gap: NDArray[np.float64], force: NDArray[np.float64]
-) -> bool:
-    """Return whether the default thresholds find a rest after the force has risen."""
-    loaded = (
-        force >= _EARLY_SHARE * np.nanmax(force)
-        if not np.isnan(force).all()
-        else np.zeros(len(force), np.bool_)
-    )
-    if not loaded.any():
-        return False
-    k = int(loaded.argmax())
-    shows = np.ones(len(gap) - k, dtype=np.bool_)
-    return first_rest(times_s[k:], gap[k:], shows, REST_SPEED_M_S, REST_WINDOW_S) is not None
+    return _GAP_SIGMAS * _scatter_of_differences(gap[known])
 
 
 def _scatter_of_differences(values: NDArray[np.float64]) -> float:

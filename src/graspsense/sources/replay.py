@@ -186,7 +186,7 @@ class ReplayBackend(SensorBackend[ReplayConfig]):
             relaxed=Command(EFFORT, 0.0, inf, inf),
             has_release=recording.has_release,
             units=recording.units,
-            notes=recording.notes,
+            notes=(*recording.notes, *recording.notices),
         )
 
     def read(self, timeout_s: float) -> Reading:

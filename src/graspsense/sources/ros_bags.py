@@ -50,10 +50,9 @@ class Bag:
         return frozenset(self.reader.topics)
 
     def messages(self, wanted: Callable[[str], bool]) -> Iterator[tuple[str, int, Any]]:
-        """Yield topic, time (ns) and message of the topics that are wanted.
+        """Yield topic, time of recording (ns) and message of the topics that are wanted.
 
-        The time is that of the header, or that of the recording if it has none. Raises ConfigError, TooLarge,
-        DataDamaged.
+        Raises ConfigError, TooLarge, DataDamaged.
         """
         connections: list[Connection] = [one for one in self.reader.connections if wanted(one.topic)]
         if not connections:
@@ -64,7 +63,7 @@ class Bag:
                 self._raw.add(len(raw))
                 definitions.check(connection.msgtype, len(raw))
                 message = self.reader.deserialize(raw, connection.msgtype)
-                yield connection.topic, stamp_ns(message) or recorded_ns, message
+                yield connection.topic, recorded_ns, message
 
 
 @contextmanager

@@ -20,10 +20,9 @@ GripperAccelerometer). In ROS a positive effort opens the gripper; here it squee
 
 from __future__ import annotations
 
-from bisect import bisect_right
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -31,12 +30,13 @@ from graspsense.core.components.channels import signal_type
 from graspsense.core.grasp.calibration import Cells, edge_force, masked, pad_force, tare, zero_of
 from graspsense.core.values.channel import Channel, FastChannel
 from graspsense.core.values.errors import ConfigError, DataDamaged, TareRefused
-from graspsense.core.values.signals import Frame, Pads, Reading, no_pads
+from graspsense.core.values.signals import Frame, Pads, Reading
 from graspsense.recording.readable import readable
 from graspsense.recording.replayable import Recording
 from graspsense.recording.unpacked import Unpacked
 from graspsense.sources.fast_samples import sample_blocks
-from graspsense.sources.ros_bags import opened_bag
+from graspsense.sources.ros_bags import opened_bag, stamp_ns
+from graspsense.sources.topic_clocks import Messages, TopicTimes, common_clock
 
 SIDES: Final = {"l": "left", "r": "right"}
 TIP_FIELDS: Final = (("l_finger_tip", "r_finger_tip"), ("data0", "data1"))
@@ -94,6 +94,9 @@ class _Image(NamedTuple):
     right: Cells
 
 
+T = TypeVar("T", _Motion, _Sampled, _Image)
+
+
 def read_bag(name: str) -> Recording:
     """Return the recording in a bag: `FILE`, or `FILE#l` and `FILE#r` if it contains both grippers.
 
@@ -107,47 +110,75 @@ def read_bag(name: str) -> Recording:
         raise ConfigError(f"there is no bag {file!r}: name a .bag file, or the folder of a ROS 2 bag")
     if side not in ("", *SIDES):
         raise ConfigError(f"{name!r}: write l or r after #, for the left or the right gripper")
-    images: list[_Image] = []
-    motions: list[_Motion] = []
-    samples: list[_Sampled] = []
     kept = Unpacked(path)
     with opened_bag(path, DEFINITIONS) as bag, readable(path):
         side = _side(path, side, bag.topics)
-        pressure, source = PRESSURE.format(side), _source(path, side, bag.topics)
-        acceleration = ACCELERATION.format(side)
-        for topic, t_ns, message in bag.messages({pressure, source, acceleration}.__contains__):
+        found = _Found(path, side, _source(path, side, bag.topics))
+        for topic, recorded_ns, message in bag.messages(found.times.__contains__):
             kept.add(_MESSAGE_BYTES)
-            if topic == acceleration:
-                samples.append(_Sampled(t_ns, tuple((one.x, one.y, one.z) for one in message.samples)))
-            elif topic == pressure:
-                image = _image(path, t_ns, message)
-                # A message can repeat the previous image, because it does not contain the clock of the board.
-                if not images or image[1:] != images[-1][1:]:
-                    images.append(image)
-            else:
-                motions += _motion(t_ns, message, f"{side}_gripper_joint")
-    if len(motions) < 2 or not images:
+            found.add(topic, recorded_ns, message)
+    return _recording(path, found)
+
+
+class _Found:
+    """The messages of a gripper in a bag, and when they came."""
+
+    def __init__(self, path: Path, side: str, source: str) -> None:
+        self.path, self.side, self.source = path, side, source
+        self.pressure, self.acceleration = PRESSURE.format(side), ACCELERATION.format(side)
+        self.images: list[_Image] = []
+        self.motions: list[_Motion] = []
+        self.samples: list[_Sampled] = []
+        self.times = {topic: Messages() for topic in (self.pressure, source, self.acceleration)}
+
+    def add(self, topic: str, recorded_ns: int, message: Any) -> None:
+        """Add a message, unless it is of other joints."""
+        if topic == self.acceleration:
+            self.samples.append(_Sampled(0, tuple((one.x, one.y, one.z) for one in message.samples)))
+        elif topic == self.pressure:
+            self.images.append(_image(self.path, message))
+        elif (motion := _motion(message, f"{self.side}_gripper_joint")) is not None:
+            self.motions.append(motion)
+        else:
+            return
+        self.times[topic].add(recorded_ns, stamp_ns(message))
+
+
+def _recording(path: Path, found: _Found) -> Recording:
+    """Return the recording that these messages are. Raises DataDamaged."""
+    pressure, source, gripper = found.pressure, found.source, f"{SIDES[found.side]} gripper"
+    if len(found.motions) < 2 or not found.images:
         raise DataDamaged(
-            f"{path} contains {len(motions)} positions of the {SIDES[side]} gripper on {source} and {len(images)} cell "
+            f"{path} contains {len(found.motions)} positions of the {gripper} on {source} and {len(found.images)} cell "
             f"images on {pressure}: a grasp needs both"
         )
-    motions.sort()
-    images.sort(key=lambda one: one.t_ns)
-    duration_s = (motions[-1].t_ns - motions[0].t_ns) * 1e-9
+    topics = {topic: one for topic, one in found.times.items() if one.recorded_ns}
+    clock = common_clock(path.name, topics, (pressure, source))
+    moved = _timed(found.motions, clock.topics[source])
+    motions = [one for one in moved if clock.begin_ns <= one.t_ns <= clock.end_ns]
+    duration_s = (motions[-1].t_ns - motions[0].t_ns) * 1e-9 if motions else 0.0
     if duration_s <= 0.0:
         raise DataDamaged(f"{path}: all positions on {source} have the same time")
-    notes = [f"recorded on a PR2, {SIDES[side]} gripper: gap from {source}, cells from {pressure}"]
-    readings = tuple(_readings(motions, images, notes))
+    notes = [f"recorded on a PR2, {gripper}: gap from {source}, cells from {pressure}", *clock.notes]
+    images = clock.topics[pressure]
+    readings = tuple(_readings(motions, _timed(found.images, images), images, notes))
     channels: tuple[Channel, ...] = ()
-    if any(one.values for one in samples):
-        channels, readings = _with_acceleration(readings, motions[0].t_ns, samples)
+    if any(one.values for one in found.samples):
+        timed = _timed(found.samples, clock.topics[found.acceleration])
+        channels, readings = _with_acceleration(readings, motions[0].t_ns, timed)
     return Recording(
-        name=f"{path.name}, {SIDES[side]} gripper",
+        name=f"{path.name}, {gripper}",
         readings=readings,
         channels=channels,
         rate_hz=(len(motions) - 1) / duration_s,
         notes=tuple(notes),
+        notices=clock.notices,
     )
+
+
+def _timed(messages: Sequence[T], times: TopicTimes) -> list[T]:
+    """Return the messages with their times on the common clock, in the order of time."""
+    return [messages[k]._replace(t_ns=ns) for ns, k in zip(times.ns.tolist(), times.order, strict=True)]
 
 
 def _side(path: Path, side: str, topics: Collection[str]) -> str:
@@ -176,7 +207,7 @@ def _source(path: Path, side: str, topics: Collection[str]) -> str:
     raise DataDamaged(f"{path} has no gap of the gripper: no topic {', '.join(wanted)}")
 
 
-def _image(path: Path, t_ns: int, message: Any) -> _Image:
+def _image(path: Path, message: Any) -> _Image:
     for left, right in TIP_FIELDS:
         if hasattr(message, left) and hasattr(message, right):
             tips = [
@@ -186,29 +217,38 @@ def _image(path: Path, t_ns: int, message: Any) -> _Image:
                 raise DataDamaged(
                     f"{path}: a pressure message has {len(tips[0])} and {len(tips[1])} cells, not {CELLS}"
                 )
-            return _Image(t_ns, *tips)
+            return _Image(0, *tips)
     names = ", ".join(" and ".join(pair) for pair in TIP_FIELDS)
     raise DataDamaged(f"{path}: a pressure message has neither of the pairs of fields {names}")
 
 
-def _motion(t_ns: int, message: Any, joint: str) -> list[_Motion]:
-    """Return the motion of this joint in a message, or nothing if the message is of other joints."""
+def _motion(message: Any, joint: str) -> _Motion | None:
+    """Return the motion of this joint in a message, None if the message is of other joints."""
     if hasattr(message, "process_value"):
-        return [_Motion(t_ns, message.process_value, message.process_value_dot, -message.command)]
+        return _Motion(0, message.process_value, message.process_value_dot, -message.command)
     if hasattr(message, "joint_position"):
         if message.joint_name not in ("", joint):
-            return []
-        return [_Motion(t_ns, message.joint_position, message.joint_velocity, -message.joint_applied_effort)]
+            return None
+        return _Motion(0, message.joint_position, message.joint_velocity, -message.joint_applied_effort)
     if joint not in message.name:
-        return []
+        return None
     i = list(message.name).index(joint)
     velocity, effort = ([*column, *[_NAN] * (i + 1)][i] for column in (message.velocity, message.effort))
-    return [_Motion(t_ns, float(message.position[i]), float(velocity), -float(effort))]
+    return _Motion(0, float(message.position[i]), float(velocity), -float(effort))
 
 
-def _readings(motions: Sequence[_Motion], images: Sequence[_Image], notes: list[str]) -> Iterator[Reading]:
+def _readings(
+    motions: Sequence[_Motion], images: Sequence[_Image], times: TopicTimes, notes: list[str]
+) -> Iterator[Reading]:
+    """Yield a reading for each motion, with the last image; its forces are missing where that is too old."""
     began_ns = motions[0].t_ns
-    pads = [Pads((one.t_ns - began_ns) * 1e-9, i, one.left, one.right) for i, one in enumerate(images, 1)]
+    pads: list[Pads] = []
+    latest: list[Pads] = []
+    for image in images:
+        # A message can repeat the previous image, because it does not contain the clock of the board.
+        if not pads or image[1:] != (pads[-1].left, pads[-1].right):
+            pads.append(Pads((image.t_ns - began_ns) * 1e-9, len(pads) + 1, image.left, image.right))
+        latest.append(pads[-1])
     first = pads[:TARE_IMAGES]
     try:
         zero = tare(first, PAD_COUNTS_PER_N, FIRST_PAD_CELL)
@@ -217,16 +257,19 @@ def _readings(motions: Sequence[_Motion], images: Sequence[_Image], notes: list[
         notes.append(
             f"the zero of the pads is uncertain, because the first {len(first)} images cannot be used for it: {refused}"
         )
-    times = [one.t_ns for one in images]
+    last, old = times.latest(np.array([one.t_ns for one in motions], dtype=np.int64))
     before: _Motion | None = None
-    for motion in motions:
-        n = bisect_right(times, motion.t_ns)
+    for motion, n, is_old in zip(motions, last.tolist(), old.tolist(), strict=True):
         dt_s = (motion.t_ns - before.t_ns) * 1e-9 if before else 0.0
         velocity = motion.velocity_m_s
         if velocity != velocity and before is not None and dt_s > 0.0:
             velocity = (motion.gap_m - before.gap_m) / dt_s
-        seen = pads[n - 1] if n else no_pads(CELLS)
-        forces = _forces(seen.left, zero[0]), _forces(seen.right, zero[1])
+        seen = latest[n]
+        forces = (
+            ((_NAN, _NAN), (_NAN, _NAN))
+            if is_old
+            else (_forces(seen.left, zero[0]), _forces(seen.right, zero[1]))
+        )
         (left, edge_left), (right, edge_right) = forces
         yield Reading(
             Frame(
@@ -249,7 +292,7 @@ def _with_acceleration(
     at: list[float] = []
     values: list[tuple[float, float, float]] = []
     before_ns: int | None = None
-    for t_ns, rows in sorted(messages, key=lambda one: one.t_ns):
+    for t_ns, rows in messages:
         if before_ns is not None and before_ns >= began_ns:
             step_ns = (t_ns - before_ns) / max(len(rows), 1)
             at += [(before_ns - began_ns + step_ns * k) * 1e-9 for k in range(1, len(rows) + 1)]

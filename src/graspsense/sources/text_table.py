@@ -36,18 +36,6 @@ UNITS: Final = frozenset((
     "m/s\u00b2", "rad/s", "deg/s", "counts", "count", "raw", "adc", "a.u.", "au", "step", "steps",
 ))  # fmt: skip
 """What stands in a line of units, in small letters."""
-SPELLED_UNITS: Final = {
-    **dict.fromkeys(("sec", "secs", "second", "seconds"), "s"),
-    **dict.fromkeys(("msec", "millisecond", "milliseconds"), "ms"),
-    **dict.fromkeys(("\u00b5s", "\u03bcs", "microsecond", "microseconds"), "us"),
-    **dict.fromkeys(("meter", "meters", "metre", "metres"), "m"),
-    **dict.fromkeys(("millimeter", "millimeters", "millimetre", "millimetres"), "mm"),
-    **dict.fromkeys(("\u00b5m", "\u03bcm", "micrometer", "micrometers", "micrometre", "micrometres"), "um"),
-    **dict.fromkeys(("newton", "newtons"), "N"),
-    **dict.fromkeys(("count", "raw", "adc"), "counts"),
-    "inch": "in",
-}
-"""Units as they are spelled out, in small letters, with the sign that stands for them here."""
 _LINE_ENDS: Final = "\n\r\v\f\x1c\x1d\x1e\x85\u2028\u2029"
 """The characters at which `str.splitlines` divides a text."""
 _COMMENTS: Final = ("#", "%")
@@ -55,8 +43,6 @@ _SEPARATOR_LINE: Final = re.compile(r'"?sep=([;,\t|])"?\s*')
 _SAMPLED: Final = 400
 """Lines from which the separator and the kinds of the columns are found."""
 _SAMPLED_CELLS: Final = 100_000
-_FIXED_ROWS: Final = 50
-"""Rows with the same number of decimals from which a last number with fewer is one that was cut off."""
 _MOST_JSON_PARTS: Final = 8
 """Depth of lists and objects in a JSON line."""
 
@@ -267,13 +253,12 @@ class _Layout:
 
     def _without_cut(self, rows: list[Row], width: int, ended: bool) -> list[Row]:
         """Return the rows without a last one that was cut off while it was written."""
-        if ended or len(rows) < 2:
+        if ended or len(rows) < 4:
             return rows
         number, last = rows[-1]
         others = {_decimals(row[-1]) for _, row in rows[:-1] if len(row) == width}
-        fixed = len(rows) > _FIXED_ROWS and len(others) == 1
-        shorter = fixed and -1 < _decimals(last[-1]) < max(others)
-        if len(last) >= width and not shorter:
+        shorter = len(others) == 1 and -1 < _decimals(last[-1]) < max(others)
+        if len(last) == width and last[-1] and not shorter:
             return rows
         self.notes.append(f"line {number} is cut off, and left out")
         return rows[:-1]
@@ -343,7 +328,7 @@ def _separator(lines: Sequence[str]) -> str:
 
     It gives most lines the same number of cells, and the first line as many if any does.
     """
-    widths = {one: _width(lines, one) for one in (";", "\t", ",", "|", " ")}
+    widths = {one: _width(lines, one) for one in (";", "\t", ",", " ")}
     agreeing = {one: count for one, (width, count) in widths.items() if width > 1}
     if agreeing.get(" ", 0) >= agreeing.get(",", 1) and _commas_are_within_numbers(lines):
         agreeing.pop(",", None)
@@ -406,13 +391,10 @@ def _can_be_names(row: Sequence[str], width: int, texts: Sequence[set[str]]) -> 
 def _are_units(row: Sequence[str]) -> bool:
     """Return whether most cells of a row are units, or stand in brackets as units do."""
     named = [cell for cell in row if cell]
-    units = [cell for cell in named if is_unit(cell.strip("[]()")) or cell[0] + cell[-1] in ("[]", "()")]
+    units = [
+        cell for cell in named if cell.strip("[]()").lower() in UNITS or cell[0] + cell[-1] in ("[]", "()")
+    ]
     return bool(named) and 2 * len(units) > len(named)
-
-
-def is_unit(text: str) -> bool:
-    """Return whether a text is a unit."""
-    return text.lower() in UNITS or text.lower() in SPELLED_UNITS
 
 
 def _decimals(cell: str) -> int:

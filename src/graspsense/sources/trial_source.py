@@ -173,7 +173,7 @@ def labelled_trials(
             folder, changed, value=source.value, checkpoints_s=source.checkpoints_s, progress=progress
         )
     else:
-        found = _data_set(source, with_checkpoints(features(), source.checkpoints_s))
+        found = _data_set(source, features())
     return found.of_class(source.only) if source.only else found
 
 
@@ -223,8 +223,10 @@ def _data_set(source: TrialSource, features: FeatureSet[Any]) -> Labelled:
     if not dataset.entry.target:
         from graspsense.sources.labelled_recordings import labelled_recordings
 
-        return labelled_recordings(name, folder, features)
-    found = dataset.load()(folder, features, unreliable=source.unreliable)
+        return labelled_recordings(name, folder, features, source.checkpoints_s)
+    found = dataset.load()(
+        folder, with_checkpoints(features, source.checkpoints_s), unreliable=source.unreliable
+    )
     if not isinstance(found, Labelled):
         raise PluginUnavailable(
             f"data set {name!r} cannot be used here: its reader gave {type(found).__name__}, not Labelled"

@@ -21,13 +21,16 @@ from graspsense.core.learn.checkpoints import with_checkpoints
 from graspsense.core.pipeline.wiring import check
 from graspsense.core.values.errors import ComponentFailed, ConfigError, DataDamaged, named
 from graspsense.recording.before_contact import before_contact, contact_force_of
+from graspsense.recording.held_phases import with_phases_of
 from graspsense.recording.labelled_recording import UnreadableRecording
 from graspsense.recording.readable import error_of_all, readable
+from graspsense.recording.reader import read_recorded
 from graspsense.recording.trial_record import FeatureValues
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from graspsense.store.rows import StoredTrial
     from graspsense.store.store import Store
 
 CHANGEABLE: Final = ("features", "controller", "run")
@@ -83,14 +86,15 @@ def extract_again(
         recording, text = f"store:{store.folder}#{number}", ""
         try:
             with readable(recording):
-                recorded = store.trial(number).record.settings
+                trial = store.trial(number)
+                recorded = trial.record.settings
                 own = {table: keys for table, keys in recorded.items() if table != "gripper"}
                 text = json.dumps(own, sort_keys=True)
                 if text in refused:
                     raise refused[text]
                 if text not in resolved:
                     resolved[text] = _resolved(own, recording, options, flags)
-                found[number] = _extracted(resolved[text], recording, checkpoints_s)
+                found[number] = _extracted(resolved[text], recording, trial, checkpoints_s)
                 settings = resolved[text]
         except (ConfigError, DataDamaged) as error:
             if isinstance(error, ConfigError):
@@ -146,13 +150,18 @@ def _resolved(
     return settings
 
 
-def _extracted(settings: Settings, recording: str, checkpoints_s: Sequence[float]) -> ExtractedAgain:
+def _extracted(
+    settings: Settings, recording: str, trial: StoredTrial, checkpoints_s: Sequence[float]
+) -> ExtractedAgain:
     gripper = settings.gripper
     backend = gripper.component.create(evolve(gripper.config, recording=recording))
     grasp = run_uninterrupted(backend, settings.controller.create(), settings.run)
+    trace = grasp.trace
+    if trial.record.origin == "import":
+        trace = with_phases_of(read_recorded(trial.recording).trace(), trace)
     try:
         feature_set = with_checkpoints(settings.features.create(), checkpoints_s)
-        features = feature_set.extract(grasp.trace)
+        features = feature_set.extract(trace)
     except Exception as error:
         raise ComponentFailed(
             f"feature set {settings.features.component.qualified} failed on {recording}: {named(error)}"

@@ -54,6 +54,7 @@ from graspsense.core.values.signals import (
     APPROACH,
     EFFORT,
     HOLD,
+    NO_GAP,
     RUNNING,
     SQUEEZE,
     Command,
@@ -568,6 +569,8 @@ class _Grasp:
     def _recording_ended(self) -> tuple[Outcome, str]:
         if self.state.law.outcome != RUNNING:
             return ended_by_itself(self.state.guard.stopped, self.state.law.outcome)
+        if self.state.law.phase == SQUEEZE and self.info.units.get("gap") == NO_GAP:
+            return Outcome.FORCE_ONLY, "no gap was recorded, so whether the fingers came to rest is not known"
         if self.state.law.phase == SQUEEZE:
             return Outcome.NEVER_STEADY, "the recording ended before the fingers came to rest"
         return Outcome.NOTHING_THERE, "the recording ended before both pads were in contact"

@@ -140,6 +140,10 @@ class Phase(enum.IntEnum):
     RELEASE = 5
 
 
+NO_GAP: Final = "none"
+"""The unit of the gap of a recording that has none; its numbers are 0."""
+
+
 class Outcome(enum.IntEnum):
     """How a grasp ended. This is a value; no exception is raised for it."""
 
@@ -155,6 +159,7 @@ class Outcome(enum.IntEnum):
     DEVICE_LOST = 9
     ABORTED = 10
     RECOGNISED = 11
+    FORCE_ONLY = 12
 
     @property
     def words(self) -> str:

@@ -98,16 +98,16 @@ class SupervisionConfig:
     closed_gap_m: float = setting(
         default=0.003,
         unit="m",
-        minimum=0.0,
-        plausible=(0.0, 0.1),
-        meaning="Gap at which the fingers count as closed: there is no object, or after contact none is left.",
+        plausible=(-0.05, 0.1),
+        meaning="Gap at which the fingers count as closed: there is no object, or after contact none is left. Negative "
+        "where the zero of the gap is not that of closed fingers.",
     )
     too_wide_m: float = setting(
         default=0.001,
         unit="m",
-        minimum=0.0,
-        plausible=(0.0, 0.1),
-        meaning="Travel within which a contact means that the object is wider than the opening.",
+        plausible=(-0.05, 0.1),
+        meaning="Travel within which a contact means that the object is wider than the opening. Negative if the gap of "
+        "a recording can grow before the contact.",
     )
     crush_share: float = setting(
         default=0.2,

@@ -22,6 +22,7 @@ from graspsense.plugin_api import (
     APPROACH,
     CONTACT_FORCE_N,
     HOLD,
+    NO_GAP,
     REST_SPEED_M_S,
     REST_WINDOW_S,
     Channel,
@@ -34,9 +35,12 @@ from graspsense.plugin_api import (
     at_rest,
     both_touch,
     first_rest,
+    gap_resolution,
+    gap_resolution_by_sample,
     missing,
     setting,
     update_rest,
+    window_of_rest,
 )
 
 if TYPE_CHECKING:
@@ -84,13 +88,18 @@ class ChittaConfig:
         above=0.0,
         plausible=(0.001, 5.0),
         meaning="Time for which the speed must stay below rest_speed_m_s; that of the controller unless it is given "
-        "here.",
+        "here. Longer where the gap is coarse: a step at this speed must fit into it.",
         follows="controller.rest_window_s",
     )
 
 
 FORCES: Final = ("mean", "left", "right", "min", "sum")
 """The choices of `ChittaConfig.force`; a number stands for each in compiled code."""
+
+FAR_APART_S: Final = 0.02
+"""Samples that are further apart can miss the contact."""
+MISSED: Final = 0.5
+"""Share of the force at rest from which on the first force of a contact does not tell when it began."""
 
 NO_TICKS: Final = 0.0
 NO_PAD: Final = 1.0
@@ -123,6 +132,10 @@ class Measured(NamedTuple):
     delta_t: float = math.nan
     f_first: float = math.nan
     f_steady: float = math.nan
+    window_s: float = 0.0
+    """The window in which a rest shows, given the resolution of the gap."""
+    blind_s: float = 0.0
+    """The time between samples in which the contact was missed; 0 if it was seen."""
 
 
 def pad_force(choice: int, left_n: float, right_n: float) -> float:
@@ -134,6 +147,15 @@ def pad_force(choice: int, left_n: float, right_n: float) -> float:
     if choice == 3:
         return math.nan if left_n != left_n or right_n != right_n else min(left_n, right_n)
     return (left_n + right_n) * (0.5 if choice == 0 else 1.0)
+
+
+def blind_time(before_s: float, contact_s: float, f_first: float, f_steady: float) -> float:
+    """Return the time between the last sample without contact and the first with it, if the contact was missed.
+
+    It was missed if the samples are far apart and the force is already a large part of that at rest.
+    """
+    step_s = contact_s - before_s
+    return step_s if step_s > FAR_APART_S and f_first >= MISSED * f_steady else 0.0
 
 
 def reached_without_contact(params: ChittaParams, ticks: TickColumns) -> float:
@@ -170,26 +192,32 @@ def measure(params: ChittaParams, ticks: TickColumns) -> Measured:
         first += 1
     if first == n:
         reached = reached_without_contact(params, ticks)
-        return Measured(reached, math.nan, math.nan, math.nan, math.nan, math.nan, math.nan)
+        return Measured(reached, math.nan, math.nan, math.nan, math.nan, math.nan, math.nan, 0.0, 0.0)
     end, holds = first, False
     while end < n and phase[end] <= HOLD:
         holds = holds or phase[end] == HOLD
         end += 1
     p_first, after_contact = gap[first], t[end - 1] - t[first]
+    resolution = gap_resolution_by_sample(t, gap, first, end)
+    window_s = window_of_rest(resolution, params.rest_speed_m_s, params.rest_window_s)
     still, since = RestState(t[first], gap[first]), first
     for i in range(first, end):
         if i > first:
-            state = update_rest(still, t[i], gap[i], params.rest_speed_m_s, params.rest_window_s)
+            state = update_rest(still, t[i], gap[i], params.rest_speed_m_s, window_s)
             if state.since_t_s != still.since_t_s or state.gap_m != still.gap_m:
                 since = i
             still = state
         # A controller can wait for more than rest, such as a force. The rest in its hold phase is then the one meant.
         shows = phase[i] == HOLD or not holds
-        if shows and gap[since] == gap[since] and at_rest(still, t[i], params.rest_window_s):
+        if shows and gap[since] == gap[since] and at_rest(still, t[i], window_s):
             f_first = pad_force(params.force, left[first], right[first])
             f_steady = pad_force(params.force, left[i], right[i])
-            return Measured(REST, p_first, after_contact, gap[since], t[since] - t[first], f_first, f_steady)
-    return Measured(CONTACT, p_first, after_contact, math.nan, math.nan, math.nan, math.nan)
+            delta_t = t[since] - t[first]
+            blind_s = blind_time(t[first - 1] if first else t[first], t[first], f_first, f_steady)
+            return Measured(
+                REST, p_first, after_contact, gap[since], delta_t, f_first, f_steady, window_s, blind_s
+            )
+    return Measured(CONTACT, p_first, after_contact, math.nan, math.nan, math.nan, math.nan, window_s, 0.0)
 
 
 @lru_cache(maxsize=16)
@@ -218,11 +246,13 @@ class ChittaFeatures(FeatureSet[ChittaConfig]):
         contact, the two rates are missing, because delta_t is zero. The force is taken at the end of the window that
         shows the rest, because at its beginning the last cell image can be from before the rest.
         """
+        if trace.units.get("gap") == NO_GAP:
+            return self.undefined("no gap was recorded")
         return self._features(self._measured(trace), trace.units)
 
     def _features(self, measured: Any, units_of: Mapping[str, str]) -> Features:
         """Return the features that follow from what was measured; `units_of` are those of the trace."""
-        reached, p_first, after_contact, p_steady, delta_t, f_first, f_steady = measured
+        reached, p_first, after_contact, p_steady, delta_t, f_first, f_steady, window_s, blind_s = measured
         t = units_of["t"]
         units = _units(t, units_of["gap"], units_of["force_left"])
         if reached < CONTACT:
@@ -230,11 +260,19 @@ class ChittaFeatures(FeatureSet[ChittaConfig]):
             return Features(names=NAMES, values=(math.nan,) * 6, units=units, reasons=reasons)
         if reached == CONTACT:
             why = f"not at rest within the {after_contact:.3g} {t} after contact"
+            if window_s > self.config.rest_window_s:
+                why = (
+                    f"rest not resolved: the gap is so coarse, or measured so rarely, that a rest shows after "
+                    f"{window_s:.3g} {t}, and there is none within the {after_contact:.3g} {t} after contact"
+                )
             values = (p_first, *(math.nan,) * 5)
             return Features(names=NAMES, values=values, units=units, reasons=missing(AT_REST, why))
         reasons = {}
         rates = (math.nan, math.nan)
-        if delta_t > 0.0:
+        if blind_s > 0.0 and t == "s":
+            why = f"contact not resolved: it is within the {blind_s:.2g} s between two samples, in which the force rose"
+            delta_t, reasons = math.nan, missing(("delta_t", *RATES), why)
+        elif delta_t > 0.0:
             rates = ((p_steady - p_first) / delta_t, (f_steady - f_first) / delta_t)
         else:
             reasons = missing(
@@ -265,13 +303,22 @@ class ChittaFeatures(FeatureSet[ChittaConfig]):
         p_first = float(trace.gap_m[first])
         end = _released(trace, first)
         after_contact = float(trace.t_s[end - 1] - trace.t_s[first])
-        rest = self._rest(trace, first, end)
+        window_s = self._window_s(trace, first, end)
+        rest = self._rest(trace, first, end, window_s)
         if rest is None:
-            return Measured(CONTACT, p_first, after_contact)
+            return Measured(CONTACT, p_first, after_contact, window_s=window_s)
         steady, shown = rest
         p_steady, delta_t = float(trace.gap_m[steady]), float(trace.t_s[steady] - trace.t_s[first])
         forces = self._force(trace, first), self._force(trace, shown)
-        return Measured(REST, p_first, after_contact, p_steady, delta_t, *forces)
+        blind_s = blind_time(float(trace.t_s[max(first - 1, 0)]), float(trace.t_s[first]), *forces)
+        return Measured(REST, p_first, after_contact, p_steady, delta_t, *forces, window_s, blind_s)
+
+    def _window_s(self, trace: Trace, first: int, end: int) -> float:
+        """Return the window in which a rest shows; where time is counted in frames, that of the settings."""
+        if trace.units["t"] != "s":
+            return self.config.rest_window_s
+        resolution = gap_resolution(trace.t_s[:end], trace.gap_m[:end], first)
+        return window_of_rest(resolution, self.config.rest_speed_m_s, self.config.rest_window_s)
 
     def _force(self, trace: Trace, tick: int) -> float:
         left, right = float(trace.force_left_n[tick]), float(trace.force_right_n[tick])
@@ -283,17 +330,16 @@ class ChittaFeatures(FeatureSet[ChittaConfig]):
         touch &= _closing(trace) & (trace.gap_m == trace.gap_m)
         return int(touch.argmax()) if touch.any() else None
 
-    def _rest(self, trace: Trace, first: int, end: int) -> tuple[int, int] | None:
+    def _rest(self, trace: Trace, first: int, end: int, window_s: float) -> tuple[int, int] | None:
         """Return the tick at which rest begins and the one at which its window ends, both before `end`, or None."""
-        config = self.config
         # A controller can wait for more than rest, such as a force. The rest in its hold phase is then the one meant.
         held = trace.phase[first:end] == HOLD
         found = first_rest(
             trace.t_s[first:end],
             trace.gap_m[first:end],
             held if held.any() else ~held,
-            config.rest_speed_m_s,
-            config.rest_window_s,
+            self.config.rest_speed_m_s,
+            window_s,
         )
         return None if found is None else (first + found[0], first + found[1])
 

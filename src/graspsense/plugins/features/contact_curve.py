@@ -7,12 +7,14 @@ numbers and reach the contact force; where only one pad does, it is the force of
 
 from __future__ import annotations
 
+from collections.abc import Collection
+from math import nan
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from attrs import frozen
+from attrs import evolve, frozen
 
-from graspsense.plugin_api import APPROACH, HOLD, RELEASE
+from graspsense.plugin_api import APPROACH, HOLD, NO_GAP, RELEASE, Features, missing
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -29,8 +31,21 @@ OPENED: Final = 0.5
 """Share of the compression by which the fingers must open, and of the largest force by which it must fall, for a
 release that the phases do not tell.
 """
+HELD: Final = 0.9
+"""Share of its peak from which on a force is still that of a hold, where the gap was not recorded."""
 STILL_CLOSED: Final = 0.02
 """Share of the compression by which the fingers may open before such a release begins."""
+
+
+def without_gap(trace: Trace, features: Features, names: Collection[str]) -> Features:
+    """Return the features; those with these names are missing if the trace has no gap."""
+    if trace.units.get("gap") != NO_GAP:
+        return features
+    values = tuple(
+        nan if name in names else value for name, value in zip(features.names, features.values, strict=True)
+    )
+    reasons = {**missing(names, "no gap was recorded"), **features.reasons}
+    return evolve(features, values=values, reasons=reasons)
 
 
 @frozen(kw_only=True, eq=False)
@@ -199,7 +214,8 @@ def _summed(parts: Floats) -> Floats:
 def _release(compression: Floats, force: Floats, phase: NDArray[np.int64]) -> int | None:
     """Return the last sample before the release, or None.
 
-    A recording has no phase of release: there it begins where the fingers open while the force falls.
+    A recording has no phase of release: there it begins where the fingers open while the force falls, or, if the gap
+    was not recorded, where the force begins to fall to half of its peak.
     """
     if bool((phase == RELEASE).any()):
         return max(int((phase == RELEASE).argmax()) - 1, 0)
@@ -207,6 +223,11 @@ def _release(compression: Floats, force: Floats, phase: NDArray[np.int64]) -> in
     travel = float(compression[most])
     open_again = (compression <= (1.0 - OPENED) * travel) & (force <= (1.0 - OPENED) * peak)
     open_again[: most + 1] = False
+    if travel <= 0.0 and not compression.any():
+        top = int(force.argmax())
+        fallen = force[top:] <= (1.0 - OPENED) * peak
+        held = np.flatnonzero(force[top : top + int(fallen.argmax())] >= HELD * peak)
+        return top + int(held[-1]) if fallen.any() else None
     if travel <= 0.0 or not open_again.any():
         return None
     closed = np.flatnonzero(compression[: int(open_again.argmax())] >= (1.0 - STILL_CLOSED) * travel)

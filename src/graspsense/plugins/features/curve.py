@@ -26,7 +26,13 @@ from graspsense.plugin_api import (
     missing,
     setting,
 )
-from graspsense.plugins.features.contact_curve import ContactCurve, contact_curve, first_crossing, samples_of
+from graspsense.plugins.features.contact_curve import (
+    ContactCurve,
+    contact_curve,
+    first_crossing,
+    samples_of,
+    without_gap,
+)
 from graspsense.plugins.features.contact_threshold import ContactThreshold
 
 if TYPE_CHECKING:
@@ -163,6 +169,12 @@ def _names(features: tuple[Feature, ...]) -> tuple[str, ...]:
 NAMES: Final = _names(_FEATURES)
 TRAVEL_NAMES: Final = (*_names(_STIFFNESS), "curvature", *(f"load_x{100 * q:.0f}" for q in LOADS))
 """The features of the loading that need a compression."""
+OF_GAP: Final = (
+    *(feature.name for feature in _FEATURES if feature.unit in ("m", "J", "N/m")),
+    *("curvature", "hysteresis"),
+    *(f"{part}_x{100 * q:.0f}" for part in ("load", "release") for q in LOADS),
+)
+"""The features that need a gap."""
 
 
 class _Found:
@@ -197,12 +209,13 @@ class CurveFeatures(FeatureSet[CurveConfig]):
         else:
             found.add("contact_gap", curve.contact_gap_m, "the gap is not a number")
             self._squeeze(curve, found)
-        return Features(
+        features = Features(
             names=NAMES,
             values=tuple(found.values.get(name, float("nan")) for name in NAMES),
             units=_units(trace),
             reasons=found.reasons,
         )
+        return without_gap(trace, features, OF_GAP)
 
     def _squeeze(self, curve: ContactCurve, found: _Found) -> None:
         """Add everything after the contact."""

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from graspsense.plugin_api import Channel, Feature, Features, FeatureSet, missing
-from graspsense.plugins.features.contact_curve import contact_curve, samples_of
+from graspsense.plugins.features.contact_curve import contact_curve, samples_of, without_gap
 from graspsense.plugins.features.contact_threshold import ContactThreshold
 
 if TYPE_CHECKING:
@@ -63,6 +63,9 @@ _QUANTILES: Final = tuple(
     for channel, unit, what in CHANNELS
     for quantile, words in QUANTILES
 )
+_OF_GAP: Final = frozenset(
+    feature.name for feature in (*_CONTACT, *_QUANTILES) if feature.unit in ("m", "m/s")
+)
 
 
 class QuantileFeatures(FeatureSet[ContactThreshold]):
@@ -89,12 +92,13 @@ class QuantileFeatures(FeatureSet[ContactThreshold]):
             else:
                 values += _quantiles(samples, start_s, end_s).tolist()
         absent = [math.nan] * (len(self.features) - len(values))
-        return Features(
+        found = Features(
             names=tuple(feature.name for feature in self.features),
             values=(*values, *absent),
             units=_units(trace),
             reasons=reasons,
         )
+        return without_gap(trace, found, _OF_GAP)
 
 
 def _contact(samples: CurveSamples, contact_force_n: float) -> tuple[float, float] | str:

@@ -172,14 +172,14 @@ def _of_arrays(path: Path, arrays: Arrays, rows: int = 0) -> ColumnTable:
         for name, array in arrays.items()
         if isinstance(array, np.ndarray)
         and array.dtype.kind in "fiub"
-        and array.ndim in (1, 2, 3)
+        and 1 <= array.ndim <= 4
         and array.size > 1
     }
     if set(arrays) == {_ALONE}:
         numeric = {_ALONE: arrays[_ALONE]}
     if not numeric:
         raise DataDamaged(
-            f"{path} has no array of numbers with one to three dimensions. It has: {', '.join(arrays)}"
+            f"{path} has no array of numbers with one to four dimensions. It has: {', '.join(arrays)}"
         )
     if not rows:
         rows = len(numeric[_ALONE]) if _ALONE in numeric else _common_length(numeric)
@@ -189,8 +189,10 @@ def _of_arrays(path: Path, arrays: Arrays, rows: int = 0) -> ColumnTable:
         if rows not in (array.shape[0], array.shape[-1]):
             continue
         values = np.asarray(array if array.shape[0] == rows else np.moveaxis(array, -1, 0), dtype=np.float64)
-        if values.ndim == 3:
-            shapes[name] = (values.shape[1], values.shape[2])
+        if (
+            values.ndim > 2
+        ):  # cells in rows and columns, each with its components if there are four dimensions
+            shapes[name] = (values.shape[1], int(np.prod(values.shape[2:])))
         values = values.reshape(rows, -1)
         if name:
             columns[name] = values[:, 0] if values.shape[1] == 1 else values

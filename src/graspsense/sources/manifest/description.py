@@ -92,7 +92,10 @@ class Manifest:
     rate_hz: float = setting(
         default=0.0, unit="Hz", minimum=0.0, meaning="Samples a second where there is no time."
     )
-    gap: Text = setting(default=(), meaning="Distance between the fingertips, which falls on closing.")
+    gap: Text = setting(
+        default=(),
+        meaning="Distance between the fingertips, which falls on closing; none where it was not recorded.",
+    )
     force: Text = setting(default=(), meaning="Force of both pads, where there is only one.")
     left: Text = setting(
         default=(), meaning="Force of the left pad, or of the finger or fingers of one side."
@@ -209,13 +212,9 @@ def _contradictions(keys: Manifest) -> list[tuple[tuple[str, ...], str]]:
         found.append(
             (("files",), 'name the files, either by patterns (files = "{label}/*.csv") or by a list')
         )
-    if not keys.gap and keys.split != "rows":
-        found.append((("gap",), 'a grasp needs its gap: gap = "COLUMN [mm]", or "0.06 - COLUMN*0.001"'))
     if keys.force and (keys.left or keys.right):
         found.append((("force",), "force stands for both pads: give it alone, or left and right"))
-    if not keys.force and bool(keys.left) != bool(keys.right):
-        found.append((("left",) if keys.left else ("right",), "give left and right, or force for both pads"))
-    if not keys.force and not keys.left:
+    if not keys.force and not keys.left and not keys.right:
         found.append((("force",), "a grasp needs its force: force, or left and right"))
     unknown = [name for name in _texts(keys.fast) if name not in keys.channels]
     if unknown:

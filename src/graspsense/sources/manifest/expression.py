@@ -5,7 +5,8 @@ columns, `+ - * /`, signs, parentheses, and the functions in `FUNCTIONS`. Nothin
 
 A column is named as it is if Python allows it as a name, and in quotes otherwise: `'stamp ms'*0.001`. Within quotes,
 `*` and `?` stand for any characters, so that `'taxel_*'` names several columns; a column with several components, as a
-matrix of a MAT file has, counts as several as well. `force[2]` is the component with this index, counted from 0.
+matrix of a MAT file has, counts as several as well. `force[2]` is the component with this index, counted from 0,
+and `cells[2::3]` every third one from there on.
 """
 
 from __future__ import annotations
@@ -48,7 +49,9 @@ OVER_TIME: Final[Mapping[str, Callable[[Any], Any]]] = {
 }
 """Functions of one column over the whole grasp: its first value, its last one, its largest one."""
 PLAIN: Final[Mapping[str, Callable[[Any], Any]]] = {"abs": np.abs, "sqrt": np.sqrt}
-FUNCTIONS: Final = (*FOLDS, *OVER_TIME, *PLAIN)
+NORM3: Final = "norm3"
+"""Function of several columns, three successive ones of which are the components of a vector: their lengths."""
+FUNCTIONS: Final = (*FOLDS, *OVER_TIME, *PLAIN, NORM3)
 
 _OPERATORS: Final[Mapping[type[ast.operator], Callable[[Any, Any], Any]]] = {
     ast.Add: np.add,
@@ -123,11 +126,7 @@ class Expression:
                 )
             return _OPERATORS[type(node.op)](left, right)
         if isinstance(node, ast.Subscript):
-            value, index = self._value(node.value, columns), int(node.slice.value)  # type: ignore[attr-defined]
-            components = value.shape[1] if value.ndim == 2 else 1
-            if index >= components:
-                self._refuse(node, f"there is no component {index}: it has {components}, counted from 0")
-            return value[:, index] if value.ndim == 2 else value
+            return self._component(node, self._value(node.value, columns))
         assert isinstance(node, ast.Call)
         assert isinstance(node.func, ast.Name)
         arguments: list[Values] = []
@@ -136,6 +135,20 @@ class Expression:
             if too_many := CELLS.exceeded(sum(value.size for value in arguments)):
                 self._refuse(node, too_many)
         return self._called(node, node.func.id, arguments)
+
+    def _component(self, node: ast.Subscript, value: Values) -> Values:
+        """Return the component with this index, or every so many components from there on."""
+        several = isinstance(node.slice, ast.Slice)
+        index = int((node.slice.lower if several else node.slice).value)  # type: ignore[attr-defined, union-attr]
+        components = value.shape[1] if value.ndim == 2 else 1
+        if index >= components:
+            self._refuse(node, f"there is no component {index}: it has {components}, counted from 0")
+        if value.ndim < 2:
+            return value
+        if not several:
+            return value[:, index]
+        chosen = value[:, index :: int(node.slice.step.value)]  # type: ignore[attr-defined]
+        return chosen if chosen.shape[1] > 1 else chosen[:, 0]
 
     def _called(self, node: ast.Call, name: str, arguments: list[Values]) -> Values:
         if name in FOLDS:
@@ -153,6 +166,15 @@ class Expression:
                 )
             return FOLDS[name](together)
         (argument,) = arguments
+        if name == NORM3:
+            width = argument.shape[1] if argument.ndim == 2 else argument.ndim
+            if width < 2 or width % 3:
+                self._refuse(
+                    node,
+                    f"norm3 takes the three components of each of several cells, and here are {width} columns",
+                )
+            lengths = np.sqrt((argument.reshape(len(argument), -1, 3) ** 2).sum(axis=2))
+            return lengths if lengths.shape[1] > 1 else lengths[:, 0]
         if name in OVER_TIME:
             if not argument.ndim:
                 self._refuse(node, f"{name} needs a column")
@@ -242,9 +264,12 @@ def _check(node: ast.AST, text: str, depth: int) -> None:
             raise _error(text, at, "there are + - * /, and the functions " + ", ".join(FUNCTIONS))
         inner = (node.left, node.right)
     elif isinstance(node, ast.Subscript):
-        index = node.slice
-        if not (isinstance(index, ast.Constant) and type(index.value) is int and index.value >= 0):
-            raise _error(text, at, "write the number of a component in brackets, counted from 0: force[2]")
+        if not _is_component(node.slice):
+            raise _error(
+                text,
+                at,
+                "write the number of a component in brackets, counted from 0: force[2], or cells[2::3] for every third",
+            )
         inner = (node.value,)
     elif isinstance(node, ast.Call):
         inner = _checked_call(node, text, at)
@@ -255,6 +280,15 @@ def _check(node: ast.AST, text: str, depth: int) -> None:
         )
     for one in inner:
         _check(one, text, depth + 1)
+
+
+def _is_component(index: ast.expr) -> bool:
+    """Return whether this is the number of a component, or that of one and a step from it: `2`, `2::3`."""
+    parts = (index,) if not isinstance(index, ast.Slice) else (index.lower, index.step)
+    if isinstance(index, ast.Slice) and index.upper is not None:
+        return False
+    numbers = [one.value for one in parts if isinstance(one, ast.Constant) and type(one.value) is int]
+    return len(numbers) == len(parts) and numbers[0] >= 0 and all(step > 0 for step in numbers[1:])
 
 
 def _checked_call(node: ast.Call, text: str, at: int) -> Sequence[ast.AST]:

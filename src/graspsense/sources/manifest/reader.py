@@ -14,7 +14,8 @@ from graspsense.core.files.limits import RECORDINGS
 from graspsense.core.values.errors import ConfigError, DataDamaged, listed
 from graspsense.recording.labelled_recording import LabelledRecording, UnreadableRecording
 from graspsense.recording.readable import each_readable, refuse_devices
-from graspsense.sources.grasp_columns import checked_recording
+from graspsense.recording.replayable import Recording
+from graspsense.sources.grasp_columns import GraspColumns, checked_recording
 from graspsense.sources.manifest.array_format import ARRAY_SUFFIXES, ArrayRules, read_arrays
 from graspsense.sources.manifest.description import QUANTITIES, ReadManifest, axes_of, read_manifest
 from graspsense.sources.manifest.facts import instance_of, label_of, order_of, recorded_at_of, values_of
@@ -63,26 +64,56 @@ def tables_of(manifest: ReadManifest, file: NamedFile) -> list[ColumnTable]:
     return tables
 
 
-def grasps_in(manifest: ReadManifest, file: NamedFile, table: ColumnTable) -> Iterator[LabelledRecording]:
-    """Yield the grasps of a table: several only where squeezes are to be found. Raises ConfigError, DataDamaged."""
-    keys = manifest.keys
+def grasps_in(
+    manifest: ReadManifest, file: NamedFile, table: ColumnTable
+) -> Iterator[LabelledRecording | UnreadableRecording]:
+    """Yield the grasps of a table: several only where squeezes are to be found.
+
+    What is wrong with one of several squeezes is told in its place. Raises ConfigError, DataDamaged.
+    """
     columns = samples(manifest, table)
-    for part in squeezes(columns) if keys.split == "force" else [columns]:
-        cut = cut_at(part, keys.cut) if keys.cut else part
-        with np.errstate(all="ignore"):  # what is infinite is refused by `checked_recording`
-            notices = tuple(notices_of(cut, zeroed=bool(keys.zero)))
-        yield LabelledRecording(
-            recording=checked_recording(
-                resampled(cut, keys.resample_hz) if keys.resample_hz else cut, rate_hz=keys.rate_hz or 1.0
-            ),
-            source=cut.source,
-            label=label_of(manifest, table),
-            instance=instance_of(manifest, table),
-            recorded_at=recorded_at_of(manifest, table),
-            order=order_of(manifest, table),
-            values=values_of(manifest, file, table),
-            notices=notices,
-        )
+    if manifest.keys.split != "force":
+        yield _grasp(manifest, file, table, columns)
+        return
+    for part in squeezes(columns):
+        yield from each_readable(part.source, partial(_grasps, manifest, file, table, part))
+
+
+def _grasps(
+    manifest: ReadManifest, file: NamedFile, table: ColumnTable, columns: GraspColumns
+) -> tuple[LabelledRecording]:
+    return (_grasp(manifest, file, table, columns),)
+
+
+def _grasp(
+    manifest: ReadManifest, file: NamedFile, table: ColumnTable, columns: GraspColumns
+) -> LabelledRecording:
+    """Return the grasp that these samples of a table are. Raises ConfigError, DataDamaged."""
+    keys = manifest.keys
+    cut = cut_at(columns, keys.cut) if keys.cut else columns
+    kept = resampled(cut, keys.resample_hz) if keys.resample_hz else cut
+    with np.errstate(all="ignore"):  # what is infinite is refused by `checked_recording`
+        notices = tuple(notices_of(cut, zeroed=bool(keys.zero)))
+    return LabelledRecording(
+        recording=_checked(kept, table, keys.rate_hz or 1.0),
+        source=cut.source,
+        label=label_of(manifest, table),
+        instance=instance_of(manifest, table),
+        recorded_at=recorded_at_of(manifest, table),
+        order=order_of(manifest, table),
+        values=values_of(manifest, file, table),
+        notices=notices,
+    )
+
+
+def _checked(columns: GraspColumns, table: ColumnTable, rate_hz: float) -> Recording:
+    """Return the recording. Raises DataDamaged, with what looked wrong when the table was read."""
+    try:
+        return checked_recording(columns, rate_hz=rate_hz)
+    except DataDamaged as error:
+        if not table.warnings:
+            raise
+        raise DataDamaged(f"{error} ({'; '.join(table.warnings)})") from error
 
 
 def _format(manifest: ReadManifest, path: Path) -> Callable[[Path], list[ColumnTable]]:

@@ -1,18 +1,18 @@
 """ROS bags and MCAP files of ROS messages as tables, read by rosbags.
 
 Every number in a message is a column, `/topic.field.field`; an array of numbers is a column with components. The rows
-are the messages of the topic, among those that are used, that has the most; each other topic holds its last value.
+are the messages of the topic, among those that are used, that has the most; each other topic holds its last value, as
+long as it is not too old (`topic_clocks`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 from mcap.records import Channel, Chunk, McapRecord, Message, Schema
-from numpy.typing import NDArray
 
 from graspsense.core.values.errors import ConfigError, DataDamaged, PluginUnavailable
 from graspsense.recording.mcap_records import records_in, records_of
@@ -20,6 +20,7 @@ from graspsense.recording.readable import readable, refuse_devices
 from graspsense.recording.unpacked import Unpacked
 from graspsense.sources.manifest.table import ColumnTable, Numbers
 from graspsense.sources.ros_bags import Definitions, opened_bag, stamp_ns
+from graspsense.sources.topic_clocks import Messages, Nanoseconds, TopicTimes, common_clock, on_one_clock
 
 MOST_COMPONENTS: Final = 4096
 """An array with more numbers is a picture, and is left out."""
@@ -27,6 +28,8 @@ _READ: Final = ("ros2msg", "cdr")
 """The encodings of a schema and of its messages that are read."""
 _NUMBER_BYTES: Final = 100
 """Bytes of a single number of a message in memory, with its name, about."""
+SAME: Final = 0.02
+"""Share of the range of a value within which it is the same before and after a silence of its topic."""
 
 
 def read_bag(path: Path, topics: Collection[str] = ()) -> list[ColumnTable]:
@@ -36,51 +39,66 @@ def read_bag(path: Path, topics: Collection[str] = ()) -> list[ColumnTable]:
     """
     if not path.exists():
         raise ConfigError(f"{path} cannot be read: there is no such file")
-    messages: dict[str, list[tuple[int, dict[str, Any]]]] = {}
+    values, times = _collected(path, topics)
+    clock = common_clock(path.name, times)
+    rows_ns = clock.topics[max(values, key=lambda topic: len(values[topic]))].ns
+    rows_ns = rows_ns[(rows_ns >= clock.begin_ns) & (rows_ns <= clock.end_ns)]
+    numbers: dict[str, Numbers] = {}
+    for topic, found in values.items():
+        numbers |= _held(clock.topics[topic], found, rows_ns)
+    return [
+        ColumnTable(
+            source=path.name,
+            numbers=numbers,
+            t_s=np.array([clock.began_ns + ns for ns in rows_ns.tolist()], dtype=np.float64) * 1e-9,
+            notes=clock.notes,
+            warnings=clock.notices,
+        )
+    ]
+
+
+def _collected(
+    path: Path, topics: Collection[str]
+) -> tuple[dict[str, list[dict[str, Any]]], dict[str, Messages]]:
+    """Return the numbers in the messages of each topic that has any, and when the messages came. Raises DataDamaged."""
+    values: dict[str, list[dict[str, Any]]] = {}
+    times: dict[str, Messages] = {}
     kept = Unpacked(path)
-    for topic, t_ns, message in _messages(path, topics):
+    for topic, recorded_ns, message in _messages(path, topics):
         numbers_in = dict(_numbers_in(message, topic))
         kept.add(sum(_NUMBER_BYTES + 8 * np.size(one) for one in numbers_in.values()))
-        messages.setdefault(topic, []).append((t_ns, numbers_in))
-    messages = {topic: found for topic, found in messages.items() if found[0][1]}
-    if not messages:
+        values.setdefault(topic, []).append(numbers_in)
+        times.setdefault(topic, Messages()).add(recorded_ns, stamp_ns(message))
+    values = {topic: found for topic, found in values.items() if found[0]}
+    if not values:
         raise DataDamaged(f"{path} has no messages with numbers")
-    clock = max(messages, key=lambda topic: len(messages[topic]))
-    for found in messages.values():
-        found.sort(key=lambda one: one[0])
-    since_ns = _since_first(path, messages, clock)
-    t_s = np.array([t_ns for t_ns, _ in messages[clock]], dtype=np.float64) * 1e-9
-    numbers: dict[str, Numbers] = {}
-    for topic, found in messages.items():
-        last = np.searchsorted(since_ns[topic], since_ns[clock], side="right") - 1
-        for name, example in found[0][1].items():
-            width = np.size(example)
-            rows = [one.get(name, np.full(width, np.nan)) for _, one in found]
-            if any(np.size(row) != width for row in rows):
-                continue  # an array whose length changes has no fixed columns
-            values = np.array(rows, dtype=np.float64).reshape(len(rows), -1)[np.maximum(last, 0)]
-            values[last < 0] = np.nan
-            numbers[name] = values[:, 0] if values.shape[1] == 1 else values
-    return [ColumnTable(source=path.name, numbers=numbers, t_s=t_s)]
+    return values, {topic: times[topic] for topic in values}
 
 
-def _since_first(
-    path: Path, messages: Mapping[str, Sequence[tuple[int, Any]]], clock: str
-) -> dict[str, NDArray[np.int64]]:
-    """Return the times of the messages (ns) since the first of this topic. Raises DataDamaged."""
-    # From 2262 on, nanoseconds since 1970 do not fit into an int64; their differences do.
-    began_ns = messages[clock][0][0]
-    try:
-        return {
-            topic: np.array([t_ns - began_ns for t_ns, _ in found], dtype=np.int64)
-            for topic, found in messages.items()
-        }
-    except OverflowError as error:
-        raise DataDamaged(f"{path} has messages that are more than 292 years apart") from error
+def _held(times: TopicTimes, found: Sequence[dict[str, Any]], rows_ns: Nanoseconds) -> dict[str, Numbers]:
+    """Return the columns of a topic: in each row the last value, NaN where it is too old to hold.
+
+    A value that is the same before and after a silence holds throughout.
+    """
+    last, old = times.latest(rows_ns)
+    columns: dict[str, Numbers] = {}
+    for name, example in found[0].items():
+        width = np.size(example)
+        rows = [found[k].get(name, np.full(width, np.nan)) for k in times.order]
+        if any(np.size(row) != width for row in rows):
+            continue  # an array whose length changes has no fixed columns
+        every = np.array(rows, dtype=np.float64).reshape(len(rows), -1)
+        held = every[np.maximum(last, 0)]
+        following = every[np.minimum(last + 1, len(every) - 1)]
+        with np.errstate(all="ignore"):
+            same = np.abs(following - held) <= SAME * np.ptp(every, axis=0)
+        held[(old & (last + 1 < len(every)))[:, np.newaxis] & ~same] = np.nan
+        columns[name] = held[:, 0] if held.shape[1] == 1 else held
+    return columns
 
 
 def _messages(path: Path, topics: Collection[str]) -> Iterator[tuple[str, int, Any]]:
-    """Yield topic, time (ns) and message. The time is that of the header, or that of the recording if it has none."""
+    """Yield topic, time of recording (ns) and message."""
     if path.suffix == ".mcap":
         with readable(path):
             refuse_devices(path)
@@ -117,7 +135,7 @@ def _mcap_messages(path: Path, topics: Collection[str]) -> Iterator[tuple[str, i
             topic, name = channels[record.channel_id]
             definitions.check(name, len(record.data))
             value = store.deserialize_cdr(record.data, name)
-            yield topic, stamp_ns(value) or record.log_time, value
+            yield topic, record.log_time, value
 
 
 def _mcap_records(path: Path) -> Iterator[McapRecord]:
@@ -151,26 +169,17 @@ def read_topics(path: Path) -> list[ColumnTable]:
 
     Raises as `read_bag`.
     """
-    messages: dict[str, list[tuple[int, dict[str, Any]]]] = {}
-    kept = Unpacked(path)
-    for topic, t_ns, message in _messages(path, ()):
-        found = dict(_numbers_in(message, topic))
-        kept.add(sum(_NUMBER_BYTES + 8 * np.size(one) for one in found.values()))
-        if found:
-            messages.setdefault(topic, []).append((t_ns, found))
-    if not messages:
-        raise DataDamaged(f"{path} has no messages with numbers")
-    clock = max(messages, key=lambda topic: len(messages[topic]))
-    since_ns = _since_first(path, messages, clock)
+    values, messages = _collected(path, ())
+    _, times, notices = on_one_clock(path.name, messages)
     tables = []
-    for topic, rows in messages.items():
-        order = np.argsort(since_ns[topic], kind="stable")
+    for topic, rows in values.items():
         numbers: dict[str, Numbers] = {}
-        for name, example in rows[0][1].items():
+        for name, example in rows[0].items():
             width = np.size(example)
-            if all(np.size(one.get(name, ())) == width for _, one in rows):
-                values = np.array([rows[k][1][name] for k in order], dtype=np.float64).reshape(len(rows), -1)
-                numbers[name] = values[:, 0] if width == 1 else values
-        t_s: Numbers = since_ns[topic][order].astype(np.float64) * 1e-9
-        tables.append(ColumnTable(source=topic, numbers=numbers, t_s=t_s))
+            if all(np.size(one.get(name, ())) == width for one in rows):
+                every = np.array([rows[k][name] for k in times[topic].order], dtype=np.float64)
+                every = every.reshape(len(rows), -1)
+                numbers[name] = every[:, 0] if width == 1 else every
+        t_s: Numbers = times[topic].ns.astype(np.float64) * 1e-9
+        tables.append(ColumnTable(source=topic, numbers=numbers, t_s=t_s, warnings=notices))
     return tables

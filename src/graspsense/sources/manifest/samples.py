@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from graspsense.core.values.errors import ConfigError, DataDamaged, listed
-from graspsense.core.values.signals import CHANNELS
+from graspsense.core.values.signals import CHANNELS, NO_GAP
 from graspsense.sources.grasp_columns import GraspColumns, without_missing
 from graspsense.sources.manifest.available import TO_SI, AvailableColumns
 from graspsense.sources.manifest.description import ReadManifest, samples_of
@@ -55,8 +55,9 @@ def samples(manifest: ReadManifest, table: ColumnTable) -> GraspColumns:
     expressions = manifest.expressions
     both = found.value("force", expressions["force"], "force")
     left = both or found.value("left", expressions["left"], "force")
-    right = both or found.value("right", expressions["right"], "force")
-    gap = found.value("gap", expressions["gap"], "gap") or (np.zeros(len(table)), "unknown")
+    right = both or found.value("right", expressions["right"], "force") or left
+    left = left or right
+    gap = found.value("gap", expressions["gap"], "gap") or (np.zeros(len(table)), NO_GAP)
     assert left is not None  # the manifest was checked for them
     assert right is not None
     if left[1] != right[1]:
@@ -123,12 +124,16 @@ def _gram_force(expression: Expression, stated: str, known: Sequence[str]) -> st
 
 
 def _folds(manifest: ReadManifest) -> list[str]:
-    """Return sentences on what stands for the two pads."""
+    """Return sentences on what stands for the two pads and for the gap."""
     expressions = manifest.expressions
-    if expressions["force"]:
-        return ["a single force was recorded; it is used for both pads"]
-    texts = [expressions[side][0].text for side in ("left", "right")]
-    return [f"the left pad is {texts[0]}, the right pad is {texts[1]}"]
+    if expressions["force"] or not (expressions["left"] and expressions["right"]):
+        notes = ["a single force was recorded; it is used for both pads"]
+    else:
+        texts = [expressions[side][0].text for side in ("left", "right")]
+        notes = [f"the left pad is {texts[0]}, the right pad is {texts[1]}"]
+    if not expressions["gap"]:
+        notes.append("no gap was recorded: features of the force alone are computed")
+    return notes
 
 
 def _has_time(manifest: ReadManifest, table: ColumnTable, found: AvailableColumns) -> bool:

@@ -9,8 +9,9 @@ import numpy as np
 from attrs import evolve
 
 from graspsense.core.files.limits import SAMPLES
+from graspsense.core.grasp.gap_resolution import gap_resolution
 from graspsense.core.values.errors import DataDamaged
-from graspsense.sources.grasp_columns import GraspColumns, check_increasing, only
+from graspsense.sources.grasp_columns import PLAUSIBLE, GraspColumns, check_increasing, only
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -39,9 +40,10 @@ def squeezes(columns: GraspColumns) -> list[GraspColumns]:
     """Return each squeeze of a recording, with the approach before it. Raises DataDamaged if there is none.
 
     An object is held while the force exceeds its lowest values by a fifth of its range. A squeeze begins halfway
-    after the one before, where both fingers are free.
+    after the one before, where both fingers are free. A force that is missing, or that no gripper has, is of its own
+    squeeze: there the last force before it counts.
     """
-    force = columns.force_n
+    force = _known_force(columns)
     low, high = np.percentile(force, [5.0, 99.5])
     held = force > low + LOADED * (high - low)
     edges = np.flatnonzero(np.diff(held.astype(np.int8)))
@@ -61,6 +63,19 @@ def squeezes(columns: GraspColumns) -> list[GraspColumns]:
     return [
         columns.rows(slice(start, end), f"squeeze {k}") for k, (start, end) in enumerate(pairwise(bounds), 1)
     ]
+
+
+def _known_force(columns: GraspColumns) -> NDArray[np.float64]:
+    """Return the mean force, with the last plausible one in the place of every other."""
+    force = columns.force_n
+    known = np.isfinite(force)
+    if not columns.units.get("force"):
+        low, high, *_ = PLAUSIBLE["force"]
+        known &= (force >= low) & (force <= high)
+    if not known.any():
+        raise DataDamaged(f"{columns.source}: no squeeze was found, because its force has no number")
+    last = np.maximum.accumulate(np.where(known, np.arange(len(force)), int(known.argmax())))
+    return force[last]
 
 
 @np.errstate(all="ignore")
@@ -98,7 +113,10 @@ def _release(force: NDArray[np.float64]) -> int | None:
 
 @np.errstate(all="ignore")
 def resampled(columns: GraspColumns, rate_hz: float) -> GraspColumns:
-    """Return the columns at this rate, interpolated. Raises DataDamaged if the time does not increase."""
+    """Return the columns at this rate, interpolated. Raises DataDamaged if the time does not increase.
+
+    A gap in steps keeps its steps, because between them it is not known; they show how finely it was measured.
+    """
     t = columns.t_s
     check_increasing(columns)
     duration_s = float(t[-1] - t[0])
@@ -110,6 +128,9 @@ def resampled(columns: GraspColumns, rate_hz: float) -> GraspColumns:
         )
     times = t[0] + np.arange(int(duration_s * rate_hz + 1e-9) + 1) / rate_hz
 
+    contact = int((columns.force_n - columns.force_n.min() > LOADED * np.ptp(columns.force_n)).argmax())
+    coarse = gap_resolution(t, columns.gap_m, contact).step_m > 0.0
+
     def along(values: NDArray[np.float64]) -> NDArray[np.float64]:
         if values.ndim == 1:
             column: NDArray[np.float64] = np.interp(times, t, values)
@@ -120,7 +141,7 @@ def resampled(columns: GraspColumns, rate_hz: float) -> GraspColumns:
         columns,
         lines=None,
         t_s=times,
-        gap_m=along(columns.gap_m),
+        gap_m=columns.gap_m[np.searchsorted(t, times, side="right") - 1] if coarse else along(columns.gap_m),
         left_n=along(columns.left_n),
         right_n=along(columns.right_n),
         effort_n=None if columns.effort_n is None else along(columns.effort_n),

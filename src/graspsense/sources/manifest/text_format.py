@@ -19,7 +19,7 @@ from graspsense.core.values.written_times import seconds_since_first
 from graspsense.sources.csv_columns import INDEX
 from graspsense.sources.manifest.patterns import regular_expression
 from graspsense.sources.manifest.table import ColumnTable, Numbers
-from graspsense.sources.text_table import SPELLED_UNITS, Line, TextTable, is_unit, read_lines, table_of
+from graspsense.sources.text_table import UNITS, Line, TextTable, read_lines, table_of
 
 
 @define
@@ -88,8 +88,7 @@ def _columns(path: Path, part: _Part, table: TextTable, *, several: bool) -> Col
             numbers[name] = times
         elif found.row or is_number(found.cell):
             not_numbers[name] = f"line {table.lines[found.row]} has {found.words}"
-    stated = {name: _unit_in(name) or unit for name, unit in zip(cells, table.units, strict=True)}
-    units = {name: SPELLED_UNITS.get(unit.lower(), unit) for name, unit in stated.items()}
+    units = {name: _unit_in(name) or unit for name, unit in zip(cells, table.units, strict=True)}
     return ColumnTable(
         source=f"{path.name}, line {table.named_in or table.lines[0]}" if several else path.name,
         numbers=numbers,
@@ -113,7 +112,7 @@ def _unit_in(heading: str) -> str:
     unit = name_and_unit(heading)[1]
     if not unit and heading.endswith(")"):
         unit = heading[:-1].rpartition("(")[2].strip()
-    return unit if is_unit(unit) else ""
+    return unit if unit.lower() in UNITS else ""
 
 
 def _names(names: Sequence[str]) -> list[str]:

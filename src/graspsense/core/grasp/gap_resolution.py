@@ -1,0 +1,91 @@
+"""How finely a gap was measured: its least step, and how often it is measured.
+
+A coarse encoder repeats a number while the fingers move, and so does a gap that is measured less often than its rows
+are written. Neither is a rest. The window in which a rest shows follows from both: a speed below tau_2 needs the time
+of a step at this speed, and a gap that was measured three times.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+ROUNDING: Final = 1e-9
+"""Share of a gap up to which a change is one of rounding."""
+MARGIN: Final = 1.05
+"""Factor on the time of a step, so that a step within the window is not motion because of rounding."""
+HELD: Final = 1.5
+"""Rows between two changes of a gap in the approach from which on it is measured less often than its rows."""
+MEASURED: Final = 3.0
+"""Number of times that a gap is measured in a window."""
+LEAST_CHANGES: Final = 3
+
+
+class GapResolution(NamedTuple):
+    """The least step of a coarse gap (m), and the time between its measurements if rows repeat it (s); else 0."""
+
+    step_m: float
+    period_s: float
+
+
+def window_of_rest(resolution: GapResolution, rest_speed_m_s: float, rest_window_s: float) -> float:
+    """Return the window (s) in which a rest below this speed (m/s) shows: not shorter than `rest_window_s`.
+
+    >>> window_of_rest(GapResolution(1e-4, 0.0), 2e-4, 0.05)
+    0.525
+    """
+    return max(rest_window_s, MARGIN * resolution.step_m / rest_speed_m_s, MEASURED * resolution.period_s)
+
+
+def gap_resolution(times_s: NDArray[np.float64], gaps_m: NDArray[np.float64], contact: int) -> GapResolution:
+    """Return the resolution of the gap of a grasp with its first contact at this sample. Arrays of shape (n,).
+
+    The gap is coarse if it repeats a number while it closes. Then its least change is its step.
+
+    >>> coarse = np.round(0.06 - 4e-5 * np.arange(100), 4)
+    >>> round(gap_resolution(np.arange(100) * 0.1, coarse, 0).step_m, 9)
+    0.0001
+    """
+    import numpy as np
+
+    with np.errstate(invalid="ignore"):
+        moved = gaps_m[1:] - gaps_m[:-1]
+        at = np.flatnonzero(np.abs(moved) > ROUNDING * np.abs(gaps_m[1:])) + 1
+    step_m, period_s = 0.0, 0.0
+    if len(at) > 1:
+        closing = moved[at - 1] < 0.0
+        if bool(((np.diff(at) > 1) & closing[1:] & closing[:-1]).any()):
+            step_m = float(np.abs(moved[at - 1]).min())
+        before = at[at <= contact]
+        changes = len(before) - 1
+        if len(before) >= LEAST_CHANGES and before[-1] - before[0] > HELD * changes:
+            period_s = float((times_s[before[-1]] - times_s[before[0]]) / changes)
+    return GapResolution(step_m, period_s)
+
+
+def gap_resolution_by_sample(
+    times_s: NDArray[np.float64], gaps_m: NDArray[np.float64], contact: int, end: int
+) -> GapResolution:
+    """Return what `gap_resolution` does for the samples before `end`, one by one, so that it can be compiled."""
+    step_m, coarse, before, was_closing = 0.0, False, 0, False
+    first_s, last_s, first, last, changes = 0.0, 0.0, 0, 0, 0
+    for i in range(1, end):
+        moved = gaps_m[i] - gaps_m[i - 1]
+        if not abs(moved) > ROUNDING * abs(gaps_m[i]):
+            continue
+        closing = moved < 0.0
+        if before > 0 and i - before > 1 and closing and was_closing:
+            coarse = True
+        step_m = abs(moved) if before == 0 else min(step_m, abs(moved))
+        before, was_closing = i, closing
+        if i <= contact:
+            if changes == 0:
+                first, first_s = i, times_s[i]
+            changes, last, last_s = changes + 1, i, times_s[i]
+    period_s = 0.0
+    if changes >= LEAST_CHANGES and last - first > HELD * (changes - 1):
+        period_s = (last_s - first_s) / (changes - 1)
+    return GapResolution(step_m if coarse else 0.0, period_s)

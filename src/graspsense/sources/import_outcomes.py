@@ -1,0 +1,51 @@
+"""How recordings end under the settings of an import, tried on some of them before any is stored."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Final
+
+from graspsense.core.components.registry import installed
+from graspsense.core.pipeline.pipeline import grasp_with
+from graspsense.core.values.errors import ConfigError, GraspsenseError
+from graspsense.core.values.signals import Outcome
+from graspsense.sources.dataset_recordings import handed_over
+
+if TYPE_CHECKING:
+    from graspsense.core.components.config import Settings
+    from graspsense.sources.import_sources import ImportedRecording
+
+MOST: Final = 24
+"""Number of recordings that are tried."""
+FEWEST: Final = 4
+"""Number of recordings from which on most of them are not a coincidence."""
+
+
+def outcomes_of(
+    recordings: Sequence[ImportedRecording], settings_of: Callable[[ImportedRecording], Settings]
+) -> Counter[Outcome]:
+    """Return how many of some recordings, evenly spread, end in which way."""
+    found: Counter[Outcome] = Counter()
+    for one in recordings[:: -(-len(recordings) // MOST)]:
+        with handed_over(one.name, one.labelled.recording):
+            try:
+                found[grasp_with(settings_of(one), installed()).outcome] += 1
+            except GraspsenseError:  # which the import itself reports
+                continue
+    return found
+
+
+def refuse_too_wide(outcomes: Counter[Outcome], settings: Settings) -> None:
+    """Raise ConfigError if most recordings end as too wide, so that all but a few of their samples are left out."""
+    wide, tried = outcomes[Outcome.TOO_WIDE], outcomes.total()
+    if tried < FEWEST or 2 * wide <= tried:
+        return
+    given = settings.values["controller"]
+    contact, travel = given.get("contact_force_n", 0.0), given.get("too_wide_m", 0.0)
+    raise ConfigError(
+        f"{wide} of {tried} recordings end as too wide, soon after their beginning: both pads feel "
+        f"contact_force_n = {contact:g} before the gap has closed by too_wide_m = {travel:g}. If the recordings "
+        "begin close to the object, add -o controller.too_wide_m=0. If the force without contact is larger than "
+        "this, add -o controller.contact_force_n=FORCE. Or leave both out, so that they follow from the recordings"
+    )

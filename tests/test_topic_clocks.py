@@ -1,0 +1,206 @@
+"""Topics whose headers are from several clocks, that begin late or end early, or that fall silent."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from graspsense.core.values.errors import DataDamaged
+from graspsense.recording.labelled_recording import LabelledRecording, UnreadableRecording
+from graspsense.recording.replayable import Recording
+from graspsense.sources.dataset_recordings import readable_or_not
+from graspsense.sources.import_sources import recordings_to_import
+from graspsense.sources.topic_clocks import Messages, common_clock
+
+S = 1_000_000_000
+BEGAN_NS = 1_700_000_000 * S
+T_S = np.arange(300) * 0.01
+GAP_M = 0.08 - 0.01 * T_S
+FORCE_N = np.maximum(T_S - 1.0, 0.0) * 3.0 + np.random.default_rng(0).normal(0.0, 0.01, len(T_S))
+MANIFEST = """\
+files = "jar"
+label = "jar"
+gap = "'/hand.position'"
+force = "'/tip.data'[0]"
+"""
+
+
+def messages(t_s: Any, stamped_s: Any = None, delay_s: float = 0.002) -> Messages:
+    """Messages that were recorded shortly after these times; without `stamped_s` their headers have these times."""
+    found = Messages()
+    for at, stamp in zip(t_s, t_s if stamped_s is None else stamped_s, strict=True):
+        found.add(BEGAN_NS + round((at + delay_s) * S), BEGAN_NS + round(stamp * S))
+    return found
+
+
+HEALTHY = messages(T_S)
+CLOCKS = {
+    "behind": T_S - 20.0,
+    "ahead": T_S + 20.0,
+    "half a second": T_S + 0.5,
+    "since boot": T_S - 1.69e9,
+    "set back": np.where(T_S > 1.3, T_S - 0.5, T_S),
+    "set forward": np.where(T_S > 1.3, T_S + 3600.0, T_S),
+}
+
+
+@pytest.mark.parametrize("clock", CLOCKS)
+@pytest.mark.parametrize("swapped", [False, True])
+def test_headers_of_another_clock_are_not_used(clock: str, swapped: bool) -> None:
+    topics = {"/hand": HEALTHY, "/tip": messages(T_S, CLOCKS[clock])}
+    common = common_clock("bag", dict(reversed(topics.items())) if swapped else topics)
+    assert np.array_equal(common.topics["/tip"].ns, common.topics["/hand"].ns)
+    assert common.end_ns - common.begin_ns == pytest.approx(3.0 * S, rel=1e-6)
+    assert len(common.notices) == 1
+    assert "recorded" in common.notices[0]
+
+
+@pytest.mark.parametrize("delay_s", [0.0, 0.1, 3600.0])
+def test_headers_of_one_clock_are_used_whatever_the_delay_of_the_recording(delay_s: float) -> None:
+    """A bag that is played and recorded again has times of recording that are all late."""
+    late = messages(T_S + 0.004, delay_s=delay_s)
+    common = common_clock("bag", {"/hand": messages(T_S, delay_s=delay_s), "/tip": late})
+    assert common.notes[-1] == "all have messages from 0.004 to 3.000 s"
+    assert common.notices == ()
+    assert common.begin_ns - common.topics["/hand"].ns[0] == pytest.approx(0.004 * S)
+    assert any("/tip: 300 messages" in note and "longest hold 10 ms" in note for note in common.notes)
+
+
+def test_a_header_without_a_time_has_that_of_its_recording_on_the_clock_of_its_topic() -> None:
+    found = messages(T_S, delay_s=3600.0)
+    found.stamped_ns[0] = found.stamped_ns[150] = 0
+    common = common_clock("bag", {"/hand": messages(T_S, delay_s=3600.0), "/tip": found})
+    assert np.array_equal(common.topics["/tip"].ns, common.topics["/hand"].ns)
+
+
+def test_a_recorder_that_was_late_once_changes_nothing() -> None:
+    found = messages(T_S)
+    held_up = BEGAN_NS + round(1.8 * S)
+    found.recorded_ns[100:170] = [max(ns, held_up + k) for k, ns in enumerate(found.recorded_ns[100:170])]
+    common = common_clock("bag", {"/hand": HEALTHY, "/tip": found})
+    assert common.notices == ()
+    assert np.array_equal(common.topics["/tip"].ns, common.topics["/hand"].ns)
+
+
+def test_topics_that_never_overlap_are_refused() -> None:
+    with pytest.raises(DataDamaged, match="no time at which all topics"):
+        common_clock("bag", {"/hand": HEALTHY, "/tip": messages(T_S + 5.0)})
+
+
+def test_a_single_message_is_a_constant() -> None:
+    common = common_clock("bag", {"/hand": HEALTHY, "/width": messages([1.5])})
+    assert (common.begin_ns, common.end_ns) == (
+        common.topics["/hand"].ns[0],
+        common.topics["/hand"].until_ns,
+    )
+    assert not common.topics["/width"].latest(common.topics["/hand"].ns)[1].any()
+
+
+# The same through the readers, on bags of a hand with a fingertip.
+
+
+@pytest.fixture
+def written(tmp_path: Path) -> Any:
+    pytest.importorskip("rosbags", reason="needs the extra ros")
+    from rosbags.rosbag2 import StoragePlugin, Writer
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    tip = "lab_msgs/msg/Tip"
+    cells = "pr2_msgs/msg/PressureState"
+    store.register(get_types_from_msg("std_msgs/Header header\nfloat64[2] data\n", tip))
+    fields = "std_msgs/Header header\nint16[] l_finger_tip\nint16[] r_finger_tip\n"
+    store.register(get_types_from_msg(fields, cells))
+    (tmp_path / "m.toml").write_text(MANIFEST)
+
+    def header(t_s: float) -> Any:
+        ns = BEGAN_NS + round(t_s * S)
+        return store.types["std_msgs/msg/Header"](
+            store.types["builtin_interfaces/msg/Time"](ns // S, ns % S), ""
+        )
+
+    def write(kept: Any, stamped_s: Any = T_S, pr2: bool = False) -> LabelledRecording | UnreadableRecording:
+        """Write the messages of the tip that are `kept`, with these times in their headers, and import the bag."""
+        joint = "sensor_msgs/msg/JointState"
+        topic = "/pressure/r_gripper_motor" if pr2 else "/tip"
+        with Writer(tmp_path / "jar", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+            hand = writer.add_connection("/joint_states" if pr2 else "/hand", joint, typestore=store)
+            force = writer.add_connection(topic, cells if pr2 else tip, typestore=store)
+            for k, (t_s, gap) in enumerate(zip(T_S, GAP_M, strict=True)):
+                state = store.types[joint](
+                    header(t_s), ["r_gripper_joint"], np.array([gap]), np.zeros(1), np.zeros(1)
+                )
+                at = BEGAN_NS + round(t_s * S) + 10**6
+                writer.write(hand, at, store.serialize_cdr(state, joint))
+                if not kept[k]:
+                    continue
+                if pr2:
+                    load = np.full(22, 3000 + round(FORCE_N[k] * 100) + k % 3, dtype=np.int16)
+                    message = store.types[cells](header(stamped_s[k]), load, load)
+                    writer.write(force, at, store.serialize_cdr(message, cells))
+                else:
+                    message = store.types[tip](header(stamped_s[k]), np.array([FORCE_N[k], 0.0]))
+                    writer.write(force, at, store.serialize_cdr(message, tip))
+        if pr2:
+            (found,), _ = recordings_to_import([f"rosbag:{tmp_path / 'jar'}"], {}, None)
+            return found.labelled
+        (one,) = readable_or_not("manifest", str(tmp_path / "m.toml"))
+        return one
+
+    return write
+
+
+ALL = np.ones(len(T_S), bool)
+
+
+def frames(recording: Recording, name: str) -> Any:
+    return np.array([getattr(reading.frame, name) for reading in recording.readings])
+
+
+@pytest.mark.parametrize("pr2", [False, True], ids=["manifest", "pr2"])
+def test_a_topic_that_dies_ends_the_recording(written: Any, pr2: bool) -> None:
+    one = written(T_S < 1.5, pr2=pr2)
+    assert len(one.recording.readings) == pytest.approx(151, abs=1)
+    assert [notice for notice in one.notices if "ends before the other topics" in notice]
+    assert any("150 messages from 0.000 to 1.490 s" in note for note in one.recording.notes)
+
+
+@pytest.mark.parametrize("pr2", [False, True], ids=["manifest", "pr2"])
+def test_a_topic_that_begins_late_shortens_the_recording(written: Any, pr2: bool) -> None:
+    one = written(T_S >= 0.03, pr2=pr2)
+    assert len(one.recording.readings) == pytest.approx(297, abs=1)
+    assert one.notices == ()
+    assert np.isfinite(frames(one.recording, "force_left_n")).all()
+
+
+@pytest.mark.parametrize("pr2", [False, True], ids=["manifest", "pr2"])
+def test_the_force_of_a_tip_on_another_clock_is_that_of_its_time(written: Any, pr2: bool) -> None:
+    one = written(ALL, T_S - 20.0, pr2=pr2)
+    assert [notice for notice in one.notices if "another clock" in notice]
+    force = frames(one.recording, "force_left_n")
+    assert len(force) >= 299
+    scale = 15 * 100 / 1600 if pr2 else 1.0
+    assert force[-1] == pytest.approx(scale * FORCE_N[-1], abs=0.1)
+
+
+def test_a_silence_while_the_force_rises_is_told(written: Any) -> None:
+    one = written((T_S < 1.5) | (T_S > 2.0))
+    words = one.line if isinstance(one, UnreadableRecording) else " ".join(one.notices)
+    assert "/tip was silent" in words
+
+
+def test_the_pads_of_a_pr2_give_no_number_in_a_silence(written: Any) -> None:
+    one = written((T_S < 1.5) | (T_S > 2.0), pr2=True)
+    force, t_s = (frames(one.recording, name) for name in ("force_left_n", "t_s"))
+    assert np.isnan(force[(t_s > 1.65) & (t_s < 1.95)]).all()
+    assert np.isfinite(force[(t_s < 1.5) | (t_s > 2.05)]).all()
+
+
+def test_a_value_that_is_the_same_after_a_silence_held(written: Any) -> None:
+    """As of a topic that is published where its value changes only."""
+    one = written((T_S < 0.3) | (T_S > 0.8))
+    assert len(one.recording.readings) == 300
+    assert np.isfinite(frames(one.recording, "force_left_n")).all()
