@@ -282,6 +282,7 @@ def test_the_page_of_a_store(tmp_path, capsys):
                 store,
                 ["can:full_open", "can:empty_open"][k % 2],
                 values=(0.066 + 0.001 * (k % 3), 5.0 + k % 2),
+                grasp=k,
             )
     with pytest.raises(SystemExit) as ended:
         main(

@@ -16,9 +16,11 @@ def gathered_warnings(notes: list[str]) -> Iterator[None]:
         try:
             yield
         finally:
-            counts = Counter((one.category.__name__, _first_line(str(one.message))) for one in caught)
+            counts = Counter((one.category, _first_line(str(one.message))) for one in caught)
     for (category, message), n in counts.items():
-        notes.append(f"{category}, {n} time{'' if n == 1 else 's'}: {message}")
+        # What is given without a category is a sentence for the user, and means the same in every fit.
+        times = f"{category.__name__}, {n} time{'' if n == 1 else 's'}: "
+        notes.append(message if category is UserWarning else f"{times}{message}")
 
 
 def _first_line(text: str) -> str:
