@@ -71,10 +71,10 @@ def ended(outcome="steady", values=(0.066, 5.5), **more):
     return evolve(begun(**more), result=result)
 
 
-def write_recording(path, ticks=120, record=None, finish=True, **texts):
+def write_recording(path, ticks=120, record=None, finish=True, grasp=0, **texts):
     """Write a recording of so many ticks, with the sections of this record; return the file.
 
-    `texts` replace those of the section START.
+    Recordings with another `grasp` have another effort. `texts` replace those of the section START.
     """
     record = record or begun()
     file = RecordingWriter(path)
@@ -86,7 +86,8 @@ def write_recording(path, ticks=120, record=None, finish=True, **texts):
         image = pads(k)
         if k == 0 or pads(k - 1).counter != image.counter:
             file.signal(number, layout.wire.pack(*pads_numbers(image)))
-        file.tick(frame(k).t_s, TICK.pack(*frame(k), 3, *command(k)))
+        measured = frame(k)._replace(effort_n=5.0 + grasp)
+        file.tick(measured.t_s, TICK.pack(*measured, 3, *command(k)))
     if record.result is not None:
         file.metadata(RESULT, record.section(RESULT))
     if finish:
@@ -103,11 +104,12 @@ def keep(
     ticks=120,
     labels=None,
     complete=True,
+    grasp=0,
     **more,
 ):
     """Add a small trial to the store and return its number; `labels` are further ones."""
     record = ended(outcome, values, label=label, instance=instance, **more)
     record = evolve(record, labels={**record.labels, **(labels or {})})
     path = store.new_recording(record.made_at)
-    write_recording(path, ticks, record)
+    write_recording(path, ticks, record, grasp=grasp)
     return store.add(record, RecordingInfo.of(path, ticks, 3), complete=complete)

@@ -20,7 +20,7 @@ def folder(tmp_path):
     """Six trials whose pads reach 0.01 N and 0.02 N more in each tick; the stored width is that of other settings."""
     with Store.open(tmp_path / "trials") as store:
         for k in range(6):
-            keep(store, ("can:full", "can:empty")[k % 2], f"can#{k}")
+            keep(store, ("can:full", "can:empty")[k % 2], f"can#{k}", grasp=k)
     return str(tmp_path / "trials")
 
 

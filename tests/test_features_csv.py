@@ -103,7 +103,7 @@ def test_what_counts_as_missing(csv, gap):
         ),
         (b"PK\x03\x04\x00\x00what,p", DataDamaged, "contains zero bytes: it is not a text file"),
         ("what,p\na,\nb,\n" * 1, DataDamaged, "no feature has any value: p"),
-        ("what,name\na,x\na,y\nb,z\n", ConfigError, "has no column of numbers besides what"),
+        ("what,name\na,x\na,y\nb,z\n", ConfigError, "has no column to learn from besides what"),
     ],
 )
 def test_what_cannot_be_read_says_where_and_why(csv, content, error, said):
@@ -130,7 +130,7 @@ def test_counters_and_texts_are_no_features_unless_asked_for(csv):
     found = read_labelled(path, "what")
     assert found.table.names == ("p",)
     assert any("trial, time (use columns to include them)" in note for note in found.notes)
-    assert any("have no numbers: comment" in note for note in found.notes)
+    assert any("hardly repeat" in note and "comment" in note for note in found.notes)
     assert read_labelled(path, "what", features=["trial", "p"]).table.names == ("trial", "p")
 
 

@@ -207,7 +207,7 @@ def test_mistakes(run, monkeypatch, tmp_path, arguments, code, said):
 
 def test_other_columns_than_the_model_takes(run, csv, tmp_path):
     model = tmp_path / "mine.json"
-    run("train", csv, "--label", "what", "--out", model)
+    run("train", csv, "--label", "what", "--features", "p_first,f_steady", "--out", model)
     other = tmp_path / "other.csv"
     other.write_text("p_first [mm],f_steady [N]\n66,9\n")
     code, _, err = run("predict", model, other)

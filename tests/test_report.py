@@ -283,6 +283,7 @@ def test_the_page_of_a_store(tmp_path, capsys):
                 store,
                 ["can:full_open", "can:empty_open"][k % 2],
                 values=(0.066 + 0.001 * (k % 3), 5.0 + k % 2),
+                grasp=k,
             )
     with pytest.raises(SystemExit) as ended:
         main(
@@ -325,7 +326,12 @@ def test_evaluate_writes_a_page_and_replaces_none_of_a_store(tmp_path, capsys):
     folder = tmp_path / "trials"
     with Store.open(folder) as store:
         for k in range(8):
-            keep(store, ["can:full_open", "can:empty_open"][k % 2], values=(0.066, 5.0 + k % 2))
+            keep(
+                store,
+                ["can:full_open", "can:empty_open"][k % 2],
+                values=(0.066, 5.0 + k % 2 + 0.01 * k),
+                grasp=k,
+            )
     command = ["evaluate", str(folder), "--folds", "2", "--report"]
     with pytest.raises(SystemExit) as ended:
         main([*command, str(tmp_path / "page")])

@@ -89,8 +89,8 @@ def test_a_label_is_restored_as_it_was_recorded_also_none(store, run):
 
 
 def test_trials_that_are_set_aside_are_not_used_until_they_are_brought_back(store, run, tmp_path):
-    for label in ("can:full_open", "can:empty_open") * 3:
-        keep(store, label)
+    for grasp, label in enumerate(("can:full_open", "can:empty_open") * 3):
+        keep(store, label, grasp=grasp)
     refs = [f"{store.folder}#{number}" for number in (1, 4)]
 
     assert run("trials", "aside", *refs, "--why", "the bench was moved")[0] == 0

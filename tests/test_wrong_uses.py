@@ -131,7 +131,7 @@ def test_a_store_may_be_named_in_every_way(run, tmp_path, name):
     with Store.open(folder) as store:
         for k in range(12):
             label = ("can:full_open", "can:empty_open")[k % 2]
-            keep(store, label, values=(0.066 + 0.001 * (k % 3), 5.0 + k % 2))
+            keep(store, label, values=(0.066 + 0.001 * (k % 3), 5.0 + k % 2 + 0.01 * k), grasp=k)
     named = name.format(folder)
     assert store_folder(named) == str(folder)
     assert as_source(named) == f"store:{folder}"

@@ -162,6 +162,7 @@ _TABLE: Final[Table] = {
     "Classifiers": {
         "core.learn.decision_path": ("SplitTest", "leaf_reason", "path_reasons"),
         "core.values.features": ("UNKNOWN", "FeatureTable", "Prediction", "table_of"),
+        "core.values.nominal": ("CodedColumn", "codes_of", "with_codes"),
         "core.values.reasons": (
             "Contribution",
             "FeatureValue",

@@ -161,6 +161,9 @@ from graspsense.core.values.features import UNKNOWN as UNKNOWN
 from graspsense.core.values.features import FeatureTable as FeatureTable
 from graspsense.core.values.features import Prediction as Prediction
 from graspsense.core.values.features import table_of as table_of
+from graspsense.core.values.nominal import CodedColumn as CodedColumn
+from graspsense.core.values.nominal import codes_of as codes_of
+from graspsense.core.values.nominal import with_codes as with_codes
 from graspsense.core.values.reasons import Contribution as Contribution
 from graspsense.core.values.reasons import FeatureValue as FeatureValue
 from graspsense.core.values.reasons import Reason as Reason

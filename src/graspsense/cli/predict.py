@@ -120,7 +120,10 @@ def _trials(
         return read_table(Path(source), model.names), None, ()
     with ProgressLine() as progress:
         labelled = trials_of(
-            source, progress, {**given, "features": given["features"] or ",".join(model.names)}
+            source,
+            progress,
+            {**given, "features": given["features"] or model.names},
+            copies=True,
         )
     return labelled.table, labelled.aimed(model.target).labels, labelled.notes
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from secrets import randbelow
 from typing import TYPE_CHECKING, Any, Final
 
 import click
@@ -35,13 +36,18 @@ if TYPE_CHECKING:
 
 EXIT_ABORTED: Final = 4
 EXIT_NOT_KEPT: Final = 2
+LARGEST_DRAWN_SEED: Final = 999_999
 MANY_GUARDED: Final = 0.1
 """Share of the ticks of a grasp from which on `run` names the settings by which the guard limits the approach."""
 
 
 @click.command(short_help="Perform one grasp.")
 @pipeline_options
-@click.option("--save", metavar="DIR", help="Store the trial and its recording in DIR.")
+@click.option(
+    "--save",
+    metavar="DIR",
+    help="Store the trial and its recording in DIR. Without --seed, a new seed is drawn.",
+)
 @click.option(
     "--label", metavar="CLASS:STATE", help="With --save: label of the object, as in can:full_open#2."
 )
@@ -82,6 +88,10 @@ def run(
     if explain_model:
         options = (*options, "gripper.explain=true")
     settings = _labelled_settings(label, pipeline, gripper, object_name, options, seed, force)
+    drawn = save is not None and settings.origins["run.seed"] == "default"
+    if drawn:  # a grasp with the seed of another one is a copy of it, not another trial
+        seed = randbelow(LARGEST_DRAWN_SEED + 1)
+        settings = _labelled_settings(label, pipeline, gripper, object_name, options, seed, force)
     check(settings)
     if dry_run:
         _say_what_would_be_done(settings, as_json)
@@ -98,6 +108,8 @@ def run(
         trial, interrupted = _grasped(settings, sinks)
     else:
         trial, interrupted, kept = _kept(save, label, settings, sinks, changed)
+        if drawn:
+            talk(f"seed {seed}, drawn for this trial; --seed {seed} repeats the grasp")
 
     asked = explain_model and "model" in trial.report and not interrupted
     condition = _condition(settings) if asked else None

@@ -24,6 +24,7 @@ SOURCES: Final = """\b
     SOURCE is one of
       FILE.csv     a feature table, one line per trial;
                    --label names the column of the label
+      FILE.arff    the same, with types from its header
       NAME:FOLDER  a data set of a plugin, such as icub:FOLDER
       store:DIR    the labelled trials of a store, or DIR alone
       simulated    grasps of the simulated gripper
@@ -38,7 +39,7 @@ _OPTIONS: Final = (
     click.option(
         "--features",
         metavar="COLUMNS",
-        help="CSV: comma-separated feature columns.  [default: all numeric columns]",
+        help="CSV: comma-separated feature columns.  [default: all that can be features]",
     ),
     click.option(
         "--before",
@@ -162,14 +163,17 @@ def trials_of(
     given: Mapping[str, Any],
     checkpoints_s: Sequence[float] = (),
     folds: int | None = None,
+    *,
+    copies: bool = False,
 ) -> Labelled:
     """Return the trials of a source, or of one class of it; `given` holds the options of `source_options`.
 
-    With `checkpoints_s` (s after the contact), they have the features of `CheckpointFeatures`. More `folds` than
-    simulated trials are refused before the first grasp.
+    With `checkpoints_s` (s after the contact), they have the features of `CheckpointFeatures`. Copies of other trials
+    are left out, unless `copies` is set. More `folds` than simulated trials are refused before the first grasp.
     Raises ConfigError, DataDamaged.
     """
     from graspsense.core.components.strict import ValidationFailed, structured
+    from graspsense.core.learn.copies import without_copies
     from graspsense.core.values.errors import ConfigError
     from graspsense.sources.trial_source import TrialSource, groups_of, kind_of, labelled_trials
 
@@ -202,7 +206,7 @@ def trials_of(
         from graspsense.sources.simulated import number_of_trials
 
         check_folds(number_of_trials(_settings(source, given, None), groups_of(described)), folds)
-    return labelled_trials(
+    found = labelled_trials(
         described,
         settings=lambda: _settings(source, given, None),
         features=lambda: _alone("features", "chitta", given, source).create(),
@@ -212,6 +216,7 @@ def trials_of(
             "grasping" if kind == SIMULATED else "extracting features", done, total
         ),
     )
+    return found if copies else without_copies(found)
 
 
 def learner_of(source: str, classifier: str | None, given: Mapping[str, Any]) -> SelectedComponent:
@@ -308,5 +313,8 @@ def _alone(table: str, name: str, given: Mapping[str, Any], source: str) -> Sele
     return SelectedComponent(component, build_plausible(component, values, force=given["force"]))
 
 
-def _names(text: str | None) -> tuple[str, ...]:
+def _names(text: str | tuple[str, ...] | None) -> tuple[str, ...]:
+    """Return the names in an option, or those that a model has."""
+    if isinstance(text, tuple):
+        return text
     return tuple(one.strip() for one in text.split(",") if one.strip()) if text else ()

@@ -174,8 +174,8 @@ def _to_predict(
 
         return read_table(Path(source), model.table.names), None, ()
     with ProgressLine() as progress:
-        named = given["features"] or (",".join(model.table.names) if is_csv(source) else None)
-        labelled = trials_of(source, progress, {**given, "features": named})
+        named = given["features"] or (model.table.names if is_csv(source) else None)
+        labelled = trials_of(source, progress, {**given, "features": named}, copies=True)
     if labelled.value is None:
         return labelled.table, None, labelled.notes
     if model.target.unit and labelled.value.unit and model.target.unit != labelled.value.unit:

@@ -20,9 +20,12 @@ def gathered_warnings(notes: list[str]) -> Iterator[None]:
         try:
             yield
         finally:
-            counts = Counter(in_words(one.message, one.category, one.filename) for one in caught)
-    for words, n in counts.items():
-        notes.append(words if n == 1 else f"{words} ({n} times)")
+            counts = Counter(
+                (in_words(one.message, one.category, one.filename), one.category) for one in caught
+            )
+    for (words, category), n in counts.items():
+        # What is given without a category is a sentence for the user, and means the same in every fit.
+        notes.append(words if n == 1 or category is UserWarning else f"{words} ({n} times)")
 
 
 def in_words(message: Warning | str, category: type[Warning], filename: str) -> str:

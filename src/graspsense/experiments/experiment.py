@@ -20,14 +20,23 @@ from graspsense.core.components.nearest_key import key_paths
 from graspsense.core.components.registry import installed
 from graspsense.core.components.strict import InvalidValue, ValidationFailed, keys_of, plain, structured
 from graspsense.core.files.limits import CASES
+from graspsense.core.learn.copies import without_copies
 from graspsense.core.learn.model import worded
 from graspsense.core.values.errors import ConfigError, GraspsenseError, UnknownName, suggestion
 from graspsense.experiments.kinds import kind_of
 from graspsense.experiments.task import Task
 from graspsense.sources.identified import IDENTIFIED, identified_scenes
+from graspsense.sources.input_content import contents_of, input_names
 from graspsense.sources.simulated import LARGEST_SEED, simulated_objects
 from graspsense.sources.simulated import number_of_trials as number_of_simulated_trials
-from graspsense.sources.trial_source import SIMULATED, TrialSource, groups_of, labelled_trials
+from graspsense.sources.trial_source import (
+    SIMULATED,
+    TrialSource,
+    groups_of,
+    keys_without_effect,
+    labelled_trials,
+    tables_without_effect,
+)
 
 PIPELINE_TABLES: Final = (*(one for one in TABLE_OF_ROLE.values() if one != "classifier"), "run")
 SWEPT_TABLES: Final = (*PIPELINE_TABLES, "classifier", "data", "test", "judge")
@@ -132,7 +141,8 @@ class ExperimentCase:
 class Planned:
     """An experiment whose file was read and checked, with its cases.
 
-    `pipelines` are the resolved pipelines by the names that the experiment gives them.
+    `pipelines` are the resolved pipelines by the names that the experiment gives them. `inputs` are the hashes of all
+    that the tasks read, by the texts that name it (`contents_of`): a task with another input is another task.
     """
 
     name: str
@@ -141,6 +151,7 @@ class Planned:
     seeds: tuple[int, ...]
     pipelines: Mapping[str, Settings]
     parts: tuple[Planned, ...] = ()
+    inputs: Mapping[str, str] = field(factory=dict)
 
     def tasks(self) -> list[Task]:
         """Return every task: all cases with the first seed, then all with the second, and so on."""
@@ -148,7 +159,17 @@ class Planned:
 
     def task(self, case: ExperimentCase, seed: int) -> Task:
         """Return the task for a case and a seed."""
-        params = {
+        params = self._params(case, first=seed == self.seeds[0])
+        own = {text: self.inputs[text] for text in input_names(params) if text in self.inputs}
+        params = {**params, "inputs": own} if own else params
+        return Task(kind=case.kind, params=params, seed=seed, name=f"{case.name}, seed {seed}".lstrip(", "))
+
+    def with_inputs(self) -> Planned:
+        """Return the experiment with the present content of its inputs."""
+        return evolve(self, inputs=contents_of([self._params(case, first=True) for case in self.cases]))
+
+    def _params(self, case: ExperimentCase, *, first: bool) -> dict[str, Any]:
+        return {
             "settings": {
                 table: {key: one for key, one in case.settings.values[table].items() if one is not None}
                 for table in PIPELINE_TABLES
@@ -159,9 +180,8 @@ class Planned:
                 {"name": one.name, "type": one.type, "config": dict(one.config)} for one in case.learners
             ],
             "judge": plain(case.judge),
-            "first": seed == self.seeds[0],
+            "first": first,
         }
-        return Task(kind=case.kind, params=params, seed=seed, name=f"{case.name}, seed {seed}".lstrip(", "))
 
 
 def shipped() -> dict[str, Any]:
@@ -207,8 +227,10 @@ def read_experiment(
     if experiment is None or complaints:
         raise ConfigError("\n".join(complaints))
     if experiment.parts:
-        return _of_parts(name, experiment, layer, within, force=force)
-    return _Plan(name, experiment, layer, force=force).planned()
+        planned = _of_parts(name, experiment, layer, within, force=force)
+    else:
+        planned = _Plan(name, experiment, layer, force=force).planned()
+    return planned.with_inputs() if len(within) == 1 else planned
 
 
 def _known_paths(values: Mapping[str, Any]) -> list[str]:
@@ -299,9 +321,32 @@ class _Plan:
                         at["variant"] = variant.name
                     at.update((dotted(path), value) for path, value in point)
                     cases.append(self._case(settings, variant, point, sweep, at))
+        self._check_effect(cases, sweep)
         if self.complaints:
             raise ConfigError("\n".join(dict.fromkeys(self.complaints)))
         return Planned(name=self.name, experiment=one, cases=tuple(cases), seeds=seeds, pipelines=pipelines)
+
+    def _check_effect(
+        self, cases: Sequence[ExperimentCase], sweep: Mapping[tuple[str, ...], Sequence[Any]]
+    ) -> None:
+        """Add an error for each swept key that the trials cannot depend on, and for cases that are therefore equal."""
+        seen: dict[str, ExperimentCase] = {}
+        for case in cases:
+            sources = [source for source in (case.data, case.test) if source is not None]
+            if self.complaints or not sources:
+                return
+            inert = set.intersection(*(set(_without_effect(source)) for source in sources))
+            named = " and ".join(source.source for source in sources)
+            keys = [dotted(path) for path in sweep if {path[0], dotted(path[:2])} & inert]
+            twin = seen.setdefault(_what_matters(case, inert), case)
+            if not keys and twin is not case:
+                keys = [key for key in case.at if case.at[key] != twin.at[key]]
+            for key in keys:
+                self.complaints.append(
+                    f"{self.layer.where(('sweep', key))}: {key} makes no difference: the trials of {named} do not "
+                    "depend on what differs. Vary a key of [classifier], [judge] or [data] that they depend on, or "
+                    f'simulate the trials (data.source = "{SIMULATED}")'
+                )
 
     def _check_cases(self, sweep: Mapping[tuple[str, ...], Sequence[Any]], pipelines: int) -> None:
         """Raise ConfigError if there are too many cases, before any of them is made."""
@@ -472,12 +517,30 @@ class _Plan:
                 yield LearnerSpec(name=name, type=component.qualified, config=config)
 
 
+def _without_effect(source: TrialSource) -> list[str]:
+    """Return the tables, and the keys of [data], that the trials of a source do not depend on."""
+    return [*tables_without_effect(source), *(f"data.{key}" for key in keys_without_effect(source))]
+
+
+def _what_matters(case: ExperimentCase, inert: set[str]) -> str:
+    """Return everything that the result of a case depends on, as text."""
+    tables = {table: case.settings.values[table] for table in PIPELINE_TABLES if table not in inert}
+    sources = [
+        {key: value for key, value in plain(source).items() if f"data.{key}" not in inert}
+        for source in (case.data, case.test)
+        if source is not None
+    ]
+    learners = [(one.name, one.type, dict(one.config)) for one in case.learners]
+    return repr((tables, sources, learners, plain(case.judge)))
+
+
 def number_of_trials(settings: Settings, data: TrialSource) -> int | None:
     """Return the number of trials of a source, None for a data set, which would have to be read."""
     if data.kind == SIMULATED:
         return number_of_simulated_trials(settings, groups_of(data))
     if data.kind == "CSV":
-        return len(labelled_trials(data, settings=lambda: settings, features=settings.features.create))
+        trials = labelled_trials(data, settings=lambda: settings, features=settings.features.create)
+        return len(without_copies(trials))
     return None
 
 
@@ -549,7 +612,7 @@ def _located(values: Mapping[str, Any], base: Path | None) -> dict[str, Any]:
     def path(text: Any) -> Any:
         if not isinstance(text, str):
             return text
-        if text.endswith((".toml", ".csv", ".tsv", ".txt")) and os.path.exists(base / text):
+        if text.endswith((".toml", ".csv", ".tsv", ".txt", ".arff")) and os.path.exists(base / text):
             return str((base / text).absolute())
         name, colon, folder = text.partition(":")
         if colon and folder and os.path.isdir(base / folder):

@@ -277,7 +277,10 @@ def _made_of(summary: Summary, results: Results) -> Section:
         ("computing time", f"{summary.seconds:.0f} s, all tasks together"),
         ("machine", f"{made.get('host', '?')}, {made.get('system', '?')}"),
         ("code", f"graspsense {made.get('graspsense', '?')}, commit {commit_text(made)}"),
-        *((f"hash of {name}", value) for name, value in (made.get("files") or {}).items()),
+        *(
+            (f"hash of {name}", value)
+            for name, value in (made.get("inputs") or made.get("files") or {}).items()
+        ),
     ]
     versions = sorted((str(k), str(v)) for k, v in (made.get("versions") or {}).items())
     try:

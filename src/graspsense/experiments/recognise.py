@@ -12,9 +12,11 @@ from attrs.validators import ge, le
 from graspsense.core.components.config import SelectedComponent, build, settings_from
 from graspsense.core.components.registry import installed
 from graspsense.core.components.strict import structured
+from graspsense.core.learn.copies import apart_from, without_copies
 from graspsense.core.learn.labelled import class_of
 from graspsense.core.values.errors import ConfigError
 from graspsense.evaluation.evaluate import evaluate
+from graspsense.evaluation.gathered_warnings import gathered_warnings
 from graspsense.experiments.task_results import (
     MOST_KEPT_GRASPS,
     ClassifierResult,
@@ -66,7 +68,7 @@ def recognise(params: Mapping[str, Any], seed: int) -> RecognitionResult:
     data = _trials(params["data"], settings, seed, curves)
     test = None
     if params["test"]:
-        test = _trials(params["test"], settings, seed + TEST_SEED_OFFSET, None)
+        test = apart_from(_trials(params["test"], settings, seed + TEST_SEED_OFFSET, None), data)
     results = []
     for spec in params["learners"]:
         component = installed().find("classifier", spec["type"])
@@ -107,12 +109,14 @@ class _CurveCollector:
 def _trials(
     values: Mapping[str, Any], settings: Settings, seed: int, curves: _CurveCollector | None
 ) -> Labelled:
-    return labelled_trials(
-        structured(values, TrialSource, "[data]"),
-        settings=lambda: settings,
-        features=settings.features.create,
-        seed=seed,
-        on_trace=curves.add if curves is not None and curves.per_label else None,
+    return without_copies(
+        labelled_trials(
+            structured(values, TrialSource, "[data]"),
+            settings=lambda: settings,
+            features=settings.features.create,
+            seed=seed,
+            on_trace=curves.add if curves is not None and curves.per_label else None,
+        )
     )
 
 
@@ -179,18 +183,21 @@ def _on_other_trials(
     classes = {""} if target != "state" else {class_of(label) for label in test.labels}
     true: list[str] = []
     predicted: list[str] = []
+    told: list[str] = []
     for class_name in sorted(classes):
         training, tested = (one.of_class(class_name) if class_name else one for one in (data, test))
         if target == "class":
             training, tested = training.aimed("class"), tested.aimed("class")
         classifier = learner.create()
-        classifier.fit(training.table, training.labels, seed)
+        with gathered_warnings(told):
+            classifier.fit(training.table, training.labels, seed)
         labels = classifier.classes()
         best = classifier.probabilities(tested.table).argmax(axis=1)
         true += tested.labels
         predicted += [labels[k] for k in best]
     note = f"trained on {len(data)} trials of {data.source}, tested on {len(true)} of {test.source}"
-    return ClassifierResult.of(name, target, OTHER_TRIALS, true, predicted, notes=(note,), tree=tree)
+    notes = (note, *test.notes, *told)
+    return ClassifierResult.of(name, target, OTHER_TRIALS, true, predicted, notes=notes, tree=tree)
 
 
 def _tree(
@@ -201,6 +208,7 @@ def _tree(
         return None
     labelled = data.aimed(target)
     classifier = learner.create()
-    classifier.fit(labelled.table, labelled.labels, seed)
+    with gathered_warnings([]):  # the evaluation tells them
+        classifier.fit(labelled.table, labelled.labels, seed)
     nodes = classifier.tree()
     return None if nodes is None else tuple(nodes)

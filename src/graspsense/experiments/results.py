@@ -3,7 +3,7 @@
 OUT/experiment.toml   the experiment with every value filled in; it runs again by itself
 OUT/pipelines/*.toml  the resolved pipelines that it names
 OUT/parts/*.toml      the experiments that it consists of, likewise
-OUT/provenance.json   versions, commit, machine, hashes of the files that were read
+OUT/provenance.json   versions, commit, machine, hashes of all inputs
 OUT/results/KEY.json  the result of a task, written and flushed when it ended
 OUT/report.html       the page
 """
@@ -11,12 +11,11 @@ OUT/report.html       the page
 from __future__ import annotations
 
 import fcntl
-import hashlib
 import json
 import os
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
 
@@ -107,7 +106,7 @@ class Results:
             "command": command,
             "begun_at": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
             "versions": dict(versions()),
-            "files": _hashes(planned),
+            "inputs": dict(planned.inputs),
             **process_provenance(),
         }
         _write(self.folder / PROVENANCE, json.dumps(provenance, indent=2, ensure_ascii=False) + "\n")
@@ -123,7 +122,10 @@ class Results:
     def experiment(self) -> Planned:
         """Return the experiment of the folder, under the name that it was run by. Raises ConfigError."""
         planned = read_experiment(str(self.folder / EXPERIMENT), force=True)
-        return evolve(planned, name=str(self.provenance().get("experiment", planned.name)))
+        found = self.provenance()
+        # The results are those of the inputs that there were. Without them, an earlier version made the results.
+        inputs = found.get("inputs", {})
+        return evolve(planned, name=str(found.get("experiment", planned.name)), inputs=inputs)
 
     @contextmanager
     def alone(self) -> Iterator[None]:
@@ -183,17 +185,6 @@ def _unswept(planned: Planned) -> list[Any]:
     swept = any(key.split(".")[0] == "classifier" for key in planned.experiment.sweep)
     varied = any(one.classifier for one in planned.experiment.variants)
     return [] if swept or varied else list(planned.cases[0].learners)
-
-
-def _hashes(planned: Planned) -> dict[str, str]:
-    """Return the hash of each file that trials are read from."""
-    found = {}
-    for case in planned.cases:
-        for source in (case.data, case.test):
-            if source is not None and source.kind == "CSV":
-                with suppress(OSError):
-                    found[source.source] = hashlib.sha256(Path(source.source).read_bytes()).hexdigest()
-    return found
 
 
 def _write(path: Path, text: str) -> None:

@@ -9,7 +9,7 @@ from attrs import field, frozen
 
 from graspsense.core.components.caller import option
 from graspsense.core.grasp.interrupts import Interrupts
-from graspsense.core.values.errors import ConfigError
+from graspsense.core.values.errors import ConfigError, listed
 from graspsense.experiments.executors.base import Executor, ExecutorLost
 from graspsense.experiments.experiment import Planned
 from graspsense.experiments.results import Results
@@ -96,6 +96,7 @@ def run_experiment(
         known = {
             key: one for key, one in results.of([task.key for task in tasks]).items() if one.state == "done"
         }
+        changed = _changed_inputs(results, planned)
         results.begin(planned, command)
         todo = [task for task in tasks if task.key not in known]
         keys, stopped = _run_tasks(todo, len(tasks), results, executor, progress, said) if todo else ([], "")
@@ -107,7 +108,7 @@ def run_experiment(
         done=sum(one.state == "done" for one in new),
         failed=tuple(one for one in new if one.state == "failed"),
         stopped=stopped,
-        notes=tuple(_notes(list(known.values()))),
+        notes=(*changed, *_notes(list(known.values()))),
     )
 
 
@@ -150,6 +151,17 @@ def _run_tasks(
         if running is not None:
             running.close()
     return keys, ""
+
+
+def _changed_inputs(results: Results, planned: Planned) -> list[str]:
+    """Return a note on the inputs that differ from those of the results in the folder."""
+    before = results.provenance().get("inputs", {})
+    names = [name for name, content in planned.inputs.items() if before.get(name, content) != content]
+    if not names:
+        return []
+    return [
+        f"changed since the results from before were made, so that their tasks were run again: {listed(names)}"
+    ]
 
 
 def _notes(known: Sequence[TaskResult]) -> list[str]:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 from attrs import evolve
 
+from graspsense.core.learn.copies import without_copies
 from graspsense.regression.estimators import DEFAULT_ESTIMATOR
 from graspsense.regression.evaluate import evaluate_regression
 from graspsense.report.html import Page, Section, bullets, figure, pair, paragraph, table
@@ -35,7 +36,7 @@ def number_sections(
         number_section(
             evaluate_regression(
                 DEFAULT_ESTIMATOR,
-                labelled_store(folder, value=name),
+                without_copies(labelled_store(folder, value=name)),
                 folds=folds,
                 seed=seed,
                 progress=progress,

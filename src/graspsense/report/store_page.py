@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final
 from attrs import frozen
 
 from graspsense.core.components.config import select_component
+from graspsense.core.learn.copies import without_copies
 from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.evaluation.evaluate import evaluate
 from graspsense.recording.labelled_recording import UnreadableRecording
@@ -80,7 +81,7 @@ def store_page(
     learner = select_component("classifier", classifier)
     labelled, evaluation, problem = None, None, ""
     try:
-        labelled = labelled_store(folder)
+        labelled = without_copies(labelled_store(folder))
         evaluation = evaluate(
             learner,
             labelled,

@@ -5,8 +5,8 @@ A name can be followed by its unit: `p_first [m]`. A first column without a name
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -17,6 +17,7 @@ from graspsense.core.learn.target_value import name_and_unit
 from graspsense.core.values.errors import ConfigError, DataDamaged, listed, suggestion
 from graspsense.core.values.features import FeatureTable
 from graspsense.core.values.label_text import is_missing_label
+from graspsense.core.values.nominal import splits_of, value_name
 from graspsense.core.values.written_numbers import NotNumbers, columns_of_numbers, is_missing, is_number
 from graspsense.core.values.written_times import seconds_since_first
 from graspsense.sources.text_table import read_lines, table_of
@@ -67,6 +68,12 @@ class CsvColumns:
             for name, cells in zip(self.names, table.columns, strict=True)
         }
         self._numbers: dict[str, Numbers | NotNumbers] | None = None
+        self.levels: dict[str, tuple[str, ...]] = {}
+
+    @property
+    def default_label(self) -> str | None:
+        """The column of the label where the file says it; a CSV file does not."""
+        return None
 
     def __len__(self) -> int:
         """Return the number of rows."""
@@ -85,7 +92,7 @@ class CsvColumns:
         """Return a column without missing values. Raises ConfigError, or DataDamaged with the line that has none."""
         cells = self.column(name, what)
         for line, cell in zip(self.lines, cells, strict=True):
-            if is_missing_label(cell):
+            if self.is_missing_text(cell):
                 raise DataDamaged(f"{self.path}, line {line}: {name} ({what}) is empty")
         return cells
 
@@ -113,14 +120,31 @@ class CsvColumns:
         """Return whether any cell of a column is a number."""
         return any(is_number(cell) for cell in self.cells[name])
 
-    def rises(self, name: str) -> bool:
-        """Return whether the values increase from row to row, as a counter or a time does, over at least five rows."""
-        values = self.numbers(name)
-        return len(values) >= 5 and all(before < after for before, after in pairwise(values))
-
     def is_blank(self, name: str) -> bool:
         """Return whether every cell of a column is missing."""
         return all(is_missing(cell) for cell in self.cells[name])
+
+    def is_missing_text(self, cell: str) -> bool:
+        """Return whether the text of a label or of a nominal value is missing."""
+        return is_missing_label(cell)
+
+    def is_nominal(self, name: str) -> bool:
+        """Return whether a column has texts instead of numbers, as its header declares or all its cells show."""
+        return name in self.levels or not (self.has_numbers(name) or self.is_blank(name))
+
+    def texts(self, name: str) -> list[str]:
+        """Return the texts of a column, empty where they are missing."""
+        return ["" if self.is_missing_text(cell) else cell for cell in self.cells[name]]
+
+    def values_of(self, name: str) -> tuple[str, ...]:
+        """Return the values of a nominal column in the order of its header, or else sorted."""
+        return self.levels.get(name) or tuple(sorted(set(self.texts(name)) - {""}))
+
+    def columns_of(self, name: str) -> list[str]:
+        """Return the names under which a column is in a table of features: one for each value if it is nominal."""
+        if name not in self.cells or not self.is_nominal(name):
+            return [name]
+        return [value_name(name, value) for value in self.values_of(name)]
 
     def keep(self, rows: Sequence[int]) -> None:
         """Remove all rows but these."""
@@ -130,9 +154,29 @@ class CsvColumns:
 
     def table(self, names: Sequence[str]) -> FeatureTable:
         """Return these columns as a table of numbers. Raises ConfigError, DataDamaged."""
-        values = np.array([self.numbers(name) for name in names], dtype=np.float64).T
+        wanted = [self._nominal_value(name) for name in names]
+        known: dict[str, set[str]] = {}
+        for column, value in filter(None, wanted):
+            known.setdefault(column, set()).add(value)
+        values = np.array(
+            [
+                self.numbers(name) if found is None else self._is_value(*found, known[found[0]])
+                for name, found in zip(names, wanted, strict=True)
+            ],
+            dtype=np.float64,
+        ).T
         return FeatureTable(
             names=tuple(names),
-            units=tuple(self.units[name] for name in names),
+            units=tuple(self.units.get(name, "") for name in names),
             values=values.reshape(len(self), len(names)),
         )
+
+    def _nominal_value(self, name: str) -> tuple[str, str] | None:
+        """Return the nominal column and the value that a name such as `colour=red` means; None for another name."""
+        if name in self.cells:
+            return None
+        return next((found for found in splits_of(name) if found[0] in self.cells), None)
+
+    def _is_value(self, column: str, value: str, known: set[str]) -> list[float]:
+        """Return 1 where a nominal column has this value, NaN where it has none of those that are known."""
+        return [float(text == value) if text in known else math.nan for text in self.texts(column)]

@@ -7,7 +7,8 @@ describe a trial are never features, and every feature remains one even if no tr
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -19,11 +20,14 @@ from graspsense.core.learn.target_value import TargetValue
 from graspsense.core.values.errors import ConfigError, DataDamaged, listed
 from graspsense.core.values.features import UNKNOWN, FeatureTable
 from graspsense.core.values.label_text import is_missing_label, label_text
+from graspsense.core.values.nominal import splits_of
 from graspsense.core.values.written_numbers import is_missing
 from graspsense.recording.atomic_file import write_or_replace
 from graspsense.recording.controls import Controls, controls
+from graspsense.sources.arff_columns import ArffColumns
 from graspsense.sources.csv_columns import CsvColumns
 from graspsense.sources.exported_table import ExportedTable, exported
+from graspsense.sources.identifiers import identifies, text_identifies
 
 
 def read_labelled(
@@ -47,7 +51,8 @@ def read_labelled(
 
     Raises ConfigError if a column does not exist or cannot be a label, DataDamaged if the file is not a valid table.
     """
-    columns = CsvColumns(path)
+    columns = columns_of_file(path)
+    label = label or columns.default_label
     notes = list(columns.notes)
     export = exported(columns)
     if export is not None:
@@ -56,13 +61,16 @@ def read_labelled(
         if instance is None and not any(map(is_missing_label, columns.cells["instance"])):
             instance = "instance"
         features = features or export.features
+    elif isinstance(columns, ArffColumns) and value is None:
+        notes += columns.without_label(label)
     target = None if value is None else _target(columns, value, export, notes)
     labels = _labels(columns, label, notes) if target is None else _texts(columns, label)
     instances = None if instance is None else tuple(columns.complete_column(instance, "the instance"))
     reserved = {name for name in (label, instance, order, value) if name}
-    table = _feature_table(columns, features, reserved, notes)
-    _note_similar_labels(labels, notes)
     ranks, no_order = _order(columns, order, export, notes)
+    identified = partial(_identified, columns, labels, ranks) if export is None else _measured
+    table = _feature_table(columns, features, reserved, identified, notes)
+    _note_similar_labels(labels, notes)
     return Labelled(
         source=str(path),
         table=table,
@@ -121,7 +129,12 @@ def _order(
 
 def read_table(path: Path, names: Sequence[str]) -> FeatureTable:
     """Return these columns of a CSV file. Raises ConfigError, DataDamaged."""
-    return CsvColumns(path).table(list(names))
+    return columns_of_file(path).table(list(names))
+
+
+def columns_of_file(path: Path) -> CsvColumns:
+    """Return the columns of a table, which is an ARFF file if its name says so. Raises ConfigError, DataDamaged."""
+    return ArffColumns(path) if path.suffix.lower() == ".arff" else CsvColumns(path)
 
 
 def write_labelled(path: Path, labelled: Labelled) -> None:
@@ -181,51 +194,76 @@ def _ranks(columns: CsvColumns, order: str | None, notes: list[str]) -> tuple[in
     return tuple(np.argsort(np.argsort(values, kind="stable"), kind="stable").tolist())
 
 
+def _identified(columns: CsvColumns, labels: Sequence[str], order: Sequence[int] | None, name: str) -> str:
+    """Return how a column identifies trials, empty if it can be a feature. Raises DataDamaged."""
+    if columns.is_nominal(name):
+        return text_identifies(columns.texts(name), labels)
+    return identifies(name, columns.units[name], columns.numbers(name), labels, order)
+
+
+def _measured(name: str) -> str:
+    """Return that no feature of an exported store identifies trials: a feature set made it."""
+    del name
+    return ""
+
+
 def _feature_table(
-    columns: CsvColumns, features: Sequence[str], reserved: set[str], notes: list[str]
+    columns: CsvColumns,
+    features: Sequence[str],
+    reserved: set[str],
+    identified: Callable[[str], str],
+    notes: list[str],
 ) -> FeatureTable:
     """Return the columns named in `features`, by default all that can be one. Raises ConfigError, DataDamaged."""
-    names = list(features) or _feature_names(columns, reserved, notes)
+    names = list(features) or _feature_names(columns, reserved, identified, notes)
     for name in names:
         if name in reserved:
             raise ConfigError(f"{name!r} cannot be a feature: it is the label, the instance or the order")
-    table = columns.table(names)
+    table = columns.table([one for name in names for one in columns.columns_of(name)])
+    for name in features:
+        if name in columns.cells and (why := identified(name)):
+            notes.append(f"{name} is used, although its values {why}: it may reveal the labels")
     _note_uninformative_columns(columns.path, table, notes)
     return table
 
 
-def _feature_names(columns: CsvColumns, reserved: set[str], notes: list[str]) -> list[str]:
-    """Return the columns of numbers that are neither reserved nor counters. Raises ConfigError, DataDamaged."""
-    names, texts, counters, blank = [], [], [], []
+def _feature_names(
+    columns: CsvColumns, reserved: set[str], identified: Callable[[str], str], notes: list[str]
+) -> list[str]:
+    """Return the columns that are neither reserved nor identifiers. Raises ConfigError, DataDamaged."""
+    names, nominal, blank = [], [], []
     if columns.index:
         notes.append(f"not used, because it is the index that pandas wrote: {columns.index}")
+    identifiers: dict[str, list[str]] = {}
     for name in columns.names:
         if name in reserved or name == columns.index:
             continue
         if columns.is_blank(name) and not columns.units[name]:
             blank.append(name)
-        elif not (columns.has_numbers(name) or columns.is_blank(name)):
-            texts.append(name)
-        elif columns.rises(name):
-            counters.append(name)
+        elif why := identified(name):
+            identifiers.setdefault(why, []).append(name)
         else:
             names.append(name)
-    if counters:
+            nominal += [name] if columns.is_nominal(name) else []
+    for why, found in identifiers.items():
         notes.append(
-            "not used, because they increase with every line as a counter or a time does: "
-            f"{listed(counters)} (use {option('features', python='columns')} to include them)"
+            f"not used, because they {why}: {listed(found)} "
+            f"(use {option('features', python='columns')} to include them)"
         )
     if blank:
         notes.append(
             f"not used, because they have no values: {listed(blank)} "
             f"(use {option('features', python='columns')} to include them)"
         )
-    if texts:
-        notes.append(f"not used, because they have no numbers: {listed(texts)}")
+    if nominal:
+        notes.append(f"nominal, with a feature for each of their values: {listed(nominal)}")
     if blank and not names:
         raise DataDamaged(f"{columns.path}: no feature has any value: {listed(blank)}")
     if not names:
-        raise ConfigError(f"{columns.path} has no column of numbers besides {', '.join(sorted(reserved))}")
+        unused = "".join(f". {note}" for note in notes if note.startswith("not used"))
+        raise ConfigError(
+            f"{columns.path} has no column to learn from besides {', '.join(sorted(reserved))}{unused}"
+        )
     return names
 
 
@@ -234,7 +272,8 @@ def _note_uninformative_columns(path: Path, table: FeatureTable, notes: list[str
     named = list(zip(table.names, table.values.T, strict=True))
     blank = [name for name, values in named if np.isnan(values).all()]
     having = [(name, values[~np.isnan(values)]) for name, values in named]
-    constant = [name for name, values in having if len(values) and values.min() == values.max()]
+    constant = [name for name, values in having if len(values) and values.min() == values.max() != 0.0]
+    constant += [name for name, values in having if len(values) and not values.any() and not splits_of(name)]
     if blank:
         notes.append(f"without any value: {listed(blank)}")
     if constant:

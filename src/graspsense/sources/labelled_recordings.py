@@ -25,6 +25,7 @@ from graspsense.recording.controls import Controls, controls, without_width
 from graspsense.recording.labelled_recording import LabelledRecording, UnreadableRecording
 from graspsense.recording.readable import each_readable, error_of_all, note_on
 from graspsense.recording.replayable import Recording
+from graspsense.recording.same_grasp import curve_bytes, grasp_numbers
 from graspsense.sources.dataset_recordings import readable_or_not
 from graspsense.sources.noise_thresholds import THRESHOLDS, thresholds_for
 from graspsense.store.first_line import NAMES, UNITS, numbers_of
@@ -82,6 +83,7 @@ def labelled_recordings(
         no_instances="the data set does not say which trials are of the same object",
         order=order,
         no_order="" if order is not None else "the data set does not say when each trial was recorded",
+        content=tuple(map(str, grasp_numbers([curve_bytes(one.recording.readings) for one in facts]))),
         **_controls(table, before, facts),
         notes=tuple(notes),
         provenance={"simulated": False},

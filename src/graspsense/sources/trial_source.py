@@ -69,6 +69,26 @@ class TrialSource(Group):
         return kind_of(self.source)
 
 
+_OF_CSV: Final = ("label", "instance", "order", "columns", "before")
+
+
+def tables_without_effect(source: TrialSource) -> tuple[str, ...]:
+    """Return the tables of a pipeline that the trials of this source do not depend on."""
+    return {"simulated": (), "CSV": ("gripper", "controller", "features", "run")}.get(
+        source.kind, ("gripper", "controller", "run")
+    )
+
+
+def keys_without_effect(source: TrialSource) -> tuple[str, ...]:
+    """Return the keys of a source that its trials do not depend on, because they are for another kind."""
+    of_kind = {
+        "simulated": (*fields_dict(Group), "groups"),
+        "CSV": _OF_CSV,
+        "data set": ("unreliable",),
+    }
+    return tuple(key for kind, keys in of_kind.items() if kind != source.kind for key in keys)
+
+
 def load_trials(
     source: str = SIMULATED,
     *,
@@ -78,30 +98,33 @@ def load_trials(
     progress: Callable[[int, int], None] | None = None,
     **keys: Any,
 ) -> Labelled:
-    """Return labelled trials: `simulated`, a CSV of features, or a data set as `store:FOLDER`.
+    """Return labelled trials, each once: `simulated`, a CSV of features, or a data set as `store:FOLDER`.
 
     `pipeline` and `options` (`"features.type=chitta"`) select the components that simulate trials, or compute their
     features; `keys` are the further fields of `TrialSource`, such as `label` or `objects`. Raises ConfigError,
     DataDamaged.
     """
     from graspsense.core.components.config import resolve
+    from graspsense.core.learn.copies import without_copies
 
     try:
         described = structured({**keys, "source": source}, TrialSource, source)
     except ValidationFailed as misfit:
         raise ConfigError("\n".join(f"{one.path[0]}: {one.text}" for one in misfit.problems)) from None
     settings = cache(lambda: resolve(pipeline, options=options, flags=gripper_flags(source)))
-    return labelled_trials(
-        described,
-        settings=settings,
-        features=lambda: settings().features.create(),
-        options=options,
-        seed=seed,
-        progress=progress,
+    return without_copies(
+        labelled_trials(
+            described,
+            settings=settings,
+            features=lambda: settings().features.create(),
+            options=options,
+            seed=seed,
+            progress=progress,
+        )
     )
 
 
-NOT_READ: Final = (".npz", ".arff", ".parquet")
+NOT_READ: Final = (".npz", ".parquet")
 """Endings of the tables that `graspsense export` writes for other programs, and that are not read as trials."""
 OF_RECORDINGS: Final = (".mcap", ".bag", ".db3", ".npy", ".mat", ".h5")
 """Endings of files of recordings, which are imported before there is anything to learn from."""
@@ -125,7 +148,7 @@ def kind_of(source: str) -> Kind:
         found = toml_kind(read_toml(Path(source), source, "TOML").values)
         called = KINDS[found].called if found else "a TOML file"
         raise ConfigError(f"{source} is {called}, not a source of trials. {_OF_TOML.get(found, '')}".rstrip())
-    if source.lower().endswith((".csv", ".tsv", ".txt")) or Path(source).is_file():
+    if source.lower().endswith((".csv", ".tsv", ".txt", ".arff")) or Path(source).is_file():
         return "CSV"
     if ":" in source:
         return "data set"
@@ -145,7 +168,7 @@ def labelled_trials(
     progress: Callable[[int, int], None] | None = None,
     on_trace: Callable[[int, str, Trace], None] | None = None,
 ) -> Labelled:
-    """Return the trials that a source describes.
+    """Return the trials that a source describes, with copies of a trial: `without_copies` is for what learns from them.
 
     `settings` is called if trials are simulated, `features` if a data set extracts features from recordings. With
     `options` as after `-o`, except those of the classifier, the features of a store are extracted again. `seed` and
@@ -198,7 +221,7 @@ def groups_of(source: TrialSource) -> tuple[Group, ...]:
 def _csv(source: TrialSource) -> Labelled:
     from graspsense.sources.features_csv import read_labelled
 
-    if not source.label and source.value is None:
+    if not source.label and source.value is None and not source.source.lower().endswith(".arff"):
         raise ConfigError(
             f"which column of {source.source} holds the label? Name it: {option('label', 'COLUMN')}"
         )

@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from datetime import datetime
 from typing import TYPE_CHECKING, Any, Final
 
@@ -25,6 +26,8 @@ from graspsense.core.values.features import FeatureTable
 from graspsense.recording.controls import controls
 from graspsense.recording.provenance import recipe
 from graspsense.recording.readable import note_on, readable
+from graspsense.recording.reader import read_recorded
+from graspsense.recording.same_grasp import curve_bytes, grasp_numbers
 from graspsense.recording.trial_record import FeatureValues
 from graspsense.store.changes import with_changed_numbers
 from graspsense.store.extract_again import ExtractedTrials, extract_again
@@ -124,6 +127,7 @@ def labelled_store(
         else:
             tables = _stored_tables(store, folder, rows, feature_set)
         first_line, unused = first_lines(store, rows.recording, rows.origin), _unused(store)
+        content = _contents(store, rows)
     order, no_order = order_recorded(rows.made_at, rows.origin, rows.labels)
     return Labelled(
         source=f"store:{folder}",
@@ -133,6 +137,7 @@ def labelled_store(
         no_instances=f"{rows.instance.count(None)} trials do not name the individual object (can:full_open#2)",
         order=order,
         no_order=no_order,
+        content=content,
         **controls(
             tables.features,
             tables.before,
@@ -144,6 +149,27 @@ def labelled_store(
         notes=(*notes, *_notes(len(set(rows.recipe)), sum(rows.simulated), len(rows)), *unused),
         provenance=_provenance(folder, rows, newest.summary.id, settings, components),
     )
+
+
+def _contents(store: Store, rows: _Rows) -> tuple[str, ...]:
+    """Return a text for each trial, equal for those of the same grasp; empty for those that are like no other.
+
+    A recovered copy has the same contact as the recording that was damaged, so that only such recordings are compared.
+    """
+    alike: dict[tuple[int, bytes], list[int]] = {}
+    for i, before in enumerate(zip(rows.before_set, rows.before_contact, strict=True)):
+        alike.setdefault(before, []).append(i)
+    contents = [""] * len(rows)
+    for group in alike.values():
+        curves: dict[int, bytes] = {}
+        for i in group if len(group) > 1 else ():
+            with suppress(ConfigError, DataDamaged):
+                grasp = read_recorded(store.recording_path(rows.recording[i]), salvage=True)
+                curves[i] = curve_bytes(grasp.readings())
+        places = list(curves)
+        for i, number in zip(places, grasp_numbers(list(curves.values())), strict=True):
+            contents[i] = str(rows.id[places[number]])
+    return tuple(contents)
 
 
 def _provenance(

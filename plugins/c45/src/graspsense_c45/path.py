@@ -29,14 +29,23 @@ class NumericTest:
 
 
 @frozen
+class NominalTest:
+    """A test of a nominal attribute: the place of the value of the row, NaN if it is missing, and the test in words."""
+
+    attribute: Attribute
+    value: float
+    words: str
+
+
+@frozen
 class Path:
     """The path of a row from the root to a leaf.
 
     steps: one test each, such as ``delta_t 0.61 s > 0.542 s``. label, probability: the prediction for the row.
     support: the training weight at the leaf, in rows. Where a tested value is missing, the prediction is a mean over
     all branches; the path follows the heaviest branch, and the step says so. numeric_tests: the tests of numeric
-    attributes among the steps, as numbers. with_label: the training weight at the leaf that has the label.
-    distribution: the probability of each class.
+    attributes among the steps, as numbers. nominal_tests: those of nominal ones. with_label: the training weight at the
+    leaf that has the label. distribution: the probability of each class.
     """
 
     steps: tuple[str, ...]
@@ -44,6 +53,7 @@ class Path:
     probability: float
     support: float
     numeric_tests: tuple[NumericTest, ...] = ()
+    nominal_tests: tuple[NominalTest, ...] = ()
     with_label: float = 0.0
     distribution: tuple[float, ...] = ()
 
@@ -63,7 +73,7 @@ def explain(tree: Tree, row: Sequence[float]) -> Path:
     # Without smoothing, the largest probability is that of the class: the row is routed once.
     of_class = largest_class(shares[None]) if not tree.laplace else class_indices(tree, values, "numpy")
     chosen = int(of_class[0])
-    node, steps, tests = 0, [], []
+    node, steps, tests, nominal = 0, [], [], []
     while not tree.is_leaf(node):
         tested = values[0, tree.splits.feature[node]]
         slot = int(tree.splits.slot(np.array([node]), np.array([tested]))[0])
@@ -81,6 +91,8 @@ def explain(tree: Tree, row: Sequence[float]) -> Path:
             tests.append(
                 NumericTest(attribute, float(tested), threshold, slot == 1, _share(tree, node, slot))
             )
+        else:
+            nominal.append(NominalTest(attribute, float(tested), steps[-1]))
         node = tree.children(node)[slot]
     return Path(
         tuple(steps),
@@ -88,6 +100,7 @@ def explain(tree: Tree, row: Sequence[float]) -> Path:
         float(shares[chosen]),
         float(tree.weighted_n_node_samples[node]),
         tuple(tests),
+        tuple(nominal),
         float(tree.class_weights[node, chosen]),
         tuple(shares.tolist()),
     )

@@ -12,17 +12,22 @@ from graspsense.plugin_api import (
     Classifier,
     ClassifierConfig,
     ClassifierEntry,
+    CodedColumn,
     Features,
     FeatureTable,
     Prediction,
+    Reason,
     SplitTest,
     TreeNode,
+    codes_of,
     hookimpl,
     in_words,
     leaf_reason,
     missing_feature,
     path_reasons,
     setting,
+    table_of,
+    with_codes,
 )
 
 if TYPE_CHECKING:
@@ -93,17 +98,16 @@ class C45(Classifier[C45Config]):
 
     def fit(self, table: FeatureTable, labels: Sequence[str], seed: int) -> None:
         """Grow and prune a tree; the seed is not used. Raises ValueError for data without a label."""
-        from graspsense_c45.fitting import fit
         from graspsense_c45.options import Options
+        from graspsense_c45.scaling import fit_scaled
         from graspsense_c45.schema import Attribute, Schema
         from graspsense_c45.table import make_table
 
         del seed
         config = self.config
         classes = tuple(sorted(set(labels)))
-        schema = Schema(
-            tuple(Attribute(name, unit) for name, unit in zip(table.names, table.units, strict=True)), classes
-        )
+        columns, values = with_codes(table)
+        schema = Schema(tuple(Attribute(one.name, one.unit, one.values) for one in columns), classes)
         numbers = {label: k for k, label in enumerate(classes)}
         options = Options(
             criterion=config.criterion,
@@ -115,8 +119,8 @@ class C45(Classifier[C45Config]):
             mdl_correction=config.mdl_correction,
             rep_folds=config.rep_folds,
         )
-        rows = make_table(schema, table.values, [numbers[label] for label in labels])
-        self._tree = fit(rows, options)
+        rows = make_table(schema, values, [numbers[label] for label in labels])
+        self._tree = fit_scaled(rows, options)
 
     def classes(self) -> tuple[str, ...]:
         """Return the labels in the order of the columns of `probabilities`."""
@@ -127,18 +131,23 @@ class C45(Classifier[C45Config]):
         from graspsense_c45.prediction import distributions
 
         tree = self._fitted()
-        return distributions(tree, table.columns([one.name for one in tree.schema.attributes]).values)
+        return distributions(tree, codes_of(_coded_columns(tree), table))
 
     def explain(self, features: Features) -> Prediction:
         """Return the prediction with the path through the tree."""
         from graspsense_c45.path import explain
 
         tree = self._fitted()
-        row = [features[one.name] for one in tree.schema.attributes]
+        columns = _coded_columns(tree)
+        row = codes_of(columns, table_of([features]))[0].tolist()
         path = explain(tree, row)
         missing = [
-            missing_feature(one.name, one.unit, f": {features.reasons.get(one.name, 'no reason given')}")
-            for one, value in zip(tree.schema.attributes, row, strict=True)
+            missing_feature(
+                one.name,
+                one.unit,
+                f": {features.reasons.get(one.columns[0], 'no value that was trained on')}",
+            )
+            for one, value in zip(columns, row, strict=True)
             if math.isnan(value)
         ]
         tests = [
@@ -154,11 +163,13 @@ class C45(Classifier[C45Config]):
         ]
         leaf = leaf_reason(path.with_label, path.support, str(path.label))
         # Where a tested feature is missing, the probability is a mean over leaves and not the share in this one.
-        one_leaf = not any(math.isnan(test.value) for test in tests)
+        tested = [test.value for test in path.numeric_tests] + [test.value for test in path.nominal_tests]
+        one_leaf = not any(map(math.isnan, tested))
+        nominal = [Reason(words=test.words) for test in path.nominal_tests if not math.isnan(test.value)]
         return Prediction(
             label=str(path.label),
             probabilities=dict(zip(self.classes(), path.distribution, strict=True)),
-            because=(*missing, *path_reasons(tests), leaf),
+            because=(*missing, *path_reasons(tests), *nominal, leaf),
             support=(path.with_label, path.support) if one_leaf and path.support > 0 else None,
         )
 
@@ -201,12 +212,14 @@ class C45(Classifier[C45Config]):
         """Load the tree that `to_json` returned. Raises ValueError if `model` is not a stored tree."""
         from graspsense_c45.stored import from_document
 
-        tree = from_document(dict(model))
-        if any(attribute.is_nominal for attribute in tree.schema.attributes):
-            raise ValueError("attributes: a feature is a number, and has no list of values")
-        self._tree = tree
+        self._tree = from_document(dict(model))
 
     def _fitted(self) -> Tree:
         if self._tree is None:
             raise ValueError("the tree is neither fitted nor loaded yet")
         return self._tree
+
+
+def _coded_columns(tree: Tree) -> list[CodedColumn]:
+    """Return the attributes of a tree as columns of a table of features."""
+    return [CodedColumn(one.name, one.unit, one.values) for one in tree.schema.attributes]

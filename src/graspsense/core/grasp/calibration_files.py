@@ -56,13 +56,14 @@ def calibration_path(folder: str | Path, serial: str, kind: str) -> Path:
         raise ConfigError(
             f"calibrations are kept by serial number, and {serial!r} is not one: it has letters, digits and . + - _"
         )
-    kept = _folder(folder)
+    kept = calibration_folder(folder)
     if kept is None:
         raise ConfigError(f"{NOWHERE.format('XDG_DATA_HOME')}, or name one by gripper.calibration")
     return kept / serial / f"{kind}.json"
 
 
-def _folder(given: str | Path) -> Path | None:
+def calibration_folder(given: str | Path) -> Path | None:
+    """Return the folder that this setting names: an empty one that of the user, None if that has no home folder."""
     if given:
         return Path(given).expanduser()
     data = data_folder()
@@ -137,7 +138,7 @@ def calibrations_of(folder: str | Path, serial: str, device: Mapping[str, Any]) 
     Raises ConfigError if `folder` names a folder that does not exist, if another user could have changed a file, or if
     a file was made on another device, or on this one with other numbers; it names the choices. Raises DataDamaged.
     """
-    place = None if folder == UNCALIBRATED else _folder(folder)
+    place = None if folder == UNCALIBRATED else calibration_folder(folder)
     if place is None:
         return {}
     if folder and not place.is_dir():

@@ -69,6 +69,8 @@ class Labelled:
     no_interval: str = ""
     order: tuple[int, ...] | None = None
     no_order: str = ""
+    content: tuple[str, ...] | None = None
+    """Equal for trials that are the same recording, or a part of it; empty where the recording is not known."""
     before_contact: ControlFeatures | None = None
     no_before_contact: str = ""
     first_line: ControlFeatures | None = None
@@ -81,7 +83,7 @@ class Labelled:
     provenance: Mapping[str, Any] = field(factory=dict)
 
     def __attrs_post_init__(self) -> None:
-        for name in ("labels", "instances", "order"):
+        for name in ("labels", "instances", "order", "content"):
             column = getattr(self, name)
             if column is not None and len(column) != len(self.table):
                 raise ValueError(
@@ -116,6 +118,7 @@ class Labelled:
             labels=_picked(self.labels, numbers),
             instances=None if self.instances is None else _picked(self.instances, numbers),
             order=None if self.order is None else _picked(self.order, numbers),
+            content=None if self.content is None else _picked(self.content, numbers),
             before_contact=_control_rows(self.before_contact, which),
             first_line=_control_rows(self.first_line, which),
             value=None

@@ -257,7 +257,7 @@ def _trace_from(
 
 def signals_of(ticks: Sequence[Any]) -> dict[str, SignalTrace]:
     """Return the trace of each further channel, given the values of `Reading.signals` in each tick."""
-    names = ticks[0]._fields if ticks else ()
+    names = getattr(ticks[0], "_fields", ()) if ticks else ()
     return {name: _signal([tick[i] for tick in ticks]) for i, name in enumerate(names)}
 
 

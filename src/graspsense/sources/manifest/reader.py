@@ -42,6 +42,13 @@ def read_recordings(place: str) -> Iterator[LabelledRecording | UnreadableRecord
                 yield from each_readable(table.source, partial(grasps_in, manifest, file, table))
 
 
+def manifest_files(place: str) -> list[Path]:
+    """Return the files that a manifest describes, and its list if it has one. Raises ConfigError, DataDamaged."""
+    manifest = read_manifest(Path(place).expanduser())
+    listed_in = [manifest.place.parent / manifest.keys.list] if manifest.keys.list else []
+    return [*listed_in, *(file.path for file in files_of(manifest))]
+
+
 def tables_of(manifest: ReadManifest, file: NamedFile) -> list[ColumnTable]:
     """Return the tables of a file, each with the facts of its path. Raises ConfigError, DataDamaged."""
     if file.problem:

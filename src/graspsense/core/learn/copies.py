@@ -1,0 +1,199 @@
+"""Copies among trials: the same grasp twice is one trial, whatever it is called and wherever it was read from.
+
+A copy in training and test data at once makes every rate too high, and every interval too narrow. Trials are copies
+of each other if their recordings are equal, or if all of their features are. Features that are counted, or rounded
+coarsely, can be equal by chance; such trials are kept, and a note says so.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from attrs import evolve
+
+from graspsense.core.learn.labelled import Labelled
+from graspsense.core.values.errors import ConfigError
+from graspsense.core.values.nominal import with_codes
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from graspsense.core.values.features import FeatureTable
+
+_SURE: Final = 100.0
+"""Equal pairs to be found for each one that is expected by chance, in a single feature."""
+_SURE_OF_ALL: Final = 10.0
+"""The same for all features together."""
+_ROUNDING: Final = 1e-9
+"""Differences below this share of a range are rounding errors."""
+_COMPARED: Final = 32
+"""Features that are compared with each other, those with the most values."""
+_FEW: Final = 5
+"""With fewer different values than this, their differences do not show the resolution of a column."""
+
+
+def without_copies(labelled: Labelled) -> Labelled:
+    """Return the trials without copies of others, with a note on what is left out.
+
+    Of several copies, the one with the fewest missing features is kept; of these, the first.
+    """
+    original, by_chance = _originals(labelled.table, labelled.content)
+    left_out = np.flatnonzero(original != np.arange(len(labelled)))
+    notes = list(labelled.notes)
+    if by_chance:
+        notes.append(
+            f"{by_chance} trials have exactly the features of another one. They count, because features that are "
+            "counted or rounded can be equal by chance: make sure that no trial is in the data twice"
+        )
+    if not len(left_out):
+        return evolve(labelled, notes=tuple(notes)) if by_chance else labelled
+    notes.append(_left_out(labelled, left_out, original))
+    kept = np.flatnonzero(original == np.arange(len(labelled)))
+    return evolve(labelled.rows(kept), notes=tuple(notes))
+
+
+def apart_from(tested: Labelled, training: Labelled) -> Labelled:
+    """Return the trials of `tested` whose features are not those of a trial of `training`, with a note on the others.
+
+    Raises ConfigError if there are none.
+    """
+    if tested.table.names != training.table.names:
+        return tested
+    values = np.concatenate([training.table.values, tested.table.values])
+    original, _ = _originals(evolve(tested.table, values=values), None)
+    n = len(training)
+    kept = np.flatnonzero(~np.isin(original[n:], original[:n]))
+    if len(kept) == len(tested):
+        return tested
+    if not len(kept):
+        raise ConfigError(
+            f"every trial of {tested.source} is a copy of a trial of {training.source}: test on others"
+        )
+    note = (
+        f"{len(tested) - len(kept)} trials to test on are left out: they are copies of trials to learn from"
+    )
+    return evolve(tested.rows(kept), notes=(*tested.notes, note))
+
+
+def _left_out(labelled: Labelled, left_out: NDArray[np.int64], original: NDArray[np.int64]) -> str:
+    example = int(left_out[0])
+    kept = int(original[example])
+    note = (
+        f"{len(left_out)} trials are left out, because they are copies of others: a copy is not another trial "
+        f"(trial {example + 1} has the same recording or features as trial {kept + 1})"
+    )
+    other = sum(labelled.labels[i] != labelled.labels[original[i]] for i in left_out.tolist())
+    if other:
+        note += f". {other} of them have another label than the trial that is kept: correct the labels"
+    return note
+
+
+def _originals(table: FeatureTable, content: Sequence[str] | None) -> tuple[NDArray[np.int64], int]:
+    """Return the trial that each one is a copy of (itself if of none), and how many are equal perhaps by chance."""
+    values = with_codes(table)[1] + 0.0  # -0.0 and 0.0 are the same number
+    known = ~np.isnan(values)
+    parents = list(range(len(table)))
+    if content is not None:
+        by_content: dict[str, int] = {}
+        parents = [by_content.setdefault(text, i) if text else i for i, text in enumerate(content)]
+    by_row: dict[bytes, int] = {}
+    equal = [by_row.setdefault(row.tobytes(), i) if known[i].any() else i for i, row in enumerate(values)]
+    repeated = [i for i, k in enumerate(equal) if _root(parents, i) != _root(parents, k)]
+    sure: list[int] = []
+    if repeated:
+        distinct = values[np.unique(equal)]
+        by_column = [_is_measured(column, len(repeated)) for column in distinct.T]
+        measured = np.array(by_column, dtype=np.bool_)
+        sure = [i for i in repeated if (measured & known[i]).any()]
+        if not sure and not _can_be_chance(distinct, len(repeated)):
+            sure = repeated
+    for i in sure:
+        parents[_root(parents, i)] = _root(parents, equal[i])
+    families = [_root(parents, i) for i in range(len(parents))]
+    return _best_of(families, known.sum(axis=1).tolist()), len(repeated) - len(sure)
+
+
+def _root(parents: list[int], i: int) -> int:
+    """Return the trial that stands for the family of trial `i`."""
+    while parents[i] != i:
+        parents[i] = i = parents[parents[i]]
+    return i
+
+
+def _best_of(families: Sequence[int], known: Sequence[int]) -> NDArray[np.int64]:
+    """Return, for each trial, the one of its family with the most features, the first of several."""
+    best: dict[int, int] = {}
+    for i, family in enumerate(families):
+        if family not in best or known[i] > known[best[family]]:
+            best[family] = i
+    return np.array([best[family] for family in families], dtype=np.int64)
+
+
+def _is_measured(column: NDArray[np.float64], repeated: int) -> bool:
+    """Return whether so many equal values show copies, because different trials hardly have the same value."""
+    given = column[~np.isnan(column)]
+    distinct = np.unique(given)
+    if len(distinct) < 2:
+        return False
+    if len(distinct) < _FEW:
+        # Only numbers that were calculated with all their digits are sure.
+        digits = max(
+            len(repr(value).partition("e")[0].strip("-0.").replace(".", "")) for value in distinct.tolist()
+        )
+        cells = 10.0**digits / 1e6
+    else:
+        cells = _cells(distinct)
+    ties = len(given) - len(distinct)
+    return ties * _SURE < repeated and _SURE * len(given) ** 2 / (2.0 * cells) < repeated
+
+
+def _cells(distinct: NDArray[np.float64]) -> float:
+    """Return how many values fit into the range of these at the resolution that they show."""
+    span = float(distinct[-1] - distinct[0])
+    step = span
+    for distance in (distinct[1:] - distinct[0]).tolist():
+        distance = abs(math.remainder(distance, step))
+        while distance > _ROUNDING * span:  # Euclid's algorithm
+            step, distance = distance, abs(math.remainder(step, distance))
+    return span / step
+
+
+def _can_be_chance(distinct: NDArray[np.float64], repeated: int) -> bool:
+    """Return whether so many trials may be equal to others of these different ones by chance.
+
+    They may if the values of all features have few combinations, and where trials often agree in all features but one.
+    """
+    finest = np.argsort([-len(np.unique(column)) for column in distinct.T], kind="stable")[:_COMPARED]
+    distinct = _independent(distinct[:, finest])
+    if distinct.shape[1] == 1:
+        return True
+    different = [np.unique(column[~np.isnan(column)]) for column in distinct.T]
+    combinations = math.prod(len(one) if len(one) < _FEW else _cells(one) for one in different if len(one))
+    trials = len(distinct) + repeated
+    if _SURE_OF_ALL * trials**2 / (2.0 * combinations) >= repeated:
+        return True
+    agreeing = 0
+    for left_out in range(distinct.shape[1]):
+        others = Counter(row.tobytes() for row in np.delete(distinct, left_out, axis=1))
+        agreeing += sum(count * (count - 1) // 2 for count in others.values())
+    return agreeing >= repeated
+
+
+def _independent(distinct: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return these columns without those that say the same as one before, such as a length in another unit."""
+    kept: list[NDArray[np.int64]] = []
+    columns = []
+    for column in distinct.T:
+        numbers = np.unique(column, return_inverse=True)[1]
+        n = len(set(numbers.tolist()))
+        if all(
+            not n == len(set(other.tolist())) == len(set(zip(numbers.tolist(), other.tolist(), strict=True)))
+            for other in kept
+        ):
+            kept.append(numbers)
+            columns.append(column)
+    return np.column_stack(columns)

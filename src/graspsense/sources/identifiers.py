@@ -1,0 +1,218 @@
+"""Columns that identify trials instead of measuring them: counters, times, dates, numbers of objects.
+
+Trials are often recorded one label after the other, so that such a column reveals the labels, in whatever order the
+lines are. A measured column may be distinct in every line as well, and may increase with the labels of a sorted file;
+what distinguishes an identifier is that it follows the lines within each label, that it is a calendar date or a clock,
+or that it consists of integers that repeat less than measured ones can.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections import Counter
+from collections.abc import Sequence
+from datetime import datetime
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+_COUNTED: Final = frozenset({"", "1", "-", "#", "count", "counts"})
+_TIMES: Final = frozenset({"s", "sec", "ms", "us", "µs", "ns", "min", "h", "d"})
+_NAMES: Final = frozenset(
+    {
+        "id",
+        "uid",
+        "uuid",
+        "index",
+        "idx",
+        "number",
+        "num",
+        "no",
+        "nr",
+        "trial",
+        "run",
+        "row",
+        "line",
+        "record",
+    }
+    | {
+        "seq",
+        "sequence",
+        "serial",
+        "counter",
+        "file",
+        "filename",
+        "session",
+        "date",
+        "timestamp",
+        "time",
+        "epoch",
+    }
+)
+_LEAST: Final = 5
+"""Lines from which on the values of a column can show that it is an identifier."""
+_FOLLOWS: Final = 0.95
+"""Rank correlation with the lines, within each label, of a counter or a clock."""
+_TIES: Final = 0.2
+_BY_CHANCE: Final = 0.005
+_ORDERS: Final = 10_000
+"""Number of orders of the lines within the labels from which on a rank correlation is no chance."""
+_IRREGULAR: Final = 0.7
+"""Quartile range of the steps of a clock over their median; of sorted measurements it is 1.6 or more on average."""
+_EPOCHS: Final = tuple((6.3e8 * unit, 4.2e9 * unit) for unit in (1.0, 1e3, 1e6, 1e9))
+"""The years 1990 to 2100 in seconds, and smaller units, since 1970."""
+_MOST_VALUES: Final = 1.0 / 3.0
+"""Share of different texts from which on they are no values of a nominal feature."""
+_DATE_TEXT: Final = re.compile(
+    r"(\d{1,4}([-./])\d{1,2}\2\d{1,4})?[T ]?(\d{1,2}(:\d{2}){1,2}(\.\d+)?)?( ?Z| ?[+-]\d\d:?\d\d)?"
+)
+_DATES: Final = ("%Y%m%d", "%Y%m%d%H%M", "%Y%m%d%H%M%S")
+
+
+def identifies(
+    name: str, unit: str, values: Sequence[float], labels: Sequence[str], order: Sequence[int] | None = None
+) -> str:
+    """Return how the values of a column identify trials, such as `number the trials`; empty if they measure something.
+
+    `values` are NaN where they are missing. `order` is the position of each line in the order of recording, where that
+    is not the order of the lines.
+    """
+    if unit not in _COUNTED | _TIMES:
+        return ""
+    column = np.array(values, dtype=np.float64)
+    given = np.flatnonzero(~np.isnan(column))
+    column, known = column[given], [labels[i] for i in given.tolist()]
+    if len(column) < _LEAST or column.min() == column.max():
+        return ""
+    if _is_calendar(column):
+        return "are dates or times"
+    whole = bool((column == np.floor(column)).all())
+    distinct = len(np.unique(column))
+    if len(set(zip(column.tolist(), known, strict=True))) >= (1.0 - _TIES) * len(column):
+        named = bool(_NAMES & set(_words(name)))
+        for lines in (given, None if order is None else np.array(order)[given]):
+            if (
+                lines is not None
+                and _follows(column, lines, known)
+                and (whole or named or _is_regular(column))
+            ):
+                return "follow the order of the lines as a counter or a time does"
+        if whole and (_hardly_repeats(column, distinct) or (named and distinct == len(column))):
+            return "number the trials"
+    if whole and _numbers_objects(column, known):
+        return "number the objects (name them by --instance)"
+    return ""
+
+
+def text_identifies(texts: Sequence[str], labels: Sequence[str]) -> str:
+    """Return how the texts of a column identify trials; empty if they are values of a nominal feature.
+
+    A missing text is empty.
+    """
+    given = [(text, label) for text, label in zip(texts, labels, strict=True) if text]
+    counts = Counter(text for text, _ in given)
+    if len(counts) < 2:
+        return ""
+    if all(map(_is_date, counts)):
+        return "are dates or times"
+    if len(counts) > max(2, len(given) * _MOST_VALUES):
+        return "are texts that hardly repeat, as names of trials, files and remarks do"
+    numbered = all(re.search(r"\d", text) for text in counts)
+    objects = max(_LEAST, 2 * len(set(labels)) + 1)
+    if numbered and len(counts) >= objects and len(set(given)) == len(counts):
+        return "name the objects (say so by --instance)"
+    return ""
+
+
+def _is_date(text: str) -> bool:
+    """Return whether a text is a date or a time of day, as 2026-11-26, 26.11.2026 14:03 or 14:03:22."""
+    return any(character.isdigit() for character in text) and _DATE_TEXT.fullmatch(text) is not None
+
+
+def _words(name: str) -> list[str]:
+    """Return the words of a name such as `trial_id` or `trialId` in lower case."""
+    return [word.lower() for word in re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|#", name)]
+
+
+def _is_calendar(column: NDArray[np.float64]) -> bool:
+    """Return whether these are times since 1970, or dates written as 20261126."""
+    least, most = float(column.min()), float(column.max())
+    if (
+        any(low <= least and most <= high for low, high in _EPOCHS)
+        and len(np.unique(column)) > len(column) / 2
+    ):
+        return True
+    if least < 19_700_101 or (column != np.floor(column)).any():
+        return False
+    return all(_is_written_date(f"{value:.0f}") for value in np.unique(column).tolist())
+
+
+def _is_written_date(text: str) -> bool:
+    for form in _DATES:
+        if len(text) == len(datetime(2000, 1, 1).strftime(form)):
+            try:
+                return 1970 <= datetime.strptime(text, form).year <= 2100
+            except ValueError:
+                return False
+    return False
+
+
+def _follows(column: NDArray[np.float64], lines: NDArray[np.int64], labels: Sequence[str]) -> bool:
+    """Return whether the values rise, or fall, with these positions within each label, or over all of them."""
+    steps = np.diff(column[np.argsort(lines)])
+    if (steps > 0.0).all() or (steps < 0.0).all():
+        return True
+    codes = np.unique(np.array(labels), return_inverse=True)[1]
+    sizes = Counter(np.bincount(codes).tolist())
+    if sum(times * math.lgamma(size + 1) for size, times in sizes.items()) < math.log(_ORDERS):
+        return False
+    ranks, places = _ranks(column, codes), _ranks(lines.astype(np.float64), codes)
+    scale = math.sqrt(float(ranks @ ranks) * float(places @ places))
+    return scale > 0.0 and abs(float(ranks @ places)) >= _FOLLOWS * scale
+
+
+def _ranks(values: NDArray[np.float64], codes: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return the rank of each value in its group, from the middle of the group; equal ones have their mean rank."""
+    counts = np.bincount(codes)
+    order = np.lexsort((values, codes))
+    inside = np.arange(len(values)) - (np.cumsum(counts) - counts)[codes[order]]
+    changes = (np.diff(codes[order]) != 0) | (np.diff(values[order]) != 0.0)
+    tie = np.concatenate([[0], np.cumsum(changes)])
+    ranks = np.empty(len(values))
+    ranks[order] = (np.bincount(tie, weights=inside) / np.bincount(tie))[tie]
+    return ranks - (counts[codes] - 1) / 2.0
+
+
+def _is_regular(column: NDArray[np.float64]) -> bool:
+    """Return whether the steps between these values are alike, as those of a clock are."""
+    low, middle, high = np.quantile(np.diff(np.unique(column)), (0.25, 0.5, 0.75))
+    return bool(high - low < _IRREGULAR * middle)
+
+
+def _hardly_repeats(column: NDArray[np.float64], distinct: int) -> bool:
+    """Return whether integers repeat so rarely that they cannot be measured, if all in their range are as frequent."""
+    n, cells = len(column), float(column.max() - column.min()) + 1.0
+    ties = n - distinct
+    if ties == 0:
+        return bool(np.log1p(-np.arange(n) / max(cells, n)).sum() < math.log(_BY_CHANCE))
+    expected = n - cells * (1.0 - (1.0 - 1.0 / cells) ** n)
+    # The number of ties is about a Poisson variable.
+    terms = [math.exp(k * math.log(expected) - expected - math.lgamma(k + 1)) for k in range(ties + 1)]
+    return sum(terms) < _BY_CHANCE
+
+
+def _numbers_objects(column: NDArray[np.float64], labels: Sequence[str]) -> bool:
+    """Return whether integers number objects: each belongs to one label, and all have as many lines, or one block."""
+    pairs = set(zip(column.tolist(), labels, strict=True))
+    counts = Counter(column.tolist())
+    objects = len(counts)
+    if len(pairs) > objects or objects < max(_LEAST, 2 * len(set(labels)) + 1):
+        return False
+    if column.max() - column.min() + 1.0 > 2.0 * objects or min(counts.values()) < 2:
+        return False
+    blocks = 1 + int((np.diff(column) != 0.0).sum())
+    return blocks == objects or len(set(counts.values())) == 1

@@ -1,0 +1,171 @@
+"""The content of what a result is computed from: hashes of data, stores, scenes, models, calibrations and plugin code.
+
+A name stays the same when its file is replaced. A result that is kept is therefore known by these hashes.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Iterable, Iterator, Mapping
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, Final
+
+from graspsense import __version__
+from graspsense.core.components.registry import installed
+from graspsense.core.grasp.calibration_files import calibration_folder
+from graspsense.core.values.errors import GraspsenseError
+from graspsense.core.values.json_values import json_text
+
+FRAMEWORK: Final = "graspsense"
+_OWN_PLUGINS: Final = "graspsense.plugins"
+_STORE: Final = "store"
+_CALIBRATION: Final = "calibration"
+
+
+def contents_of(params: Any) -> dict[str, str]:
+    """Return the hash of each input that these parameters name, by the text that names it, and our own version.
+
+    Parameters are JSON values. A text names an input if it is a file, if a file or folder follows its colon
+    (`store:DIR`, `identified:cup.toml,mug.toml`), or if it is the qualified name of a component.
+    """
+    found = {FRAMEWORK: __version__}
+    codes = _codes()
+    for text in set(input_names(params)) - found.keys():
+        content = _content(text, codes)
+        if content is not None:
+            found[text] = content
+    return found
+
+
+def input_names(params: Any) -> Iterator[str]:
+    """Yield every text that may name an input of these parameters."""
+    yield FRAMEWORK
+    yield from _texts(params)
+
+
+def _texts(value: Any) -> Iterator[str]:
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, Mapping):
+        for key, inner in value.items():
+            if key == _CALIBRATION and isinstance(inner, str):
+                folder = calibration_folder(inner)
+                yield from () if folder is None else (f"{_CALIBRATION}:{folder}",)
+            yield from _texts(inner)
+    elif isinstance(value, list | tuple):
+        for inner in value:
+            yield from _texts(inner)
+
+
+def _content(text: str, codes: Mapping[str, tuple[str, str]]) -> str | None:
+    """Return the hash of what a text names; None if it names no input. `codes` are those of `_codes`."""
+    if "\n" in text:
+        return None  # the text of a scene, which is its own content
+    code = codes.get(text)
+    if code is not None:
+        return _hash_of_code(*code)
+    kind, colon, places = text.partition(":")
+    if kind == _STORE and colon:
+        return _hash_of_store(places)
+    paths = [_path(place) for place in (places if colon else text).split(",")]
+    if not all(os.path.isfile(path) or (colon and os.path.isdir(path)) for path in paths):
+        return None
+    parts = [_hash_of_files(path, kind) for path in paths]
+    reader = codes.get(f"{kind}:") if colon else None
+    return _hash([*parts, *(() if reader is None else (_hash_of_code(*reader),))])
+
+
+def _path(place: str) -> str:
+    """Return the path of a place, without the number of an object or of a recording behind it."""
+    path = os.path.expanduser(place.strip())
+    whole, mark, number = path.rpartition("#")
+    return whole if mark and number.isdecimal() else path
+
+
+def _codes() -> dict[str, tuple[str, str]]:
+    """Return version and module of every component by its qualified name, and of every data set as `NAME:`."""
+    found = {
+        part.qualified: (part.version, part.entry.target.partition(":")[0])
+        for part in installed().components()
+    }
+    for part in installed().datasets():
+        target = part.entry.target or part.entry.recordings
+        found[f"{part.name}:"] = (part.version, target.partition(":")[0])
+    return found
+
+
+@cache
+def _hash_of_code(version: str, module: str) -> str:
+    """Return a hash of a version and of all files of the package that a module is in."""
+    package = _OWN_PLUGINS if module.startswith(f"{_OWN_PLUGINS}.") else module.partition(".")[0]
+    if package == FRAMEWORK:
+        return version
+    spec = find_spec(package)
+    places = [] if spec is None else list(spec.submodule_search_locations or [spec.origin or ""])
+    return _hash([version, *(_hash_of_tree(place) for place in places if os.path.exists(place))])
+
+
+def _hash_of_store(folder: str) -> str:
+    """Return a hash of the trials of a store, of their labels, and of all changes of them."""
+    from graspsense.store.store import Store
+
+    try:
+        with Store.read(folder) as store:
+            trials = store.query("SELECT id, sha256, label, instance, set_aside FROM trial ORDER BY id")
+            changes = store.query('SELECT trial, "action", "before", "after" FROM change ORDER BY id')
+    except GraspsenseError as error:
+        return _hash([str(error)])  # the task tells it
+    return _hash([json_text([list(row) for row in (*trials, *changes)])])
+
+
+def _hash_of_files(path: str, kind: str) -> str:
+    """Return the hash of a file or a folder, and of the files that a manifest describes."""
+    if kind != "manifest":
+        return _hash_of_tree(path)
+    from graspsense.sources.manifest.reader import manifest_files
+
+    try:
+        files = manifest_files(path)
+    except GraspsenseError:
+        files = []  # the task tells it
+    return _hash(_hash_of_tree(str(file)) for file in (path, *files))
+
+
+def _hash_of_tree(path: str) -> str:
+    """Return the hash of a file, or of all files below a folder with their names; hidden ones do not count."""
+    if not os.path.isdir(path):
+        return _hash_of_file(path)
+    parts = []
+    for folder, folders, names in os.walk(path):
+        folders[:] = sorted(name for name in folders if not name.startswith((".", "__pycache__")))
+        for name in sorted(names):
+            file = os.path.join(folder, name)
+            if not name.startswith("."):
+                parts.append(f"{os.path.relpath(file, path)} {_hash_of_file(file)}")
+    return _hash(parts)
+
+
+def _hash_of_file(path: str) -> str:
+    """Return the hash of a regular file; of what cannot be read, why."""
+    try:
+        if not os.path.isfile(path):
+            return "no file"
+        state = os.stat(path)
+        return _read_hash(path, state.st_size, state.st_mtime_ns, state.st_ino)
+    except OSError as error:
+        return str(error.strerror)
+
+
+@cache
+def _read_hash(path: str, size: int, changed_ns: int, inode: int) -> str:
+    """Return the hash of a file in this state, which is read once."""
+    del size, changed_ns, inode
+    with Path(path).open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _hash(parts: Iterable[str]) -> str:
+    return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:32]

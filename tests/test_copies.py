@@ -1,0 +1,178 @@
+"""A copy is not another trial: what is stored, recovered, imported or pasted twice counts once."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from graspsense.cli.main import main
+from graspsense.core.learn.copies import apart_from, without_copies
+from graspsense.core.learn.labelled import Labelled
+from graspsense.core.values.errors import ConfigError
+from graspsense.core.values.features import FeatureTable
+from graspsense.core.values.signals import Frame, Reading, no_pads
+from graspsense.recording.same_grasp import curve_bytes, grasp_numbers
+from graspsense.sources.trial_source import load_trials
+from graspsense.store.recover import recover_file
+
+
+def labelled(values, labels=None, content=None):
+    values = np.array(values, dtype=float)
+    names = tuple(f"f{i}" for i in range(values.shape[1]))
+    return Labelled(
+        source="made here",
+        table=FeatureTable(names=names, units=("",) * len(names), values=values),
+        labels=tuple(labels or ["a", "b"] * (len(values) // 2) + ["a"] * (len(values) % 2)),
+        content=content,
+    )
+
+
+def command(words):
+    with pytest.raises(SystemExit) as ended:
+        main(words)
+    return ended.value.code
+
+
+def measured(trials=40, features=3, seed=0):
+    return np.random.default_rng(seed).normal(size=(trials, features))
+
+
+def copies_said(trials):
+    return [note for note in trials.notes if "copies" in note]
+
+
+@given(
+    seed=st.integers(0, 1000),
+    times=st.integers(2, 6),
+    features=st.integers(1, 4),
+    digits=st.sampled_from([5, 17]),
+)
+def test_measured_trials_count_once_however_often_they_are_pasted(seed, times, features, digits):
+    values = np.array([[float(f"{v:.{digits}g}") for v in row] for row in measured(30, features, seed)])
+    rng = np.random.default_rng(seed)
+    order = rng.permutation(np.tile(np.arange(30), times))
+    found = without_copies(labelled(values[order], [f"{i % 2}" for i in order]))
+    assert sorted(map(tuple, found.table.values)) == sorted(map(tuple, values))
+    assert copies_said(found)
+
+
+def test_trials_without_copies_stay_as_they_are():
+    trials = labelled(measured())
+    assert without_copies(trials) is trials
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        np.random.default_rng(1).integers(0, 4, size=(60, 1)),  # counts
+        np.random.default_rng(1).integers(0, 3, size=(200, 4)),  # marks on a scale
+        np.random.default_rng(1).integers(40, 60, size=(60, 1)) * 0.001,  # a width in whole millimetres
+        np.random.default_rng(1).integers(300, 360, size=(200, 1)) * 7.3e-5,  # ticks of an encoder
+        np.random.default_rng(1).integers(0, 2, size=(60, 1)) * [[1e-9, 0.0]],  # on and off
+    ],
+)
+def test_coarse_features_that_are_equal_by_chance_count_and_it_is_said(values):
+    found = without_copies(labelled(values))
+    assert len(found) == len(values)
+    assert any("by chance" in note for note in found.notes)
+
+
+def test_copies_of_coarse_trials_are_found_where_chance_cannot_make_them():
+    values = np.random.default_rng(2).integers(0, 50, size=(30, 6))
+    assert len(without_copies(labelled(np.concatenate([values, values])))) == 30
+
+
+def test_a_trial_without_any_feature_is_no_copy():
+    values = measured()
+    values[::4] = np.nan
+    assert len(without_copies(labelled(values))) == 40
+
+
+def test_of_a_grasp_with_a_damaged_copy_the_one_with_more_features_is_kept():
+    values = measured(4)
+    values[1, 1:] = np.nan
+    found = without_copies(labelled(values, "abab", content=("", "x", "x", "")))
+    assert found.table.values.tolist() == np.delete(values, 1, axis=0).tolist()
+
+
+def test_a_copy_with_another_label_is_said():
+    values = measured(10)
+    found = without_copies(labelled(np.concatenate([values, values[:1]]), [*"ababababab", "b"]))
+    assert len(found) == 10
+    assert "another label" in copies_said(found)[0]
+
+
+def test_trials_that_were_learned_from_are_not_tested_on():
+    training, others = labelled(measured(seed=0)), measured(seed=1)
+    mixed = labelled(np.concatenate([others, training.table.values[:7]]))
+    found = apart_from(mixed, training)
+    assert found.table.values.tolist() == others.tolist()
+    assert "7 trials" in copies_said(found)[0]
+    with pytest.raises(ConfigError, match="every trial"):
+        apart_from(training, training)
+
+
+def readings(force, ticks=40):
+    # Without a force, nothing moves.
+    frames = (
+        Frame(k * 0.01, 0.01, 0.06 - 0.001 * force * k, 0.0, 5.0, force * k, force * k, 0.0, 0.0, 0)
+        for k in range(ticks)
+    )
+    return [Reading(frame, no_pads(0), ()) for frame in frames]
+
+
+def test_the_part_of_a_recording_is_of_the_same_grasp():
+    still = readings(0.0)
+    curves = [readings(0.1)[:25], readings(0.1), readings(0.2), readings(0.1), still, still[:20]]
+    assert grasp_numbers([curve_bytes(one) for one in curves]) == [1, 1, 2, 1, 4, 5]
+
+
+def table_of_noise(path, copies):
+    rng = np.random.default_rng(3)
+    lines = [f"{'ab'[i % 2]},{rng.normal():.4f},{rng.normal():.4f}" for i in range(40)]
+    path.write_text("object,w,s\n" + "\n".join(lines * copies) + "\n")
+    return str(path)
+
+
+def test_doubling_the_lines_of_a_table_changes_no_rate(tmp_path, capsys):
+    found = []
+    for copies in (1, 2):
+        path = table_of_noise(tmp_path / f"{copies}.csv", copies)
+        assert command(["evaluate", path, "--label", "object", "--json"]) == 0
+        found.append(json.loads(capsys.readouterr().out))
+    assert found[0]["headline"] == found[1]["headline"]
+    assert any("copies" in note for note in found[1]["notes"])
+
+
+def test_each_grasp_that_run_saves_is_another_one_unless_a_seed_is_given(tmp_path, capsys):
+    store = str(tmp_path / "s")
+
+    def run(*words):
+        assert command(["run", "--save", store, "--label", "can:empty_open", "--json", *words]) == 0
+        said = capsys.readouterr()
+        return json.loads(said.out)["seed"], said.err
+
+    drawn = [run() for _ in range(3)]
+    assert len({seed for seed, _ in drawn}) == 3
+    assert f"--seed {drawn[0][0]}" in drawn[0][1]
+    assert run("--seed", "5")[0] == run("-o", "run.seed=5")[0] == 5
+    trials = load_trials(f"store:{store}")
+    assert len(trials) == 4
+    assert "1 trials" in copies_said(trials)[0]
+
+
+def test_a_damaged_recording_and_its_recovered_copy_are_one_trial(tmp_path, capsys):
+    folder = tmp_path / "s"
+    for seed, label in enumerate(["can:empty_open", "odwalla:full_open"]):
+        assert command(["run", "--save", str(folder), "--label", label, "--seed", str(seed)]) == 0
+    recording = sorted((folder / "recordings").glob("*.mcap"))[0]
+    recording.write_bytes(recording.read_bytes()[:-200])
+    copy = recover_file(recording, tmp_path / "copy.mcap").recording
+    assert command(["import", str(copy), "--label", "can:empty_open", "--save", str(folder)]) == 0
+    trials = load_trials(f"store:{folder}")
+    assert len(trials) == 2
+    assert copies_said(trials)

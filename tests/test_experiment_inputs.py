@@ -1,0 +1,228 @@
+"""Results are of the content of their inputs: what was replaced since is computed again, and nothing else."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import wayward
+from attrs import evolve
+from kept import keep
+
+from graspsense.core.values.errors import ConfigError
+from graspsense.experiments.executors.serial import Serial
+from graspsense.experiments.experiment import read_experiment
+from graspsense.experiments.results import Results
+from graspsense.experiments.run import run_experiment
+from graspsense.experiments.summary import summarise
+from graspsense.sources.input_content import contents_of
+from graspsense.store.changes import set_aside
+from graspsense.store.store import Store
+
+EXPERIMENT = """
+title = "a"
+question = "b?"
+classifiers = ["knn"]
+[data]
+source = "{source}"
+{label}
+[judge]
+controls = false
+folds = 2
+grasps = 0
+"""
+
+
+def experiment(folder, source, label='label = "what"', more=""):
+    path = folder / "e.toml"
+    path.write_text(EXPERIMENT.format(source=source, label=label) + more)
+    return str(path)
+
+
+def rate_of(planned, results):
+    (condition,) = summarise(planned, results).conditions
+    return condition.rate.mean, condition.by_seed[0].rate.n
+
+
+def table(path, seed, separation):
+    rng = np.random.default_rng(seed)
+    lines = [f"{'ab'[i % 2]},{rng.normal(separation * (i % 2)):.6f}" for i in range(40)]
+    path.write_text("what,w [m]\n" + "\n".join(lines) + "\n")
+
+
+def test_a_replaced_table_is_evaluated_anew_and_it_is_said(tmp_path):
+    table(tmp_path / "t.csv", 1, 50.0)
+    file, results = experiment(tmp_path, "t.csv"), Results(tmp_path / "out")
+    run_experiment(read_experiment(file), results, Serial)
+    assert rate_of(read_experiment(file), results) == (1.0, 40)
+
+    table(tmp_path / "t.csv", 2, 0.0)
+    account = run_experiment(read_experiment(file), results, Serial, resume=True)
+    assert (account.kept, account.done) == (0, 1)
+    assert any("t.csv" in note for note in account.notes)
+    assert rate_of(read_experiment(file), results)[0] < 0.9
+    again = run_experiment(read_experiment(file), results, Serial, resume=True)
+    assert (again.kept, again.done, again.notes) == (1, 0, ())
+
+
+def test_the_page_of_results_is_that_of_the_content_that_they_were_made_from(tmp_path):
+    table(tmp_path / "t.csv", 1, 50.0)
+    results = Results(tmp_path / "out")
+    run_experiment(read_experiment(experiment(tmp_path, "t.csv")), results, Serial)
+    table(tmp_path / "t.csv", 2, 0.0)
+    assert rate_of(results.experiment(), results) == (1.0, 40)
+
+
+def grasps(store, numbers):
+    for k in numbers:
+        keep(
+            store,
+            ("can:full_open", "can:empty_open")[k % 2],
+            values=(0.06 + 0.00013 * k, 5.0 + k % 2),
+            grasp=k,
+        )
+
+
+def test_a_store_that_grew_or_was_corrected_is_another_input(tmp_path):
+    with Store.open(tmp_path / "s") as store:
+        grasps(store, range(12))
+        file, results = experiment(tmp_path, "store:s", label=""), Results(tmp_path / "out")
+        run_experiment(read_experiment(file), results, Serial)
+        assert rate_of(read_experiment(file), results)[1] == 12
+
+        grasps(store, range(12, 24))
+        account = run_experiment(read_experiment(file), results, Serial, resume=True)
+        assert (account.kept, account.done) == (0, 1)
+        assert rate_of(read_experiment(file), results)[1] == 24
+
+        set_aside(store, [3], "slipped")
+        assert run_experiment(read_experiment(file), results, Serial, resume=True).done == 1
+        assert rate_of(read_experiment(file), results)[1] == 23
+
+
+@pytest.fixture
+def scene(tmp_path):
+    path = tmp_path / "cup.toml"
+    path.write_text("width_m = 0.06\n")
+    return path
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["{}/cup.toml", "{}/cup.toml#2", "identified:{}/cup.toml,{}/mug.toml", "icub:{}", "mcap:{}/cup.toml"],
+)
+def test_files_and_folders_are_known_by_their_content(tmp_path, scene, name):
+    (tmp_path / "mug.toml").write_text("")
+    name = name.format(tmp_path, tmp_path)
+    params = {"data": {"named": {"cup": name}}}
+    before = contents_of(params)
+    assert name in before
+    assert contents_of(params) == before
+    scene.write_text("width_m = 0.07\n")
+    assert contents_of(params)[name] != before[name]
+
+
+def test_files_that_a_manifest_describes_count_wherever_they_are(tmp_path):
+    (tmp_path / "here").mkdir()
+    (tmp_path / "there").mkdir()
+    manifest = tmp_path / "here" / "m.toml"
+    manifest.write_text(
+        'folder = "../there"\nfiles = "{label}.csv"\ntime = "t [s]"\ngap = "gap [m]"\nforce = "F [N]"\n'
+    )
+    data = tmp_path / "there" / "can.csv"
+    data.write_text("t,gap,F\n0,0.1,0\n")
+    name = f"manifest:{manifest}"
+    before = contents_of([name])[name]
+    data.write_text("t,gap,F\n0,0.2,0\n")
+    assert contents_of([name])[name] != before
+
+
+def test_the_calibrations_of_a_gripper_count_with_and_without_their_setting(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
+    folder = tmp_path / "graspsense" / "calibration" / "S1"
+    folder.mkdir(parents=True)
+    for given in ("", str(folder.parent)):
+        params = {"gripper": {"calibration": given}}
+        (folder / "tare.json").write_text("1")
+        before = contents_of(params)
+        (folder / "tare.json").write_text("2")
+        assert contents_of(params) != before
+
+
+def test_the_code_of_a_plugin_and_its_version_count(tmp_path, monkeypatch):
+    import graspsense.sources.input_content as module
+
+    (tmp_path / "my_plugin").mkdir()
+    law = tmp_path / "my_plugin" / "law.py"
+    law.write_text("a = 1")
+    monkeypatch.syspath_prepend(tmp_path)
+
+    def content(version):
+        module._hash_of_code.cache_clear()  # as in another process
+        return module._hash_of_code(version, "my_plugin.law")
+
+    before = content("1.0")
+    assert content("1.0") == before
+    assert content("1.1") != before
+    law.write_text("a = 22")
+    assert content("1.0") != before
+
+
+def test_the_components_of_a_task_are_inputs(tmp_path):
+    table(tmp_path / "t.csv", 1, 1.0)
+    planned = read_experiment(experiment(tmp_path, "t.csv"))
+    assert planned.inputs.keys() >= {str(tmp_path / "t.csv"), "graspsense/knn", "graspsense"}
+    (task,) = planned.tasks()
+    assert (
+        task.key != evolve(planned, inputs={**planned.inputs, "graspsense/knn": "other code"}).tasks()[0].key
+    )
+    assert task.key == evolve(planned, inputs={**planned.inputs, "another/part": "other code"}).tasks()[0].key
+
+
+def test_what_is_no_file_is_no_input():
+    assert contents_of({"a": "can:full_open", "b": ["", "a\nb = 1\n"], "c": 3, "d": None}).keys() == {
+        "graspsense"
+    }
+
+
+@pytest.mark.parametrize(
+    ("sweep", "key"),
+    [
+        ('"controller.probing_force_n" = [17.0, 20.0]', "controller.probing_force_n"),
+        ('"gripper.coulomb_n" = [1.0, 2.0]', "gripper.coulomb_n"),
+        ('"features.type" = ["chitta", "curve"]', "features.type"),
+        ('"run.hold_s" = [0.1, 0.2]', "run.hold_s"),
+        ('"data.instances" = [2, 3]', "data.instances"),
+    ],
+)
+def test_a_sweep_without_effect_on_a_table_is_refused(tmp_path, sweep, key):
+    (tmp_path / "t.csv").write_text(wayward.CSV)
+    with pytest.raises(ConfigError, match=f"{key} makes no difference"):
+        read_experiment(experiment(tmp_path, "t.csv", more=f"[sweep]\n{sweep}\n"))
+
+
+def test_pipelines_that_differ_in_nothing_that_a_table_depends_on_are_refused(tmp_path):
+    (tmp_path / "t.csv").write_text(wayward.CSV)
+    (tmp_path / "p.toml").write_text('extends = "default"\n[controller]\nprobing_force_n = 17.0\n')
+    file = experiment(tmp_path, "t.csv")
+    text = 'pipelines = ["default", "p.toml"]\n'
+    (tmp_path / "e.toml").write_text(text + (tmp_path / "e.toml").read_text())
+    with pytest.raises(ConfigError, match="pipeline makes no difference"):
+        read_experiment(file)
+
+
+@pytest.mark.parametrize(
+    ("sweep", "tasks"),
+    [
+        ('"judge.folds" = [2, 3]', 2),
+        ('"data.columns" = [["p"], ["q"]]', 2),
+        ('"classifier.neighbours" = [1, 3]', 1),  # of two classifiers
+    ],
+)
+def test_a_sweep_that_a_table_depends_on_is_planned(tmp_path, sweep, tasks):
+    table(tmp_path / "t.csv", 1, 1.0)
+    text = (tmp_path / "t.csv").read_text().replace("w [m]", "p").splitlines()
+    (tmp_path / "t.csv").write_text(
+        "\n".join([f"{text[0]},q", *(f"{line},{k % 7}.5" for k, line in enumerate(text[1:]))])
+    )
+    planned = read_experiment(experiment(tmp_path, "t.csv", more=f"[sweep]\n{sweep}\n"))
+    assert len({task.key for task in planned.tasks()}) == tasks

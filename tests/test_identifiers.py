@@ -1,0 +1,130 @@
+"""What identifies a trial is not a feature, in whatever order the lines are; what was measured is one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from graspsense.core.values.errors import ConfigError
+from graspsense.sources.features_csv import read_labelled
+from graspsense.sources.identifiers import identifies
+
+LABELS = ("can",) * 30 + ("jar",) * 30
+N = len(LABELS)
+
+
+def swapped(values):
+    return [values[1], values[0], *values[2:]]
+
+
+def tied(values):
+    return [*values[:7], values[6], *values[8:]]
+
+
+COUNTERS = {
+    "a trial number": range(N),
+    "with gaps": np.cumsum(np.random.default_rng(0).integers(1, 9, N)),
+    "with large gaps": np.cumsum(np.random.default_rng(0).integers(1, 500, N)),
+    "a clock in seconds": np.cumsum(np.random.default_rng(0).normal(20.0, 3.0, N)),
+    "a clock with a pause": [12.5 * i + 3000.0 * (i >= 30) for i in range(N)],
+    "seconds since 1970": [1.7e9 + 31.7 * i for i in range(N)],
+    "milliseconds since 1970": [1_700_000_000_123 + 31_700 * i for i in range(N)],
+    "dates": [20260101 + i % 28 + 100 * (i // 28) for i in range(N)],
+    "dates of sessions": [20260101 + i // 15 for i in range(N)],
+    "times": [20261126093000 + i % 30 + 100 * (i // 30) for i in range(N)],
+}
+ORDERS = {"as it is": list, "falling": lambda values: list(values)[::-1], "a swap": swapped, "a tie": tied}
+
+
+@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize("counter", COUNTERS)
+def test_a_counter_or_a_time_is_no_feature_in_any_order(counter, order):
+    assert identifies("x", "", ORDERS[order](list(COUNTERS[counter])), LABELS)
+
+
+@given(
+    seed=st.integers(0, 10_000),
+    counter=st.sampled_from(["a trial number", "seconds since 1970", "dates", "times"]),
+)
+def test_nor_where_the_lines_are_shuffled(seed, counter):
+    order = np.random.default_rng(seed).permutation(N)
+    assert identifies("x", "", np.array(COUNTERS[counter])[order], [LABELS[i] for i in order])
+
+
+@pytest.mark.parametrize("name", ["trial_id", "runNumber", "No", "index", "file"])
+def test_a_number_with_gaps_is_known_by_its_name_where_the_lines_are_shuffled(name):
+    order = np.random.default_rng(1).permutation(N)
+    values = np.array(COUNTERS["with large gaps"])[order]
+    labels = [LABELS[i] for i in order]
+    assert identifies(name, "", values, labels)
+    assert not identifies("force", "", values, labels)
+
+
+def test_a_counter_of_each_label_is_no_feature():
+    assert identifies("x", "", [*range(30), *range(30)], LABELS)
+
+
+def test_numbers_of_objects_are_instances_and_no_features():
+    objects = np.repeat(np.arange(12), 5)
+    order = np.random.default_rng(1).permutation(N)
+    assert "--instance" in identifies("x", "", objects, LABELS)
+    assert "--instance" in identifies("x", "", objects[order], [LABELS[i] for i in order])
+
+
+def test_what_follows_the_order_of_recording_is_no_feature_where_the_lines_are_sorted_otherwise():
+    order = np.random.default_rng(1).permutation(N)
+    clock = np.array(COUNTERS["a clock in seconds"])[order]
+    labels = [LABELS[i] for i in order]
+    assert identifies("x", "", clock, labels, order.tolist())
+
+
+@given(seed=st.integers(0, 10_000), scale=st.sampled_from([1e-6, 1e-3, 1.0, 50.0]))
+def test_a_measured_column_is_a_feature_in_a_file_sorted_by_its_labels(seed, scale):
+    rng = np.random.default_rng(seed)
+    labels = [f"size {i // 12}" for i in range(N)]
+    rising = [scale * (i // 12 + rng.normal(0.0, 0.1)) for i in range(N)]
+    noise = rng.normal(0.0, scale, N)
+    for values in (rising, rising[::-1], noise, sorted(noise), np.round(noise / scale * 40.0)):
+        assert not identifies("width", "", values, labels)
+
+
+@given(seed=st.integers(0, 10_000))
+def test_counts_and_ticks_that_were_measured_are_features(seed):
+    rng = np.random.default_rng(seed)
+    for values in (
+        rng.normal([300.0] * 30 + [500.0] * 30, 60.0).round(),  # counts of an analog-to-digital converter
+        rng.normal([50.0] * 30 + [70.0] * 30, 2.0).round(),  # a width in whole millimetres
+        rng.poisson([3.0] * 30 + [9.0] * 30),  # contacts
+        rng.integers(0, 2, N),
+    ):
+        assert not identifies("x", "", values.astype(float), LABELS)
+
+
+def test_what_has_the_unit_of_a_measurement_is_one():
+    assert not identifies("width", "mm", list(range(N)), LABELS)
+    assert identifies("t", "s", [3.0 * i for i in range(N)], LABELS)
+
+
+def table(path, column, values, measured=True):
+    rng = np.random.default_rng(5)
+    lines = [f"{label},{value},{rng.normal():.3f}" for label, value in zip(LABELS, values, strict=True)]
+    text = "\n".join(lines if measured else [line.rpartition(",")[0] for line in lines])
+    path.write_text(f"object,{column}{',s' if measured else ''}\n{text}\n")
+    return path
+
+
+def test_an_identifier_is_said_and_used_only_where_it_is_named(tmp_path):
+    path = table(tmp_path / "t.csv", "trial_id", range(N)[::-1])
+    found = read_labelled(path, "object")
+    assert found.table.names == ("s",)
+    assert any("trial_id" in note and "to include them" in note for note in found.notes)
+    chosen = read_labelled(path, "object", features=["trial_id", "s"])
+    assert chosen.table.names == ("trial_id", "s")
+    assert any("trial_id" in note and "reveal" in note for note in chosen.notes)
+
+
+def test_a_table_of_identifiers_alone_says_why_nothing_is_left(tmp_path):
+    with pytest.raises(ConfigError, match=r"trial_id.*to include them"):
+        read_labelled(table(tmp_path / "t.csv", "trial_id", range(N), measured=False), "object")

@@ -1,0 +1,238 @@
+"""Texts of a table are nominal features of every classifier; ARFF files are read as their header says."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from graspsense.cli.main import main
+from graspsense.core.components.config import select_component
+from graspsense.core.values.errors import ConfigError, DataDamaged
+from graspsense.core.values.features import FeatureTable
+from graspsense.core.values.nominal import codes_of, value_name, with_codes
+from graspsense.evaluation.evaluate import evaluate
+from graspsense.sources.features_csv import read_labelled, read_table
+from graspsense.sources.trial_source import load_trials
+
+WEATHER = """\
+% The weather data of J. R. Quinlan (1986).
+@RELATION weather
+
+@attribute outlook {sunny, overcast, 'very rainy'}
+@attribute temperature REAL
+@attribute humidity integer
+@attribute windy {TRUE, FALSE}
+@attribute play {yes, no}
+
+@data
+sunny,85,85,FALSE,no
+sunny,80,90,TRUE,no
+overcast,83,86,FALSE,yes
+'very rainy',70,96,FALSE,yes
+'very rainy',68,80,FALSE,yes
+'very rainy',65,70,TRUE,no
+overcast,64,65,TRUE,yes
+sunny,72,95,FALSE,no
+sunny,69,70,FALSE,yes
+'very rainy',75,80,FALSE,yes
+sunny,75,70,TRUE,yes
+overcast,72,90,TRUE,yes
+overcast,81,75,FALSE,yes
+"very rainy",71,91,TRUE,no
+"""
+
+
+def command(words):
+    with pytest.raises(SystemExit) as ended:
+        main(list(map(str, words)))
+    return ended.value.code
+
+
+@pytest.fixture
+def weather(tmp_path):
+    path = tmp_path / "weather.arff"
+    path.write_text(WEATHER)
+    return path
+
+
+def shapes(folder, seed=0, trials=60):
+    """Write trials whose label is decided by a text and a number together, with some texts missing."""
+    rng = np.random.default_rng(seed)
+    lines = []
+    for i in range(trials):
+        colour = ("red", "green", "blue")[i % 3]
+        weight = rng.uniform(0.0, 1.0)
+        label = "a" if colour == "red" or (colour == "blue" and weight > 0.5) else "b"
+        lines.append(f"{label},{colour if i % 20 else ''},{weight:.6f}")
+    path = folder / "shapes.csv"
+    path.write_text("what,colour,weight [kg]\n" + "\n".join(lines) + "\n")
+    return path
+
+
+@pytest.mark.parametrize("classifier", ["c45", "ebm", "forest", "knn", "svm", "tree", "boosted"])
+def test_a_text_reaches_every_classifier(tmp_path, classifier):
+    trials = read_labelled(shapes(tmp_path), "what")
+    assert trials.table.names == ("colour=blue", "colour=green", "colour=red", "weight")
+    found = evaluate(
+        select_component("classifier", classifier),
+        trials,
+        classifier=classifier,
+        folds=5,
+        controls=False,
+        learning_curve=False,
+    )
+    # The weight alone decides for one of three colours: 2 of 3 and no more are right without the colour.
+    assert found.headline.rate > 0.8
+
+
+def test_c45_grows_the_published_tree_of_the_weather_data(weather):
+    trials = load_trials(str(weather))
+    classifier = select_component("classifier", "c45").create()
+    classifier.fit(trials.table, trials.labels, 0)
+    assert [(node.branch, node.label, node.trials, node.wrong) for node in classifier.tree()] == [
+        ("", "yes", 14.0, 5.0),
+        ("outlook = sunny", "no", 5.0, 2.0),
+        ("outlook = overcast", "yes", 4.0, 0.0),
+        ("outlook = very rainy", "yes", 5.0, 2.0),
+        ("humidity ≤ 75", "yes", 2.0, 0.0),
+        ("humidity > 75", "no", 3.0, 0.0),
+        ("windy = TRUE", "no", 2.0, 0.0),
+        ("windy = FALSE", "yes", 3.0, 0.0),
+    ]
+    restored = select_component("classifier", "c45").create()
+    restored.from_json(json.loads(json.dumps(classifier.to_json())))
+    np.testing.assert_array_equal(
+        restored.probabilities(trials.table), classifier.probabilities(trials.table)
+    )
+    because = [reason.words for reason in restored.explain(trials.table.row(13)).because]
+    assert "outlook = very rainy" in because
+    assert "windy = TRUE" in because
+
+
+def test_a_model_of_nominal_features_predicts_from_other_tables(weather, tmp_path, capsys):
+    model = tmp_path / "m.json"
+    assert command(["train", weather, "--out", model]) == 0
+    other = tmp_path / "other.csv"
+    other.write_text(
+        "windy,humidity,outlook,temperature\nTRUE,70,overcast,60\nFALSE,90,sunny,80\nTRUE,80,foggy,70\n"
+    )
+    capsys.readouterr()
+    assert command(["predict", model, other, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)["predictions"]
+    assert [one["label"] for one in found[:2]] == ["yes", "no"]
+    # A value that the training did not have is as a missing one.
+    assert any("outlook is missing" in reason["words"] for reason in found[2]["because"])
+
+
+def test_arff_is_read_as_it_is_written(tmp_path):
+    path = tmp_path / "t.arff"
+    path.write_text(
+        "@relation 'a % b'\r\n"
+        "@attribute 'p first [m]' numeric % a comment\r\n"
+        "@ATTRIBUTE level {1, 2, none, '?'}\r\n"
+        "@attribute note string\r\n"
+        "@attribute day date 'yyyy-MM-dd'\r\n"
+        "@attribute class {b, a, never}\r\n"
+        "@data\r\n" + "1.5e-3, 1, 'it\\'s', '2026-11-26', a\r\n"
+        "?, none, ?, '2026-11-27', b, {2}\r\n"
+        "{0 2.5, 1 2, 4 a}\r\n"
+        "4 '?' x '2026-11-28' b\r\n"
+        "4 '?' x '2026-11-28' ?\r\n" * 4
+    )
+    found = read_labelled(path, None)
+    assert found.labels == ("a", "b", "a", "b") * 4
+    nominal = ("level=1", "level=2", "level=none", "level=?", "note=it's", "note=x")
+    assert found.table.names == ("p first", *nominal)
+    assert found.table.units[0] == "m"
+    np.testing.assert_array_equal(found.table.values[:4, 0], [1.5e-3, np.nan, 2.5, 4.0])
+    np.testing.assert_array_equal(found.table.values[:4, 1:5].argmax(axis=1), [0, 2, 1, 3])
+    assert np.isnan(found.table.values[1, 5:]).all()
+    assert any("4 trials" in note for note in found.notes)
+    assert any("weights" in note for note in found.notes)
+    assert "class=b" in read_labelled(path, "level").table.names
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line"),
+    [
+        ("sunny,85,85,FALSE,no", "snowy,85,85,FALSE,no", "line 11.*snowy"),
+        ("sunny,85,85,FALSE,no", "sunny,85,85,FALSE", "line 11.*4 values"),
+        ("sunny,85,85,FALSE,no", "sunny,hot,85,FALSE,no", "line 11.*hot"),
+        ("sunny,85,85,FALSE,no", "sunny,'85,85,FALSE,no", "line 11.*quote"),
+        ("@attribute windy {TRUE, FALSE}", "@attribute windy relational", "line 7.*relational"),
+        ("@attribute windy {TRUE, FALSE}", "@attribute windy {TRUE, TRUE}", "line 7.*once"),
+        ("@attribute windy {TRUE, FALSE}", "@attribute outlook {TRUE, FALSE}", "line 7.*outlook"),
+        ("@data", "@rows", "@rows"),
+    ],
+)
+def test_a_damaged_arff_file_is_told_with_its_line(weather, old, new, line):
+    weather.write_text(WEATHER.replace(old, new, 1))
+    with pytest.raises(DataDamaged, match=line):
+        load_trials(str(weather))
+
+
+def test_a_store_that_is_exported_to_arff_can_be_read(weather):
+    with pytest.raises(ConfigError, match="no column 'x'"):
+        load_trials(str(weather), label="x")
+
+
+@pytest.mark.parametrize(
+    ("texts", "said"),
+    [
+        ([f"grasp_{i:04d}.csv" for i in range(40)], "hardly repeat"),
+        ([f"2026-11-{1 + i // 10:02d}" for i in range(40)], "dates or times"),
+        ([f"{1 + i // 10}.11.2026 10:00" for i in range(40)], "dates or times"),
+        ([f"object {i // 4}" for i in range(40)], "--instance"),
+        ([("it slipped", "", "good", f"see {i}")[i % 4] for i in range(40)], "hardly repeat"),
+    ],
+)
+def test_texts_that_identify_trials_are_no_features(tmp_path, texts, said):
+    lines = [f"{'ab'[i // 20]},{text},{i % 7}.25" for i, text in enumerate(texts)]
+    path = tmp_path / "t.csv"
+    path.write_text("what,text,w\n" + "\n".join(lines) + "\n")
+    found = read_labelled(path, "what")
+    assert found.table.names == ("w",)
+    assert any("text" in note and said in note for note in found.notes)
+
+
+@given(
+    codes=st.lists(st.one_of(st.none(), st.integers(0, 3)), min_size=1, max_size=20),
+    values=st.lists(st.text("ab= ,", min_size=1), min_size=4, max_size=4, unique=True),
+)
+def test_a_nominal_feature_is_found_again_in_its_columns(codes, values):
+    columns = np.array([[np.nan] * 4 if k is None else [float(k == j) for j in range(4)] for k in codes])
+    table = FeatureTable(
+        names=(*(value_name("colour", value) for value in values), "w"),
+        units=("", "", "", "", "m"),
+        values=np.column_stack([columns, np.arange(len(codes))]),
+    )
+    found, coded = with_codes(table)
+    assert [(one.name, one.unit, one.values) for one in found] == [
+        ("colour", "", tuple(values)),
+        ("w", "m", None),
+    ]
+    np.testing.assert_array_equal(coded[:, 0], [np.nan if k is None else k for k in codes])
+    np.testing.assert_array_equal(codes_of(found, table), coded)
+
+
+def test_numbers_with_an_equal_sign_in_their_name_stay_numbers():
+    table = FeatureTable(names=("a=1", "a=2"), units=("m", ""), values=np.array([[0.5, 1.0], [1.0, 0.0]]))
+    found, coded = with_codes(table)
+    assert [one.name for one in found] == ["a=1", "a=2"]
+    np.testing.assert_array_equal(coded, table.values)
+
+
+def test_a_column_of_texts_can_be_named_and_left_out(tmp_path):
+    path = shapes(tmp_path)
+    assert read_labelled(path, "what", features=["colour"]).table.names == (
+        "colour=blue",
+        "colour=green",
+        "colour=red",
+    )
+    assert read_labelled(path, "what", features=["weight"]).table.names == ("weight",)
+    known = read_table(path, ["colour=red", "colour=green"]).values
+    assert np.isnan(known[2]).all()  # blue is none of them

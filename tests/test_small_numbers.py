@@ -1,0 +1,33 @@
+"""Numbers are small in SI units: every classifier tells apart what it tells apart in a smaller unit."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from graspsense.core.components.config import select_component
+from graspsense.core.learn.labelled import Labelled
+from graspsense.core.values.features import FeatureTable
+from graspsense.evaluation.evaluate import evaluate
+
+
+def measured(factor):
+    rng = np.random.default_rng(2)
+    values = np.array([[rng.normal((6.0, 11.0)[i % 2], 0.6)] for i in range(40)]) * factor
+    table = FeatureTable(names=("compliance",), units=("m/N",), values=values)
+    return Labelled(source="made here", table=table, labels=("stiff", "soft") * 20)
+
+
+@pytest.mark.parametrize("classifier", ["c45", "tree", "forest", "knn", "svm", "ebm"])
+@pytest.mark.parametrize("factor", [1e-6, 1e-12])
+def test_a_classifier_recognises_what_differs_by_micrometres(classifier, factor):
+    found = evaluate(
+        select_component("classifier", classifier),
+        measured(factor),
+        classifier=classifier,
+        folds=4,
+        controls=False,
+        learning_curve=False,
+    )
+    assert found.headline.rate >= 0.9
+    assert any(note.startswith("compliance: ") for note in found.notes) is (classifier == "c45")
