@@ -58,7 +58,7 @@ class Session:
         return found
 
 
-def recorded(subject: Subject) -> Session:
+def readings_of(subject: Subject) -> Session:
     """Open the gripper, use it for some seconds of its own clock, close it, and return the readings."""
     backend: SensorBackend[Any] = subject.create()
     try:

@@ -57,9 +57,9 @@ class Subject:
     @cached_property
     def session(self) -> Session:
         """Return the readings of the gripper while it is opened, closed and opened again; recorded once."""
-        from graspsense.testing.session import recorded
+        from graspsense.testing.session import readings_of
 
-        return recorded(self)
+        return readings_of(self)
 
 
 @define(eq=False, kw_only=True)
@@ -74,6 +74,8 @@ class Package:
     plugins: Plugins
     builds: bool = True
     """Whether a wheel is built to check that it is complete."""
+    data: Mapping[str, str] = field(factory=dict)
+    """A folder of examples for each of its data sets, by name."""
 
     @property
     def name(self) -> str:
@@ -83,7 +85,9 @@ class Package:
     role = "distribution"
 
 
-def package_of(distribution: str, plugins: Plugins, *, builds: bool = True) -> Package | None:
+def package_of(
+    distribution: str, plugins: Plugins, *, builds: bool = True, data: Mapping[str, str] | None = None
+) -> Package | None:
     """Return the distribution of this name as it is installed, or None."""
     name = canonical(distribution)
     statuses = tuple(one for one in plugins.statuses if one.distribution == name)
@@ -105,4 +109,5 @@ def package_of(distribution: str, plugins: Plugins, *, builds: bool = True) -> P
         resources=tuple(one for one in resources if one.distribution == name),
         plugins=plugins,
         builds=builds,
+        data=dict(data or {}),
     )
