@@ -148,6 +148,10 @@ def dataset_page() -> str:
             "that the reader goes on with the next one. Whatever the file makes a library raise becomes an error that "
             "names the file.",
             "",
+            "`graspsense plugins check DISTRIBUTION --data NAME=FOLDER` (in a test `parametrize_checks(DISTRIBUTION, "
+            "data={NAME: FOLDER})`) reads the sound examples in this folder twice, which must give the same, and then "
+            "with an empty file and with a word in each column: the error must name the file and the column.",
+            "",
             "## LabelledRecording",
             "",
             f"    {_fields_signature(LabelledRecording)}",

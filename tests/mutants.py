@@ -33,6 +33,7 @@ from graspsense.plugin_api import (
     POSITION,
     SQUEEZE,
     STEADY,
+    VELOCITY,
     Channel,
     ClassifierConfig,
     Command,
@@ -499,6 +500,34 @@ class ControllerWithForgettingFreeMotion(FreeController):
     free_motion = FreeMotion(free_begin, free_command, free_end_that_forgets)
 
 
+def pushing(params, state, reading):
+    _, after = step(params, state, reading)
+    return Command(VELOCITY, -0.01, 15.0, inf), after
+
+
+@mutant("controller", "says-what-it-asks-for", "asked_force_n returns None", commands=("velocity",))
+class Silent(Law):
+    step = staticmethod(pushing)
+
+    def asked_speed_m_s(self):
+        return 0.01
+
+
+@mutant("controller", "says-what-it-asks-for", "return the force that it commands", commands=("velocity",))
+class Understating(Silent):
+    def asked_force_n(self):
+        return 5.0
+
+
+@mutant("controller", "says-what-it-asks-for", "return the speed that it commands", commands=("velocity",))
+class Overstating(Silent):
+    def asked_force_n(self):
+        return 15.0
+
+    def asked_speed_m_s(self):
+        return 0.02
+
+
 @mutant("controller", "events-are-declared", "set bit i for the i-th name")
 class TellsAnother(Teller):
     events = ()
@@ -712,6 +741,19 @@ class Unlimited(Hand):
     _asked = 0.0
 
 
+@mutant("sensor-backend", "says-what-commands-become", "take 'effort' out")
+class Rushing(Hand):
+    closes_itself: ClassVar = {"effort": "a target"}
+
+
+mutant(
+    "sensor-backend",
+    "says-what-commands-become",
+    "what a command of force becomes",
+    accepts=("position", "force"),
+)(type("Taciturn", (Hand,), {"closes_itself": {"position": "a target"}}))
+
+
 mutant(
     "sensor-backend",
     "accepts-every-declared-kind",
@@ -736,6 +778,21 @@ class Picky(Hand):
 class Conjuring(Hand):
     def open(self, seed):
         return evolve(super().open(seed), simulated=False)
+
+
+@mutant("sensor-backend", "objects-can-be-grasped", "it holds the same thing under every label")
+class Unchanging(Hand):
+    def objects(self):
+        return ()
+
+
+@frozen(kw_only=True)
+class Objectless:
+    vanishes_s: float = setting(default=inf, unit="s", meaning="When the cable is pulled.")
+    here: bool = setting(default=True, meaning="Whether the gripper is connected.")
+
+
+mutant("sensor-backend", "objects-can-be-grasped", "no key 'object'", config=Objectless)(Hand)
 
 
 @mutant("sensor-backend", "objects-can-be-grasped", "objects() gives that name")
@@ -792,6 +849,33 @@ def _(reading):
 @giving("performs-a-whole-grasp", "ended as aborted")
 def _(reading):
     return Reading(reading.frame._replace(t_s=float(f"{reading.frame.t_s:.9f}")), "no pads")
+
+
+@mutant("sensor-backend", "squeezes-with-what-it-is-asked", "`least_force_n`")
+class Forceful(Hand):
+    """Squeezes with 30 N if it is to close at all, and does not say so."""
+
+    def apply(self, command):
+        super().apply(command._replace(value=30.0) if command.value > 0.0 else command)
+
+
+@mutant("sensor-backend", "what-it-delivers-is-kept", "of its")
+class Uncounted(Hand):
+    def read(self, timeout_s):
+        reading = super().read(timeout_s)
+        counter = reading.pads.counter
+        return reading._replace(
+            pads=reading.pads._replace(counter=float(counter) if counter > 9 else counter)
+        )
+
+
+@mutant("sensor-backend", "what-it-delivers-is-kept", "'pad_t_s' is not in an export")
+class Timeless(Hand):
+    """Gives every image the same time."""
+
+    def read(self, timeout_s):
+        reading = super().read(timeout_s)
+        return reading._replace(pads=reading.pads._replace(t_s=0.0))
 
 
 @mutant("sensor-backend", "reports-plain-values", "numbers, text and booleans only")

@@ -7,10 +7,11 @@ from math import inf, nan
 from typing import NamedTuple
 
 import numpy as np
-from attrs import frozen
+from attrs import evolve, frozen
 
 from graspsense.plugin_api import (
     EFFORT,
+    NAMES_INPUT,
     NO_PADS,
     Channel,
     Classifier,
@@ -119,6 +120,7 @@ class Law(Controller[LawConfig]):
 @frozen(kw_only=True)
 class HandConfig:
     vanishes_s: float = setting(default=inf, unit="s", meaning="When the cable is pulled.")
+    object: str = setting(default="cup:full", effect=NAMES_INPUT, meaning="What it holds.")
     here: bool = setting(default=True, meaning="Whether the gripper is connected.")
 
 
@@ -131,7 +133,7 @@ class Hand(SensorBackend[HandConfig]):
         return (ObjectKind(name="cup", states=("full", "empty")),)
 
     def with_object(self, name):
-        return type(self)(self.config)
+        return type(self)(evolve(self.config, object=name))
 
     def open(self, seed):
         if not self.config.here:

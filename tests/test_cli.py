@@ -128,7 +128,7 @@ def test_version_is_that_of_the_distribution():
             ["plugins", "show", "replai"],
             "graspsense: no plugin or component named 'replai'. "
             "Known: backprop, boosted, catch22, chitta, curve, ebm, force, forest, graspsense, hybrid, knn, mlp, "
-            "quantiles, replay, svm, tree, velocity. Did you mean 'replay'?\n",
+            "quantiles, replay, send-and-watch, svm, tree, velocity. Did you mean 'replay'?\n",
         ),
     ],
 )
@@ -168,6 +168,33 @@ def test_every_error_has_its_code_and_no_traceback(run, error, code, said):
     ran = run("fail")
 
     assert (ran.code, ran.out, ran.err) == (code, "", said)
+
+
+def test_an_internal_error_names_the_plugin_and_the_place(run, site, monkeypatch):
+    site.install(
+        "lab-faulty",
+        """
+        import click
+        from graspsense.plugin_api import CommandEntry, hookimpl
+
+        GRASPSENSE_API = (2, 0)
+
+        @hookimpl
+        def graspsense_commands():
+            yield CommandEntry(name="fault", target=f"{__name__}:fault", summary="fails")
+
+        @click.command()
+        def fault():
+            {}["gap"]
+        """,
+    )
+    monkeypatch.setattr(loader, "_current", None)
+
+    ran = run("fault")
+
+    assert ran.code == 70
+    assert "of the plugin lab-faulty: " in ran.err
+    assert "lab_faulty_plugin.py:13 in fault" in " ".join(ran.err.split())
 
 
 def test_the_traceback_is_there_on_demand(run, monkeypatch):

@@ -439,7 +439,7 @@ def test_tables_that_are_missing_altogether_are_named(plugins, write):
         == """\
 3 errors in the settings:
   gripper.type is not given: name a sensor backend. Known: hand, other, replay
-  controller.type is not given: name a controller. Known: force, hybrid, law, velocity
+  controller.type is not given: name a controller. Known: force, hybrid, law, send-and-watch, velocity
   features.type is not given: name a feature set. Known: catch22, chitta, curve, none-at-all, quantiles"""
     )
 

@@ -137,6 +137,24 @@ def test_a_class_that_does_not_declare_what_is_missing(monkeypatch):
         of(Wrong).declared()
 
 
+class Sided(Peak, FeatureSet[PeakConfig]):
+    """Needs the pad that its settings name."""
+
+    @property
+    def requires(self):
+        return (Channel(f"force_{self.config.side}", "N"),)
+
+    features = Summit.features
+
+
+def test_what_features_and_laws_require_may_depend_on_their_settings():
+    sided = of(Sided)
+
+    assert sided.declared().requires == (Channel("force_left", "N"),)
+    assert sided.declared(PeakConfig(side="right")).requires == (Channel("force_right", "N"),)
+    assert sided.declared_twice() == ()
+
+
 def test_what_entry_and_class_declare_is_told():
     assert of(Summit, requires=()).declared_twice() == ("requires",)
 

@@ -121,3 +121,24 @@ def test_an_effort_within_its_limits_is_handed_on_as_it_is():
 def test_a_kind_nobody_knows_or_a_place_nobody_can_reach_stops_the_grasp(command):
     halted, state = guard(LIMITS, FRESH, frame(), command)
     assert (halted.kind, halted.value, state.stopped) == (EFFORT, 0.0, 1)
+
+
+@pytest.mark.parametrize(
+    ("command", "counts"),
+    [
+        (Command(VELOCITY, -0.01, 60.0, inf), True),
+        (Command(VELOCITY, -0.01, 12.0, inf), False),
+        (Command(VELOCITY, -0.01, inf, inf), False),  # it leaves the limit to the gripper
+        (Command(POSITION, 0.0, 60.0, inf), True),
+        (Command(POSITION, 0.0, 10.0, 0.1), True),
+        (Command(POSITION, 0.0, 10.0, 0.01), False),
+        (Command(FORCE, 10.0, inf, 0.1), True),
+    ],
+)
+def test_a_limit_that_is_lowered_counts_as_a_value_that_is(command, counts):
+    allowed, state = guard(REAL, FRESH, frame(), command)
+    assert state.acted == counts
+    assert allowed.effort_limit_n <= 12.0
+    assert allowed.speed_limit_m_s <= 0.015
+    _, state = guard(REAL, state, frame(left=0.7), command)
+    assert state.acted == counts  # after a contact, the limits of the gripper are above all of these

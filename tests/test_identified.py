@@ -6,7 +6,10 @@ import pytest
 from click.testing import CliRunner
 
 from graspsense.cli.main import cli
+from graspsense.core.components.identification import RecordedSqueeze
 from graspsense.core.values.errors import ConfigError
+from graspsense.core.values.trace import trace_of
+from graspsense.sources import squeezes as module
 from graspsense.sources.identified import gripper_flags, identified_scenes
 from graspsense.sources.squeezes import recorded_squeezes
 from graspsense.sources.trial_source import TrialSource, groups_of, kind_of
@@ -35,6 +38,29 @@ def test_recordings_of_two_objects_need_a_name(store):
     assert squeeze.gripper["pad_stiffness_n_m"] == 3e4
     with pytest.raises(ConfigError, match=r"'spong'.*sponge"):
         recorded_squeezes([store], "spong")
+
+
+@pytest.mark.slow
+def test_one_trial_of_a_store_can_be_named(store):
+    folder = store.removeprefix("store:")
+    for name in (f"{folder}#2", f"store:{folder}#2"):
+        (squeeze,) = recorded_squeezes([name])
+        assert (squeeze.label, squeeze.name) == ("block", f"{folder}#2")
+    with pytest.raises(ConfigError, match="no trial 7"):
+        recorded_squeezes([f"{folder}#7"])
+
+
+def test_a_class_that_the_user_names_is_one_object(monkeypatch):
+    """Its states are not asked for again."""
+    squeezes = {
+        name: RecordedSqueeze(name=name, sha256="", trace=trace_of([], [], [], []), label=label)
+        for name, label in (("a", "bottle:full"), ("b", "bottle:empty"), ("c", "can:full"))
+    }
+    monkeypatch.setattr(module, "_of_source", lambda source: [squeezes[source]])
+    chosen = recorded_squeezes(["a", "b", "c"], "bottle")
+    assert [(one.name, one.label) for one in chosen] == [("a", "bottle"), ("b", "bottle")]
+    with pytest.raises(ConfigError, match=r"of 2 objects.*name="):
+        recorded_squeezes(["a", "b"])
 
 
 def test_an_identified_scene_gives_its_label_and_its_fingertips(tmp_path):

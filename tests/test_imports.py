@@ -43,7 +43,7 @@ MAY_KNOW = {
         "testing",
         "cli",
     },
-    "testing": {"core", "plugin_api", "testing"},
+    "testing": {"core", "plugin_api", "recording", "sources", "testing"},
     "scaffold": {"core", "scaffold"},
     "plugin_api": {"core"},
     "__init__": {"core"},

@@ -34,6 +34,7 @@ MANY_PARAMETERS = {
     "graspsense/cli/experiment.py:experiment": OPTIONS,
     "graspsense/cli/identify.py:identify": OPTIONS,
     "graspsense/cli/import_.py:import_": OPTIONS,
+    "graspsense/cli/plugins.py:check": OPTIONS,
     "graspsense/cli/report.py:report": OPTIONS,
     "graspsense/cli/run.py:run": OPTIONS,
     "graspsense/cli/tradeoff.py:condition": OPTIONS,
@@ -43,6 +44,7 @@ MANY_PARAMETERS = {
     "graspsense/core/grasp/transmission.py:screw_linkage": "the ten published constants of a linkage, by keyword only",
     "graspsense/evaluation/crossval.py:cross_validate": "public; three optional ones are by keyword only",
     "graspsense/evaluation/evaluate.py:evaluate": "public; all settings of an evaluation, by keyword only",
+    "graspsense/testing/conformance.py:examine": "public; all that a check can be told, by keyword only",
     "graspsense_c45/classifier.py:__init__": "scikit-learn requires an explicit parameter for each setting",
 }
 """Functions with more than `MAX_PARAMETERS` parameters, with the reason."""

@@ -75,6 +75,7 @@ def test_built_in_parts_need_no_metadata(site):
     assert [one.qualified for one in plugins.components("controller")] == [
         "graspsense/force",
         "graspsense/hybrid",
+        "graspsense/send-and-watch",
         "graspsense/velocity",
     ]
     entry = plugins.find("feature-set", "chitta").declared()

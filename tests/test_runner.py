@@ -4,6 +4,7 @@ import gc
 import math
 import signal
 import time
+from math import inf, nan
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -16,10 +17,11 @@ from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp import runner
 from graspsense.core.grasp.runner import run_grasp
 from graspsense.core.values.errors import NoDevice, RecordingEnded, TareRefused
-from graspsense.core.values.signals import EFFORT, Command, Outcome, Phase, Reading
+from graspsense.core.values.signals import EFFORT, VELOCITY, Command, Outcome, Phase, Reading
 from graspsense.plugins.controllers.hybrid import HybridConfig, HybridController
 from graspsense.plugins.controllers.supervision import not_begun
 from graspsense.plugins.controllers.velocity import VelocityState
+from graspsense.testing import gentle
 
 HYBRID = HybridController(HybridConfig())
 RUN = RunConfig()
@@ -659,3 +661,39 @@ def test_the_wall_clock_of_a_grasp_is_what_it_took():
     began = time.perf_counter()
     grasp = run_grasp(Scripted(squeezing, bottle), HYBRID, RUN)
     assert 0.0 < grasp.seconds_wall <= time.perf_counter() - began
+
+
+def pushing(effort_limit_n):
+    """A law that closes by a velocity, with this limit of the effort, until the gap rests."""
+
+    def step(params, state, reading):
+        return Command(VELOCITY, -0.01, effort_limit_n, inf), gentle.step(params, state, reading)[1]
+
+    law = type("Pushing", (gentle.GentleController,), {"step": staticmethod(step)})
+    law.asked_force_n = lambda self: effort_limit_n
+    return law(VELOCITY)
+
+
+@pytest.mark.parametrize("force_n", [15.0, 30.0, 60.0])
+def test_a_squeeze_under_the_limits_of_a_first_use_is_told(force_n):
+    """Without pads these are three equal grasps, and nobody is to call them equally good."""
+    gripper = Scripted(squeezing, lambda t: (nan, nan), clock="device")
+    grasp = run_grasp(gripper, pushing(force_n), RUN)
+    closing = [command for command in gripper.commands if command.value == -0.01]
+    assert {command.effort_limit_n for command in closing} == {RUN.first_effort_n}
+    assert grasp.counts["guarded"] == len(grasp.trace)  # the opening of 20 N is lowered to 12 N as well
+    (told,) = [warning for warning in grasp.warnings if "run.first_effort_n" in warning]
+    assert "no pad has felt a contact" in told
+
+
+def test_a_squeeze_within_its_limits_is_not_said_to_be_limited():
+    grasp = run_grasp(Scripted(squeezing, bottle, clock="device"), HYBRID, RUN)
+    assert not any("squeeze limited" in warning for warning in grasp.warnings)
+
+
+def test_an_effort_limit_above_the_ceiling_counts_and_is_told():
+    understating = pushing(90.0)
+    type(understating).asked_force_n = lambda self: 20.0
+    grasp = run_grasp(Scripted(squeezing, bottle, clock="device"), understating, RUN)
+    assert any("effort at its ceiling" in warning for warning in grasp.warnings)
+    assert grasp.counts["guarded"] >= (grasp.trace.phase == Phase.SQUEEZE).sum()

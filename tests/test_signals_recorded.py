@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 import csv
+import json
 import sys
 from math import inf, isnan
 
 import numpy as np
 import pytest
 from attrs import frozen
+from click.testing import CliRunner
+from kept import begun
 
 from graspsense import load_pipeline
+from graspsense.cli.main import cli
 from graspsense.core.components.registry import IsolatedPlugins
 from graspsense.core.pipeline.pipeline import grasp_with
 from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.core.values.trace import ImageTrace, SampleTrace
 from graspsense.plugin_api import (
     EFFORT,
+    NO_PADS,
     Channel,
     Command,
     DeviceInfo,
@@ -24,7 +29,9 @@ from graspsense.plugin_api import (
     Features,
     FeatureSet,
     FeatureSetEntry,
+    Frame,
     Image,
+    Pads,
     Reading,
     Samples,
     SensorBackend,
@@ -33,7 +40,9 @@ from graspsense.plugin_api import (
     hookimpl,
 )
 from graspsense.recording.export_trace import write_csv, write_npz, write_parquet
+from graspsense.recording.layout import START
 from graspsense.recording.reader import read_recorded
+from graspsense.recording.recorder import Recorder
 from graspsense.sources.exported_grasp import read_exported
 from graspsense.sources.replay import read_named
 from graspsense.store.record_grasp import record_grasp
@@ -121,7 +130,10 @@ class Shaking(FeatureSet[NoKeys]):
 
 @hookimpl
 def graspsense_sensor_backends():
-    return [SensorBackendEntry(name="palm", target=f"{__name__}:Palm", summary="a gripper with a palm")]
+    return [
+        SensorBackendEntry(name="palm", target=f"{__name__}:Palm", summary="a gripper with a palm"),
+        SensorBackendEntry(name="camera", target=f"{__name__}:Camera", summary="a gripper with a camera"),
+    ]
 
 
 @hookimpl
@@ -290,3 +302,83 @@ def test_an_export_as_csv_has_a_line_for_each_sample_with_its_time_and_axes(reco
     with (tmp_path / "grasp-palm.csv").open(newline="") as file:
         images = list(csv.DictReader(file))
     assert [float(row["cells_05"]) for row in images] == trial.trace.signals["palm"].cells[:, 5].tolist()
+
+
+class Camera(Palm):
+    """The gripper with a camera of more cells than a message once held, and fingertips of a size of their own."""
+
+    channels = (
+        *FRAME,
+        TactileArray("pads", "counts", 1000.0, rows=200, columns=200),
+        TactileArray("camera", "counts", 100.0, rows=240, columns=320),
+    )
+
+    def read(self, timeout_s):
+        return self._fingers.read(timeout_s)
+
+
+@pytest.fixture
+def large(tmp_path, monkeypatch):
+    """A grasp with large arrays: the trial, its store, and the path of its recording."""
+    monkeypatch.setitem(sys.modules, __name__, HERE)
+    options = ["gripper.type=camera", "features.type=chitta", "classifier.type=none", "run.hold_s=0.01"]
+    with IsolatedPlugins() as plugins, Store.open(tmp_path / "trials") as store:
+        plugins.add(HERE, "lab-hand")
+        settings = load_pipeline(options=options, plugins=plugins).settings
+        kept = record_grasp(store, settings, plugins, labels={}, origin="run")
+        (path,) = (tmp_path / "trials" / "recordings").glob("*.mcap")
+        yield kept, path
+
+
+@pytest.mark.slow
+def test_arrays_of_any_size_are_recorded_replayed_and_exported(large, tmp_path):
+    kept, path = large
+    trace = kept.trial.trace
+    assert kept.number == 1
+    assert kept.counts["ticks"] == len(trace) > 0
+    read = read_recorded(path)
+    assert len(read) == len(trace)
+    assert same(trace.signals["camera"], read.trace().signals["camera"])
+    assert trace.pad_left.shape[1] == 40_000
+    assert read.trace().pad_right.tobytes() == trace.pad_right.tobytes()
+    write_npz(tmp_path / "grasp.npz", read)
+    again = read_named("npz", str(tmp_path / "grasp.npz"))
+    assert again.readings[-1].signals.camera.cells == tuple(trace.signals["camera"].cells[-1])
+
+
+def test_an_array_that_no_recording_holds_is_refused_where_it_is_declared():
+    with pytest.raises(ValueError, match="GRASPSENSE_MAX_CHANNEL_NUMBERS"):
+        TactileArray("camera", "counts", rows=1025, columns=1024)
+    with pytest.raises(ValueError, match="GRASPSENSE_MAX_CHANNEL_NUMBERS"):
+        FastChannel("sound", "Pa", 1e9, samples=2**19, axes=("x", "y", "z"))
+
+
+def test_the_images_of_every_array_are_counted(recorded, tmp_path):
+    trial, path, _ = recorded
+    done = CliRunner().invoke(cli, ["export", str(path), "--to", str(tmp_path / "g.npz"), "--json"])
+    assert done.exit_code == 0, done.output
+    assert json.loads(done.stdout)["images"] == len(trial.trace.signals["palm"].t_s) > 20
+
+
+@pytest.mark.parametrize("cells", [0, 1, 5, 22, 300])
+def test_fingertips_of_any_size_are_recorded_and_read(tmp_path, cells):
+    recorder = Recorder(tmp_path / "g.mcap")
+    recorder.metadata(START, begun().section(START))
+    images = [Pads(0.1 * k, k + 1, (1.0 + k,) * cells, (2.0 + k,) * cells) for k in range(3)]
+    for k, pads in enumerate(images):
+        frame = Frame(0.1 * k, 0.1, 0.05, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0)
+        recorder.take(Reading(frame, pads), 3, Command(EFFORT, 0.0, inf, inf))
+    recorder.finish()
+    read = read_recorded(tmp_path / "g.mcap")
+    assert [reading.pads for reading in read.readings()] == images
+    assert len(read.pads) == read.images == 3
+
+
+def test_a_recording_without_images_has_none(tmp_path):
+    recorder = Recorder(tmp_path / "g.mcap")
+    recorder.metadata(START, begun().section(START))
+    frame = Frame(0.0, 0.1, 0.05, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0)
+    recorder.take(Reading(frame, NO_PADS), 3, Command(EFFORT, 0.0, inf, inf))
+    recorder.finish()
+    read = read_recorded(tmp_path / "g.mcap")
+    assert (len(read), len(read.pads), read.images) == (1, 0, 0)

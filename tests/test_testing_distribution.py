@@ -13,7 +13,7 @@ from graspsense.testing.conformance import checks_for
 from graspsense.testing.subject import package_of
 
 HEAD = """
-    from graspsense.plugin_api import Feature, FeatureSetEntry, PipelineEntry, hookimpl
+    from graspsense.plugin_api import DatasetEntry, Feature, FeatureSetEntry, PipelineEntry, hookimpl
     GRASPSENSE_API = (2, 0)
 """
 
@@ -37,11 +37,31 @@ SOUND = (
     def graspsense_pipelines():
         yield PipelineEntry("lab", "lab_pipes:lab.toml", "a recording")
 
+    @hookimpl
+    def graspsense_datasets():
+        yield DatasetEntry(name="lab-data", recordings="lab_reader:recordings", summary="grasps")
+
     @hookimpl(optionalhook=True)
     def graspsense_lab_parts():
         return [1, 2, 3]
 """
 )
+
+READER = """
+    from functools import partial
+    from pathlib import Path
+    import numpy as np
+    from graspsense.plugin_api import GraspColumns, LabelledRecording, checked_recording, each_readable
+
+    def recordings(folder):
+        for path in sorted(Path(folder).glob("*.csv")):
+            yield from each_readable(path.name, partial(grasps_in, path))
+
+    def grasps_in(path):
+        t_s, gap_m, left_n, right_n = np.loadtxt(path, delimiter=",", skiprows=1, unpack=True)
+        columns = GraspColumns(source=path.name, t_s=t_s, gap_m=gap_m, left_n=left_n, right_n=right_n)
+        yield LabelledRecording(recording=checked_recording(columns), source=path.name, label="jar:full")
+"""
 
 PIPELINE = """
     [gripper]
@@ -56,13 +76,18 @@ PIPELINE = """
 """
 
 
-def check(site, name, plugin=SOUND, features="chitta"):
-    site.install("lab-thing", plugin)
+def check(site, name, plugin=SOUND, features="chitta", reader=READER):
+    site.install("lab-thing", plugin, lab_reader=reader)
+    examples = site.folder / "examples"
+    examples.mkdir()
+    for k in range(2):
+        rows = [f"{t / 100},{0.06 - t / 9000},{t / 50},{t / 40}" for t in range(100)]
+        (examples / f"jar_{k}.csv").write_text("\n".join(["seconds,opening,thumb,index", *rows, ""]))
     (site.folder / "lab_pipes").mkdir()
     (site.folder / "lab_pipes" / "__init__.py").touch()
     (site.folder / "lab_pipes" / "lab.toml").write_text(PIPELINE.format(features=features))
     site.modules.append("lab_pipes")
-    package = package_of("lab-thing", site.discover())
+    package = package_of("lab-thing", site.discover(), data={"lab-data": str(examples)})
     (one,) = [one for one in CHECKS["distribution"] if one.id == name]
     return outcome_of(one, package, {})
 
@@ -157,8 +182,47 @@ def test_an_observer_that_returns_something_is_caught(site):
     assert "an observer returns nothing" in check(site, "observers-change-nothing", returning).text
 
 
+READERS = [
+    (
+        "readers-read-the-same-twice",
+        'label="jar:full"',
+        'label=f"jar:{np.random.random()}"',
+        "other recordings when",
+    ),
+    ("readers-read-the-same-twice", "unpack=True)", "unpack=True)[:3]", "cannot read: jar_0.csv"),
+    (
+        "reader-errors-name-file-and-column",
+        'np.loadtxt(path, delimiter=",", skiprows=1, unpack=True)',
+        'np.genfromtxt(path, delimiter=",", skip_header=1, unpack=True, missing_values="word", filling_values=0.0)',
+        "does not name file and column",
+    ),
+    (
+        "reader-errors-name-file-and-column",
+        'np.loadtxt(path, delimiter=",", skiprows=1, unpack=True)',
+        "[np.nan_to_num(c) if k else np.arange(len(c)) / 100 for k, c in enumerate("
+        'np.genfromtxt(path, delimiter=",", skip_header=1, unpack=True))]',
+        "is no error",
+    ),
+    (
+        "reader-errors-name-file-and-column",
+        "t_s, gap_m, left_n, right_n = ",
+        "if not path.stat().st_size:\n            return\n        t_s, gap_m, left_n, right_n = ",
+        "an empty jar_0.csv is no error",
+    ),
+]
+
+
+@pytest.mark.parametrize(("name", "sound", "broken", "says"), READERS)
+def test_a_check_catches_a_reader_that_is_broken(site, name, sound, broken, says):
+    assert sound in READER
+    result = check(site, name, reader=READER.replace(sound, broken))
+
+    assert result.state == "failed"
+    assert says in result.text
+
+
 def test_every_check_of_a_distribution_has_a_mutant():
-    others = {"wheel-is-complete", "pipelines-fit-together"}
+    others = {"wheel-is-complete", "pipelines-fit-together", *(name for name, *_ in READERS)}
     assert {one.id for one in CHECKS["distribution"]} == set(MUTANTS) | others
     assert "numpy" in HEAVY
 

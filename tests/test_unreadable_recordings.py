@@ -257,7 +257,7 @@ def test_of_a_store(tmp_path, capsys):
     with Store.open(folder) as store:
         for k in range(6):
             label = "can:full" if k % 2 else "can:empty"
-            keep(store, label, f"can#{k % 3}", values=(0.06 + k / 1000, 5.0), ticks=30)
+            keep(store, label, f"can#{k % 3}", values=(0.06 + k / 1000, 5.0), ticks=30, grasp=k)
         names = [store.summary(k + 1).recording for k in range(6)]
         with store.transaction() as connection:
             connection.execute("UPDATE trial SET \"values\" = x'00' WHERE id = 2")

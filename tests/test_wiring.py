@@ -5,15 +5,28 @@ from __future__ import annotations
 import sys
 
 import pytest
+from parts import CHANNELS_OF_HAND, Hand, HandConfig, Law, LawConfig, channels
 
+from graspsense import load_pipeline
 from graspsense.core.components.config import Flag, resolve
 from graspsense.core.components.registry import IsolatedPlugins
 from graspsense.core.pipeline.wiring import check
 from graspsense.core.values.errors import WiringError
+from graspsense.plugin_api import (
+    Channel,
+    Controller,
+    ControllerEntry,
+    SensorBackend,
+    SensorBackendEntry,
+    hookimpl,
+)
+
+HERE = sys.modules[__name__]
 
 PARTS = """
     from attrs import frozen
     from graspsense.plugin_api import Channel, ControllerEntry, FeatureSetEntry, SensorBackendEntry, hookimpl
+    from graspsense.plugin_api import FastChannel, TactileArray
 
     GRASPSENSE_API = (2, 0)
 
@@ -31,19 +44,27 @@ PARTS = """
     @hookimpl
     def graspsense_sensor_backends():
         yield entry(SensorBackendEntry, "full", channels=FAST, accepts=("effort", "velocity"))
-        yield entry(SensorBackendEntry, "bare", channels=(Channel("gap", "m"),), accepts=("position",))
+        yield entry(SensorBackendEntry, "bare", channels=(Channel("gap", "m"),), accepts=("force",))
+        more = (FastChannel("shake", "m/s2", samples=8, axes=("x", "y")), TactileArray("palm", "N", rows=2, columns=3))
+        yield entry(SensorBackendEntry, "rich", channels=(*FAST, *more), accepts=("velocity",))
         yield entry(SensorBackendEntry, "mute", channels=(), accepts=())
 
     @hookimpl
     def graspsense_controllers():
         yield entry(ControllerEntry, "gap-only", requires=(Channel("gap", "m"),), commands=("velocity",))
         force = Channel("force_left", "N", 24.0)
+        shake = FastChannel("shake", "m/s2", samples=1, axes=("x", "y"))
+        yield entry(ControllerEntry, "shaking", requires=(shake,), commands=("velocity",))
         yield entry(ControllerEntry, "both", requires=(force,), commands=("effort", "velocity"))
         yield entry(ControllerEntry, "still", requires=(), commands=())
         yield entry(ControllerEntry, "fast", requires=(Channel("gap", "m", 500.0),), commands=("position",))
 
     @hookimpl
     def graspsense_feature_sets():
+        fast, wide = FastChannel("shake", "m/s2", samples=1, axes=("x", "y")), FastChannel("shake", "m/s2", axes=("x",))
+        yield entry(FeatureSetEntry, "shaken", requires=(fast,), features=())
+        yield entry(FeatureSetEntry, "narrow", requires=(wide,), features=())
+        yield entry(FeatureSetEntry, "scalar", requires=(Channel("palm", "N"),), features=())
         yield entry(FeatureSetEntry, "rapid", requires=(Channel("force_left", "N", 100.0),), features=())
         yield entry(FeatureSetEntry, "celsius", requires=(Channel("heat", "degC"),), features=())
         yield entry(FeatureSetEntry, "nothing", requires=(), features=())
@@ -152,3 +173,90 @@ def test_every_misfit_is_told_at_once(misfit):
         "features graspsense/chitta needs the channel 'force_right' in N",
         "controller graspsense/hybrid commands effort",
     ]
+
+
+@pytest.mark.parametrize(
+    ("controller", "features", "says"),
+    [
+        ("still", "shaken", ""),  # features see the samples, whatever their number in a tick
+        ("still", "narrow", "as 1 samples a tick of x"),
+        ("shaking", "nothing", "as 1 samples a tick of x, y"),  # a law reads what comes in a tick
+        ("still", "scalar", "as one number a tick, but gripper lab/rich gives it as an array of 6 cells"),
+    ],
+)
+def test_channels_of_another_kind_or_shape_are_told_before_the_grasp(misfit, controller, features, says):
+    told = misfit("rich", controller, features)
+    assert bool(told) == bool(says)
+    assert says in told
+
+
+class Stiff(Hand, SensorBackend[HandConfig]):
+    """A gripper that cannot squeeze gently, move slowly, or be moved by little; opening it is an error."""
+
+    channels = channels(*CHANNELS_OF_HAND)
+    accepts = ("effort",)
+    least_force_n = 25.0
+    least_speed_m_s = 0.02
+    least_step_m = 0.0004
+
+    def open(self, seed):
+        raise AssertionError("it was opened")
+
+
+class Stepping(Law, Controller[LawConfig]):
+    requires = (Channel("gap", "m"),)
+    commands = ("effort",)
+
+    def asked_step_m(self):
+        return 1e-4
+
+
+class StiffPlugin:
+    GRASPSENSE_API = (2, 0)
+
+    @hookimpl
+    def graspsense_sensor_backends(self):
+        yield SensorBackendEntry(name="stiff", target=f"{__name__}:Stiff", summary="a stiff hand")
+
+    @hookimpl
+    def graspsense_controllers(self):
+        yield ControllerEntry(name="stepping", target=f"{__name__}:Stepping", summary="moves in small steps")
+
+
+@pytest.fixture
+def refusal(monkeypatch):
+    monkeypatch.setitem(sys.modules, __name__, HERE)
+    with IsolatedPlugins(StiffPlugin()) as plugins:
+
+        def refusal(*options):
+            options = ["gripper.type=stiff", "classifier.type=none", *options]
+            try:
+                load_pipeline(options=options, plugins=plugins)
+            except WiringError as error:
+                return str(error)
+            return ""
+
+        yield refusal
+
+
+FIRST = ("run.first_effort_n=30", "run.first_speed_m_s=0.03")
+ASKED = ("controller.probing_force_n=30", "controller.closing_speed_m_s=0.03")
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        ((*FIRST, ASKED[1], "controller.probing_force_n=5"), ["force of 5 N", "25 N"]),
+        ((*FIRST, ASKED[0], "controller.closing_speed_m_s=0.01"), ["speed of 10 mm/s", "20 mm/s"]),
+        ((*FIRST, "controller.type=stepping"), ["step of 0.1 mm", "0.4 mm"]),
+        ((*ASKED, FIRST[1]), ["run.first_effort_n is 12 N", "run.first_effort_n=25"]),
+        ((*ASKED, FIRST[0]), ["run.first_speed_m_s is 0.015 m/s", "run.first_speed_m_s=0.02"]),
+        ((*ASKED, *FIRST, "run.effort_ceiling_n=9"), ["run.effort_ceiling_n is 9 N"]),
+        ((*ASKED, *FIRST), []),
+    ],
+)
+def test_what_a_gripper_cannot_do_gently_is_refused_before_it_is_opened(refusal, options, says):
+    told = refusal(*options)
+    assert bool(told) == bool(says)
+    for words in says:
+        assert words in told

@@ -99,6 +99,49 @@ def test_the_six_features_need_pads_and_the_user_is_told():
         load_pipeline("robotiq-2f85", options=["features.type=chitta"])
 
 
+@pytest.mark.parametrize("setting", ["controller.approach_force_n=5", "run.first_effort_n=12"])
+def test_less_than_the_least_force_is_refused_before_anything_moves(setting):
+    with pytest.raises(WiringError, match="20 N"):
+        load_pipeline("robotiq-2f85", options=["gripper.port=/dev/nowhere", setting])
+
+
+@pytest.mark.usefixtures("own_time")
+def test_forces_above_the_limit_of_a_first_use_are_told_to_be_one_grasp():
+    for force_n in (40, 60):
+        options = ["gripper.port=fake", "gripper.reply_timeout_s=60", f"controller.probing_force_n={force_n}"]
+        trial = load_pipeline("robotiq-2f85", options=options).grasp()
+        # 25 N on 10 N/mm, whatever was asked for.
+        assert trial.features["p_steady"] == pytest.approx(0.0575, abs=0.0008)
+        assert trial.counts["guarded"] > 10
+        assert any("run.first_effort_n (25 N)" in warning for warning in trial.warnings)
+
+
+@pytest.mark.usefixtures("own_time")
+@pytest.mark.parametrize("sends", ["position", "velocity", "force"])
+def test_every_kind_of_command_closes_gently_and_run_says_what_it_becomes(sends):
+    options = ["gripper.port=fake", "gripper.reply_timeout_s=60", f"controller.sends={sends}"]
+    trial = load_pipeline("robotiq-2f85", options=options).grasp()
+    assert trial.outcome.words == "steady", trial.reason
+    assert trial.features["p_steady"] == pytest.approx(0.0575, abs=0.0008)
+    assert -trial.trace.velocity_m_s.min() < 0.025
+    assert any(
+        note.startswith(f"the gripper closes by itself: a {sends} becomes") for note in trial.device.notes
+    )
+
+
+def test_an_effort_is_not_sent_to_a_gripper_that_closes_by_itself():
+    options = ["gripper.port=/dev/nowhere", "controller.type=hybrid", "controller.sends=effort"]
+    with pytest.raises(WiringError, match="commands effort"):
+        load_pipeline(
+            options=[
+                "gripper.type=robotiq-2f85",
+                "features.type=chitta-without-pads",
+                "classifier.type=none",
+                *options,
+            ]
+        )
+
+
 @pytest.mark.usefixtures("own_time")
 def test_a_slow_velocity_is_a_goal_that_moves():
     gripper = create("sensor-backend", "robotiq-2f85", port="fake", reply_timeout_s=PATIENT_S)

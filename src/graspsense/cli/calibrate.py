@@ -128,7 +128,9 @@ def _set_up(asked: Mapping[str, Any], replace: bool) -> Iterator[_Setup]:
     folder = getattr(config, "calibration", None)
     if folder is None:
         raise ConfigError(
-            f"gripper {component.qualified} keeps no calibrations: choose a device, as in --gripper pr2"
+            f"gripper {component.qualified} keeps no calibrations: its settings have no key 'calibration'. Choose a "
+            "device that keeps them, as in --gripper pr2. A plugin whose cells are in counts adds the key, and applies "
+            "what `calibrations_of` finds (docs/tcp_gripper.md)"
         )
     if folder == UNCALIBRATED:
         raise ConfigError("gripper.calibration is none, so there is no folder to keep a calibration in")
@@ -185,7 +187,10 @@ def _counts_per_n(setup: _Setup) -> float:
 
     counts = setup.info.numbers.get("pad_counts_per_n")
     if counts is None:
-        raise ConfigError(f"{setup.info.name} does not state the counts of its pads under one newton")
+        raise ConfigError(
+            f"{setup.info.name} does not state the counts of its pads under one newton: give "
+            'DeviceInfo(numbers={"pad_counts_per_n": ...})'
+        )
     return float(counts)
 
 

@@ -111,10 +111,12 @@ def collect(
 
 
 def _run(collection: Collection, save: str, as_json: bool) -> None:
-    """Run the collection and print what there is of each label, also if the operator interrupts it."""
+    """Run the collection and print what there is of each label, also if it is interrupted or a trial is not kept."""
+    from graspsense.recording.atomic_file import SaveFailed
+
     try:
         collection.run()
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, SaveFailed):
         with suppress(OSError):  # the terminal may have gone
             _print_counts(save, collection, as_json)
         raise

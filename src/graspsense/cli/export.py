@@ -60,7 +60,7 @@ def export(source: str, target: str, pictures: bool, as_json: bool) -> None:
             export_trace.write_pictures(path, grasp)
         else:
             export_trace.WRITERS[path.suffix](path, grasp)
-        written = {"ticks": len(grasp), "images": len(grasp.pads)}
+        written = {"ticks": len(grasp), "images": grasp.images}
     if as_json:
         echo_json({"file": target, **written})
     else:

@@ -20,12 +20,17 @@ if TYPE_CHECKING:
 
 
 @click.command(short_help="Identify an object from recorded squeezes, as a scene of the simulator.")
-@click.argument("sources", nargs=-1, required=True, metavar="RECORDING|store:DIR...", callback=named_source)
+@click.argument(
+    "sources", nargs=-1, required=True, metavar="RECORDING|store:DIR|DIR#N...", callback=named_source
+)
 @click.option(
     "--out", metavar="FILE.toml", callback=file_to_write_as(".toml"), required=True, help="File of the scene."
 )
 @click.option(
-    "--class", "name", metavar="NAME", help="Use only the recordings with this label, or of this class."
+    "--class",
+    "name",
+    metavar="NAME",
+    help="Use the recordings with this label or of this class, as one object.",
 )
 @click.option(
     "--block",
@@ -71,7 +76,8 @@ def identify(
 
     \b
     RECORDING is a FILE.mcap, or what `graspsense import` reads: a manifest
-    FILE.toml, or KIND:FILE. store:DIR are the trials of a store.
+    FILE.toml, or KIND:FILE. store:DIR are the trials of a store, and
+    DIR#N is one of them.
 
     `graspsense run --object FILE.toml` grasps the object in simulation.
     """

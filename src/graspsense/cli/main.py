@@ -230,7 +230,7 @@ def _report(error: Exception, arguments: Sequence[str]) -> int:
         notes = [*advice(error, arguments), *notes]
     told = "\n  ".join([message, *notes])
     if code == EXIT_BUG and not isinstance(error, GraspsenseError):
-        told = f"internal error: {told}\n  This is a bug, ours or a plugin's."
+        told = f"internal error: {told}\n  This is a bug, {_whose(error)}."
         if os.environ.get(TRACEBACK_VARIABLE) != "1":
             told += f" Run it again with {TRACEBACK_VARIABLE}=1 to see where it happened."
     if os.environ.get(TRACEBACK_VARIABLE) == "1":
@@ -247,6 +247,31 @@ def _report(error: Exception, arguments: Sequence[str]) -> int:
             echo_json({"error": {"kind": type(error).__name__, "message": message, "exit_code": code}})
     _flush_stdout()
     return code
+
+
+def _whose(error: Exception) -> str:
+    """Return whose bug an error is: that of the plugin whose code is nearest to it, with the place, or ours."""
+    from graspsense.core.components.registry import installed
+
+    try:
+        statuses = installed().statuses
+    except Exception:  # with GRASPSENSE_STRICT_PLUGINS, the error may be that of loading them
+        statuses = ()
+    places = {}
+    for status in statuses:
+        module = sys.modules.get(status.module.partition(".")[0])
+        file = getattr(module, "__file__", None)
+        if file and module is not sys.modules["graspsense"]:
+            places[os.path.dirname(file) + os.sep if hasattr(module, "__path__") else file] = (
+                status.distribution
+            )
+    for frame in reversed(traceback.extract_tb(error.__traceback__)):
+        for place, distribution in places.items():
+            if frame.filename.startswith(place):
+                return (
+                    f"probably of the plugin {distribution}: {frame.filename}:{frame.lineno} in {frame.name}"
+                )
+    return "ours or a plugin's"
 
 
 def _flush_stdout() -> None:

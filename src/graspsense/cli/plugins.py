@@ -94,6 +94,12 @@ def show(name: str, as_json: bool) -> None:
     default=True,
     help="Build a wheel of an editable installation and check its contents.",
 )
+@click.option(
+    "--data",
+    metavar="NAME=FOLDER",
+    multiple=True,
+    help="Folder with sound examples for a reader of recordings.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print JSON: counts and every result.")
 @click.pass_context
 def check(
@@ -103,6 +109,7 @@ def check(
     unplugged: Sequence[str],
     absent: Sequence[str],
     wheel: bool,
+    data: Sequence[str],
     as_json: bool,
 ) -> None:
     """Check a component (NAME or DISTRIBUTION/NAME), or a distribution with all its components.
@@ -118,6 +125,7 @@ def check(
         unplugged=_settings(unplugged) if unplugged else None,
         absent=_settings(absent) if absent else None,
         wheel=wheel,
+        data=dict(_named_folder(one) for one in data),
     )
 
     def told(result: Any) -> None:
@@ -195,6 +203,18 @@ def enable(distribution: str) -> None:
         raise UnknownName(f"{name} is not disabled. Disabled are: {', '.join(sorted(names)) or 'none'}")
     path = write_disabled(names - {name})
     echo(f"{name} is enabled again, in {path}")
+
+
+def _named_folder(option: str) -> tuple[str, str]:
+    """Return the name and the folder in `NAME=FOLDER`. Raises ConfigError."""
+    from graspsense.core.values.errors import ConfigError
+
+    name, mark, folder = option.partition("=")
+    if not (name and mark and folder):
+        raise ConfigError(
+            f"--data {option!r}: write NAME=FOLDER, the data set and the folder of its examples"
+        )
+    return name, folder
 
 
 def _settings(options: Sequence[str]) -> dict[str, Any]:

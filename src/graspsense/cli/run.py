@@ -213,7 +213,7 @@ def _kept(
     """
     from graspsense.core.components.registry import installed
     from graspsense.store.comparable import check_device, check_settings, newest_grasp
-    from graspsense.store.labels import labels_of
+    from graspsense.store.labels import check_label, labels_of
     from graspsense.store.record_grasp import record_grasp
     from graspsense.store.store import Store
 
@@ -224,6 +224,8 @@ def _kept(
             check_settings(store, before, settings)
 
         def opened(device: DeviceInfo) -> None:
+            if label is not None:
+                check_label(settings, device)
             if before is not None:
                 check_device(store, before, device)
 
@@ -266,6 +268,9 @@ def print_trial(trial: Trial) -> None:
         first = ""
         if trial.device.clock == "device" and counts["guarded"] > MANY_GUARDED * counts["ticks"]:
             first = ": until a contact, run.first_speed_m_s and run.first_effort_n limit this gripper"
+            channels = {channel.name for channel in trial.device.channels}
+            if channels and not channels & {"force_left", "force_right"}:
+                first += ", which has no pads to feel one"
         echo_entry("note", f"the guard limited {counts['guarded']} of {counts['ticks']} ticks{first}")
     if counts.get("late"):
         echo_entry("note", f"{counts['late']} of {counts['ticks']} frames came late")
@@ -288,12 +293,12 @@ def _print_prediction(prediction: Prediction) -> None:
 
 
 def _shown(value: float, unit: str, reason: str) -> str:
-    from graspsense.core.values.units import display_unit, with_unit
+    from graspsense.core.values.units import display_unit, in_column, with_unit
 
     if value != value:
         return f"{'-':>9}  ({reason})"
     shown, factor = display_unit(unit)
-    return with_unit(f"{value * factor:9.3f}", shown)
+    return with_unit(in_column(value * factor), shown)
 
 
 def effort_words(kinds: Sequence[str], least_n: float, most_n: float) -> str:

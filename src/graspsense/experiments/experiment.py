@@ -19,10 +19,10 @@ from graspsense.core.components.layers import Layer, Merged, dotted, option_laye
 from graspsense.core.components.nearest_key import key_paths
 from graspsense.core.components.registry import installed
 from graspsense.core.components.strict import InvalidValue, ValidationFailed, keys_of, plain, structured
-from graspsense.core.files.limits import CASES
 from graspsense.core.learn.copies import without_copies
 from graspsense.core.learn.model import worded
 from graspsense.core.values.errors import ConfigError, GraspsenseError, UnknownName, suggestion
+from graspsense.core.values.limits import CASES
 from graspsense.experiments.kinds import kind_of
 from graspsense.experiments.task import Task
 from graspsense.sources.identified import IDENTIFIED, identified_scenes

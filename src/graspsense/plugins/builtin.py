@@ -19,7 +19,7 @@ GRASPSENSE_API = (2, 0)
 
 @hookimpl
 def graspsense_controllers() -> Iterable[ControllerEntry]:
-    """Return the controller of the paper, and the two that it consists of."""
+    """Return the controller of the paper, its two parts, and one for grippers that close by themselves."""
     for name, summary in (
         ("velocity", "PI control of the gap's rate, whatever is in the way"),
         ("force", "constant effort, or closed loop on the pad force, from the start"),
@@ -30,6 +30,11 @@ def graspsense_controllers() -> Iterable[ControllerEntry]:
             target=f"graspsense.plugins.controllers.{name}:{name.capitalize()}Controller",
             summary=summary,
         )
+    yield ControllerEntry(
+        name="send-and-watch",
+        target="graspsense.plugins.controllers.send_and_watch:SendAndWatchController",
+        summary="for a gripper that closes by itself: a target with speed and force, raised in steps from the contact",
+    )
 
 
 @hookimpl

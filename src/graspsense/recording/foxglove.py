@@ -24,7 +24,7 @@ from graspsense.core.components.caller import option
 from graspsense.core.values.channel import TactileArray
 from graspsense.core.values.errors import ConfigError
 from graspsense.recording.layout import CDR_HEADER, PADS_TOPIC, SIGNAL_TOPIC
-from graspsense.recording.reader import LARGEST_RECORD
+from graspsense.recording.reader import largest_record
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -94,7 +94,7 @@ def with_pictures(grasp: RecordedGrasp) -> bytes:
     channels: dict[int, tuple[int, str]] = {}
     raw_image = writer.register_schema(RAW_IMAGE, "ros2msg", DEFINITION.encode())
     with grasp.path.open("rb") as file:
-        for record in StreamReader(file, validate_crcs=True, record_size_limit=LARGEST_RECORD).records:
+        for record in StreamReader(file, validate_crcs=True, record_size_limit=largest_record()).records:
             if isinstance(record, Metadata):
                 writer.add_metadata(record.name, dict(record.metadata))
             elif isinstance(record, Schema) and record.id not in schemas:
@@ -140,7 +140,7 @@ def _pictures(grasp: RecordedGrasp) -> Mapping[str, Sequence[_Pictures]]:
     for name, found in grasp.topics.items():
         fields = found.rows.dtype.names or ()
         if name == PADS_TOPIC:
-            values = np.array([list(row)[2:] for row in found.rows.tolist()], dtype=float)
+            values = np.array([found.numbers(i)[2:] for i in range(len(found.rows))], dtype=float)
             cells = values.shape[1] // 2
             array = declared.get("pads")
             if array is None or array.cells != cells:

@@ -17,6 +17,7 @@ from typing import Any, Final
 
 from attrs import field, frozen
 
+from graspsense.core.values.limits import CHANNEL_NUMBERS
 from graspsense.core.values.signals import Frame, Image, Pads, Reading, Samples
 
 VERSION: Final = 2
@@ -35,8 +36,8 @@ TICK_FIELDS: Final = (*Frame._fields, "phase", "command_kind", *_COMMAND_FIELDS)
 SCALARS_TOPIC: Final = "/grasp/scalars"
 SIGNAL_TOPIC: Final = "/grasp/signals/"
 """Before the name of a tactile array or a fast channel."""
-MOST_NUMBERS: Final = 65536
-"""Limit on the numbers of one message that is read."""
+_BESIDE_A_CHANNEL: Final = 8
+"""Numbers of a message beside those of a channel, at most."""
 
 CDR_HEADER: Final = b"\x00\x01\x00\x00"
 """Little-endian CDR without options."""
@@ -79,7 +80,9 @@ class Topic:
                 raise ValueError(f"{self.name} has the field {line[:40]!r}")
             kind, number, name = match.groups()
             fields.append((name, "d" if kind == "float64" else "q", int(number or 0)))
-        if fields[:1] != [("t_s", "d", 0)] or sum(max(n, 1) for _, _, n in fields) > MOST_NUMBERS:
+        # The images of the fingertips have the numbers of a channel twice.
+        most = 2 * CHANNEL_NUMBERS.most + _BESIDE_A_CHANNEL
+        if fields[:1] != [("t_s", "d", 0)] or sum(max(n, 1) for _, _, n in fields) > most:
             raise ValueError(f"{self.name} has other fields than graspsense writes")
         return tuple(fields)
 
@@ -89,20 +92,27 @@ class Topic:
         return struct.Struct("<" + "".join(f"{max(number, 1)}{kind}" for _, kind, number in self.fields))
 
 
-_FIELD: Final = re.compile(r"(float64|int64)(?:\[([1-9][0-9]{0,5})\])? ([a-z][a-z0-9_]*)")
+_FIELD: Final = re.compile(r"(float64|int64)(?:\[([1-9][0-9]{0,17})\])? ([a-z][a-z0-9_]*)")
 
 
 def pads_topic(cells: int) -> Topic:
     """Return the topic of the images of two fingertips with so many cells each."""
-    sides = [f"{side}_{i:02d}" for side in ("left", "right") for i in range(cells)]
-    fields = ("t_s", "counter", *sides)
+    if cells in (0, _FIRST_SIZE):
+        return pads_topic_by_cell(cells)
     # A schema is one definition, so fingertips of another size have a name of their own.
+    definition = f"float64 t_s\nint64 counter\nfloat64[{cells}] left\nfloat64[{cells}] right\n"
+    return Topic(PADS_TOPIC, f"graspsense_msgs/msg/Pads{cells}", definition)
+
+
+def pads_topic_by_cell(cells: int) -> Topic:
+    """Return the topic with a field for each cell: of fingertips with 22 cells, and in old recordings of all."""
+    sides = [f"{side}_{i:02d}" for side in ("left", "right") for i in range(cells)]
     name = "Pads" if cells == _FIRST_SIZE else f"Pads{cells}"
-    return Topic(PADS_TOPIC, f"graspsense_msgs/msg/{name}", _schema(fields).decode())
+    return Topic(PADS_TOPIC, f"graspsense_msgs/msg/{name}", _schema(("t_s", "counter", *sides)).decode())
 
 
 _FIRST_SIZE: Final = 22
-"""Cells of the fingertips of the message type that has no number in its name, which is that of old recordings."""
+"""Cells of the fingertips of the message type that has no number in its name."""
 
 
 def signal_topics(signals: Any) -> list[tuple[Topic, Callable[[Reading], tuple[Any, ...] | None]]]:

@@ -21,6 +21,7 @@ from graspsense.core.values.channel import Channel as DeclaredChannel
 from graspsense.core.values.channel import FastChannel, TactileArray
 from graspsense.core.values.errors import ConfigError, DataDamaged, TooLarge, named
 from graspsense.core.values.events import GraspEvent, event_from_json
+from graspsense.core.values.limits import CHANNEL_NUMBERS
 from graspsense.core.values.signals import Frame, Image, Pads, Phase, Reading, Samples, no_pads
 from graspsense.core.values.trace import SI_UNITS, Trace, trace_of
 from graspsense.recording.layout import (
@@ -39,6 +40,7 @@ from graspsense.recording.layout import (
     VERSION,
     Topic,
     pads_topic,
+    pads_topic_by_cell,
 )
 from graspsense.recording.mcap_records import records_in, records_of
 from graspsense.recording.readable import readable, refuse_devices
@@ -49,8 +51,13 @@ from graspsense.recording.unpacked import Unpacked
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-LARGEST_RECORD: Final = 1 << 26
-"""Limit on the size of a record, compressed or not; 64 MB would be a chunk of more than five minutes."""
+
+def largest_record() -> int:
+    """Return the limit on the bytes of a record: 64 MB, and more where larger channels are allowed.
+
+    A chunk ends with the message that makes it larger than 16 MB. Raises ConfigError as `CHANNEL_NUMBERS.most`.
+    """
+    return max(1 << 26, (1 << 25) + 24 * CHANNEL_NUMBERS.most)
 
 
 @frozen(kw_only=True, eq=False)
@@ -105,9 +112,18 @@ class RecordedGrasp:
 
     @property
     def pads(self) -> NDArray[np.void]:
-        """The images of the fingertips, one row each: `t_s`, `counter`, `left_00` and so on."""
+        """The images of the fingertips, one row each: `t_s`, `counter`, and the cells of both."""
         found = self.topics.get(PADS_TOPIC)
         return np.empty(0, _row_type(pads_topic(0))) if found is None else found.rows
+
+    @property
+    def images(self) -> int:
+        """The number of images of the fingertips and of all other arrays."""
+        return sum(
+            len(found.rows)
+            for name, found in self.topics.items()
+            if name == PADS_TOPIC or "cells" in (found.rows.dtype.names or ())
+        )
 
     @property
     def channels(self) -> tuple[DeclaredChannel, ...]:
@@ -194,11 +210,15 @@ class RecordedGrasp:
         return tuple(readings)
 
     def _images(self) -> list[Pads]:
-        rows = self.pads
-        if not len(rows):
+        found = self.topics.get(PADS_TOPIC)
+        if found is None:
             return []
-        cells = (len(rows.dtype.names or ()) - 2) // 2
-        return [Pads(row[0], row[1], row[2 : 2 + cells], row[2 + cells :]) for row in rows.tolist()]
+        images = []
+        for i in range(len(found.rows)):
+            t_s, counter, *cells = found.numbers(i)
+            half = len(cells) // 2
+            images.append(Pads(t_s, counter, tuple(cells[:half]), tuple(cells[half:])))
+        return images
 
     def _signals(self) -> list[Any]:
         """Return the value of `Reading.signals` in each tick; empty where there are no further channels."""
@@ -340,7 +360,7 @@ class _PartialGrasp:
 
     def records(self, file: BinaryIO) -> Iterator[McapRecord]:
         """Yield the records of the file. Raises TooLarge, and what the library raises on a damaged file."""
-        return records_of(file, self._unpacked, largest=LARGEST_RECORD, validate_crcs=True)
+        return records_of(file, self._unpacked, largest=largest_record(), validate_crcs=True)
 
     def take_all(self, file: BinaryIO, salvage: bool) -> str:
         """Add all records of a file, with `salvage` also those behind a damaged chunk. Return its damage."""
@@ -468,7 +488,9 @@ def _is_ours(topic: Topic) -> bool:
     """Return whether a topic has the fields that graspsense writes under its name."""
     names = [name for name, _, _ in topic.fields]
     if topic.name == PADS_TOPIC:
-        return topic.definition == pads_topic((len(names) - 2) // 2).definition
+        if names == ["t_s", "counter", "left", "right"]:
+            return topic.definition == pads_topic(topic.fields[-1][2]).definition
+        return topic.definition == pads_topic_by_cell((len(names) - 2) // 2).definition
     if topic.name == SCALARS_TOPIC:
         return len(names) > 1 and all(kind == "d" and not number for _, kind, number in topic.fields)
     return names in (["t_s", "counter", "cells"], ["t_s", "counter", "new", "axes", "values"])

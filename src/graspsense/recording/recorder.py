@@ -46,6 +46,8 @@ PIPE_BYTES: Final = 1 << 20
 RETRIES_PER_TICK: Final = 8
 """Queued messages offered with each new one; the limit keeps a tick short."""
 QUEUE_LIMIT: Final = 500_000
+QUEUE_BYTES: Final = 256 << 20
+"""Limits on the messages that wait for the pipe; what is beyond them is dropped, and counted."""
 ANSWER_TIMEOUT_S: Final = 60.0
 
 Data = bytes | memoryview
@@ -96,10 +98,13 @@ class Recorder:
             with suppress(OSError):  # the user's limit of pipe memory
                 fcntl.fcntl(self._fd, fcntl.F_SETPIPE_SZ, PIPE_BYTES)
         self._waiting: deque[bytes] = deque()
+        self._waiting_bytes = 0
         self._counter = 0
         self._pads: _Channel | None = None
         self._signals: list[tuple[_Channel, Callable[[Reading], tuple[Any, ...] | None]]] | None = None
-        self._announced = self._events = 0
+        self._announced = 0
+        self.ticks = self.events = 0
+        """Ticks and events of the controller that were taken."""
         # All messages of a tick are packed here and written at once. Less code and fewer objects are faster here than
         # their number suggests: a millisecond after the last tick, the processor's cache holds few of them.
         self._buffer = bytearray(TICK_WIRE.size)
@@ -139,13 +144,15 @@ class Recorder:
                 self._defer(data)
             except OSError:
                 self._broken = True
+        self.ticks += 1
 
     def event(self, event: GraspEvent) -> None:
         """Pass on an event of the controller, so that the recording has it if the grasp is cut off."""
         if event.source == "controller":
-            self._events += 1
-            body = json.dumps([f"{EVENT}{self._events}", {"event": json_text(event_as_json(event))}]).encode()
+            number = self.events + 1
+            body = json.dumps([f"{EVENT}{number}", {"event": json_text(event_as_json(event))}]).encode()
             self._send(LENGTH_WIRE.pack(IS_METADATA, len(body)) + body)
+            self.events = number
 
     def _announce(self, topic: Topic) -> _Channel:
         body = json.dumps([topic.name, topic.type_name, topic.definition]).encode()
@@ -200,6 +207,11 @@ class Recorder:
         """Stop without ending the trial. The file remains as `.part`, or is deleted if it has no tick."""
         self._final_answer(b"")
 
+    def incomplete(self, missing: str) -> SaveFailed:
+        """Leave a recording that lacks something of its grasp, and return why it is not kept."""
+        self.leave()
+        return self._failure({"error": missing})
+
     def _failure(self, answer: Mapping[str, Any] | None) -> SaveFailed:
         reason = "the writer process died" if answer is None else answer.get("error", "it was abandoned")
         part = self.path.with_name(self.path.name + PART)
@@ -217,15 +229,16 @@ class Recorder:
             for _ in range(RETRIES_PER_TICK):
                 if not waiting or not self._write(waiting[0]):
                     return
-                waiting.popleft()
+                self._waiting_bytes -= len(waiting.popleft())
         elif not self._write(data):
             self._defer(data)
 
     def _defer(self, data: Data) -> None:
-        if len(self._waiting) >= QUEUE_LIMIT:
+        if len(self._waiting) >= QUEUE_LIMIT or self._waiting_bytes + len(data) > QUEUE_BYTES:
             self._dropped += 1
             return
         self._waiting.append(bytes(data))
+        self._waiting_bytes += len(data)
         self._deferred += 1
         self._most_waiting = max(self._most_waiting, len(self._waiting))
 
@@ -251,8 +264,10 @@ class Recorder:
             rest = bytes(data[written:])
             if self._waiting and self._waiting[0] is data:
                 self._waiting[0] = rest
+                self._waiting_bytes -= written
                 return False
             self._waiting.appendleft(rest)
+            self._waiting_bytes += len(rest)
         return True
 
     def _drain(self, last: bytes) -> None:
@@ -260,6 +275,7 @@ class Recorder:
         until = time.monotonic() + ANSWER_TIMEOUT_S
         view = memoryview(b"".join((*self._waiting, last)))
         self._waiting.clear()
+        self._waiting_bytes = 0
         while view and not self._broken:
             if not select.select([], [self._fd], [], max(0.0, until - time.monotonic()))[1]:
                 self._broken = True

@@ -5,18 +5,17 @@ from __future__ import annotations
 import hashlib
 import math
 import struct
-from array import array
-from collections.abc import Iterable, Mapping, Sequence
-from itertools import chain
-from typing import Any, Final
+from collections.abc import Mapping
+from typing import Final
 
 from attrs import field, frozen
 
-from graspsense.core.components.channels import declared_shape, further, shape_of
+from graspsense.core.components.delivered import Delivered
 from graspsense.core.values.channel import Channel
 from graspsense.core.values.errors import DataDamaged
-from graspsense.core.values.signals import Frame, Image, Reading, Samples
+from graspsense.core.values.signals import Frame, Reading
 
+_FRAME: Final = struct.Struct(f"<{len(Frame._fields)}d")
 REPLAY_NOTE: Final = "a recording cannot react: the controller's commands have no effect on it"
 
 
@@ -45,47 +44,14 @@ def check_recording(recording: Recording) -> None:
     """Raise DataDamaged if a recording has nothing to replay, or what no gripper can have measured."""
     if not recording.readings:
         raise DataDamaged(f"{recording.name} has no frames")
-    cells = len(recording.readings[0].pads.left)
-    further_channels = further(recording.channels)
-    shapes = [declared_shape(channel) for channel in further_channels]
-    pads, signals = struct.Struct(f"<{2 * cells}d"), None
-    for k, (frame, image, values) in enumerate(recording.readings, 1):
-        try:
-            _FRAME.pack(*frame)
-            _STATUS.pack(frame.status)
-            pads.pack(*image.left, *image.right)
-        except (struct.error, TypeError, OverflowError) as error:
-            raise DataDamaged(f"{recording.name}: frame {k} is not one of a gripper: {error}") from None
-        if values is not signals and not _fits(values, shapes):
-            names = ", ".join(channel.name for channel in further_channels) or "none"
-            raise DataDamaged(f"{recording.name}: frame {k} has other values than its channels ({names})")
-        signals = values
+    delivered = Delivered(recording.channels)
+    for k, reading in enumerate(recording.readings, 1):
+        if problem := delivered.problem(reading):
+            raise DataDamaged(f"{recording.name}: frame {k}: {problem}")
     if not all(math.isfinite(reading.frame.t_s) for reading in recording.readings):
         raise DataDamaged(f"{recording.name}: the time of a frame is not a number")
     if not 0.0 < recording.rate_hz < math.inf:
         raise DataDamaged(f"{recording.name}: its rate is {recording.rate_hz} frames a unit of time")
-
-
-def _fits(values: Iterable[Any], shapes: Sequence[tuple[int, ...]]) -> bool:
-    """Return whether these are the values of channels of these shapes: numbers, images and blocks of samples."""
-    if [shape_of(value) for value in values] != shapes:
-        return False
-    for value in values:
-        if isinstance(value, Image):
-            numbers: Iterable[float] = value.cells
-        elif isinstance(value, Samples):
-            numbers = chain.from_iterable(value.values)
-        else:
-            numbers = (value,)
-        try:
-            array("d", numbers)
-        except TypeError:
-            return False
-    return True
-
-
-_FRAME: Final = struct.Struct(f"<{len(Frame._fields)}d")
-_STATUS: Final = struct.Struct("<q")
 
 
 def content_sha256(recording: Recording) -> str:

@@ -11,9 +11,9 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Final
 
-from graspsense.core.files.limits import CELLS
 from graspsense.core.learn.target_value import name_and_unit
 from graspsense.core.values.errors import DataDamaged, listed
+from graspsense.core.values.limits import CELLS
 from graspsense.sources.csv_columns import CsvColumns
 from graspsense.sources.text_table import check_columns, check_lines, text_of
 

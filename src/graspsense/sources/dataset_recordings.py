@@ -8,7 +8,8 @@ from contextlib import contextmanager
 from itertools import islice
 from typing import Final
 
-from graspsense.core.components.registry import installed
+from graspsense.core.components.entries import DatasetEntry
+from graspsense.core.components.registry import Resource, installed
 from graspsense.core.values.errors import (
     ComponentFailed,
     ConfigError,
@@ -42,7 +43,13 @@ def readable_or_not(kind: str, place: str) -> Iterator[LabelledRecording | Unrea
     A reader that fails ends its data set: what it failed with comes last. Raises UnknownName, PluginUnavailable, and
     ConfigError or DataDamaged if it fails before the first recording.
     """
-    dataset = installed().dataset(kind)
+    yield from recordings_of(installed().dataset(kind), kind, place)
+
+
+def recordings_of(
+    dataset: Resource[DatasetEntry], kind: str, place: str
+) -> Iterator[LabelledRecording | UnreadableRecording]:
+    """Yield every recording of a data set at this place, as `readable_or_not`."""
     read = dataset.recordings()
     number = 0
     try:

@@ -13,9 +13,9 @@ import numpy as np
 
 from graspsense.core.components.channels import from_json, further
 from graspsense.core.files.csv_text import text_of_cell
-from graspsense.core.files.limits import CELLS, CHANNEL_NUMBERS
 from graspsense.core.values.channel import Channel, FastChannel, TactileArray
 from graspsense.core.values.errors import ConfigError, DataDamaged
+from graspsense.core.values.limits import CELLS, CHANNEL_NUMBERS
 from graspsense.core.values.written_numbers import NotNumbers, columns_of_numbers
 from graspsense.recording.export_trace import beside, declared_beside
 from graspsense.recording.layout import PADS_TOPIC, SCALARS_TOPIC, SIGNAL_TOPIC, TICK_FIELDS

@@ -14,6 +14,7 @@ from graspsense.core.values.channel import Channel, FastChannel, TactileArray
 from graspsense.core.values.errors import DataDamaged
 from graspsense.core.values.signals import NO_PADS, Frame, Image, Reading, Samples
 from graspsense.recording.replayable import Recording
+from graspsense.sources.fast_samples import sample_blocks
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -36,8 +37,11 @@ PLAUSIBLE: Final = {
 class GraspColumns:
     """The samples of a grasp: each column has shape (n,), each array in `arrays` has shape (n, cells).
 
-    `units` names the units that are not SI, by `t`, `gap`, `force` or the name of a further channel. `notes` say how
-    the columns came about.
+    A channel of `scalars` or `arrays` that was sampled at other times has them in `times`, as m increasing numbers (s)
+    on the clock of `t_s`. Its values have m rows: those of a fast channel one number for each axis, those of a tactile
+    array one for each cell. Samples of a fast channel outside of the times of `t_s` are left out, and the notes of the
+    recording say so. `units` names the units that are not SI, by `t`, `gap`, `force` or the name of a further channel.
+    `notes` say how the columns came about.
     """
 
     source: str
@@ -50,7 +54,11 @@ class GraspColumns:
     scalars: Mapping[str, Numbers] = field(factory=dict)
     arrays: Mapping[str, Numbers] = field(factory=dict)
     shapes: Mapping[str, tuple[int, int]] = field(factory=dict)
-    """Rows and columns of the cells of an array, or samples and axes of a fast channel; else there is one row."""
+    """Rows and columns of the cells of an array (else there is one row), or samples and axes of a fast channel.
+
+    A fast channel with several numbers in a sample of `t_s` needs it, unless it has `times`."""
+    times: Mapping[str, Numbers] = field(factory=dict)
+    """The times (s) of the channels that have their own."""
     fast: frozenset[str] = frozenset()
     """Those of `arrays` that are the samples of a fast channel."""
     units: Mapping[str, str] = field(factory=dict)
@@ -86,10 +94,23 @@ class GraspColumns:
             right_n=self.right_n[which],
             effort_n=None if self.effort_n is None else self.effort_n[which],
             velocity_m_s=None if self.velocity_m_s is None else self.velocity_m_s[which],
-            scalars={name: values[which] for name, values in self.scalars.items()},
-            arrays={name: values[which] for name, values in self.arrays.items()},
+            scalars=self._rows(self.scalars, which),
+            arrays=self._rows(self.arrays, which),
+            times=self._rows(self.times, which),
             lines=None if self.lines is None else self.lines[which],
         )
+
+    def _rows(self, channels: Mapping[str, Numbers], which: Any) -> dict[str, Numbers]:
+        """Return these samples of channels; of one with its own times, those within the times of the samples."""
+        t_s = self.t_s[which]
+        found = {}
+        for name, values in channels.items():
+            rows = which
+            if name in self.times:
+                at = self.times[name]
+                rows = (at >= t_s[0]) & (at <= t_s[-1]) if len(t_s) else np.zeros(len(at), bool)
+            found[name] = values[rows]
+        return found
 
 
 def without_missing(columns: GraspColumns) -> GraspColumns:
@@ -116,10 +137,12 @@ def only(columns: GraspColumns, kept: NDArray[np.bool_], what: str) -> GraspColu
 def checked_recording(columns: GraspColumns, *, rate_hz: float | None = None) -> Recording:
     """Return the recording that these columns are; `rate_hz` is that of a single sample.
 
-    Samples without a number are left out, with a note. Raises DataDamaged if most have none, if the time does not
-    increase, or if a value is in another unit.
+    Samples without a number are left out, with a note. Raises DataDamaged if columns differ in length, if a channel has
+    another shape than `shapes` says, if most samples have no number, if a time does not increase, or if a value is in
+    another unit. It names the column.
     """
-    columns = without_missing(columns)
+    _check_lengths(columns)
+    columns = _within_ticks(without_missing(columns))
     steps = _time_steps(columns, rate_hz)
     _check_complete(columns)
     _check_plausible(columns, "gap", "gap", columns.gap_m)
@@ -130,7 +153,10 @@ def checked_recording(columns: GraspColumns, *, rate_hz: float | None = None) ->
         velocities = np.diff(columns.gap_m, prepend=columns.gap_m[:1]) / steps
     _check_plausible(columns, "velocity", "gap", *(() if columns.velocity_m_s is None else (velocities,)))
     _check_plausible(columns, "time between samples", "t", np.array([np.median(steps)]))
-    channels = _channels(columns)
+    try:
+        channels = _channels(columns)
+    except ValueError as error:  # a name or a size that no channel can have
+        raise DataDamaged(f"{columns.source}: {error}") from error
     return Recording(
         name=columns.source,
         readings=tuple(_readings(columns, steps, velocities, channels)),
@@ -139,6 +165,85 @@ def checked_recording(columns: GraspColumns, *, rate_hz: float | None = None) ->
         notes=columns.notes,
         channels=channels,
     )
+
+
+def _check_lengths(columns: GraspColumns) -> None:
+    """Raise DataDamaged for the first column without one row for each time, or with another number of dimensions."""
+    n = len(columns)
+    named = {
+        name: getattr(columns, name)
+        for name in ("t_s", "gap_m", "left_n", "right_n", "effort_n", "velocity_m_s")
+        if getattr(columns, name) is not None
+    }
+    for name, at in columns.times.items():
+        if name not in columns.scalars and name not in columns.arrays:
+            raise DataDamaged(
+                f"{columns.source}: `times` names {name!r}, which is neither a scalar nor an array"
+            )
+        wrong = np.flatnonzero(~(np.diff(at) > 0.0)) if np.ndim(at) == 1 else np.zeros(1, int)
+        if len(wrong) or not np.isfinite(at).all():
+            raise DataDamaged(
+                f"{columns.source}: the times of {name!r} do not increase at sample {_second(wrong)}"
+            )
+    for name, values in (*named.items(), *columns.scalars.items(), *columns.arrays.items()):
+        dimensions = 2 if name in columns.arrays else 1
+        if np.ndim(values) != dimensions:
+            raise DataDamaged(
+                f"{columns.source}: {name!r} has the shape {np.shape(values)}, and "
+                + (
+                    "one row for each sample is needed"
+                    if dimensions == 2
+                    else "one number for each sample is needed"
+                )
+            )
+        rows = len(columns.times[name]) if name in columns.times else n
+        if len(values) != rows:
+            of = f"`times` has {rows} for it" if name in columns.times else f"t_s has {rows}"
+            raise DataDamaged(f"{columns.source}: {name!r} has {len(values)} samples, and {of}")
+    for name in sorted(columns.fast - columns.arrays.keys()):
+        raise DataDamaged(f"{columns.source}: `fast` names {name!r}, which is not in `arrays`")
+    for name, values in columns.arrays.items():
+        _check_shape(columns, name, values.shape[1])
+
+
+def _within_ticks(columns: GraspColumns) -> GraspColumns:
+    """Return the columns without the samples of fast channels that are outside of the times of the ticks.
+
+    Raises DataDamaged if a channel with its own times has none within them.
+    """
+    arrays, times, notes = dict(columns.arrays), dict(columns.times), [*columns.notes]
+    for name, at in columns.times.items():
+        within = (at >= columns.t_s[0]) & (at <= columns.t_s[-1])
+        if len(at) and not within.any():
+            raise DataDamaged(
+                f"{columns.source}: the times of {name!r} are {at[0]:g} to {at[-1]:g} s, and those of t_s "
+                f"{columns.t_s[0]:g} to {columns.t_s[-1]:g} s: give both in seconds on one clock"
+            )
+        if name in columns.fast and not within.all():
+            arrays[name], times[name] = arrays[name][within], at[within]
+            notes.append(f"{int((~within).sum())} samples of {name} are before or after those of the gap")
+    return evolve(columns, arrays=arrays, times=times, notes=tuple(notes))
+
+
+def _second(wrong: NDArray[np.int64]) -> str:
+    return str(int(wrong[0]) + 2) if len(wrong) else "that is no number"
+
+
+def _check_shape(columns: GraspColumns, name: str, width: int) -> None:
+    """Raise DataDamaged if a channel does not have the shape that `shapes` says, or needs one and has none."""
+    shape = columns.shapes.get(name)
+    own = name in columns.times
+    if name in columns.fast and shape is None and not own and width > 1:
+        raise DataDamaged(
+            f"{columns.source}: the fast channel {name!r} has {width} numbers a sample, which can be axes or samples: "
+            f"write shapes={{{name!r}: (1, {width})}} for {width} axes, ({width}, 1) for {width} samples, or give the "
+            "times of its own samples in `times`"
+        )
+    per_row = 1 if shape is None else (shape[1] if own and name in columns.fast else shape[0] * shape[1])
+    if shape is not None and per_row != width:
+        raise DataDamaged(
+            f"{columns.source}: {name!r} has {width} numbers a sample, and `shapes` says {shape[0]} x {shape[1]}"
+        )
 
 
 def _time_steps(columns: GraspColumns, rate_hz: float | None) -> Numbers:
@@ -244,10 +349,8 @@ def _array(columns: GraspColumns, name: str, values: Numbers) -> Channel:
     width = values.shape[1]
     first, second = columns.shapes.get(name, (1, width))
     if name not in columns.fast:
-        if first * second != width:  # an expression took some of the cells
-            first, second = 1, width
         return TactileArray(name, columns.units.get(name, "counts"), finger=name, rows=first, columns=second)
-    samples, axes = (first, second) if name in columns.shapes and first * second == width else (width, 1)
+    samples, axes = (first, second) if name not in columns.times else (_most_in_a_tick(columns, name), width)
     names = (
         ("value",)
         if axes == 1
@@ -255,8 +358,37 @@ def _array(columns: GraspColumns, name: str, values: Numbers) -> Channel:
         if axes <= 3
         else tuple(f"axis_{k}" for k in range(axes))
     )
-    rate_hz = samples / float(np.median(np.diff(columns.t_s))) if len(columns) > 1 else 0.0
+    at = columns.times.get(name, columns.t_s)
+    a_row = 1 if name in columns.times else samples
+    rate_hz = a_row / float(np.median(np.diff(at))) if len(at) > 1 else 0.0
     return FastChannel(name, columns.units.get(name, "1"), rate_hz, samples=samples, axes=names)
+
+
+def _most_in_a_tick(columns: GraspColumns, name: str) -> int:
+    """Return the largest number of samples of a channel with its own times that are new in one tick."""
+    there = np.searchsorted(columns.times[name], columns.t_s, side="right")
+    return max(int(np.diff(there, prepend=0).max(initial=0)), 1)
+
+
+def _series(columns: GraspColumns, channel: Channel, values: Numbers) -> list[Any]:
+    """Return the value of a further channel in each tick."""
+    own, times = columns.times.get(channel.name), columns.t_s
+    if isinstance(channel, FastChannel):
+        if own is not None:
+            return sample_blocks(times, own, values, channel)
+        return _blocks(times.tolist(), values, channel)
+    at = times if own is None else own
+    rows: list[Any] = values.tolist()
+    nothing: Any = math.nan
+    if isinstance(channel, TactileArray):
+        rows = [
+            Image(t_s, k, tuple(row)) for k, (t_s, row) in enumerate(zip(at.tolist(), rows, strict=True), 1)
+        ]
+        nothing = Image(0.0, 0, (math.nan,) * channel.cells)
+    if own is None:
+        return rows
+    there = np.searchsorted(own, times, side="right").tolist()
+    return [rows[count - 1] if count else nothing for count in there]
 
 
 def _readings(
@@ -269,16 +401,8 @@ def _readings(
     further: list[Any] = [()] * n
     if channels:
         make = signal_type(channels)._make  # type: ignore[attr-defined]
-        series: list[list[Any]] = [values.tolist() for values in columns.scalars.values()]
-        series += [
-            _blocks(times, values, channel)
-            if isinstance(channel, FastChannel)
-            else [
-                Image(t_s, k, tuple(cells))
-                for k, (t_s, cells) in enumerate(zip(times, values.tolist(), strict=True), 1)
-            ]
-            for channel, values in zip(channels[len(columns.scalars) :], columns.arrays.values(), strict=True)
-        ]
+        every = (*columns.scalars.values(), *columns.arrays.values())
+        series = [_series(columns, channel, values) for channel, values in zip(channels, every, strict=True)]
         further = list(map(make, zip(*series, strict=True)))
     frames = zip(
         times, steps.tolist(), columns.gap_m.tolist(), velocities.tolist(), efforts, columns.left_n.tolist(),

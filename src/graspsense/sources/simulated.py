@@ -20,7 +20,6 @@ from graspsense.core.components.caller import option
 from graspsense.core.components.compiled_features import CompiledExtraction, both, compiled_extraction
 from graspsense.core.components.roles import BatchBackend, FeatureSet
 from graspsense.core.components.strict import plain
-from graspsense.core.files.limits import CLASSES
 from graspsense.core.grasp.runner import run_uninterrupted
 from graspsense.core.learn.checkpoints import with_checkpoints
 from graspsense.core.learn.labelled import Labelled, class_of
@@ -28,6 +27,7 @@ from graspsense.core.pipeline.wiring import check
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import ComponentFailed, ConfigError, named
 from graspsense.core.values.features import FeatureRows, Features
+from graspsense.core.values.limits import CLASSES
 from graspsense.recording.before_contact import (
     before_contact,
     before_contact_compiled,

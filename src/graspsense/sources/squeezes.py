@@ -7,11 +7,14 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from attrs import evolve
+
 from graspsense.core.components.caller import option
 from graspsense.core.components.identification import RecordedSqueeze
 from graspsense.core.learn.labelled import class_of
 from graspsense.core.values.errors import ConfigError, suggestion
 from graspsense.store.naming import STORE, as_source
+from graspsense.store.trial_ref import parse_trial_ref
 
 if TYPE_CHECKING:
     from graspsense.recording.reader import RecordedGrasp
@@ -20,7 +23,8 @@ if TYPE_CHECKING:
 def recorded_squeezes(sources: Sequence[str], name: str | None = None) -> tuple[RecordedSqueeze, ...]:
     """Return the squeezes of these sources; `name`: those with this label or of this class only.
 
-    A source is a FILE.mcap, `store:DIR`, or whatever `graspsense import` reads. Raises ConfigError if there are none,
+    Those of a class that the user names are of one object, whatever its state. A source is a FILE.mcap, `store:DIR`, a
+    trial `DIR#NUMBER` of a store, or whatever `graspsense import` reads. Raises ConfigError if there are none,
     if they are of several objects, or if a channel is not in SI units; DataDamaged.
     """
     squeezes = [squeeze for source in sources for squeeze in _of_source(source)]
@@ -36,7 +40,8 @@ def recorded_squeezes(sources: Sequence[str], name: str | None = None) -> tuple[
                 f"no recording has the label or the class {name!r}. Known: {there_are}."
                 + suggestion(name, known)
             )
-        labels = sorted({one.label for one in squeezes})
+        squeezes = [evolve(one, label=name) for one in squeezes]
+        labels = [name]
     if len(labels) > 1:
         raise ConfigError(
             f"the recordings are of {len(labels)} objects, and a scene describes one. Name it: "
@@ -50,7 +55,10 @@ def recorded_squeezes(sources: Sequence[str], name: str | None = None) -> tuple[
 
 def _of_source(source: str) -> Iterator[RecordedSqueeze]:
     source = as_source(source)
-    if source.startswith(STORE) and "#" not in source:
+    folder, mark, number = source.removeprefix(STORE).rpartition("#")
+    if mark and number.isdecimal() and (source.startswith(STORE) or Path(folder).expanduser().is_dir()):
+        yield from _of_store(*parse_trial_ref(source.removeprefix(STORE)))
+    elif source.startswith(STORE):
         yield from _of_store(source.removeprefix(STORE))
     elif source.endswith(".mcap"):
         from graspsense.recording.reader import read_recorded
@@ -62,16 +70,16 @@ def _of_source(source: str) -> Iterator[RecordedSqueeze]:
         yield from _of_import(source)
 
 
-def _of_store(folder: str) -> Iterator[RecordedSqueeze]:
-    """Yield the trials of a store that were not set aside, oldest first."""
+def _of_store(folder: str, number: int | None = None) -> Iterator[RecordedSqueeze]:
+    """Yield this trial of a store, or all that were not set aside, oldest first."""
     from graspsense.recording.reader import read_recorded
     from graspsense.store.store import Store
 
     with Store.read(folder) as store:
-        numbers = [one.id for one in store.page(limit=1_000_000) if one.complete]
-        for number in reversed(numbers):
-            trial = store.trial(number)
-            yield _of_grasp(read_recorded(trial.recording), f"{folder}#{number}", trial.recording_sha256)
+        complete = (one.id for one in store.page(limit=1_000_000) if one.complete)
+        for k in [number] if number is not None else reversed([*complete]):
+            trial = store.trial(k)
+            yield _of_grasp(read_recorded(trial.recording), f"{folder}#{k}", trial.recording_sha256)
 
 
 def _of_grasp(grasp: RecordedGrasp, name: str, sha256: str) -> RecordedSqueeze:

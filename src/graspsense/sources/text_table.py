@@ -17,8 +17,8 @@ from typing import Any, Final
 
 from attrs import frozen
 
-from graspsense.core.files.limits import CELLS, COLUMNS, LINE_CHARACTERS, TEXT_BYTES
 from graspsense.core.values.errors import ConfigError, DataDamaged
+from graspsense.core.values.limits import CELLS, COLUMNS, LINE_CHARACTERS, TEXT_BYTES
 from graspsense.core.values.written_numbers import is_missing, is_number
 from graspsense.recording.readable import not_opened, readable, refuse_devices
 from graspsense.recording.unpacked import Unpacked

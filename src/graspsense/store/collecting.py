@@ -19,7 +19,7 @@ from graspsense.core.values.signals import Outcome
 from graspsense.recording.atomic_file import SaveFailed
 from graspsense.store.changes import set_aside
 from graspsense.store.comparable import check_device, check_settings, newest_grasp
-from graspsense.store.labels import labels_of
+from graspsense.store.labels import check_label, labels_of
 from graspsense.store.record_grasp import RecordedTrial, record_grasp
 from graspsense.store.rows import StoredTrial
 from graspsense.store.store import Store
@@ -139,6 +139,11 @@ class Collection:
 
     def _grasp(self, word: str) -> None:
         settings = self.settings_for(word, self.wanted.seed + self._number_of_trials())
+
+        def opened(device: DeviceInfo) -> None:
+            check_label(settings, device)
+            self._check_device(device)
+
         try:
             grasp = record_grasp(
                 self.store,
@@ -147,7 +152,7 @@ class Collection:
                 labels={**self.wanted.labels, **labels_of(word)},
                 origin="collect",
                 sinks=self.sinks,
-                on_open=self._check_device,
+                on_open=opened,
             )
         except NoDevice as error:
             if not self.collected:

@@ -11,6 +11,7 @@ from graspsense.core.values.label_text import label_text
 
 if TYPE_CHECKING:
     from graspsense.core.components.config import Settings
+    from graspsense.core.values.device import DeviceInfo
 
 _WORD: Final = re.compile(r"(?P<kind>[^\s:#,]+)(?P<state>:[^\s:#,]+)?(?P<number>#[^\s:#,]+)?")
 
@@ -52,3 +53,13 @@ def agrees(settings: Settings, label: str) -> bool:
     known = {name for kind in settings.gripper.create().objects() for name in kind.full_names}
     named = label.partition("#")[0]
     return held == named or not known & {held, named}
+
+
+def check_label(settings: Settings, device: DeviceInfo) -> None:
+    """Raise ConfigError if this gripper is simulated and holds the same thing whatever the label says."""
+    if device.simulated and not settings.gripper.create().objects():
+        raise ConfigError(
+            f"{device.name} is simulated and cannot be told what it holds, so a label would be given to whatever that "
+            "is: its class needs `objects` and `with_object` (docs/roles/sensor-backend.md). Without labels it can be "
+            "tried with `graspsense run`"
+        )

@@ -98,9 +98,24 @@ def _recorded(
         recorder.leave()
         raise
     try:
+        missing = _missing(trial, recorder, interrupted)
+        if missing:
+            raise recorder.incomplete(f"{missing} ({trial.reason})" if trial.reason else missing)
         recorder.metadata(RESULT, record.section(RESULT))
         recording = recorder.finish()
-        number = store.add(record, recording, complete=not recording.dropped)
+        complete = not recording.dropped and recording.ticks == recorder.ticks
+        number = store.add(record, recording, complete=complete)
     except SaveFailed as error:
         return RecordedTrial(trial=trial, number=None, counts={}, problem=str(error), interrupted=interrupted)
     return RecordedTrial(trial=trial, number=number, counts=recording.counts, interrupted=interrupted)
+
+
+def _missing(trial: Trial, recorder: Recorder, interrupted: bool) -> str:
+    """Return what the recorder did not take of a grasp; an interruption can cut off its last tick and event."""
+    cut = 1 if interrupted else 0
+    ticks, events = len(trial.trace), len(trial.trace.events)
+    if recorder.ticks < ticks - cut:
+        return f"it has {recorder.ticks} of the {ticks} ticks of the grasp"
+    if recorder.events < events - cut:
+        return f"it has {recorder.events} of the {events} events of the controller"
+    return ""

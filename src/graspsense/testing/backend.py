@@ -15,14 +15,17 @@ from graspsense.core.components.config import create
 from graspsense.core.components.entries import KINDS
 from graspsense.core.components.roles import SensorBackend
 from graspsense.core.components.run_config import RunConfig
+from graspsense.core.components.strict import keys_of
 from graspsense.core.control.guard import GuardState, guard
-from graspsense.core.grasp.runner import run_uninterrupted
+from graspsense.core.grasp.protection.effort_ceiling import MARGIN
+from graspsense.core.grasp.runner import Grasp, run_uninterrupted
 from graspsense.core.values.channel import Channel, FastChannel, TactileArray
 from graspsense.core.values.errors import DeviceLost, NoDevice, RecordingEnded, TareRefused, named
 from graspsense.core.values.signals import (
     CHANNELS,
     EFFORT,
     FORCE,
+    HOLD,
     POSITION,
     VELOCITY,
     Command,
@@ -32,11 +35,11 @@ from graspsense.core.values.signals import (
     Reading,
     Samples,
 )
-from graspsense.testing import component, protection
+from graspsense.testing import component, protection, recorded
 from graspsense.testing.checks import CheckFailed, CheckSkipped, checks_of, demand
 from graspsense.testing.gentle import EFFORT_N, FORCE_N, GentleController, kind_of
 from graspsense.testing.model_gripper import CHANNELS_OF_FIELD
-from graspsense.testing.session import TIMEOUT_S, limits_of, recorded
+from graspsense.testing.session import TIMEOUT_S, limits_of, readings_of
 from graspsense.testing.subject import Subject
 
 WIDEST_M: Final = 0.5
@@ -395,17 +398,22 @@ def closing_closes(subject: Subject) -> None:
 
 
 def stays_within_its_limits(subject: Subject) -> None:
-    """Under the largest commands, the reported effort and speed stay within their limits."""
+    """Under the largest commands of each kind, the reported effort and speed stay within their limits."""
     if subject.session.info.opening is None:
         raise CheckSkipped("a recording cannot be commanded")
+    for name in subject.entry.accepts:
+        _stays_within_its_limits(subject, KINDS.index(name))
+
+
+def _stays_within_its_limits(subject: Subject, kind: int) -> None:
     backend = subject.create()
+    least = {"effort_n": backend.least_force_n, "velocity_m_s": backend.least_speed_m_s}
     try:
         info = backend.open(0)
         first = limits_of(info)
         # The limits of a first use apply after a contact too.
         limits = first._replace(effort_limit_n=first.first_effort_n, speed_limit_m_s=first.first_speed_m_s)
         watcher = GuardState(0, 0, 0)
-        kind = kind_of(subject.entry.accepts)
         greatest = {VELOCITY: -1e6, POSITION: 0.0, FORCE: 1e6, EFFORT: 1e6}[kind]
         command = Command(kind, greatest, inf, inf)
         for _ in range(max(int(0.5 * info.rate_hz), 20)):
@@ -419,14 +427,31 @@ def stays_within_its_limits(subject: Subject) -> None:
             ):
                 found = abs(getattr(frame, name))
                 demand(
-                    not found > grace * limit,
-                    f"{name} reaches {found:.3g} under commands limited to {limit:g}: apply `effort_limit_n` and "
-                    "`speed_limit_m_s` of each command",
+                    not found > grace * max(limit, least[name]),
+                    f"{name} reaches {found:.3g} under {KINDS[kind]} commands limited to {limit:g}: apply "
+                    "`effort_limit_n` and `speed_limit_m_s` of each command",
                 )
             allowed, watcher = guard(limits, watcher, frame, command)
             backend.apply(allowed)
     finally:
         backend.close()
+
+
+def says_what_commands_become(subject: Subject) -> None:
+    """A gripper that closes by itself says for each kind of command what it becomes, and accepts no effort."""
+    backend = subject.create()
+    if not backend.closes_itself:
+        return
+    demand(
+        "effort" not in subject.entry.accepts,
+        "it closes by itself and accepts an effort, which has no speed, so that it would rush: take 'effort' out of "
+        "`accepts`",
+    )
+    lacking = [kind for kind in subject.entry.accepts if not backend.closes_itself.get(kind)]
+    demand(
+        not lacking,
+        f"`closes_itself` does not say what a command of {', '.join(lacking)} becomes: write it in a few words",
+    )
 
 
 def accepts_every_declared_kind(subject: Subject) -> None:
@@ -466,7 +491,7 @@ def read_returns_within_its_timeout(subject: Subject) -> None:
     longest = subject.session.longest_read_s
     if longest > TIMEOUT_S + GRACE_S:
         # Other work on the computer can hold a read up, too, but hardly in a second session.
-        longest = min(longest, recorded(subject).longest_read_s)
+        longest = min(longest, readings_of(subject).longest_read_s)
     demand(
         longest <= TIMEOUT_S + GRACE_S,
         f"a read with a time-out of {TIMEOUT_S} s took {longest:.2f} s: return None when nothing came in time",
@@ -599,10 +624,21 @@ def expect_accepts_any_controller(subject: Subject) -> None:
 
 
 def objects_can_be_grasped(subject: Subject) -> None:
-    """Each object that it declares can be grasped, and only a simulated gripper declares objects."""
+    """Each object that it declares can be grasped; a simulated gripper declares objects, and no other does."""
     kinds = subject.create().objects()
     if not kinds:
+        demand(
+            not subject.session.info.simulated,
+            "it is simulated and objects() is empty, so it holds the same thing under every label: return an "
+            "ObjectKind for each thing that it can hold, and take one in with_object, as in "
+            "`type(self)(attrs.evolve(self.config, object=name))`",
+        )
         raise CheckSkipped("it grasps real objects")
+    demand(
+        "object" in keys_of(subject.component.config_class()),
+        "objects() names what it can hold, and its settings have no key 'object', which --object and `collect` set: "
+        "add `object: str = setting(default=..., effect=NAMES_INPUT, meaning=...)` to its config",
+    )
     names = [name for kind in kinds for name in kind.full_names]
     twice = {name for name in names if names.count(name) > 1}
     demand(not twice, f"objects() gives {', '.join(sorted(twice))} twice: give each full name once")
@@ -625,10 +661,39 @@ def objects_can_be_grasped(subject: Subject) -> None:
         )
 
 
+def _gentle_grasp(subject: Subject) -> Grasp:
+    """Return a gentle grasp; performed once."""
+    if "gentle grasp" not in subject.kept:
+        controller = GentleController(kind_of(subject.entry.accepts))
+        subject.kept["gentle grasp"] = run_uninterrupted(subject.create(), controller, RunConfig(hold_s=0.05))
+    grasp: Grasp = subject.kept["gentle grasp"]
+    return grasp
+
+
+def squeezes_with_what_it_is_asked(subject: Subject) -> None:
+    """At rest on an object, no force exceeds the limit that was commanded, or the least that the gripper declares."""
+    if subject.session.info.opening is None:
+        raise CheckSkipped("a recording cannot be commanded")
+    grasp, backend = _gentle_grasp(subject), subject.create()
+    held = grasp.trace.phase == HOLD
+    if not held.any():
+        raise CheckSkipped("a gentle grasp came to rest on nothing")
+    kind = kind_of(subject.entry.accepts)
+    asked_n = max(FORCE_N if kind == FORCE else EFFORT_N, backend.least_force_n)
+    for name in ("effort_n", "force_left_n", "force_right_n"):
+        values = getattr(grasp.trace, name)[held]
+        known = values[values == values].tolist()
+        most_n = median(known) if known else 0.0
+        demand(
+            most_n <= MARGIN * asked_n + grasp.device.friction_n + 1.0,
+            f"it holds with a {name} of {most_n:.3g} where {KINDS[kind]} commands allow {asked_n:g} N: keep to "
+            "`effort_limit_n` of a command, or declare the least that it can do as `least_force_n` of its class",
+        )
+
+
 def performs_a_whole_grasp(subject: Subject) -> None:
     """The runner can perform a whole grasp: open, tare, close, hold, open again, relax."""
-    kind = kind_of(subject.entry.accepts)
-    grasp = run_uninterrupted(subject.create(), GentleController(kind), RunConfig(hold_s=0.05))
+    kind, grasp = kind_of(subject.entry.accepts), _gentle_grasp(subject)
     demand(
         grasp.outcome not in (Outcome.ABORTED, Outcome.DEVICE_LOST, Outcome.RUNNING),
         f"a gentle grasp with {KINDS[kind]} commands ended as {grasp.outcome.words}: {grasp.reason}",
@@ -760,6 +825,7 @@ CHECKS: Final = (
         velocity_is_the_rate_of_the_gap,
         closing_closes,
         stays_within_its_limits,
+        says_what_commands_become,
         accepts_every_declared_kind,
         read_returns_within_its_timeout,
         pads_can_be_zeroed,
@@ -768,6 +834,8 @@ CHECKS: Final = (
         expect_accepts_any_controller,
         objects_can_be_grasped,
         performs_a_whole_grasp,
+        squeezes_with_what_it_is_asked,
+        recorded.what_it_delivers_is_kept,
         reports_plain_values,
         dry_run_accepts_the_same_commands,
         reports_a_lost_device,

@@ -136,6 +136,7 @@ def examine(
     absent: Mapping[str, Any] | None = None,
     expected_failures: Mapping[str, str] | None = None,
     wheel: bool = True,
+    data: Mapping[str, str] | None = None,
     plugins: Plugins | None = None,
 ) -> Examined:
     """Return the components with this name, ready to be checked.
@@ -143,11 +144,12 @@ def examine(
     `name` is a distribution, for itself and all its components, or a component (`NAME` or `DISTRIBUTION/NAME`). `keys`
     are settings as in a pipeline file. `unplugged` and `absent` are further settings of a gripper: those under which it
     vanishes during a grasp, and those under which it is not there. `expected_failures` maps the id of a check to the
-    reason of its failure. `wheel` is False if no wheel is to be built. `plugins` are searched for the name, by default
+    reason of its failure. `wheel` is False if no wheel is to be built. `data` maps each data set of a distribution to a
+    folder of sound examples. `plugins` are searched for the name, by default
     those that are installed. Raises UnknownName.
     """
     plugins = installed() if plugins is None else plugins
-    whole = package_of(name, plugins, builds=wheel)
+    whole = package_of(name, plugins, builds=wheel, data=data)
     components = [one for one in plugins.components() if name in (one.name, one.qualified)]
     if whole is None and not components:
         raise plugins.unknown(name)
@@ -193,7 +195,7 @@ def parametrize_checks(name: str, **options: Any) -> Any:
 class Conformance:
     """Base class for a class `Test...` with a test for each check of the component `name`.
 
-    `keys`, `unplugged`, `absent`, `expected_failures` and `wheel` are as in `examine`.
+    `keys`, `unplugged`, `absent`, `expected_failures`, `wheel` and `data` are as in `examine`.
     """
 
     name: ClassVar[str]
@@ -202,6 +204,7 @@ class Conformance:
     absent: ClassVar[Mapping[str, Any] | None] = None
     expected_failures: ClassVar[Mapping[str, str]] = {}
     wheel: ClassVar[bool] = True
+    data: ClassVar[Mapping[str, str]] = {}
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
@@ -212,6 +215,7 @@ class Conformance:
             absent=cls.absent,
             expected_failures=cls.expected_failures,
             wheel=cls.wheel,
+            data=cls.data,
         )
         several = len(examined.subjects) > 1
         for case in examined.cases():

@@ -12,14 +12,19 @@ from graspsense.core.components.channels import further, no_signals
 from graspsense.core.components.entries import KINDS
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.control.free_motion import FreeMotion, free_motion_of
+from graspsense.core.grasp.protection.effort_ceiling import MARGIN
 from graspsense.core.grasp.runner import run_uninterrupted
 from graspsense.core.values.channel import Channel
 from graspsense.core.values.errors import named
 from graspsense.core.values.signals import (
     APPROACH,
     EFFORT,
+    FORCE,
     HOLD,
+    POSITION,
     RUNNING,
+    SQUEEZE,
+    VELOCITY,
     Command,
     Frame,
     Outcome,
@@ -313,6 +318,36 @@ def handles_frames_of_nan(subject: Subject) -> None:
     demand(isinstance(command, Command), f"step returned {command!r} on a frame of NaN")
 
 
+def says_what_it_asks_for(subject: Subject) -> None:
+    """`asked_force_n` and `asked_speed_m_s` say the force of the squeeze and the speed that it commands, if any."""
+    law = subject.create()
+    forces, speeds = [], []
+    for tick in (one for thing in OBJECTS for one in ticks_of(subject, thing)):
+        kind, value, effort_limit_n, speed_limit_m_s = tick.command
+        if tick.after.phase in (SQUEEZE, HOLD):
+            forces += [effort_limit_n] if kind in (VELOCITY, POSITION) else [value] * (kind == FORCE)
+        elif kind != EFFORT:
+            speeds.append(abs(value) if kind == VELOCITY else speed_limit_m_s)
+    for what, unit, asked, commanded, margin in (
+        ("force", "N", law.asked_force_n(), forces, MARGIN),
+        ("speed", "m/s", law.asked_speed_m_s(), speeds, 1.0 + 1e-9),
+    ):
+        most = max((one for one in commanded if one < inf), default=0.0)
+        name = f"asked_{what}_{unit.replace('/', '_').lower()}"
+        demand(
+            most == 0.0 or asked is not None,
+            f"it commands a {what} of {most:g} {unit}, and {name} returns None: return that {what}, so that a gripper "
+            "that cannot do as little is refused before it moves",
+        )
+        # A speed is the least that is asked for, a force the greatest.
+        found = most if what == "force" else min((one for one in commanded if 0.0 < one < inf), default=inf)
+        fits = asked is None or (most <= margin * asked if what == "force" else asked <= margin * found)
+        demand(
+            most == 0.0 or fits,
+            f"{name} returns {asked} {unit}, and it commands {found:g} {unit}: return the {what} that it commands",
+        )
+
+
 def events_are_declared(subject: Subject) -> None:
     """The events in the state are those that the class names, as bits of an integer; none is told in every tick."""
     names = getattr(subject.component.component_class(), "events", ())
@@ -432,6 +467,7 @@ CHECKS: Final = (
         grasps_are_independent,
         requires_what_it_reads,
         handles_frames_of_nan,
+        says_what_it_asks_for,
         events_are_declared,
         free_motion_is_step,
         phases_are_in_order,

@@ -30,6 +30,7 @@ from graspsense.core.components.entries import (
 from graspsense.core.components.registry import SLOW_IMPORT_S, Resource
 from graspsense.core.pipeline.wiring import check as check_wiring
 from graspsense.core.values.errors import GraspsenseError, named
+from graspsense.testing import reader
 from graspsense.testing.checks import Check, CheckFailed, CheckSkipped, checks_of, demand
 from graspsense.testing.component import ADVICE_ON_IMPORTS
 from graspsense.testing.samples import a_trial, an_event
@@ -311,6 +312,8 @@ CHECKS: Final = checks_of(
     pipelines_fit_together,
     observers_change_nothing,
     probe_returns_in_time,
+    reader.readers_read_the_same_twice,
+    reader.reader_errors_name_file_and_column,
 )
 
 

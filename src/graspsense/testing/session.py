@@ -66,7 +66,7 @@ class Gripper(Protocol):
         """Return a new instance of it."""
 
 
-def recorded(gripper: Gripper) -> Session:
+def readings_of(gripper: Gripper) -> Session:
     """Open the gripper, use it for some seconds of its own clock, close it, and return the readings."""
     backend = gripper.create()
     try:

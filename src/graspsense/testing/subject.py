@@ -10,7 +10,7 @@ from attrs import define, field
 
 from graspsense.core.components.config import build
 from graspsense.core.components.registry import Component, Plugins, PluginStatus, Resource, canonical
-from graspsense.testing.session import Session, recorded
+from graspsense.testing.session import Session, readings_of
 
 
 @define(slots=False, eq=False, kw_only=True)
@@ -55,7 +55,7 @@ class Subject:
     @cached_property
     def session(self) -> Session:
         """Return the readings of the gripper while it is opened, closed and opened again; recorded once."""
-        return recorded(self)
+        return readings_of(self)
 
 
 @define(eq=False, kw_only=True)
@@ -70,6 +70,8 @@ class Package:
     plugins: Plugins
     builds: bool = True
     """Whether a wheel is built to check that it is complete."""
+    data: Mapping[str, str] = field(factory=dict)
+    """A folder of examples for each of its data sets, by name."""
 
     @property
     def name(self) -> str:
@@ -79,7 +81,9 @@ class Package:
     role = "distribution"
 
 
-def package_of(distribution: str, plugins: Plugins, *, builds: bool = True) -> Package | None:
+def package_of(
+    distribution: str, plugins: Plugins, *, builds: bool = True, data: Mapping[str, str] | None = None
+) -> Package | None:
     """Return the distribution of this name as it is installed, or None."""
     name = canonical(distribution)
     statuses = tuple(one for one in plugins.statuses if one.distribution == name)
@@ -101,4 +105,5 @@ def package_of(distribution: str, plugins: Plugins, *, builds: bool = True) -> P
         resources=tuple(one for one in resources if one.distribution == name),
         plugins=plugins,
         builds=builds,
+        data=dict(data or {}),
     )

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from math import inf, nan
-from typing import Final, final
+from typing import ClassVar, Final, final
 
-from attrs import frozen
+from attrs import evolve, frozen
 
 from graspsense.plugin_api import (
     FORCE,
+    NAMES_INPUT,
     NO_PADS,
     POSITION,
     VELOCITY,
@@ -22,20 +23,24 @@ from graspsense.plugin_api import (
     DeviceLost,
     Frame,
     NoDevice,
+    ObjectKind,
     Pads,
     Reading,
     SensorBackend,
+    UnknownName,
     setting,
 )
-from graspsense_robotiq_2f85.fake import Fake
+from graspsense_robotiq_2f85.fake import THINGS, Fake
 from graspsense_robotiq_2f85.faults import STATUS_BITS, bit_of
 from graspsense_robotiq_2f85.modbus import Client, NoReply, opened
 from graspsense_robotiq_2f85.registers import (
     ACTIVE,
     AMPERES_A_STEP,
+    CLOSED_BYTE,
     COUNT,
     FORCES_N,
     INPUT,
+    OPEN_BYTE,
     OPEN_M,
     OUTPUT,
     SPEEDS_M_S,
@@ -77,6 +82,11 @@ class Robotiq2F85Config:
         plausible=(1.0, 2000.0),
         meaning="Grip force per motor current. The manual does not give it, so this is an assumption: measure yours.",
     )
+    object: str = setting(
+        default="block",
+        effect=NAMES_INPUT,
+        meaning="What the emulated gripper holds: block or sponge.",
+    )
     vanishes_s: float = setting(
         default=inf,
         unit="s",
@@ -95,8 +105,26 @@ class Robotiq2F85(SensorBackend[Robotiq2F85Config]):
         Channel("effort", "N", RATE_HZ),
     )
     accepts = ("velocity", "position", "force")
+    closes_itself: ClassVar[Mapping[str, str]] = {
+        "velocity": "the open or closed position, with this speed; below 20 mm/s a target that moves at it",
+        "position": "the target, with the limits of the command as speed and force",
+        "force": "the closed position, with this force and at most 20 mm/s",
+    }
+    least_force_n = FORCES_N[0]
+    least_step_m = OPEN_M / (CLOSED_BYTE - OPEN_BYTE)
     _client: Client | None = None
     _fake: Fake | None = None
+
+    def objects(self) -> Sequence[ObjectKind]:
+        """Return what the emulated gripper can hold."""
+        names = THINGS if self.config.port == "fake" else ()
+        return [ObjectKind(name=name, default=True) for name in names]
+
+    def with_object(self, name: str) -> SensorBackend[Robotiq2F85Config]:
+        """Return the emulated gripper with this object. Raises ConfigError for a real one."""
+        if self.config.port != "fake":
+            return super().with_object(name)
+        return Robotiq2F85(evolve(self.config, object=name))
 
     def open(self, seed: int) -> DeviceInfo:
         """Open and activate the gripper, which opens and closes once. Raises NoDevice."""
@@ -105,7 +133,13 @@ class Robotiq2F85(SensorBackend[Robotiq2F85Config]):
         config = self.config
         port = config.port
         if port == "fake":
-            self._fake = Fake(vanishes_s=config.vanishes_s)
+            name = config.object.partition("#")[0]
+            if name not in THINGS:
+                raise UnknownName(
+                    f"the emulated gripper has no object {name!r}: there are {', '.join(THINGS)}"
+                )
+            thing_m, stiffness_n_m = THINGS[name]
+            self._fake = Fake(thing_m=thing_m, stiffness_n_m=stiffness_n_m, vanishes_s=config.vanishes_s)
             port = self._fake.serial
         self._asked = Request(active=True, go=False, position=0, speed=0, force=0)
         try:

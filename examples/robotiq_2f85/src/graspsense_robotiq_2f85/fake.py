@@ -43,6 +43,8 @@ NEWTONS_PER_AMPERE: Final = 150.0
 READ: Final = (3, 4)
 WRITE: Final = 16
 READ_AND_WRITE: Final = 23
+THINGS: Final = {"block": (0.06, 10000.0), "sponge": (0.06, 3000.0)}
+"""Width (m) and stiffness (N/m) of the things that the emulated gripper can hold."""
 
 
 class Fingers:

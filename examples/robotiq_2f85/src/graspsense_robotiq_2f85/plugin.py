@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from graspsense.plugin_api import (
-    ControllerEntry,
     FeatureSetEntry,
     PipelineEntry,
     SensorBackendEntry,
@@ -27,16 +26,6 @@ def graspsense_sensor_backends() -> Iterable[SensorBackendEntry]:
 
 
 @hookimpl
-def graspsense_controllers() -> Iterable[ControllerEntry]:
-    """Return the control law for a gripper without pads."""
-    yield ControllerEntry(
-        name="close-until-stopped",
-        target="graspsense_robotiq_2f85.law:CloseUntilStopped",
-        summary="closes at a set speed with a set force until it has stood still",
-    )
-
-
-@hookimpl
 def graspsense_feature_sets() -> Iterable[FeatureSetEntry]:
     """Return the features that need no pads."""
     yield FeatureSetEntry(
@@ -52,5 +41,5 @@ def graspsense_pipelines() -> Iterable[PipelineEntry]:
     yield PipelineEntry(
         name="robotiq-2f85",
         resource="graspsense_robotiq_2f85:pipelines/robotiq-2f85.toml",
-        summary="a Robotiq 2F-85, closed until it is stopped, and the features that need no pads",
+        summary="a Robotiq 2F-85, closed by send-and-watch, and the features that need no pads",
     )

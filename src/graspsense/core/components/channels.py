@@ -10,7 +10,6 @@ from typing import Any, Final
 
 from attrs import asdict
 
-from graspsense.core.files.limits import CHANNEL_NUMBERS
 from graspsense.core.values.channel import Channel, FastChannel, TactileArray
 from graspsense.core.values.signals import CHANNELS, Image, Samples
 
@@ -80,13 +79,6 @@ def from_json(value: Mapping[str, Any]) -> Channel:
         if isinstance(listed, list):
             given[name] = tuple(_place(one) if isinstance(one, list) else one for one in listed)
     channel: Channel = cls(**given)
-    numbers = 1
-    if isinstance(channel, TactileArray):
-        numbers = channel.cells
-    elif isinstance(channel, FastChannel):
-        numbers = channel.samples * len(channel.axes)
-    if too_many := CHANNEL_NUMBERS.exceeded(numbers):
-        raise ValueError(f"{channel.name} has {too_many}")
     return channel
 
 

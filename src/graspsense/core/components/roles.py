@@ -80,6 +80,17 @@ class SensorBackend(ABC, Generic[ConfigT]):
 
     accepts: ClassVar[tuple[str, ...]]
     """The kinds of command that it accepts: any of effort, velocity, position, force."""
+    closes_itself: Mapping[str, str] = {}
+    """For a gripper that closes by itself to a target, with a speed and a force: what each kind of command becomes.
+
+    `{"position": "the target, with its speed and force", "force": "the closed position, with this force at 20 mm/s"}`
+    names every kind that it accepts. An effort has no speed, so such a gripper accepts none. `run` shows it."""
+    least_force_n: float = 0.0
+    """The least force (N) with which it can squeeze, whatever it is commanded; 0 if there is none."""
+    least_speed_m_s: float = 0.0
+    """The least speed (m/s) of the gap at which it can move; 0 if there is none."""
+    least_step_m: float = 0.0
+    """The least change of the gap (m) that it can be commanded; 0 if there is none."""
 
     @property
     def channels(self) -> tuple[Channel, ...]:
@@ -96,6 +107,8 @@ class SensorBackend(ABC, Generic[ConfigT]):
 
     def objects(self) -> Sequence[ObjectKind]:
         """Return the kinds of object that this backend can simulate; empty if it grasps real objects.
+
+        A gripper that is opened as `simulated` has at least one: `collect` tells it by `with_object` what to hold.
 
         `ObjectKind(name="foam", states=("dry", "wet"), default=True)` stands for `foam:dry` and `foam:wet`; without
         `states`, for `foam`. Simulated trials for which the user names no objects are of the kinds with `default`.
@@ -379,7 +392,26 @@ class Controller(ABC, Generic[ConfigT]):
         """Return the greatest force (N) on each finger that this law asks for; None if it asks for none.
 
         The effort of a real gripper stays below it, plus a margin and the friction of the drive, whatever `step`
-        commands (`run.effort_ceiling_n`). A law that squeezes with a force returns that force.
+        commands (`run.effort_ceiling_n`). A law that squeezes with a force returns that force. A gripper that cannot
+        squeeze as gently (`gentlest_force_n`) is refused before it is opened.
+        """
+        return None
+
+    def gentlest_force_n(self) -> float | None:
+        """Return the least force (N) on each finger that this law asks for; by default `asked_force_n`."""
+        return self.asked_force_n()
+
+    def asked_speed_m_s(self) -> float | None:
+        """Return the least speed (m/s) of the gap at which this law closes the fingers; None if it asks for none.
+
+        A gripper that cannot move as slowly is refused before it is opened.
+        """
+        return None
+
+    def asked_step_m(self) -> float | None:
+        """Return the least change of the gap (m) that this law commands by a position; None if it commands none.
+
+        A gripper that cannot carry out so small a step is refused before it is opened.
         """
         return None
 

@@ -1,7 +1,8 @@
 """The guard between a controller and a gripper: it limits commands, and stops the grasp if a command is not a number.
 
 It applies the limits of effort and speed of the gripper and of the command, turns NaN into a stop, and keeps the first
-closing of a real gripper slow and weak until a contact was detected. It counts the ticks in which it acts.
+closing of a real gripper slow and weak until a contact was detected. It counts the ticks in which it changes a value,
+or lowers a limit that the command gives.
 """
 
 from __future__ import annotations
@@ -66,6 +67,7 @@ def guard(
         return halt, GuardState(contact_seen, acted + 1, 1)
 
     asked = value
+    lowered = False
     if kind == EFFORT:
         if value > effort_limit:
             value = effort_limit
@@ -76,15 +78,18 @@ def guard(
             value = 0.0
     elif kind == VELOCITY:
         value = min(max(value, -speed_limit), speed_limit)
+        lowered = effort_limit < command.effort_limit_n < inf
     elif kind == FORCE:
         value = min(max(value, 0.0), effort_limit)
+        lowered = speed_limit < command.speed_limit_m_s < inf
     elif kind == POSITION and value < inf:
         value = max(value, 0.0)
+        lowered = effort_limit < command.effort_limit_n < inf or speed_limit < command.speed_limit_m_s < inf
     else:
         # An unknown kind, or a position out of reach, is treated like NaN.
         halt = Command(EFFORT, 0.0, params.effort_limit_n, params.speed_limit_m_s)
         return halt, GuardState(contact_seen, acted + 1, 1)
-    if value != asked:
+    if value != asked or lowered:
         acted += 1
     elif kind == EFFORT:
         # The value is within its limits, which have no further meaning for an effort.

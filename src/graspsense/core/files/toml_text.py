@@ -11,7 +11,7 @@ import tomllib
 from collections.abc import Mapping
 from typing import Any, Final
 
-from graspsense.core.files.limits import SETTINGS_BYTES
+from graspsense.core.values.limits import SETTINGS_BYTES
 
 MOST_NESTED: Final = 50
 """Limit on the depth of tables and lists, and on the parts of a dotted key."""

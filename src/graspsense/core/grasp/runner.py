@@ -16,6 +16,7 @@ from typing import Any, Final, Protocol, runtime_checkable
 
 from attrs import evolve, frozen
 
+from graspsense.core.components.delivered import Delivered
 from graspsense.core.components.roles import Controller, SensorBackend
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.control.binding import bind, maker
@@ -81,7 +82,10 @@ class Watcher(Protocol):
 
 
 class Sink(Protocol):
-    """A receiver of every tick, such as a terminal or a recorder. It must not block."""
+    """A receiver of every tick, such as a terminal or a recorder. It must not block.
+
+    One that raises receives nothing more, and the reason of the outcome names it.
+    """
 
     def take(self, reading: Reading, phase: int, command: Command) -> None:
         """Receive one tick."""
@@ -207,6 +211,7 @@ def run_grasp(
             info = _opened(backend, run.seed)
             if not info.channels:
                 info = evolve(info, channels=_declared(backend))
+            info = evolve(info, notes=(*info.notes, *_becoming(backend, controller)))
             if on_open is not None:
                 on_open(info)
             grasp = _Grasp(backend, controller, run, info, sinks, on_event, interrupts)
@@ -232,14 +237,14 @@ def run_grasp(
     return Grasp(
         trace=grasp.recorder.trace(),
         outcome=outcome,
-        reason=reason,
+        reason="; ".join(filter(None, (reason, *grasp.failed_sinks))),
         device=info,
         report=report,
         counts={"ticks": len(frames), "late": grasp.late, "guarded": grasp.guarded},
         events=tuple(grasp.events),
         seconds_simulated=grasp.seconds() if info.clock == "virtual" else None,
         seconds_wall=time.perf_counter() - began,
-        warnings=() if grasp.protection is None else grasp.protection.warnings,
+        warnings=grasp.warnings(),
         interrupted=grasp.interrupted or interrupts.count > 0,
     )
 
@@ -289,12 +294,33 @@ def _opened(backend: SensorBackend[Any], seed: int) -> DeviceInfo:
     return info
 
 
+def _becoming(backend: SensorBackend[Any], controller: Controller[Any]) -> tuple[str, ...]:
+    """Return sentences on what the commands of this controller become on a gripper that closes by itself."""
+    sends = getattr(controller.config, "sends", None)
+    sent = (
+        (sends,) if sends is not None else getattr(type(controller), "commands", tuple(backend.closes_itself))
+    )
+    return tuple(
+        f"the gripper closes by itself: a {kind} becomes {backend.closes_itself[kind]}"
+        for kind in sent
+        if kind in backend.closes_itself
+    )
+
+
 def _declared(backend: SensorBackend[Any]) -> tuple[Channel, ...]:
     """Return the channels of an open gripper; none where the class does not declare them."""
     try:
         return tuple(backend.channels)
     except NotImplementedError:
         return ()
+
+
+MOSTLY: Final = 0.1
+"""Share of the commands of a squeeze from which on it is not the one that the controller commanded."""
+
+
+class _NotDelivered(Exception):
+    """A reading that is not what the gripper declares."""
 
 
 class _Overdue(Exception):
@@ -322,10 +348,12 @@ class _Grasp:
         self.event_names = type(controller).events
         self.params = tick_params(info, controller, run)
         self.protection = None if info.harmless else Protection(info, controller, run, self._fault_seen)
+        self.delivered = Delivered(info.channels)
         self.state: TickState = first_state(controller.init())
         self.recorder = TraceRecorder({**SI_UNITS, **info.units})
         self.events: list[GraspEvent] = []
-        self.late = self.guarded = 0
+        self.late = self.guarded = self.squeezed = self.squeezed_guarded = 0
+        self.failed_sinks: list[str] = []
         self.first_t_s: float | None = None
         self.last: Frame | None = None
 
@@ -345,7 +373,7 @@ class _Grasp:
             ending = Outcome.DEVICE_LOST, str(error)
         except RecordingEnded:
             ending = self._recording_ended()
-        except (TareRefused, _Overdue) as error:
+        except (TareRefused, _Overdue, _NotDelivered) as error:
             ending = Outcome.ABORTED, str(error)
         except KeyboardInterrupt:
             self.interrupted = True
@@ -389,9 +417,7 @@ class _Grasp:
         most_ticks, leaps = self._most_ticks(), self._leaps()
         while n_ticks < most_ticks:
             n_ticks += 1
-            reading = read(timeout_s)
-            if reading is None:
-                raise DeviceLost(no_frame(run, self.info))
+            reading = self._checked(read(timeout_s))
             frame, pads, _ = reading
             self.last = frame
             if self.first_t_s is None:
@@ -415,7 +441,7 @@ class _Grasp:
             recorded = phase >= APPROACH and stepped
             if recorded:
                 self.late += frame.dt_s > late_s
-                self.guarded += self._acted(state) > acted
+                self._count(phase, self._acted(state) > acted)
             try:
                 apply(command)
             finally:
@@ -424,17 +450,24 @@ class _Grasp:
                     record(reading, phase, command)
                 if state.events:
                     self._told(frame, phase, state.events)
-            if recorded:
-                if self.sinks:
+                if recorded and self.sinks:
                     self._show(reading, phase, command)
-                if self.watcher is not None and phase < RELEASE and not state.done:
-                    state = self._watched(self.watcher, frame, state)
+            if recorded and self.watcher is not None and phase < RELEASE and not state.done:
+                state = self._watched(self.watcher, frame, state)
             if state.done or watcher.stopped or self._fault() is not None:
                 return
             if leaps and same_phase and phase != SQUEEZE and phase != HOLD:
                 n_ticks += self._leap(phase, reading, int(most_ticks - n_ticks))
                 state = self.state
         raise _Overdue(overdue(run))
+
+    def _checked(self, reading: Reading | None) -> Reading:
+        """Return a reading that came, and that is what the gripper declares."""
+        if reading is None:
+            raise DeviceLost(no_frame(self.run, self.info))
+        if problem := self.delivered.problem(reading):
+            raise _NotDelivered(f"{self.info.name} delivered what it does not declare: {problem}")
+        return reading
 
     def _most_ticks(self) -> float:
         """Return the number of ticks that a grasp may take; a recording ends by itself.
@@ -466,13 +499,18 @@ class _Grasp:
         return free.n_ticks
 
     def _show(self, reading: Reading, phase: int, command: Command) -> None:
-        """Pass a tick to the sinks. One that fails is dropped, because it must not change the outcome of a grasp."""
+        """Pass a tick to the sinks."""
         for sink in self.sinks:
             try:
                 sink.take(reading, phase, command)
             except FAILURES as error:
-                self.sinks = [other for other in self.sinks if other is not sink]
-                self._event(reading.frame.t_s, Phase(phase), f"{type(sink).__name__} failed: {named(error)}")
+                self._drop(sink, error, reading.frame.t_s, Phase(phase))
+
+    def _drop(self, sink: Sink, error: BaseException, t_s: float, phase: Phase) -> None:
+        """Drop a sink that failed: the grasp goes on, and the reason of its outcome names the sink."""
+        self.sinks = [other for other in self.sinks if other is not sink]
+        self.failed_sinks.append(f"{type(sink).__name__} failed: {named(error)}")
+        self._event(t_s, phase, self.failed_sinks[-1])
 
     def _protected(self, reading: Reading, phase: int, command: Command) -> Command:
         """Return the command that the protection allows, if this gripper can hurt something."""
@@ -505,6 +543,30 @@ class _Grasp:
             self._event(frame.t_s, Phase(self.state.phase), "guard: a command was limited")
         return now
 
+    def _count(self, phase: int, limited: bool) -> None:
+        """Count a command, and whether guard or protection limited it."""
+        self.guarded += limited
+        if phase in (SQUEEZE, HOLD):
+            self.squeezed += 1
+            self.squeezed_guarded += limited
+
+    def warnings(self) -> tuple[str, ...]:
+        """Return the faults that were seen, and that the squeeze was not the one that the controller commanded."""
+        seen = () if self.protection is None else self.protection.warnings
+        if self.squeezed_guarded <= MOSTLY * self.squeezed:
+            return seen
+        why = f"the limits of the gripper are {self.info.effort_limit_n:g} N and {self.info.speed_limit_m_s:g} m/s"
+        guard_params = self.params.guard
+        if not self.state.guard.contact_seen and guard_params.first_effort_n < inf:
+            why = (
+                f"no pad has felt a contact, so run.first_effort_n ({guard_params.first_effort_n:g} N) and "
+                f"run.first_speed_m_s ({guard_params.first_speed_m_s:g} m/s) held throughout"
+            )
+        elif self.protection is not None and self.protection.acted:
+            why = "see run.effort_ceiling_n"
+        told = f"squeeze limited: {self.squeezed_guarded} of its {self.squeezed} commands were lowered; {why}"
+        return (*seen, told)
+
     def _told(self, frame: Frame, phase: int, events: int) -> None:
         """Log the events that the controller told in this tick, one for each bit that is set."""
         for i in range(events.bit_length()):
@@ -519,8 +581,10 @@ class _Grasp:
             self.on_event(event)
         for sink in self.sinks:
             if isinstance(sink, EventSink):
-                with suppress(*FAILURES):  # as with ticks, a failing sink must not change the outcome
+                try:
                     sink.event(event)
+                except FAILURES as error:
+                    self._drop(sink, error, t_s, phase)
         return event
 
     def _watched(self, watcher: Watcher, frame: Frame, state: TickState) -> TickState:

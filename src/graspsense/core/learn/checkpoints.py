@@ -16,10 +16,10 @@ from attrs import evolve, frozen
 
 from graspsense.core.components.caller import option
 from graspsense.core.components.roles import FeatureSet
-from graspsense.core.files.limits import CHECKPOINTS
 from graspsense.core.learn.labelled import ControlFeatures, Labelled
 from graspsense.core.values.errors import ConfigError
 from graspsense.core.values.features import Features, FeatureTable, missing
+from graspsense.core.values.limits import CHECKPOINTS
 from graspsense.core.values.signals import HOLD, SQUEEZE
 
 if TYPE_CHECKING:

@@ -9,11 +9,11 @@ from attrs import evolve, field, frozen
 from attrs.converters import optional
 
 from graspsense.core.components.caller import option
-from graspsense.core.files.limits import CLASSES, FEATURES
 from graspsense.core.learn.target_value import TargetValue
 from graspsense.core.values.errors import ConfigError, DataDamaged, suggestion
 from graspsense.core.values.features import LARGEST_VALUE, FeatureTable
 from graspsense.core.values.label_text import label_text
+from graspsense.core.values.limits import CLASSES, FEATURES
 
 if TYPE_CHECKING:
     import numpy as np

@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import Any, Final
 
 from graspsense import __version__
-from graspsense.core.files.limits import MODEL_BYTES
 from graspsense.core.files.regular_file import first_bytes
 from graspsense.core.values.errors import ConfigError, DataDamaged
+from graspsense.core.values.limits import MODEL_BYTES
 
 MOST_DIGITS: Final = 100
 """Largest number of digits of a whole number in a model."""

@@ -6,13 +6,14 @@ from collections.abc import Iterator
 
 from graspsense.core.components.channels import declared_shape
 from graspsense.core.components.config import SelectedComponent, Settings, select_component
+from graspsense.core.components.entries import Role
 from graspsense.core.components.registry import Component, installed
 from graspsense.core.values.channel import Channel, FastChannel, TactileArray
-from graspsense.core.values.errors import GraspsenseError, WiringError
+from graspsense.core.values.errors import GraspsenseError, PluginUnavailable, WiringError
 
 
 def check(settings: Settings) -> None:
-    """Check channels, units, rates and command kinds.
+    """Check channels, units, rates, command kinds, and the least force, speed and step of the gripper.
 
     Raises WiringError that lists every mismatch, with both components, what one provides and what the other requires,
     and PluginUnavailable if a component does not declare what it provides or requires.
@@ -25,6 +26,41 @@ def check(settings: Settings) -> None:
         raise WiringError(
             "\n".join([f"{head}:", *(f"  {one}" for one in misfits), f"  {_fitting(settings)}"])
         )
+    if too_small := [*_too_small(settings)]:
+        raise WiringError("\n  ".join(["the gripper cannot do as little as is asked:", *too_small]))
+
+
+def _too_small(settings: Settings) -> Iterator[str]:
+    """Yield what the controller asks for, or a limit of the run allows, that is less than the gripper can do."""
+    try:
+        gripper, law, run = settings.gripper.create(), settings.controller.create(), settings.run
+    except PluginUnavailable:
+        return  # a driver that is missing is told where the gripper is opened
+    least = (
+        ("force", "N", gripper.least_force_n, law.gentlest_force_n(), 1.0),
+        ("speed", "mm/s", gripper.least_speed_m_s, law.asked_speed_m_s(), 1e3),
+        ("step", "mm", gripper.least_step_m, law.asked_step_m(), 1e3),
+    )
+    asks, cannot = _named(settings.controller.component), _named(settings.gripper.component)
+    if gripper.closes_itself and "effort" in sent_kinds(settings.controller):
+        yield f"{asks} commands an effort, which has no speed, and {cannot} closes by itself. Send one of its kinds"
+    for what, unit, can, asked, factor in least:
+        if asked is not None and asked < can:
+            yield (
+                f"{asks} asks for a {what} of {asked * factor:g} {unit}, and the least {what} of {cannot} is "
+                f"{can * factor:g} {unit}. Ask for at least that, or choose another gripper"
+            )
+    limits = (
+        ("first_effort_n", "force", "N", run.first_effort_n, gripper.least_force_n),
+        ("effort_ceiling_n", "force", "N", run.effort_ceiling_n, gripper.least_force_n),
+        ("first_speed_m_s", "speed", "m/s", run.first_speed_m_s, gripper.least_speed_m_s),
+    )
+    for key, what, unit, limit, can in limits:
+        if limit is not None and limit < can:
+            yield (
+                f"run.{key} is {limit:g} {unit}, and {cannot} cannot keep that limit: its least {what} is {can:g} "
+                f"{unit}. If that is not too much for the object, set -o run.{key}={can:g}"
+            )
 
 
 def _fitting(settings: Settings) -> str:
@@ -70,16 +106,25 @@ def _channel_misfits(gripper: SelectedComponent, user: SelectedComponent) -> Ite
             yield f"{needs}, {lacks}. {choose}"
         elif have.unit != wanted.unit:
             yield f"{needs}, but {provider} gives it in {have.unit}. {choose}"
-        elif isinstance(wanted, TactileArray | FastChannel) and not _fits(wanted, have):
+        elif not _fits(wanted, have, user.component.role):
             yield f"{needs} as {_layout(wanted)}, but {provider} gives it as {_layout(have)}. {choose}"
         elif have.rate_hz < wanted.rate_hz:
             rate = f"at {have.rate_hz:g} Hz" if have.rate_hz else "at no promised rate"
             yield f"{needs}, but {provider} gives it {rate}. {choose}"
 
 
-def _fits(wanted: Channel, have: Channel) -> bool:
-    """Return whether a channel has the kind and the shape that is wanted, so that the same code reads it."""
-    return type(have) is type(wanted) and declared_shape(have) == declared_shape(wanted)
+def _fits(wanted: Channel, have: Channel, role: Role) -> bool:
+    """Return whether a channel has the kind and the shape that is wanted, so that the same code reads it.
+
+    Features read the samples of a fast channel, not how many come in a tick.
+    """
+    if wanted.name == "pads" and not isinstance(wanted, TactileArray):
+        return True  # the images of fingertips of any size
+    if type(have) is not type(wanted):
+        return False
+    if role == "feature-set" and isinstance(wanted, FastChannel):
+        return declared_shape(have)[1:] == declared_shape(wanted)[1:]
+    return declared_shape(have) == declared_shape(wanted)
 
 
 def _layout(channel: Channel) -> str:
@@ -94,10 +139,16 @@ def _settings_hint(gripper: SelectedComponent) -> str:
     return " with these settings" if gripper.component.channels_vary() else ""
 
 
+def sent_kinds(controller: SelectedComponent) -> tuple[str, ...]:
+    """Return the kinds of command that a controller sends with its settings."""
+    law = controller.declared
+    kinds: tuple[str, ...] = (controller.config.sends,) if law.alternatives else law.commands
+    return kinds
+
+
 def _command_misfits(gripper: SelectedComponent, controller: SelectedComponent) -> Iterator[str]:
-    law, accepted = controller.declared, gripper.declared.accepts
-    sent = (controller.config.sends,) if law.alternatives else law.commands
-    for kind in sent:
+    accepted = gripper.declared.accepts
+    for kind in sent_kinds(controller):
         if kind not in accepted:
             kinds = ", ".join(accepted) or "none"
             yield (

@@ -9,6 +9,7 @@ from typing import Any, Final, Literal
 from attrs import Attribute, field, frozen
 from attrs.validators import and_, deep_iterable, ge, in_, instance_of, min_len
 
+from graspsense.core.values.limits import CHANNEL_NUMBERS
 from graspsense.core.values.signals import CHANNELS
 
 
@@ -60,13 +61,20 @@ class Channel:
             )
 
 
+def _refuse_too_many(channel: Channel, numbers: int) -> None:
+    """Raise ValueError if a reading of this channel has more numbers than a recording holds."""
+    if too_many := CHANNEL_NUMBERS.exceeded(numbers):
+        raise ValueError(f"channel {channel.name!r} has {too_many}")
+
+
 @frozen
 class TactileArray(Channel):
     """An array of tactile cells. An image of it has one number for each cell.
 
     The array named `pads` stands for both fingertips, whose images are `Reading.pads`; every other array has its
     `Image` in `Reading.signals`. Its cells are given by `rows` and `columns` (row by row), by `positions_m`, or by
-    both. Raises ValueError if there is no cell, or if these do not have the same number of cells.
+    both. Raises ValueError if there is no cell, if these do not have the same number of cells, or if there are more
+    than `GRASPSENSE_MAX_CHANNEL_NUMBERS`.
     """
 
     finger: str = field(default="", validator=instance_of(str), kw_only=True)
@@ -86,6 +94,7 @@ class TactileArray(Channel):
                 f"array {self.name!r} has {self.rows} rows, {self.columns} columns and {placed} positions: give rows "
                 "and columns, the position of each cell, or both with the same number of cells"
             )
+        _refuse_too_many(self, self.cells)
         if self.facing and len(self.facing) != self.cells:
             raise ValueError(
                 f"array {self.name!r} has {self.cells} cells, and 'facing' has {len(self.facing)} values"
@@ -123,3 +132,4 @@ class FastChannel(Channel):
             raise ValueError(
                 f"channel {self.name!r} is part of a frame, so it has one value a tick: give another name"
             )
+        _refuse_too_many(self, self.samples * len(self.axes))

@@ -4,15 +4,34 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Final
 
 
 def display_unit(unit: str) -> tuple[str, float]:
-    """Return the unit in which a quantity is shown, and the factor to it: mm for m, mm/s for m/s.
+    """Return the unit in which a quantity is shown, and the factor to it: mm for m, mm/s for m/s, mm2, cm3.
 
     An acceleration stays in m/s2.
     """
+    if unit in _AREAS_AND_VOLUMES:
+        return _AREAS_AND_VOLUMES[unit]
     length = unit == "m" or (unit.startswith("m/") and not unit.startswith(("m/s2", "m/s^2")))
     return (f"m{unit}", 1e3) if length else (unit, 1.0)
+
+
+_AREAS_AND_VOLUMES: Final = {
+    **{unit: (f"m{unit}", 1e6) for unit in ("m2", "m^2", "m²")},
+    **{unit: (f"c{unit}", 1e6) for unit in ("m3", "m^3", "m³")},
+}
+
+
+def in_column(value: float) -> str:
+    """Return a number for a column: with three decimals, or with three digits where these would hide it.
+
+    >>> in_column(57.8), in_column(0.0), in_column(2.5e-5), in_column(101325e3)
+    ('   57.800', '    0.000', ' 2.50e-05', ' 1.01e+08')
+    """
+    fits = not 0.0 < abs(value) < 1e-3 and not abs(value) >= 1e5
+    return f"{value:9.3f}" if fits else f"{value:9.2e}"
 
 
 def in_words(value: float, unit: str) -> str:

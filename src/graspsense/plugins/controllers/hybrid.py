@@ -15,7 +15,7 @@ from graspsense.plugin_api import (
     APPROACH,
     EFFORT,
     NOT_FREE,
-    VELOCITY,
+    POSITION,
     Command,
     Controller,
     Frame,
@@ -106,12 +106,14 @@ def step(params: HybridParams, state: HybridState, reading: Reading) -> tuple[Co
         elapsed = frame.t_s - contact_t
         if elapsed < params.ramp_s:
             effort = approach_effort + (effort - approach_effort) * (elapsed / params.ramp_s)
-    value, limit = effort, inf
-    if params.kind == VELOCITY:
+    value, limit, speed = effort, inf, inf
+    if params.kind != EFFORT:
         value = -params.velocity.closing_speed_m_s
+        if params.kind == POSITION:
+            value, speed = 0.0, params.velocity.closing_speed_m_s
         if progress.phase != APPROACH:
             limit = effort
-    return Command(params.kind, value, limit, inf), HybridState(
+    return Command(params.kind, value, limit, speed), HybridState(
         progress.phase,
         progress.outcome,
         progress,
@@ -149,7 +151,7 @@ class HybridController(Controller[HybridConfig]):
 
     requires = LAW_CHANNELS
     commands = ("effort",)
-    alternatives = ("velocity",)
+    alternatives = ("velocity", "position")
     step = staticmethod(step)
     events = EVENTS
     free_motion = FreeMotion(free_begin, free_command, free_end)
@@ -157,6 +159,10 @@ class HybridController(Controller[HybridConfig]):
     def asked_force_n(self) -> float:
         """Return the probing force (N)."""
         return float(self.config.probing_force_n)
+
+    def asked_speed_m_s(self) -> float:
+        """Return the closing speed (m/s)."""
+        return float(self.config.closing_speed_m_s)
 
     def contact_force_n(self) -> float:
         """Return the contact force (N) of the supervision."""

@@ -14,6 +14,7 @@ from attrs import frozen
 from graspsense.plugin_api import (
     EFFORT,
     NOT_FREE,
+    POSITION,
     VELOCITY,
     Command,
     Controller,
@@ -65,10 +66,11 @@ class VelocityLoopConfig:
         meaning="Initial value of the integral: the Coulomb friction of the gripper (7 N is fed forward in "
         "pr2_gripper_sensor).",
     )
-    sends: Literal["effort", "velocity"] = setting(
+    sends: Literal["effort", "velocity", "position"] = setting(
         default="effort",
-        meaning="What is commanded. velocity is for a gripper with a velocity loop of its own: the gains then have no "
-        "effect, and the squeeze closes on with the effort as a limit.",
+        meaning="What is commanded. velocity is for a gripper with a velocity loop of its own, position for one that "
+        "closes by itself at this speed: the gains then have no effect, and the squeeze closes on with the effort as a "
+        "limit.",
     )
 
 
@@ -100,7 +102,7 @@ def velocity_loop(config: VelocityLoopConfig) -> VelocityLoop:
 
 def kind_sent(config: VelocityLoopConfig) -> int:
     """Return the command kind of the key `sends`."""
-    return VELOCITY if config.sends == "velocity" else EFFORT
+    return {"effort": EFFORT, "velocity": VELOCITY, "position": POSITION}[config.sends]
 
 
 def closing_effort(
@@ -141,9 +143,12 @@ def step(params: VelocityParams, state: VelocityState, reading: Reading) -> tupl
     frame = reading.frame
     progress = supervise(params.supervision, state.progress, frame)
     value, integral = closing_effort(params.loop, state.integral_n, frame.velocity_m_s, frame.dt_s)
+    speed = inf
     if params.kind == VELOCITY:
         value = -params.loop.closing_speed_m_s
-    return Command(params.kind, value, inf, inf), VelocityState(
+    elif params.kind == POSITION:
+        value, speed = 0.0, params.loop.closing_speed_m_s
+    return Command(params.kind, value, inf, speed), VelocityState(
         progress.phase, progress.outcome, progress, integral, events_of(state.progress, progress)
     )
 
@@ -173,10 +178,14 @@ class VelocityController(Controller[VelocityConfig]):
 
     requires = LAW_CHANNELS
     commands = ("effort",)
-    alternatives = ("velocity",)
+    alternatives = ("velocity", "position")
     step = staticmethod(step)
     events = EVENTS
     free_motion = FreeMotion(free_begin, free_command, free_end)
+
+    def asked_speed_m_s(self) -> float:
+        """Return the closing speed (m/s)."""
+        return float(self.config.closing_speed_m_s)
 
     def contact_force_n(self) -> float:
         """Return the contact force (N) of the supervision."""

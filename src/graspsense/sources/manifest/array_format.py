@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from attrs import evolve, frozen
 
-from graspsense.core.files.limits import RECORDINGS
 from graspsense.core.values.errors import ConfigError, DataDamaged, listed
+from graspsense.core.values.limits import RECORDINGS
 from graspsense.sources.manifest.description import AXES, TIME
 from graspsense.sources.manifest.hdf5_file import hdf5_arrays
 from graspsense.sources.manifest.mat_file import mat_variables

@@ -13,8 +13,8 @@ from attrs import Attribute, frozen
 from graspsense.core.components.layers import read_toml
 from graspsense.core.components.setting import setting
 from graspsense.core.components.strict import ValidationFailed, structured
-from graspsense.core.files.limits import ENTRIES
 from graspsense.core.values.errors import ConfigError
+from graspsense.core.values.limits import ENTRIES
 from graspsense.sources.manifest.expression import Expression, ExpressionError, parse
 from graspsense.sources.manifest.patterns import file_template, regular_expression
 

@@ -19,8 +19,8 @@ from typing import TYPE_CHECKING, Any, Final, NoReturn
 import numpy as np
 from attrs import frozen
 
-from graspsense.core.files.limits import CELLS
 from graspsense.core.values.errors import ConfigError, listed, suggestion
+from graspsense.core.values.limits import CELLS
 from graspsense.sources.manifest.patterns import PatternError, wildcard
 
 if TYPE_CHECKING:

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from graspsense.core.files.limits import RECORDINGS
 from graspsense.core.values.errors import ConfigError, DataDamaged, listed
+from graspsense.core.values.limits import RECORDINGS
 from graspsense.recording.labelled_recording import LabelledRecording, UnreadableRecording
 from graspsense.recording.readable import each_readable, refuse_devices
 from graspsense.recording.replayable import Recording

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from keyword import iskeyword
 from typing import Final
 
@@ -81,7 +81,7 @@ def samples(manifest: ReadManifest, table: ColumnTable) -> GraspColumns:
         velocity_m_s=None if velocity is None else velocity[0],
         scalars=scalars,
         arrays=arrays,
-        shapes=_shapes(manifest, table, found),
+        shapes=_shapes(manifest, table, found, arrays),
         fast=manifest.fast,
         units={
             **units,
@@ -201,12 +201,20 @@ def _channels(
 
 
 def _shapes(
-    manifest: ReadManifest, table: ColumnTable, found: AvailableColumns
+    manifest: ReadManifest, table: ColumnTable, found: AvailableColumns, arrays: Mapping[str, Numbers]
 ) -> dict[str, tuple[int, int]]:
-    """Return the shape of each channel that is computed from a column with a shape, such as an image."""
+    """Return the shape of each channel that is computed from a column with a shape, such as an image.
+
+    The numbers of a fast channel without one are samples of one axis.
+    """
     shapes = {}
-    for name, expression in manifest.channels.items():
-        for column in expression.columns(tuple(found)):
-            if column in table.shapes:
-                shapes[name] = table.shapes[column]
+    for name, values in arrays.items():
+        width = values.shape[1]
+        columns = manifest.channels[name].columns(tuple(found))
+        known = [table.shapes[column] for column in columns if column in table.shapes]
+        # An expression may have taken some of the cells.
+        if known and known[-1][0] * known[-1][1] == width:
+            shapes[name] = known[-1]
+        elif name in manifest.fast:
+            shapes[name] = (width, 1)
     return shapes

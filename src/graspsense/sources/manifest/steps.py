@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from attrs import evolve
 
-from graspsense.core.files.limits import SAMPLES
 from graspsense.core.grasp.gap_resolution import gap_resolution
 from graspsense.core.values.errors import DataDamaged
+from graspsense.core.values.limits import SAMPLES
 from graspsense.sources.grasp_columns import PLAUSIBLE, GraspColumns, check_increasing, only
 
 if TYPE_CHECKING:
@@ -137,6 +137,9 @@ def resampled(columns: GraspColumns, rate_hz: float) -> GraspColumns:
             return column
         return np.column_stack([np.interp(times, t, column) for column in values.T])
 
+    def along_own(name: str, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        return values if name in columns.times else along(values)
+
     return evolve(
         columns,
         lines=None,
@@ -146,7 +149,7 @@ def resampled(columns: GraspColumns, rate_hz: float) -> GraspColumns:
         right_n=along(columns.right_n),
         effort_n=None if columns.effort_n is None else along(columns.effort_n),
         velocity_m_s=None if columns.velocity_m_s is None else along(columns.velocity_m_s),
-        scalars={name: along(values) for name, values in columns.scalars.items()},
-        arrays={name: along(values) for name, values in columns.arrays.items()},
+        scalars={name: along_own(name, values) for name, values in columns.scalars.items()},
+        arrays={name: along_own(name, values) for name, values in columns.arrays.items()},
         notes=(*columns.notes, f"resampled to {rate_hz:g} Hz"),
     )

@@ -176,14 +176,15 @@ class Component(Declared[ComponentEntry]):
     def declared(self, config: object = None) -> Any:
         """Return its entry with all that its class declares.
 
-        `config` is an instance of its config class, by default that of its defaults; the channels of a gripper may
-        depend on it. Raises PluginUnavailable if the class cannot be imported, or does not declare something.
+        `config` is an instance of its config class, by default that of its defaults; what the class declares by a
+        property may depend on it. Raises PluginUnavailable if the class cannot be imported, or does not declare
+        something.
         """
         if not left_out(self.entry, self.role):
             return self.entry
         cls = self.component_class()
         part: Any = cls
-        if self.channels_vary():
+        if any(self._varies(name) for name in left_out(self.entry, self.role)):
             if config is None:
                 with contextlib.suppress(TypeError, ValueError):
                     config = self.config_class()()
@@ -193,13 +194,17 @@ class Component(Declared[ComponentEntry]):
         except NotDeclared as error:
             raise self._unavailable(str(error)) from error
         except FAILURES as error:
-            raise self._unavailable(f"its channels raised {type(error).__name__}: {error}") from error
+            raise self._unavailable(f"what it declares raised {type(error).__name__}: {error}") from error
 
     def channels_vary(self) -> bool:
         """Return whether its channels depend on its settings. Raises PluginUnavailable."""
         if self.role != "sensor-backend" or getattr(self.entry, "channels", None) is not None:
             return False
-        return isinstance(inspect.getattr_static(self.component_class(), "channels"), property)
+        return self._varies("channels")
+
+    def _varies(self, name: str) -> bool:
+        """Return whether the class declares this by a property, which may depend on its settings."""
+        return isinstance(inspect.getattr_static(self.component_class(), name, None), property)
 
     def declared_twice(self) -> tuple[str, ...]:
         """Return what both its entry and its class declare. Raises PluginUnavailable."""

@@ -31,6 +31,11 @@ def effort_ceiling_n(info: DeviceInfo, controller: Controller[object], run: RunC
     return min(MARGIN * force_n + friction_n, info.effort_limit_n)
 
 
+def asked_effort_n(command: Command) -> float:
+    """Return the effort (N) that a command may use: that of an effort or a force, otherwise its limit."""
+    return command.value if command.kind in (EFFORT, FORCE) else command.effort_limit_n
+
+
 def limited(command: Command, closing_n: float, opening_n: float) -> Command:
     """Return the command with at most these efforts (N) in closing and in opening direction."""
     kind, value, effort_limit_n, speed_limit_m_s = command

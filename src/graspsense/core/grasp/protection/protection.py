@@ -16,10 +16,11 @@ from graspsense.core.components.roles import Controller
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.protection.cells import Fingertips
 from graspsense.core.grasp.protection.drift import Drift
-from graspsense.core.grasp.protection.effort_ceiling import effort_ceiling_n, limited
+from graspsense.core.grasp.protection.effort_ceiling import asked_effort_n, effort_ceiling_n, limited
 from graspsense.core.grasp.protection.motor import Motor
 from graspsense.core.grasp.protection.pad_balance import PadBalance
 from graspsense.core.grasp.protection.reports import Reports
+from graspsense.core.grasp.protection.rush import Rush
 from graspsense.core.grasp.protection.status import StatusWatch
 from graspsense.core.grasp.protection.stuck_force import StuckForce
 from graspsense.core.grasp.protection.touch import Touch
@@ -60,6 +61,7 @@ class Protection:
         self.acted = 0
         rates = {channel.name: channel.rate_hz for channel in info.channels}
         self._ceiling_n = effort_ceiling_n(info, controller, run)
+        self._effort_limit_n = info.effort_limit_n
         self._approach_n = max(self._ceiling_n, run.first_effort_n if run.first_effort_n < inf else 0.0)
         self._relaxed = info.relaxed
         opening_n = (
@@ -76,6 +78,8 @@ class Protection:
         self._fingertips = Fingertips()
         self._motor = Motor("effort" in rates, info.rate_hz)
         self._status = StatusWatch(info.status_bits)
+        first_m_s = run.first_speed_m_s if info.clock == "device" else inf
+        self._rush = Rush(min(first_m_s, info.speed_limit_m_s), info.rate_hz)
         self._reports = Reports(info.rate_hz, rates.get("pads", 0.0))
 
     @property
@@ -94,12 +98,14 @@ class Protection:
         for fault in self._status.see(frame, phase):
             self._see(fault, phase)
         self._see(self._motor.see(frame, phase), phase)
+        if phase == APPROACH and self._touch.free():
+            self._see(self._rush.see(frame))
         if not self._declared and frame.force_left_n == frame.force_left_n:
             self._has_pads = True
         if self._has_pads:
             self._see_pads(reading, phase, command)
         allowed = self._limited(phase, command)
-        self.acted += allowed.value != command.value
+        self.acted += allowed.value != command.value or self._gives(command) > asked_effort_n(allowed)
         self._motor.apply(frame, allowed)
         return allowed
 
@@ -148,11 +154,17 @@ class Protection:
         if fault.ends and self.ending is None:
             self.ending = fault
 
+    def _gives(self, command: Command) -> float:
+        """Return the effort (N) that the controller gives; minus infinity if it leaves it to the gripper."""
+        effort_n = asked_effort_n(command)
+        left = command.kind not in (EFFORT, FORCE) and effort_n >= self._effort_limit_n
+        return -inf if left else effort_n
+
     def _limited(self, phase: int, command: Command) -> Command:
         if self.ending is not None:
             return self._relaxed
         closing_n = self._approach_n if phase == APPROACH else self._ceiling_n
-        if phase in (SQUEEZE, HOLD) and command.kind in (EFFORT, FORCE) and command.value > closing_n:
+        if phase in (SQUEEZE, HOLD) and self._gives(command) > closing_n:
             self._see(
                 Fault(
                     "effort at its ceiling",

@@ -56,7 +56,7 @@ CELLS: Final = SizeLimit("GRASPSENSE_MAX_CELLS", 10_000_000, "cells of a table")
 SAMPLES: Final = SizeLimit("GRASPSENSE_MAX_SAMPLES", 5_000_000, "samples of a grasp")
 SETTINGS_BYTES: Final = SizeLimit("GRASPSENSE_MAX_SETTINGS_BYTES", 2**19, "bytes of a file of settings")
 CHANNEL_NUMBERS: Final = SizeLimit(
-    "GRASPSENSE_MAX_CHANNEL_NUMBERS", 65_536, "numbers of a channel in one sample"
+    "GRASPSENSE_MAX_CHANNEL_NUMBERS", 2**20, "numbers of a channel in one reading"
 )
 ENTRIES: Final = SizeLimit("GRASPSENSE_MAX_ENTRIES", 500, "entries of a key of a manifest")
 MODEL_BYTES: Final = SizeLimit("GRASPSENSE_MAX_MODEL_BYTES", 256 * 2**20, "bytes of a model")

@@ -1,0 +1,103 @@
+"""Whether readings are what a gripper declares: numbers, and images and samples of the declared shapes."""
+
+from __future__ import annotations
+
+import struct
+from array import array
+from collections.abc import Iterable
+from itertools import chain
+from typing import Any, Final
+
+from graspsense.core.components.channels import declared_shape, further, shape_of
+from graspsense.core.values.channel import Channel, TactileArray
+from graspsense.core.values.signals import Frame, Image, Pads, Reading, Samples
+
+_FRAME: Final = struct.Struct(f"<{len(Frame._fields) - 1}dq")
+
+
+class Delivered:
+    """Checks the readings of one grasp, in order. What the channels do not say, the first reading does."""
+
+    def __init__(self, channels: Iterable[Channel]) -> None:
+        channels = tuple(channels)
+        self._shapes = {channel.name: declared_shape(channel) for channel in further(channels)}
+        self._declared = tuple(self._shapes)
+        self._names: tuple[str, ...] | None = None
+        arrays = [one.cells for one in channels if one.name == "pads" and isinstance(one, TactileArray)]
+        self._cells = arrays[0] if arrays else None
+        self._pads: Pads | None = None
+        self._counter = 0
+        self._signals: Any = ()
+
+    def problem(self, reading: Reading) -> str:
+        """Return what is wrong with this reading, in words; an empty text if nothing is."""
+        frame, pads, signals = reading
+        try:
+            _FRAME.pack(*frame)
+        except (struct.error, TypeError, OverflowError) as error:
+            return f"its frame is not one of a gripper: {error}"
+        problem = ""
+        if pads is not self._pads:
+            self._pads = pads
+            problem = self._of_pads(pads)
+        if signals is not self._signals or self._names is None:
+            self._signals = signals
+            problem = problem or self._of_signals(signals)
+        return problem
+
+    def _of_pads(self, pads: Pads) -> str:
+        if self._cells is None and pads.counter:
+            self._cells = len(pads.left)
+        for side in (pads.left, pads.right):
+            if self._cells is not None and len(side) != self._cells and (pads.counter or side):
+                return f"an image of a fingertip has {len(side)} cells instead of {self._cells}"
+        if pads.counter != self._counter:
+            self._counter = pads.counter
+            if not (_are_numbers(pads.left) and _are_numbers(pads.right)):
+                return "an image of a fingertip has a cell that is not a number"
+        return ""
+
+    def _of_signals(self, signals: Any) -> str:
+        names = getattr(signals, "_fields", ())
+        if self._names is None:
+            missing = [name for name in self._declared if name not in names]
+            if missing:
+                return f"the declared channel {missing[0]!r} is not delivered"
+            self._names = names
+        if names != self._names:
+            return f"its further channels are {', '.join(names) or 'none'}, and were {', '.join(self._names)}"
+        for name, value in zip(names, signals, strict=True):
+            shape = self._shapes.setdefault(name, shape_of(value))
+            problem = _problem(value, shape)
+            if problem:
+                return f"the channel {name!r} {problem}"
+        return ""
+
+
+def _problem(value: Any, shape: tuple[int, ...]) -> str:
+    """Return what is wrong with the value of a channel that has this shape."""
+    if shape_of(value) != shape:
+        return f"has {_sized(shape_of(value))} instead of {_sized(shape)}"
+    if isinstance(value, Image):
+        numbers: Iterable[Any] = value.cells
+    elif isinstance(value, Samples):
+        if any(len(row) != shape[1] for row in value.values) or not 0 <= value.new <= shape[0]:
+            return f"does not have {_sized(shape)} in each tick"
+        numbers = chain.from_iterable(value.values)
+    else:
+        numbers = (value,)
+    return "" if _are_numbers(numbers) else "has a value that is not a number"
+
+
+def _sized(shape: tuple[int, ...]) -> str:
+    if not shape:
+        return "one number"
+    return f"{shape[0]} cells" if len(shape) == 1 else f"{shape[0]} samples of {shape[1]} axes"
+
+
+def _are_numbers(values: Iterable[Any]) -> bool:
+    try:
+        array("d", values)
+    except TypeError:
+        return False
+    return True

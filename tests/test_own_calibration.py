@@ -1,0 +1,92 @@
+"""A gripper of one's own, with cells in counts, is calibrated by the same commands as ours."""
+
+from __future__ import annotations
+
+import sys
+
+import pytest
+from attrs import evolve, frozen
+from parts import CHANNELS_OF_HAND, Hand, HandConfig, channels
+
+from graspsense.cli.main import main
+from graspsense.core.components.registry import IsolatedPlugins
+from graspsense.plugin_api import (
+    NAMES_INPUT,
+    SensorBackend,
+    SensorBackendEntry,
+    calibrations_of,
+    hookimpl,
+    load_of,
+    setting,
+    stored_tables,
+    stored_zero,
+)
+
+HERE = sys.modules[__name__]
+NUMBERS = {"pad_counts_per_n": 2200.0}
+
+
+@frozen(kw_only=True)
+class CountingConfig(HandConfig):
+    calibration: str = setting(default="", effect=NAMES_INPUT, meaning="Folder of calibrations.")
+
+
+class Counting(Hand, SensorBackend[CountingConfig]):
+    channels = channels(*CHANNELS_OF_HAND)
+    accepts = ("effort",)
+
+    def open(self, seed):
+        return evolve(super().open(seed), serial="H7", numbers=NUMBERS)
+
+    def read(self, timeout_s):
+        return super().read(timeout_s)._replace(signals=())
+
+
+class Keyless(Hand):
+    channels = Counting.channels
+    accepts = ("effort",)
+
+
+class Plugin:
+    GRASPSENSE_API = (2, 0)
+
+    @hookimpl
+    def graspsense_sensor_backends(self):
+        for cls in (Counting, Keyless):
+            config = "parts:HandConfig" if cls is Keyless else ""
+            yield SensorBackendEntry(
+                cls.__name__.lower(), f"{__name__}:{cls.__name__}", "a hand", config=config
+            )
+
+
+@pytest.fixture
+def calibrate(monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, __name__, HERE)
+
+    def calibrate(gripper, *arguments):
+        with IsolatedPlugins(Plugin()), pytest.raises(SystemExit) as ended:
+            main(["calibrate", *arguments, "--gripper", gripper, "-o", "classifier.type=none"])
+        return ended.value.code, capsys.readouterr().err
+
+    return calibrate
+
+
+def test_zero_and_force_are_stored_and_found_by_serial_number(calibrate, tmp_path):
+    readings = tmp_path / "readings.csv"
+    readings.write_text("side,pad_counts,load_n\nleft,2200,1.1\nleft,4400,2.2\nright,2200,1\nright,4400,2\n")
+    folder = ("-o", f"gripper.calibration={tmp_path}")
+    assert calibrate("counting", "tare", *folder) == (0, "")
+    assert calibrate("counting", "load-cell", str(readings), *folder)[0] == 0
+
+    found = calibrations_of(tmp_path, "H7", NUMBERS)
+    left, right = stored_zero(found["tare"])
+    assert (len(left), set(left), set(right)) == (22, {3000.0}, {3000.0})
+    left_table, _ = stored_tables(found["load-cell"])
+    assert load_of(left_table, 1.5) == (pytest.approx(1.65), True)
+
+
+def test_a_gripper_without_the_setting_is_told_what_it_takes(calibrate):
+    code, said = calibrate("keyless", "tare")
+    assert code == 2
+    assert "no key 'calibration'" in said
+    assert "calibrations_of" in said

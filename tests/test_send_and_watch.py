@@ -1,0 +1,180 @@
+"""The law for a gripper that closes by itself, on a body that does: it keeps going to its target between commands."""
+
+from __future__ import annotations
+
+import sys
+from math import inf
+
+import numpy as np
+import pytest
+from attrs import evolve
+from parts import HandConfig
+
+from graspsense import WiringError, load_pipeline
+from graspsense.core.components.registry import IsolatedPlugins
+from graspsense.core.components.run_config import RunConfig
+from graspsense.core.grasp.runner import run_grasp
+from graspsense.core.values.errors import ConfigError
+from graspsense.core.values.signals import EFFORT, FORCE, POSITION, VELOCITY, Command, Outcome, Phase, Reading
+from graspsense.plugin_api import CHANNELS, Channel, ObjectKind, SensorBackend, SensorBackendEntry, hookimpl
+from graspsense.plugins.controllers.force import ForceConfig, ForceController
+from graspsense.plugins.controllers.send_and_watch import SendAndWatchConfig, SendAndWatchController
+from graspsense.testing.model_gripper import OBJECTS, ModelGripper
+
+HERE = sys.modules[__name__]
+WITH_PADS = ("gap", "velocity", "effort", "force_left", "force_right")
+PADLESS = ("gap", "velocity", "effort")
+
+
+class Body(ModelGripper):
+    """The model gripper as one that closes by itself: a real one, which takes a target, a speed and a force.
+
+    A command is carried out for ten ticks before the next one is looked at.
+    """
+
+    accepts = ("position", "velocity", "force")
+
+    def __init__(self, names, thing="a soft object", clock="device"):
+        channels = frozenset(Channel(name, CHANNELS[name], 1000.0) for name in names)
+        super().__init__(channels, *OBJECTS[thing])
+        self._declared, self.clock, self.sent, self.k = tuple(channels), clock, [], 0
+
+    @property
+    def channels(self):
+        return self._declared
+
+    def open(self, seed):
+        info = super().open(seed)
+        opening = Command(POSITION, 0.078, inf, 0.05)
+        relaxed = Command(VELOCITY, 0.0, inf, inf)
+        self.now = relaxed
+        return evolve(info, clock=self.clock, opening=opening, relaxed=relaxed)
+
+    def apply(self, command):
+        self.sent.append(command)
+        if self.k % 10 == 0:
+            self.now = command
+        self.k += 1
+        super().apply(self.now)
+
+
+RUN = RunConfig(first_effort_n=100.0)
+
+
+def grasped(names=PADLESS, thing="a soft object", run=RUN, **keys):
+    body = Body(names, thing)
+    keys = {"pads": "force_left" in names, **keys}
+    return body, run_grasp(body, SendAndWatchController(SendAndWatchConfig(**keys)), run)
+
+
+@pytest.mark.parametrize("sends", ["position", "velocity", "force"])
+@pytest.mark.parametrize("names", [PADLESS, WITH_PADS], ids=["without pads", "with pads"])
+@pytest.mark.parametrize("thing", ["a soft object", "a hard object"])
+def test_it_approaches_gently_stops_raises_the_force_in_steps_and_waits_for_rest(names, thing, sends):
+    body, grasp = grasped(names, thing, sends=sends)
+    assert grasp.outcome is Outcome.STEADY, grasp.reason
+    trace = grasp.trace
+    kind = {"position": POSITION, "velocity": VELOCITY, "force": FORCE}[sends]
+    closing = [one for one in body.sent if one.kind == kind and (kind == FORCE or one.effort_limit_n < 25.0)]
+    forces = [one.value if kind == FORCE else one.effort_limit_n for one in closing]
+    assert list(dict.fromkeys(forces)) == [5.0, 10.0, 15.0, 20.0]
+    approach = trace.phase == Phase.APPROACH
+    assert -trace.velocity_m_s[approach].min() < 0.0105
+    held = trace.effort_n[trace.phase == Phase.HOLD]
+    assert held == pytest.approx(20.0, rel=0.1)
+    # Until the first step, the fingers stay within what the approach presses.
+    contact_s = trace.t_s[trace.phase == Phase.SQUEEZE][0]
+    before_step = (trace.t_s >= contact_s) & (trace.t_s < contact_s + 0.1)
+    assert trace.effort_n[before_step].max() < 8.0
+
+
+def test_nothing_between_the_fingers_is_said():
+    _, grasp = grasped(thing="nothing")
+    assert grasp.outcome is Outcome.NOTHING_THERE
+
+
+def test_with_pads_that_do_not_both_feel_it_is_one_finger():
+    class OnePad(Body):
+        def read(self, timeout_s):
+            reading = super().read(timeout_s)
+            return Reading(reading.frame._replace(force_right_n=0.0), reading.pads, reading.signals)
+
+    body = OnePad(WITH_PADS, "a hard object")
+    grasp = run_grasp(body, SendAndWatchController(SendAndWatchConfig(pads=True)), RUN)
+    assert grasp.outcome is Outcome.ONE_FINGER
+
+
+def test_an_effort_that_becomes_a_fast_closing_ends_the_grasp():
+    """A driver that turns an effort into a target without a speed: it rushes, and that is told."""
+
+    class Rushing(Body):
+        accepts = ("effort",)
+
+        def apply(self, command):
+            self.sent.append(command)
+            closes = command.kind == EFFORT and command.value >= 0.0
+            super(Body, self).apply(Command(POSITION, 0.0, 20.0, 0.136) if closes else command)
+
+    body = Rushing(WITH_PADS, "nothing")
+    grasp = run_grasp(body, ForceController(ForceConfig()), RunConfig())
+    assert grasp.outcome is Outcome.ABORTED
+    assert "fingers rush" in grasp.reason
+    assert "run.first_speed_m_s" in grasp.reason
+    rushed = grasp.trace.t_s[grasp.trace.velocity_m_s < -0.045]
+    assert rushed[-1] - rushed[0] < 0.2
+
+
+class Hand(Body, SensorBackend[HandConfig]):
+    """The same body as a plugin."""
+
+    channels = tuple(Channel(name, CHANNELS[name], 1000.0) for name in WITH_PADS)
+    closes_itself = {  # noqa: RUF012
+        "position": "the target with force and speed",
+        "velocity": "a far target",
+        "force": "closing with this force",
+        "effort": "a far target without a speed",
+    }
+    accepts = ("position", "velocity", "force", "effort")
+
+    def __init__(self, config):
+        Body.__init__(self, WITH_PADS)
+        self.config = config
+
+    def objects(self):
+        return (ObjectKind(name="cup"),)
+
+
+class Plugin:
+    GRASPSENSE_API = (2, 0)
+
+    @hookimpl
+    def graspsense_sensor_backends(self):
+        yield SensorBackendEntry(name="closing-hand", target=f"{__name__}:Hand", summary="closes by itself")
+
+
+@pytest.fixture
+def pipeline(monkeypatch):
+    monkeypatch.setitem(sys.modules, __name__, HERE)
+    with IsolatedPlugins(Plugin()) as plugins:
+
+        def pipeline(*options):
+            fixed = ["gripper.type=closing-hand", "features.type=chitta", "classifier.type=none"]
+            return load_pipeline(options=[*fixed, "run.first_effort_n=30", *options], plugins=plugins)
+
+        yield pipeline
+
+
+def test_what_its_commands_become_is_told_with_the_grasp(pipeline):
+    notes = pipeline("controller.type=send-and-watch", "controller.sends=velocity").grasp().device.notes
+    assert "the gripper closes by itself: a velocity becomes a far target" in notes
+
+
+def test_an_effort_is_refused_where_the_gripper_closes_by_itself(pipeline):
+    with pytest.raises(WiringError, match="an effort, which has no speed"):
+        pipeline("controller.type=send-and-watch", "controller.type=force")
+
+
+def test_its_settings_are_checked(pipeline):
+    with pytest.raises(ConfigError, match="sends"):
+        pipeline("controller.type=send-and-watch", "controller.sends=effort")
+    assert np.isfinite(SendAndWatchController(SendAndWatchConfig()).params().closing_speed_m_s)

@@ -1,0 +1,189 @@
+"""What cannot be recorded is not kept, and what a label cannot select is not grasped: each is told."""
+
+from __future__ import annotations
+
+import io
+import sys
+
+import pytest
+from attrs import frozen
+from parts import ACCELERATION, CHANNELS_OF_HAND, Hand, HandConfig, channels
+
+from graspsense.cli.main import main
+from graspsense.core.components.config import resolve
+from graspsense.core.components.registry import IsolatedPlugins
+from graspsense.plugin_api import Reading, SensorBackend, SensorBackendEntry, hookimpl, setting
+from graspsense.recording.reader import read_recorded
+from graspsense.store.record_grasp import record_grasp
+from graspsense.store.store import Store
+
+HERE = sys.modules[__name__]
+PLAIN = ("classifier.type=none", "features.type=chitta")
+GRASPSENSE_API = (2, 0)
+
+
+@frozen(kw_only=True)
+class UncountableConfig(HandConfig):
+    images: int = setting(default=50, meaning="Images with a counter that is a whole number.")
+
+
+class Uncountable(Hand, SensorBackend[UncountableConfig]):
+    """After some images, their counter is one that no recording can hold."""
+
+    channels = channels(*CHANNELS_OF_HAND)
+    accepts = ("effort",)
+
+    def read(self, timeout_s):
+        reading = super().read(timeout_s)
+        counter = reading.pads.counter
+        if counter > self.config.images:
+            return reading._replace(pads=reading.pads._replace(counter=float(counter)), signals=())
+        return reading._replace(signals=())
+
+
+@frozen(kw_only=True)
+class ShorteningConfig(HandConfig):
+    what: str = setting(default="image", meaning="What goes wrong.")
+
+
+class Shortening(Hand, SensorBackend[ShorteningConfig]):
+    """Delivers something else than it declares from 1.5 s on."""
+
+    channels = (*channels(*CHANNELS_OF_HAND), ACCELERATION)
+    accepts = ("effort",)
+
+    def read(self, timeout_s):
+        frame, pads, signals = super().read(timeout_s)
+        if frame.t_s > 1.5:
+            frame, pads, signals = SPOILT[self.config.what](frame, pads, signals)
+        return Reading(frame, pads, signals)
+
+
+SPOILT = {
+    "image": lambda frame, pads, signals: (frame, pads._replace(left=pads.left[:5]), signals),
+    "cell": lambda frame, pads, signals: (frame, pads._replace(right=(None,) * 22), signals),
+    "rows": lambda frame, pads, signals: (
+        frame,
+        pads,
+        signals._replace(acceleration=signals.acceleration._replace(values=((0.0,),) * 3)),
+    ),
+    "frame": lambda frame, pads, signals: (frame._replace(edge_left_n=None), pads, signals),
+    "status": lambda frame, pads, signals: (frame._replace(status=1 << 70), pads, signals),
+    "signals": lambda frame, pads, signals: (frame, pads, ()),
+}
+
+
+class Thingless(Uncountable):
+    """Is simulated, and cannot be told what it holds."""
+
+    opened = commanded = 0
+
+    def objects(self):
+        return ()
+
+    def open(self, seed):
+        type(self).opened += 1
+        return super().open(seed)
+
+    def apply(self, command):
+        type(self).commanded += command.value != 0.0
+        super().apply(command)
+
+
+@hookimpl
+def graspsense_sensor_backends():
+    for cls in (Uncountable, Thingless, Shortening):
+        yield SensorBackendEntry(
+            name=cls.__name__.lower(), target=f"{__name__}:{cls.__name__}", summary="a hand"
+        )
+
+
+@pytest.fixture
+def plugins(monkeypatch):
+    monkeypatch.setitem(sys.modules, __name__, HERE)
+    with IsolatedPlugins() as plugins:
+        plugins.add(HERE, "lab-hand")
+        yield plugins
+
+
+@pytest.fixture
+def graspsense(plugins, capsys, monkeypatch):
+    def graspsense(*arguments, answers=""):
+        monkeypatch.setattr(sys, "stdin", io.StringIO(answers))
+        options = [part for option in PLAIN for part in ("-o", option)]
+        with pytest.raises(SystemExit) as ended:
+            main([*arguments, *options])
+        return ended.value.code, *capsys.readouterr()
+
+    return graspsense
+
+
+def numbers_in(folder):
+    with Store.read(folder) as store:
+        return [one.id for one in store.page(set_aside=None)]
+
+
+def test_a_grasp_whose_recorder_fails_is_not_kept_and_its_outcome_says_why(plugins, tmp_path):
+    settings = resolve("default", options=["gripper.type=uncountable", *PLAIN], plugins=plugins)
+    with Store.open(tmp_path / "t") as store:
+        kept = record_grasp(store, settings, plugins, labels={}, origin="run")
+    assert kept.number is None
+    assert f"of the {len(kept.trial.trace)} ticks" in kept.problem
+    assert "graspsense recover" in kept.problem
+    assert "Recorder failed: " in kept.trial.reason
+    assert numbers_in(tmp_path / "t") == []
+    # What was recorded until then can be recovered; it is no trial that counts.
+    assert [one.suffix for one in (tmp_path / "t" / "recordings").iterdir()] == [".part"]
+
+
+def test_run_says_in_outcome_and_exit_code_that_the_trial_is_not_kept(graspsense, tmp_path):
+    code, out, err = graspsense("run", "--gripper", "uncountable", "--save", str(tmp_path / "t"))
+    assert code == 2
+    (outcome,) = [line for line in out.splitlines() if line.startswith("outcome")]
+    assert "Recorder failed" in outcome
+    assert "kept as trial" not in err
+
+
+def test_collect_neither_counts_it_nor_goes_on(graspsense, tmp_path):
+    folder = str(tmp_path / "t")
+    command = ("collect", "--labels", "cup:full", "--each", "2", "--save", folder, "--gripper", "uncountable")
+    code, out, err = graspsense(*command, answers="\n\n")
+    assert code != 0
+    assert "0 of 2" in out
+    assert "ticks of the grasp" in err
+    assert "Recorder failed" in err
+    assert numbers_in(folder) == []
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("collect", "--labels", "cup:full,cup:empty", "--each", "1", "--save"),
+        ("run", "--label", "cup:full", "--save"),
+    ],
+    ids=["collect", "run"],
+)
+def test_a_simulated_gripper_that_cannot_be_told_what_it_holds_grasps_nothing_under_a_label(
+    graspsense, tmp_path, command
+):
+    Thingless.opened = Thingless.commanded = 0
+    code, _, err = graspsense(*command, str(tmp_path / "t"), "--gripper", "thingless", answers="\n\n")
+    assert code == 2
+    assert "with_object" in err
+    assert (Thingless.opened, Thingless.commanded) == (1, 0)
+    assert numbers_in(tmp_path / "t") == []
+
+
+@pytest.mark.parametrize("what", SPOILT)
+def test_what_a_gripper_does_not_declare_ends_the_grasp_and_the_trial_until_then_is_kept(
+    graspsense, tmp_path, what
+):
+    folder = tmp_path / "t"
+    more = ("--gripper", "shortening", "-o", f"gripper.what={what}", "--save", str(folder))
+    code, out, err = graspsense("run", *more)
+    assert code == 4, err
+    assert "aborted: hand delivered what it does not declare" in out
+    with Store.read(folder) as store:
+        (trial,) = store.page()
+        assert trial.outcome == "aborted"
+        assert 500 < len(read_recorded(store.trial(1).recording)) < 1500
