@@ -106,6 +106,7 @@ def run(
         echo_json({**trial_as_json(trial), **({} if kept is None else {"kept": kept}), **further})
     else:
         print_trial(trial)
+        _print_better(settings, trial)
         _print_model(trial, condition)
     if plot is not None:
         draw_grasp(trial, Path(plot))
@@ -146,6 +147,19 @@ def _condition(settings: Settings) -> Conditions | None:
         return None
     with ProgressLine() as progress:
         return conditions(settings, [scene], [settings.run.seed], progress=progress)
+
+
+def _print_better(settings: Settings, trial: Trial) -> None:
+    """Name the pipeline that recognises more, if the plugin of this one declares it."""
+    from graspsense.core.components.registry import installed
+
+    shipped = {one.entry.name: one.entry for one in installed().pipelines()}
+    entry = shipped.get(settings.pipeline)
+    if entry is not None and entry.better and trial.prediction is not None and trial.device.simulated:
+        echo_entry(
+            "better",
+            f"this pipeline is {entry.name}; {entry.better} recognises more: --pipeline {entry.better}",
+        )
 
 
 def _print_model(trial: Trial, condition: Conditions | None) -> None:

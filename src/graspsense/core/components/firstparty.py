@@ -41,5 +41,5 @@ SHIPPED: Final[dict[tuple[Role, str], Shipped]] = {
 }
 """Components in other distributions of this project, for the hint if one is not installed."""
 
-MODELS: Final[dict[str, Shipped]] = {"default": _SIM}
+MODELS: Final[dict[str, Shipped]] = {"default": _SIM, "best": _SIM}
 """Models that this project ships, with their distributions."""
