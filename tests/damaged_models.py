@@ -46,9 +46,9 @@ def answered(path: Path) -> None:
     values = np.array([[1e308] * len(model.names), [math.nan] * len(model.names), [0.06] * len(model.names)])
     table = FeatureTable(names=model.names, units=model.units, values=values)
     for part in (model, *(part for _, part in model.checkpoints)):
-        labels, shares = part.answers(table)
+        _, shares = part.answers(table)
         assert np.abs(shares.sum(axis=1) - 1.0).max() < 1e-6
-        part.prediction_sets(table, labels, shares)
+        part.predictions(table)
         for i in range(len(table)):
             prediction = part.predict(table.row(i))
             assert abs(sum(prediction.probabilities.values()) - 1.0) < 1e-6

@@ -136,6 +136,21 @@ def test_one_label_is_refused(name):
         fitted(name, table, ["same"] * len(labels))
 
 
+@pytest.mark.parametrize("kept", [("bottle:full", "can:full"), ("bottle:empty", "bottle:full", "can:full")])
+def test_the_weights_of_a_network_are_the_network(kept):
+    table, labels = trials()
+    rows = np.flatnonzero(np.isin(labels, kept))
+    network = fitted("mlp", table.rows(rows), [labels[i] for i in rows], kept_as="weights")
+    stored = json.loads(json.dumps(network.to_json()))
+    again = create("classifier", "mlp", kept_as="weights")
+    again.from_json(stored)
+
+    assert "trials" not in stored
+    assert again.classes() == network.classes()
+    assert (again.probabilities(table) == network.probabilities(table)).all()
+    assert again.to_json() == stored
+
+
 def test_another_version_of_scikit_learn_is_said():
     kept = fitted("knn", *trials()).to_json()
     again = create("classifier", "knn")

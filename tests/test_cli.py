@@ -121,7 +121,7 @@ def test_version_is_that_of_the_distribution():
         ),
         (
             ["config", "validate", "nosuch"],
-            "graspsense: no pipeline named 'nosuch'. Known: default.\n"
+            "graspsense: no pipeline named 'nosuch'. Known: best, default.\n"
             "  A file is given with its ending .toml\n",
         ),
         (

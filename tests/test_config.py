@@ -240,7 +240,7 @@ def test_extends_in_a_circle_is_an_error(plugins, write):
 
 def test_a_file_that_extends_nothing_known_is_named_with_its_line(plugins, write):
     assert complaint(write('extends = "defualt"')).startswith(
-        "lab.toml:1: no pipeline named 'defualt'. Known: default. Did you mean 'default'?"
+        "lab.toml:1: no pipeline named 'defualt'. Known: best, default. Did you mean 'default'?"
     )
     assert complaint(write("extends = 3")) == (
         "lab.toml:1: extends: expected the name of a pipeline or the path of a .toml file, "
@@ -448,7 +448,7 @@ class TestFiles:
     def test_no_such_pipeline(self, plugins, write):
         write(BASE, "mine")
         assert complaint("defualt").startswith(
-            "no pipeline named 'defualt'. Known: default. Did you mean 'default'?"
+            "no pipeline named 'defualt'. Known: best, default. Did you mean 'default'?"
         )
         assert complaint("mine").endswith(
             "A file is given with its ending .toml; there is a file 'mine' without it: rename it"

@@ -20,6 +20,7 @@ from parts import Nearest
 from test_classifiers import trials
 
 from graspsense.core.components.registry import Component, installed
+from graspsense.core.learn.certainty import Certainty, SupportClass
 from graspsense.core.learn.conformal import LabelThreshold, PredictionSets
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.learn.model import checkpoint_model, classifier_from, load_model, train, write_model
@@ -46,14 +47,20 @@ def labelled(n=5):
 
 
 def trained(name, **config):
-    """A model with everything that a file can have: prediction sets, a temperature and a checkpoint."""
+    """A model with everything that a file can have: certainty, prediction sets, a temperature and a checkpoint."""
     component = installed().find("classifier", name)
     settings = create("classifier", name, **{**SMALL.get(name, {}), **config}).config
     provenance = {"settings": {"controller": {"type": "hybrid", "probing_force_n": 20.0}}}
     model = train(component, settings, labelled(), name="m", seed=4, provenance=provenance)
-    thresholds = {label: LabelThreshold(score=0.1, units=9, own=True) for label in model.classifier.classes()}
-    sets = PredictionSets(coverage=0.9, unit="trials", thresholds=thresholds, unknown=1, trials=15)
-    model = evolve(model, sets=sets, temperature=1.5)
+    thresholds = {label: LabelThreshold(score=0.1, units=9) for label in model.classifier.classes()}
+    sets = PredictionSets(
+        coverage=0.9, unit="trials", thresholds=thresholds, of_support=(0.1, 0.2), unknown=1, trials=15
+    )
+    classes = [
+        SupportClass(least=least, probabilities=(0.4, 0.9), rates=(0.3, 0.7), units=30.0)
+        for least in (0.0, 4.0)
+    ]
+    model = evolve(model, sets=sets, temperature=1.5, certainty=Certainty(classes=tuple(classes)))
     return evolve(model, checkpoints=((0.2, checkpoint_model(model, 0.2, model)),))
 
 
@@ -92,6 +99,12 @@ EVERY = pytest.param((0, 0, 0), 1000, marks=pytest.mark.long, id="every")
 @pytest.mark.parametrize("name", KINDS)
 def test_damages_of_a_model_are_refused_or_answer(tmp_path, name, damages, least):
     write_model(tmp_path / "m.json", trained(name))
+    assert read_damaged(*damages, tmp_path / "m.json") >= least
+
+
+@pytest.mark.parametrize(("damages", "least"), [pytest.param((3, 20, 4), 60, id="few"), SOME, EVERY])
+def test_damages_of_the_weights_of_a_network_are_refused_or_answer(tmp_path, damages, least):
+    write_model(tmp_path / "m.json", trained("mlp", kept_as="weights"))
     assert read_damaged(*damages, tmp_path / "m.json") >= least
 
 
@@ -160,7 +173,12 @@ def test_what_is_no_strict_json_is_refused(tmp_path, text, says):
         ("provenance.after_contact_s", 0.1),
         ("sets.coverage", 0.999_999_999),
         ("sets.thresholds.bottle:empty", [0.1, 9]),
-        ("sets.thresholds.bottle:empty", [0.1, 9, 1]),
+        ("sets.thresholds.bottle:empty.score", "high"),
+        ("sets.of_support", [0.1]),
+        ("certainty.0.rates", [0.3, 1.7]),
+        ("certainty.0.probabilities", [0.9, 0.4]),
+        ("certainty.1.support", 0.0),
+        ("checkpoints.0.certainty", [{}]),
         ("sets.unknown", 16),
         ("temperature", 1e-300),
         ("unknown.spread", [1.0, 1.0]),

@@ -6,6 +6,7 @@ import re
 
 import numpy as np
 import pytest
+from attrs import evolve
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -79,14 +80,17 @@ def test_trials_within_the_told_ranges_have_the_same_prediction(name):
     assert several > 10
 
 
-def test_few_training_trials_do_not_make_a_prediction_certain():
-    few = Prediction(label="x", probabilities={"x": 1.0, "y": 0.0}, because=("r",), support=(6.0, 6.0))
-    many = Prediction(label="x", probabilities={"x": 1.0, "y": 0.0}, because=("r",), support=(600.0, 600.0))
-    model = Prediction(label="x", probabilities={"x": 1.0, "y": 0.0}, because=("r",))
+def test_a_share_of_training_trials_is_no_certainty():
+    shares = {"x": 1.0, "y": 0.0}
+    counted = Prediction(label="x", probabilities=shares, because=("r",), support=(6.0, 6.0))
+    elsewhere = evolve(counted, no_certainty="another force")
+    measured = evolve(counted, probabilities={"x": 0.45, "y": 0.55}, calibrated=True)
 
-    assert few.certainty_in_words == "about 88 %: 6 of 6 training trials"
-    assert many.certainty_in_words == "about 99 %: 600 of 600 training trials"
-    assert model.certainty_in_words == "over 99 % by the model"
+    assert (counted.certainty, counted.certainty_in_words) == (None, "6 of 6 training trials")
+    assert elsewhere.certainty_in_words == "6 of 6 training trials; no certainty: another force"
+    assert measured.certainty_in_words == "about 45 %: 6 of 6 training trials"
+    assert evolve(measured, support=None).certainty_in_words == "about 45 %"
+    assert evolve(measured, probabilities=shares, support=None).certainty_in_words == "over 99 %"
     assert Prediction(label="unknown", probabilities={"x": 1.0}, because=("r",)).certainty_in_words == ""
 
 
@@ -99,5 +103,5 @@ def test_classifiers_that_count_training_trials_say_how_many(name, settings):
     said = classifier.explain(Features(names=("a",), values=(0.0515,), units=("m",)))
 
     assert (said.label, said.support) == ("y", (4.0, 4.0))
-    assert said.certainty == pytest.approx(5 / 6)
+    assert said.certainty is None
     assert max(said.probabilities.values()) == 1.0

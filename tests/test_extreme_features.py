@@ -31,7 +31,7 @@ def test_a_trial_of_extreme_features_has_probabilities_and_is_unknown_where_it_i
     table = FeatureTable(names=NAMES, units=UNITS, values=np.array(rows))
     labels, shares = model.answers(table)
     assert shares.sum(axis=1) == pytest.approx(np.ones(len(rows)))
-    model.prediction_sets(table, labels, shares)
+    model.predictions(table)
     for i, row in enumerate(rows):
         prediction = model.predict(table.row(i))
         assert prediction.label == labels[i] == UNKNOWN  # each first feature is far from every bottle and can

@@ -135,7 +135,7 @@ def test_hook_graspsense_classifiers():
 def test_hook_graspsense_pipelines():
     plugins = IsolatedPlugins(example("graspsense_pipelines"))
 
-    assert [one.name for one in plugins.pipelines()] == ["default", "lab"]
+    assert [one.name for one in plugins.pipelines()] == ["best", "default", "lab"]
     assert "[gripper]" in plugins.pipeline("graspsense/default").file().read_text()
 
 

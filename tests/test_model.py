@@ -9,21 +9,26 @@ import math
 import pytest
 from attrs import evolve
 from test_classifiers import NAMES, UNITS, trials
+from test_conformal import bottles
 
-from graspsense.core.components.config import Flag, resolve
+from graspsense.cli.main import main
+from graspsense.core.components.config import Flag, SelectedComponent, resolve
 from graspsense.core.components.registry import IsolatedPlugins, installed
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.learn.model import load_model, model_for, train, worded, write_model
+from graspsense.core.learn.model_content import digest
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import ConfigError, DataDamaged, UnknownName
 from graspsense.core.values.features import UNKNOWN, Features
 from graspsense.core.values.signals import EFFORT, Command
+from graspsense.evaluation.doubt import calibrated
 
 CAN = Features(names=NAMES, values=(0.0661, 8.0, 0.0), units=UNITS)
 
 
-def model(name="c45", **provenance):
+def model(name="c45", features=NAMES, **provenance):
     table, labels = trials()
+    table = table.columns(features)
     component = installed().find("classifier", name)
     labelled = Labelled(source="a test", table=table, labels=tuple(labels), provenance=provenance)
     return train(component, component.config_class()(), labelled, name="test", seed=4)
@@ -72,7 +77,7 @@ def test_a_file_gives_back_the_model(tmp_path, name):
 
 def test_a_pipeline_reads_a_model_once_and_again_when_its_file_has_changed(tmp_path):
     path = tmp_path / "kept.json"
-    write_model(path, model("knn"))
+    write_model(path, model("knn", NAMES[:2]))  # those that the pipeline has
     settings = resolve("default", options=["classifier.type=knn", f"classifier.model={path}"])
     first = model_for(settings, installed())
     assert model_for(settings, installed()) is first
@@ -175,6 +180,68 @@ def test_another_force_speed_or_gripper_is_said():
     )
 
 
+def test_no_figure_is_given_that_was_not_measured_under_the_settings_of_the_grasp():
+    component = installed().find("classifier", "c45")
+    values = resolve().values
+    provenance = {
+        "simulated": True,
+        "settings": {t: values[t] for t in ("gripper", "controller", "features")},
+    }
+    bottled = bottles(20, spread=0.3)
+    measured = evolve(
+        calibrated(
+            train(component, component.config_class()(), bottled, name="m"),
+            SelectedComponent(component, component.config_class()()),
+            bottled,
+            0,
+        ),
+        provenance=provenance,
+    )
+    row = bottled.table.row(0)
+    same, other = resolve(), resolve(options=("controller.probing_force_n=15",))
+    changed = {**provenance, "settings": {**provenance["settings"], "controller": other.values["controller"]}}
+
+    for said in (measured.predict(row, same), measured.predict(row, provenance=provenance)):
+        assert said.certainty is not None
+        assert said.coverage == 0.9
+    elsewhere = (
+        measured.predict(row, other),
+        measured.predict(row, same, device("device")),
+        measured.predict(row, provenance=changed),
+        measured.predict(row, provenance={"simulated": False}),
+        *measured.predictions(bottled.table, changed),
+    )
+    for said in elsewhere:
+        assert (said.certainty, said.coverage, said.prediction_set) == (None, None, ())
+        assert "%" not in said.certainty_in_words
+        assert said.as_json()["no_certainty"]
+
+
+def test_the_sets_of_an_earlier_version_are_left_out_and_it_says_what_to_do(file):
+    content = json.loads(file.read_text())
+    del content["sha256"], content["certainty"]
+    sets = {"coverage": 0.9, "unit": "trials", "reason": "", "thresholds": {"can:full": [0.1, 9, True]}}
+    content |= {"version": 1, "sets": sets}
+    file.write_text(json.dumps({**content, "sha256": digest(content)}))
+
+    said = load_model(str(file), installed()).predict(CAN)
+
+    assert (said.certainty, said.prediction_set) == (None, ())
+    assert "train it again" in said.no_certainty
+
+
+def test_a_model_of_other_features_is_refused_before_the_grasp_with_what_to_do(capsys):
+    given = ("-o", "features.type=curve", "--gripper", "sim")
+    for command in (("run",), ("run", "-o", "run.stop_when_sure=true"), ("config", "validate")):
+        with pytest.raises(SystemExit) as ended:
+            main([*command, *given])
+        said = capsys.readouterr()
+        assert ended.value.code == 2
+        assert "approach" not in said.err
+        assert "p_first" in said.err
+        assert "-o features.type=curve --classifier c45" in said.err
+
+
 class TestDamage:
     def test_a_changed_number(self, file):
         file.write_text(file.read_text().replace("0.25", "0.26", 1))
@@ -196,9 +263,9 @@ class TestDamage:
             load_model(str(file), installed())
 
     def test_a_later_version(self, file):
-        rewritten(file, version=2)
+        rewritten(file, version=3)
 
-        with pytest.raises(DataDamaged, match=r"has version 2; this graspsense .* reads 1"):
+        with pytest.raises(DataDamaged, match=r"has version 3; this graspsense .* reads up to 2"):
             load_model(str(file), installed())
 
     @pytest.mark.parametrize(

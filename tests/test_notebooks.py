@@ -81,8 +81,10 @@ def test_a_trial_shows_outcome_curve_features_and_prediction():
         probabilities={"cup:<full>": 0.98, "cup:empty": 0.02, "can": 0.001},
         because=("force 7 N > 5 N",),
         warnings=("few trials",),
+        calibrated=True,
     )
     trial = evolve(a_trial(), prediction=prediction)
+    elsewhere = evolve(prediction, calibrated=False, no_certainty="another force")
 
     text = shown(trial)
 
@@ -93,7 +95,10 @@ def test_a_trial_shows_outcome_curve_features_and_prediction():
     assert "&lt;full&gt;" in trial._repr_html_()
     assert repr(trial).startswith("<Trial: steady, ")
     assert repr(trial).endswith("predicted cup:<full>>")
-    assert repr(prediction) == "<Prediction: cup:<full>, 98 % by the model>"
+    assert repr(prediction) == "<Prediction: cup:<full>, about 98 %>"
+    unmeasured = shown(evolve(trial, prediction=elsewhere))
+    assert "98 %" not in unmeasured
+    assert "no certainty: another force" in unmeasured
 
 
 def test_a_trace_shows_a_curve_also_without_forces_and_without_ticks():

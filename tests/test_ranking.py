@@ -31,6 +31,10 @@ def test_features_without_information_are_worse_and_the_same_trials_are_compared
     assert {one.standing for one in found.candidates if one.features == "noise"} == {"worse"}
     assert {one.rates["instance_held_out"].n for one in found.candidates} == {180}
     assert found.candidates[0].name in found.verdict
+    assert found.chosen.of == 6
+    assert found.chosen.rate <= found.candidates[0].rates["instance_held_out"].rate
+    assert found.candidates[0].rates["instance_held_out"].interval == found.chosen.interval
+    assert found.chosen.words in found.verdict
 
 
 def test_intervals_are_wider_for_more_comparisons():

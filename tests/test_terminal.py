@@ -203,7 +203,7 @@ def test_predictions_fit_the_terminal_and_count_their_training_trials(csv, tmp_p
     assert shown.code == 0
     assert all(len(line) <= width for line in shown.lines if str(tmp_path) not in line)
     assert "can:full" in shown.text
-    assert "98 %" in shown.text  # calibrated
+    assert "no certainty" in shown.text or "not calibrated" in shown.text  # by so few instances
     assert "100 %" not in shown.text
     assert "mm" in shown.text
     assert not re.search(r"[0-9] m\b", shown.text)

@@ -1,9 +1,11 @@
-"""The model that comes with the simulator: what it says, and that its command makes it again."""
+"""The models that come with the simulator: what they say, and that their commands make them again."""
 
 from __future__ import annotations
 
 import json
 import shlex
+import subprocess
+import sys
 from importlib.resources import files
 from pathlib import Path
 
@@ -14,7 +16,10 @@ pytest.importorskip("graspsense_c45", reason="the default model is a tree of gra
 from graspsense import load_pipeline
 from graspsense.cli.main import main
 
-KEPT = json.loads(files("graspsense_sim_gripper").joinpath("models/default.json").read_text(encoding="utf-8"))
+MODELS = files("graspsense_sim_gripper").joinpath("models")
+KEPT = json.loads(MODELS.joinpath("default.json").read_text(encoding="utf-8"))
+BEST = json.loads(MODELS.joinpath("best.json").read_text(encoding="utf-8"))
+BENCHMARK = Path(__file__).parents[3] / "benchmarks/certainty.py"
 
 
 @pytest.fixture(scope="module")
@@ -67,7 +72,7 @@ def test_nothing_there_is_unknown(pipeline):
 
 def test_its_sets_are_calibrated_for_each_label():
     assert KEPT["sets"]["unit"] == "instances"
-    assert {(units, own) for _, units, own in KEPT["sets"]["thresholds"].values()} == {(60, True)}
+    assert {one["units"] for one in KEPT["sets"]["thresholds"].values()} == {400}
 
 
 def test_a_grasp_has_predictions_while_it_goes_on_and_the_answer_of_the_whole_grasp(pipeline):
@@ -103,11 +108,63 @@ def test_its_provenance_says_what_made_it():
     assert {"graspsense", "graspsense-c45", "numpy", "python"} == provenance["versions"].keys()
 
 
-def test_it_was_made_with_the_settings_of_today():
-    values = load_pipeline("default").settings.values
+@pytest.mark.parametrize(("name", "kept"), [("default", KEPT), ("best", BEST)])
+def test_it_was_made_with_the_settings_of_today(name, kept):
+    values = load_pipeline(name).settings.values
 
     for table in ("gripper", "controller", "features"):
-        assert KEPT["provenance"]["settings"][table] == json.loads(json.dumps(values[table]))
+        assert kept["provenance"]["settings"][table] == json.loads(json.dumps(values[table]))
+
+
+def test_an_answer_from_four_training_trials_is_no_certain_one(pipeline):
+    said = pipeline.grasp(object="can:empty_open").prediction
+
+    assert said.label == "can:full_open"  # wrong
+    assert said.support == (4.0, 4.0)
+    assert said.certainty < 0.6
+    assert "can:empty_open" in said.prediction_set
+
+
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+def test_the_better_pipeline_names_what_the_default_one_confuses(capsys):
+    said = load_pipeline("best").grasp(object="can:empty_open").prediction
+
+    assert said.label == "can:empty_open"
+    assert said.prediction_set == ("can:empty_open",)
+    for name, says in (("default", True), ("best", False)):
+        with pytest.raises(SystemExit) as ended:
+            main(["run", "--pipeline", name])
+        assert not ended.value.code
+        assert ("--pipeline best" in capsys.readouterr().out) is says
+
+
+@pytest.mark.parametrize(("force_n", "measured"), [(20, True), (15, False)])
+def test_a_figure_is_printed_only_for_the_force_at_which_it_was_measured(capsys, force_n, measured):
+    option = ("-o", f"controller.probing_force_n={force_n}")
+    given = ("--objects", "can:full_open,can:empty_open", "--instances", "1", "--trials", "1")
+    told = []
+    for arguments in (("run",), ("predict", "default", "simulated", *given)):
+        with pytest.raises(SystemExit) as ended:
+            main([*arguments, *option, "--json"])
+        assert not ended.value.code
+        told.append(json.loads(capsys.readouterr().out))
+
+    for said in (told[0]["prediction"], *told[1]["predictions"]):
+        assert (said["certainty"] is not None) is measured
+        assert (said["coverage"] is not None) is measured
+        assert bool(said["prediction_set"]) is measured
+        assert bool(said["no_certainty"]) is not measured
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["default", "best"])
+def test_what_is_printed_holds_on_a_thousand_new_grasps(name):
+    """Certainty by support and tenth, and sets by support, size and label: no row is off by more than chance."""
+    done = subprocess.run(
+        [sys.executable, BENCHMARK, name, "--seed", "7201"], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "sets of one label" in done.stdout
 
 
 @pytest.mark.slow

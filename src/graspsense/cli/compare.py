@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     help=f"""Cross-validate several classifiers with several feature sets on SOURCE, on the same folds.
 
     Names which are equivalent to the best, and the cheapest of them. Differences are paired by trial, with intervals
-    corrected for the number of comparisons. `before_contact` is the control from before contact (in the iCub data set
+    that hold for all pairs together. `before_contact` is the control from before contact (in the iCub data set
     the first frame alone).
 
     {SOURCES}""",

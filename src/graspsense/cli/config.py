@@ -54,16 +54,22 @@ def validate(name: str | None, as_json: bool, **asked: Any) -> None:
     """Check that the settings are valid and the components fit together, without opening anything."""
     from graspsense.core.components.registry import installed
     from graspsense.core.learn.model import model_for
+    from graspsense.core.pipeline.anytime import anytime_of
     from graspsense.core.pipeline.wiring import check
-    from graspsense.core.values.errors import ConfigError
+    from graspsense.core.values.errors import ConfigError, WiringError
 
     settings = _settings(name, asked)
     check(settings)
     notes = []
+    model = None
     try:
-        model_for(settings, installed())
+        model = model_for(settings, installed())
+    except WiringError:
+        raise
     except ConfigError as error:
         notes.append(f"`collect` works with it, `run` does not yet: {error}")
+    else:
+        anytime_of(model, settings.features.create(), settings)
     if as_json:
         echo_json(
             {"valid": True, "pipeline": settings.pipeline, "components": settings.components, "notes": notes}

@@ -52,7 +52,7 @@ def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
     if given["target_value"]:
         raise click.UsageError(f"--target-value: model {model} predicts a label, not a number")
     asked = load_model(model, installed())
-    table, labels, notes = _trials(asked, source, given)
+    table, labels, notes, provenance = _trials(asked, source, given)
     mismatch = asked.misfit(table)
     if mismatch:
         raise ConfigError(mismatch)
@@ -61,9 +61,9 @@ def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
             *notes,
             f"more than {MOST_WITH_REASONS} trials: the predictions have no reasons",
         )
-        predictions = _without_reasons(asked, table)
+        predictions = asked.predictions(table, provenance)
     else:
-        predictions = [asked.predict(table.row(i)) for i in range(len(table))]
+        predictions = [asked.predict(table.row(i), provenance=provenance) for i in range(len(table))]
     rate = None
     if labels is not None:
         rate = RecognitionRate(
@@ -110,14 +110,14 @@ def _refuse_swapped(model: str, source: str) -> None:
 
 def _trials(
     model: Model, source: str, given: Mapping[str, Any]
-) -> tuple[FeatureTable, tuple[str, ...] | None, tuple[str, ...]]:
-    """Return the features of the trials, their labels (None if the source has none), and notes."""
+) -> tuple[FeatureTable, tuple[str, ...] | None, tuple[str, ...], Mapping[str, Any]]:
+    """Return the features of the trials, their labels (None if the source has none), notes, and how they were made."""
     from graspsense.cli.progress import ProgressLine
 
     if is_csv(source) and not given["label"]:
         from graspsense.sources.features_csv import read_table
 
-        return read_table(Path(source), model.names), None, ()
+        return read_table(Path(source), model.names), None, (), {}
     with ProgressLine() as progress:
         labelled = trials_of(
             source,
@@ -125,7 +125,7 @@ def _trials(
             {**given, "features": given["features"] or model.names},
             copies=True,
         )
-    return labelled.table, labelled.aimed(model.target).labels, labelled.notes
+    return labelled.table, labelled.aimed(model.target).labels, labelled.notes, labelled.provenance
 
 
 def _print(predictions: Sequence[Prediction], labels: tuple[str, ...] | None) -> None:
@@ -142,32 +142,8 @@ def _print(predictions: Sequence[Prediction], labels: tuple[str, ...] | None) ->
         because = "; ".join(reason.words for reason in one.because)
         rows.append((str(i + 1), one.label, certainty, *of_set, *label, because))
     echo_table(header, rows, {"PREDICTION": prediction_style, "CORRECT": correct_style})
-
-
-def _without_reasons(model: Model, table: FeatureTable) -> list[Prediction]:
-    """Return the predictions of many trials in one call, without reasons."""
-    from graspsense.core.learn.temperature import at_temperature
-    from graspsense.core.values.features import Prediction
-
-    labels, shares = model.answers(table)
-    calibrated = at_temperature(shares, model.temperature).tolist()
-    classes = model.classifier.classes()
-    warnings = model.predict(table.row(0)).warnings
-    coverage = None if model.sets is None else model.sets.coverage
-    return [
-        Prediction(
-            label=label,
-            probabilities=dict(zip(classes, row, strict=True)),
-            because=(),
-            warnings=warnings,
-            prediction_set=members,
-            coverage=coverage if members else None,
-            calibrated=model.temperature is not None,
-        )
-        for label, row, members in zip(
-            labels, calibrated, model.prediction_sets(table, labels, shares), strict=True
-        )
-    ]
+    for reason in dict.fromkeys(one.no_certainty for one in predictions if one.no_certainty):
+        echo_entry("certainty", f"none: {reason}")
 
 
 def _known(prediction: Prediction) -> bool:

@@ -118,10 +118,16 @@ def run(
         echo_json({**trial_as_json(trial), **({} if kept is None else {"kept": kept}), **further})
     else:
         print_trial(trial)
-        _print_model(trial, condition)
+        _print_further(settings, trial, condition)
     if plot is not None:
         draw_grasp(trial, Path(plot))
     _exit(trial, interrupted, "" if kept is None else kept["problem"])
+
+
+def _print_further(settings: Settings, trial: Trial, condition: Conditions | None) -> None:
+    """Print which pipeline recognises more, and what the simulator computed."""
+    _print_better(settings, trial)
+    _print_model(trial, condition)
 
 
 def _grasped(settings: Settings, sinks: Sequence[Sink]) -> tuple[Trial, bool]:
@@ -158,6 +164,19 @@ def _condition(settings: Settings) -> Conditions | None:
         return None
     with ProgressLine() as progress:
         return conditions(settings, [scene], [settings.run.seed], progress=progress)
+
+
+def _print_better(settings: Settings, trial: Trial) -> None:
+    """Name the pipeline that recognises more, if the plugin of this one declares it."""
+    from graspsense.core.components.registry import installed
+
+    shipped = {one.entry.name: one.entry for one in installed().pipelines()}
+    entry = shipped.get(settings.pipeline)
+    if entry is not None and entry.better and trial.prediction is not None and trial.device.simulated:
+        echo_entry(
+            "better",
+            f"this pipeline is {entry.name}; {entry.better} recognises more: --pipeline {entry.better}",
+        )
 
 
 def _print_model(trial: Trial, condition: Conditions | None) -> None:

@@ -95,7 +95,15 @@ _OPTIONS: Final = (
 _ONLY_FOR: Final = {
     "CSV": ("label", "instance", "order", "features", "before"),
     "data set": ("unreliable",),
-    SIMULATED: ("objects", "instances", "trials", "states_per_instance", "pipeline", "gripper"),
+    SIMULATED: (
+        "objects",
+        "instances",
+        "trials",
+        "states_per_instance",
+        "calibration_instances",
+        "pipeline",
+        "gripper",
+    ),
 }
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
@@ -21,8 +21,16 @@ from graspsense.cli.sources import (
 from graspsense.cli.terminal import echo, echo_as_it_is, echo_entry, talk
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from graspsense.core.components.config import SelectedComponent
+    from graspsense.core.learn.checkpoints import CheckpointTrials
     from graspsense.core.learn.labelled import Labelled
     from graspsense.core.learn.model import Model
+
+
+_NOT_EVALUATED: Final = ("out", "keep", "overwrite", "as_json", "calibration_instances")
+"""Options of `train` that `evaluate` does not have."""
 
 
 @click.command(
@@ -51,6 +59,12 @@ if TYPE_CHECKING:
 )
 @checkpoints_option
 @classifier_option
+@click.option(
+    "--calibration-instances",
+    type=click.IntRange(1),
+    help="simulated: measure certainty and sets on so many further instances of each object.  "
+    "[default: by cross-validation on the training trials]",
+)
 @source_options
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def train(
@@ -61,18 +75,16 @@ def train(
     target: str,
     classifier: str | None,
     checkpoints: str | None,
+    calibration_instances: int | None,
     as_json: bool,
     **given: Any,
 ) -> None:
     """Train a model, write it, and print what it was trained on."""
-    from attrs import evolve
+    from functools import partial
 
-    from graspsense.cli.progress import ProgressLine
-    from graspsense.core.learn.checkpoints import checkpoints_of, split_checkpoints
+    from graspsense.core.learn.checkpoints import checkpoints_of
     from graspsense.core.learn.model import train as trained
     from graspsense.core.learn.model import write_model
-    from graspsense.evaluation.checkpoints import checkpoint_models
-    from graspsense.evaluation.doubt import calibrated
     from graspsense.evaluation.gathered_warnings import gathered_warnings
 
     check_outputs(out, keep, overwrite=overwrite, sources=[source])
@@ -84,24 +96,19 @@ def train(
         return
     learner = learner_of(source, classifier, given)
     _refuse_single_scene(source)
-    with ProgressLine() as progress:
-        labelled = _with_target(trials_of(source, progress, given, times), target)
-    parts = split_checkpoints(labelled, times) if times else ()
-    if parts:
-        labelled = parts[-1].labelled
+    labelled, held_out = _trials(source, given, times, target, calibration_instances)
     notes = list(labelled.notes)
     with gathered_warnings(notes):
-        model = trained(
+        made = partial(
+            trained,
             learner.component,
             learner.config,
-            labelled,
             name=Path(out).stem,
             seed=given["seed"],
             target=target,
             provenance={"command": command_line(("keep", "overwrite", "as_json"))},
         )
-        model = calibrated(model, learner, labelled, given["seed"])
-        model = evolve(model, checkpoints=checkpoint_models(model, learner, parts[:-1], given["seed"]))
+        labelled, model = _made(made, learner, labelled, held_out, times, given["seed"])
     write_model(Path(out), model)
     _keep(keep, labelled)
     for note in notes:
@@ -110,6 +117,53 @@ def train(
         echo_json({"model": out, **_as_values(model), "trials": len(labelled)})
     else:
         _say_trained(out, model)
+
+
+def _made(
+    made: Callable[[Labelled], Model],
+    learner: SelectedComponent,
+    labelled: Labelled,
+    held_out: Labelled | None,
+    times: Sequence[float],
+    seed: int,
+) -> tuple[Labelled, Model]:
+    """Return the trials of whole grasps, and their model, calibrated, with those of the checkpoints."""
+    from attrs import evolve
+
+    from graspsense.core.learn.checkpoints import split_checkpoints
+    from graspsense.evaluation.checkpoints import checkpoint_models
+    from graspsense.evaluation.doubt import calibrated, calibrated_by
+
+    parts = split_checkpoints(labelled, times) if times else ()
+    further: Sequence[CheckpointTrials] = ()
+    if parts:
+        labelled = parts[-1].labelled
+        if held_out is not None:
+            further = split_checkpoints(held_out, times)
+            held_out = further[-1].labelled
+    model = made(labelled)
+    model = calibrated(model, learner, labelled, seed) if held_out is None else calibrated_by(model, held_out)
+    early = checkpoint_models(model, learner, parts[:-1], seed, further)
+    return labelled, evolve(model, checkpoints=early)
+
+
+def _trials(
+    source: str,
+    given: Mapping[str, Any],
+    times: Sequence[float],
+    target: str,
+    calibration_instances: int | None,
+) -> tuple[Labelled, Labelled | None]:
+    """Return the trials to learn from, and those of further objects to calibrate with, if they are asked for."""
+    from graspsense.cli.progress import ProgressLine
+
+    with ProgressLine() as progress:
+        labelled = _with_target(trials_of(source, progress, given, times), target)
+        if calibration_instances is None:
+            return labelled, None
+        # A seed that neither another training nor an evaluation is likely to have.
+        others = {"instances": calibration_instances, "seed": (given["seed"] + 2**31) % 2**32}
+        return labelled, trials_of(source, progress, {**given, **others}, times).aimed(target)
 
 
 def _keep(keep: str | None, labelled: Labelled) -> None:
@@ -153,7 +207,7 @@ def _say_trained(out: str, model: Model) -> None:
         sets = "" if part.sets is None else f", sets {part.sets.in_words}"
         echo_entry(f"{after_s:g} s", f"after the contact: {part.provenance['trials']} grasps{sets}")
     # In one line, so that it can be copied.
-    echo_as_it_is(f"how good    {command_line(('out', 'keep', 'overwrite', 'as_json'), 'evaluate')}")
+    echo_as_it_is(f"how good    {command_line(_NOT_EVALUATED, 'evaluate')}")
 
 
 def _refuse_single_scene(source: str) -> None:

@@ -10,7 +10,7 @@ from attrs import frozen
 
 from graspsense.core.learn.model import Model, checkpoint_model, train
 from graspsense.evaluation.crossval import Pooled, cross_validate
-from graspsense.evaluation.doubt import calibrated, exchangeable_instances, held_out_members
+from graspsense.evaluation.doubt import calibrated, calibrated_by, exchangeable_instances, held_out_members
 from graspsense.evaluation.folds import instance_held_out, stratified
 from graspsense.evaluation.intervals import RecognitionRate, rate_of
 
@@ -27,20 +27,29 @@ SURE: Final = "stop when sure"
 
 
 def checkpoint_models(
-    whole: Model, learner: SelectedComponent, parts: Sequence[CheckpointTrials], seed: int
+    whole: Model,
+    learner: SelectedComponent,
+    parts: Sequence[CheckpointTrials],
+    seed: int,
+    further: Sequence[CheckpointTrials] = (),
 ) -> tuple[tuple[float, Model], ...]:
-    """Return a model for each checkpoint, trained and calibrated on the same part of the trials that reach it.
+    """Return a model for each checkpoint, trained on the same part of the trials that reach it.
 
+    It is calibrated with the same part of `further` trials of other objects, or without them by cross-validation.
     Raises ConfigError if nothing can be learned from them.
     """
     models = []
-    for part in parts:
+    for k, part in enumerate(parts):
         assert part.after_s is not None
         labelled = part.labelled
         model = train(
             learner.component, learner.config, labelled, name=whole.name, seed=seed, target=whole.target
         )
-        model = calibrated(model, learner, labelled, seed)
+        model = (
+            calibrated_by(model, further[k].labelled)
+            if further
+            else calibrated(model, learner, labelled, seed)
+        )
         models.append((part.after_s, checkpoint_model(whole, part.after_s, model)))
     return tuple(models)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from math import nan
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -47,13 +48,26 @@ class Pooled:
     probabilities: NDArray[np.float64]
     scores: NDArray[np.float64]
     """The scores from which prediction sets are made, of the same shape."""
+    support: NDArray[np.float64]
+    """The number of training trials that each answer rests on; NaN without such a number."""
     unlike: NDArray[np.bool_]
     trained_on: float
     """Mean number of training trials per fold."""
 
+    @property
+    def columns(self) -> NDArray[np.int64]:
+        """The column of each predicted label."""
+        return columns_of(self.predicted, self.classes)
+
     def right(self, labels: Sequence[str]) -> list[bool]:
         """Return whether each trial is predicted correctly."""
         return [answer == label for answer, label in zip(self.predicted, labels, strict=True)]
+
+
+def columns_of(labels: Sequence[str], classes: Sequence[str]) -> NDArray[np.int64]:
+    """Return the column of each of these labels."""
+    column = {name: k for k, name in enumerate(classes)}
+    return np.array([column[label] for label in labels], dtype=np.int64)
 
 
 def cross_validate(
@@ -83,6 +97,7 @@ def cross_validate(
     probabilities = np.full((len(labels), len(all_classes)), np.nan)
     scores = probabilities.copy()
     unlike = np.zeros(len(labels), dtype=np.bool_)
+    support = np.full(len(labels), np.nan)
     sizes: list[int] = []
     for rows, of in zip(groups, folds, strict=True):
         of_group = {labels[i] for i in rows}
@@ -96,7 +111,7 @@ def cross_validate(
             if share < 1.0:
                 training = thinned(training, labels, share, seed)
             known = [labels[i] for i in training]
-            classes, shares = _predict(learner, table, training, known, test, seed)
+            classes, shares, support[test] = _predict(learner, table, training, known, test, seed)
             columns = np.array([all_classes.index(name) for name in classes])
             probabilities[np.ix_(test, columns)] = shares
             novelty = novelty_of(table.rows(training), known)
@@ -108,7 +123,9 @@ def cross_validate(
             sizes.append(len(training))
             if progress is not None:
                 progress()
-    return Pooled(tuple(predicted), all_classes, probabilities, scores, unlike, float(np.mean(sizes)))
+    return Pooled(
+        tuple(predicted), all_classes, probabilities, scores, support, unlike, float(np.mean(sizes))
+    )
 
 
 def thinned(rows: NDArray[np.int64], labels: Sequence[str], share: float, seed: int) -> NDArray[np.int64]:
@@ -129,10 +146,10 @@ def _predict(
     known: Sequence[str],
     test: NDArray[np.int64],
     seed: int,
-) -> tuple[tuple[str, ...], NDArray[np.float64]]:
-    """Return the classes and their probabilities for the test trials."""
+) -> tuple[tuple[str, ...], NDArray[np.float64], NDArray[np.float64] | float]:
+    """Return the classes, their probabilities for the test trials, and the support of the answers."""
     if len(set(known)) == 1:
-        return (known[0],), np.ones((len(test), 1))
+        return (known[0],), np.ones((len(test), 1)), nan
     classifier = learner.create()
     try:
         classifier.fit(table.rows(training), known, seed)
@@ -140,4 +157,6 @@ def _predict(
         raise FitRefused(
             f"the classifier refused {len(known)} training trials of {len(set(known))} labels: {error}"
         ) from error
-    return classifier.classes(), classifier.probabilities(table.rows(test))
+    tested = table.rows(test)
+    support = classifier.support(tested)
+    return classifier.classes(), classifier.probabilities(tested), nan if support is None else support

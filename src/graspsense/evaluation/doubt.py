@@ -8,10 +8,26 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from attrs import evolve, field, frozen
 
-from graspsense.core.learn.conformal import COVERAGE, PredictionSets, sets_of
+from graspsense.core.learn.certainty import Certainty, certainty_of, with_certainty
+from graspsense.core.learn.conformal import (
+    COVERAGE,
+    Answers,
+    PredictionSets,
+    scores_of,
+    sets_of,
+    units_needed,
+)
 from graspsense.core.learn.temperature import at_temperature, temperature_of
 from graspsense.core.values.errors import ConfigError
-from graspsense.evaluation.crossval import ClassifierFactory, FitRefused, Groups, Pooled, cross_validate
+from graspsense.core.values.features import UNKNOWN
+from graspsense.evaluation.crossval import (
+    ClassifierFactory,
+    FitRefused,
+    Groups,
+    Pooled,
+    columns_of,
+    cross_validate,
+)
 from graspsense.evaluation.folds import instance_held_out, stratified
 from graspsense.evaluation.intervals import RecognitionRate
 
@@ -75,8 +91,29 @@ class Reliability:
     """The calibration error of the probabilities that the classifier itself gives, before temperature scaling."""
 
 
+@frozen(kw_only=True, eq=False)
+class _Calibration:
+    """What held-out trials tell of later answers: their certainty, the temperature, and the prediction sets."""
+
+    certainty: Certainty
+    temperature: float | None
+    sets: PredictionSets
+
+    def answers(self, pooled: Pooled, rows: NDArray[np.int64]) -> Answers:
+        """Return what the sets of these trials are made of."""
+        return _answers(self.certainty, pooled, rows)
+
+    def probabilities(self, pooled: Pooled, rows: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Return the calibrated probabilities of these trials."""
+        return with_certainty(
+            at_temperature(pooled.probabilities[rows], self.temperature),
+            pooled.columns[rows],
+            self.answers(pooled, rows).certainty,
+        )
+
+
 def calibrated(model: Model, learner: ClassifierFactory, labelled: Labelled, seed: int) -> Model:
-    """Return a model of these trials with prediction sets and calibrated probabilities, from cross-validation on them.
+    """Return a model of these trials with certainty and prediction sets, from cross-validation on them.
 
     Whole instances are held out where each label has several; otherwise each trial is a unit.
     """
@@ -88,17 +125,85 @@ def calibrated(model: Model, learner: ClassifierFactory, labelled: Labelled, see
             if instances is None
             else instance_held_out(labels, instances, FOLDS, seed)
         )
-        groups = [np.arange(len(labels))]
-        pooled = cross_validate(learner, labelled.table, labels, groups, [folds], seed=seed)
+        pooled = cross_validate(learner, labelled.table, labels, [np.arange(len(labels))], [folds], seed=seed)
     except (FitRefused, ConfigError) as refusal:
         unit = "trials" if instances is None else "instances"
         none = PredictionSets(coverage=COVERAGE, unit=unit, thresholds={}, reason=str(refusal))
         return evolve(model, sets=none)
-    sets = sets_of(_of_truth(pooled, labels), pooled.right(labels), labels, instances)
+    return _with_calibration(model, pooled, labels, instances)
+
+
+def calibrated_by(model: Model, labelled: Labelled) -> Model:
+    """Return a model with certainty and prediction sets from trials of objects that it was not trained on.
+
+    Trials of a label that the model does not know are left out.
+    """
+    classes = model.classifier.classes()
+    known = labelled.rows(np.flatnonzero([label in classes for label in labelled.labels]))
+    answers, shares = model.answers(known.table)
+    table = known.table.columns(model.names)
+    support = model.classifier.support(table)
+    pooled = Pooled(
+        predicted=tuple(classes[k] for k in shares.argmax(axis=1).tolist()),
+        classes=classes,
+        probabilities=shares,
+        scores=scores_of(shares, model.novelty.closeness(table, classes)),
+        support=np.full(len(known), np.nan) if support is None else support,
+        unlike=np.array([answer == UNKNOWN for answer in answers]),
+        trained_on=float(model.provenance.get("trials", 0)),
+    )
+    return _with_calibration(model, pooled, known.labels, exchangeable_instances(known))
+
+
+def _with_calibration(
+    model: Model, pooled: Pooled, labels: Sequence[str], instances: Sequence[str] | None
+) -> Model:
+    found = _calibration(pooled, labels, instances, np.arange(len(labels)))
+    if isinstance(found, str):
+        unit = "trials" if instances is None else "instances"
+        return evolve(model, sets=PredictionSets(coverage=COVERAGE, unit=unit, thresholds={}, reason=found))
     return evolve(
         model,
-        sets=evolve(sets, unknown=int(pooled.unlike.sum()), trials=len(labels)),
-        temperature=temperature_of(pooled.probabilities, _columns(pooled, labels)),
+        certainty=found.certainty,
+        temperature=found.temperature,
+        sets=evolve(found.sets, unknown=int(pooled.unlike.sum()), trials=len(labels)),
+    )
+
+
+def _calibration(
+    pooled: Pooled, labels: Sequence[str], instances: Sequence[str] | None, rows: NDArray[np.int64]
+) -> _Calibration | str:
+    """Return what these held-out trials tell; if they have too few units for anything, that as the reason."""
+    numbers = rows.tolist()
+    own = None if instances is None else [instances[i] for i in numbers]
+    # An instance may have several labels, such as a bottle in each of its states: these are answers of their own.
+    units = [str(i) if instances is None else f"{labels[i]} {instances[i]}" for i in numbers]
+    count = len(set(units if own is None else own))
+    if count < units_needed():
+        unit = "trials" if own is None else "instances"
+        return f"{count} calibration {unit}, {100 * COVERAGE:.0f} % needs {units_needed()}"
+    right = pooled.right(labels)
+    certainty = certainty_of(
+        pooled.probabilities[rows, pooled.columns[rows]],
+        pooled.support[rows],
+        [right[i] for i in numbers],
+        units,
+    )
+    truth = columns_of(labels, pooled.classes)[rows]
+    return _Calibration(
+        certainty=certainty,
+        temperature=temperature_of(pooled.probabilities[rows], truth),
+        sets=sets_of(_answers(certainty, pooled, rows), truth, pooled.classes, own),
+    )
+
+
+def _answers(certainty: Certainty, pooled: Pooled, rows: NDArray[np.int64]) -> Answers:
+    predicted, support = pooled.columns[rows], pooled.support[rows]
+    return Answers(
+        scores=pooled.scores[rows],
+        predicted=predicted,
+        certainty=certainty.rate(pooled.probabilities[rows, predicted], support),
+        support_class=certainty.class_of(support),
     )
 
 
@@ -122,23 +227,14 @@ def held_out_members(
 
     The sets of a fold are calibrated with the predictions of the other folds.
     """
-    truth, right = _of_truth(pooled, labels), pooled.right(labels)
     inside = np.zeros(pooled.scores.shape, dtype=np.bool_)
     for rows, of in zip(groups, folds, strict=True):
         for fold in np.unique(of).tolist():
-            test, others = rows[of == fold], rows[of != fold].tolist()
-            sets = sets_of(
-                truth[others],
-                [right[i] for i in others],
-                [labels[i] for i in others],
-                None if instances is None else [instances[i] for i in others],
-            )
-            if not sets.thresholds:
-                return sets.reason
-            known = [k for k, name in enumerate(pooled.classes) if name in sets.thresholds]
-            # A label that the other folds do not have has no threshold: it is not a member of any set.
-            names = [pooled.classes[k] for k in known]
-            inside[np.ix_(test, known)] = sets.members(pooled.scores[np.ix_(test, known)], names)
+            test = rows[of == fold]
+            found = _calibration(pooled, labels, instances, rows[of != fold])
+            if isinstance(found, str) or not found.sets.thresholds:
+                return found if isinstance(found, str) else found.sets.reason
+            inside[test] = found.sets.members(found.answers(pooled, test), pooled.classes)
     return inside
 
 
@@ -159,8 +255,7 @@ def set_coverage(
     inside = held_out_members(pooled, labels, instances, groups, folds)
     if isinstance(inside, str):
         return SetCoverage(asked=COVERAGE, unit=unit, reason=inside)
-    column = {name: k for k, name in enumerate(pooled.classes)}
-    covered = [bool(inside[i, column[label]]) for i, label in enumerate(labels)]
+    covered = inside[np.arange(len(labels)), columns_of(labels, pooled.classes)].tolist()
     sizes = inside.sum(axis=1)
     rows_of = {name: [i for i, label in enumerate(labels) if label == name] for name in pooled.classes}
     right = np.array(pooled.right(labels))
@@ -177,26 +272,35 @@ def set_coverage(
 
 
 def held_out_probabilities(
-    pooled: Pooled, labels: Sequence[str], groups: Groups, folds: Sequence[Folds]
+    pooled: Pooled,
+    labels: Sequence[str],
+    instances: Sequence[str] | None,
+    groups: Groups,
+    folds: Sequence[Folds],
 ) -> NDArray[np.float64]:
     """Return the probabilities of held-out trials as a model gives them: calibrated with the trials of other folds."""
-    columns = _columns(pooled, labels)
-    calibrated = pooled.probabilities.copy()
+    probabilities = pooled.probabilities.copy()
     for rows, of in zip(groups, folds, strict=True):
         for fold in np.unique(of).tolist():
-            test, others = rows[of == fold], rows[of != fold]
-            temperature = temperature_of(pooled.probabilities[others], columns[others])
-            calibrated[test] = at_temperature(pooled.probabilities[test], temperature)
-    return calibrated
+            test = rows[of == fold]
+            found = _calibration(pooled, labels, instances, rows[of != fold])
+            if not isinstance(found, str):
+                probabilities[test] = found.probabilities(pooled, test)
+    return probabilities
 
 
 def reliability(
-    pooled: Pooled, labels: Sequence[str], groups: Groups, folds: Sequence[Folds], rate_of: RateOf
+    pooled: Pooled,
+    labels: Sequence[str],
+    instances: Sequence[str] | None,
+    groups: Groups,
+    folds: Sequence[Folds],
+    rate_of: RateOf,
 ) -> Reliability:
     """Return how well the calibrated probabilities of held-out trials agree with the rate."""
     truth = np.array(labels)[:, np.newaxis] == np.array(pooled.classes)
     right = pooled.right(labels)
-    given = np.nan_to_num(held_out_probabilities(pooled, labels, groups, folds), nan=0.0)
+    given = np.nan_to_num(held_out_probabilities(pooled, labels, instances, groups, folds), nan=0.0)
     before = _bins(np.nan_to_num(pooled.probabilities, nan=0.0), right, rate_of)
     curve = _bins(given, right, rate_of)
     return Reliability(
@@ -219,14 +323,3 @@ def _bins(
 def _calibration_error(curve: Sequence[ReliabilityBin]) -> float:
     trials = sum(point.rate.n for point in curve)
     return sum(point.rate.n / trials * abs(point.probability - point.rate.rate) for point in curve)
-
-
-def _of_truth(pooled: Pooled, labels: Sequence[str]) -> NDArray[np.float64]:
-    """Return the score of the true label of each trial."""
-    return pooled.scores[np.arange(len(labels)), _columns(pooled, labels)]
-
-
-def _columns(pooled: Pooled, labels: Sequence[str]) -> NDArray[np.int64]:
-    """Return the column of the true label of each trial."""
-    column = {name: k for k, name in enumerate(pooled.classes)}
-    return np.array([column[label] for label in labels])

@@ -226,14 +226,29 @@ class _Evaluator:
 
     def sets(self, headline: _Headline) -> SetCoverage:
         """Return the coverage of the prediction sets, with the unit of exchangeability that the folds hold out."""
-        instances = self.trials.instances if headline.protocol == INSTANCE_HELD_OUT else None
         return set_coverage(
-            headline.pooled, self.labels, instances, self.groups, headline.folds, self.rate_among
+            headline.pooled,
+            self.labels,
+            self._units(headline),
+            self.groups,
+            headline.folds,
+            self.rate_among,
         )
 
     def reliability(self, headline: _Headline) -> Reliability:
         """Return how well the probabilities of the headline's held-out trials agree with the rate."""
-        return reliability(headline.pooled, self.labels, self.groups, headline.folds, self.rate_among)
+        return reliability(
+            headline.pooled,
+            self.labels,
+            self._units(headline),
+            self.groups,
+            headline.folds,
+            self.rate_among,
+        )
+
+    def _units(self, headline: _Headline) -> Sequence[str] | None:
+        """Return the instances that the folds of the headline hold out, None if they hold out trials."""
+        return self.trials.instances if headline.protocol == INSTANCE_HELD_OUT else None
 
     def by_features(self, pooled: Pooled) -> dict[str, RecognitionRate]:
         """Return the rates among trials with features and without any; nothing if all trials have features."""

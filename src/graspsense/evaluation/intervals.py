@@ -104,21 +104,25 @@ class Difference:
 
 
 def rate_of(
-    right: Sequence[bool], instances: Sequence[str] | None = None, no_interval: str = ""
+    right: Sequence[bool],
+    instances: Sequence[str] | None = None,
+    no_interval: str = "",
+    comparisons: float = 1.0,
 ) -> RecognitionRate:
     """Return the rate of trials; `right` states which are correct, `instances` the object of each trial.
 
-    `no_interval` is a reason to give no interval.
+    `no_interval` is a reason to give no interval. The interval is corrected for a number of rates that shall hold
+    together (Bonferroni).
     """
     correct, n = sum(right), len(right)
     if no_interval:
         return RecognitionRate(correct, n, None, no_interval)
     if instances is None:
-        return RecognitionRate(correct, n)
+        return RecognitionRate(correct, n, wilson(correct, n, _z(comparisons)))
     count = len(set(instances))
     if count < MIN_INSTANCES:
         return RecognitionRate(correct, n, None, too_few(count), count)
-    return RecognitionRate(correct, n, clustered(right, instances), instances=count)
+    return RecognitionRate(correct, n, clustered(right, instances, comparisons), instances=count)
 
 
 def too_few(instances: int) -> str:
@@ -126,14 +130,14 @@ def too_few(instances: int) -> str:
     return f"{instances} instance{'' if instances == 1 else 's'}, at least {MIN_INSTANCES} are needed"
 
 
-def clustered(right: Sequence[bool], instances: Sequence[str]) -> Interval:
+def clustered(right: Sequence[bool], instances: Sequence[str], comparisons: float = 1.0) -> Interval:
     """Return the 95 % interval of a rate on several instances, as if these were drawn at random."""
     n, correct = len(right), sum(right)
     variance, count = _variance_of_mean([float(one) for one in right], instances)
     p = correct / n
     # Where every trial is right (or wrong), the design effect is unknown; trials of an instance then count as one.
     effect = n / count if p in (0.0, 1.0) else max(variance / (p * (1.0 - p) / n), 1.0)
-    return wilson(correct / effect, n / effect, _t(count - 1))
+    return wilson(correct / effect, n / effect, _t(count - 1, comparisons))
 
 
 def wilson(correct: float, n: float, quantile: float = Z) -> Interval:
@@ -151,7 +155,7 @@ def difference(
     first: Sequence[bool],
     second: Sequence[bool],
     instances: Sequence[str] | None = None,
-    comparisons: int = 1,
+    comparisons: float = 1.0,
 ) -> Difference:
     """Return the rate of `first` minus that of `second`; both state which of the same trials are correct.
 
@@ -204,14 +208,14 @@ def _variance_of_mean(values: Sequence[float], instances: Sequence[str]) -> tupl
     return count / (count - 1) * math.fsum(one * one for one in by_instance.values()) / n**2, count
 
 
-def _t(degrees: int, comparisons: int = 1) -> float:
+def _t(degrees: int, comparisons: float = 1.0) -> float:
     """Return the 97.5 % quantile of Student's distribution, for one of several comparisons."""
     from scipy.special import stdtrit
 
     return float(stdtrit(degrees, 1.0 - 0.025 / comparisons))
 
 
-def _z(comparisons: int) -> float:
+def _z(comparisons: float) -> float:
     """Return the 97.5 % quantile of the standard normal distribution, for one of several comparisons."""
     if comparisons == 1:
         return Z

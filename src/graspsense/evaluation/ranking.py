@@ -1,8 +1,8 @@
 """Classifiers and feature sets crossed on the same folds: which are as good as the best, and which is cheapest.
 
-Every candidate is compared with the one that has the highest rate, paired by trial, with intervals corrected for the
-number of comparisons (Bonferroni). A classifier outside of graspsense can be compared too, if it predicts the same
-trials with the same folds (`OutsideAnswers`).
+Every candidate is compared with the one that has the highest rate, paired by trial, with intervals that hold together
+for all pairs; the rate of that one is corrected for the choice (`graspsense.evaluation.chosen`). A classifier outside
+of graspsense can be compared too, if it predicts the same trials with the same folds (`OutsideAnswers`).
 """
 
 from __future__ import annotations
@@ -12,9 +12,10 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
-from attrs import frozen
+from attrs import evolve, frozen
 
 from graspsense.core.values.errors import ConfigError
+from graspsense.evaluation.chosen import ChosenRate, comparisons_of, rate_of_chosen
 from graspsense.evaluation.crossval import ClassifierFactory, FitRefused, cross_validate
 from graspsense.evaluation.doubt import SetCoverage, exchangeable_instances, set_coverage
 from graspsense.evaluation.folds import in_order, instance_held_out, stratified
@@ -67,6 +68,8 @@ class Ranking:
     trials: int
     candidates: tuple[Candidate, ...]
     notes: tuple[str, ...]
+    chosen: ChosenRate | None = None
+    """The rate of the best without the luck of being chosen; None for a single candidate."""
 
     @property
     def verdict(self) -> str:
@@ -76,6 +79,8 @@ class Ranking:
         equal = [one for one in self.candidates if one.standing in ("best", "equivalent")]
         open_ = [one for one in self.candidates if one.standing == "undecided"]
         text = f"{best.name} has the highest rate, {rate:.1f} %."
+        if self.chosen is not None:
+            text += f" As the best of {self.chosen.of} it was lucky too: of new trials expect {self.chosen.words}."
         if len(equal) > 1:
             cheapest = min(equal, key=lambda one: one.training_s)
             others = ", ".join(one.name for one in equal[1:])
@@ -159,12 +164,18 @@ def rank(
             for protocol, predicted in answers.predicted.items()
         }
         measured[key] = _Measured(right=right, training_s=answers.training_s)
+    judged = [key for key in measured if key[1] != BEFORE_CONTACT]
+    if not judged:
+        raise ConfigError("no classifier could be trained on these trials")
+    right_of = np.array([measured[key].right[headline] for key in judged])
+    chosen = rate_of_chosen(right_of, first.instances, first.no_interval) if len(judged) > 1 else None
     return Ranking(
         source=first.source,
         protocol=headline,
         trials=len(first),
-        candidates=_ranked(measured, headline, first),
+        candidates=_ranked(measured, headline, first, chosen, comparisons_of(right_of, first.instances)),
         notes=(*first.notes, *dict.fromkeys(notes)),
+        chosen=chosen,
     )
 
 
@@ -214,15 +225,16 @@ def _rate_among(trials: Labelled) -> Callable[[Sequence[bool], Sequence[int] | N
 
 
 def _ranked(
-    measured: Mapping[tuple[str, str], _Measured], headline: str, trials: Labelled
+    measured: Mapping[tuple[str, str], _Measured],
+    headline: str,
+    trials: Labelled,
+    chosen: ChosenRate | None,
+    comparisons: float,
 ) -> tuple[Candidate, ...]:
     """Return the candidates by their rate under the headline protocol; those from before contact come last."""
     judged = [key for key in measured if key[1] != BEFORE_CONTACT]
-    if not judged:
-        raise ConfigError("no classifier could be trained on these trials")
     right = {key: one.right[headline] for key, one in measured.items()}
     best = max(judged, key=lambda key: sum(right[key]))
-    comparisons = max(len(judged) - 1, 1)
     candidates = []
     for key in sorted(right, key=lambda key: (key[1] == BEFORE_CONTACT, -sum(right[key]), key != best)):
         loss = None
@@ -231,14 +243,16 @@ def _ranked(
             loss = difference(right[best], right[key], trials.instances, comparisons)
             standing = _standing(loss)
         one = measured[key]
+        rates = {
+            protocol: rate_of(of, trials.instances, trials.no_interval) for protocol, of in one.right.items()
+        }
+        if key == best and chosen is not None:
+            rates[headline] = evolve(rates[headline], interval=chosen.interval)
         candidates.append(
             Candidate(
                 classifier=key[0],
                 features=key[1],
-                rates={
-                    protocol: rate_of(of, trials.instances, trials.no_interval)
-                    for protocol, of in one.right.items()
-                },
+                rates=rates,
                 training_s=one.training_s,
                 sets=one.sets if key in judged else None,
                 loss=loss,

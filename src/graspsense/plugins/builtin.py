@@ -116,9 +116,15 @@ def graspsense_datasets() -> Iterable[DatasetEntry]:
 
 @hookimpl
 def graspsense_pipelines() -> Iterable[PipelineEntry]:
-    """Return the default pipeline."""
+    """Return the pipeline of the paper, and the one that recognises more."""
     yield PipelineEntry(
         name="default",
         resource="graspsense:plugins/pipelines/default.toml",
         summary="simulated gripper, hybrid control, the six features of Table I",
+        better="best",
+    )
+    yield PipelineEntry(
+        name="best",
+        resource="graspsense:plugins/pipelines/best.toml",
+        summary="the default gripper and control, with a neural network on features of the whole force curve",
     )

@@ -56,14 +56,14 @@ def features_html(features: Features) -> str:
 
 
 def prediction_html(prediction: Prediction) -> str:
-    """Return the label, the most probable classes, the reasons and the warnings."""
+    """Return the label, the most probable classes where they are calibrated, the reasons and the warnings."""
     known = ((label, share) for label, share in prediction.probabilities.items() if share >= LEAST_SHOWN)
     likely = sorted(known, key=lambda pair: -pair[1])[:5]
     certainty = f", {prediction.certainty_in_words}" if prediction.certainty_in_words else ""
     parts = [sentence(f"predicted: {prediction.label}{certainty}", strong=True)]
     if prediction.set_in_words:
         parts.append(sentence(f"set: {prediction.set_in_words}"))
-    if likely:
+    if likely and prediction.calibrated:
         parts.append(table(("class", "probability"), [(label, percent(share)) for label, share in likely]))
     parts += [sentence(reason.words) for reason in prediction.because]
     parts += [sentence(f"warning: {warning}") for warning in prediction.warnings]

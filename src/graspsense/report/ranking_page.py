@@ -64,7 +64,7 @@ def _differences(ranking: Ranking) -> Section:
     best, margin = ranking.candidates[0], f"{100 * MARGIN:.0f} points"
     text = (
         f"The loss is the rate of {best.name} minus that of the candidate on the same grasps, in percentage points. "
-        "The 95 % intervals are corrected for the number of comparisons. A candidate is equivalent if the interval is "
+        "The 95 % intervals hold for all pairs of candidates together. A candidate is equivalent if the interval is "
         f"below {margin}, worse if it is above zero, else undecided: more grasps could show either."
     )
     rows = [

@@ -179,6 +179,7 @@ def _provenance(
         "simulated": any(rows.simulated),
         "store": str(folder),
         "newest_trial": newest,
+        "recipes": len(set(rows.recipe)),
         "settings": settings,
         "components": components,
     }

@@ -133,6 +133,13 @@ class C45(Classifier[C45Config]):
         tree = self._fitted()
         return distributions(tree, codes_of(_coded_columns(tree), table))
 
+    def support(self, table: FeatureTable) -> NDArray[np.float64]:
+        """Return the training trials in the leaf of each trial; NaN where a feature is missing."""
+        from graspsense_c45.prediction import leaf_weights
+
+        tree = self._fitted()
+        return leaf_weights(tree, table.columns([one.name for one in tree.schema.attributes]).values)
+
     def explain(self, features: Features) -> Prediction:
         """Return the prediction with the path through the tree."""
         from graspsense_c45.path import explain

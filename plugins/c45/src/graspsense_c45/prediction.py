@@ -55,6 +55,24 @@ def class_indices(tree: Tree, values: ArrayLike, engine: Engine = "auto") -> Ind
     return result
 
 
+def leaf_weights(tree: Tree, values: ArrayLike) -> Reals:
+    """Return the training weight in the leaf of each row; NaN for a row that lacks a value which is tested.
+
+    Raises ValueError as `distributions` does.
+    """
+    x = _checked(tree, values)
+    splits, result = tree.splits, np.full(len(x), np.nan)
+    rows, nodes = np.arange(len(x)), np.zeros(len(x), dtype=np.int64)
+    while rows.size:
+        ended = splits.feature[nodes] == LEAF
+        result[rows[ended]] = tree.weighted_n_node_samples[nodes[ended]]
+        rows, nodes = rows[~ended], nodes[~ended]
+        slots = splits.slot(nodes, x[rows, splits.feature[nodes]])
+        known = slots >= 0
+        rows, nodes = rows[known], splits.first_child[nodes[known]] + slots[known]
+    return result
+
+
 def node_distributions(tree: Tree, laplace: bool) -> Reals:
     """Return the distribution at each node; a leaf without training weight has that of its parent."""
     weights, total = tree.class_weights, tree.weighted_n_node_samples

@@ -24,11 +24,16 @@ def graspsense_sensor_backends() -> Iterable[SensorBackendEntry]:
 
 @hookimpl
 def graspsense_models() -> Iterable[ModelEntry]:
-    """Return the model that tells the paper's containers and their states apart."""
+    """Return the models that tell the paper's containers and their states apart."""
     yield ModelEntry(
         name="default",
         resource="graspsense_sim_gripper:models/default.json",
         summary="C4.5 on simulated grasps of the paper's containers, at 20 N and 10 mm/s",
+    )
+    yield ModelEntry(
+        name="best",
+        resource="graspsense_sim_gripper:models/best.json",
+        summary="A neural network on the force curve of simulated grasps of the same containers, at 20 N and 10 mm/s",
     )
 
 

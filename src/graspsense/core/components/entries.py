@@ -199,6 +199,8 @@ class PipelineEntry:
     """The file in its package: `"package:path/inside/it.toml"`."""
     summary: str = field(validator=instance_of(str))
     """What the pipeline is for, in one line."""
+    better: str = field(default="", validator=instance_of(str), kw_only=True)
+    """The name of a pipeline for the same gripper that recognises more, which `run` names; empty if there is none."""
 
 
 @frozen

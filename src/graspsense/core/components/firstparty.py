@@ -60,12 +60,11 @@ _CURVE = Example("graspsense-grasp-curve", "grasp_curve")
 
 EXAMPLES: Final[dict[tuple[Role, str], Example]] = {
     ("sensor-backend", "robotiq-2f85"): _ROBOTIQ,
-    ("controller", "close-until-stopped"): _ROBOTIQ,
     ("feature-set", "chitta-without-pads"): _ROBOTIQ,
     ("feature-set", "grasp-curve"): _CURVE,
     ("feature-set", "chitta-and-curve"): _CURVE,
 }
 """Components of the examples, for the hint if one is not installed."""
 
-MODELS: Final[dict[str, Shipped]] = {"default": _SIM}
+MODELS: Final[dict[str, Shipped]] = {"default": _SIM, "best": _SIM}
 """Models that this project ships, with their distributions."""

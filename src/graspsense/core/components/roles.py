@@ -524,6 +524,15 @@ class Classifier(ABC, Generic[ConfigT]):
     def probabilities(self, table: FeatureTable) -> NDArray[np.float64]:
         """Return the probability of each class for each trial, shape (trials, classes); each row sums to 1."""
 
+    def support(self, table: FeatureTable) -> NDArray[np.float64] | None:
+        """Return the number of training trials that each answer rests on, as in the leaf of a tree, shape (trials,).
+
+        NaN is a trial without such a number; None if there is none for any. Answers with the same probability are
+        calibrated separately by it, so it is useful only where it differs between trials.
+        """
+        del table
+        return None
+
     @abstractmethod
     def explain(self, features: Features) -> Prediction:
         """Return the prediction for one trial, with the reason in words and units."""

@@ -4,17 +4,14 @@ A label belongs to the set of a trial if its score reaches a threshold. The scor
 of equal probabilities, that label is ahead whose training trials lie closer (a tree gives most labels the probability
 0). The predicted label is always a member, so its score counts as larger than any other.
 
-The threshold of a label comes from trials that were predicted without their instance, as in cross-conformal prediction
-(V. Vovk, Ann. Math. Artif. Intell. 74 (2015) 9). The rank of such a trial is the share of the label's trials of other
-instances whose true label has a larger score. The level is the rank that the asked share of the trials does not exceed,
-and the threshold the score of which that share is larger. Trials of one instance resemble each other, so instances have
-equal weights, shared by their trials. Both quantiles are interpolated between the trials. Split conformal prediction
-takes the next trial instead, which guarantees the coverage for any number of instances, but with few it covers more
-than is asked: 94 % with 15 instances for 90 %.
+The threshold of a label comes from trials of it that were predicted without their instance, as in cross-conformal
+prediction (V. Vovk, Ann. Math. Artif. Intell. 74 (2015) 9): the largest score that is reached as often as asked for. So
+does the threshold of a class of support (`learn.certainty`), from all trials in it. A label belongs to a set if it
+reaches either of the two, so that the sets hold for each label and for answers from few training trials (Mondrian
+conformal prediction, V. Vovk, A. Gammerman and G. Shafer, Algorithmic Learning in a Random World, 2005, section 4.5). A
+label with too few units is a member of every set.
 
-A label with enough instances has a threshold of its own (class-wise sets); the other labels share that of all labels
-together. No label is covered less than it is recognised, because the prediction is a member: a label that is recognised
-in 97 % of its trials is covered in at least 97 %.
+A set keeps a single label only if the answer is as certain as the sets shall be; otherwise the next label is added.
 
 The scores are cross-validated, but the prediction is by the model of all trials, so the coverage is not guaranteed:
 `graspsense evaluate` measures it.
@@ -36,12 +33,12 @@ if TYPE_CHECKING:
 
 COVERAGE: Final = 0.9
 """Share of the trials whose set shall contain the true label."""
-_COVERAGES: Final = (0.01, 0.999)
+COVERAGES: Final = (0.01, 0.999)
 """The coverages that a stored model may have; each needs a number of units that can be counted."""
 _ROUNDING: Final = 1e-9
 _CLOSENESS: Final = 1e-3
 """Weight of the closeness in a score: it only matters among probabilities that are equal, or almost."""
-_PREDICTED: Final = 2.0
+NEVER_REACHED: Final = 2.0
 """The score of the predicted label, which is always a member: larger than those of all other labels."""
 
 
@@ -91,76 +88,88 @@ def scores_of(probabilities: NDArray[np.float64], closeness: NDArray[np.float64]
 class LabelThreshold:
     """The smallest score with which a label belongs to a set.
 
-    `units` is the number of calibration units that have trials of the label. `own` says whether the threshold is
-    computed from those alone; otherwise it is that of all labels together.
+    `units` is the number of calibration units that have trials of the label. With too few of them the score is None:
+    the label is then a member of every set.
     """
 
-    score: float
+    score: float | None
     units: int
-    own: bool
+
+
+@frozen(kw_only=True, eq=False)
+class Answers:
+    """What sets are made of, for some trials: the scores of all labels, and what the predictions rest on.
+
+    `scores` has shape (trials, classes), NaN for a label that is not possible. `predicted` has the columns of the
+    predicted labels, `certainty` how certain they are, `support_class` their class of support.
+    """
+
+    scores: NDArray[np.float64]
+    predicted: NDArray[np.int64]
+    certainty: NDArray[np.float64]
+    support_class: NDArray[np.int64]
 
 
 @frozen(kw_only=True)
 class PredictionSets:
     """The thresholds of all labels, from trials that were predicted by a model without their unit.
 
-    `unit` is `instances` or `trials`. `thresholds` is empty if there are too few units; `reason` then says so.
-    `unknown` of the `trials` calibration trials were called unknown: the false alarms of that rule.
+    `unit` is `instances` or `trials`. `of_support` has the threshold of each class of support, which holds for all
+    labels. `thresholds` is empty if no label has enough units; `reason` then says so. `unknown` of the `trials`
+    calibration trials were called unknown: the false alarms of that rule.
     """
 
     coverage: float
     unit: str
     thresholds: Mapping[str, LabelThreshold]
+    of_support: tuple[float, ...] = (NEVER_REACHED,)
     reason: str = ""
     unknown: int = 0
     trials: int = 0
 
-    def of(self, scores: Mapping[str, float], label: str) -> tuple[str, ...]:
-        """Return the set of a trial, the label with the largest score first; empty without thresholds.
+    def members(self, answers: Answers, classes: Sequence[str]) -> NDArray[np.bool_]:
+        """Return which classes belong to the set of each trial, of the shape of the scores.
 
-        `label` is the prediction, which is always a member.
+        A label without a threshold, which no calibration trial had, is a member like one with too few units.
         """
-        if not self.thresholds:
-            return ()
-        members = [name for name, score in scores.items() if name == label or self._contains(name, score)]
-        return tuple(sorted(members, key=lambda name: (name != label, -scores[name])))
-
-    def members(self, scores: NDArray[np.float64], classes: Sequence[str]) -> NDArray[np.bool_]:
-        """Return which classes belong to the set of each trial; NaN is not a possible answer.
-
-        `scores` has shape (trials, classes). Raises KeyError if a class that is possible has no threshold.
-        """
+        scores = answers.scores
         inside = np.zeros(scores.shape, dtype=np.bool_)
+        of_support = np.array(self.of_support)[answers.support_class]
         for k, name in enumerate(classes):
-            possible = ~np.isnan(scores[:, k])
-            if possible.any():
-                least = self.thresholds[name].score - _ROUNDING
-                inside[possible, k] = scores[possible, k] >= least
-        inside[np.arange(len(inside)), np.nanargmax(scores, axis=1)] = True
+            own = self.thresholds[name].score if name in self.thresholds else None
+            least = np.minimum(of_support, -math.inf if own is None else own) - _ROUNDING
+            inside[:, k] = scores[:, k] >= least
+        rows = np.arange(len(inside))
+        inside[rows, answers.predicted] = True
+        alone = np.flatnonzero(
+            (inside.sum(axis=1) == 1)
+            & (answers.certainty < self.coverage)
+            & ((~np.isnan(scores)).sum(axis=1) > 1)
+        )
+        others = np.where(np.isnan(scores), -np.inf, scores)[alone]
+        others[np.arange(len(alone)), answers.predicted[alone]] = -np.inf
+        inside[alone, others.argmax(axis=1) if len(alone) else alone] = True
         return inside
 
-    def _contains(self, label: str, score: float) -> bool:
-        return score >= self.thresholds[label].score - _ROUNDING
+    @property
+    def uncalibrated(self) -> tuple[str, ...]:
+        """The labels that are in every set, because they have too few units."""
+        return tuple(sorted(name for name, one in self.thresholds.items() if one.score is None))
 
     @property
     def in_words(self) -> str:
-        """How the sets are calibrated, and how many more units a label needs for a threshold of its own."""
+        """How the sets are calibrated, and how many more units a label needs to be calibrated."""
         if not self.thresholds:
             return f"none: {self.reason}"
         needed = units_needed(self.coverage)
-        shared = {name: one.units for name, one in self.thresholds.items() if not one.own}
+        shared = self.uncalibrated
         text = f"{100 * self.coverage:.0f} % for {len(self.thresholds) - len(shared)} of {len(self.thresholds)} labels"
         if not shared:
             return (
                 f"{text} ({min(one.units for one in self.thresholds.values())} {self.unit} or more of each)"
             )
-        if len(shared) > 1 and len(shared) == len(self.thresholds) and len(set(shared.values())) == 1:
-            lacking = f"{needed - next(iter(shared.values()))} more of each"
-        else:
-            lacking = ", ".join(f"{name} {needed - units} more" for name, units in sorted(shared.items()))
-        return (
-            f"{text}, over all labels together for the others; a label needs {needed} {self.unit}: {lacking}"
-        )
+        lacking = ", ".join(f"{name} {needed - self.thresholds[name].units} more" for name in shared)
+        return f"{text}; the others are in every set; a label needs {needed} {self.unit}: {lacking}"
 
     def to_json(self) -> dict[str, Any]:
         """Return the thresholds as values that JSON represents exactly."""
@@ -170,31 +179,28 @@ class PredictionSets:
             "reason": self.reason,
             "unknown": self.unknown,
             "trials": self.trials,
-            "thresholds": {name: [one.score, one.units, one.own] for name, one in self.thresholds.items()},
+            "thresholds": {
+                name: {"units": one.units, "score": one.score} for name, one in self.thresholds.items()
+            },
+            "of_support": list(self.of_support),
         }
 
 
-def sets_from(kept: StoredValues, classes: Sequence[str]) -> PredictionSets:
-    """Return the sets of a stored model. Raises DataDamaged if they do not fit its classes."""
+def sets_from(kept: StoredValues, classes: Sequence[str], support_classes: int) -> PredictionSets:
+    """Return the sets of a stored model. Raises DataDamaged if they do not fit its labels or its classes of support."""
     thresholds, stored = {}, kept.table("thresholds")
     for name in stored:
-        if len(stored.items(name)) != 3:
-            raise stored.refusal(
-                name, "expected a score, a number of units, and whether it is the label's own"
-            )
-        entry = StoredValues(
-            dict(zip(("score", "units", "own"), stored.items(name), strict=True)), stored.field(name)
-        )
-        thresholds[name] = LabelThreshold(
-            score=entry.number("score"), units=entry.whole("units"), own=entry.flag("own")
-        )
+        entry = stored.table(name)
+        score = None if entry.value("score") is None else entry.number("score")
+        thresholds[name] = LabelThreshold(score=score, units=entry.whole("units"))
     if thresholds and set(thresholds) != set(classes):
         raise kept.refusal("thresholds", "the thresholds of its prediction sets are not those of its labels")
     trials = kept.whole("trials")
     return PredictionSets(
-        coverage=kept.number("coverage", *_COVERAGES),
+        coverage=kept.number("coverage", *COVERAGES),
         unit=kept.choice("unit", ("instances", "trials")),
         thresholds=thresholds,
+        of_support=tuple(kept.numbers("of_support", (support_classes if thresholds else None,)).tolist()),
         reason=kept.text("reason"),
         unknown=kept.whole("unknown", most=trials),
         trials=trials,
@@ -202,59 +208,44 @@ def sets_from(kept: StoredValues, classes: Sequence[str]) -> PredictionSets:
 
 
 def sets_of(
-    true_scores: NDArray[np.float64],
-    right: Sequence[bool],
-    labels: Sequence[str],
+    answers: Answers,
+    truth: NDArray[np.int64],
+    classes: Sequence[str],
     instances: Sequence[str] | None,
     coverage: float = COVERAGE,
 ) -> PredictionSets:
     """Return the sets that held-out trials calibrate.
 
-    `true_scores` are the scores of the true labels, by models trained without the instance of the trial; `right` says
-    which of these trials were predicted correctly. Without `instances`, each trial is a unit.
+    `answers` are by models that were trained without the instance of the trial, `truth` the columns of the true
+    labels. Without `instances`, each trial is a unit.
     """
     unit = "trials" if instances is None else "instances"
-    units = np.array([str(i) for i in range(len(labels))] if instances is None else instances)
-    given = np.array(labels)
+    units = np.array([str(i) for i in range(len(truth))] if instances is None else instances)
     needed = units_needed(coverage)
-    count = len(np.unique(units))
-    if count < needed:
-        reason = f"{count} calibration {unit}, {100 * coverage:.0f} % needs {needed}"
-        return PredictionSets(coverage=coverage, unit=unit, thresholds={}, reason=reason)
-    scores = np.where(right, _PREDICTED, true_scores)
+    scores = answers.scores[np.arange(len(truth)), truth]
+    scores = np.where(answers.predicted == truth, NEVER_REACHED, scores)
     thresholds = {}
-    for name in sorted(set(labels)):
-        rows = given == name
+    for k in np.unique(truth).tolist():
+        rows = truth == k
         of_label = len(np.unique(units[rows]))
-        own = of_label >= needed
-        value = (
-            _threshold(scores[rows], units[rows], coverage) if own else _threshold(scores, units, coverage)
-        )
-        thresholds[name] = LabelThreshold(score=value, units=of_label, own=own)
-    return PredictionSets(coverage=coverage, unit=unit, thresholds=thresholds)
-
-
-def _threshold(scores: NDArray[np.float64], units: NDArray[np.str_], coverage: float) -> float:
-    """Return the score of which a larger one has the level, as a share of the trials, interpolated between scores."""
-    names, unit_of, trials_of_unit = np.unique(units, return_inverse=True, return_counts=True)
-    weights = 1.0 / trials_of_unit[unit_of]
-    larger = _weight_above(scores, weights)
-    own = np.empty(len(scores))
-    for rows in np.split(np.argsort(unit_of, kind="stable"), np.cumsum(trials_of_unit)[:-1]):
-        own[rows] = _weight_above(scores[rows], weights[rows])
-    ranks = (larger - own) / (len(names) - 1)
-    order = np.argsort(ranks, kind="stable")
-    reached = np.cumsum(weights[order]) / len(names)
-    level = np.interp(coverage, reached, ranks[order])
-    falling = np.argsort(-scores, kind="stable")
-    return float(np.interp(level, larger[falling] / len(names), scores[falling]))
-
-
-def _weight_above(scores: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return, for each score, the sum of the weights of the larger ones."""
-    order = np.argsort(-scores, kind="stable")
-    above: NDArray[np.float64] = np.concatenate(([0.0], np.cumsum(weights[order])))
-    return above[np.searchsorted(-scores[order], -scores, side="left")]
+        score = calibrated_threshold(scores[rows], units[rows], coverage) if of_label >= needed else None
+        thresholds[classes[k]] = LabelThreshold(score=score, units=of_label)
+    if all(one.score is None for one in thresholds.values()):
+        most = max((one.units for one in thresholds.values()), default=0)
+        reason = f"{most} calibration {unit} at most of a label, {100 * coverage:.0f} % needs {needed}"
+        return PredictionSets(coverage=coverage, unit=unit, thresholds={}, reason=reason)
+    numbers = range(int(answers.support_class.max()) + 1)
+    of_support = [
+        calibrated_threshold(scores[rows], units[rows], coverage)
+        for rows in (answers.support_class == number for number in numbers)
+    ]
+    return PredictionSets(
+        coverage=coverage,
+        unit=unit,
+        thresholds=thresholds,
+        # With a single class, the thresholds of the labels suffice.
+        of_support=tuple(of_support) if len(of_support) > 1 else (NEVER_REACHED,),
+    )
 
 
 def calibrated_threshold(scores: NDArray[np.float64], units: NDArray[np.str_], coverage: float) -> float:

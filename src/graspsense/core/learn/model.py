@@ -21,16 +21,25 @@ import numpy as np
 from attrs import evolve, frozen
 
 from graspsense import __version__
+from graspsense.core.components.entries import TABLE_OF_ROLE
 from graspsense.core.components.firstparty import MODELS
 from graspsense.core.components.setting import CHANGES_NO_RESULT, NAMES_INPUT, UNIT_OF_ENDING, settings_marked
 from graspsense.core.files.whole_file import write_whole
-from graspsense.core.learn.conformal import PredictionSets, scores_of, sets_from
+from graspsense.core.learn.certainty import Certainty, certainty_from, with_certainty
+from graspsense.core.learn.conformal import COVERAGES, Answers, PredictionSets, scores_of, sets_from
 from graspsense.core.learn.model_content import digest, model_bytes, parsed, sealed_content
 from graspsense.core.learn.novelty import Novelty, novelty_from, novelty_of
 from graspsense.core.learn.stored_values import StoredValueError, StoredValues
 from graspsense.core.learn.temperature import RANGE as TEMPERATURES
 from graspsense.core.learn.temperature import at_temperature
-from graspsense.core.values.errors import ConfigError, DataDamaged, PluginUnavailable, UnknownName, named
+from graspsense.core.values.errors import (
+    ConfigError,
+    DataDamaged,
+    PluginUnavailable,
+    UnknownName,
+    WiringError,
+    named,
+)
 from graspsense.core.values.features import (
     LARGEST_VALUE,
     UNKNOWN,
@@ -46,7 +55,7 @@ from graspsense.core.values.units import display_unit, without_underscores
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from graspsense.core.components.config import SelectedComponent, Settings
+    from graspsense.core.components.config import Settings
     from graspsense.core.components.registry import Component, Plugins
     from graspsense.core.components.roles import Classifier
     from graspsense.core.learn.labelled import Labelled
@@ -55,7 +64,9 @@ if TYPE_CHECKING:
 FORMAT: Final = "graspsense model"
 REGRESSION_FORMAT: Final = "graspsense regression model"
 """The `format` of a model that predicts a number (`graspsense.regression`)."""
-VERSION: Final = 1
+VERSION: Final = 2
+_READ: Final = (1, VERSION)
+"""The versions that are read. Sets of the first one do not hold for answers from few trials, and are left out."""
 MODELS_KEPT: Final = 4
 """How many models of pipelines stay in memory."""
 
@@ -82,9 +93,11 @@ class Model:
     novelty: Novelty
     provenance: Mapping[str, Any]
     sets: PredictionSets | None = None
-    """Calibrated prediction sets; None in a model of an earlier version."""
+    """Calibrated prediction sets; None in a model that was never calibrated."""
+    certainty: Certainty | None = None
+    """How often its answers are right, by their support; None in a model that is not calibrated."""
     temperature: float | None = None
-    """The temperature (`learn.temperature`) at which its probabilities are calibrated; None: they are not."""
+    """The temperature (`learn.temperature`) of the probabilities of the labels that are not predicted."""
     checkpoints: tuple[tuple[float, Model], ...] = ()
     """The models for grasps that go on: each with the seconds after the contact up to which it knows them."""
 
@@ -117,15 +130,21 @@ class Model:
         return None if after_s is None else float(after_s)
 
     def predict(
-        self, features: Features, settings: Settings | None = None, device: DeviceInfo | None = None
+        self,
+        features: Features,
+        settings: Settings | None = None,
+        device: DeviceInfo | None = None,
+        provenance: Mapping[str, Any] | None = None,
     ) -> Prediction:
         """Return the prediction for one trial, with warnings about its validity.
 
-        `settings` and `device` are those of the grasp, if there was one. A trial that lacks a feature of the model, or
-        has it in another unit, is unknown, with that as the reason. Raises DataDamaged if the classifier gives no
-        probabilities.
+        `settings` and `device` are those of the grasp, if there was one, `provenance` what a source says of its trials.
+        A trial under other settings than those of the training has no certainty and no set. One that lacks a feature of
+        the model, or has it in another unit, is unknown, with that as the reason. Raises DataDamaged if the classifier
+        gives no probabilities.
         """
-        warnings = tuple(self._warnings(settings, device))
+        differences = tuple(self.differences(settings, device, provenance))
+        warnings = (*self._kind_warnings(differences), *differences)
         probabilities: Mapping[str, float] = {}
         because: tuple[Reason | str, ...]
         misfit = self.misfit(features)
@@ -133,26 +152,22 @@ class Model:
             because = (misfit,)
         else:
             chosen = _chosen(features, self.names)
-            explained = self.classifier.explain(_bounded(chosen))
+            bounded = _bounded(chosen)
+            explained = self.classifier.explain(bounded)
             classes = self.classifier.classes()
             shares = np.array([[explained.probabilities.get(name, 0.0) for name in classes]])
             self._refuse_improbable(shares)
-            (calibrated,) = at_temperature(shares, self.temperature).tolist()
-            prediction = evolve(
-                explained,
-                probabilities=dict(zip(classes, calibrated, strict=True)),
-                calibrated=self.temperature is not None,
-            )
-            warnings = (*prediction.warnings, *warnings)
+            warnings = (*explained.warnings, *warnings)
             strange = self.novelty.unlike(chosen)
+            table = table_of([bounded])
+            (prediction,) = self._calibrated(table, [explained.label], shares, bool(differences))
             if strange is None:
-                (members,) = self.prediction_sets(table_of([chosen]), [prediction.label], shares)
                 return evolve(
                     prediction,
+                    because=explained.because,
+                    support=explained.support,
                     warnings=warnings,
                     model=self.in_a_line,
-                    prediction_set=members,
-                    coverage=self.sets.coverage if self.sets is not None and members else None,
                 )
             probabilities = prediction.probabilities
             because = (strange,)
@@ -166,12 +181,67 @@ class Model:
             model=self.in_a_line,
         )
 
+    def predictions(
+        self, table: FeatureTable, provenance: Mapping[str, Any] | None = None
+    ) -> list[Prediction]:
+        """Return the predictions of many trials in one call, without reasons. Raises what `answers` raises."""
+        differences = tuple(self.differences(provenance=provenance))
+        warnings = (*self._kind_warnings(differences), *differences)
+        labels, shares = self.answers(table)
+        made = self._calibrated(table.columns(self.names), labels, shares, bool(differences))
+        return [evolve(one, warnings=warnings, model=self.in_a_line) for one in made]
+
+    def _calibrated(
+        self, table: FeatureTable, labels: Sequence[str], shares: NDArray[np.float64], elsewhere: bool
+    ) -> list[Prediction]:
+        """Return predictions with certainty and sets, without reasons; those of unknown trials have no set.
+
+        `shares` are the probabilities that the classifier gives. With `elsewhere`, the trials are not of the kind that
+        the model was measured on, and nothing is calibrated.
+        """
+        classes = self.classifier.classes()
+        known = np.array([label != UNKNOWN for label in labels])
+        predicted = shares.argmax(axis=1)
+        predicted[known] = [classes.index(label) for label in labels if label != UNKNOWN]
+        no_certainty = "it was not measured under these settings" if elsewhere else self.no_certainty
+        probabilities, members = shares, np.zeros(shares.shape, dtype=np.bool_)
+        if self.certainty is not None and not no_certainty:
+            support = self.classifier.support(table)
+            if support is None:
+                support = np.full(len(table), np.nan)
+            certainty = self.certainty.rate(shares[np.arange(len(table)), predicted], support)
+            probabilities = with_certainty(at_temperature(shares, self.temperature), predicted, certainty)
+            if self.sets is not None and self.sets.thresholds:
+                scores = scores_of(shares, self.novelty.closeness(table, classes))
+                answers = Answers(
+                    scores=scores,
+                    predicted=predicted,
+                    certainty=certainty,
+                    support_class=self.certainty.class_of(support),
+                )
+                members[known] = self.sets.members(answers, classes)[known]
+        made = []
+        for i, label in enumerate(labels):
+            order = sorted(np.flatnonzero(members[i]), key=lambda k: (k != predicted[i], -scores[i, k]))
+            made.append(
+                Prediction(
+                    label=label,
+                    probabilities=dict(zip(classes, probabilities[i].tolist(), strict=True)),
+                    because=(),
+                    prediction_set=tuple(classes[k] for k in order),
+                    coverage=self.sets.coverage if self.sets is not None and order else None,
+                    calibrated=not no_certainty,
+                    no_certainty=no_certainty,
+                )
+            )
+        return made
+
     def answers(self, table: FeatureTable) -> tuple[list[str], NDArray[np.float64]]:
         """Return the label of `predict` for each trial of a table, and the probabilities that the classifier gives.
 
-        The probabilities are not calibrated (`at_temperature` does that). Their shape is (trials, classes), in the
-        order of the classes of the classifier; unknown trials have probabilities too. Raises ConfigError if the table
-        does not have the features of the model, DataDamaged if the classifier gives no probabilities.
+        The probabilities are not calibrated. Their shape is (trials, classes), in the order of the classes of the
+        classifier; unknown trials have probabilities too. Raises ConfigError if the table does not have the features of
+        the model, DataDamaged if the classifier gives no probabilities.
         """
         misfit = self.misfit(table)
         if misfit:
@@ -187,21 +257,13 @@ class Model:
         labels = [UNKNOWN if strange else classes[k] for strange, k in zip(unlike, best, strict=True)]
         return labels, shares
 
-    def prediction_sets(
-        self, table: FeatureTable, labels: Sequence[str], shares: NDArray[np.float64]
-    ) -> list[tuple[str, ...]]:
-        """Return the prediction set of each trial, given the predicted labels and what the classifier gives.
-
-        A set is empty if the trial is unknown, or if the model has no calibrated sets.
-        """
-        if self.sets is None or not self.sets.thresholds:
-            return [()] * len(table)
-        classes = self.classifier.classes()
-        scores = scores_of(shares, self.novelty.closeness(table, classes))
-        return [
-            () if label == UNKNOWN else self.sets.of(dict(zip(classes, row, strict=True)), label)
-            for label, row in zip(labels, scores.tolist(), strict=True)
-        ]
+    @property
+    def no_certainty(self) -> str:
+        """Why its predictions have no certainty; empty if they have one."""
+        if self.certainty is not None:
+            return ""
+        reason = self.sets.reason if self.sets is not None else "it was not measured"
+        return f"the model is not calibrated ({reason})"
 
     def misfit(self, given: Features | FeatureTable) -> str:
         """Return why the model cannot be applied to these features; empty if it can."""
@@ -225,33 +287,53 @@ class Model:
                 f"model {self.name!r} cannot be used: {error}. Train it again, with the defaults of {self.component}"
             ) from error
 
-    def _warnings(self, settings: Settings | None, device: DeviceInfo | None) -> Iterator[str]:
-        kind = "simulated grasps" if self.simulated else "grasps"
-        if self.simulated:
-            if device is not None and device.clock == "device" and not device.simulated:
-                yield (
-                    "trained on simulated grasps, but this gripper is real: expect wrong answers until a model is "
-                    "trained on grasps of its own"
-                )
-            else:
-                yield "trained on simulated grasps: valid for the simulator, untested on real objects"
-        if settings is None:
-            return
+    def differences(
+        self,
+        settings: Settings | None = None,
+        device: DeviceInfo | None = None,
+        provenance: Mapping[str, Any] | None = None,
+    ) -> Iterator[str]:
+        """Yield, in words, how trials differ from those of the training, so that its certainty does not hold for them.
+
+        The arguments are those of `predict`.
+        """
+        real = device is not None and device.clock == "device" and not device.simulated
+        if self.simulated and real:
+            yield (
+                "trained on simulated grasps, but this gripper is real: expect wrong answers until a model is "
+                "trained on grasps of its own"
+            )
+        elif self.simulated and provenance is not None and provenance.get("simulated") is False:
+            yield "trained on simulated grasps, but these trials are real: expect wrong answers"
+        recipes = int((provenance or {}).get("recipes", 1))
+        if recipes > 1 and self.provenance.get("recipes", 1) == 1:
+            yield f"these trials were recorded with {recipes} different settings of gripper, controller or features"
         trained = dict(self.provenance.get("settings", {}))
-        for table in _COMPARED_TABLES:
-            then, now = trained.get(table), settings.values.get(table)
-            if then is None or now is None:
+        kind = "simulated grasps" if self.simulated else "grasps"
+        for table, now, ignored in _compared(settings, provenance):
+            then = trained.get(table)
+            if then is None:
                 continue
             if then.get("type") != now.get("type"):
                 yield f"trained on {kind} with {table} {then.get('type')}, this one was with {now.get('type')}"
                 continue
-            for key in sorted((then.keys() & now.keys()) - _not_compared(getattr(settings, table))):
+            for key in sorted((then.keys() & now.keys()) - ignored):
                 if json_ready(then[key]) != json_ready(now[key]):
                     what, value = worded(key, then[key])
                     yield (
                         f"trained on {kind} with {what} {value}, this one was with {worded(key, now[key])[1]} "
                         f"({table}.{key})"
                     )
+
+    def _kind_warnings(self, differences: Sequence[str]) -> Iterator[str]:
+        """Yield what holds for all predictions of a model of simulated grasps, unless a difference says more."""
+        if self.sets is not None and self.sets.uncalibrated and not differences:
+            names = ", ".join(self.sets.uncalibrated)
+            yield f"in every set, because too few {self.sets.unit} calibrate it: {names}"
+        if self.simulated and not any(
+            one.startswith("trained on simulated grasps, but") for one in differences
+        ):
+            yield "trained on simulated grasps: valid for the simulator, untested on real objects"
 
     def as_json(self) -> dict[str, Any]:
         """Return the content of the file of the model."""
@@ -265,6 +347,7 @@ class Model:
             "provenance": json_ready(self.provenance),
             "unknown": self.novelty.to_json(),
             **({} if self.sets is None else {"sets": self.sets.to_json()}),
+            "certainty": None if self.certainty is None else self.certainty.to_json(),
             **({} if self.temperature is None else {"temperature": self.temperature}),
             "model": self.classifier.to_json(),
             **(
@@ -284,6 +367,7 @@ def _part_as_json(after_s: float, part: Model) -> dict[str, Any]:
         "by_label": json_ready(part.provenance["by_label"]),
         "unknown": part.novelty.to_json(),
         "sets": None if part.sets is None else part.sets.to_json(),
+        "certainty": None if part.certainty is None else part.certainty.to_json(),
         "temperature": part.temperature,
         "model": part.classifier.to_json(),
     }
@@ -309,6 +393,7 @@ def _part_from_json(whole: Model, component: Component, config: Any, kept: Store
         classifier=classifier,
         novelty=_novelty_from(kept, classifier, whole.names, whole.units),
         sets=_sets_from(kept, classifier),
+        certainty=_certainty_from(kept),
         temperature=_temperature_from(kept),
         provenance={
             "trials": kept.whole("trials"),
@@ -369,11 +454,27 @@ def _novelty_from(
     return novelty
 
 
+def _certainty_from(stored: StoredValues) -> Certainty | None:
+    """Return the certainty; None in a model without calibration, or of an earlier version. Raises DataDamaged."""
+    if "certainty" not in stored or stored.value("certainty") is None:
+        return None
+    return certainty_from(stored.tables("certainty"))
+
+
 def _sets_from(stored: StoredValues, classifier: Classifier[Any]) -> PredictionSets | None:
     """Return the prediction sets, if there are any. Raises DataDamaged."""
     if "sets" not in stored or stored.value("sets") is None:
         return None
-    return sets_from(stored.table("sets"), classifier.classes())
+    if "certainty" not in stored:
+        old = stored.table("sets")
+        reason = "its file was written by an earlier version of graspsense: train it again"
+        return PredictionSets(
+            coverage=old.number("coverage", *COVERAGES), unit=old.text("unit"), thresholds={}, reason=reason
+        )
+    certainty = _certainty_from(stored)
+    return sets_from(
+        stored.table("sets"), classifier.classes(), 0 if certainty is None else len(certainty.classes)
+    )
 
 
 def _temperature_from(stored: StoredValues) -> float | None:
@@ -407,9 +508,31 @@ def refuse_improbable(shares: Any, trials: int, classes: int) -> None:
         raise ValueError("it gives no probabilities: they are not finite, are below 0, or do not sum to 1")
 
 
-def _not_compared(chosen: SelectedComponent) -> frozenset[str]:
+def _compared(
+    settings: Settings | None, provenance: Mapping[str, Any] | None
+) -> Iterator[tuple[str, Mapping[str, Any], frozenset[str]]]:
+    """Yield the tables of settings of a trial, with the keys that may differ between training and use."""
+    stated = (provenance or {}).get("settings") or {}
+    for table in _COMPARED_TABLES:
+        if settings is not None and settings.values.get(table) is not None:
+            yield table, settings.values[table], _not_compared(type(getattr(settings, table).config))
+        elif settings is None and stated.get(table) is not None:
+            yield table, stated[table], _not_compared(_config_class(table, stated[table].get("type")))
+
+
+def _config_class(table: str, name: Any) -> type:
+    """Return the config class of an installed component; `object`, which has no settings, if there is none."""
+    from graspsense.core.components.registry import installed
+
+    role = next(role for role, one in TABLE_OF_ROLE.items() if one == table)
+    try:
+        return installed().find(role, str(name)).config_class()
+    except ConfigError:
+        return object
+
+
+def _not_compared(config_class: type) -> frozenset[str]:
     """Return the settings of a component that may differ between training and use without a warning."""
-    config_class = type(chosen.config)
     unchanging = settings_marked(config_class, CHANGES_NO_RESULT)
     return unchanging | settings_marked(config_class, NAMES_INPUT) | {"type"}
 
@@ -520,6 +643,7 @@ def _restored(stored: StoredValues, name: str, plugins: Plugins, component: Comp
         novelty=_novelty_from(stored, classifier, names, units),
         provenance=_provenance_from(stored),
         sets=_sets_from(stored, classifier),
+        certainty=_certainty_from(stored),
         temperature=_temperature_from(stored),
     )
     return evolve(model, checkpoints=_checkpoints_from(stored, model, component, config))
@@ -545,7 +669,7 @@ def model_for(settings: Settings, plugins: Plugins) -> Model | None:
     """Return the model of the classifier of a pipeline; None if the pipeline has no classifier.
 
     The same content gives the same model, which must not be changed. Raises ConfigError if the pipeline names no model,
-    and what `load_model` raises.
+    WiringError if the model takes other features than those of the pipeline, and what `load_model` raises.
     """
     chosen = settings.classifier
     if chosen is None:
@@ -563,7 +687,28 @@ def model_for(settings: Settings, plugins: Plugins) -> Model | None:
             + _how_to_train(settings, name)
             + "\n  or do without: -o classifier.type=none"
         )
-    return _kept_model(_text(name, plugins), name, plugins, chosen.component)
+    model = _kept_model(_text(name, plugins), name, plugins, chosen.component)
+    given = settings.features.declared.features
+    misfit = model.misfit(
+        FeatureTable(
+            names=tuple(one.name for one in given),
+            units=tuple(one.unit for one in given),
+            values=np.empty((0, len(given))),
+        )
+    )
+    if misfit:
+        raise WiringError(
+            f"{misfit}. It could not answer: choose its features, features.type = "
+            f"{_features_of(model)}; train a model of these features:\n{_how_to_train(settings, 'model.json')}\n"
+            "  or do without: -o classifier.type=none"
+        )
+    return model
+
+
+def _features_of(model: Model) -> str:
+    """Return the feature set that a model was trained with, as far as it is known."""
+    table = dict(model.provenance.get("settings", {})).get("features") or {}
+    return str(table.get("type", "those of its training"))
 
 
 def _how_to_train(settings: Settings, out: str) -> str:
@@ -573,6 +718,8 @@ def _how_to_train(settings: Settings, out: str) -> str:
     of = f"--gripper {settings.gripper.component.name}"
     if settings.pipeline.endswith(".toml"):
         of = f"--pipeline {shlex.quote(settings.pipeline)}"
+    if settings.origins.get("features.type", "").startswith("-o"):
+        of += f" -o features.type={settings.features.component.name}"
     if settings.gripper.create().objects():
         return f"  train one: graspsense train simulated {of} --classifier {name} --out {out}"
     return (
@@ -600,7 +747,7 @@ def _content(name: str, text: bytes) -> dict[str, Any]:
         raise ConfigError(
             f"model {name!r} predicts a number, not a label: use it with graspsense predict {name} SOURCE"
         )
-    return sealed_content(name, content, FORMAT, VERSION, "model of graspsense")
+    return sealed_content(name, content, FORMAT, _READ, "model of graspsense")
 
 
 def _json(value: Any) -> str:

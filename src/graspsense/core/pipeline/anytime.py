@@ -160,4 +160,10 @@ def anytime_of(model: Model | None, feature_set: FeatureSet[Any], settings: Sett
         raise ConfigError(
             f"run.stop_when_sure: model {model.name!r} has no prediction sets at its checkpoints ({reason})"
         )
+    if stops and (differences := [*model.differences(settings)]):
+        raise ConfigError(
+            f"run.stop_when_sure: the sets of model {model.name!r} were not measured under these settings, so nothing "
+            f"is sure: {differences[0]}. Train a model with these settings, or let the grasp go on: "
+            "-o run.stop_when_sure=false"
+        )
     return Anytime(model, feature_set, settings, stops=stops)

@@ -167,7 +167,7 @@ class Prediction:
     of those in the leaf of the tree, or among the nearest. `prediction_set` has the labels that cannot be ruled out,
     the most probable first: it contains the true label of a new object with the probability `coverage`. It is empty,
     and `coverage` None, if the model is not calibrated or the trial is unknown. `calibrated` says whether the
-    probabilities agree with rates in held-out trials (`graspsense.core.learn.temperature`).
+    probabilities agree with rates in held-out trials (`graspsense.core.learn.certainty`); `no_certainty` says why not.
     """
 
     label: str
@@ -179,6 +179,7 @@ class Prediction:
     prediction_set: tuple[str, ...] = field(default=(), converter=_texts)
     coverage: float | None = None
     calibrated: bool = False
+    no_certainty: str = ""
 
     @property
     def set_in_words(self) -> str:
@@ -189,27 +190,19 @@ class Prediction:
 
     @property
     def certainty(self) -> float | None:
-        """How certain the label is, as a probability below 1; None without probabilities.
-
-        A share of few training trials overstates it: 6 of 6 does not mean that the next one is certain. Unless the
-        probabilities are calibrated, such a share is therefore corrected by the rule of succession, (with the label
-        + 1) / (all + 2), which gives 88 % for 6 of 6.
-        """
-        if self.support is not None and not self.calibrated:
-            with_label, trials = self.support
-            return (with_label + 1) / (trials + 2)
-        return self.probabilities.get(self.label)
+        """The share of right answers among those that rest on as much; None if it was not measured."""
+        return self.probabilities.get(self.label) if self.calibrated else None
 
     @property
     def certainty_in_words(self) -> str:
-        """The certainty with what it rests on, such as `about 88 %: 6 of 6 training trials`; empty without any."""
-        if self.certainty is None:
-            return ""
-        if self.support is None:
-            return f"{percent(self.certainty)} by the model"
-        with_label, trials = self.support
-        about = percent(self.certainty).removeprefix("over ")
-        return f"about {about}: {with_label:.4g} of {trials:.4g} training trials"
+        """The certainty with what it rests on, such as `about 88 %: 6 of 6 training trials`; empty without either."""
+        with_label, trials = self.support or (0.0, 0.0)
+        rests = f"{with_label:.4g} of {trials:.4g} training trials" if self.support is not None else ""
+        if self.certainty is not None:
+            about = percent(self.certainty)
+            return (about if about.startswith("over") else f"about {about}") + (f": {rests}" if rests else "")
+        why = f"no certainty: {self.no_certainty}" if self.no_certainty else ""
+        return "; ".join(one for one in (rests, why) if one)
 
     def as_json(self) -> dict[str, Any]:
         """Return label, probabilities, set and reasons as `--json` prints them."""
@@ -219,7 +212,9 @@ class Prediction:
             "support": None if self.support is None else list(self.support),
             "prediction_set": list(self.prediction_set),
             "coverage": self.coverage,
+            "certainty": self.certainty,
             "calibrated": self.calibrated,
+            "no_certainty": self.no_certainty,
             "because": [one.as_json() for one in self.because],
         }
 

@@ -53,7 +53,7 @@ class Knn(ScikitClassifier[KnnConfig]):
         )
         return (*self.shapley_reasons(fitted, row, given, shares), Reason(words=words))
 
-    def support(self, fitted: FittedEstimator, row: NDArray[np.float64]) -> tuple[float, float]:
+    def counted(self, fitted: FittedEstimator, row: NDArray[np.float64]) -> tuple[float, float]:
         """Return the votes for the label, and all votes."""
         _, rows = fitted.estimator.kneighbors(row)
         votes = [fitted.labels[i] for i in rows[0].tolist()]

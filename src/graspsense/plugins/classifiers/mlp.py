@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 from attrs import frozen
 
-from graspsense.plugin_api import FeatureValue, Reason, setting
-from graspsense.plugins.classifiers.scikit import FittedEstimator, KeptConfig, ScikitClassifier, most_likely
+from graspsense.plugin_api import FeatureValue, Reason, StoredValues, setting
+from graspsense.plugins.classifiers.scikit import (
+    FittedEstimator,
+    KeptConfig,
+    ScikitClassifier,
+    most_likely,
+    restored,
+)
 
 if TYPE_CHECKING:
     import numpy as np
@@ -30,6 +36,10 @@ class MlpConfig(KeptConfig):
     )
     weight_decay: float = setting(
         default=0.01, minimum=0.0, maximum=1e6, meaning="L2 penalty on the weights."
+    )
+    kept_as: Literal["trials", "weights", "skops"] = setting(  # type: ignore[assignment]
+        default="trials",
+        meaning="What a model file holds: the training trials, the weights, or the fitted estimator (extra skops).",
     )
 
 
@@ -64,3 +74,47 @@ class Mlp(ScikitClassifier[MlpConfig]):
             *self.shapley_reasons(fitted, row, given, shares),
             most_likely(shares, "outputs of the network"),
         )
+
+    def shares(self, fitted: FittedEstimator, rows: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the probabilities of preprocessed trials; they are not finite if the weights are too large."""
+        import numpy as np
+
+        with np.errstate(over="ignore", invalid="ignore"):
+            return super().shares(fitted, rows)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the weights, or what the setting `kept_as` asks for."""
+        kept = super().to_json()
+        if self.config.kept_as != "weights":
+            return kept
+        fitted = self._model()
+        return {
+            **{key: kept[key] for key in ("made_with", "seed", "features")},
+            "classes": list(self.classes()),
+            **{name: getattr(fitted, name).tolist() for name in ("fill", "mean", "scale")},
+            "weights": [layer.tolist() for layer in fitted.estimator.coefs_],
+            "offsets": [layer.tolist() for layer in fitted.estimator.intercepts_],
+        }
+
+    def from_json(self, model: Mapping[str, Any]) -> None:
+        """Restore the network, without training it if the weights were kept. Raises DataDamaged or ValueError."""
+        if "weights" not in model:
+            super().from_json(model)
+            return
+        import numpy as np
+
+        stored = StoredValues(model)
+        names, units = stored.features("features")
+        classes = stored.texts("classes", distinct=True)
+        outputs = 1 if len(classes) == 2 else len(classes)
+        shapes = [(len(names), self.config.hidden), (self.config.hidden, outputs)]
+        layers = StoredValues({str(k): layer for k, layer in enumerate(stored.items("weights"))}, "weights")
+        offsets = StoredValues({str(k): layer for k, layer in enumerate(stored.items("offsets"))}, "offsets")
+        estimator = self.estimator(0, 2)
+        estimator.coefs_ = [layers.numbers(str(k), shape) for k, shape in enumerate(shapes)]
+        estimator.intercepts_ = [offsets.numbers(str(k), shape[1:]) for k, shape in enumerate(shapes)]
+        estimator.classes_ = np.array(classes)
+        estimator.n_layers_, estimator.n_outputs_ = len(shapes) + 1, outputs
+        estimator.n_features_in_ = len(names)
+        estimator.out_activation_ = "logistic" if outputs == 1 else "softmax"
+        self._made_with, self._fitted = "", restored(stored, names, units, estimator)

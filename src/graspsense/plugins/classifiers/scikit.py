@@ -135,7 +135,7 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
             label=label,
         )
 
-    def support(self, fitted: FittedEstimator, row: NDArray[np.float64]) -> tuple[float, float] | None:
+    def counted(self, fitted: FittedEstimator, row: NDArray[np.float64]) -> tuple[float, float] | None:
         """Return the training trials that the largest probability was counted from: with the label, and in all.
 
         None where the probabilities are not a share of training trials.
@@ -227,7 +227,7 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
             probabilities=shares,
             because=(*filled, *self.reasons(fitted, row, given, ranked)),
             warnings=self._version_warnings(),
-            support=self.support(fitted, row),
+            support=self.counted(fitted, row),
         )
 
     def to_json(self) -> dict[str, Any]:
@@ -280,27 +280,14 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
     def _from_skops(
         self, stored: StoredValues, names: tuple[str, ...], units: tuple[str, ...]
     ) -> FittedEstimator:
-        import numpy as np
-
         from graspsense.plugins.classifiers.skops_text import from_text
 
-        fill, mean, scale = (stored.numbers(name, (len(names),)) for name in ("fill", "mean", "scale"))
-        if not (scale > 0.0).all():
-            raise stored.refusal("scale", "a feature has the scale 0, or a negative one")
         seed = stored.whole("seed", most=LARGEST_SEED)
         try:
             estimator = from_text(stored.text("skops"), self.estimator(seed, 2), len(names))
         except ValueError as error:
             raise stored.refusal("skops", str(error)) from error
-        return FittedEstimator(
-            estimator=estimator,
-            table=FeatureTable(names=names, units=units, values=np.empty((0, len(names)))),
-            labels=(),
-            seed=seed,
-            fill=fill,
-            mean=mean,
-            scale=scale,
-        )
+        return restored(stored, names, units, estimator)
 
     def _refuse_endless(self, trials: int, features: int, labels: int) -> None:
         """Raise ValueError if the settings make a training too long for this number of trials, features and labels."""
@@ -327,7 +314,29 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
         )
 
 
+def restored(
+    stored: StoredValues, names: tuple[str, ...], units: tuple[str, ...], estimator: Any
+) -> FittedEstimator:
+    """Return an estimator that was stored with its preprocessing, without training trials. Raises DataDamaged."""
+    import numpy as np
+
+    fill, mean, scale = (stored.numbers(name, (len(names),)) for name in ("fill", "mean", "scale"))
+    if not (scale > 0.0).all():
+        raise stored.refusal("scale", "a feature has the scale 0, or a negative one")
+    return FittedEstimator(
+        estimator=estimator,
+        table=FeatureTable(names=names, units=units, values=np.empty((0, len(names)))),
+        labels=(),
+        seed=stored.whole("seed", most=LARGEST_SEED),
+        fill=fill,
+        mean=mean,
+        scale=scale,
+    )
+
+
 def most_likely(shares: Mapping[str, float], what: str) -> Reason:
-    """Return the three largest shares in words; `shares` has the largest first."""
-    best = list(shares.items())[:3]
-    return Reason(words=f"{what}: " + ", ".join(f"{label} {share:.0%}" for label, share in best))
+    """Return the labels of the three largest shares; `shares` has the largest first.
+
+    The shares themselves say nothing of how often such an answer is right.
+    """
+    return Reason(words=f"{what}, the largest first: {', '.join(list(shares)[:3])}")

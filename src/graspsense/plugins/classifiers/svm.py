@@ -80,5 +80,5 @@ class Svm(ScikitClassifier[SvmConfig]):
         """Return the contributions of the features to the softmax, and the labels with the largest values."""
         return (
             *self.shapley_reasons(fitted, row, given, shares),
-            most_likely(shares, "softmax of the decision values (not calibrated)"),
+            most_likely(shares, "softmax of the decision values"),
         )

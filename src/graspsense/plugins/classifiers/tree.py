@@ -7,7 +7,15 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from attrs import frozen
 
-from graspsense.plugin_api import FeatureValue, Reason, SplitTest, leaf_reason, path_reasons, setting
+from graspsense.plugin_api import (
+    FeatureTable,
+    FeatureValue,
+    Reason,
+    SplitTest,
+    leaf_reason,
+    path_reasons,
+    setting,
+)
 from graspsense.plugins.classifiers.scikit import FittedEstimator, KeptConfig, ScikitClassifier
 
 if TYPE_CHECKING:
@@ -61,9 +69,18 @@ class Cart(ScikitClassifier[CartConfig]):
                     above=bool(row[0, k] > inner.threshold[node]),
                 )
             )
-        return (*path_reasons(tests), leaf_reason(*self.support(fitted, row), next(iter(shares))))
+        return (*path_reasons(tests), leaf_reason(*self.counted(fitted, row), next(iter(shares))))
 
-    def support(self, fitted: FittedEstimator, row: NDArray[np.float64]) -> tuple[float, float]:
+    def support(self, table: FeatureTable) -> NDArray[np.float64]:
+        """Return the training trials in the leaf of each trial."""
+        import numpy as np
+
+        fitted = self._model()
+        rows = fitted.ready(table.columns(fitted.table.names).values)
+        inner = fitted.estimator.tree_
+        return np.asarray(inner.n_node_samples[fitted.estimator.apply(rows)], dtype=np.float64)
+
+    def counted(self, fitted: FittedEstimator, row: NDArray[np.float64]) -> tuple[float, float]:
         """Return how many training trials in the leaf have its most frequent label, and how many there are."""
         inner, leaf = fitted.estimator.tree_, int(fitted.estimator.apply(row)[0])
         trials = int(inner.n_node_samples[leaf])

@@ -189,6 +189,9 @@ def contact_curve(samples: CurveSamples, contact_force_n: float) -> ContactCurve
     steps, travel = t_s[1:] - t_s[:-1], compression[1:] - compression[:-1]
     between = 0.5 * (force[1:] + force[:-1])
     start = _release(compression, force, phase)
+    # Where the contact falls on a sample, the first step has no length.
+    with np.errstate(divide="ignore", invalid="ignore"):
+        half_rise, velocity = 0.5 * (force[1:] - force[:-1]) / steps, travel / steps
     return ContactCurve(
         t_s=t_s,
         compression_m=compression,
@@ -200,8 +203,8 @@ def contact_curve(samples: CurveSamples, contact_force_n: float) -> ContactCurve
         released=start is not None,
         impulse_n_s=_summed(between * steps),
         work_j=_summed(between * travel),
-        half_rise=0.5 * (force[1:] - force[:-1]) / steps,
-        velocity_m_s=travel / steps,
+        half_rise=half_rise,
+        velocity_m_s=velocity,
     )
 
 

@@ -1,0 +1,194 @@
+"""Certainty: how often answers that rest on as much were right, among trials that were held out.
+
+An answer rests on a probability, and in a tree on the number of training trials in its leaf (its *support*). A leaf
+was chosen for its trials, so that 4 of 4 means less than 57 of 57, by how much only held-out trials tell. They are
+divided into classes of support, each with enough of them. Within a class the rate of right answers rises with the
+probability (isotonic regression, R. E. Barlow et al., Statistical Inference under Order Restrictions, 1972). Each step
+of it has enough units, and its rate is (right + 1) / (all + 2), so that no answer is certain.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from attrs import frozen
+
+from graspsense.core.learn.stored_values import StoredValues
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+STEP_UNITS: Final = 5
+"""Least number of units from which a rate is computed, if there are as many."""
+STEP_SHARE: Final = 0.02
+"""Least share of all units from which a rate is computed: more units give more exact rates, and not more of them."""
+CLASS_UNITS: Final = 60
+"""Least number of units in a class of support, if there are as many."""
+SUPPORT_BOUNDS: Final = (5.0, 10.0, 20.0, 40.0, 80.0)
+"""Numbers of training trials at which a class of support may begin."""
+_ROUNDING: Final = 1e-9
+
+
+@frozen(kw_only=True)
+class SupportClass:
+    """Answers that rest on at least `least` training trials, and fewer than those of the next class.
+
+    `rates` rise; each holds for probabilities from the number in `probabilities` at its place on, the first for all
+    smaller ones too. `units` is the number of units that they were computed from.
+    """
+
+    least: float
+    probabilities: tuple[float, ...]
+    rates: tuple[float, ...]
+    units: float
+
+
+@frozen(kw_only=True)
+class Certainty:
+    """The rates of right answers by support and probability; the classes of support begin with the smallest."""
+
+    classes: tuple[SupportClass, ...]
+
+    def class_of(self, support: NDArray[np.float64]) -> NDArray[np.int64]:
+        """Return the number of the class of support of each answer. NaN is an answer without support."""
+        bounds = [one.least for one in self.classes[1:]]
+        found = np.searchsorted(np.array(bounds) - _ROUNDING, np.nan_to_num(support, nan=0.0), side="right")
+        return np.asarray(found, dtype=np.int64)
+
+    def rate(self, probability: NDArray[np.float64], support: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the rate of right answers among those with this probability and support."""
+        chosen = self.class_of(support)
+        result = np.empty(len(probability))
+        for k, one in enumerate(self.classes):
+            rows = np.flatnonzero(chosen == k)
+            steps = np.array(one.probabilities[1:]) - _ROUNDING
+            result[rows] = np.array(one.rates)[np.searchsorted(steps, probability[rows], side="right")]
+        return result
+
+    def to_json(self) -> list[dict[str, Any]]:
+        """Return the rates as values that JSON represents exactly."""
+        return [
+            {
+                "support": one.least,
+                "units": one.units,
+                "probabilities": list(one.probabilities),
+                "rates": list(one.rates),
+            }
+            for one in self.classes
+        ]
+
+
+def certainty_from(kept: Sequence[StoredValues]) -> Certainty:
+    """Return the certainty of a stored model. Raises DataDamaged."""
+    classes: list[SupportClass] = []
+    for one in kept:
+        rates = one.numbers("rates", (None,), least=0.0)
+        probabilities = one.numbers("probabilities", (len(rates),), least=0.0)
+        if not len(rates) or (rates > 1.0).any():
+            raise one.refusal("rates", "there is none, or one is above 1")
+        if (np.diff(probabilities) <= 0.0).any():
+            raise one.refusal("probabilities", "they do not rise")
+        least = one.number("support", least=0.0)
+        if classes and least <= classes[-1].least:
+            raise one.refusal("support", "the classes of support do not rise")
+        classes.append(
+            SupportClass(
+                least=least,
+                probabilities=tuple(probabilities.tolist()),
+                rates=tuple(rates.tolist()),
+                units=one.number("units", least=0.0),
+            )
+        )
+    return Certainty(classes=tuple(classes))
+
+
+def certainty_of(
+    probability: NDArray[np.float64],
+    support: NDArray[np.float64],
+    right: Sequence[bool],
+    units: Sequence[str],
+) -> Certainty:
+    """Return the certainty that held-out answers give; at least one.
+
+    `probability` and `support` are those of the predicted labels. Trials of one unit weigh as much as one trial.
+    """
+    _, unit_of, trials_of_unit = np.unique(np.array(units), return_inverse=True, return_counts=True)
+    weights = 1.0 / trials_of_unit[unit_of]
+    known = np.nan_to_num(support, nan=0.0)
+    answers = np.array(right, dtype=np.float64)
+    least_units = max(STEP_UNITS, STEP_SHARE * float(weights.sum())) - _ROUNDING
+    edges = [0.0, *_bounds(known, weights), np.inf]
+    classes = []
+    for least, end in pairwise(edges):
+        rows = (known >= least) & (known < end)
+        begins, rates = _steps(probability[rows], answers[rows], weights[rows], least_units)
+        classes.append(
+            SupportClass(least=least, probabilities=begins, rates=rates, units=float(weights[rows].sum()))
+        )
+    return Certainty(classes=tuple(classes))
+
+
+def with_certainty(
+    probabilities: NDArray[np.float64], predicted: NDArray[np.int64], certainty: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return probabilities, shape (trials, classes), in which the predicted label has its certainty.
+
+    The other labels share what remains in their proportions, as far as none of them exceeds the predicted one. NaN
+    marks a label that is not possible.
+    """
+    result = probabilities.copy()
+    for i, (k, sure) in enumerate(zip(predicted.tolist(), certainty.tolist(), strict=True)):
+        others = np.flatnonzero(~np.isnan(result[i]))
+        others = others[others != k]
+        if not len(others):
+            continue
+        own = max(sure, 1.0 / (len(others) + 1))
+        even = (1.0 - own) / len(others)
+        total = float(result[i, others].sum())
+        shares = (1.0 - own) * result[i, others] / total if total > 0.0 else np.full(len(others), even)
+        most = float(shares.max())
+        if most > own + _ROUNDING:
+            shares = even + (shares - even) * (own - even) / (most - even)
+        result[i, others], result[i, k] = shares, own
+    return result
+
+
+def _bounds(support: NDArray[np.float64], weights: NDArray[np.float64]) -> list[float]:
+    """Return where the classes of support begin after the first, so that each has enough units."""
+    bounds: list[float] = []
+    begin = 0.0
+    for bound in SUPPORT_BOUNDS:
+        below = float(weights[(support >= begin) & (support < bound)].sum())
+        if min(below, float(weights[support >= bound].sum())) >= CLASS_UNITS - _ROUNDING:
+            bounds.append(bound)
+            begin = bound
+    return bounds
+
+
+def _steps(
+    probability: NDArray[np.float64],
+    right: NDArray[np.float64],
+    weights: NDArray[np.float64],
+    least_units: float,
+) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Return where the steps of the isotonic regression begin, and their rates."""
+    from sklearn.isotonic import isotonic_regression
+
+    values, value_of = np.unique(np.round(probability, 9), return_inverse=True)
+    of_value = np.bincount(value_of, weights)
+    # Consecutive values are taken together until they have enough units; the last ones join those before.
+    bins, number, gathered, remaining = np.zeros(len(values), dtype=np.int64), 0, 0.0, float(weights.sum())
+    for i, weight in enumerate(of_value.tolist()):
+        bins[i] = number
+        gathered, remaining = gathered + weight, remaining - weight
+        if min(gathered, remaining) >= least_units:
+            number, gathered = number + 1, 0.0
+    all_of = np.bincount(bins[value_of], weights)
+    right_of = np.bincount(bins[value_of], weights * right)
+    level_of = np.unique(isotonic_regression(right_of / all_of, sample_weight=all_of), return_inverse=True)[1]
+    rates = (np.bincount(level_of, right_of) + 1.0) / (np.bincount(level_of, all_of) + 2.0)
+    begins = [float(values[np.flatnonzero(level_of[bins] == level)[0]]) for level in range(len(rates))]
+    return tuple(begins), tuple(np.maximum.accumulate(rates).tolist())

@@ -1,0 +1,86 @@
+"""The best of several candidates: who is called worse, and the rate of the chosen one, where the truth is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.special import ndtr
+from scipy.stats import binom
+
+from graspsense.evaluation.chosen import comparisons_of, rate_of_chosen
+from graspsense.evaluation.intervals import difference
+
+
+def independent(rng, candidates):
+    """Sixty trials, of which every candidate recognises 60 % on average."""
+    return rng.random((candidates, 60)) < 0.6, np.full(candidates, 0.6), None
+
+
+def alike(rng, candidates):
+    """Trials that are hard are hard for every candidate."""
+    hard, own = rng.normal(size=120), rng.normal(size=(candidates, 120))
+    return 0.7 * hard + np.sqrt(0.51) * own < 0.5, np.full(candidates, ndtr(0.5)), None
+
+
+def of_instances(rng, candidates):
+    """Fifteen instances of eight trials, some hard for all candidates and some for a single one."""
+    hard, own = rng.normal(size=15), rng.normal(size=(candidates, 15))
+    each = 0.5 * np.repeat(hard, 8) + 0.4 * np.repeat(own, 8, axis=1)
+    right = each + np.sqrt(0.59) * rng.normal(size=(candidates, 120)) < 0.6
+    return right, np.full(candidates, ndtr(0.6)), [f"#{i}" for i in np.repeat(np.arange(15), 8)]
+
+
+def unequal(rng, candidates):
+    """Candidates whose rates differ by some points."""
+    rates = np.clip(0.7 + 0.06 * rng.normal(size=candidates), 0.05, 0.97)
+    return rng.random((candidates, 150)) < rates[:, np.newaxis], rates, None
+
+
+SLOW = [pytest.param(*one, marks=pytest.mark.slow) for one in ((4, 100), (12, 60), (32, 40))]
+
+
+@pytest.mark.parametrize(("candidates", "repeats"), [(4, 15), *SLOW])
+@pytest.mark.parametrize("drawn", [independent, alike, of_instances, unequal])
+def test_no_equal_is_called_worse_and_the_rate_of_the_best_is_covered(drawn, candidates, repeats):
+    worse, covered, excess = 0, 0, []
+    for seed in range(repeats):
+        right, rates, instances = drawn(np.random.default_rng((candidates, seed)), candidates)
+        best = int(right.sum(axis=1).argmax())
+        comparisons = comparisons_of(right, instances)
+        losses = [
+            difference(right[best].tolist(), right[i].tolist(), instances, comparisons).interval[0]
+            for i in range(candidates)
+            if rates[i] >= rates[best] and i != best
+        ]
+        worse += any(low > 0.0 for low in losses)
+        chosen = rate_of_chosen(right, instances)
+        covered += chosen.interval[0] <= rates[best] <= chosen.interval[1]
+        excess.append(chosen.rate - rates[best])
+
+    most = binom.ppf(0.999, repeats, 0.05)
+    assert worse <= most
+    assert covered >= repeats - most
+    assert abs(np.mean(excess)) < 3.3 * 0.07 / np.sqrt(
+        repeats
+    )  # a rate of 60 trials has a standard error of 7 points
+
+
+def test_a_candidate_that_is_far_worse_is_told_and_the_rate_of_a_clear_best_stays():
+    rng = np.random.default_rng(0)
+    right = np.array([rng.random(300) < p for p in (0.95, 0.6, 0.6, 0.6)])
+    comparisons = comparisons_of(right, None)
+
+    assert all(
+        difference(right[0].tolist(), one.tolist(), None, comparisons).interval[0] > 0 for one in right[1:]
+    )
+    chosen = rate_of_chosen(right, None)
+    assert chosen.rate == pytest.approx(right[0].mean(), abs=0.01)
+    assert chosen.of == 4
+
+
+def test_candidates_with_the_same_answers_are_one_comparison():
+    right = np.random.default_rng(1).random(80) < 0.7
+
+    assert comparisons_of(np.array([right] * 8), None) == 1.0
+    # The quantile of 2000 draws is not exactly 1.96.
+    assert comparisons_of(np.array([right, right, ~right]), None) == pytest.approx(1.0, abs=0.5)
