@@ -262,7 +262,6 @@ def config_of(values: Values) -> SimConfig:
     hardening = strength("hardening", values)
     return SimConfig(
         fidelity="fixed",
-        scheme="explicit",
         coulomb_n=values["coulomb_n"],
         breakaway_n=values["coulomb_n"] + 1.0,
         load_friction_coefficient=values["load_friction_coefficient"],
@@ -552,7 +551,7 @@ def _figures(values: Values, seed: int) -> dict[str, float]:
     }
     for name, (controller, force_n) in cases.items():
         (done,) = run_many(
-            evolve(config_of(values), fidelity="scene", scheme="auto"),
+            evolve(config_of(values), fidelity="scene"),
             create("controller", controller, probing_force_n=force_n),
             ["block"],
             [TRIALS_PER_SEED * seed + 900],

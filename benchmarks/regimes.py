@@ -1,13 +1,13 @@
-"""A map of regimes: which scheme a scene needs, and where fixed steps of 1 ms fail. Simulated.
+"""A map of regimes: where the chosen steps and fixed steps of 1 ms have the accuracy. Simulated.
 
     python benchmarks/regimes.py [--scenes 1500] [--rows FILE] [--markdown FILE] [--first N] [--short]
 
 The scenes are drawn from the ranges that gripper, object and controller may physically have, not from those in which
 the simulator works, and apart from those of `benchmarks/selection.py`. Their seeds are fresh unless `--first` names the
 first. Each is grasped by the hybrid controller in the steps that are selected for 10, 1 and 0.1 %, in
-fixed steps of 1 ms (explicit and implicit), and in the reference. The error is that of
+fixed steps of 1 ms, and in the reference. The error is that of
 `graspsense_sim_gripper.reduction.error`; a different outcome is an infinite error. A reference that has not settled in
-some tick, or that a selected grasp differs from, is compared with even explicit steps of 10 us. Finished scenes are
+some tick, or that a selected grasp differs from, is compared with even steps of 10 us. Finished scenes are
 appended to the file of `--rows`, and are not run again if the program is started again with the same file. Times are
 processor times of the compiled loop that holds all kinds of terms; selecting the steps is measured apart.
 """
@@ -48,7 +48,6 @@ from graspsense_sim_gripper.terms.registry import in_order
 
 Row = dict[str, Any]
 ACCURACIES: Final = (0.1, 0.01, 0.001)
-FIXED: Final = ("explicit", "implicit")
 EVEN_S: Final = 1e-5
 """Steps so short that they show whether a reference in doubt is right."""
 REFERENCE: Final = 1e-4
@@ -173,11 +172,10 @@ def measured(bench: Bench, number: int) -> Row:
     row["reference_resolved"] = reference.state.step.unresolved + reference.state.contact.unbalanced == 0
     for accuracy in ACCURACIES:
         row[f"{accuracy:g}"] = _case(bench, scene, accuracy, "scene", reference, dt)
-    for scheme in FIXED:
-        fixed = evolve(scene, config=evolve(scene.config, scheme=scheme, step_s=1e-3))
-        row[scheme] = _case(bench, fixed, 0.01, "scene", reference, dt)
+    fixed = evolve(scene, config=evolve(scene.config, step_s=1e-3))
+    row["fixed"] = _case(bench, fixed, 0.01, "scene", reference, dt)
     if not row["reference_resolved"] or any(row[f"{a:g}"]["error"] > a for a in ACCURACIES):
-        even = evolve(scene, config=evolve(scene.config, scheme="explicit", step_s=EVEN_S))
+        even = evolve(scene, config=evolve(scene.config, step_s=EVEN_S))
         row["even"] = _case(bench, even, 0.01, "scene", reference, dt)["error"]
     return row
 
@@ -204,7 +202,7 @@ def _case(
         "error": error,
         "of": of,
         "flags": flags,
-        "scheme": reduction.decisions[0].decision,
+        "chosen": reduction.decisions[0].decision,
         "steps": state.step.n_steps,
         "ms": 1e3 * seconds_of(bench, job, setup),
         "selection_ms": 1e3 * bench.selection_s,
@@ -279,7 +277,7 @@ def page(rows: Sequence[Row], picture: str | None) -> str:
         ("Unstable loop", unstable),
     ):
         lines += ["", f"## {title}", "", *_within(some)]
-    lines += ["", "## Schemes", "", *_needed(stable + pads)]
+    lines += ["", "## Chosen steps", "", *_needed(stable + pads)]
     lines += ["", "## Where fixed steps of 1 ms fail", "", *_fixed(stable)]
     lines += ["", "## Largest errors without a flag", "", *_misses(stable)]
     return "\n".join(lines) + "\n"
@@ -288,10 +286,10 @@ def page(rows: Sequence[Row], picture: str | None) -> str:
 def _summary(rows: Sequence[Row]) -> Iterator[str]:
     """Yield the result for an accuracy of 1 % with ideal sensors and a stable loop."""
     kept = sum(_is_kept(row["0.01"], 0.01) for row in rows)
-    beyond = sum(not _is_kept(row["explicit"], 0.01) for row in rows)
+    beyond = sum(not _is_kept(row["fixed"], 0.01) for row in rows)
     yield (
         f"With ideal sensors and a stable loop, {kept} of {len(rows)} grasps are within an accuracy of 1 %, flagged or "
-        f"refused. Fixed explicit steps of 1 ms are beyond 1 % without a flag in {beyond} of {len(rows)} scenes."
+        f"refused. Fixed steps of 1 ms are beyond 1 % without a flag in {beyond} of {len(rows)} scenes."
     )
     yield ""
 
@@ -323,7 +321,7 @@ def _within(rows: Sequence[Row]) -> Iterator[str]:
     )
     yield "|---|---|---|---|---|---|---|---|"
     cases = [(f"{a:g}", a, f"selected for {a:.1%}") for a in ACCURACIES]
-    cases += [(s, 0.01, f"fixed steps of 1 ms, {s}, against 1 %") for s in FIXED]
+    cases.append(("fixed", 0.01, "fixed steps of 1 ms, against 1 %"))
     for name, accuracy, what in cases:
         mine = [row[name] for row in rows]
         if not mine:
@@ -346,12 +344,12 @@ def _median(values: Sequence[float]) -> float:
 
 
 def _needed(rows: Sequence[Row]) -> Iterator[str]:
-    yield "| accuracy | schemes |"
+    yield "| accuracy | steps |"
     yield "|---|---|"
     for accuracy in ACCURACIES:
         mine = [row[f"{accuracy:g}"] for row in rows if "refused" not in row[f"{accuracy:g}"]]
-        schemes = ", ".join(f"{name} {n}" for name, n in Counter(one["scheme"] for one in mine).most_common())
-        yield f"| {accuracy:.1%} | {schemes} |"
+        chosen = ", ".join(f"{name} {n}" for name, n in Counter(one["chosen"] for one in mine).most_common())
+        yield f"| {accuracy:.1%} | {chosen} |"
 
 
 BINS: Final[Sequence[tuple[str, str, Sequence[float]]]] = (
@@ -368,25 +366,19 @@ BINS: Final[Sequence[tuple[str, str, Sequence[float]]]] = (
 
 
 def _fixed(rows: Sequence[Row]) -> Iterator[str]:
-    yield (
-        "| quantity | range | scenes | explicit beyond 10, 1, 0.1 % | implicit beyond 10, 1, 0.1 % "
-        "| selected for 1 %: beyond, unflagged |"
-    )
-    yield "|---|---|---|---|---|---|"
+    yield ("| quantity | range | scenes | fixed beyond 10, 1, 0.1 % | selected for 1 %: beyond, unflagged |")
+    yield "|---|---|---|---|---|"
     for key, what, edges in BINS:
         for least, most in zip((-math.inf, *edges), (*edges, math.inf), strict=True):
             mine = [row for row in rows if least <= row.get(key, math.nan) < most]
             if not mine:
                 continue
-            beyond = [
-                ", ".join(str(sum(row[scheme]["error"] > a for row in mine)) for a in ACCURACIES)
-                for scheme in FIXED
-            ]
+            beyond = ", ".join(str(sum(row["fixed"]["error"] > a for row in mine)) for a in ACCURACIES)
             silent = sum(not _is_kept(row["0.01"], 0.01) for row in mine)
             within = f"below {most:g}" if math.isinf(least) else f"from {least:g}"
             if math.isfinite(least) and math.isfinite(most):
                 within = f"{least:g} to {most:g}"
-            yield f"| {what} | {within} | {len(mine)} | {beyond[0]} | {beyond[1]} | {silent} |"
+            yield f"| {what} | {within} | {len(mine)} | {beyond} | {silent} |"
 
 
 def _misses(rows: Sequence[Row]) -> Iterator[str]:
@@ -399,13 +391,13 @@ def _misses(rows: Sequence[Row]) -> Iterator[str]:
     if not missed:
         yield "None: every grasp with ideal sensors and a stable loop is within the accuracy, flagged or refused."
         return
-    yield "| scene | accuracy | error | of | outcome of the reference | scheme | error of fixed steps of 10 µs |"
+    yield "| scene | accuracy | error | of | outcome of the reference | steps | error of fixed steps of 10 µs |"
     yield "|---|---|---|---|---|---|---|"
     for _, accuracy, row in sorted(missed, key=lambda one: -one[0])[:20]:
         case = row[f"{accuracy:g}"]
         yield (
             f"| {row['scene']} | {accuracy:g} | {case['error']:.3g} | {case['of']} | {row['outcome']} "
-            f"| {case['scheme']} | {row['even']:.2g} |"
+            f"| {case['chosen']} | {row['even']:.2g} |"
         )
     yield ""
     yield (
@@ -420,16 +412,15 @@ def draw(rows: Sequence[Row], file: Path) -> None:
     from matplotlib.figure import Figure
 
     some = [row for row in rows if "failed" not in row and row["stable"] and row["sensor"] == "ideal"]
-    figure = Figure(figsize=(11.0, 7.0), dpi=80, layout="constrained")
+    figure = Figure(figsize=(13.0, 4.0), dpi=80, layout="constrained")
     FigureCanvasAgg(figure)
-    axes: Any = figure.subplots(2, 2)
+    axes: Any = figure.subplots(1, 3)
     for ax, (name, what) in zip(
         axes.ravel(),
         (
             ("0.01", "selected for 1 %"),
             ("0.001", "selected for 0.1 %"),
-            ("explicit", "fixed 1 ms, explicit"),
-            ("implicit", "fixed 1 ms, implicit"),
+            ("fixed", "fixed 1 ms"),
         ),
         strict=True,
     ):

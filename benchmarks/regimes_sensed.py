@@ -62,7 +62,7 @@ DIFFERS: Final = 0.05
 """Probability below which two distributions are taken as different."""
 WAYS: Final = {
     "selected": {"accuracy": ACCURACY},
-    "fixed": {"fidelity": "scene", "scheme": "explicit", "step_s": 1e-3},
+    "fixed": {"fidelity": "scene", "step_s": 1e-3},
 }
 
 
@@ -243,7 +243,7 @@ def page(rows: Sequence[Row], instances: int) -> list[str]:
         "| largest distance without a flag |",
         "|---|---|---|---|---|---|---|---|",
     ]
-    for way, words in (("selected", "selected for 1 %"), ("fixed", "fixed steps of 1 ms, explicit")):
+    for way, words in (("selected", "selected for 1 %"), ("fixed", "fixed steps of 1 ms")):
         mine = [row[way] for row in done]
         known = [one for one in mine if "refused" not in one]
         worst = [(largest(one), one) for one in known]

@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
+from unverified import unverified_setup
 
 from graspsense.plugin_api import gap_and_rate, revolutions_at
-from graspsense_sim_gripper.build import unverified_setup
 from graspsense_sim_gripper.compiled.compose import composed_move, composition
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.dynamics.state import Motion

@@ -7,7 +7,7 @@ from graspsense.plugin_api import APPROACH, create
 from graspsense_sim_gripper.batch import run_many
 from graspsense_sim_gripper.config import SimConfig
 
-TICK_BY_TICK = {"fidelity": "fixed", "scheme": "explicit"}
+TICK_BY_TICK = {"fidelity": "fixed"}
 HYBRID = create("controller", "hybrid")
 RINGING = create("controller", "hybrid", velocity_gain_n_s_m=1500.0, integral_gain_n_m=1e5)
 """Gains with which the loop of the speed is hardly damped."""

@@ -418,7 +418,7 @@ def test_processes_end_held_grasps_with_their_hold_too_where_no_release_is_read(
 def test_a_batch_takes_the_run_settings_as_the_runner_does():
     # Held ten times as long as by default, which a batch once did not notice.
     run = RunConfig(seed=4, hold_s=2.5)
-    config = SimConfig(object="toy", fidelity="fixed", scheme="explicit")
+    config = SimConfig(object="toy", fidelity="fixed")
     alone = run_grasp(SimBackend(config), HYBRID, run).trace
     among = run_many(config, HYBRID, ["toy"], [4], run=run)[0].trace
     assert bits(alone) == bits(among)
@@ -687,7 +687,7 @@ class Pressing(Controller[None]):
 def test_after_a_batch_with_a_whole_number_another_one_may_have_a_fraction():
     """Compiled code takes a number that was an integer at first for an integer."""
     pytest.importorskip("numba", reason="the compiled loop needs the extra `fast`")
-    config = SimConfig(sensor="ideal", fidelity="fixed", scheme="explicit")
+    config = SimConfig(sensor="ideal", fidelity="fixed")
     for effort_n in (4, 4.75):
         fast, plain = (
             run_many(config, Pressing(effort_n), ["toy"], [1], compiled=compiled)[0]

@@ -6,8 +6,8 @@ import itertools
 import math
 
 import pytest
+from unverified import unverified_setup
 
-from graspsense_sim_gripper.build import unverified_setup
 from graspsense_sim_gripper.compiled.compose import bind_reachable, sum_of, uncompressed
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.dynamics.contact import ObjectModel, PadCompliance, solve_contact

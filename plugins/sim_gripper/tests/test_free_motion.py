@@ -96,7 +96,7 @@ def test_a_grasp_with_free_motion_is_the_grasp_tick_by_tick(controller, sensor):
 def test_free_motion_changes_no_bit_of_the_catalogue(controller, sensor):
     law, names = create("controller", controller), sorted(catalogue())
     # With steps over several ticks, the law of free motion serves whole approaches instead.
-    config = SimConfig(sensor=sensor, fidelity="fixed", scheme="explicit")
+    config = SimConfig(sensor=sensor, fidelity="fixed")
     seeds = range(len(names))
     every = run_many(config, stepped(law), names, seeds, compiled=False)
     for workers in (1, 2):

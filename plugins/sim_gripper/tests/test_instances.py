@@ -3,10 +3,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from attrs import evolve
+from unverified import unverified_setup
 
 from graspsense.core.values.errors import UnknownName
 from graspsense.plugin_api import RunConfig, create
-from graspsense_sim_gripper.build import build, unverified_setup
+from graspsense_sim_gripper.build import build
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.objects.instance import sample
 from graspsense_sim_gripper.objects.library import find, split_number

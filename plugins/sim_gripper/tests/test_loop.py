@@ -19,7 +19,7 @@ from graspsense_sim_gripper.terms.term import NoState
 numba = pytest.importorskip("numba", reason="the compiled loop needs the extra `fast`")
 
 HYBRID = create("controller", "hybrid")
-TICK_BY_TICK = {"fidelity": "fixed", "scheme": "explicit"}
+TICK_BY_TICK = {"fidelity": "fixed"}
 """The settings with which no step lasts several ticks."""
 
 

@@ -5,18 +5,18 @@ from math import inf
 
 import numpy as np
 import pytest
+from unverified import unverified_setup
 
 from graspsense.core.components.run_config import RunConfig
 from graspsense.plugin_api import EFFORT, RELEASE, Command, create, gap_and_rate, revolutions_at
 from graspsense_sim_gripper.batch import job, run_many
 from graspsense_sim_gripper.binding import bind_reachable
-from graspsense_sim_gripper.build import unverified_setup
 from graspsense_sim_gripper.compiled.compose import plant_move, step_parts, uncompressed
 from graspsense_sim_gripper.compiled.padding import composition_of
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.dynamics.state import Contact, Motion, PlantState
 from graspsense_sim_gripper.stepping.macro_step import HALF, macro_step, next_ticks, values_at
-from graspsense_sim_gripper.stepping.scheme import BOGACKI_SHAMPINE, Steps
+from graspsense_sim_gripper.stepping.scheme import Steps
 from graspsense_sim_gripper.stepping.trend import UNKNOWN
 from graspsense_sim_gripper.terms.registry import laws_of
 
@@ -52,8 +52,8 @@ class Plant:
         return self._macro_step(params, state, effort_n, h, trend)
 
     def after(self, state, seconds, effort_n=EFFORT_N):
-        """Return the plant after this time, in steps of 50 us of third order."""
-        fine = self.params._replace(steps=Steps(inf, BOGACKI_SHAMPINE, 5e-5, growth=inf))
+        """Return the plant after this time, in steps of 10 us."""
+        fine = self.params._replace(steps=Steps(inf, 1e-5, growth=inf))
         return self._move(fine, state, effort_n, seconds)
 
 
@@ -213,7 +213,7 @@ def test_the_forces_of_a_release_are_those_of_single_ticks():
     law = create("controller", "hybrid")
     many, single = (
         run_many(SimConfig(sensor="ideal", **fidelity), law, ["odwalla:full_closed"], [3])[0]
-        for fidelity in ({}, {"fidelity": "fixed", "scheme": "explicit"})
+        for fidelity in ({}, {"fidelity": "fixed"})
     )
     forces = [grasp.trace.force_left_n[grasp.trace.phase == RELEASE] for grasp in (many, single)]
     assert len(forces[0]) == len(forces[1]) > 700
@@ -227,7 +227,7 @@ def test_images_and_outcome_are_those_of_single_ticks(settings):
     law = create("controller", "hybrid")
     many, single = (
         run_many(SimConfig(**settings, **fidelity), law, ["can:empty_open"], [4])[0]
-        for fidelity in ({}, {"fidelity": "fixed", "scheme": "explicit"})
+        for fidelity in ({}, {"fidelity": "fixed"})
     )
     assert many.model.reduction.steps.macro_tolerance > 0.0
     assert many.outcome == single.outcome
@@ -261,7 +261,7 @@ def test_a_command_within_a_step_takes_effect_in_its_tick(compiled):
             compiled=compiled,
             run=run,
         )[0]
-        for fidelity in ({"fidelity": "scene"}, {"fidelity": "fixed", "scheme": "explicit"})
+        for fidelity in ({"fidelity": "scene"}, {"fidelity": "fixed"})
     )
     assert many.model.reduction.steps.macro_tolerance > 0.0
     first = int(np.argmax(many.trace.force_left_n > 3.0))

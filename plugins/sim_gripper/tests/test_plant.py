@@ -17,14 +17,7 @@ from graspsense_sim_gripper.dynamics.contact import ObjectModel, PadCompliance, 
 from graspsense_sim_gripper.dynamics.drive import Drive, Friction, sliding_friction, stribeck_excess
 from graspsense_sim_gripper.dynamics.state import Contact, ContactState, Motion, PlantState
 from graspsense_sim_gripper.reduction.levels import PLAIN, steps_for
-from graspsense_sim_gripper.stepping.scheme import (
-    BOGACKI_SHAMPINE,
-    MEAN_FORCE,
-    TR_BDF2,
-    VERLET,
-    PlantParams,
-    Steps,
-)
+from graspsense_sim_gripper.stepping.scheme import PlantParams, Steps
 from graspsense_sim_gripper.terms.elastic import Elastic, elastic
 from graspsense_sim_gripper.terms.foam import Foam
 from graspsense_sim_gripper.terms.gas import Gas
@@ -209,8 +202,7 @@ def test_with_the_drive_off_stored_energy_never_rises(stiffness, speed, coulomb,
 )
 def test_without_friction_a_squeeze_and_the_letting_go_create_no_energy(stiffness, speed, damping):
     link, terms = straight_linkage(4e-4), (Elastic(stiffness, 0.0), Loss(damping))
-    # By TR-BDF2, as where the damper makes it stiff.
-    params = PlantParams(drive(0.0, 0.0, 0.0, 0.0, link), thing(*terms), Steps(2e-4, TR_BDF2))
+    params = PlantParams(drive(0.0, 0.0, 0.0, 0.0, link), thing(*terms), FINE)
     params = params._replace(drive=params.drive._replace(inertia=100.0 * link.pitch_m**2))
     state, move = at(0.0503, (NoState(), NoState()), speed_m_s=-speed, link=link), plant_move([elastic, loss])
     first = before = 50.0 * speed * speed
@@ -218,39 +210,9 @@ def test_without_friction_a_squeeze_and_the_letting_go_create_no_energy(stiffnes
         state = move(params, state, 0.0, TICK)
         now = 50.0 * (state.motion.speed_rev_s * state.motion.jacobian_m_rev) ** 2
         now += 0.5 * stiffness * state.contact.left.compression_m**2
-        assert now <= before + 1e-9 * first
-        before = now
-
-
-@pytest.mark.slow
-@settings(max_examples=30, deadline=None)
-@given(
-    st.floats(4.0, 6.0).map(lambda e: 10.0**e),
-    st.floats(6.0, 12.0).map(lambda e: 10.0**e if e > 6.5 else 0.0),
-    st.floats(0.001, 0.2),
-    st.floats(-6.0, -3.0).map(lambda e: 10.0**e),
-    st.sampled_from([LINK, straight_linkage(4e-4)]),
-)
-def test_what_swings_keeps_its_energy_by_the_mean_force_even_where_it_stiffens(
-    k1, k3, speed, tolerance, link
-):
-    params = PlantParams(
-        drive(0.0, 0.0, 0.0, 0.0, link), thing(Elastic(k1, k3)), Steps(tolerance, MEAN_FORCE)
-    )
-    if link is not LINK:
-        params = params._replace(drive=params.drive._replace(inertia=100.0 * link.pitch_m**2))
-    state, move = at(0.0503, (NoState(),), speed_m_s=-speed, link=link), plant_move([elastic])
-    first = before = 0.5 * params.drive.inertia * state.motion.speed_rev_s**2
-    for _ in range(400):
-        state = move(params, state, 0.0, TICK)
-        if state.motion.speed_rev_s == 0.0 and state.contact.touched == 0:
-            # At the end of its travel.
-            break
-        d = state.contact.left.compression_m
-        now = 0.5 * params.drive.inertia * state.motion.speed_rev_s**2 + 0.5 * k1 * d * d + 0.25 * k3 * d**4
-        # What is left are the searches' rounding, many times over where it stiffens this much.
-        assert abs(now - before) <= 5e-9 * first
-        before = now
+        # The swing of a kick-drift-kick step, as above.
+        assert now <= before + 2e-3 * first
+        before = min(before, now)
 
 
 @pytest.mark.parametrize("damping", [1.0, 1e3, 1e6])
@@ -298,14 +260,9 @@ def test_the_slam_of_a_constant_effort_is_as_large_as_estimated(stiffness, speed
     assert state.peak_n == pytest.approx(peak, rel=0.05)
 
 
-@pytest.mark.parametrize(
-    "scheme", [VERLET, *(pytest.param(one, marks=pytest.mark.slow) for one in (TR_BDF2, MEAN_FORCE))]
-)
-def test_halving_the_step_quarters_the_error_of_the_peak(scheme):
+def test_halving_the_step_quarters_the_error_of_the_peak():
     def peak(steps):
-        params = PlantParams(
-            drive(), thing(Elastic(2e5, 0.0), Maxwell(3e4, 0.02)), Steps(inf, scheme, TICK / steps)
-        )
+        params = PlantParams(drive(), thing(Elastic(2e5, 0.0), Maxwell(3e4, 0.02)), Steps(inf, TICK / steps))
         state = at(0.052, (NoState(), MaxwellState(0.0)), speed_m_s=-0.05)
         return run(params, state, 30.0, 0.15, (elastic, maxwell)).peak_n
 
@@ -387,11 +344,8 @@ def test_the_stops_hold_at_both_ends():
 
 
 @pytest.mark.parametrize("link", [LINK, STRAIGHT])
-@pytest.mark.parametrize("scheme", [VERLET, TR_BDF2, MEAN_FORCE, BOGACKI_SHAMPINE])
-def test_what_is_pressed_at_the_closed_end_is_pressed_as_far_as_the_travel_goes(scheme, link):
-    params = PlantParams(
-        drive(link=link), thing(Elastic(1e4, 0.0), width=0.002), Steps(1e-3, scheme, growth=4.0)
-    )
+def test_what_is_pressed_at_the_closed_end_is_pressed_as_far_as_the_travel_goes(link):
+    params = PlantParams(drive(link=link), thing(Elastic(1e4, 0.0), width=0.002), Steps(1e-3, growth=4.0))
     state = run(params, at(0.01, (NoState(),), speed_m_s=-0.15, link=link), 60.0, 0.3)
     assert (state.motion.gap_m, state.motion.speed_rev_s) == (pytest.approx(0.0, abs=1e-9), 0.0)
     assert state.contact.left_n == pytest.approx(20.0, rel=1e-6)
@@ -444,7 +398,7 @@ def test_steps_that_grow_slowly_see_what_rings_after_a_touch(tolerance):
     def force(steps):
         return plant_move([surface])(PlantParams(free, body, steps), start, 0.0, 5e-3).contact.left_n
 
-    exact = force(Steps(inf, VERLET, 1e-6))
+    exact = force(Steps(inf, 1e-6))
     errors = [abs(force(Steps(tolerance, growth=growth)) - exact) / exact for growth in (2.0, 1.1, 1.03)]
     assert errors[0] > 4.0 * errors[1] > 16.0 * errors[2]
     assert errors[2] < 1e-4
@@ -458,7 +412,7 @@ def test_a_tick_that_is_to_settle_is_halved_even_where_no_error_asks_for_it():
     speeds = []
     for settle in (0.0, 1e-9):
         after = plant_move([elastic])(
-            PlantParams(free, thing(*SPRING), Steps(1e9, VERLET, inf, settle)), start, 0.0, TICK
+            PlantParams(free, thing(*SPRING), Steps(1e9, inf, settle)), start, 0.0, TICK
         )
         speeds.append(after.motion.speed_rev_s * after.motion.jacobian_m_rev)
     exact = -0.05 * math.exp(-3e4 / 100.0 * TICK)
@@ -552,8 +506,8 @@ def test_a_stuck_gripper_does_not_creep_whatever_it_holds(name, params):
     assert math.isfinite(after.contact.left.force_n)
 
 
-def a_step_per_tick(scheme=VERLET):
-    return steps_for(PLAIN.at(0.01), VERLET, TICK)._replace(scheme=scheme, macro_tolerance=0.0)
+def a_step_per_tick():
+    return steps_for(PLAIN.at(0.01), TICK)._replace(macro_tolerance=0.0)
 
 
 @cache
@@ -575,13 +529,13 @@ def pressed_again(steps):
     "steps",
     [
         pytest.param(a_step_per_tick(), id="a step per tick"),
-        pytest.param(Steps(inf, VERLET, TICK, growth=inf), id="fixed"),
-        pytest.param(Steps(3e-4, BOGACKI_SHAMPINE, growth=1.1), id="by their error"),
+        pytest.param(Steps(inf, TICK, growth=inf), id="fixed"),
+        pytest.param(Steps(3e-4, growth=1.1), id="by their error"),
     ],
 )
 def test_fingers_meet_an_object_that_has_not_recovered_its_shape_where_it_ends(steps):
     # Without this event the dampers of the pads acted over the whole tick: 0.37 N too much where the force is 0.46 N.
-    (found, _), (expected, deep) = pressed_again(steps), pressed_again(Steps(inf, VERLET, 5e-6))
+    (found, _), (expected, deep) = pressed_again(steps), pressed_again(Steps(inf, 5e-6))
     # It is pressed again while it is still 6 mm deep.
     assert expected[0] == 0.0 < expected[-1]
     assert deep > 0.006
@@ -601,9 +555,7 @@ def test_steps_are_short_after_a_contact_and_whole_ticks_soon_afterwards():
             state = after
         return counts
 
-    short, fixed = (
-        in_each_tick(steps) for steps in (a_step_per_tick(), Steps(inf, VERLET, TICK, growth=inf))
-    )
+    short, fixed = (in_each_tick(steps) for steps in (a_step_per_tick(), Steps(inf, TICK, growth=inf)))
     # Up to the contact, and from it on 10, 20, 40 us and so on.
     assert short[0] + short[1] > 6
     assert short[3:] == [1] * 5
@@ -615,10 +567,10 @@ def test_the_steps_from_a_contact_that_is_off_by_rounding_are_those_from_the_con
     # The search for the contact went on in steps of down to 3e-11 s, over which the rate of compression is rounding.
     terms, laws = (Elastic(4e4, 0.0), Surface(30.0, 410.0, 11.0, 4e4)), (elastic, surface)
     body = ObjectModel(0.05, 0.4, PadCompliance(1e5), terms)
-    params = PlantParams(drive(), body, Steps(3.4e-5, BOGACKI_SHAMPINE, growth=1.03))
+    params = PlantParams(drive(), body, Steps(3.4e-5, growth=1.03))
     start = at(0.05 + before_m, (NoState(), OscillatorState(0.0, 0.0)), speed_m_s=-0.038)
     after = run(params, start, 2.0, 3.4e-3, laws, dt=3.4e-3)
-    fine = run(params._replace(steps=Steps(inf, VERLET, 1e-6)), start, 2.0, 3.4e-3, laws, dt=3.4e-3)
+    fine = run(params._replace(steps=Steps(inf, 1e-6)), start, 2.0, 3.4e-3, laws, dt=3.4e-3)
     assert after.step.n_steps < 250
     assert after.step.unresolved == 0
     assert after.peak_n == pytest.approx(fine.peak_n, rel=1e-4)

@@ -320,8 +320,7 @@ def test_a_step_per_tick_is_chosen_where_it_is_accurate_enough_and_not_where_it_
 
 
 def test_forced_steps_and_contacts_beyond_the_tick_are_not_verified():
-    for config in (evolve(CONFIG, step_s=1e-4), evolve(CONFIG, scheme="implicit")):
-        assert selected(config, thing(SHELL), hybrid()).verification is None
+    assert selected(evolve(CONFIG, step_s=1e-4), thing(SHELL), hybrid()).verification is None
     hard = selected(evolve(CONFIG, pad_stiffness_n_m=math.inf), thing(("elastic", {"k1_n_m": 1e9})), hybrid())
     assert (hard.unresolved, hard.verification) == (("trace", "features"), None)
 
@@ -431,9 +430,7 @@ def test_the_report_says_which_quantities_are_not_verified(terms, further, unsur
 def test_an_unstable_sampled_loop_is_named_in_the_report(gripper, gain, growth, tmp_path):
     scene = tmp_path / "scene.toml"
     scene.write_text('width_m = 0.05\n[[terms]]\ntype = "elastic"\nk1_n_m = 1000.0\n')
-    config = evolve(
-        CONFIG, object=str(scene), open_gap_m=0.052, fidelity="fixed", scheme="explicit", **gripper
-    )
+    config = evolve(CONFIG, object=str(scene), open_gap_m=0.052, fidelity="fixed", **gripper)
     law = create("controller", "hybrid", velocity_gain_n_s_m=gain)
     report = run_grasp(SimBackend(config), law, RunConfig()).report
     (grasped,) = SimBackend(config).run_many(law, [str(scene)], [0])

@@ -10,8 +10,8 @@ from textwrap import dedent
 
 import numpy as np
 import pytest
-from attrs import evolve
 from click.testing import CliRunner
+from unverified import unverified_setup
 
 from graspsense.cli.main import cli
 from graspsense.core.components.run_config import RunConfig
@@ -19,7 +19,6 @@ from graspsense.core.grasp.runner import run_grasp
 from graspsense.plugin_api import ConfigError, UnknownName, create
 from graspsense_sim_gripper.backend import SimBackend
 from graspsense_sim_gripper.batch import run_many
-from graspsense_sim_gripper.build import unverified_setup
 from graspsense_sim_gripper.compiled.compose import plant_move
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.objects.instance import sample
@@ -58,7 +57,7 @@ def test_a_file_needs_no_more_than_a_width_and_its_terms(scene):
 
 
 def test_the_text_of_a_scene_is_grasped_like_its_file(scene):
-    text, config = dedent(BOTTLE), SimConfig(fidelity="fixed", scheme="explicit")
+    text, config = dedent(BOTTLE), SimConfig(fidelity="fixed")
     from_file, from_text, other = run_many(config, HYBRID, [scene(BOTTLE), text, f"{text}#3"], [5, 5, 5])
     assert from_text.trace.force_left_n.tolist() == from_file.trace.force_left_n.tolist()
     # It has no spread, so its third instance is the nominal one.
@@ -68,7 +67,7 @@ def test_the_text_of_a_scene_is_grasped_like_its_file(scene):
 
 
 def test_the_report_of_a_grasp_is_of_the_scene_as_it_was_then(scene, tmp_path):
-    config = SimConfig(fidelity="fixed", scheme="explicit")
+    config = SimConfig(fidelity="fixed")
     grasp, again = run_many(config, HYBRID, [scene(BOTTLE)] * 2, [5, 5], traces=False)
     before = grasp.report()
     (tmp_path / "bottle.toml").unlink()
@@ -81,19 +80,14 @@ def test_a_text_that_is_not_a_scene_is_refused():
         find("widht_m = 0.05\n")
 
 
-def test_fixed_steps_are_not_verified_and_are_those_of_a_prescribed_scheme():
-    config = SimConfig(object=dedent(BOTTLE), fidelity="fixed", scheme="explicit", sensor="ideal")
+def test_fixed_steps_are_not_verified():
+    config = SimConfig(object=dedent(BOTTLE), fidelity="fixed", sensor="ideal")
     backend = SimBackend(config)
     backend.open(0)
     selection = backend.report()["selection"]
     decisions = {row["subject"]: row["decision"] for row in selection["decisions"]}
-    assert decisions == {"steps": "Verlet", "contact": "not examined"}
+    assert decisions == {"steps": "by their error", "contact": "not examined"}
     assert selection["verified"] is None
-    fixed, prescribed = (
-        run_many(evolve(config, fidelity=fidelity), HYBRID, [config.object], [2])[0].trace
-        for fidelity in ("fixed", "scene")
-    )
-    assert fixed.gap_m.tolist() == prescribed.gap_m.tolist()
 
 
 def test_a_fidelity_that_drops_or_keeps_terms_is_refused():
@@ -155,11 +149,6 @@ def test_a_parameter_with_a_spread_varies_between_instances_and_alone():
 def test_parameters_without_a_law_are_refused(terms, says):
     with pytest.raises(ConfigError, match=says):
         find(f"width_m = 0.06\n[[terms]]\n{terms}\n")
-
-
-def test_a_fixed_model_needs_a_scheme():
-    with pytest.raises(ValueError, match="set scheme to explicit"):
-        SimConfig(fidelity="fixed")
 
 
 @pytest.mark.slow

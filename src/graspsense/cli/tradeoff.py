@@ -139,7 +139,7 @@ def simulation(
     seed: int | None,
     force: bool,
 ) -> None:
-    """Run the same grasps with every scheme and fidelity of the simulator.
+    """Run the same grasps with several accuracies and step lengths of the simulator.
 
     Errors of features, peak force and force trace with ideal sensors are relative to a reference that keeps every term
     and halves its steps until nothing changes. With the sensors of the gripper, recognition and the distributions of

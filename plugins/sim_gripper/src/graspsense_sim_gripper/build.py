@@ -38,7 +38,6 @@ from graspsense_sim_gripper.problem import GraspSetup, Problem
 from graspsense_sim_gripper.random_numbers import Generator, GeneratorOf, NumpyGenerator
 from graspsense_sim_gripper.reduction.levels import step_tolerance
 from graspsense_sim_gripper.reduction.model import Reduction
-from graspsense_sim_gripper.reduction.propose import grip_of, propose
 from graspsense_sim_gripper.sensing import ImageClock, PadCells, SensorParams, SensorState, initial_sensor
 from graspsense_sim_gripper.stepping.scheme import PlantParams, Steps
 
@@ -165,16 +164,6 @@ def _instance(problem: Problem, rng: Generator) -> Instance | None:
     if problem.spec is None:
         return None
     return sample(problem.spec, rng if problem.config.spread else None, problem.number)
-
-
-def unverified_setup(config: SimConfig, scene: str | ObjectSpec | None, seed: int) -> GraspSetup:
-    """Return a grasp in a model that no trial grasp has verified, for studies of the plant without a controller.
-
-    Raises as `build` and `instantiate` do.
-    """
-    problem = build(config, scene) if isinstance(scene, str) else problem_of(config, scene)
-    reduction = None if problem.spec is None else propose(problem, grip_of(problem))
-    return instantiate(problem, reduction, seed)
 
 
 def _setup(

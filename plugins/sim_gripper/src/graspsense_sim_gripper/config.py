@@ -3,20 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Literal
+from typing import Literal
 
 from attrs import frozen
 
 from graspsense.plugin_api import CHANGES_NO_RESULT, NAMES_INPUT, setting
-
-
-def _has_scheme(config: SimConfig, attribute: Any, fidelity: str) -> None:
-    """Raise ValueError if nothing may be selected and no scheme is given."""
-    if fidelity == "fixed" and config.scheme == "auto":
-        raise ValueError(
-            "fixed selects nothing, so it needs a scheme: set scheme to explicit (velocity Verlet), or to implicit "
-            "(TR-BDF2) where the damping of the object over the moving mass, times the tick, exceeds 1"
-        )
 
 
 @frozen(kw_only=True, cache_hash=True)
@@ -50,9 +41,8 @@ class SimConfig:
     )
     fidelity: Literal["scene", "reference", "fixed"] = setting(
         default="scene",
-        validator=_has_scheme,
         meaning="scene: steps for the accuracy, verified by trial grasps. reference: steps that are halved until the "
-        "result no longer changes. fixed: the given `scheme`; nothing is selected and no trial grasp verifies it.",
+        "result no longer changes. fixed: steps for the accuracy, which no trial grasp verifies.",
     )
     expected_force_n: float | None = setting(
         default=None,
@@ -69,11 +59,6 @@ class SimConfig:
         plausible=(1e-4, 1.0),
         effect=CHANGES_NO_RESULT,
         meaning="Speed of the fingers at the contact for which the steps are selected; not set: that of a trial grasp.",
-    )
-    scheme: Literal["auto", "explicit", "implicit"] = setting(
-        default="auto",
-        meaning="Integration scheme: `explicit` (velocity Verlet) or `implicit` (TR-BDF2); `auto` lets the scene "
-        "decide.",
     )
     step_s: float | None = setting(
         default=None,
@@ -272,8 +257,8 @@ class SimConfig:
 
     @property
     def has_forced_steps(self) -> bool:
-        """Whether the settings prescribe the scheme or the length of the steps."""
-        return self.scheme != "auto" or self.step_s is not None
+        """Whether the settings prescribe the length of the steps."""
+        return self.step_s is not None
 
     @property
     def force_delay_s(self) -> float:

@@ -29,6 +29,14 @@ from graspsense_sim_gripper.sensing import (
     apply_tare,
     sense,
 )
+from graspsense_sim_gripper.stepping.macro_step import (
+    FIRST_TICKS,
+    DenseOutput,
+    constant_values,
+    held_at_once,
+    values_at,
+    with_peak,
+)
 from graspsense_sim_gripper.stepping.scheme import PlantParams, Steps
 from graspsense_sim_gripper.stepping.trend import UNKNOWN, Trend
 
@@ -75,6 +83,17 @@ class MacroControl(NamedTuple):
     """Ticks to wait after one that was not accepted; doubles each time."""
     trend: Trend
     """That at the end of the last one, if it was accepted."""
+
+
+class Ahead(NamedTuple):
+    """A macro-step that has been computed, in whose ticks sensors and controller still have to run."""
+
+    ticks: int
+    """Number of its ticks; 0: there is none."""
+    values: DenseOutput
+    after: PlantState
+    control: MacroControl
+    """That of the next one, if this one is taken to its end."""
 
 
 def uses_macro_steps(steps: Steps) -> int:
@@ -165,7 +184,7 @@ class Buffers(NamedTuple):
 
 EVENT_SHIFT: Final = 8
 """Number of bits of a phase in `Buffers.phases`."""
-NOT_STARTED: Final = LoopState(0, 0, -1, 0, 0.0, 0, MacroControl(2, 0, 1, UNKNOWN))
+NOT_STARTED: Final = LoopState(0, 0, -1, 0, 0.0, 0, MacroControl(FIRST_TICKS, 0, 1, UNKNOWN))
 ROWS_AT_ONCE: Final = 128
 """The most rows that are recorded at once. The loop stops this many rows before the end of a buffer, so that none is
 cut by it."""
@@ -189,10 +208,20 @@ def _no_signals(
     return (), state
 
 
-def _no_ticks(
-    params: GraspParams, at: LoopProgress, now: MacroControl, pads: Pads, columns: Table, phases: Any
-) -> tuple[LoopProgress, MacroControl]:
-    return at, now
+def no_step(plant: PlantState, control: MacroControl) -> Ahead:
+    """Return that no macro-step is taken."""
+    return Ahead(0, constant_values(plant), plant, control)
+
+
+def _never_begins(
+    params: GraspParams,
+    plant: PlantState,
+    sensor: SensorState,
+    effort_n: float,
+    ticks: int,
+    now: MacroControl,
+) -> Ahead:
+    return no_step(plant, now)
 
 
 def _every_tick(
@@ -211,8 +240,8 @@ keep_signals: Callable[[Any, Any, int], None] = _keep_nothing
 """What records them: `palm.keep_samples` of a gripper with an accelerometer."""
 move: Callable[[PlantParams, PlantState, float, float], PlantState] = move_unbound
 control: Callable[[TickParams, TickState, Reading], tuple[Command, TickState]] = control_unbound
-run_ticks: Callable[..., tuple[LoopProgress, MacroControl]] = _no_ticks
-"""`macro_ticks.run_macro_step` where a step may last several ticks, after which the plant has moved in all of them."""
+begin_macro_step: Callable[..., Ahead] = _never_begins
+"""`macro_ticks.begin_macro_step` where a step may last several ticks."""
 run_approach_ticks: Callable[[GraspParams, LoopProgress, Frame, Table, Any], LoopProgress] = _every_tick
 """`approach.approach_ticks`, in the interpreter `free_ticks.approach_or_free_ticks`, where ticks are run at once."""
 
@@ -224,15 +253,16 @@ def grasp(params: GraspParams, progress: SimulationState, buffers: Buffers) -> S
     `images` or `columns` are full, call it again with the returned state, and with longer buffers that begin with the
     same values.
     """
-    dt_s, pad_buffers, columns = params.dt_s, buffers.pads, buffers.columns
-    images = pad_buffers.images
+    dt_s, pad_buffers, images = params.dt_s, buffers.pads, buffers.pads.images
     ticks, recorded, phase, tare_from, effort, failed, macro = progress.loop
     plant, sensor, state, palm = progress.plant, progress.sensor, progress.controller, progress.palm
-    capacity = len(columns[0]) - ROWS_AT_ONCE
-    count = sensor.images
+    capacity = len(buffers.columns[0]) - ROWS_AT_ONCE
+    # The macro-step that is being taken, its number of ticks (0: there is none), and how many of them are over.
+    ahead, n, k, peak, count = no_step(plant, macro), 0, 0, plant.peak_n, sensor.images
     pads = Pads(sensor.image_t_s, count, images[count - 1][0], images[count - 1][1])
-    while ticks < params.max_ticks and recorded < capacity and sensor.images < len(images):
-        measured = PlantReadings(plant.motion, plant.contact.left_n, plant.contact.right_n)
+    while n > 0 or (ticks < params.max_ticks and recorded < capacity and sensor.images < len(images)):
+        measured = values_at(ahead.values, k / n) if n > 0 else _readings(plant)
+        peak = max(peak, measured.left_n, measured.right_n)
         t_s, last_effort = ticks * dt_s, effort
         frame, sensor = sense(params.sensor, sensor, measured, t_s, dt_s, effort, pad_buffers)
         if sensor.images != count:
@@ -244,36 +274,35 @@ def grasp(params: GraspParams, progress: SimulationState, buffers: Buffers) -> S
         past_tare, same_phase = phase != TARING, state.phase == phase
         if not same_phase:
             if phase == TARING and count > tare_from:
-                _tare(pad_buffers, tare_from, count)
-                sensor = apply_tare(sensor, pad_buffers)
-            phase = state.phase
-            tare_from = count
-        effort = command.value
+                sensor = _tared(sensor, pad_buffers, tare_from, count)
+            phase, tare_from = state.phase, count
+        effort, ends = command.value, state.done == 1 or state.guard.stopped == 1
         if phase > TARING and past_tare:
-            row = recorded & NOT_NEGATIVE
-            record(columns, row, frame, effort)
-            buffers.phases[row] = phase | state.events << EVENT_SHIFT
-            keep_signals(signals, buffers.palm, row)
+            _record(buffers, recorded & NOT_NEGATIVE, frame, effort, state)
+            keep_signals(signals, buffers.palm, recorded & NOT_NEGATIVE)
             recorded += 1
         ticks += 1
-        if state.done == 1 or state.guard.stopped == 1:
+        if n > 0 and (ends or effort != last_effort):
+            plant = move(held_at_once(params.plant, plant), plant, last_effort, k * dt_s)
+            plant, macro, n = with_peak(plant, peak), MacroControl(FIRST_TICKS, ticks, 1, UNKNOWN), 0
+        if ends:
             break
-        before, suits = ticks, effort == last_effort
-        if params.macro_steps > 0 and suits and same_phase and phase >= APPROACH and ticks >= macro.from_tick:
-            at = LoopProgress(ticks, recorded, effort, plant, sensor, state)
-            at, macro = run_ticks(params, at, macro, pads, columns, buffers.phases)
-            ticks, recorded, effort, plant, sensor, state = at
-            if state.done == 1 or state.guard.stopped == 1:
-                break
-        if ticks == before:
-            # Keeping the plant before the tick as well would cost compiled code a sixth of its time.
+        single = n == 0
+        if single and same_phase and effort == last_effort and phase >= APPROACH and ticks >= macro.from_tick:
+            ahead, peak = begin_macro_step(params, plant, sensor, effort, ticks, macro), plant.peak_n
+            macro, n, k = ahead.control, ahead.ticks, 0
+            single = n == 0
+        k += 1
+        if single:
             plant = move(params.plant, plant, effort, dt_s)
+        elif k == n:
+            plant, n = with_peak(ahead.after, peak), 0
         if not is_finite(plant):
             failed = 1
             break
-        if ticks == before and same_phase and phase != SQUEEZE and phase != HOLD:
+        if single and same_phase and phase != SQUEEZE and phase != HOLD:
             at = LoopProgress(ticks, recorded, effort, plant, sensor, state)
-            at = run_approach_ticks(params, at, frame, columns, buffers.phases)
+            at = run_approach_ticks(params, at, frame, buffers.columns, buffers.phases)
             ticks, recorded, effort, plant, sensor, state = at
     ended = LoopState(ticks, recorded, phase, tare_from, effort, failed, macro)
     return SimulationState(ended, plant, sensor, state, palm)
@@ -326,8 +355,15 @@ def has_ended(state: TickState) -> bool:
     return bool(state.done == 1 or state.guard.stopped == 1)
 
 
-def record(columns: Table, row: int, frame: Frame, command: float) -> None:
-    """Write a row of `COLUMNS`."""
+def _readings(plant: PlantState) -> PlantReadings:
+    """Return what sensors measure of the plant at a tick."""
+    return PlantReadings(plant.motion, plant.contact.left_n, plant.contact.right_n)
+
+
+def _record(buffers: Buffers, row: int, frame: Frame, command: float, state: TickState) -> None:
+    """Write the row of a tick."""
+    columns = buffers.columns
+    buffers.phases[row] = state.phase | state.events << EVENT_SHIFT
     columns[0][row] = frame.t_s
     columns[1][row] = frame.gap_m
     columns[2][row] = frame.velocity_m_s
@@ -339,7 +375,7 @@ def record(columns: Table, row: int, frame: Frame, command: float) -> None:
     columns[8][row] = command
 
 
-def _tare(pads: PadBuffers, begin: int, end: int) -> None:
+def _tared(sensor: SensorState, pads: PadBuffers, begin: int, end: int) -> SensorState:
     """Set the zeros to the mean of the images from `begin` to before `end`, added in order of arrival.
 
     The result is that of `graspsense.core.grasp.calibration.tare`, since every simulated cell has a reading.
@@ -352,3 +388,4 @@ def _tare(pads: PadBuffers, begin: int, end: int) -> None:
             right += pads.images[k][1][i]
         pads.left_zero[i] = left / (end - begin)
         pads.right_zero[i] = right / (end - begin)
+    return apply_tare(sensor, pads)

@@ -33,13 +33,12 @@ _FORMS: Final = (
     ),
     *(
         SimulationVariant(
-            method=f"even steps, {scheme}",
+            method="even steps",
             fidelity="scene",
             step=f"{step_s * 1e3:g} ms",
-            settings={"fidelity": "scene", "scheme": scheme, "step_s": step_s},
+            settings={"fidelity": "scene", "step_s": step_s},
             for_recognition=step_s == STEPS_S[0],
         )
-        for scheme in ("explicit", "implicit")
         for step_s in STEPS_S
     ),
     SimulationVariant(
@@ -52,7 +51,7 @@ _FORMS: Final = (
 
 
 def variants() -> tuple[SimulationVariant, ...]:
-    """Return the settings to compare: the reference, steps by their error, and even steps of both schemes.
+    """Return the settings to compare: the reference, steps by their error, and even steps.
 
     They are compiled if numba is installed, except for the one that measures the interpreter.
     """

@@ -26,16 +26,14 @@ from graspsense_sim_gripper.dynamics.contact import (
 from graspsense_sim_gripper.dynamics.state import Contact, ContactState, Motion, Past, PlantState, StepState
 from graspsense_sim_gripper.free_ticks import approach_or_free_ticks, free_ticks
 from graspsense_sim_gripper.loop import GraspParams, LoopProgress, SimulationState, grasp
-from graspsense_sim_gripper.macro_ticks import run_macro_step
+from graspsense_sim_gripper.macro_ticks import begin_macro_step
 from graspsense_sim_gripper.palm import keep_samples, palm_signals
 from graspsense_sim_gripper.problem import ControllerStep
 from graspsense_sim_gripper.sensing import SensorState
 from graspsense_sim_gripper.stepping.advance import advance, move
 from graspsense_sim_gripper.stepping.coast import can_glide, glide
 from graspsense_sim_gripper.stepping.converge import refine_until_converged
-from graspsense_sim_gripper.stepping.implicit import SpeedSearch
 from graspsense_sim_gripper.stepping.scheme import Attempt, PlantParams, Start
-from graspsense_sim_gripper.stepping.tr_bdf2 import Stage
 from graspsense_sim_gripper.terms.registry import active_laws, find_term, laws_of, moving_of, phases_of
 from graspsense_sim_gripper.terms.switchable import Switchable, switched_on_sum
 from graspsense_sim_gripper.terms.term import LAW_ERRORS, Law, Moves, OnSum, Phase, SumLaw
@@ -53,7 +51,7 @@ INTERPRETED: Final[Constructors] = {
     kind: maker(kind)
     for kind in (
         *(PlantState, Motion, Contact, ContactState, Past, StepState, SensorState, Frame),
-        *(Start, Attempt, SpeedSearch, Stage, PadLoad, BalanceSearch),
+        *(Start, Attempt, PadLoad, BalanceSearch),
     )
 }
 """The named tuples that a tick creates, each with a constructor that takes the interpreter half the time."""
@@ -381,8 +379,7 @@ def _loop_of(
     control = bind_reachable(tick, {"step": step, "events_told": events_of(step)})
     parts: dict[str, Any] = {"move": move, "control": control}
     if _may_last_several_ticks(composition):
-        own = {"move": move, "control": control, **step_parts(composition)}
-        parts["run_ticks"] = bind_reachable(run_macro_step, own)
+        parts["begin_macro_step"] = bind_reachable(begin_macro_step, step_parts(composition))
         if law := free_parts(step):
             glides = {"can_glide": can_glide, "glide": glide}
             parts["run_approach_ticks"] = (

@@ -9,15 +9,14 @@ from typing import Any, Final
 
 from graspsense.plugin_api import CompileOptions, Inlining, compile_function, first_call
 from graspsense_sim_gripper.dynamics.contact import _pressed, solve_contact
-from graspsense_sim_gripper.stepping.advance import advance, attempt_of, move, take_step, take_steps
+from graspsense_sim_gripper.stepping.advance import advance, move, take_step, take_steps
 from graspsense_sim_gripper.stepping.converge import refine_until_converged
 
 _REMAIN_CALLS: Final = {
-    # Every scheme calls the laws of the object through the contact: inlined, they would be compiled once per scheme.
+    # The laws of the object are called through the contact: inlined, they would be compiled once per call.
     _pressed.__code__: ("solve_contact",),
     solve_contact.__code__: ("_release_from_rigid_pads",),
     # These are rarely called: inlined, they would take registers from velocity Verlet.
-    attempt_of.__code__: ("tr_bdf2", "mean_force"),
     take_step.__code__: ("stick", "_after_event"),
 }
 

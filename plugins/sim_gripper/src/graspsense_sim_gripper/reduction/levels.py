@@ -9,7 +9,7 @@ import math
 from typing import Final, NamedTuple
 
 from graspsense_sim_gripper.dynamics.contact import BALANCE_RTOL
-from graspsense_sim_gripper.stepping.scheme import VERLET, Steps
+from graspsense_sim_gripper.stepping.scheme import Steps
 
 STEP_SHARE: Final = 0.34
 """The tolerance of a step is (0.34 accuracy)^1.5, so that the accumulated error of many steps is proportional to the
@@ -89,11 +89,9 @@ def step_growth(accuracy: float) -> float:
     return 1.0 + min(1.0, math.sqrt(accuracy / GROWTH_ACCURACY))
 
 
-def steps_for(level: Level, scheme: int, dt_s: float) -> Steps:
-    """Return the step control of a level with this scheme, for ticks of `dt_s` seconds."""
+def steps_for(level: Level, dt_s: float) -> Steps:
+    """Return the step control of a level, for ticks of `dt_s` seconds."""
     if level.plain == 1:
-        return Steps(
-            math.inf, VERLET, dt_s, growth=PLAIN_GROWTH, macro_tolerance=MACRO_SHARE * level.step_tol
-        )
+        return Steps(math.inf, dt_s, growth=PLAIN_GROWTH, macro_tolerance=MACRO_SHARE * level.step_tol)
     longest_s = dt_s / level.min_steps if level.min_steps > 1 else math.inf
-    return Steps(step_tolerance(level.step_tol), scheme, longest_s, growth=step_growth(level.step_tol))
+    return Steps(step_tolerance(level.step_tol), longest_s, growth=step_growth(level.step_tol))

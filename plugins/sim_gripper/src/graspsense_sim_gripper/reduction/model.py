@@ -52,9 +52,11 @@ class Reduction:
     """The compression, speed, duration and force for which the steps were selected."""
     steps: Steps
     decisions: tuple[StepDecision, ...]
-    """The scheme, and what the steps may not resolve."""
+    """How the steps are controlled, and what they may not resolve."""
     frequency: float
     """The natural frequency of the stiffest contact times the tick."""
+    is_stiff: bool
+    """Whether the motion is damped so strongly that its speed relaxes within a tick."""
     unresolved: tuple[str, ...]
     """Those of `QUANTITIES` that the steps cannot resolve, so that no trial grasp can verify them."""
     left_out: tuple[int, ...]

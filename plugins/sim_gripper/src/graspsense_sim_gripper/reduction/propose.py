@@ -1,4 +1,4 @@
-"""Proposing the steps of a level: which scheme integrates the grasps of an object, and what it cannot resolve.
+"""Proposing the steps of a level, and what they cannot resolve.
 
 The object is compressed along two prescribed paths (see `probe`). Decisions depend only on computed forces and rates,
 not on the kinds of the terms, so a term that a plugin contributes is treated like any other.
@@ -28,7 +28,7 @@ from graspsense_sim_gripper.reduction.levels import (
 )
 from graspsense_sim_gripper.reduction.model import QUANTITIES, Reduction, StepDecision
 from graspsense_sim_gripper.reduction.probe import Grip, damping, stiffness
-from graspsense_sim_gripper.stepping.scheme import BOGACKI_SHAMPINE, MEAN_FORCE, TR_BDF2, VERLET, Steps
+from graspsense_sim_gripper.stepping.scheme import Steps
 from graspsense_sim_gripper.terms.registry import find_term
 from graspsense_sim_gripper.terms.switchable import Switchable, switched_off
 from graspsense_sim_gripper.terms.term import NO_STATE, Term, WorkingPoint, no_rates
@@ -57,12 +57,6 @@ MOST_SWING_STEPS: Final = 500
 PERIOD_RAD: Final = 2.0 * math.pi
 """An oscillation with a period within a tick is computed, but nothing is verified: the finest trial grasps may miss it
 too, and agree."""
-SCHEMES: Final = {
-    VERLET: "Verlet",
-    TR_BDF2: "TR-BDF2",
-    MEAN_FORCE: "mean force",
-    BOGACKI_SHAMPINE: "Bogacki-Shampine",
-}
 
 
 def grip_of(problem: Problem, force_n: float | None = None, speed_m_s: float | None = None) -> Grip:
@@ -95,10 +89,7 @@ def propose(problem: Problem, grip: Grip, scale: LevelScale = CONTROLLED[0]) -> 
     stiffnesses = stiffness(grip, dt_s)
     frequency = max(math.sqrt(max(stiffnesses[0], 0.0) / grip.mass_kg), *too_fast.values(), 0.0) * dt_s
     resolved = max(stiffnesses) <= 1.05 * STIFFEST_N_M and frequency <= 1.05
-    scheme = VERLET
-    if level.plain == 0:
-        scheme = _scheme(config.accuracy, damping_rate, frequency / dt_s, dt_s, config.coulomb_n > 0.0)
-    steps = _with_settings(steps_for(level, scheme, dt_s), config)
+    steps = _with_settings(steps_for(level, dt_s), config)
     fastest = max((per_s for i, per_s in swings.items() if i not in too_fast), default=0.0)
     if fastest > 0.0:
         steps = steps._replace(longest_touched_s=angle / fastest)
@@ -109,7 +100,7 @@ def propose(problem: Problem, grip: Grip, scale: LevelScale = CONTROLLED[0]) -> 
         decisions=(
             StepDecision(
                 subject="steps",
-                decision=_scheme_in_words(scheme, level.plain, steps),
+                decision=_in_words(steps, dt_s),
                 what="damping rate times tick",
                 number=damping_rate * dt_s,
             ),
@@ -130,6 +121,7 @@ def propose(problem: Problem, grip: Grip, scale: LevelScale = CONTROLLED[0]) -> 
             ),
         ),
         frequency=frequency,
+        is_stiff=damping_rate * dt_s > 1.0,
         unresolved=QUANTITIES if within_tick else () if resolved else QUANTITIES[1:],
         left_out=tuple(too_fast),
         oscillates=_any_oscillates(grip.kinds, model.terms, grip.point),
@@ -138,13 +130,13 @@ def propose(problem: Problem, grip: Grip, scale: LevelScale = CONTROLLED[0]) -> 
 
 
 def fixed(problem: Problem) -> Reduction:
-    """Return the scheme of the settings: nothing is computed in order to select it.
+    """Return the steps that follow from the accuracy, or from `step_s`, without examining the object.
 
-    The steps follow from the accuracy, or from `step_s`. Raises TypeError if there is no object.
+    Raises TypeError if there is no object.
     """
     config, setup = problem.model_config, _nominal(problem)
     level = CONTROLLED[0].at(config.accuracy)
-    steps = _with_settings(steps_for(level, VERLET, setup.dt_s), config)
+    steps = _with_settings(steps_for(level, setup.dt_s), config)
     swings = _frequencies(setup.kinds, setup.plant.object, USUAL_POINT)
     fastest = max(swings.values(), default=0.0)
     if fastest > 0.0:
@@ -156,10 +148,11 @@ def fixed(problem: Problem) -> Reduction:
         point=USUAL_POINT,
         steps=steps,
         decisions=(
-            StepDecision(subject="steps", decision=SCHEMES[steps.scheme], what=what, number=0.0),
+            StepDecision(subject="steps", decision=_in_words(steps, setup.dt_s), what=what, number=0.0),
             StepDecision(subject="contact", decision="not examined", what=what, number=0.0),
         ),
         frequency=0.0,
+        is_stiff=False,
         unresolved=(),
         left_out=(),
         oscillates=_any_oscillates(setup.kinds, setup.plant.object.terms, USUAL_POINT),
@@ -173,7 +166,7 @@ def plain(problem: Problem) -> Reduction:
     Raises TypeError if there is no object.
     """
     level, dt_s = PLAIN.at(problem.model_config.accuracy), _nominal(problem).dt_s
-    steps = _with_settings(steps_for(level, VERLET, dt_s), problem.model_config)
+    steps = _with_settings(steps_for(level, dt_s), problem.model_config)
     return evolve(fixed(problem), steps=steps, level=level)
 
 
@@ -189,25 +182,16 @@ def _nominal(problem: Problem) -> GraspSetup:
     return problem.nominal
 
 
-def _scheme(accuracy: float, damping_rate: float, frequency: float, dt_s: float, has_friction: bool) -> int:
-    """Return the scheme for this damping rate (1/s) and this angular frequency (rad/s) of the contact."""
-    if damping_rate * dt_s > 1.0:
-        return TR_BDF2
-    # Velocity Verlet lets the energy of an oscillation vary. This matters only if the oscillation is hardly damped.
-    undamped = frequency * (6.0 * step_tolerance(accuracy)) ** (2.0 / 3.0) / 4.0
-    return MEAN_FORCE if damping_rate < undamped and not has_friction else VERLET
-
-
-def _scheme_in_words(scheme: int, plain: int, steps: Steps) -> str:
+def _in_words(steps: Steps, dt_s: float) -> str:
     if steps.macro_tolerance > 0.0:
-        return f"{SCHEMES[scheme]}, a step per tick; in batches over several ticks"
-    return f"{SCHEMES[scheme]}, a step per tick" if plain == 1 else SCHEMES[scheme]
+        return "a step per tick; in batches over several ticks"
+    if steps.tolerance < math.inf:
+        return "by their error"
+    return "a step per tick" if steps.longest_s == dt_s else f"of {steps.longest_s:g} s"
 
 
 def _with_settings(steps: Steps, config: SimConfig) -> Steps:
-    """Return the steps with the scheme, the length and the convergence that the settings prescribe."""
-    if config.scheme != "auto":
-        steps = steps._replace(scheme=(steps.scheme or TR_BDF2) if config.scheme == "implicit" else VERLET)
+    """Return the steps with the length and the convergence that the settings prescribe."""
     if config.step_s is not None:
         steps = steps._replace(tolerance=math.inf, longest_s=float(config.step_s), growth=math.inf)
     if config.step_s is not None or config.drive_lag_s > 0.0 or config.acceleration:

@@ -40,7 +40,6 @@ from graspsense_sim_gripper.reduction.verify import (
     trial_grasps,
     without_term,
 )
-from graspsense_sim_gripper.stepping.scheme import TR_BDF2
 from graspsense_sim_gripper.term_failure import raised_in_term
 from graspsense_sim_gripper.terms.term import LAW_ERRORS
 
@@ -190,7 +189,8 @@ def _accepted(problem: Problem, grip: Grip, trial: TrialGrasps) -> Iterator[Redu
     config = problem.model_config
     least, quantity, grasps, n_accepted = math.inf, "", 1, 0
     near_threshold: Sensitivity | None = None
-    scales = (PLAIN, *CONTROLLED) if _suits_explicit(problem, grip) else CONTROLLED
+    # A step per tick would not be stable with dampers that are faster than the tick.
+    scales = CONTROLLED if propose(problem, grip).is_stiff else (PLAIN, *CONTROLLED)
     for scale in scales:
         if near_threshold and scale.at(config.accuracy).step_tol >= near_threshold.step_tol:
             continue
@@ -291,11 +291,6 @@ def _accepted_for_instances(
         verification = evolve(verification, grasps=verification.grasps + 1, features=tuple(features))
         force_n = max(force_n, grasp.peak_n)
     return evolve(reduction, verification=verification, point=reduction.point._replace(force_n=force_n))
-
-
-def _suits_explicit(problem: Problem, grip: Grip) -> bool:
-    """Return whether explicit steps suit the object: it is not stiff."""
-    return propose(problem, grip).steps.scheme != TR_BDF2
 
 
 def _reference_scale(config: SimConfig, scale: LevelScale) -> LevelScale:

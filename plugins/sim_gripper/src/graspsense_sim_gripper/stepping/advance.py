@@ -9,7 +9,6 @@ from graspsense.plugin_api import gap_and_rate
 from graspsense_sim_gripper.dynamics.contact import has_event, is_pressed, is_touched, restarted
 from graspsense_sim_gripper.dynamics.drive import Drive, is_held
 from graspsense_sim_gripper.dynamics.state import Contact, Motion, PlantState, StepState
-from graspsense_sim_gripper.stepping.bogacki_shampine import bogacki_shampine
 from graspsense_sim_gripper.stepping.coast import coast
 from graspsense_sim_gripper.stepping.control import (
     FREE_GROWTH,
@@ -22,12 +21,8 @@ from graspsense_sim_gripper.stepping.control import (
     next_length,
     relative_error,
 )
-from graspsense_sim_gripper.stepping.events import first, parting, pressing
-from graspsense_sim_gripper.stepping.mean_force import mean_force
+from graspsense_sim_gripper.stepping.events import parting, pressing
 from graspsense_sim_gripper.stepping.scheme import (
-    BOGACKI_SHAMPINE,
-    TR_BDF2,
-    VERLET,
     Attempt,
     PlantParams,
     Start,
@@ -35,7 +30,6 @@ from graspsense_sim_gripper.stepping.scheme import (
     start_of,
 )
 from graspsense_sim_gripper.stepping.stick import stick
-from graspsense_sim_gripper.stepping.tr_bdf2 import tr_bdf2
 from graspsense_sim_gripper.stepping.verlet import verlet
 from graspsense_sim_gripper.terms.phi import phi1
 
@@ -117,18 +111,16 @@ def take_step(
         attempt = _standing(start)
         after_step = StepState(step.next_s, step.n_steps + 1, step.unresolved)
     else:
-        attempt = attempt_of(params, start, effort_n, h)
+        attempt = verlet(params, start, effort_n, h)
         changes = contact.touched == 1 and has_event(contact, attempt.contact)
         duration = attempt.duration_s
         if duration > MIN_STEP_S and not forced:
             fraction = BISECTION
             if not changes:
-                # The path of Verlet is known in advance, and it ends at the other events by itself.
+                # The step ends at the other events by itself.
                 fraction = parting(params, start, attempt)
                 if fraction == 0.0:
                     fraction = pressing(params, start, attempt)
-                if fraction == 0.0 and steps.scheme != VERLET:
-                    fraction = first(params, start, attempt)
             if fraction > 0.0:
                 retry = StepState(duration * fraction, step.n_steps, step.unresolved)
                 return PlantState(state.motion, contact, retry, state.effort_n, state.peak_n), 0.0
@@ -167,17 +159,6 @@ def _standing(start: Start) -> Attempt:
     """Return an attempt of no duration: the start of the step, at rest."""
     revolutions, _, gap, jacobian = start.motion
     return Attempt(Motion(revolutions, 0.0, gap, jacobian), start.contact, 0.0, 0.0, 0.0)
-
-
-def attempt_of(params: PlantParams, start: Start, effort_n: float, h: float) -> Attempt:
-    """Return a step of `h` by the scheme of these parameters."""
-    if params.steps.scheme == VERLET:
-        return verlet(params, start, effort_n, h)
-    if params.steps.scheme == TR_BDF2:
-        return tr_bdf2(params, start, effort_n, h)
-    if params.steps.scheme == BOGACKI_SHAMPINE:
-        return bogacki_shampine(params, start, effort_n, h)
-    return mean_force(params, start, effort_n, h)
 
 
 def _without_reversal(start: Start, attempt: Attempt) -> Attempt:

@@ -85,7 +85,6 @@ def _halved(steps: Steps, dt: float) -> Steps:
     """Return steps of half the length, also where the end of the tick `dt` cut them."""
     return Steps(
         max(ERROR_RATIO * steps.tolerance, min(steps.tolerance, MIN_TOLERANCE)),
-        steps.scheme,
         0.5 * min(steps.longest_s, dt),
         steps.settle,
         1.0 + 0.5 * (steps.growth - 1.0),

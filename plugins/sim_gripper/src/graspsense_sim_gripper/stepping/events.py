@@ -1,7 +1,7 @@
 """Events that end a step: a contact, an end of the travel, a reversal, the release of the object, a contact after it.
 
-The equation of motion changes at an event, so no step goes beyond it. The explicit scheme knows its path in advance and
-ends at the event (`drift`). For an implicit scheme, `first` returns the fraction of the step at which the event lies.
+The equation of motion changes at an event, so no step goes beyond it. The path of a Verlet step is known in advance,
+and it ends at the event (`drift`). For a macro-step, `first` returns the fraction of the step at which the event lies.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def drift(params: PlantParams, start: Start, h: float) -> tuple[Motion, float]:
 
 
 def first(params: PlantParams, start: Start, attempt: Attempt) -> float:
-    """Return the fraction of an implicit step at which an event lies, by the secant; 0 if there is none."""
+    """Return the fraction of a macro-step at which an event lies, by the secant; 0 if there is none."""
     revolutions, speed, gap, jacobian = start.motion
     revolutions1, speed1, gap1, jacobian1 = attempt.motion
     direction, meeting = start.direction, start.meeting_m

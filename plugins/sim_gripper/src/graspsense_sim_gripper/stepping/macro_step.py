@@ -12,8 +12,8 @@ import math
 from typing import Final, NamedTuple
 
 from graspsense.plugin_api import gap_and_rate
-from graspsense_sim_gripper.dynamics.contact import has_event
-from graspsense_sim_gripper.dynamics.drive import is_held
+from graspsense_sim_gripper.dynamics.contact import ObjectModel, has_event, pad_forces
+from graspsense_sim_gripper.dynamics.drive import Drive, acceleration, is_held, sliding_friction
 from graspsense_sim_gripper.dynamics.state import (
     Contact,
     Motion,
@@ -31,7 +31,6 @@ from graspsense_sim_gripper.stepping.control import (
     relative_error,
 )
 from graspsense_sim_gripper.stepping.events import first, parting
-from graspsense_sim_gripper.stepping.implicit import acceleration_of, force_error, pressed
 from graspsense_sim_gripper.stepping.polynomial import Cubic, derivative, hermite, parabola, value
 from graspsense_sim_gripper.stepping.scheme import (
     FORCE_SCALE_N,
@@ -53,6 +52,8 @@ from graspsense_sim_gripper.stepping.trend import (
     trend_at_end,
 )
 
+FIRST_TICKS: Final = 2
+"""Number of ticks in the first macro-step."""
 MAX_TICKS: Final = 128
 """Largest number of ticks in a macro-step; no more than the rows that `loop.ROWS_AT_ONCE` keeps free."""
 RELAXATION_ERROR: Final = 0.1
@@ -176,6 +177,32 @@ def _moved(
     return error, HALF, middle, after, trend_at_end(rates, h)
 
 
+def pressed(model: ObjectModel, contact: Contact, gap_m: float, speed_m_s: float, h: float) -> Contact:
+    """Return the contact at this gap, reached within `h` and closing at `speed_m_s`, where something is touched."""
+    return pad_forces(model, contact, gap_m, speed_m_s, h, False) if contact.touched == 1 else contact
+
+
+def acceleration_of(
+    drive: Drive,
+    jacobian_m_rev: float,
+    speed_rev_s: float,
+    contact: Contact,
+    effort_n: float,
+    direction: float,
+) -> float:
+    """Return the motor's acceleration (rev/s2) while it slides in this direction under the forces of the contact."""
+    load = _load(contact)
+    friction_n = sliding_friction(drive.friction, speed_rev_s * jacobian_m_rev, load)
+    return acceleration(drive, jacobian_m_rev, speed_rev_s, load - effort_n, friction_n, direction)
+
+
+def force_error(start: Start, motion1: Motion, contact1: Contact, position_error_rev: float) -> float:
+    """Return the error of the force (N) that this error of the position causes, by the mean stiffness of the step."""
+    way = abs(motion1.revolutions - start.motion.revolutions)
+    change_n = abs(_load(contact1) - _load(start.contact))
+    return change_n * abs(position_error_rev) / way if way > 0.0 else 0.0
+
+
 def _event_share(params: PlantParams, start: Start, middle: Contact, attempt: Attempt) -> float:
     """Return the share of this step up to its first event, as far as it is known; 0 if there is none.
 
@@ -240,8 +267,17 @@ def constant_values(state: PlantState) -> DenseOutput:
 
 
 def with_peak(state: PlantState, peak_n: float) -> PlantState:
-    """Return the same state with this largest force on a pad."""
+    """Return the same state, in which the largest force on a pad so far was at least this."""
+    peak_n = max(state.peak_n, peak_n)
     return PlantState(state.motion, state.contact, state.step, state.effort_n, peak_n)
+
+
+def held_at_once(model: PlantParams, plant: PlantState) -> PlantParams:
+    """Return the model in which fingers at rest are held in one step. A macro-step showed how little relaxes."""
+    drive, body, (tolerance, longest_s, settle, growth, touched_s, macro_tolerance) = model
+    if plant.motion.speed_rev_s == 0.0:
+        longest_s = math.inf
+    return PlantParams(drive, body, Steps(tolerance, longest_s, settle, growth, touched_s, macro_tolerance))
 
 
 def values_at(dense: DenseOutput, s: float) -> PlantReadings:

@@ -1,7 +1,4 @@
-"""The interface of the integration schemes.
-
-A scheme is a function `scheme(params, start, effort_n, h) -> Attempt`. It does not decide whether its step is accepted.
-"""
+"""The parameters of steps, and what a step begins and ends with."""
 
 from __future__ import annotations
 
@@ -19,11 +16,6 @@ from graspsense_sim_gripper.dynamics.drive import (
 )
 from graspsense_sim_gripper.dynamics.state import Contact, Motion, PlantState
 
-VERLET: Final = 0
-TR_BDF2: Final = 1
-MEAN_FORCE: Final = 2
-BOGACKI_SHAMPINE: Final = 3
-"""The schemes: velocity Verlet, TR-BDF2, the discrete gradient, a Runge-Kutta pair (see the modules of these names)."""
 SPEED_SCALE_M_S: Final = 1e-3
 FORCE_SCALE_N: Final = 1.0
 """Errors are relative to the speed and the force, or to these values if those are smaller."""
@@ -34,7 +26,6 @@ class Steps(NamedTuple):
 
     tolerance: float
     """Error of a step, relative to force and speed, beyond which it is rejected."""
-    scheme: int = VERLET
     longest_s: float = math.inf
     settle: float = 0.0
     """Relative change of speed and force at which the halving of steps ends; 0: steps are not halved."""
@@ -58,7 +49,7 @@ class PlantParams(NamedTuple):
 
 
 class Start(NamedTuple):
-    """The state before a step, with the quantities that every scheme needs."""
+    """The state before a step, with the quantities that it needs."""
 
     motion: Motion
     contact: Contact
@@ -73,12 +64,12 @@ class Start(NamedTuple):
 
 
 class Attempt(NamedTuple):
-    """The result of a scheme: the state after the step, and estimates of its errors."""
+    """The state after a step, and estimates of its errors. It does not say whether the step is accepted."""
 
     motion: Motion
     contact: Contact
     duration_s: float
-    """Shorter than the requested step if the scheme itself ends at an event."""
+    """Shorter than the requested step if the step itself ends at an event."""
     speed_error_m_s: float
     force_error_n: float
 

@@ -1,0 +1,15 @@
+"""A grasp before it begins, in steps that no trial grasp has verified: for tests of the plant without a controller."""
+
+from __future__ import annotations
+
+from graspsense_sim_gripper.build import build, instantiate, problem_of
+from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.objects.spec import ObjectSpec
+from graspsense_sim_gripper.problem import GraspSetup
+from graspsense_sim_gripper.reduction.propose import grip_of, propose
+
+
+def unverified_setup(config: SimConfig, scene: str | ObjectSpec, seed: int) -> GraspSetup:
+    problem = build(config, scene) if isinstance(scene, str) else problem_of(config, scene)
+    reduction = None if problem.spec is None else propose(problem, grip_of(problem))
+    return instantiate(problem, reduction, seed)
