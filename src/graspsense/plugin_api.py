@@ -22,11 +22,14 @@ _TABLE: Final[Table] = {
             "ControllerEntry",
             "DatasetEntry",
             "EmulatorEntry",
+            "ExperimentEntry",
+            "ExperimentKindEntry",
             "FastChannel",
             "Feature",
             "FeatureSetEntry",
             "Finding",
             "FoundDevice",
+            "IdentifierEntry",
             "ModelEntry",
             "PipelineEntry",
             "SensorBackendEntry",
@@ -81,7 +84,7 @@ _TABLE: Final[Table] = {
     "Sensor backends that do many grasps at once": {
         "core.components.roles": ("BatchBackend", "BatchOptions", "Grasped", "SimulationVariant"),
     },
-    "Sensor backends that identify an object from recorded squeezes": {
+    "Identifying an object from recorded squeezes": {
         "core.components.identification": (
             "CandidateScore",
             "Identification",
@@ -90,8 +93,8 @@ _TABLE: Final[Table] = {
             "RecordedSqueeze",
             "SqueezeFit",
             "Undetermined",
+            "repeatability",
         ),
-        "inference": ("half_width", "interval_of_mean", "predictive_p"),
     },
     "Emulated devices": {
         "core.components.emulated": ("EmulatedDevice",),
