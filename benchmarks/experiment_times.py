@@ -1,10 +1,11 @@
-"""Measure the processor time per trial of the experiments that come with graspsense.
+"""Measure the processor time per trial of the experiments that are installed.
 
     python benchmarks/experiment_times.py [NAME...] [--short]
 
-Runs two tasks of each experiment in this process and writes `src/graspsense/experiments/durations.toml`, from which
-`graspsense experiment` tells how long an experiment takes. Names measure these alone and keep the other figures.
-`--short` measures the first of them and writes nothing.
+Runs two tasks of each experiment in this process and prints the figures that the entries of the experiments and of
+their kinds have as `seconds_per_trial`, from which `graspsense experiment` tells how long an experiment takes. That of
+a kind is the median over its experiments. `graspsense.experiments.duration` names the machine. `--short` measures the
+first experiment alone.
 """
 
 from __future__ import annotations
@@ -14,14 +15,11 @@ import datetime
 import os
 import platform
 import time
-import tomllib
 from pathlib import Path
+from statistics import median
 
-from graspsense.core.components.config import toml_key
 from graspsense.experiments.executors.serial import Serial
 from graspsense.experiments.experiment import number_of_trials, read_experiment, shipped
-
-FILE = Path(__file__).parents[1] / "src/graspsense/experiments/durations.toml"
 
 
 def seconds_per_trial(name: str) -> tuple[str, float]:
@@ -55,30 +53,16 @@ def main() -> None:
     parser.add_argument("--short", action="store_true", help="least work, only to show that it runs")
     given = parser.parse_args()
     asked = given.names or [name for name in shipped() if not read_experiment(name).parts]
-    values = tomllib.loads(FILE.read_text()) if FILE.is_file() else {}
-    shares, kinds = dict(values.get("seconds_per_trial", {})), dict(values.get("kinds", {}))
+    of_kind: dict[str, list[float]] = {}
     for name in asked[:1] if given.short else asked:
         begun = time.monotonic()
-        kinds[name], shares[name] = seconds_per_trial(name)
-        print(
-            f"{name}: {shares[name]:.4f} s per trial ({time.monotonic() - begun:.0f} s, "
-            f"load {os.getloadavg()[0]:.1f})",
-            flush=True,
-        )
-        if given.short:
-            return
-        lines = [
-            "# Written by benchmarks/experiment_times.py: processor seconds per trial of each experiment.",
-            f'processor = "{processor()}"',
-            f'date = "{datetime.date.today().isoformat()}"',
-            "",
-            "[seconds_per_trial]",
-            *(f"{toml_key(key)} = {shares[key]:.3g}" for key in sorted(shares)),
-            "",
-            "[kinds]",
-            *(f'{toml_key(key)} = "{kinds[key]}"' for key in sorted(kinds)),
-        ]
-        FILE.write_text("\n".join(lines) + "\n")
+        kind, share = seconds_per_trial(name)
+        of_kind.setdefault(kind, []).append(share)
+        taken = f"{time.monotonic() - begun:.0f} s, load {os.getloadavg()[0]:.1f}"
+        print(f"{name}: {share:.3g} s per trial ({taken})", flush=True)
+    for kind, shares in of_kind.items():
+        print(f"kind {kind}: {median(shares):.3g} s per trial")
+    print(f"{processor()} on {datetime.date.today().isoformat()}")
 
 
 if __name__ == "__main__":

@@ -14,7 +14,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from graspsense.cli.main import main
-from graspsense.core.values.errors import ConfigError
+from graspsense.core.components.registry import IsolatedPlugins
+from graspsense.core.values.errors import ConfigError, UnknownName
 from graspsense.evaluation.over_seeds import OverSeeds, mean_difference
 from graspsense.experiments.executors.serial import Serial
 from graspsense.experiments.experiment import read_experiment, shipped
@@ -23,6 +24,7 @@ from graspsense.experiments.run import run_experiment
 from graspsense.experiments.summary import summarise
 from graspsense.experiments.task import Task, TaskResult
 from graspsense.experiments.timing import TimeLeft
+from graspsense.plugin_api import ExperimentEntry, hookimpl
 from graspsense.store.store import Store
 
 EXPERIMENT = """
@@ -110,10 +112,32 @@ def test_what_is_shipped_resolves_to_itself(name, tmp_path):
     assert [task.key for task in again.tasks()] == [task.key for task in planned.tasks()]
 
 
-def test_shipped_experiments_lie_in_the_package():
+def test_every_experiment_file_of_the_package_is_declared():
     folder = files("graspsense.experiments").joinpath("shipped")
-    assert {one.name for one in folder.iterdir()} >= {f"{name}.toml" for name in shipped()}
-    assert "probing_force" in shipped()
+    declared = {name for name, resource in shipped().items() if resource.distribution == "graspsense"}
+    assert {file.name for file in folder.iterdir()} == {f"{name}.toml" for name in declared}
+
+
+@pytest.mark.parametrize("asked", ["paper", "table_2", "mine.toml"])
+def test_an_experiment_of_a_distribution_that_is_missing_says_what_to_install(asked, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine.toml").write_text('title = "x"\nkind = "grasp"')
+    with IsolatedPlugins(), pytest.raises(UnknownName, match=r'graspsense-paper:\n.*"graspsense\[paper\]"'):
+        read_experiment(asked)
+
+
+def test_two_plugins_may_ship_an_experiment_of_one_name():
+    class Study:
+        GRASPSENSE_API = (2, 0)
+
+        @hookimpl
+        def graspsense_experiments(self):
+            yield ExperimentEntry("probing_force", "graspsense:experiments/shipped/probing_force.toml")
+
+    with IsolatedPlugins(Study()):
+        assert {"graspsense/probing_force", "graspsense-test/probing_force"} <= shipped().keys()
+        with pytest.raises(UnknownName, match="graspsense and graspsense-test"):
+            read_experiment("probing_force")
 
 
 def test_resume_does_what_is_missing_and_nothing_else(file, tmp_path):
@@ -204,7 +228,7 @@ def test_one_run_at_a_time_writes_to_a_folder(file, tmp_path):
     [
         ('title = "x"\nsedes = 2', r"mine.toml:2: sedes: .*Did you mean 'seeds'"),
         ('title = "x"\nseeds = 0', r"mine.toml:2: seeds: 0 seeds: give at least 1"),
-        ('title = "x"\nkind = "juggle"', r"no kind of experiment 'juggle'"),
+        ('title = "x"\nkind = "juggle"', r"no kind of experiment named 'juggle'"),
         ('title = "x"\n[sweep]\n"controler.x" = [1]', r"mine.toml:3: sweep.controler.x: .*'controller'"),
         ('title = "x"\n[sweep]\n"run.seed" = 3', r"mine.toml:3: sweep.run.seed: give a list of values"),
         ('title = "x"\n[sweep]\n"controller.probing_forse_n" = [1.0]', r"Did you mean 'probing_force_n'"),

@@ -19,7 +19,14 @@ from graspsense.core.values.features import Features
 from graspsense.core.values.signals import Outcome, Phase
 from graspsense.core.values.trace import trace_of
 from graspsense.core.values.trial import RunInfo, Trial
-from graspsense.plugin_api import CommandEntry, collect, hookimpl
+from graspsense.plugin_api import (
+    CommandEntry,
+    ExperimentKindEntry,
+    PluginUnavailable,
+    UnknownName,
+    collect,
+    hookimpl,
+)
 
 HOOKS = {name: spec for name, spec in vars(hookspecs).items() if name.startswith("graspsense_")}
 DOCS = (Path(__file__).parents[1] / "docs" / "hooks.md").read_text()
@@ -170,6 +177,33 @@ def test_hook_graspsense_emulators():
 
     entry = plugins.emulator("lab-hand").entry
     assert (entry.target, entry.wires, entry.options) == ("lab_hand.emulator:emulate", ("pty",), ())
+
+
+def test_hook_graspsense_identifiers():
+    plugins = IsolatedPlugins(example("graspsense_identifiers"))
+
+    assert plugins.identifier("lab-sim").entry.target == "lab_sim.identification:identify"
+    with pytest.raises(UnknownName, match=r"graspsense-identify:\n.*graspsense\[identify\]"):
+        plugins.identifier("sim")
+    with pytest.raises(UnknownName, match="Known: lab-sim"):
+        plugins.identifier("replay")
+
+
+def test_hook_graspsense_experiment_kinds():
+    plugins = IsolatedPlugins(example("graspsense_experiment_kinds"))
+
+    assert plugins.experiment_kind("wear").targets == ("run", "keys", "result", "findings")
+    with pytest.raises(ValueError, match="both 'run' and 'keys'"):
+        ExperimentKindEntry(name="wear", run="lab_study.wear:run", summary="without keys")
+
+
+def test_hook_graspsense_experiments():
+    plugins = IsolatedPlugins(example("graspsense_experiments"))
+
+    worn = plugins.experiment("graspsense-test/worn-cans")
+    assert worn.entry.resource == "lab_study:experiments/worn_cans.toml"
+    with pytest.raises(PluginUnavailable, match="lab_study"):
+        worn.file()
 
 
 def test_hook_graspsense_conformance_checks():

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import json
+from importlib import import_module
+
 import pytest
 from click.testing import CliRunner
+from identifiers import SCENE
 
 from graspsense.cli.main import cli
 from graspsense.core.components.identification import RecordedSqueeze
-from graspsense.core.values.errors import ConfigError
+from graspsense.core.components.registry import IsolatedPlugins
+from graspsense.core.values.errors import ConfigError, UnknownName
 from graspsense.core.values.trace import trace_of
+from graspsense.plugin_api import IdentifierEntry, hookimpl
 from graspsense.sources import squeezes as module
 from graspsense.sources.identified import gripper_flags, identified_scenes
 from graspsense.sources.squeezes import recorded_squeezes
@@ -98,6 +104,45 @@ def test_the_command_refuses_what_is_not_a_scene_before_it_reads(tmp_path):
     done = CliRunner().invoke(cli, ["identify", "none.mcap", "--out", str(tmp_path / "cup.json")])
     assert done.exit_code == 2
     assert "cup.json: the name of the file must end in .toml" in done.output
+
+
+class Undecided:
+    GRASPSENSE_API = (2, 0)
+
+    @hookimpl
+    def graspsense_identifiers(self):
+        yield IdentifierEntry("sim", "identifiers:undecided", "a scene that is not to be used")
+
+
+@pytest.mark.slow
+def test_a_scene_with_a_number_that_is_not_determined_is_written_with_force_only(store, tmp_path):
+    scene, page = tmp_path / "cup.toml", tmp_path / "cup.html"
+    command = ["graspsense", "identify", store, "--class", "block", "--out", str(scene)]
+    with IsolatedPlugins(Undecided()) as plugins:
+        for name in ("c45", "sim-gripper"):
+            module = import_module(f"graspsense_{name.replace('-', '_')}.plugin")
+            plugins.add(module, f"graspsense-{name}")
+        with pytest.raises(
+            ConfigError, match=r"cup.toml is not written:\n  k2 is not determined.*\n  --force"
+        ):
+            CliRunner().invoke(cli, [*command[1:], "--page", str(page)], catch_exceptions=False)
+        assert not scene.exists()
+        assert "k2 is not determined" in page.read_text()
+        forced = CliRunner().invoke(cli, [*command[1:], "--force", "--json"], catch_exceptions=False)
+    assert forced.exit_code == 0
+    assert scene.read_text() == SCENE
+    assert json.loads(forced.stdout)["refusals"] == ["k2 is not determined: too wide; squeeze deeper"]
+
+
+def test_without_the_distribution_that_identifies_the_command_says_what_to_install(tmp_path):
+    plugins = IsolatedPlugins()
+    for name in ("c45", "sim-gripper"):
+        module = import_module(f"graspsense_{name.replace('-', '_')}.plugin")
+        plugins.add(module, f"graspsense-{name}")
+    with plugins, pytest.raises(UnknownName, match=r"graspsense-identify:\n.*graspsense\[identify\]"):
+        CliRunner().invoke(
+            cli, ["identify", "none.mcap", "--out", str(tmp_path / "cup.toml")], catch_exceptions=False
+        )
 
 
 def test_a_single_scene_is_refused_before_anything_is_simulated(tmp_path):

@@ -22,10 +22,13 @@ _TABLE: Final[Table] = {
             "ControllerEntry",
             "DatasetEntry",
             "EmulatorEntry",
+            "ExperimentEntry",
+            "ExperimentKindEntry",
             "Feature",
             "FeatureSetEntry",
             "Finding",
             "FoundDevice",
+            "IdentifierEntry",
             "ModelEntry",
             "PipelineEntry",
             "SensorBackendEntry",
@@ -83,7 +86,7 @@ _TABLE: Final[Table] = {
     "Sensor backends that do many grasps at once": {
         "core.components.roles": ("BatchBackend", "BatchOptions", "Grasped", "SimulationVariant"),
     },
-    "Sensor backends that identify an object from recorded squeezes": {
+    "Identifying an object from recorded squeezes": {
         "core.components.identification": (
             "CandidateScore",
             "Identification",
@@ -92,8 +95,8 @@ _TABLE: Final[Table] = {
             "RecordedSqueeze",
             "SqueezeFit",
             "Undetermined",
+            "repeatability",
         ),
-        "inference": ("half_width", "interval_of_mean", "predictive_p"),
     },
     "Emulated devices": {
         "core.components.emulated": ("EmulatedDevice",),

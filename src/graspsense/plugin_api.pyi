@@ -11,10 +11,13 @@ from graspsense.core.components.entries import ConformanceCheckEntry as Conforma
 from graspsense.core.components.entries import ControllerEntry as ControllerEntry
 from graspsense.core.components.entries import DatasetEntry as DatasetEntry
 from graspsense.core.components.entries import EmulatorEntry as EmulatorEntry
+from graspsense.core.components.entries import ExperimentEntry as ExperimentEntry
+from graspsense.core.components.entries import ExperimentKindEntry as ExperimentKindEntry
 from graspsense.core.components.entries import Feature as Feature
 from graspsense.core.components.entries import FeatureSetEntry as FeatureSetEntry
 from graspsense.core.components.entries import Finding as Finding
 from graspsense.core.components.entries import FoundDevice as FoundDevice
+from graspsense.core.components.entries import IdentifierEntry as IdentifierEntry
 from graspsense.core.components.entries import ModelEntry as ModelEntry
 from graspsense.core.components.entries import PipelineEntry as PipelineEntry
 from graspsense.core.components.entries import SensorBackendEntry as SensorBackendEntry
@@ -80,7 +83,7 @@ from graspsense.core.components.roles import BatchOptions as BatchOptions
 from graspsense.core.components.roles import Grasped as Grasped
 from graspsense.core.components.roles import SimulationVariant as SimulationVariant
 
-# Sensor backends that identify an object from recorded squeezes
+# Identifying an object from recorded squeezes
 from graspsense.core.components.identification import CandidateScore as CandidateScore
 from graspsense.core.components.identification import Identification as Identification
 from graspsense.core.components.identification import IdentifiedParameter as IdentifiedParameter
@@ -88,9 +91,7 @@ from graspsense.core.components.identification import PredictiveCheck as Predict
 from graspsense.core.components.identification import RecordedSqueeze as RecordedSqueeze
 from graspsense.core.components.identification import SqueezeFit as SqueezeFit
 from graspsense.core.components.identification import Undetermined as Undetermined
-from graspsense.inference import half_width as half_width
-from graspsense.inference import interval_of_mean as interval_of_mean
-from graspsense.inference import predictive_p as predictive_p
+from graspsense.core.components.identification import repeatability as repeatability
 
 # Emulated devices
 from graspsense.core.components.emulated import EmulatedDevice as EmulatedDevice

@@ -15,6 +15,8 @@ from graspsense.cli.output import echo_json
 from graspsense.cli.terminal import Style, echo, echo_entry, echo_table, talk
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from graspsense.experiments.duration import Effort
     from graspsense.experiments.experiment import Planned
     from graspsense.experiments.findings import Findings
@@ -142,7 +144,7 @@ def _counts(account: Account, problem: str) -> dict[str, object]:
     }
 
 
-def _list(known: dict[str, object], as_json: bool) -> None:
+def _list(known: Iterable[str], as_json: bool) -> None:
     from graspsense.experiments.duration import effort_of, measured_on
     from graspsense.experiments.experiment import read_experiment
 

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from graspsense.cli.options import force_option
 from graspsense.cli.output import check_outputs, echo_json, file_to_write_as
 from graspsense.cli.sources import named_source
 from graspsense.cli.terminal import Style, echo, echo_entry, echo_table, talk
@@ -57,7 +56,11 @@ if TYPE_CHECKING:
     multiple=True,
     help="Set a key: -o gripper.pad_stiffness_n_m=inf for rigid fingertips. Can be repeated.",
 )
-@force_option
+@click.option(
+    "--force",
+    is_flag=True,
+    help="Accept settings outside of their plausible range, and write a scene that the squeezes do not determine.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def identify(
     sources: tuple[str, ...],
@@ -83,7 +86,7 @@ def identify(
     """
     from graspsense.cli.progress import ProgressLine
     from graspsense.core.components.config import Flag, resolve
-    from graspsense.core.components.roles import BatchBackend
+    from graspsense.core.components.registry import installed
     from graspsense.core.values.errors import ConfigError
     from graspsense.recording.atomic_file import write_or_replace
     from graspsense.sources.squeezes import recorded_squeezes
@@ -91,15 +94,14 @@ def identify(
     check_outputs(out, page, overwrite=overwrite, sources=sources)
     flags = [Flag("--gripper", "gripper.type", gripper)] if gripper else []
     settings = resolve(pipeline, options=options, flags=flags, force=force)
-    backend = settings.gripper.create()
-    if not isinstance(backend, BatchBackend):
-        raise ConfigError(
-            f"gripper {settings.gripper.component.qualified} is not a simulator, so it has no scenes: --gripper sim"
-        )
+    identifier = installed().identifier(settings.gripper.component.name).load()
     squeezes = recorded_squeezes(sources, name)
     with ProgressLine() as progress:
-        result = backend.identify(squeezes, progress, recorded_squeezes(blocks) if blocks else ())
-    write_or_replace(Path(out), result.scene.encode())
+        block = recorded_squeezes(blocks) if blocks else ()
+        result = identifier(settings.gripper.config, squeezes, progress, block)
+    refused = result.refusals if not force else ()
+    if not refused:
+        write_or_replace(Path(out), result.scene.encode())
     if page:
         from graspsense.report.identification import identification_page
         from graspsense.report.write import write_html
@@ -108,16 +110,22 @@ def identify(
     for note in result.notes:
         talk(f"note: {note}")
     if as_json:
-        echo_json(_as_values(out, result))
+        echo_json(_as_values(None if refused else out, result))
     else:
-        _print(out, result)
+        _print(result)
+        if not refused:
+            echo_entry("scene", out)
+            echo_entry("use it", f"graspsense run --object {out}")
         if page:
             echo_entry("page", page)
+    if refused:
+        reasons = "".join(f"\n  {reason}" for reason in refused)
+        raise ConfigError(f"{out} is not written:{reasons}\n  --force writes it all the same")
 
 
-def _print(out: str, result: Identification) -> None:
+def _print(result: Identification) -> None:
     """Print the identified object, the candidates, and what is not determined."""
-    from graspsense.core.components.identification import repeatability
+    from graspsense.core.components.identification import held_out_in_words, repeatability
 
     rms = [fit.rms_n for fit in result.fits]
     relative = [fit.residual for fit in result.fits]
@@ -128,6 +136,8 @@ def _print(out: str, result: Identification) -> None:
         "residual",
         f"{1e3 * sum(rms) / len(rms):.0f} mN rms, {100.0 * mean:.2f} % of the peak (largest {100.0 * worst:.2f} %)",
     )
+    if result.held_out:
+        echo_entry("held out", held_out_in_words(result.held_out))
     if len(result.fits) > 1:
         echo_entry("repeatable", f"squeezes differ by {_percent(repeatability(result.fits))} of the peak")
     echo()
@@ -137,7 +147,7 @@ def _print(out: str, result: Identification) -> None:
     )
     echo()
     echo_table(
-        ("CANDIDATE", "PARAMETERS", "HELD OUT", "FIT", "VERDICT"),
+        ("CANDIDATE", "PARAMETERS", "ERROR", "FIT", "VERDICT"),
         [
             (one.terms, str(one.parameters), _percent(one.error), _percent(one.fit_error), one.verdict)
             for one in result.candidates
@@ -151,8 +161,6 @@ def _print(out: str, result: Identification) -> None:
         [(one.what, one.reason, one.remedy) for one in result.undetermined],
     )
     echo()
-    echo_entry("scene", out)
-    echo_entry("use it", f"graspsense run --object {out}")
 
 
 def _interval(parameter: IdentifiedParameter) -> str:
@@ -165,7 +173,7 @@ def _percent(share: float) -> str:
     return "-" if math.isnan(share) else f"{100.0 * share:.2f} %"
 
 
-def _as_values(out: str, result: Identification) -> dict[str, Any]:
+def _as_values(out: str | None, result: Identification) -> dict[str, Any]:
     from attrs import asdict
 
     from graspsense.core.components.identification import repeatability
@@ -181,6 +189,8 @@ def _as_values(out: str, result: Identification) -> dict[str, Any]:
         "candidates": values(result.candidates),
         "undetermined": values(result.undetermined),
         "fits": [{"name": one.name, "rms_n": one.rms_n, "peak_n": one.peak_n} for one in result.fits],
+        "held_out": list(result.held_out),
+        "refusals": list(result.refusals),
         "repeatability": None if len(result.fits) < 2 else repeatability(result.fits),
         "checks": [{"statistic": one.statistic, "p": one.p} for one in result.checks],
         "notes": list(result.notes),

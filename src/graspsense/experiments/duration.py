@@ -1,22 +1,20 @@
 """How long an experiment takes, estimated from its number of trials and from measured processor times.
 
-`durations.toml` holds processor seconds per trial, in which making the trial, training and judging are included. They
-were measured by `benchmarks/experiment_times.py`; the file names the machine.
+The entries of experiments and of their kinds have processor seconds per trial, in which making the trial, training and
+judging are included. `benchmarks/experiment_times.py` measures them.
 """
 
 from __future__ import annotations
 
 import math
-import tomllib
-from collections.abc import Mapping
-from functools import cache
-from importlib.resources import files
-from statistics import median
-from typing import Any
+from typing import Final
 
 from attrs import frozen
 
-from graspsense.experiments.experiment import Planned, number_of_trials
+from graspsense.experiments.experiment import Planned, number_of_trials, shipped
+from graspsense.experiments.kinds import kind_of
+
+MEASURED_ON: Final = "times measured on Intel(R) Xeon(R) Processor at 2.0 GHz on 2026-11-22"
 
 
 @frozen(kw_only=True)
@@ -48,7 +46,7 @@ class Effort:
 
 def effort_of(planned: Planned) -> Effort:
     """Return what an experiment consists of, with an estimate of the time."""
-    per_trial = _measured()["seconds_per_trial"]
+    entries = {name: resource.entry for name, resource in shipped().items()}
     trials, seconds, trainings = 0, 0.0, 0
     known = estimated = True
     for case in planned.cases:
@@ -59,8 +57,10 @@ def effort_of(planned: Planned) -> Effort:
         trials += number
         targets, folds = len(getattr(case.judge, "targets", ())), getattr(case.judge, "folds", 1)
         trainings += len(case.learners) * targets * (folds if case.test is None else 1)
-        name = case.part or planned.name
-        share = per_trial.get(name) or per_trial.get(f"kind {case.kind}")
+        entry = entries.get(case.part or planned.name)
+        share = None if entry is None else entry.seconds_per_trial
+        if share is None:
+            share = kind_of(case.kind).declared.entry.seconds_per_trial
         estimated = estimated and share is not None
         seconds += number * (share or 0.0)
     seeds = len(planned.seeds)
@@ -76,8 +76,7 @@ def effort_of(planned: Planned) -> Effort:
 
 def measured_on() -> str:
     """Return what the estimates rest on: the processor on which the times were measured, and the date."""
-    found = _measured()
-    return f"estimated from times measured on {found['processor']} on {found['date']}"
+    return f"estimated from {MEASURED_ON}"
 
 
 def duration_in_words(seconds: float) -> str:
@@ -87,14 +86,3 @@ def duration_in_words(seconds: float) -> str:
     if seconds < 5400:
         return f"{math.ceil(seconds / 60)} min"
     return f"{seconds / 3600:.1f} h"
-
-
-@cache
-def _measured() -> Mapping[str, Any]:
-    text = files("graspsense.experiments").joinpath("durations.toml").read_text(encoding="utf-8")
-    values = tomllib.loads(text)
-    shares, kinds = dict(values["seconds_per_trial"]), values["kinds"]
-    # An experiment from a user's file is estimated from the shipped experiments of the same kind.
-    for kind in dict.fromkeys(kinds.values()):
-        shares[f"kind {kind}"] = median(shares[name] for name, of in kinds.items() if of == kind)
-    return {**values, "seconds_per_trial": shares}

@@ -5,19 +5,19 @@ from __future__ import annotations
 import itertools
 import math
 import os
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from importlib.resources import files
 from pathlib import Path
 from typing import Any, Final
 
 from attrs import evolve, field, frozen
 
 from graspsense.core.components.config import Settings, build_plausible, default_paths, resolve
-from graspsense.core.components.entries import TABLE_OF_ROLE
+from graspsense.core.components.entries import TABLE_OF_ROLE, ExperimentEntry
 from graspsense.core.components.layers import Layer, Merged, dotted, option_layers, read_toml, typed_path
 from graspsense.core.components.nearest_key import key_paths
-from graspsense.core.components.registry import installed
+from graspsense.core.components.registry import Resource, installed
 from graspsense.core.components.strict import InvalidValue, ValidationFailed, keys_of, plain, structured
 from graspsense.core.learn.copies import without_copies
 from graspsense.core.learn.model import worded
@@ -184,13 +184,12 @@ class Planned:
         }
 
 
-def shipped() -> dict[str, Any]:
-    """Return the files of the experiments that are part of graspsense, by name."""
-    folder = files("graspsense.experiments").joinpath("shipped")
+def shipped() -> dict[str, Resource[ExperimentEntry]]:
+    """Return the experiments that graspsense and plugins ship by their names, qualified where two share a name."""
+    known = installed().experiments()
+    times = Counter(resource.name for resource in known)
     return {
-        one.name.removesuffix(".toml"): one
-        for one in sorted(folder.iterdir(), key=lambda one: one.name)
-        if one.name.endswith(".toml")
+        resource.name if times[resource.name] == 1 else resource.qualified: resource for resource in known
     }
 
 
@@ -590,18 +589,18 @@ def _found(asked: str) -> tuple[Layer, Path | None, str]:
     if asked.endswith(".toml"):
         path = Path(asked).expanduser()
         return read_toml(path, asked, "experiment"), path.parent, path.stem
-    known = shipped()
-    if asked not in known:
+    try:
+        resource = installed().experiment(asked)
+    except UnknownName as error:
         hint = (
             f"; there is a file {asked}.toml: write the name with .toml"
             if Path(f"{asked}.toml").is_file()
             else ""
         )
         raise UnknownName(
-            f"no experiment named {asked!r}. Known: {', '.join(known)}.{suggestion(asked, known)}"
-            f"\n  An experiment of your own is a file: write its name with .toml{hint}"
-        )
-    return read_toml(known[asked], f"experiment {asked}", "experiment"), None, asked
+            f"{error}\n  An experiment of your own is a file: write its name with .toml{hint}"
+        ) from error
+    return read_toml(resource.file(), f"experiment {asked}", "experiment"), None, resource.name
 
 
 def _located(values: Mapping[str, Any], base: Path | None) -> dict[str, Any]:

@@ -20,7 +20,6 @@ from graspsense.experiments.task import TaskResult
 from graspsense.experiments.task_results import (
     AnyTaskResult,
     ClassifierResult,
-    GraspResult,
     RecognitionResult,
 )
 
@@ -160,14 +159,6 @@ class Summary:
         """Return the recognition result of this case and seed, None if there is none."""
         result = self.results.get((case, seed))
         return result if isinstance(result, RecognitionResult) else None
-
-    def grasp_results(self) -> list[tuple[str, int, GraspResult]]:
-        """Return case, seed and result of every task of kind `grasp`."""
-        return [
-            (case, seed, result)
-            for (case, seed), result in self.results.items()
-            if isinstance(result, GraspResult)
-        ]
 
     def as_json(self) -> dict[str, Any]:
         """Return the JSON form that `graspsense experiment --json` prints."""

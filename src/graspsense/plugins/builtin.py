@@ -8,6 +8,8 @@ from graspsense.plugin_api import (
     ClassifierEntry,
     ControllerEntry,
     DatasetEntry,
+    ExperimentEntry,
+    ExperimentKindEntry,
     FeatureSetEntry,
     PipelineEntry,
     SensorBackendEntry,
@@ -128,3 +130,67 @@ def graspsense_pipelines() -> Iterable[PipelineEntry]:
         resource="graspsense:plugins/pipelines/best.toml",
         summary="the default gripper and control, with a neural network on features of the whole force curve",
     )
+
+
+@hookimpl
+def graspsense_experiment_kinds() -> Iterable[ExperimentKindEntry]:
+    """Return the kinds of experiments that compare recognition rates, and those of trade-offs."""
+    yield ExperimentKindEntry(
+        name="recognise",
+        run="graspsense.experiments.recognise:recognise",
+        keys="graspsense.experiments.recognise:EvaluationSettings",
+        seconds_per_trial=0.00986,
+        summary="trains and tests classifiers on the trials",
+    )
+    trades = "graspsense.experiments.trade"
+    for name, module, keys, seconds, summary in (
+        ("trade", "costs", "TradeSettings", 0.00394, "recognition against what a setting costs"),
+        ("early", "early", "EarlySettings", 0.0363, "recognition against the time since contact"),
+        ("squeezes", "squeezes", "RepeatSettings", 0.0025, "recognition against the number of squeezes"),
+        ("physics", "physics", "ModelErrorSettings", 0.00578, "recognition when test trials lack a term"),
+        ("next_squeeze", "next_squeeze", "NextSqueezeSettings", 0.0156, "rules for the next squeeze"),
+        (
+            "compare",
+            "compare",
+            "ComparisonSettings",
+            0.0232,
+            "classifiers against training and prediction time",
+        ),
+    ):
+        yield ExperimentKindEntry(
+            name=name,
+            run=f"{trades}.{module}:{name}",
+            keys=f"{trades}.{module}:{keys}",
+            findings=f"{trades}.findings:findings",
+            seconds_per_trial=seconds,
+            summary=summary,
+        )
+    yield ExperimentKindEntry(
+        name="trades",
+        findings=f"{trades}.findings:findings",
+        summary="several trade-offs as one experiment",
+    )
+
+
+@hookimpl
+def graspsense_experiments() -> Iterable[ExperimentEntry]:
+    """Return the experiments of this package; `benchmarks/experiment_times.py` measures the times."""
+    for name, seconds in (
+        ("probing_force", 0.00986),
+        ("trade_accuracy", 0.00626),
+        ("trade_cells", 0.0033),
+        ("trade_classifiers", 0.0232),
+        ("trade_force", 0.009),
+        ("trade_frame_rate", 0.00337),
+        ("trade_joint", None),
+        ("trade_next", 0.0156),
+        ("trade_noise", 0.000927),
+        ("trade_physics", 0.00529),
+        ("trade_recognition", None),
+        ("trade_sensing", None),
+        ("trade_speed", 0.0045),
+        ("trade_squeezes", 0.0025),
+        ("trade_time", 0.0363),
+    ):
+        resource = f"graspsense:experiments/shipped/{name}.toml"
+        yield ExperimentEntry(name, resource, seconds_per_trial=seconds)

@@ -147,10 +147,10 @@ def table(
 
 
 VERDICTS: Final = {
-    "holds": ("✓", "good"),
+    "agrees": ("✓", "good"),
     "yes": ("✓", "good"),
     "higher": ("▲", "good"),
-    "does not hold": ("✗", "bad"),
+    "differs": ("✗", "bad"),
     "no": ("✗", "bad"),
     "lower": ("▼", "bad"),
     "equivalent": ("✓", "good"),

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from graspsense.core.components.identification import repeatability
+from graspsense.core.components.identification import held_out_in_words, repeatability
 from graspsense.report.html import Page, Section, bullets, figure, panels, paragraph, table
 from graspsense.report.svg import INKS, QUIET, WIDTH, AxisScale, Picture, reaching
 
@@ -43,9 +43,9 @@ def identification_page(result: Identification, scene: str) -> Page:
         headline=f"{what}: {chosen}",
         answer=(
             f"{len(result.fits)} squeezes, fitted to {100.0 * float(np.mean(relative)):.2g} % of the peak force (rms). "
-            f"{_differ(result.fits)}The scene is {scene}."
+            f"{_differ(result.fits)}{_held_out(result.held_out)}The scene is {scene}."
         ),
-        beside=bullets(result.notes),
+        beside=bullets(result.refusals, "warning") + bullets(result.notes),
         sections=(
             Section(id="parameters", title="Parameters", body=_parameters(result.parameters)),
             Section(id="open", title="Not determined", body=_undetermined(result)),
@@ -61,6 +61,10 @@ def _differ(fits: Sequence[SqueezeFit]) -> str:
     if len(fits) < 2:
         return ""
     return f"Among themselves, the squeezes differ by {100.0 * repeatability(fits):.2g} % of the peak. "
+
+
+def _held_out(errors: Sequence[float]) -> str:
+    return f"Held out: {held_out_in_words(errors)}. " if errors else ""
 
 
 def _parameters(parameters: Sequence[IdentifiedParameter]) -> str:
@@ -84,10 +88,11 @@ def _candidates(result: Identification) -> str:
         for one in result.candidates
     ]
     note = paragraph(
-        "The error is the rms residual over the peak force. The simplest candidate is chosen whose error on held-out "
-        "data is not larger than the least by more than a standard error of the difference."
+        "The error is the rms residual over the peak force, of other recordings with a width and a stiffness of their "
+        "own, or of other stretches of a single recording. The simplest candidate is chosen whose error is not larger "
+        "than the least by more than a standard error of the difference."
     )
-    header = ("candidate", "parameters", "error, held out", "error, fitted", "verdict")
+    header = ("candidate", "parameters", "error", "error, fitted", "verdict")
     return note + table("Candidates", header, rows, 1)
 
 

@@ -20,13 +20,7 @@ from typing import Any, Final
 from urllib.parse import unquote, urlparse
 
 from graspsense.core.components.config import resolve
-from graspsense.core.components.entries import (
-    CommandEntry,
-    ConformanceCheckEntry,
-    DatasetEntry,
-    ModelEntry,
-    PipelineEntry,
-)
+from graspsense.core.components.entries import ConformanceCheckEntry, PipelineEntry
 from graspsense.core.components.registry import SLOW_IMPORT_S, Resource
 from graspsense.core.pipeline.wiring import check as check_wiring
 from graspsense.core.values.errors import GraspsenseError, named
@@ -95,20 +89,15 @@ def plugin_modules_are_light(package: Package) -> None:
 
 
 def everything_declared_loads(package: Package) -> None:
-    """Every class, config, pipeline, model, reader and command that it declares can be loaded."""
+    """Every class, config, file, reader, command and kind of experiment that it declares can be loaded."""
     for component in package.components:
         component.config_class()
         component.component_class()
     for resource in package.resources:
-        if isinstance(resource.entry, PipelineEntry | ModelEntry):
+        if resource.is_file:
             resource.file()
-        elif isinstance(resource.entry, DatasetEntry):
-            if resource.entry.recordings:
-                resource.recordings()
-            if resource.entry.target:
-                resource.load()
-        else:
-            resource.load()
+        for part in resource.targets:
+            resource.load(part)
 
 
 def names_are_unique(package: Package) -> None:
@@ -119,6 +108,8 @@ def names_are_unique(package: Package) -> None:
         *package.plugins.models(),
         *package.plugins.datasets(),
         *package.plugins.commands(),
+        *package.plugins.experiment_kinds(),
+        *package.plugins.experiments(),
     ]
     parts: list[Any] = [*package.components, *package.resources]
     for mine in parts:
@@ -212,7 +203,7 @@ def wheel_is_complete(package: Package) -> None:
                 f"the wheel of {folder.name} has no module {module}: {_ADVICE}",
             )
     for resource in package.resources:
-        if isinstance(resource.entry, PipelineEntry | ModelEntry):
+        if resource.is_file:
             top, _, path = resource.entry.resource.partition(":")
             name = f"{top.replace('.', '/')}/{path}"
             demand(name in inside, f"the wheel of {folder.name} has no file {name}: {_ADVICE}")
@@ -239,11 +230,7 @@ def _modules_of(package: Package) -> Iterator[str]:
         targets = (component.entry.target, component.entry.config)
         yield from (target.partition(":")[0] for target in targets if target)
     for resource in package.resources:
-        if isinstance(resource.entry, DatasetEntry):
-            targets = (resource.entry.recordings, resource.entry.target)
-            yield from (target.partition(":")[0] for target in targets if target)
-        elif isinstance(resource.entry, CommandEntry):
-            yield resource.entry.target.partition(":")[0]
+        yield from (getattr(resource.entry, part).partition(":")[0] for part in resource.targets)
 
 
 def _lies_within(module: str, folder: Path) -> bool:

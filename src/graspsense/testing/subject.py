@@ -95,6 +95,9 @@ def package_of(
         *plugins.datasets(),
         *plugins.commands(),
         *plugins.emulators(),
+        *plugins.identifiers(),
+        *plugins.experiment_kinds(),
+        *plugins.experiments(),
         *plugins.conformance_checks(),
     ]
     return Package(

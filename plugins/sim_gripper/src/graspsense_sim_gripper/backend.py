@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import repeat
 from typing import Any, Final, Unpack
 
@@ -19,11 +19,9 @@ from graspsense.plugin_api import (
     Frame,
     FreeRun,
     Grasped,
-    Identification,
     ObjectKind,
     Pads,
     Reading,
-    RecordedSqueeze,
     RunConfig,
     SimulationVariant,
     TickParams,
@@ -68,7 +66,6 @@ NOISE_TICKS: Final = 512
 MOST_FREE_TICKS: Final = 1024
 """Largest number of ticks of free motion that are run at once."""
 
-Progress = Callable[[str, int, int], None]
 
 _sense = bind_reachable(sense, {}, INTERPRETED)
 _reading = maker(Reading)
@@ -301,18 +298,6 @@ class SimBackend(BatchBackend[SimConfig]):
         from graspsense_sim_gripper.variants import variants
 
         return variants()
-
-    def identify(
-        self,
-        squeezes: Sequence[RecordedSqueeze],
-        progress: Progress,
-        block: Sequence[RecordedSqueeze] = (),
-    ) -> Identification:
-        """Return the object that recorded squeezes are of. Raises ConfigError."""
-        # Imported here, since only this needs the optimiser.
-        from graspsense_sim_gripper.identify.run import identify
-
-        return identify(self.config, squeezes, progress, block)
 
     def perturbed(self, scenes: Sequence[str], share: float) -> Mapping[str, SimBackend]:
         """Return this gripper, and this gripper with each parameter larger by this share, see `perturbed`."""

@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 from attrs import field, frozen
-from attrs.validators import and_, deep_iterable, instance_of, matches_re, min_len, optional
+from attrs.validators import and_, deep_iterable, ge, instance_of, matches_re, min_len, optional
 
 from graspsense.core.values.channel import IS_NAME, Channel
 from graspsense.core.values.errors import suggestion
@@ -279,6 +279,26 @@ class EmulatorEntry:
 
 
 @frozen
+class IdentifierEntry:
+    """A function that identifies an object from recorded squeezes, as a scene of a simulator: `graspsense identify`.
+
+    `name` is the sensor backend that simulates the scene. `target` is a function `identify(config, squeezes, progress,
+    block)` that returns an `Identification`. `config` is that of the backend, `squeezes` and `block` are sequences of
+    `RecordedSqueeze`, `block` those of a rigid block by the same gripper. `progress(what, done, total)` tells how far
+    it is. It raises ConfigError if the squeezes determine no object.
+    """
+
+    name: str = field(validator=IS_NAME)
+    """The sensor backend that simulates the scene."""
+    target: str = field(validator=_IS_TARGET)
+    """The import string of the function `identify(config, squeezes, progress, block)`."""
+    summary: str = field(validator=instance_of(str))
+    """What is identified, in one line."""
+    needs: str = ""
+    """What to install or do if the target cannot be imported."""
+
+
+@frozen
 class ConformanceCheckEntry:
     """A check of what other plugins return from a hook that this plugin owns.
 
@@ -297,6 +317,49 @@ class ConformanceCheckEntry:
     """What the check requires, in one line."""
     needs: str = ""
     """What to install or do if the target cannot be imported."""
+
+
+@frozen(kw_only=True)
+class ExperimentKindEntry:
+    """A kind of experiment, which an experiment file names by its key `kind`.
+
+    `run` is a function `run(params, seed)` that computes a task; its result must depend on these two alone, and
+    `result` is the attrs class of the result. `keys` is the attrs class of the keys under `[judge]`. A kind without
+    `run` is for experiments that consist of others. Raises ValueError if only one of `run` and `keys` is given.
+    """
+
+    name: str = field(validator=IS_NAME)
+    """The value of the key `kind`."""
+    summary: str = field(validator=instance_of(str))
+    """What a task computes, in one line."""
+    run: str = field(default="", validator=_IS_TARGET_OR_EMPTY)
+    """The import string of the function `run(params, seed)`."""
+    keys: str = field(default="", validator=_IS_TARGET_OR_EMPTY)
+    """The import string of the class of the keys under `[judge]`."""
+    result: str = field(default="", validator=_IS_TARGET_OR_EMPTY)
+    """The import string of the class of the result; empty for recognition rates."""
+    findings: str = field(default="", validator=_IS_TARGET_OR_EMPTY)
+    """The import string of a function from a `Summary` to `Findings`; empty if the rates are the whole report."""
+    seconds_per_trial: float | None = field(default=None, validator=optional(ge(0.0)))
+    """Processor time per trial, from which the duration of a user's experiment is estimated; None if not known."""
+    needs: str = ""
+    """What to install or do if these cannot be imported."""
+
+    def __attrs_post_init__(self) -> None:
+        if bool(self.run) != bool(self.keys):
+            raise ValueError(f"kind {self.name!r} of experiment needs both 'run' and 'keys', or neither")
+
+
+@frozen
+class ExperimentEntry:
+    """An experiment file shipped inside a package: `resource` is `"package:path/inside/it.toml"`."""
+
+    name: str = field(validator=IS_NAME)
+    """The name of the experiment, for `graspsense experiment`."""
+    resource: str = field(validator=_IS_RESOURCE)
+    """The file in its package: `"package:path/inside/it.toml"`."""
+    seconds_per_trial: float | None = field(default=None, validator=optional(ge(0.0)))
+    """Processor time per trial, from which the duration is estimated; None for that of its kind."""
 
 
 @frozen

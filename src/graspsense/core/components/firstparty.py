@@ -32,11 +32,15 @@ class Shipped:
 
 _PR2 = Shipped("graspsense-pr2-gripper", "pr2_gripper", "pr2")
 _SIM = Shipped("graspsense-sim-gripper", "sim_gripper", "sim")
+_MUJOCO = Shipped("graspsense-mujoco-gripper", "mujoco_gripper", "mujoco")
 _C45 = Shipped("graspsense-c45", "c45", "c45")
+_PAPER = Shipped("graspsense-paper", "paper", "paper")
+_IDENTIFY = Shipped("graspsense-identify", "identify", "identify")
 
 SHIPPED: Final[dict[tuple[Role, str], Shipped]] = {
     ("sensor-backend", "pr2"): _PR2,
     ("sensor-backend", "sim"): _SIM,
+    ("sensor-backend", "mujoco"): _MUJOCO,
     ("classifier", "c45"): _C45,
 }
 """Components in other distributions of this project, for the hint if one is not installed."""
@@ -68,3 +72,19 @@ EXAMPLES: Final[dict[tuple[Role, str], Example]] = {
 
 MODELS: Final[dict[str, Shipped]] = {"default": _SIM, "best": _SIM}
 """Models that this project ships, with their distributions."""
+
+EXPERIMENTS: Final[dict[str, Shipped]] = dict.fromkeys(
+    (
+        *("approach_speed", "controllers", "eleven_classes", "fig_4", "fig_5", "fig_6", "one_finger_first"),
+        *("other_classifiers", "paper", "stiction", "table_2", "table_3", "table_4", "table_5", "table_6"),
+        *("why_force", "worn_bottles"),
+    ),
+    _PAPER,
+)
+"""Experiments in other distributions of this project."""
+
+EXPERIMENT_KINDS: Final[dict[str, Shipped]] = dict.fromkeys(("grasp", "paper", "table"), _PAPER)
+"""Kinds of experiments in other distributions of this project."""
+
+IDENTIFIERS: Final[dict[str, Shipped]] = {"sim": _IDENTIFY}
+"""What identifies objects as scenes of a sensor backend, in other distributions of this project."""

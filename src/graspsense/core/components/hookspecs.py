@@ -18,9 +18,12 @@ from graspsense.core.components.entries import (
     ControllerEntry,
     DatasetEntry,
     EmulatorEntry,
+    ExperimentEntry,
+    ExperimentKindEntry,
     FeatureSetEntry,
     Finding,
     FoundDevice,
+    IdentifierEntry,
     ModelEntry,
     PipelineEntry,
     SensorBackendEntry,
@@ -82,6 +85,21 @@ def graspsense_commands() -> Iterable[CommandEntry]:  # type: ignore[empty-body]
 @hookspec
 def graspsense_emulators() -> Iterable[EmulatorEntry]:  # type: ignore[empty-body]
     """Return the devices that this plugin can emulate as devices of the operating system."""
+
+
+@hookspec
+def graspsense_identifiers() -> Iterable[IdentifierEntry]:  # type: ignore[empty-body]
+    """Return functions that identify objects from recorded squeezes."""
+
+
+@hookspec
+def graspsense_experiment_kinds() -> Iterable[ExperimentKindEntry]:  # type: ignore[empty-body]
+    """Return the kinds of experiments of this plugin."""
+
+
+@hookspec
+def graspsense_experiments() -> Iterable[ExperimentEntry]:  # type: ignore[empty-body]
+    """Return the experiment files that this plugin ships."""
 
 
 @hookspec

@@ -48,10 +48,11 @@ class IdentifiedParameter:
 
 @frozen(kw_only=True)
 class CandidateScore:
-    """A candidate: its terms, its number of free parameters, and its error on data that it was not fitted to.
+    """A candidate: its terms, its number of free parameters, and the error by which it is compared with others.
 
-    `error` is the rms residual over the peak force, of held-out recordings or held-out stretches. `verdict` says
-    why the candidate was chosen or not.
+    `error` is the rms residual over the peak force, of recordings that its terms were not fitted to, each with a width
+    and a stiffness of its own; of a single recording, that of stretches which it was not fitted to. `verdict` says why
+    the candidate was chosen or not.
     """
 
     terms: str
@@ -64,11 +65,15 @@ class CandidateScore:
 
 @frozen(kw_only=True)
 class Undetermined:
-    """A quantity that the recordings do not determine: why, and what would determine it."""
+    """A quantity that the recordings do not determine: why, and what would determine it.
+
+    `in_scene`: whether it is a number of the scene, whose value then means nothing.
+    """
 
     what: str
     reason: str
     remedy: str
+    in_scene: bool = False
 
 
 @frozen(kw_only=True, eq=False)
@@ -115,6 +120,15 @@ def repeatability(fits: Sequence[SqueezeFit]) -> float:
     return deviation / float(np.mean([one.peak_n for one in fits]))
 
 
+def held_out_in_words(errors: Sequence[float]) -> str:
+    """Return how well squeezes are predicted from the other recordings."""
+    rms = math.sqrt(sum(error * error for error in errors) / len(errors))
+    return (
+        f"{100.0 * rms:.1f} % of the peak ({100.0 * min(errors):.1f} to {100.0 * max(errors):.1f}): each recording "
+        "predicted from others, with a width of its own"
+    )
+
+
 @frozen(kw_only=True)
 class PredictiveCheck:
     """A statistic of the recorded squeezes beside that of simulated ones.
@@ -133,7 +147,9 @@ class PredictiveCheck:
 class Identification:
     """An object identified from recorded squeezes.
 
-    `scene` is the text of a scene file. `draws` has a row for each draw of the parameters, in their order.
+    `scene` is the text of a scene file. `draws` has a row for each draw of the parameters, in their order. `held_out`
+    has the rms error over the peak of each squeeze, predicted from other recordings, with only a width of its own; it
+    is empty for a single recording. `refusals` says why the scene is not to be used.
     """
 
     label: str
@@ -142,6 +158,8 @@ class Identification:
     candidates: tuple[CandidateScore, ...]
     undetermined: tuple[Undetermined, ...]
     fits: tuple[SqueezeFit, ...]
+    held_out: tuple[float, ...] = ()
+    refusals: tuple[str, ...] = ()
     checks: tuple[PredictiveCheck, ...] = ()
     draws: NDArray[Any] | None = None
     notes: tuple[str, ...] = ()

@@ -39,7 +39,6 @@ if TYPE_CHECKING:
 
     from graspsense.core.components.compiled_features import CompiledFeatures
     from graspsense.core.components.entries import Feature
-    from graspsense.core.components.identification import Identification, Progress, RecordedSqueeze
     from graspsense.core.components.run_config import RunConfig
     from graspsense.core.control.tick import FreeRun, TickParams, TickState
     from graspsense.core.values.channel import Channel
@@ -267,22 +266,6 @@ class BatchBackend(SensorBackend[ConfigT]):
     def variants(self) -> Sequence[SimulationVariant]:
         """Return the variants that trade accuracy for time; empty if there are none."""
         return ()
-
-    def identify(
-        self,
-        squeezes: Sequence[RecordedSqueeze],
-        progress: Progress,
-        block: Sequence[RecordedSqueeze] = (),
-    ) -> Identification:
-        """Return the object that recorded squeezes are of, as a scene of this simulator.
-
-        `block` are squeezes of a rigid block by the same gripper, from which its fingertips are identified first.
-        Raises ConfigError if the simulator cannot identify objects, or if the squeezes determine none.
-        """
-        del squeezes, progress, block
-        raise ConfigError(
-            f"{type(self).__name__} cannot identify an object from recordings. gripper.type = 'sim' can"
-        )
 
     def perturbed(self, scenes: Sequence[str], share: float) -> Mapping[str, BatchBackend[Any]]:
         """Return this gripper with each parameter of it, or of these scenes, larger by a share; "" is unchanged.

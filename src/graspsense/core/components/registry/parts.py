@@ -23,8 +23,11 @@ from graspsense.core.components.entries import (
     ConformanceCheckEntry,
     DatasetEntry,
     EmulatorEntry,
+    ExperimentEntry,
+    ExperimentKindEntry,
     Finding,
     FoundDevice,
+    IdentifierEntry,
     ModelEntry,
     PipelineEntry,
     Role,
@@ -49,6 +52,9 @@ EntryT = TypeVar(
     DatasetEntry,
     CommandEntry,
     EmulatorEntry,
+    ExperimentEntry,
+    ExperimentKindEntry,
+    IdentifierEntry,
     ConformanceCheckEntry,
 )
 
@@ -231,17 +237,26 @@ class Component(Declared[ComponentEntry]):
 
 @frozen
 class Resource(Declared[EntryT]):
-    """A pipeline, model, data set, command, emulator or conformance check that a plugin declares."""
+    """A pipeline, model, data set, command, emulator, experiment or check that a plugin declares."""
 
     @property
     def kind(self) -> str:
         """The kind of its entry in words."""
         return _KIND_OF_ENTRY[type(self.entry)]
 
-    def load(self) -> Any:
-        """Import and return the target of an entry that is code. Raises PluginUnavailable."""
-        assert not isinstance(self.entry, PipelineEntry | ModelEntry), "pipelines and models are files"
-        return self._import(self.entry.target)
+    @property
+    def targets(self) -> tuple[str, ...]:
+        """The names of the fields of its entry that name code; none for a file."""
+        return tuple(name for name in _TARGETS if getattr(self.entry, name, ""))
+
+    @property
+    def is_file(self) -> bool:
+        """Whether it is a file of its package."""
+        return hasattr(self.entry, "resource")
+
+    def load(self, part: str = "target") -> Any:
+        """Import and return what this field of an entry names. Raises PluginUnavailable."""
+        return self._import(getattr(self.entry, part))
 
     def recordings(self) -> Any:
         """Import and return the function of a data set that yields its recordings. Raises PluginUnavailable."""
@@ -253,8 +268,8 @@ class Resource(Declared[EntryT]):
         return self._import(self.entry.recordings)
 
     def file(self) -> Traversable:
-        """Return the file of a pipeline or model. Raises PluginUnavailable if its package does not contain it."""
-        assert isinstance(self.entry, PipelineEntry | ModelEntry), f"a {self.kind} is code"
+        """Return its file. Raises PluginUnavailable if its package does not contain it."""
+        assert isinstance(self.entry, PipelineEntry | ModelEntry | ExperimentEntry), f"a {self.kind} is code"
         package, _, path = self.entry.resource.partition(":")
         try:
             file = files(package).joinpath(path)
@@ -265,12 +280,16 @@ class Resource(Declared[EntryT]):
         return file
 
 
+_TARGETS: Final = ("target", "recordings", "run", "keys", "result", "findings")
 _KIND_OF_ENTRY: Final[dict[type, str]] = {
     PipelineEntry: "pipeline",
     ModelEntry: "model",
     DatasetEntry: "data set",
     CommandEntry: "command",
     EmulatorEntry: "emulator",
+    ExperimentEntry: "experiment",
+    ExperimentKindEntry: "kind of experiment",
+    IdentifierEntry: "identifier of objects",
     ConformanceCheckEntry: "conformance check",
 }
 

@@ -11,7 +11,7 @@ import os
 import sys
 import traceback
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from types import TracebackType
+from types import MappingProxyType, TracebackType
 from typing import TYPE_CHECKING, Any, Final, Literal, TypeVar
 
 from attrs import evolve
@@ -24,14 +24,25 @@ from graspsense.core.components.entries import (
     ConformanceCheckEntry,
     DatasetEntry,
     EmulatorEntry,
+    ExperimentEntry,
+    ExperimentKindEntry,
     FeatureSetEntry,
     Finding,
     FoundDevice,
+    IdentifierEntry,
     ModelEntry,
     PipelineEntry,
     Role,
 )
-from graspsense.core.components.firstparty import EXAMPLES, SHIPPED
+from graspsense.core.components.firstparty import (
+    EXAMPLES,
+    EXPERIMENT_KINDS,
+    EXPERIMENTS,
+    IDENTIFIERS,
+    SHIPPED,
+    Example,
+    Shipped,
+)
 from graspsense.core.components.registry.discovery import (
     PluginSource,
     builtin_source,
@@ -78,6 +89,9 @@ RESOURCE_HOOKS: Final[dict[str, type]] = {
     "graspsense_datasets": DatasetEntry,
     "graspsense_commands": CommandEntry,
     "graspsense_emulators": EmulatorEntry,
+    "graspsense_identifiers": IdentifierEntry,
+    "graspsense_experiment_kinds": ExperimentKindEntry,
+    "graspsense_experiments": ExperimentEntry,
     "graspsense_conformance_checks": ConformanceCheckEntry,
 }
 
@@ -143,18 +157,10 @@ class Plugins:
 
         Raises UnknownName if there is none, or if several distributions provide the short name.
         """
-        hint = ""
-        wanted, _, short = name.rpartition("/")
-        shipped = SHIPPED.get((role, short)) or EXAMPLES.get((role, short))
-        present = {status.distribution for status in self._statuses}
-        if (
-            shipped
-            and canonical(wanted) in ("", shipped.distribution)
-            and shipped.distribution not in present
-        ):
-            hint = f"It is provided by {shipped.distribution}:\n  {shipped.hint}"
         key = f"{TABLE_OF_ROLE[role]}.type"
-        return self._only(role.replace("-", " "), self.components(role), name, key, hint)
+        provided: dict[tuple[Role, str], Shipped | Example] = {**EXAMPLES, **SHIPPED}
+        shipped = {short: by for (of_role, short), by in provided.items() if of_role == role}
+        return self._only(role.replace("-", " "), self.components(role), name, key, shipped)
 
     def pipelines(self) -> tuple[Resource[PipelineEntry], ...]:
         """Return the pipeline files that plugins ship."""
@@ -176,6 +182,18 @@ class Plugins:
         """Return the devices that can be emulated."""
         return self._resources_of(EmulatorEntry)
 
+    def identifiers(self) -> tuple[Resource[IdentifierEntry], ...]:
+        """Return the functions that identify objects."""
+        return self._resources_of(IdentifierEntry)
+
+    def experiment_kinds(self) -> tuple[Resource[ExperimentKindEntry], ...]:
+        """Return the kinds of experiments that plugins add."""
+        return self._resources_of(ExperimentKindEntry)
+
+    def experiments(self) -> tuple[Resource[ExperimentEntry], ...]:
+        """Return the experiment files that plugins ship."""
+        return self._resources_of(ExperimentEntry)
+
     def conformance_checks(self) -> tuple[Resource[ConformanceCheckEntry], ...]:
         """Return the checks that plugins contribute to the conformance kit."""
         return self._resources_of(ConformanceCheckEntry)
@@ -195,6 +213,20 @@ class Plugins:
     def command(self, name: str) -> Resource[CommandEntry]:
         """Return the subcommand of this short or qualified name. Raises UnknownName."""
         return self._only("command", self.commands(), name)
+
+    def experiment(self, name: str) -> Resource[ExperimentEntry]:
+        """Return the experiment of this short or qualified name. Raises UnknownName."""
+        return self._only("experiment", self.experiments(), name, shipped=EXPERIMENTS)
+
+    def experiment_kind(self, name: str) -> Resource[ExperimentKindEntry]:
+        """Return the kind of experiment of this short or qualified name. Raises UnknownName."""
+        return self._only("kind of experiment", self.experiment_kinds(), name, "kind", EXPERIMENT_KINDS)
+
+    def identifier(self, gripper: str) -> Resource[IdentifierEntry]:
+        """Return what identifies objects as scenes of this sensor backend. Raises UnknownName."""
+        return self._only(
+            "identifier of objects for gripper", self.identifiers(), gripper, shipped=IDENTIFIERS
+        )
 
     def emulator(self, name: str) -> Resource[EmulatorEntry]:
         """Return the emulator of this short or qualified name. Raises UnknownName."""
@@ -338,10 +370,18 @@ class Plugins:
         of_kind = (resource for resource in self._resources if type(resource.entry) is kind)
         return tuple(sorted(of_kind, key=lambda resource: (resource.name, resource.distribution)))
 
-    def _only(self, kind: str, known: Sequence[PartT], name: str, key: str = "", hint: str = "") -> PartT:
+    def _only(
+        self,
+        kind: str,
+        known: Sequence[PartT],
+        name: str,
+        key: str = "",
+        shipped: Mapping[str, Shipped | Example] = MappingProxyType({}),
+    ) -> PartT:
         """Return the part among `known` with this name, or raise UnknownName.
 
-        `key` is the setting in which the qualified name belongs, `hint` replaces the list of known names.
+        `key` is the setting in which the qualified name belongs. `shipped` names distributions of this project that
+        provide a part: where one is not installed, the error says how to install it.
         """
         wanted, _, short = name.rpartition("/")
         matching = [
@@ -357,8 +397,10 @@ class Plugins:
             raise UnknownName(
                 f'{kind} {name!r} is provided by {providers}; write {how}"{matching[0].qualified}"'
             )
-        if hint:
-            raise UnknownName(f"no {kind} named {name!r}. {hint}")
+        by = shipped.get(short)
+        present = {status.distribution for status in self._statuses}
+        if by and canonical(wanted) in ("", by.distribution) and by.distribution not in present:
+            raise UnknownName(f"no {kind} named {name!r}. It is provided by {by.distribution}:\n  {by.hint}")
         names = sorted({part.qualified if wanted else part.name for part in known})
         raise UnknownName(
             f"no {kind} named {name!r}. Known: {', '.join(names) or 'none'}.{suggestion(name, names)}"

@@ -1,0 +1,836 @@
+"""Whether `graspsense identify` brings known scenes back, and at how many recordings a simulator stops paying.
+
+    python plugins/identify/benchmarks/identify.py [--repeats 4] [--only NAME...] [--sensors NAME...] [...]
+    python plugins/identify/benchmarks/identify.py --delays 0 0.01 0.025 [...] [--rows FILE] [--markdown FILE]
+    python plugins/identify/benchmarks/identify.py --spreads 0 0.3 [...] [--rows FILE] [--markdown FILE]
+    python plugins/identify/benchmarks/identify.py --true-terms [...] [--rows FILE] [--markdown FILE]
+    python plugins/identify/benchmarks/identify.py --rows FILE --markdown FILE
+    python plugins/identify/benchmarks/identify.py --true-steps 6 [--recordings 30] [--rows FILE] [--markdown FILE]
+    python plugins/identify/benchmarks/identify.py --transfer [--rows FILE] [--markdown docs/identify.md] [--png FILE]
+
+Each scene below is grasped in simulation by the hybrid controller with a hold, with ideal sensors, with PR2 pads, and
+with pads at the 60 Hz of Robotiq's TSF-85 whose fingertips harden, once, three times and ten times. In each repeat,
+every value of the scene is multiplied by a factor from 0.74 to 1.35. With three and ten grasps the stiffness differs
+between objects (10 %). The scene is then identified from these grasps. A row says whether the true terms were
+chosen, and how many of the 90 % intervals hold the true values where they were. An interval of a single squeeze is of
+this squeeze, whose object has the nominal stiffness. Rows are appended to the file of `--rows`, and `--markdown` writes
+its tables between the marks of a page.
+
+With `--true-terms`: the true terms are given, and only they are fitted, which takes a fifth of the time. Their table is
+that of the coverage of intervals. Many scenes are needed for it: the parameters of a scene share an error that is
+drawn once, that of the mean stiffness of its objects, or, with one squeeze and pads, that of the friction of the drive.
+How often this error lies within its own 90 % interval is known without a measurement, and is nine of ten. So the table
+also has the coverage with the scenes of both kinds weighted by nine and one tenths (post-stratification: Cochran,
+Sampling Techniques, 3rd edition, 1977, section 5A.9).
+
+With `--delays`: the forces of the recordings are late by these times (s), of which the settings of the gripper do not
+know, and their table is that of the delays that come back.
+
+With `--spreads`: one parameter of each scene of `OWN_SPREADS` differs between objects by these standard deviations of
+its logarithm, and their table is that of the spreads that are claimed.
+
+With `--transfer`: four containers of the catalogue are the real world. From 1, 3, 10 and 30 recordings of each,
+a classifier is trained on the recordings, and another on simulated squeezes of the scenes that they were identified as.
+A third is trained on as many simulated squeezes of the true scenes: an identification does no better on average. All
+are tested on 40 other recordings of each container.
+
+With `--true-steps 6`: what is replaced in the identified scenes by the numbers of the true ones, step by step, and what
+rate classifiers trained on six draws of them have.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import os
+import platform
+import tempfile
+import time
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
+from datetime import date
+from itertools import product
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from attrs import asdict, evolve, frozen
+
+from graspsense import load_pipeline
+from graspsense.core.components.identification import Identification, RecordedSqueeze
+from graspsense.evaluation.intervals import wilson
+from graspsense.plugin_api import RunConfig, create, table_of
+from graspsense_identify.gas import combinations
+from graspsense_identify.interval import LEVEL, interval_of_mean, normal
+from graspsense_identify.laws import SLOTS
+from graspsense_identify.run import identify
+from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.objects.instance import _draws_of_number
+from graspsense_sim_gripper.objects.library import SCENE_IN_MEMORY
+from graspsense_sim_gripper.objects.library import find as find_object
+from graspsense_sim_gripper.terms.gas import Gas
+
+WIDTH_M: Final = 0.05
+AT_M: Final = 0.01
+SCENES: Final[Mapping[str, tuple[Mapping[str, Any], ...]]] = {
+    "spring": ({"type": "elastic", "k1_n_m": 1500.0},),
+    "stiffening": ({"type": "elastic", "k1_n_m": 800.0, "k3_n_m3": 1.5e7},),
+    "softening": ({"type": "elastic", "k1_n_m": 3000.0, "k3_n_m3": -1e7},),
+    "hertz": ({"type": "rigid", "hertz_n_m15": 30000.0},),
+    "foam": ({"type": "foam", "force_n": 8.0, "at_m": AT_M, "exponent": 2.3},),
+    "creeping": (
+        {"type": "elastic", "k1_n_m": 1200.0},
+        {"type": "maxwell", "k_n_m": 500.0, "tau_s": 0.2},
+    ),
+    "damped": ({"type": "elastic", "k1_n_m": 1500.0}, {"type": "loss", "damping_n_s_m": 60.0}),
+    "snap": (
+        {
+            "type": "snap",
+            "k1_n_m": 3000.0,
+            "critical_m": 2e-3,
+            "drop_n": 2.0,
+            "fall_m": 1e-3,
+            "k2_n_m": 2500.0,
+        },
+    ),
+    "creeping foam": (
+        {"type": "foam", "force_n": 8.0, "at_m": AT_M, "exponent": 2.0},
+        {"type": "maxwell", "k_n_m": 300.0, "tau_s": 0.3},
+    ),
+    "creeping hertz": (
+        {"type": "rigid", "hertz_n_m15": 20000.0},
+        {"type": "maxwell", "k_n_m": 400.0, "tau_s": 0.25},
+    ),
+    "two branches": (
+        {"type": "elastic", "k1_n_m": 1000.0},
+        {"type": "maxwell", "k_n_m": 600.0, "tau_s": 0.08},
+        {"type": "maxwell", "k_n_m": 400.0, "tau_s": 0.5},
+    ),
+    "creeping and damped": (
+        {"type": "elastic", "k1_n_m": 1200.0},
+        {"type": "maxwell", "k_n_m": 600.0, "tau_s": 0.4},
+        {"type": "loss", "damping_n_s_m": 40.0},
+    ),
+}
+AIR: Final = {"pressure_pa": 101325.0, "exponent": 1.0, "bulge_m3_pa": 0.0, "area_slope_m": 0.0}
+SCENES_WITH_GAS: Final[Mapping[str, tuple[Mapping[str, Any], ...]]] = {
+    "closed gas": (
+        {"type": "elastic", "k1_n_m": 500.0},
+        {"type": "gas", "area_m2": 2e-4, "volume_m3": 2.4e-6, **AIR},
+    ),
+    "vented gas": (
+        {"type": "elastic", "k1_n_m": 1300.0},
+        {"type": "gas", "area_m2": 1.2e-3, "volume_m3": 1e-4, "vent_m2": 7e-7, **AIR},
+    ),
+}
+ALL_SCENES: Final = {**SCENES, **SCENES_WITH_GAS}
+"""Of those with gas, the combinations of `graspsense_identify.gas` come back, and not each number."""
+COUNTS: Final = (1, 3, 10)
+SENSORS: Final[Mapping[str, Mapping[str, Any]]] = {
+    "ideal": {"sensor": "ideal"},
+    "PR2 pads": {"sensor": "pads"},
+    "60 Hz pads": {"sensor": "pads", "pad_period_s": 1.0 / 60.0, "pad_hardening_m": 0.001},
+}
+"""The settings of the gripper."""
+FACTOR: Final = 0.3
+"""The logarithm of the largest factor on the values of a scene."""
+STIFFNESS_SPREAD: Final = 0.1
+OWN_SPREADS: Final = {"creeping": "maxwell.tau_s", "stiffening": "elastic.k3_n_m3", "foam": "foam.exponent"}
+"""The parameter with a spread of its own in the rows of `--spreads`."""
+HOLD_S: Final = 1.5
+TOLD_APART: Final = 1.03
+"""Terms whose fits differ by less than this factor are not told apart by the data."""
+FORCE_N: Final = 18.0
+CONTAINERS: Final = ("odwalla:empty_open", "naked:empty_open", "can:empty_open", "water:empty_open")
+TRANSFER_COUNTS: Final = (1, 3, 10, 30)
+TRUE_STEPS: Final[Sequence[tuple[str, Sequence[str] | None]]] = (
+    ("nothing", ()),
+    ("also the spread of the share", ("share_spread",)),
+    ("also offset, mass and friction on the table", ("offset_spread_m", "mass_kg", "friction")),
+    ("also the share of the cells", ("share",)),
+    ("also the width and its spread", ("width_m", "width_spread_m")),
+    ("also the spread of the stiffness", ("stiffness_spread",)),
+    ("everything", None),
+)
+"""What is replaced by the true values in the rows of `--true-steps`, one after the other."""
+TESTED: Final = 40
+SIMULATED: Final = 40
+"""Simulated squeezes of each scene, each of another object: with fewer objects, their spreads show less."""
+
+
+@frozen(kw_only=True)
+class Row:
+    """The result for a scene, a sensor, a number of recordings, and a repeat."""
+
+    scene: str
+    sensor: str
+    recordings: int
+    repeat: int
+    chosen: str
+    """The chosen terms."""
+    right_terms: bool
+    told_apart: bool
+    """Whether the data tell the true terms from the chosen ones: the chosen ones fit worse, or are more."""
+    found: tuple[tuple[str, float, float, float, float], ...]
+    """Each parameter with its true value, its value, and the ends of its interval, where the true terms were chosen."""
+    seconds: float
+    late_s: float = 0.0
+    """By how much the forces of the recordings were late."""
+    delay: tuple[float, float, float, bool] | None = None
+    """The identified delay, the ends of its interval, and whether it was used; None if none was determined."""
+    own_spread: float = 0.0
+    """The spread of the parameter of `OWN_SPREADS`."""
+    spreads: tuple[tuple[str, float, float, float], ...] = ()
+    """The parameters for which a spread of their own was claimed, with it and the ends of its interval."""
+
+
+def drawn(terms: Sequence[Mapping[str, Any]], repeat: int) -> list[dict[str, Any]]:
+    """Return the terms of a repeat, with every value but that of `at_m` times a factor of its own."""
+    rng = np.random.default_rng([repeat, len(terms)])
+    return [
+        {
+            key: value
+            if key in ("type", "at_m") or (term["type"] == "gas" and key in AIR)
+            else value * math.exp(rng.uniform(-FACTOR, FACTOR))
+            for key, value in term.items()
+        }
+        for term in terms
+    ]
+
+
+def scene_text(
+    terms: Sequence[Mapping[str, Any]], spread: float, own: str = "", own_spread: float = 0.0
+) -> str:
+    """Return the text of a scene with these terms. `own`: the parameter with a spread of its own."""
+    lines = [f"width_m = {WIDTH_M}", f"stiffness_spread = {spread}", "share = 0.6", "share_spread = 0.01"]
+    for term in terms:
+        lines.append("[[terms]]")
+        lines += [f"{key} = {json.dumps(value)}" for key, value in term.items()]
+        kind, _, name = own.partition(".")
+        if own_spread > 0.0 and kind == term["type"]:
+            lines.append(f"spread = {{ {name} = {own_spread} }}")
+    return "\n".join(lines) + "\n"
+
+
+def squeezes_of(
+    scene: str, label: str, gripper: Mapping[str, Any], names: Sequence[str], seeds: Sequence[int]
+) -> list[RecordedSqueeze]:
+    """Return simulated recordings of a scene, one of each object, which the names tell apart."""
+    config = SimConfig(**gripper)
+    backend = create("sensor-backend", "sim", **gripper)
+    controller = create("controller", "hybrid", probing_force_n=FORCE_N)
+    objects = [f"{scene}#{name}" for name in names]
+    run = RunConfig(hold_s=HOLD_S)
+    done = backend.run_many(controller, objects, list(seeds), run=run, traces=True)
+    return [
+        RecordedSqueeze(
+            name=f"{label}-{seed}",
+            sha256="0" * 64,
+            trace=grasp.trace,
+            label=label,
+            instance=f"{label}#{name}",
+            gripper={"pad_stiffness_n_m": config.pad_stiffness_n_m, **gripper},
+            simulated=True,
+        )
+        for name, seed, grasp in zip(names, seeds, done, strict=True)
+    ]
+
+
+def delayed(squeeze: RecordedSqueeze, late_s: float) -> RecordedSqueeze:
+    """Return the recording of a sensor whose forces, and times of images, are late by a number of ticks."""
+    trace = squeeze.trace
+    ticks = round(late_s / float(np.median(np.diff(trace.t_s))))
+    last = len(trace.t_s) - ticks
+
+    def late(force: Any) -> Any:
+        return np.concatenate([np.full(ticks, force[0]), force[:last]])
+
+    left, right = late(trace.force_left_n), late(trace.force_right_n)
+    return evolve(
+        squeeze,
+        trace=evolve(trace, pad_t_s=trace.pad_t_s + late_s, force_left_n=left, force_right_n=right),
+    )
+
+
+def true_values(terms: Sequence[Mapping[str, Any]], identified: str) -> dict[str, float]:
+    """Return the true values of the parameters, with a foam's force at the compression of the identified scene.
+
+    The first of two Maxwell branches is the one that is the first in the identified scene, by their relaxation times.
+    """
+    scene = tomllib.loads(identified)["terms"]
+    at_m = {one["type"]: one.get("at_m") for one in scene}
+    times = [one["tau_s"] for one in scene if one["type"] == "maxwell"]
+    branches = sorted((one for one in terms if one["type"] == "maxwell"), key=lambda one: float(one["tau_s"]))
+    if times != sorted(times):
+        branches.reverse()
+    values = {}
+    for term in terms:
+        name = "maxwell 2" if term["type"] == "maxwell" and term is not branches[0] else term["type"]
+        if name == "gas":
+            numbers = {key: value for key, value in term.items() if key != "type"}
+            values |= {f"gas.{key}": value for key, value in combinations(Gas(**numbers)).items()}
+            continue
+        for key, value in term.items():
+            if key in ("type", "at_m"):
+                continue
+            if term["type"] == "foam" and key == "force_n" and at_m.get("foam"):
+                value = value * (at_m["foam"] / term["at_m"]) ** term["exponent"]
+            values[f"{name}.{key}"] = float(value)
+    return values
+
+
+def named(terms: Sequence[Mapping[str, Any]]) -> str:
+    """Return the name of the candidate with these terms."""
+    cubic = sum(one.get("k3_n_m3", 0.0) for one in terms)
+    form = "softening" if cubic < 0.0 else "k1, k3" if cubic > 0.0 else "k1"
+    kinds = sorted((one["type"] for one in terms), key=SLOTS.index)
+    vented = any(one.get("vent_m2") for one in terms)
+    words = {"elastic": f"elastic ({form})", "gas": "gas (vented)" if vented else "gas (closed)"}
+    return " + ".join(words.get(kind, kind) for kind in kinds)
+
+
+def seeds_of(name: str, sensor: str, count: int, repeat: int) -> list[int]:
+    """Return the seeds of the grasps of a row, which are the numbers of its objects as well.
+
+    They are others in every row: the number of an object fixes its stiffness, whatever its terms.
+    """
+    series = (list(ALL_SCENES).index(name) * 10 + list(SENSORS).index(sensor)) * 100 + count
+    return [100_000 * (series + 1) + 100 * repeat + i for i in range(count)]
+
+
+def mean_is_covered(row: Mapping[str, Any]) -> bool:
+    """Return whether the 90 % interval of Student's t from the stiffness of the row's objects covers the true mean.
+
+    It uses what was drawn and no measurement: where it does not cover, no identification would.
+    """
+    seeds = seeds_of(row["scene"], row["sensor"], row["recordings"], row["repeat"])
+    drawn = np.array([_draws_of_number(SCENE_IN_MEMORY, seed, 2)[0] for seed in seeds])
+    low, high = interval_of_mean(drawn)
+    return low < 0.0 < high
+
+
+def drawn_are_covered(row: Mapping[str, Any]) -> bool | None:
+    """Return whether the error that is common to the parameters of a scene lies within its 90 % interval.
+
+    It is that of the mean stiffness of its objects; of a single squeeze with pads that of the friction of the drive.
+    None for a single squeeze with ideal sensors, which has no such error. It uses no measurement.
+    """
+    if row["recordings"] > 1:
+        return mean_is_covered(row)
+    if row["sensor"] == "ideal":
+        return None
+    (seed,) = seeds_of(row["scene"], row["sensor"], 1, row["repeat"])
+    # `sample` draws five numbers of the placement before.
+    return bool(abs(np.random.default_rng(seed).standard_normal(6)[5]) < normal())
+
+
+def measured(
+    name: str,
+    sensor: str,
+    count: int,
+    repeat: int,
+    late_s: float = 0.0,
+    own_spread: float = 0.0,
+    *,
+    terms_known: bool = False,
+) -> Row:
+    """Return the row of a scene. `terms_known`: only the true terms are fitted."""
+    terms = drawn(ALL_SCENES[name], repeat)
+    text = scene_text(terms, STIFFNESS_SPREAD if count > 1 else 0.0, OWN_SPREADS.get(name, ""), own_spread)
+    seeds = seeds_of(name, sensor, count, repeat)
+    squeezes = squeezes_of(text, name, SENSORS[sensor], [str(one) for one in seeds], seeds)
+    only = named(terms) if terms_known else ""
+    late = [delayed(one, late_s) for one in squeezes]
+    result = identify(SimConfig(), late, lambda *_: None, only=only)
+    chosen = next(one for one in result.candidates if one.chosen)
+    true = next((one for one in result.candidates if one.terms == named(terms)), None)
+    right = true is chosen
+    truth = true_values(terms, result.scene) if right else {}
+    found = [one for one in result.parameters if one.name in truth]
+    alike = true is not None and chosen.fit_error <= TOLD_APART * true.fit_error
+    return Row(
+        scene=name,
+        sensor=sensor,
+        recordings=count,
+        repeat=repeat,
+        chosen=chosen.terms,
+        right_terms=right,
+        told_apart=right or true is None or not alike or chosen.parameters > true.parameters,
+        found=tuple((one.name, truth[one.name], one.value, one.low, one.high) for one in found),
+        seconds=result.seconds,
+        late_s=late_s,
+        delay=_delay(result),
+        own_spread=own_spread,
+        spreads=tuple(
+            (one.name.removesuffix(".spread"), one.value, one.low, one.high)
+            for one in result.parameters
+            if one.name.endswith(".spread")
+        ),
+    )
+
+
+def _delay(result: Identification) -> tuple[float, float, float, bool] | None:
+    """Return the delay, the ends of its interval, and whether it was used; None if it was refused."""
+    found = next((one for one in result.parameters if one.name == "delay_s"), None)
+    refused = any(one.what == "delay of the sensor" for one in result.undetermined)
+    used = tomllib.loads(result.scene)["identified"]["sensor"]["delay_s"] != 0.0
+    return None if found is None or (refused and not used) else (found.value, found.low, found.high, used)
+
+
+def in_words(row: Row) -> str:
+    """Return a row as a line of text."""
+    errors = ", ".join(f"{100.0 * (value / truth - 1.0):+.2f}" for _, truth, value, *_ in row.found)
+    covered = _covered([row.found])
+    right = (
+        "right terms" if row.right_terms else f"{row.chosen}{'' if row.told_apart else ' (as good a fit)'}"
+    )
+    return (
+        f"{row.scene:20} {row.sensor:10} {row.recordings:3} {right}, covered {sum(covered)} of {len(covered)}, "
+        f"errors {errors} %, {row.seconds:.1f} s"
+    )
+
+
+def _covered(rows: Sequence[Sequence[Sequence[Any]]]) -> list[bool]:
+    """Return whether each interval holds the true value."""
+    return [low <= truth <= high for row in rows for _, truth, _, low, high in row]
+
+
+def _share(part: int, whole: int) -> str:
+    if not whole:
+        return "–"
+    low, high = wilson(part, whole)
+    return f"{100.0 * part / whole:.0f} % ({part} of {whole}; {100.0 * low:.0f} to {100.0 * high:.0f})"
+
+
+def _covered_share(group: Sequence[Mapping[str, Any]]) -> str:
+    """Return the share of the intervals that cover, with the Wilson interval of the effective number of intervals.
+
+    The intervals of a scene share their error, so that they count as fewer: by the design effect, which is the variance
+    between scenes over that of independent intervals (Korn and Graubard, Survey Methodology 24, 1998).
+    """
+    sizes = np.array([len(one["found"]) for one in group if one["found"]])
+    if not len(sizes):
+        return "–"
+    hits = np.array([sum(_covered([one["found"]])) for one in group if one["found"]])
+    whole, part, scenes = int(sizes.sum()), int(hits.sum()), len(sizes)
+    share = part / whole
+    effective = float(scenes)
+    if scenes > 1 and 0 < part < whole:
+        between = float(np.sum((hits - share * sizes) ** 2)) * scenes / (scenes - 1) / whole**2
+        effective = min(share * (1.0 - share) / max(between, 1e-12), float(whole))
+    low, high = wilson(share * effective, effective)
+    return f"{100.0 * share:.0f} % ({part} of {whole}; {100.0 * low:.0f} to {100.0 * high:.0f})"
+
+
+def as_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Return the tables of these rows: by sensor and number of recordings, and by scene."""
+
+    def line(head: Sequence[str], group: Sequence[Mapping[str, Any]]) -> str:
+        apart = [one for one in group if one["told_apart"]]
+        several = [one for one in group if one["recordings"] > 1]
+        errors = [abs(value / truth - 1.0) for one in group for _, truth, value, *_ in one["found"]]
+        cells = (
+            *head,
+            str(len(group)),
+            _share(sum(one["right_terms"] for one in group), len(group)),
+            _share(sum(one["right_terms"] for one in apart), len(apart)),
+            _covered_share(group),
+            _share(sum(mean_is_covered(one) for one in several), len(several)),
+            f"{100.0 * float(np.median(errors)):.2g} %" if errors else "–",
+            f"{float(np.median([one['seconds'] for one in group])):.1f} s",
+        )
+        return "| " + " | ".join(cells) + " |"
+
+    columns = ("scenes", "right terms", "where the data tell them apart", "90 % intervals that cover")
+    columns += ("scenes whose drawn objects cover", "median error", "median time")
+
+    def header(head: Sequence[str]) -> list[str]:
+        names = (*head, *columns)
+        return table_head(names)
+
+    lines = header(("sensor", "squeezes"))
+    for sensor in SENSORS:
+        for count in COUNTS:
+            group = [one for one in rows if one["sensor"] == sensor and one["recordings"] == count]
+            if group:
+                lines.append(line((sensor, str(count)), group))
+    lines += [line(("all", "all"), rows), "", *header(("scene",))]
+    for name in ALL_SCENES:
+        group = [one for one in rows if one["scene"] == name]
+        if group:
+            lines.append(line((name,), group))
+    return "\n".join(lines)
+
+
+def table_head(columns: Sequence[str]) -> list[str]:
+    """Return the first lines of a table in Markdown."""
+    return ["| " + " | ".join(columns) + " |", "|" + "---|" * len(columns)]
+
+
+def coverage_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Return the table of the coverage with the true terms given: by sensor and number of recordings."""
+    columns = (
+        "sensor",
+        "squeezes",
+        "scenes",
+        "90 % intervals that cover",
+        "scenes whose drawn error is covered",
+    )
+    columns += ("intervals that cover there", "and in the other scenes", "weighted by nine and one tenths")
+    lines = table_head(columns)
+    for sensor, count in product(SENSORS, COUNTS):
+        group = [one for one in rows if one["sensor"] == sensor and one["recordings"] == count]
+        within = [one for one in group if drawn_are_covered(one)]
+        beyond = [one for one in group if drawn_are_covered(one) is False]
+        if not group:
+            continue
+        cells = (
+            *(sensor, str(count), str(len(group)), _covered_share(group)),
+            _share(len(within), len(within) + len(beyond)),
+            *(_hits(within), _hits(beyond), _weighted(within, beyond)),
+        )
+        lines.append("| " + " | ".join(cells) + " |")
+    return "\n".join(lines)
+
+
+def _hits(group: Sequence[Mapping[str, Any]]) -> str:
+    covered = _covered([one["found"] for one in group])
+    return f"{sum(covered)} of {len(covered)}" if covered else "–"
+
+
+def _weighted(within: Sequence[Mapping[str, Any]], beyond: Sequence[Mapping[str, Any]]) -> str:
+    """Return the coverage with the probabilities of both kinds of scenes, and its standard error between scenes."""
+    if len(within) < 2 or len(beyond) < 2:
+        return "–"
+    share = variance = 0.0
+    for weight, group in ((LEVEL, within), (1.0 - LEVEL, beyond)):
+        sizes = np.array([len(one["found"]) for one in group])
+        hits = np.array([sum(_covered([one["found"]])) for one in group])
+        own = float(hits.sum() / sizes.sum())
+        squares = float(np.sum((hits - own * sizes) ** 2)) * len(group) / (len(group) - 1)
+        share += weight * own
+        variance += weight**2 * squares / float(sizes.sum()) ** 2
+    return f"{100.0 * share:.0f} ± {100.0 * math.sqrt(variance):.1f} %"
+
+
+def delays_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Return the table of the delays: by sensor, number of recordings, and delay."""
+    columns = ("sensor", "squeezes", "forces late by", "scenes", "delay used", "not determined")
+    columns += ("90 % intervals of the delay that cover", "median error of the delay", "right terms")
+    columns += ("90 % intervals of the parameters that cover",)
+    lines = table_head(columns)
+    for key in sorted(
+        {(list(SENSORS).index(one["sensor"]), one["recordings"], one["late_s"]) for one in rows}
+    ):
+        sensor, count, late_s = list(SENSORS)[key[0]], key[1], key[2]
+        group = [
+            one
+            for one in rows
+            if (one["sensor"], one["recordings"], one["late_s"]) == (sensor, count, late_s)
+        ]
+        found = [one["delay"] for one in group if one["delay"]]
+        errors = [1e3 * abs(value - late_s) for value, *_ in found]
+        covered = _covered([one["found"] for one in group])
+        cells = (
+            *(sensor, str(count), f"{1e3 * late_s:.0f} ms", str(len(group))),
+            *(str(sum(one[3] for one in found)), str(len(group) - len(found))),
+            _share(sum(low <= late_s <= high for _, low, high, _ in found), len(found)),
+            f"{float(np.median(errors)):.2g} ms" if errors else "–",
+            _share(sum(one["right_terms"] for one in group), len(group)),
+            _share(sum(covered), len(covered)),
+        )
+        lines.append("| " + " | ".join(cells) + " |")
+    return "\n".join(lines)
+
+
+def spreads_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Return the table of the spreads: by sensor, number of objects, parameter and spread."""
+    columns = (
+        "sensor",
+        "objects",
+        "parameter",
+        "its spread",
+        "scenes",
+        "claimed",
+        "claimed of another parameter",
+    )
+    columns += ("90 % intervals that cover", "median of what was claimed")
+    lines = table_head(columns)
+    keys = {
+        (list(SENSORS).index(one["sensor"]), one["recordings"], one["scene"], one["own_spread"])
+        for one in rows
+    }
+    for place, count, scene, spread in sorted(keys):
+        sensor, parameter = list(SENSORS)[place], OWN_SPREADS[scene]
+        group = [
+            one
+            for one in rows
+            if (one["sensor"], one["recordings"], one["scene"], one["own_spread"])
+            == (sensor, count, scene, spread)
+        ]
+        found = [claim for one in group for claim in one["spreads"] if claim[0] == parameter]
+        others = sum(any(claim[0] != parameter for claim in one["spreads"]) for one in group)
+        cells = (
+            *(sensor, str(count), f"`{parameter}`", f"{spread:g}", str(len(group))),
+            *(_share(len(found), len(group)), str(others)),
+            _share(sum(low <= spread <= high for *_, low, high in found), len(found)) if spread else "–",
+            f"{float(np.median([value for _, value, *_ in found])):.2g}" if found else "–",
+        )
+        lines.append("| " + " | ".join(cells) + " |")
+    return "\n".join(lines)
+
+
+def write_between(path: Path, mark: str, text: str) -> None:
+    """Replace what is between the two comments `mark` of a page by a text."""
+    begin, end = f"<!-- {mark} -->", f"<!-- end of {mark} -->"
+    before, _, rest = path.read_text(encoding="utf-8").partition(begin)
+    _, found, after = rest.partition(end)
+    if not found:
+        raise SystemExit(f"{path} has no lines {begin} and {end}")
+    path.write_text(f"{before}{begin}\n{text}\n{end}{after}", encoding="utf-8")
+
+
+def transfer(counts: Sequence[int], tested: int, classifier: str = "forest") -> list[dict[str, float]]:
+    """Return the recognition rates of classifiers trained on recordings, and on the scenes identified from them."""
+    settings = load_pipeline("default", options=[f"classifier.type={classifier}"]).settings
+    extract = settings.features.create().extract
+    pads = SENSORS["PR2 pads"]
+    recorded = {
+        name: squeezes_of(name, name, pads, [str(i // 3) for i in seeds], seeds)
+        for name in CONTAINERS
+        for seeds in [range(max(TRANSFER_COUNTS) + tested)]
+    }
+    test = [(extract(one.trace), name) for name in CONTAINERS for one in recorded[name][-tested:]]
+    true = [(extract(one.trace), name) for name in CONTAINERS for one in simulated_of(name, name)]
+    on_true = _right(settings, true, test)
+    rows = []
+    with tempfile.TemporaryDirectory() as folder:
+        for count in counts:
+            own = [(extract(one.trace), name) for name in CONTAINERS for one in recorded[name][:count]]
+            simulated = []
+            begin = time.monotonic()
+            for k, name in enumerate(CONTAINERS):
+                path = Path(folder) / f"{k}-{count}.toml"
+                result = identify(SimConfig(), recorded[name][:count], lambda *_: None)
+                path.write_text(result.scene, encoding="utf-8")
+                simulated += [(extract(one.trace), name) for one in simulated_of(str(path), name)]
+            rows.append(
+                {
+                    "recordings": count,
+                    "tested": len(test),
+                    "on_recordings": _right(settings, own, test),
+                    "on_identified": _right(settings, simulated, test),
+                    "on_true": on_true,
+                    "on_both": _right(settings, [*own, *simulated], test),
+                    "seconds": time.monotonic() - begin,
+                }
+            )
+            print(rows[-1], flush=True)
+    return rows
+
+
+def true_steps(count: int, tested: int, runs: int, classifier: str = "forest") -> list[dict[str, Any]]:
+    """Return the recognition rates of classifiers trained on scenes identified from so many recordings of each
+    container, of which more and more numbers are replaced by the true ones."""
+    settings = load_pipeline("default", options=[f"classifier.type={classifier}"]).settings
+    extract = settings.features.create().extract
+    pads, total = SENSORS["PR2 pads"], max(TRANSFER_COUNTS) + tested
+    scenes, test = {}, []
+    for name in CONTAINERS:
+        recorded = squeezes_of(name, name, pads, [str(i // 3) for i in range(total)], range(total))
+        scenes[name] = identify(SimConfig(), recorded[:count], lambda *_: None).scene
+        test += [(extract(one.trace), name) for one in recorded[-tested:]]
+    rows = []
+    for step, keys in TRUE_STEPS:
+        if keys is None:
+            scenes = {name: name for name in CONTAINERS}
+        else:
+            scenes = {name: with_true(scene, find_object(name), keys) for name, scene in scenes.items()}
+        right = []
+        for run in range(runs):
+            new = {name: simulated_of(scene, name, 10_000 * (run + 1)) for name, scene in scenes.items()}
+            train = [(extract(one.trace), name) for name, squeezes in new.items() for one in squeezes]
+            right.append(_right(settings, train, test))
+        rows.append({"step": step, "recordings": count, "tested": len(test), "right": right})
+        print(rows[-1], flush=True)
+    return rows
+
+
+def with_true(scene: str, true: Any, keys: Sequence[str]) -> str:
+    """Return the text of a scene with the values that the true object has of these keys."""
+    head, mark, terms = scene.partition("[[terms]]")
+    kept = [line for line in head.splitlines() if line.partition(" = ")[0] not in keys]
+    return "\n".join([*kept, *(f"{key} = {getattr(true, key)}" for key in keys), "", mark + terms])
+
+
+def simulated_of(scene: str, label: str, first: int = 10_000) -> list[RecordedSqueeze]:
+    """Return the simulated squeezes of a scene that a classifier is trained on."""
+    seeds = [first + i for i in range(SIMULATED)]
+    return squeezes_of(scene, label, SENSORS["PR2 pads"], [str(one) for one in seeds], seeds)
+
+
+def _right(settings: Any, train: Sequence[tuple[Any, str]], test: Sequence[tuple[Any, str]]) -> int:
+    """Return how many of the tested squeezes are recognised."""
+    classifier = settings.classifier.create()
+    classifier.fit(table_of([row for row, _ in train]), [label for _, label in train], seed=0)
+    best = np.argmax(classifier.probabilities(table_of([row for row, _ in test])), axis=1)
+    names = classifier.classes()
+    return sum(names[k] == label for k, (_, label) in zip(best, test, strict=True))
+
+
+_CURVES: Final = (
+    ("on_recordings", "the recordings"),
+    ("on_identified", "scenes identified from them"),
+    ("on_both", "both"),
+    ("on_true", "the true scenes"),
+)
+
+
+def transfer_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Return the table of the transfer."""
+    names = ["recordings a class", *(f"trained on {name}" for _, name in _CURVES)]
+    lines = table_head(names)
+    for row in rows:
+        rates = [_share(int(row[key]), int(row["tested"])) for key, _ in _CURVES]
+        lines.append("| " + " | ".join([str(row["recordings"]), *rates]) + " |")
+    return "\n".join(lines)
+
+
+def true_steps_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Return the table of the rates with more and more true values."""
+    lines = [
+        "| true values instead of the identified ones | recognised, mean of the runs | each run |",
+        "|---|---|---|",
+    ]
+    for row in rows:
+        right, tested = row["right"], row["tested"]
+        rate = f"{100.0 * float(np.mean(right)) / tested:.1f} %"
+        lines.append(f"| {row['step']} | {rate} | {', '.join(map(str, right))} of {tested} |")
+    return "\n".join(lines)
+
+
+def draw_transfer(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
+    """Draw the rates over the number of recordings."""
+    import matplotlib as mpl
+
+    mpl.use("Agg")
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots(figsize=(6.4, 3.8), layout="constrained")
+    counts = [row["recordings"] for row in rows]
+    for key, name in _CURVES:
+        rates = [100.0 * row[key] / row["tested"] for row in rows]
+        ends = [wilson(int(row[key]), int(row["tested"])) for row in rows]
+        low = [rate - 100.0 * end[0] for rate, end in zip(rates, ends, strict=True)]
+        high = [100.0 * end[1] - rate for rate, end in zip(rates, ends, strict=True)]
+        axes.errorbar(counts, rates, yerr=[low, high], marker="o", capsize=3.0, label=f"trained on {name}")
+    axes.set_xscale("log")
+    axes.set_xticks(counts, [str(one) for one in counts])
+    axes.minorticks_off()
+    axes.set_xlabel("recordings a class")
+    axes.set_ylabel("recognised, % (95 % interval)")
+    axes.grid(alpha=0.3)
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=2, frameon=False)
+    figure.savefig(path, dpi=140)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--repeats", type=int, default=4)
+    parser.add_argument("--first", type=int, default=0, help="number of the first repeat")
+    parser.add_argument("--only", nargs="+", choices=list(ALL_SCENES), default=list(SCENES))
+    parser.add_argument("--sensors", nargs="+", choices=list(SENSORS), default=list(SENSORS))
+    parser.add_argument("--recordings", nargs="+", type=int, help="the numbers of recordings")
+    parser.add_argument("--delays", nargs="+", type=float, help="the times by which the forces are late (s)")
+    parser.add_argument(
+        "--spreads", nargs="+", type=float, help="the spreads of the parameters of OWN_SPREADS"
+    )
+    parser.add_argument("--true-terms", action="store_true", help="fit the true terms only")
+    parser.add_argument("--transfer", action="store_true")
+    parser.add_argument("--true-steps", type=int, metavar="RUNS", help="simulated trainings of each step")
+    parser.add_argument("--rows", type=Path, help="append the rows to this file (JSON lines)")
+    parser.add_argument(
+        "--markdown", type=Path, help="write the tables of --rows to this page, and run nothing"
+    )
+    parser.add_argument("--png", type=Path, help="draw the transfer of --rows, and run nothing")
+    parser.add_argument("--json", action="store_true")
+    parser.add_argument("--short", action="store_true", help="least work, only to show that it runs")
+    asked = parser.parse_args()
+    if asked.markdown or asked.png:
+        if asked.rows is None:
+            parser.error("--markdown and --png need --rows FILE")
+        _publish(asked)
+        return
+    if asked.short:
+        asked.only, asked.recordings, asked.repeats = ["creeping"], [1], 1
+        asked.sensors = ["PR2 pads"]
+    begin = time.monotonic()
+    rows: list[Any] = []
+    if asked.transfer or asked.true_steps:
+        counts = asked.recordings or TRANSFER_COUNTS
+        rows = (
+            true_steps(max(counts), TESTED, asked.true_steps)
+            if asked.true_steps
+            else transfer(counts, TESTED)
+        )
+        if asked.rows:
+            with asked.rows.open("a", encoding="utf-8") as out:
+                out.writelines(f"{json.dumps(one)}\n" for one in rows)
+    else:
+        # A run that is stopped has all scenes in its rows.
+        for repeat in range(asked.first, asked.first + asked.repeats):
+            for count in asked.recordings or COUNTS:
+                for sensor, name, late_s, own in product(
+                    asked.sensors, asked.only, asked.delays or [0.0], asked.spreads or [0.0]
+                ):
+                    row = measured(name, sensor, count, repeat, late_s, own, terms_known=asked.true_terms)
+                    rows.append(asdict(row))
+                    if asked.rows:
+                        with asked.rows.open("a", encoding="utf-8") as out:
+                            out.write(f"{json.dumps(rows[-1])}\n")
+                    if not asked.json:
+                        print(in_words(row), flush=True)
+
+    made = {"date": str(date.today()), "python": platform.python_version(), "cores": os.cpu_count()}
+    if asked.json:
+        print(json.dumps({"rows": rows, "made": made}, indent=2))
+    else:
+        if not (asked.transfer or asked.true_steps):
+            print(_tables(asked)(rows))
+        print(f"{made}, {time.monotonic() - begin:.0f} s")
+
+
+def _tables(asked: argparse.Namespace) -> Callable[[Sequence[Mapping[str, Any]]], str]:
+    """Return what writes the tables of the asked rows."""
+    if asked.true_terms:
+        return coverage_markdown
+    if asked.spreads:
+        return spreads_markdown
+    return delays_markdown if asked.delays else as_markdown
+
+
+def _publish(asked: argparse.Namespace) -> None:
+    """Write the tables and the picture of rows that were measured before."""
+    rows = [json.loads(line) for line in asked.rows.read_text(encoding="utf-8").splitlines()]
+    if asked.png:
+        draw_transfer(rows, asked.png)
+    if asked.markdown and asked.true_steps:
+        write_between(asked.markdown, "true steps", true_steps_markdown(rows))
+    elif asked.markdown and asked.transfer:
+        write_between(asked.markdown, "transfer", transfer_markdown(rows))
+    elif asked.markdown and asked.true_terms:
+        write_between(asked.markdown, "coverage", coverage_markdown(rows))
+    elif asked.markdown and asked.spreads:
+        write_between(asked.markdown, "spreads", spreads_markdown(rows))
+    elif asked.markdown and asked.delays:
+        write_between(asked.markdown, "delays", delays_markdown(rows))
+    elif asked.markdown:
+        of_gas = all(row["scene"] in SCENES_WITH_GAS for row in rows)
+        write_between(asked.markdown, "gas" if of_gas else "known scenes", as_markdown(rows))
+
+
+if __name__ == "__main__":
+    main()

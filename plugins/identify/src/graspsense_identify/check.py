@@ -1,0 +1,77 @@
+"""The posterior predictive check: new simulated squeezes beside the recorded ones.
+
+Each simulated set has as many squeezes as were recorded. Its parameters are a draw of the identified ones, its objects
+and placements are drawn from the spreads, and it follows the recorded paths of the gap. The p-value of a statistic is
+that of the mean over a set.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graspsense.plugin_api import PredictiveCheck
+from graspsense_identify.fit import Fitted
+from graspsense_identify.forward import ForwardModel
+from graspsense_identify.prepare import Squeeze
+from graspsense_identify.spread import Uncertainty
+
+Floats = NDArray[np.float64]
+
+SETS: Final = 60
+MAX_SQUEEZES: Final = 10
+STATISTICS: Final = (
+    ("peak force", "N"),
+    ("work until the peak", "mJ"),
+    ("force at the end over the peak", ""),
+)
+
+
+def predictive_checks(
+    model: ForwardModel, fitted: Fitted, found: Uncertainty, squeezes: Sequence[Squeeze], seed: int = 1
+) -> tuple[PredictiveCheck, ...]:
+    """Return a check of each statistic."""
+    rng = np.random.default_rng(seed)
+    used = list(squeezes[:MAX_SQUEEZES])
+    recorded = np.array([_statistics(one, one.force_n) for one in used])
+    spread = math.hypot(
+        *(one if math.isfinite(one) else 0.0 for one in (found.between_objects, found.between_squeezes))
+    )
+    residual = float(np.sqrt(np.mean(fitted.residuals**2)))
+    means, every = [], []
+    for draw in found.draws[:SETS]:
+        rows = []
+        for squeeze, width, factor in zip(used, fitted.widths_m, fitted.factors, strict=False):
+            own = math.exp(spread * rng.standard_normal()) if len(used) > 1 else factor
+            forces = model.forces(squeeze, fitted.candidate, draw.tolist(), width, own)
+            noisy = forces + residual * squeeze.peak_n * rng.standard_normal(len(forces))
+            rows.append(_statistics(squeeze, noisy))
+        means.append(np.mean(rows, axis=0))
+        every.append(rows)
+    p_values = np.mean(np.asarray(means) >= recorded.mean(axis=0), axis=0)
+    simulated = np.array(every).reshape(-1, len(STATISTICS))
+    return tuple(
+        PredictiveCheck(
+            statistic=name,
+            unit=unit,
+            recorded=tuple(recorded[:, k].tolist()),
+            simulated=tuple(simulated[:, k].tolist()),
+            p=float(p_values[k]),
+        )
+        for k, (name, unit) in enumerate(STATISTICS)
+    )
+
+
+def _statistics(squeeze: Squeeze, force_n: Floats) -> tuple[float, float, float]:
+    """Return peak force, work (mJ) until the gap is smallest, and the force there at the end of the hold, relative."""
+    gap = squeeze.gap_m[squeeze.sample]
+    peak = int(np.argmax(force_n))
+    least = int(np.argmin(gap))
+    closing = -np.diff(gap[: least + 1])
+    work = float(np.sum(0.5 * (force_n[1 : least + 1] + force_n[:least]) * closing))
+    held = np.flatnonzero(gap < gap[least] + 0.03 * squeeze.depth_m)
+    return float(force_n[peak]), 1e3 * work, float(force_n[int(held[-1])] / force_n[peak])

@@ -1,0 +1,324 @@
+"""Choosing the terms: every candidate is fitted, and judged by squeezes or stretches that it was not fitted to.
+
+The simplest candidate is chosen whose error on held-out data is not larger than the least one by more than a standard
+error of their paired difference.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Final
+
+import numpy as np
+from attrs import evolve, frozen
+from numpy.typing import NDArray
+
+from graspsense.plugin_api import CandidateScore, ConfigError
+from graspsense_identify.corners import with_corners
+from graspsense_identify.fit import LEAST_ERROR, Fitted, Mask, fit, held_out_rms
+from graspsense_identify.forward import ForwardModel
+from graspsense_identify.laws import GAS, CandidateLaw, DataScale, memories, static_candidates
+from graspsense_identify.prepare import Squeeze
+from graspsense_identify.threads import in_threads
+
+MAX_FOLDS: Final = 5
+STRETCHES: Final = 9
+STRETCH_FOLDS: Final = 3
+STATIC_KEPT: Final = 3
+"""Static laws that are tried with every memory."""
+WORTH_REFINING: Final = 4.0
+"""A candidate whose direct fit is worse than the best by this factor is not refined."""
+MANY: Final = 4
+"""Candidates that are usually refined and judged, for the progress."""
+WORTH_TRYING: Final = 3.0
+"""A candidate whose fit is worse than the best by this factor is not judged by held-out data."""
+MANY_EVALUATIONS: Final = 400
+"""Of the chosen fit, so that it converges in a flat valley, too."""
+LEAST_GAIN: Final = 0.03
+"""A term more has to reduce the error on held-out data by at least this share."""
+
+
+@frozen(kw_only=True, eq=False)
+class Choice:
+    """The chosen fit, and the scores of all candidates."""
+
+    fitted: Fitted
+    refined: tuple[Fitted, ...]
+    """The candidates whose direct fit was near the best, chosen or not."""
+    scores: tuple[CandidateScore, ...]
+
+
+@frozen(kw_only=True, eq=False)
+class _Judged:
+    fitted: Fitted
+    errors: NDArray[np.float64]
+    """The rms residual over the peak in each held-out part."""
+
+
+def choose(
+    model: ForwardModel,
+    squeezes: Sequence[Squeeze],
+    scale: DataScale,
+    *,
+    has_memory: bool,
+    progress: Callable[[int, int], None],
+    only: str = "",
+) -> Choice:
+    """Return the chosen fit.
+
+    `has_memory`: whether the squeezes can determine a term with a memory. `only`: the name of the candidate that is
+    fitted without a choice.
+    """
+    direct = evolve(model, direct=True)
+    statics = static_candidates(scale)
+    with_memory = memories(scale) if has_memory else []
+    counter = _Counter(
+        (3 if with_memory else 1) * len(statics) + (STATIC_KEPT + 1) * (1 + len(with_memory)) + 2 * MANY,
+        progress,
+    )
+    rough = _rough(direct, statics, squeezes, with_memory, counter)
+    kept = list(range(len(statics))) if only else _kept(rough)
+    candidates = [
+        joined.starting_at(_values(rough[k]))
+        for k in kept
+        for joined in (statics[k], *_joined(statics[k], with_memory))
+        if only in ("", joined.name)
+    ]
+    if not candidates:
+        raise ConfigError(f"no candidate for these squeezes has the terms {only}")
+    directly = in_threads(lambda one: fit(direct, one, squeezes), candidates, counter.done)
+    least_directly = max(min(one.rms for one in directly), LEAST_ERROR)
+    near = [one for one in directly if one.rms <= WORTH_REFINING * least_directly]
+    fits = in_threads(lambda one: refined(model, one, squeezes), near, counter.done)
+    least = max(min(one.rms for one in fits), LEAST_ERROR)
+    worth = [one for one in fits if one.rms <= WORTH_TRYING * least and not _adds_nothing(one, fits)]
+    judged = in_threads(lambda one: _judged(model, one, squeezes), worth, counter.done)
+    best = _simplest(judged)
+    converged = fit(
+        model, best.fitted.candidate, squeezes, start=best.fitted, max_evaluations=MANY_EVALUATIONS
+    )
+    names = {one.candidate.name for one in fits}
+    only_directly = [one for one in directly if one.candidate.name not in names]
+    only_directly += [one for k, one in enumerate(rough) if k not in kept]
+    scores = [_score(one, best, judged, fits) for one in fits]
+    dropped = [
+        CandidateScore(
+            terms=one.candidate.name,
+            parameters=len(one.values),
+            error=math.nan,
+            fit_error=one.rms,
+            verdict=_dropped(one.rms / least_directly),
+        )
+        for one in only_directly
+    ]
+    ranked = (*sorted(scores, key=_rank), *sorted(dropped, key=_rank))
+    return Choice(fitted=converged, refined=tuple(fits), scores=ranked)
+
+
+def _rough(
+    direct: ForwardModel,
+    statics: Sequence[CandidateLaw],
+    squeezes: Sequence[Squeeze],
+    with_memory: Sequence[CandidateLaw],
+    counter: _Counter,
+) -> list[Fitted]:
+    """Return the direct fit of each law without memory: alone, or with a branch if the squeezes show a memory."""
+    alone = in_threads(
+        lambda one: fit(direct, with_corners(direct, one, squeezes), squeezes), statics, counter.done
+    )
+    if not with_memory:
+        return alone
+    # From its own starts, and from the fit without a memory, which has found the corners of the law.
+    roughly = [one.joined(with_memory[1]) for one in statics]
+    roughly += [one.starting_at(_values(own)) for one, own in zip(roughly, alone, strict=True)]
+    tried = in_threads(lambda one: fit(direct, one, squeezes), roughly, counter.done)
+    pairs = zip(tried[: len(statics)], tried[len(statics) :], strict=True)
+    return [min(pair, key=lambda one: one.cost) for pair in pairs]
+
+
+def refined(model: ForwardModel, directly: Fitted, squeezes: Sequence[Squeeze]) -> Fitted:
+    """Return the fit of a candidate through the fingertips, from its direct fit.
+
+    The direct fit of a snap-through may prefer the wrong corners, since noise and lag bias it most where the force
+    falls. So the corners are tried once more.
+    """
+    fitted = fit(model, directly.candidate, squeezes, start=directly)
+    law = with_corners(model, directly.candidate, squeezes)
+    if not law.more_starts:
+        return fitted
+    return min(fitted, fit(model, law, squeezes), key=lambda one: one.cost)
+
+
+def _dropped(times: float) -> str:
+    """Return why a candidate with so many times the least direct residual was not refined."""
+    if times > WORTH_REFINING:
+        return f"its direct residual is {times:.1f} times the least"
+    return f"not among the {STATIC_KEPT} laws that fit best directly"
+
+
+def chosen_instead(choice: Choice, fitted: Fitted, verdict: str) -> Choice:
+    """Return the choice of another of the refined candidates."""
+    scores = [
+        evolve(one, chosen=True, verdict=f"chosen: {verdict}")
+        if one.terms == fitted.candidate.name
+        else evolve(one, chosen=False, verdict="only common values need its terms")
+        if one.chosen
+        else one
+        for one in choice.scores
+    ]
+    return Choice(fitted=fitted, refined=choice.refined, scores=tuple(sorted(scores, key=_rank)))
+
+
+def _kept(rough: Sequence[Fitted]) -> list[int]:
+    """Return which laws are tried with every memory: those that fit best."""
+    order = np.argsort([one.cost for one in rough], kind="stable").tolist()
+    # A gas takes no other law's place: it resembles a spring that stiffens.
+    first = [k for k in order if GAS not in rough[k].candidate.slots][:STATIC_KEPT]
+    # The simplest law stays among the candidates, so that the table shows what it costs to leave the others out.
+    return sorted({0, *first, *order[:STATIC_KEPT]})
+
+
+def _joined(static: CandidateLaw, with_memory: Sequence[CandidateLaw]) -> list[CandidateLaw]:
+    """Return a law with each memory whose terms it does not have already."""
+    return [static.joined(one) for one in with_memory if static.can_join(one)]
+
+
+def _adds_nothing(fitted: Fitted, fits: Sequence[Fitted]) -> bool:
+    """Return whether a simpler candidate fits as well.
+
+    A parameter more has to reduce the residual by more than it would reduce that of noise (Bayesian information
+    criterion, Schwarz 1978), and by `LEAST_GAIN` where the terms of the simpler candidate are among those of this one.
+    """
+    for one in fits:
+        more = len(fitted.values) - len(one.values)
+        if more > 0 and information(one) < information(fitted):
+            return True
+        if _contains(fitted, one) and least_error(fitted) > (1.0 - LEAST_GAIN) * least_error(one):
+            return True
+    return False
+
+
+def _contains(fitted: Fitted, simpler: Fitted) -> bool:
+    free, fewer = ({(one.slot, one.name) for one in each.candidate.free} for each in (fitted, simpler))
+    return fewer < free
+
+
+def information(fitted: Fitted) -> float:
+    """Return half of the Bayesian information criterion, less a constant: smaller is better."""
+    n = len(fitted.residuals)
+    return n * math.log(least_error(fitted)) + 0.5 * fitted.parameters * math.log(n)
+
+
+def least_error(fitted: Fitted) -> float:
+    """Return the rms residual, in which those below `LEAST_ERROR` hardly differ."""
+    return math.hypot(fitted.rms, LEAST_ERROR)
+
+
+def _rank(score: CandidateScore) -> tuple[bool, float, float]:
+    """Return the key of the order of the table: the chosen candidate, then by the error on held-out data."""
+    return not score.chosen, math.inf if math.isnan(score.error) else score.error, score.fit_error
+
+
+class _Counter:
+    """Counts what is done, for the progress."""
+
+    def __init__(self, total: int, progress: Callable[[int, int], None]) -> None:
+        self._n, self._total, self._progress = 0, total, progress
+
+    def done(self) -> None:
+        self._n += 1
+        self._progress(min(self._n, self._total), self._total)
+
+
+def _values(fitted: Fitted) -> dict[str, float]:
+    return {one.label: value for one, value in zip(fitted.candidate.free, fitted.values, strict=True)}
+
+
+def _judged(model: ForwardModel, fitted: Fitted, squeezes: Sequence[Squeeze]) -> _Judged:
+    """Return the errors of a candidate on data that it was not fitted to."""
+    n = len(squeezes)
+    errors: list[float] = []
+    if n == 1:
+        for mask in _stretch_masks(squeezes[0]):
+            part = fit(model, fitted.candidate, squeezes, [~mask], start=fitted)
+            everywhere = fit_residuals(model, part, squeezes[0])
+            errors.append(float(np.sqrt(np.mean(everywhere[mask] ** 2))))
+        return _Judged(fitted=fitted, errors=np.array(errors))
+    folds = min(n, MAX_FOLDS)
+    for k in range(folds):
+        train = [i for i in range(n) if i % folds != k]
+        part = fit(
+            model,
+            fitted.candidate,
+            [squeezes[i] for i in train],
+            start=evolve(
+                fitted,
+                widths_m=tuple(fitted.widths_m[i] for i in train),
+                factors=tuple(fitted.factors[i] for i in train),
+            ),
+        )
+        errors += [
+            held_out_rms(model, part, squeezes[i], fitted.widths_m[i], own_stiffness=True)
+            for i in range(n)
+            if i % folds == k
+        ]
+    return _Judged(fitted=fitted, errors=np.array(errors))
+
+
+def fit_residuals(model: ForwardModel, fitted: Fitted, squeeze: Squeeze) -> NDArray[np.float64]:
+    """Return the residuals of a fit to one squeeze at all of its samples, relative to the peak."""
+    if fitted.lag_s != 0.0:
+        squeeze = squeeze.delayed(fitted.lag_s)
+    forces = model.forces(squeeze, fitted.candidate, fitted.values, fitted.widths_m[0], fitted.factors[0])
+    return (forces - squeeze.force_n) / squeeze.peak_n
+
+
+def _stretch_masks(squeeze: Squeeze) -> list[Mask]:
+    """Return the samples that are held out in each fold: every third of nine stretches."""
+    number = np.minimum(np.arange(len(squeeze.force_n)) * STRETCHES // len(squeeze.force_n), STRETCHES - 1)
+    return [number % STRETCH_FOLDS == k for k in range(STRETCH_FOLDS)]
+
+
+def _simplest(judged: Sequence[_Judged]) -> _Judged:
+    """Return the simplest candidate that is not worse than the best."""
+    best = min(judged, key=lambda one: float(np.mean(_logarithms(one))))
+    for one in sorted(judged, key=lambda one: len(one.fitted.values)):
+        difference = _logarithms(one) - _logarithms(best)
+        spread = float(np.std(difference, ddof=1)) if len(difference) > 1 else 0.0
+        error = spread / math.sqrt(len(difference))
+        if float(np.mean(difference)) <= max(error, LEAST_GAIN):
+            return one
+    return best
+
+
+def _logarithms(judged: _Judged) -> NDArray[np.float64]:
+    """Return the logarithms of the errors, in which those below `LEAST_ERROR` hardly differ."""
+    result: NDArray[np.float64] = 0.5 * np.log(judged.errors**2 + LEAST_ERROR**2)
+    return result
+
+
+def _score(
+    fitted: Fitted, best: _Judged, judged: Sequence[_Judged], fits: Sequence[Fitted]
+) -> CandidateScore:
+    own = next((one for one in judged if one.fitted is fitted), None)
+    error = math.nan if own is None else float(np.sqrt(np.mean(own.errors**2)))
+    least = float(np.sqrt(np.mean(best.errors**2)))
+    if own is best:
+        verdict = "chosen"
+    elif own is None and _adds_nothing(fitted, fits):
+        verdict = "fits no better than with fewer terms"
+    elif own is None:
+        verdict = f"its residual is {fitted.rms / best.fitted.rms:.1f} times that of the chosen terms"
+    elif len(fitted.values) > len(best.fitted.values):
+        verdict = f"more parameters, error {100.0 * (error / least - 1.0):+.0f} %"
+    else:
+        verdict = f"error {100.0 * (error / least - 1.0):+.0f} %"
+    return CandidateScore(
+        terms=fitted.candidate.name,
+        parameters=len(fitted.values),
+        error=error,
+        fit_error=fitted.rms,
+        verdict=verdict,
+        chosen=own is best,
+    )

@@ -1,0 +1,169 @@
+"""Where the fit of a snap-through starts: the corners of the law that explain the measured forces best.
+
+Between its corners a snap-through is a straight line. For given corners its force is linear in the two stiffnesses, the
+drop, and the product of stiffness and an error of the width. So the corners are tried on a grid, and the other numbers
+follow from linear least squares (separable least squares: Golub and Pereyra, SIAM J. Numer. Anal. 10, 1973). The grid
+is then made finer around its minima. The derivatives of a fit jump where a corner passes a sample, so the minimum that
+it reaches from coarse corners can depend on rounding.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+import numpy as np
+from attrs import evolve
+from numpy.typing import NDArray
+
+from graspsense_identify.forward import ForwardModel
+from graspsense_identify.laws import SNAP, CandidateLaw, FitStart
+from graspsense_identify.prepare import CONTACT_SHARE, Squeeze
+
+Floats = NDArray[np.float64]
+
+CRITICAL: Final = np.linspace(0.04, 0.96, 47)
+"""Critical compressions that are tried, over the largest compression."""
+FALL: Final = np.geomspace(0.01, 0.8, 18)
+"""Lengths of the fall that are tried, over the largest compression."""
+TRIED: Final = 12
+"""Minima of the grid that are refined."""
+BEST: Final = 4
+"""Refined minima from which a fit starts."""
+FINER: Final = np.array([(i, j) for i in range(-2, 3) for j in range(-2, 3)]) / 2.0
+"""Corners that are tried around a minimum, in units of the reach of a step."""
+REACH: Final = (0.02, 0.26)
+"""First reach: of the critical compression over the largest one, and of the logarithm of the length of the fall."""
+STEPS: Final = 12
+"""Times that a minimum is refined; the reach is reduced by `SHRINK` each time."""
+SHRINK: Final = 0.6
+LEAST_SAMPLES: Final = 6
+"""Of a squeeze during the compression; four numbers follow from them."""
+WIDTH_WEIGHT: Final = 0.01
+"""Weight of a force at the contact in the least squares. Where a single sample precedes the critical compression, it
+does not determine both stiffness and width: then the width is the first estimate."""
+RIDGE: Final = np.diag([WIDTH_WEIGHT**2, 1e-12, 1e-12, 1e-12])
+"""Added to the normal equations: the weight of the width, and small numbers that keep the equations solvable where no
+sample shows a stiffness or a drop."""
+LEAST_NUMBER: Final = 1e-6
+"""A stiffness or a drop, over those of the squeeze, that is smaller is shown by no sample."""
+
+
+class _Load(NamedTuple):
+    """The compression of an object over the largest one, and the force over its peak, at the samples."""
+
+    compression: Floats
+    force: Floats
+
+
+class _Corners(NamedTuple):
+    """Pairs of corners over the largest compression, and what follows from them: an entry or a row for each pair."""
+
+    critical: Floats
+    fall: Floats
+    cost: Floats
+    """The sum of the squared residuals; infinite if the numbers are not those of a snap-through."""
+    numbers: Floats
+    """The force at the contact, k1, the drop, and k2, shape (n, 4)."""
+
+
+def with_corners(model: ForwardModel, law: CandidateLaw, squeezes: Sequence[Squeeze]) -> CandidateLaw:
+    """Return the law with further starts at the corners that the squeezes show, if it is a snap-through alone."""
+    if law.slots != (SNAP,):
+        return law
+    loads_m = [_loading(model, squeeze) for squeeze in squeezes]
+    # Through the fingertips, a hard object has no compression but that of the noise.
+    loads_m = [load for load in loads_m if len(load.force) >= LEAST_SAMPLES and load.compression[-1] > 0.0]
+    if not loads_m:
+        return law
+    depth = float(np.median([load.compression[-1] for load in loads_m]))
+    loads = [load._replace(compression=load.compression / depth) for load in loads_m]
+    peak_n = float(np.median([squeeze.peak_n for squeeze in squeezes]))
+    starts = [_start(corners, depth, peak_n) for corners in _minima(loads)]
+    # The error of the width by the force at the contact is itself in error by noise.
+    return evolve(law, more_starts=(*starts, *(start._replace(wider_m=0.0) for start in starts)))
+
+
+def _loading(model: ForwardModel, squeeze: Squeeze) -> _Load:
+    """Return the compression of the object (m) and the force over its peak, from the contact to the deepest sample."""
+    compression = squeeze.width_m - squeeze.gap_m[squeeze.sample] - model.compressed_m(squeeze.force_n)
+    force = squeeze.force_n / squeeze.peak_n
+    first, deepest = int(np.argmax(force > CONTACT_SHARE)), int(np.argmax(compression))
+    part = slice(first, deepest + 1)
+    return _Load(compression[part], force[part])
+
+
+def _minima(loads: Sequence[_Load]) -> list[_Corners]:
+    """Return the best minima over the corners, the best one first, each with a single pair of corners."""
+    critical, fall = (axis.ravel() for axis in np.meshgrid(CRITICAL, FALL, indexing="ij"))
+    tried = _at_corners(loads, critical, fall)
+    cost = tried.cost.reshape(len(CRITICAL), len(FALL))
+    bordered = np.pad(cost, 1, constant_values=np.inf)
+    neighbours = np.lib.stride_tricks.sliding_window_view(bordered, (3, 3)).min(axis=(2, 3))
+    minima = np.flatnonzero((cost <= neighbours) & np.isfinite(cost))
+    minima = minima[np.argsort(tried.cost[minima], kind="stable")][:TRIED]
+    refined = [_refined(loads, _pair(tried, k)) for k in minima.tolist()]
+    # Corners between the same samples often explain them equally well, so only the best of these is kept.
+    by_division: dict[tuple[int, ...], _Corners] = {}
+    for corners in sorted(refined, key=lambda corners: float(corners.cost[0])):
+        by_division.setdefault(_division(loads, corners), corners)
+    return list(by_division.values())[:BEST]
+
+
+def _division(loads: Sequence[_Load], corners: _Corners) -> tuple[int, ...]:
+    """Return the numbers of samples before each corner."""
+    ends = (corners.critical, corners.critical + corners.fall)
+    return tuple(int(np.count_nonzero(load.compression < end)) for load in loads for end in ends)
+
+
+def _refined(loads: Sequence[_Load], best: _Corners) -> _Corners:
+    """Return the minimum near these corners, by a grid that becomes finer."""
+    for step in range(STEPS):
+        moves = FINER * REACH * SHRINK**step
+        critical = np.maximum(best.critical + moves[:, 0], 0.5 * CRITICAL[0])
+        tried = _at_corners(loads, critical, best.fall * np.exp(moves[:, 1]))
+        k = int(np.argmin(tried.cost))
+        if tried.cost[k] < best.cost[0]:
+            best = _pair(tried, k)
+    return best
+
+
+def _pair(tried: _Corners, k: int) -> _Corners:
+    return _Corners(*(column[k : k + 1] for column in tried))
+
+
+def _at_corners(loads: Sequence[_Load], critical: Floats, fall: Floats) -> _Corners:
+    """Return what follows from each of these pairs of corners, over the largest compression."""
+    cost, numbers = np.zeros(len(critical)), []
+    begin, length = critical[:, np.newaxis], fall[:, np.newaxis]
+    for compression, force in loads:
+        beyond = compression - begin
+        columns = np.stack(
+            [
+                np.ones_like(beyond),
+                np.minimum(compression, begin),
+                -np.clip(beyond / length, 0.0, 1.0),
+                np.maximum(beyond - length, 0.0),
+            ],
+            axis=1,
+        )
+        normal = columns @ columns.transpose(0, 2, 1) + RIDGE
+        solution = np.linalg.solve(normal, columns @ force[:, np.newaxis])
+        residuals = (solution.transpose(0, 2, 1) @ columns)[:, 0] - force
+        cost += np.sum(residuals**2, axis=1)
+        numbers.append(solution[..., 0])
+    median = np.median(numbers, axis=0)
+    offset, k1 = median[:, 0], median[:, 1]
+    snaps = (median[:, 1:].min(axis=1) > LEAST_NUMBER) & (critical * k1 + offset > 0.0)
+    return _Corners(critical, fall, np.where(snaps, cost, np.inf), median)
+
+
+def _start(corners: _Corners, depth: float, peak_n: float) -> FitStart:
+    """Return the start at a pair of corners."""
+    offset, k1, drop, k2 = corners.numbers[0].tolist()
+    # A force at the contact is that of a wider object, whose compression is larger by as much.
+    wider = offset / k1
+    shares = (k1, float(corners.critical[0]) + wider, drop, float(corners.fall[0]), k2)
+    stiffness = peak_n / depth
+    units = (stiffness, depth, peak_n, depth, stiffness)
+    return FitStart(tuple(np.multiply(shares, units).tolist()), wider * depth)

@@ -1,0 +1,190 @@
+"""The delay of the sensor: by how much the force lags behind the gap beyond what the settings say.
+
+A force that lags is lower than that of the object while the fingers close, and keeps rising after they have stopped.
+A damper makes it higher and falls at once. For a spring of stiffness k, a lag of T at constant speed is the same as a
+damper of -k T, or as another width: where the speed does not change, no recording tells them apart. Where it does, each
+candidate is fitted with the lag as a further parameter, common to all squeezes, since they have one sensor.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+from attrs import evolve, frozen
+
+from graspsense.plugin_api import IdentifiedParameter, Undetermined
+from graspsense_identify.choose import LEAST_GAIN, information, least_error
+from graspsense_identify.fit import Fitted, fit
+from graspsense_identify.forward import ForwardModel
+from graspsense_identify.interval import normal
+from graspsense_identify.laws import LOSS, CandidateLaw
+from graspsense_identify.prepare import MAX_LAG_S, Squeeze
+from graspsense_identify.refuse import shows_memory
+from graspsense_identify.spread import refits
+from graspsense_identify.threads import in_threads
+
+EVIDENCE: Final = 5.0
+"""The logarithm of the Bayes factor (Schwarz's approximation) from which on a lag is taken for real."""
+PLAUSIBLE: Final = 10.0
+"""Candidates with a lag that are within this of the best one are plausible, unless a simpler one is better."""
+WIDEST_S: Final = 0.02
+"""A delay whose interval is wider is not determined."""
+PATH_ERROR_S: Final = 5e-4
+"""Standard deviation of a lag that the finite number of nodes of a path causes, with ideal sensors."""
+
+
+@frozen(kw_only=True)
+class Delay:
+    """The delay of the sensor: that which is used, and what the recordings show of it."""
+
+    settings_s: float
+    """That of the settings."""
+    used_s: float
+    """That with which the object was identified."""
+    shown_s: float = math.nan
+    """That with which the chosen terms fit best; NaN where the motion cannot show any."""
+    low_s: float = math.nan
+    high_s: float = math.nan
+    """The 90 % interval of that."""
+    basis: str = ""
+    beside_loss_s: float = math.nan
+    """Half its interval if the object also had a damper (`loss`), which it was identified without; NaN if it has one,
+    or if the delay of the settings is used."""
+
+    @property
+    def is_used(self) -> bool:
+        """Whether the object was identified with a delay of the recordings, not that of the settings."""
+        return self.used_s != self.settings_s
+
+    @property
+    def parameters(self) -> list[IdentifiedParameter]:
+        """The delay that is used, with an interval that holds it and what the recordings show; nothing without that."""
+        if math.isnan(self.shown_s):
+            return []
+        return [
+            IdentifiedParameter(
+                name="delay_s",
+                unit="s",
+                value=self.used_s,
+                low=min(self.low_s, self.used_s),
+                high=max(self.high_s, self.used_s),
+                basis=f"{self.basis}; of the {'recordings' if self.is_used else 'settings'}",
+            )
+        ]
+
+    @property
+    def error_s(self) -> float:
+        """How far the delay that is used is from that of the recordings, where these exclude it; else 0."""
+        if math.isnan(self.shown_s) or self.low_s <= self.used_s <= self.high_s:
+            return 0.0
+        return abs(self.used_s - self.shown_s)
+
+    @property
+    def undetermined(self) -> list[Undetermined]:
+        """What stays open of it."""
+        if math.isnan(self.shown_s):
+            reason = "the fingers close at one speed and do not hold: a lag moves the contact, or looks like a damper"
+        elif self.high_s - self.low_s > WIDEST_S:
+            low, high = 1e3 * self.low_s, 1e3 * self.high_s
+            reason = f"its 90 % interval is {low:.3g} to {high:.3g} ms: a lag looks like a damper, or a wider object"
+        elif self.error_s > 0.0:
+            reason = (
+                f"the recordings rather show {1e3 * self.shown_s:.3g} ms, but other terms fit as well without"
+            )
+        elif self.beside_loss_s > 0.5 * WIDEST_S:
+            half_ms = 1e3 * self.beside_loss_s
+            reason = f"a damper (loss) and a longer delay fit as well: with one, it is +- {half_ms:.2g} ms"
+        else:
+            return []
+        return [
+            Undetermined(
+                what="delay of the sensor",
+                reason=f"{reason}; {1e3 * self.used_s:.3g} ms are used",
+                remedy="close at a changing speed, hold and open, from before the contact, or measure the force at a "
+                "higher rate",
+            )
+        ]
+
+
+@frozen(kw_only=True)
+class Lag:
+    """By how much the force lags beyond the delay of the settings."""
+
+    lag_s: float = 0.0
+    """0 where the recordings show no lag."""
+    error_s: float = 0.0
+    """Its standard deviation from the choice of the terms, and from the finite number of nodes."""
+
+
+def lag_beyond_settings(model: ForwardModel, refined: Sequence[Fitted], squeezes: Sequence[Squeeze]) -> Lag:
+    """Return the lag without which none of these candidates fits as well.
+
+    `refined`: fits with the times as they are.
+    """
+    if not shows_memory(squeezes):
+        return Lag()
+    lagging = in_threads(lambda one: fit(model, one.candidate, squeezes, start=one, has_lag=True), refined)
+    best = min(lagging, key=information)
+    own = refined[lagging.index(best)]
+    gained = information(best) <= min(information(one) for one in refined) - EVIDENCE
+    better = least_error(best) <= (1.0 - LEAST_GAIN) * least_error(own)
+    if not gained or not better or abs(best.lag_s) > 0.98 * MAX_LAG_S:
+        return Lag()
+    near = [one for one in lagging if information(one) <= information(best) + PLAUSIBLE]
+    lags = [one.lag_s for one in near if not _is_dominated(one, near)]
+    return Lag(
+        lag_s=best.lag_s,
+        error_s=math.hypot(PATH_ERROR_S, max(abs(one - best.lag_s) for one in lags) / normal()),
+    )
+
+
+def _is_dominated(fitted: Fitted, others: Sequence[Fitted]) -> bool:
+    """Return whether a simpler candidate has more evidence."""
+    return any(
+        one.parameters < fitted.parameters and information(one) < information(fitted) for one in others
+    )
+
+
+def delay_of(
+    model: ForwardModel,
+    fitted: Fitted,
+    damper: CandidateLaw,
+    squeezes: Sequence[Squeeze],
+    settings_s: float,
+    lag: Lag,
+) -> Delay:
+    """Return the delay of the sensor.
+
+    `fitted`: the chosen fit, to squeezes whose force lags by `lag`. `damper`: the term that looks like a lag.
+    """
+    used_s = settings_s + lag.lag_s
+    if not shows_memory(squeezes):
+        return Delay(settings_s=settings_s, used_s=used_s)
+    lagging = fit(model, fitted.candidate, squeezes, start=fitted, has_lag=True)
+    again = refits(model, lagging, squeezes, np.random.default_rng(0), has_lag=True)
+    lags = np.array([one.lag_s for one in again.fits])
+    scattered = again.factor * math.sqrt(again.scale * float(np.sum((lags - lags.mean()) ** 2)))
+    # Where the motion does not show a lag, the fits stay where they begin and do not scatter.
+    random = max(scattered, normal() * lagging.lag_error_s)
+    half = math.hypot(random, normal() * max(lag.error_s, PATH_ERROR_S))
+    shown = used_s + lagging.lag_s
+    beside = math.nan
+    if lag.lag_s != 0.0 and LOSS not in fitted.candidate.slots:
+        damped = evolve(
+            fitted,
+            candidate=fitted.candidate.joined(damper),
+            values=(*fitted.values, *(one.starts[0] for one in damper.free)),
+        )
+        beside = fit(model, damped.candidate, squeezes, start=damped, has_lag=True).lag_error_s
+    return Delay(
+        settings_s=settings_s,
+        used_s=used_s,
+        shown_s=shown,
+        low_s=shown - half,
+        high_s=shown + half,
+        basis=again.basis,
+        beside_loss_s=normal() * beside,
+    )

@@ -1,0 +1,223 @@
+"""The fracture of objects that broke while the fingers closed: at which force or compression, and how it differs.
+
+An object that bears in its next squeeze what it bore before has not broken, however far the force fell.
+
+The force at a break lies between the last measurement before it and what the unbroken object would have borne at the
+first measurement after it. Objects that did not break say that theirs is larger. Both are used by maximum likelihood of
+a lognormal distribution with censored observations (Lawless, Statistical Models and Methods for Lifetime Data, 2003,
+section 5.2).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+from attrs import frozen
+from numpy.typing import NDArray
+
+from graspsense.plugin_api import IdentifiedParameter, Undetermined
+from graspsense_identify.fit import Fitted
+from graspsense_identify.forward import ForwardModel, Runs
+from graspsense_identify.interval import student
+from graspsense_identify.prepare import BREAK_SHARE, Squeeze
+from graspsense_identify.random_effects import FALSE_CLAIMS, Scatter, between
+
+Floats = NDArray[np.float64]
+
+LEAST_BROKEN: Final = 3
+"""Objects that have to break before their spread is identified."""
+SMALLEST_SPREAD: Final = 1e-4
+MOST_LEFT: Final = 1.0
+SAME_DEPTH: Final = 0.9
+"""A squeeze as deep as this share of another one is compared with it."""
+
+
+@frozen(kw_only=True)
+class FractureFit:
+    """The parameters of the term `fracture`: its limit by force or by compression, with its spread."""
+
+    name: str
+    """`force_n` or `compression_m`."""
+    value: float
+    low: float
+    high: float
+    spread: Scatter | None
+    """Standard deviation of the logarithm between objects; None if fewer than three broke, or if they differ by no more
+    than the measurements leave open."""
+    left: float
+    broken: int
+    whole: int
+    seen_again: int
+    """Of the broken ones, those whose next squeeze shows that the force does not come back."""
+
+    @property
+    def parameters(self) -> list[IdentifiedParameter]:
+        """The identified parameters."""
+        unit = "N" if self.name == "force_n" else "m"
+        basis = f"{self.broken} of {self.broken + self.whole} squeezes broke the object"
+        found = [
+            IdentifiedParameter(
+                name=f"fracture.{self.name}",
+                unit=unit,
+                value=self.value,
+                low=self.low,
+                high=self.high,
+                basis=basis,
+            ),
+            IdentifiedParameter(
+                name="fracture.left", unit="", value=self.left, low=math.nan, high=math.nan, basis="median"
+            ),
+        ]
+        if self.spread is not None:
+            found.append(
+                IdentifiedParameter(
+                    name=f"fracture.{self.name}.spread",
+                    unit="",
+                    value=self.spread.value,
+                    low=self.spread.low,
+                    high=self.spread.high,
+                    basis=basis,
+                )
+            )
+        return found
+
+    @property
+    def undetermined(self) -> list[Undetermined]:
+        """What the breaks leave open."""
+        found = []
+        if self.broken < LEAST_BROKEN:
+            found.append(
+                Undetermined(
+                    what="fracture by force or by compression, and its spread",
+                    reason=f"{self.broken} squeezes broke the object",
+                    remedy=f"break {LEAST_BROKEN} objects or more",
+                )
+            )
+        if self.seen_again < self.broken:
+            found.append(
+                Undetermined(
+                    what="whether the objects broke",
+                    reason=f"{self.broken - self.seen_again} of {self.broken} falls of the force are in the last "
+                    "squeeze of their object, or in that of an object without a number",
+                    remedy="squeeze each object once more after the fall, labelled cup#1, cup#2, cup#3",
+                )
+            )
+        return found
+
+
+def fracture_of(
+    model: ForwardModel, fitted: Fitted, squeezes: Sequence[Squeeze], force_scatter: float = 0.0
+) -> FractureFit | None:
+    """Return the fracture of these squeezes; None if none of them broke the object.
+
+    `force_scatter`: standard deviation of the logarithm of the force's scale between squeezes.
+    """
+    breaks: dict[str, list[float]] = {"force_n": [], "compression_m": []}
+    survived: dict[str, list[float]] = {"force_n": [], "compression_m": []}
+    errors: dict[str, list[float]] = {"force_n": [], "compression_m": []}
+    left = []
+    for i, squeeze in enumerate(squeezes):
+        forces, compressions = _whole(model, fitted, squeeze, i)
+        if squeeze.broken_n is None:
+            survived["force_n"].append(float(np.max(forces)))
+            survived["compression_m"].append(float(np.max(compressions)))
+            continue
+        last = squeeze.sample[-1]
+        for name, course in (("force_n", forces), ("compression_m", compressions)):
+            breaks[name].append(0.5 * float(course[last] + course[-1]))
+            # Anywhere between the two measurements.
+            errors[name].append(abs(math.log(float(course[-1]) / float(course[last]))) / math.sqrt(12.0))
+        left.append(squeeze.broken_n / max(float(forces[-1]), 1e-9))
+    if not left:
+        return None
+    fits = {name: _lognormal(np.array(breaks[name]), np.array(survived[name])) for name in breaks}
+    name = "force_n"
+    if len(left) >= LEAST_BROKEN and fits["compression_m"][1] < fits["force_n"][1]:
+        name = "compression_m"
+    mean, spread = fits[name]
+    variances = np.array(errors[name]) ** 2 + (force_scatter**2 if name == "force_n" else 0.0)
+    half = student(len(left) - 1) * spread / math.sqrt(len(left)) if len(left) > 1 else math.nan
+    return FractureFit(
+        name=name,
+        value=math.exp(mean),
+        low=math.exp(mean - half),
+        high=math.exp(mean + half),
+        spread=_spread(np.log(breaks[name]), variances, spread) if len(left) >= LEAST_BROKEN else None,
+        left=min(max(float(np.median(left)), 0.0), MOST_LEFT),
+        broken=len(left),
+        whole=len(squeezes) - len(left),
+        seen_again=sum(bears_again(squeezes, i) is False for i in range(len(squeezes))),
+    )
+
+
+def not_broken(squeezes: Sequence[Squeeze]) -> list[int]:
+    """Return the squeezes in which the force falls although the object does not break.
+
+    Where one object bears the force again, a fall of which no later squeeze shows more is taken for the same.
+    """
+    again = [bears_again(squeezes, i) for i in range(len(squeezes))]
+    if True not in again:
+        return []
+    return [i for i, one in enumerate(squeezes) if one.broken_n is not None and again[i] is not False]
+
+
+def bears_again(squeezes: Sequence[Squeeze], i: int) -> bool | None:
+    """Return whether the object of a squeeze bears, in its next one, the force that it had before the fall.
+
+    The squeezes are in the order of the recordings. None if the force does not fall in this squeeze, if the object has
+    no number, or if no later squeeze of it is as deep.
+    """
+    squeeze = squeezes[i]
+    if squeeze.broken_n is None or not squeeze.instance:
+        return None
+    depth_m = squeeze.width_m - float(squeeze.gap_m[squeeze.sample[-1]])
+    for later in squeezes[i + 1 :]:
+        if later.instance == squeeze.instance and later.depth_m >= SAME_DEPTH * depth_m:
+            within = later.width_m - later.gap_m[later.sample] <= depth_m / SAME_DEPTH
+            return bool(np.max(later.force_n[within]) > (1.0 - BREAK_SHARE) * squeeze.force_n[-1])
+    return None
+
+
+def _spread(logs: Floats, variances: Floats, likeliest: float) -> Scatter | None:
+    """Return the spread between objects; None if the errors of the breaks make their scatter.
+
+    `likeliest`: with the objects that did not break. Its interval is as wide as that of the broken ones alone.
+    """
+    scatter = between(logs, variances + SMALLEST_SPREAD**2, FALSE_CLAIMS)
+    if scatter is None:
+        return None
+    ratio = likeliest / scatter.value
+    return Scatter(likeliest, ratio * scatter.low, ratio * scatter.high)
+
+
+def _whole(model: ForwardModel, fitted: Fitted, squeeze: Squeeze, i: int) -> tuple[Floats, Floats]:
+    """Return the forces and compressions that the object would have had at the nodes, if it had not broken."""
+    numbers = fitted.candidate.numbers(np.array([fitted.values]), np.array([fitted.factors[i]]))
+    width = fitted.widths_m[i]
+    runs = Runs(np.zeros(1, np.int64), np.array([width]), numbers, fitted.candidate.active)
+    forces = model.run(model.paths([squeeze]), runs)[0]
+    return forces, width - squeeze.gap_m - model.compressed_m(forces)
+
+
+def _lognormal(breaks: Floats, survived: Floats) -> tuple[float, float]:
+    """Return mean and standard deviation of the logarithm; the deviation is 0 for a single break."""
+    from scipy.optimize import minimize
+    from scipy.stats import norm
+
+    logs, beyond = np.log(breaks), np.log(np.maximum(survived, 1e-12))
+    mean = float(np.mean(logs))
+    if len(logs) < 2:
+        return mean, 0.0
+    first = max(float(np.std(logs, ddof=1)), SMALLEST_SPREAD)
+    if not len(beyond) or float(np.max(beyond)) < mean - 4.0 * first:
+        return mean, first
+
+    def negative(x: Floats) -> float:
+        spread = math.exp(x[1])
+        return -float(np.sum(norm.logpdf(logs, x[0], spread)) + np.sum(norm.logsf(beyond, x[0], spread)))
+
+    found = minimize(negative, np.array([mean, math.log(first)]), method="Nelder-Mead")
+    return float(found.x[0]), math.exp(float(found.x[1]))

@@ -1,0 +1,117 @@
+"""Fits of the chosen law to each squeeze by itself, and whether a simpler law with own values explains them better.
+
+Common values that do not hold for all objects fit badly, and a law with more terms, or a lag, may mimic that. So a
+simpler law with values of each squeeze is taken instead of the chosen one where it has more evidence, and the lag is
+then that of a single squeeze.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from attrs import evolve
+from numpy.typing import NDArray
+
+from graspsense_identify.choose import Choice, chosen_instead
+from graspsense_identify.delay import EVIDENCE, Lag, lag_beyond_settings
+from graspsense_identify.fit import LEAST_ERROR, Fitted, fit
+from graspsense_identify.forward import ForwardModel
+from graspsense_identify.prepare import Squeeze
+from graspsense_identify.spread import LEAST_INSTANCES
+from graspsense_identify.threads import in_threads
+
+Floats = NDArray[np.float64]
+
+
+def alone(model: ForwardModel, fitted: Fitted, squeezes: Sequence[Squeeze]) -> list[Fitted]:
+    """Return the fits of a candidate to each squeeze by itself; none with fewer than three objects with names."""
+    names = {one.instance for one in squeezes}
+    if "" in names or len(names) < LEAST_INSTANCES:
+        return []
+    return in_threads(lambda i: _alone(model, fitted, squeezes[i], i), range(len(squeezes)))
+
+
+class Individual(NamedTuple):
+    """A choice, and the fits of its candidate to each squeeze by itself."""
+
+    choice: Choice
+    fits: list[Fitted]
+    """None with fewer than three objects with names."""
+    varies: bool
+    """Whether common values fit worse than noise would make them."""
+
+    def lag(self, model: ForwardModel, squeezes: Sequence[Squeeze]) -> Lag:
+        """Return the lag of the force beyond the settings."""
+        if not self.varies:
+            return lag_beyond_settings(model, self.choice.refined, squeezes)
+        first = in_threads(lambda one: _alone(model, one, squeezes[0], 0), self.choice.refined)
+        return lag_beyond_settings(model, first, squeezes[:1])
+
+    @property
+    def of_each(self) -> Fitted:
+        """The chosen fit with the width of each squeeze, and its factor on the stiffness: where the values vary, those
+        that it has by itself."""
+        fitted = self.choice.fitted
+        if not self.varies:
+            return fitted
+        values = np.log([one.values for one in self.fits])
+        reference = reference_stiffness(fitted, values)
+        logs = np.log(fitted.factors) if reference is None else values[:, reference]
+        return evolve(
+            fitted,
+            widths_m=tuple(one.widths_m[0] for one in self.fits),
+            factors=tuple(np.exp(logs - logs.mean()).tolist()),
+        )
+
+
+def simplest_alone(model: ForwardModel, choice: Choice, squeezes: Sequence[Squeeze]) -> Individual:
+    """Return the choice, or that of a simpler candidate whose values differ between objects."""
+    own = alone(model, choice.fitted, squeezes)
+    if not own or _evidence(own) > _common_evidence(choice.fitted) - EVIDENCE:
+        return Individual(choice, own, varies=False)
+    simpler = [one for one in choice.refined if one.parameters < choice.fitted.parameters]
+    for one in sorted(simpler, key=lambda one: (one.parameters, one.cost)):
+        fits = alone(model, one, squeezes)
+        if _evidence(fits) < min(_evidence(own), _common_evidence(choice.fitted)) - EVIDENCE:
+            chosen = chosen_instead(choice, one, "simpler, with values of each object")
+            return Individual(chosen, fits, varies=True)
+    return Individual(choice, own, varies=True)
+
+
+def _evidence(fits: Sequence[Fitted]) -> float:
+    """Return half of the Bayesian information criterion of fits to each squeeze, less a constant."""
+    residuals = np.concatenate([one.residuals for one in fits])
+    free = sum(len(one.values) for one in fits)
+    return _information(float(np.sqrt(np.mean(residuals**2))), free, len(residuals))
+
+
+def _common_evidence(fitted: Fitted) -> float:
+    """Return that of a fit with common values, and a factor of each squeeze on the stiffness."""
+    return _information(fitted.rms, len(fitted.values) + len(fitted.factors) - 1, len(fitted.residuals))
+
+
+def _information(rms: float, free: int, n: int) -> float:
+    return n * math.log(math.hypot(rms, LEAST_ERROR)) + 0.5 * free * math.log(n)
+
+
+def stiffnesses(fitted: Fitted) -> list[int]:
+    """Return the places of the stiffnesses among the free parameters."""
+    return [i for i, one in enumerate(fitted.candidate.free) if one.is_stiffness]
+
+
+def reference_stiffness(fitted: Fitted, values: Floats) -> int | None:
+    """Return the stiffness that differs least between the squeezes: the others vary with it, and beyond it."""
+    return min(stiffnesses(fitted), key=lambda i: float(np.var(values[:, i])), default=None)
+
+
+def _alone(model: ForwardModel, fitted: Fitted, squeeze: Squeeze, i: int) -> Fitted:
+    factor = fitted.factors[i]
+    own = tuple(
+        value * factor if one.is_stiffness else value
+        for one, value in zip(fitted.candidate.free, fitted.values, strict=True)
+    )
+    start = evolve(fitted, values=own, widths_m=(fitted.widths_m[i],), factors=(1.0,))
+    return fit(model, fitted.candidate, [squeeze], start=start)

@@ -1,0 +1,384 @@
+"""Preparing a recorded squeeze: where contact, hold and release are, and which force was measured when.
+
+A force of the pads is taken at the time of its image, not at the ticks that repeat it: taken at the ticks, it would lag
+behind the gap by up to a period, which makes a fast branch look stiffer and slower than it is.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+from typing import Final, NamedTuple
+
+import numpy as np
+from attrs import evolve, frozen
+from numpy.typing import NDArray
+
+from graspsense.plugin_api import ConfigError, RecordedSqueeze, Trace
+
+Floats = NDArray[np.float64]
+
+MAX_NODES: Final = 320
+"""Nodes of the path of a squeeze, besides the times of the samples."""
+LEAST_NODES: Final = 120
+MAX_SAMPLES: Final = 160
+"""Samples of the force of a squeeze; more are averaged in blocks."""
+LEAST_SAMPLES: Final = 50
+MANY: Final = 10
+"""With more squeezes than these, each has fewer nodes and samples, so that a fit takes no longer."""
+CONTACT_SHARE: Final = 0.03
+"""The share of the peak force above which the object counts as touched."""
+NOISE_FACTOR: Final = 5.0
+"""Multiple of the noise above which the object counts as touched."""
+SCATTER: Final = 1.4826 / math.sqrt(2.0)
+"""Standard deviation of white noise over the median difference of two neighbouring samples."""
+BEFORE_S: Final = 0.05
+"""The path begins at least this long before the force exceeds the threshold."""
+BEFORE_SHARE: Final = 0.8
+"""And where the gap is wider by this share of the compression, which is more than a fit moves the contact."""
+HOLD_SHARE: Final = 0.01
+"""A gap that changes by less than this share of the compression is held."""
+BREAK_SHARE: Final = 0.4
+"""A force that falls by this share before the fingers open is a break of the object, if it falls between two
+measurements, or within `BREAK_S` and `BREAK_TRAVEL`: a shell that snaps through falls along its compression, and a
+memory
+relaxes with time."""
+BREAK_S: Final = 0.15
+BREAK_TRAVEL: Final = 0.05
+"""Share of the compression."""
+OPENED_SHARE: Final = 0.01
+"""Where the gap has opened by more than this share of the compression, the fingers release the object. What yields
+under them lets them close: a damped object loses most of its force before they have opened by a tenth."""
+MIN_SAMPLES: Final = 8
+"""Fewer samples in contact determine nothing."""
+MAX_LAG_S: Final = 0.1
+"""The force lags behind the gap by at most this time more than the settings say, or precedes it by as much."""
+
+
+class Stretches(NamedTuple):
+    """What a squeeze consists of."""
+
+    load_s: float
+    """Duration of the compression."""
+    hold_s: float
+    """Longest time for which the gap was held under force."""
+    speed_m_s: float
+    """Median closing speed during the compression."""
+    has_approach: bool
+    """Whether the recording begins before the contact."""
+    has_release: bool
+    """Whether it shows the object released."""
+
+
+@frozen(kw_only=True, eq=False)
+class Squeeze:
+    """A squeeze as the fit uses it: the path of the gap at nodes, and the force at some of them."""
+
+    name: str
+    instance: str
+    sha256: str
+    t_s: Floats
+    gap_m: Floats
+    speed_m_s: Floats
+    """Closing speed at the nodes."""
+    step_s: Floats
+    """Time since the node before."""
+    sample: NDArray[np.int64]
+    """Nodes at which the force was measured."""
+    force_n: Floats
+    """The force at these nodes: the mean of both pads, over `share`."""
+    averaged_s2: Floats
+    """Variance of the times of the measurements of which each of these forces is the mean; 0 for a single one."""
+    width_m: float
+    """The gap at contact, as a first estimate."""
+    noise_n: float
+    """Standard deviation of the force before the contact."""
+    stretches: Stretches
+    pad_difference: float
+    """The largest difference of the forces on both pads, over the largest mean force; 0 with a single pad."""
+    share: float = 1.0
+    """The share of the force that the pads measure."""
+    broken_n: float | None = None
+    """The force at the last node, right after the object broke, where the squeeze is cut; None if it did not break."""
+    course: tuple[Floats, Floats]
+    """Times and gaps of the recording from `MAX_LAG_S` before the first node on."""
+
+    def delayed(self, lag_s: float) -> Squeeze:
+        """Return the squeeze if its force lagged behind the gap by so much: at every node, the gap of that time."""
+        gap = np.interp(self.t_s - lag_s, *self.course)
+        return evolve(self, gap_m=gap, speed_m_s=-np.gradient(gap, self.t_s))
+
+    @cached_property
+    def averaging(self) -> tuple[Floats, Floats]:
+        """Weights of the node before and of the node after each sample in the mean over the times of the sample.
+
+        The mean of a force f over times of variance v is f + v f'' / 2, and f'' follows from the three nodes.
+        """
+        inner = (self.sample > 0) & (self.sample < len(self.t_s) - 1)
+        at = np.clip(self.sample, 1, len(self.t_s) - 2)
+        before_s, after_s = self.t_s[at] - self.t_s[at - 1], self.t_s[at + 1] - self.t_s[at]
+        share = np.where(inner, self.averaged_s2 / (before_s + after_s), 0.0)
+        return share / before_s, share / after_s
+
+    def at_samples(self, forces: Floats) -> Floats:
+        """Return the mean force over the times of each sample, from forces at the nodes, in the last axis."""
+        last = len(self.t_s) - 1
+        here = forces[..., self.sample]
+        before = forces[..., np.maximum(self.sample - 1, 0)]
+        after = forces[..., np.minimum(self.sample + 1, last)]
+        weight_before, weight_after = self.averaging
+        mean: Floats = here + weight_before * (before - here) + weight_after * (after - here)
+        return mean
+
+    @cached_property
+    def measured_path(self) -> tuple[Floats, Floats]:
+        """The measured force at every node, and its rate."""
+        force = np.interp(self.t_s, self.t_s[self.sample], self.force_n)
+        return force, np.gradient(force, self.t_s)
+
+    @cached_property
+    def peak_n(self) -> float:
+        """The largest force."""
+        return float(np.max(self.force_n))
+
+    @cached_property
+    def depth_m(self) -> float:
+        """The largest closure beyond the contact."""
+        return float(self.width_m - np.min(self.gap_m))
+
+
+class Resolution(NamedTuple):
+    """Into how many nodes and samples a squeeze is divided."""
+
+    nodes: int = MAX_NODES
+    samples: int = MAX_SAMPLES
+
+
+FULL: Final = Resolution()
+
+
+def resolution(squeezes: int) -> Resolution:
+    """Return the resolution for a number of squeezes."""
+    share = min(MANY / squeezes, 1.0)
+    return Resolution(max(int(share * MAX_NODES), LEAST_NODES), max(int(share * MAX_SAMPLES), LEAST_SAMPLES))
+
+
+class NoSqueeze(ConfigError):
+    """A recording in which nothing, or too little, was squeezed."""
+
+
+def prepared(
+    squeeze: RecordedSqueeze,
+    delay_s: float,
+    parts: Resolution = FULL,
+    lag_s: float = 0.0,
+    *,
+    may_break: bool = True,
+) -> Squeeze:
+    """Return the squeeze of a recording.
+
+    `delay_s`: by how much a force without a time of its own lags behind the gap, by the settings of the sensor. The
+    times of images contain this delay. `lag_s`: by how much every force lags beyond that. `may_break`: whether the
+    squeeze ends where the object seems to break.
+
+    Raises ConfigError if it has no gap, no force, no contact, or too few samples in contact.
+    """
+    trace = squeeze.trace
+    times, forces = _samples(squeeze.name, trace, delay_s, lag_s)
+    peak = float(np.max(forces))
+    noise, threshold, touching = _contact(squeeze.name, forces, peak)
+    first = int(touching[0])
+    begin = min(times[max(first - 1, 0)] - BEFORE_S, _begin(trace, times[first]))
+    last, broken = int(touching[-1]), None
+    if may_break:
+        last, broken = _end(trace, times, forces, first, last)
+    window = (times >= begin) & (np.arange(len(times)) <= last)
+    after = times[:0] if broken is None else times[broken : broken + 1]
+    broken_n = None if broken is None else float(forces[broken])
+    progress = _progress(trace, np.append(times[window], after))
+    touched = int(np.searchsorted(np.flatnonzero(window), first))
+    times, forces, averaged_s2 = _in_blocks(times[window], forces[window], touched, progress, parts.samples)
+    nodes, sample = _nodes(np.append(times, after), progress, parts.nodes)
+    sample = sample[: len(times)]
+    course = _smooth_course(trace, nodes)
+    gap = np.interp(nodes, *course)
+    width = float(np.interp(times[max(int(np.argmax(forces > threshold)) - 1, 0)], nodes, gap))
+    return Squeeze(
+        name=squeeze.name,
+        instance=squeeze.instance,
+        sha256=squeeze.sha256,
+        t_s=nodes,
+        gap_m=gap,
+        speed_m_s=-np.gradient(gap, nodes),
+        step_s=np.diff(nodes, prepend=nodes[0] - BEFORE_S),
+        sample=sample,
+        force_n=forces,
+        averaged_s2=averaged_s2,
+        broken_n=broken_n,
+        course=course,
+        width_m=width,
+        noise_n=noise,
+        pad_difference=_pad_difference(trace, begin, float(times[-1])) / peak,
+        stretches=_stretches(nodes, gap, width, has_approach=first > 1),
+    )
+
+
+def _contact(name: str, forces: Floats, peak: float) -> tuple[float, float, NDArray[np.int64]]:
+    """Return the noise before the contact, the force from which on the object counts as touched, and the samples beyond
+    it. Raises NoSqueeze."""
+    scatter = SCATTER * float(np.median(np.abs(np.diff(forces)))) if len(forces) > MIN_SAMPLES else 0.0
+    first = int(np.argmax(forces > CONTACT_SHARE * peak))
+    noise = float(np.std(forces[: max(first - 2, 0)])) if first > 6 else 0.0
+    threshold = max(CONTACT_SHARE * peak, NOISE_FACTOR * noise)
+    touching = np.flatnonzero(forces > threshold)
+    if peak <= NOISE_FACTOR * scatter or not len(touching):
+        raise NoSqueeze(f"{name}: no force exceeds the noise: nothing was touched")
+    if len(touching) < MIN_SAMPLES:
+        raise NoSqueeze(
+            f"{name}: {len(touching)} measurements of the force in contact, and at least {MIN_SAMPLES} are "
+            "needed: squeeze more slowly, or measure at a higher rate"
+        )
+    return noise, threshold, touching
+
+
+def _samples(name: str, trace: Trace, delay_s: float, lag_s: float) -> tuple[Floats, Floats]:
+    """Return the times at which the force was measured, and the mean force of the pads. Raises ConfigError."""
+    sides = [side for side in (trace.force_left_n, trace.force_right_n) if np.isfinite(side).any()]
+    if not sides or not np.isfinite(trace.gap_m).any():
+        missing = "force" if not sides else "gap"
+        raise ConfigError(f"{name}: it has no {missing}, and a scene is identified from force and gap")
+    force, times = np.mean(sides, axis=0), trace.t_s
+    changed = np.flatnonzero(np.any([np.diff(side, prepend=np.nan) != 0.0 for side in sides], axis=0))
+    images = trace.pad_t_s
+    if len(images) > MIN_SAMPLES and len(changed) <= 1.3 * len(images) + 2:
+        # Whatever its delay, an image has arrived when the next one is taken. The last one may still be on its way.
+        images = images[images + delay_s <= times[-1] + 1e-9]
+        shown = np.append(np.searchsorted(times, images[1:] - 1e-9), len(times)) - 1
+        times, force, delay_s = images[shown >= 0], force[shown[shown >= 0]], 0.0
+    elif len(changed) > MIN_SAMPLES and np.median(np.diff(changed)) > 1.5:
+        # A force of a lower rate than the ticks, repeated between its samples. In a hold it may not change for long.
+        times, force = times[changed], force[changed]
+    finite = np.isfinite(force) & np.isfinite(times)
+    return times[finite] - delay_s - lag_s, force[finite]
+
+
+def _pad_difference(trace: Trace, begin_s: float, end_s: float) -> float:
+    """Return the largest difference (N) of the forces on both pads between two times; 0 if one pad has none."""
+    within = (trace.t_s >= begin_s) & (trace.t_s <= end_s)
+    apart = np.abs(trace.force_left_n - trace.force_right_n)[within]
+    return float(np.max(apart[np.isfinite(apart)], initial=0.0))
+
+
+def _progress(trace: Trace, times: Floats) -> tuple[Floats, Floats]:
+    """Return times of a squeeze, and a measure from 0 to 1 that rises by half with the time and by half with the way of
+    the fingers: nodes at equal distances in it are dense where the force changes, and follow a long hold too."""
+    t = np.linspace(times[0], times[-1], MAX_NODES)
+    way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(np.interp(t, *_smooth_course(trace, t)))))])
+    return t, 0.5 * (t - t[0]) / (t[-1] - t[0]) + 0.5 * way / max(float(way[-1]), 1e-12)
+
+
+def _begin(trace: Trace, touched_s: float) -> float:
+    """Return the time before `touched_s` from which on the contact may lie: the fingers were further apart before.
+
+    A force that rises slowly exceeds the threshold long after the contact.
+    """
+    before = np.flatnonzero((trace.t_s <= touched_s) & np.isfinite(trace.gap_m))
+    if not len(before):
+        return touched_s
+    gap = trace.gap_m[before]
+    wider = np.flatnonzero(gap > gap[-1] + BEFORE_SHARE * (gap[-1] - float(np.nanmin(trace.gap_m))))
+    return float(trace.t_s[before[wider[-1] if len(wider) else 0]])
+
+
+def _end(trace: Trace, times: Floats, forces: Floats, first: int, last: int) -> tuple[int, int | None]:
+    """Return the last sample of a squeeze, and the one after the break if the object broke there."""
+    gap = np.interp(times, trace.t_s, trace.gap_m)
+    depth = float(gap[first]) - float(np.min(gap[first : last + 1]))
+    loaded = BREAK_SHARE * float(np.max(forces[first : last + 1]))
+    for i in range(first + MIN_SAMPLES, last + 1):
+        begin = min(int(np.searchsorted(times, times[i] - BREAK_S)), i - 1)
+        peak = begin + int(np.argmax(forces[begin:i]))
+        within = gap[peak] - gap[i] <= BREAK_TRAVEL * depth or i == peak + 1
+        within = within and gap[i] - gap[peak] <= OPENED_SHARE * depth
+        falls = forces[i] < (1.0 - BREAK_SHARE) * forces[peak]
+        if falls and within and forces[peak] > loaded and peak >= first + MIN_SAMPLES:
+            return peak, i
+    return last, None
+
+
+def _in_blocks(
+    times: Floats, values: Floats, touched: int, progress: tuple[Floats, Floats], samples: int
+) -> tuple[Floats, Floats, Floats]:
+    """Return times and values of about this number of means of neighbouring samples, which are evenly spaced in the
+    progress, and the variance of the times of each.
+
+    Those beside the contact, at the sample `touched`, stay single: the force of a damper jumps there, and the mean over
+    a jump would be compared with that of a smooth course.
+    """
+    if len(times) <= samples:
+        return times, values, np.zeros(len(times))
+    block = np.minimum(np.interp(times, *progress) * samples, samples - 1).astype(np.int64)
+    beside = np.abs(block - block[touched]) <= 1
+    edges = np.flatnonzero(beside | (np.diff(block, prepend=-1) > 0))
+    counts = np.diff(edges, append=len(times))
+    mean_s = np.add.reduceat(times, edges) / counts
+    variance_s2 = np.add.reduceat((times - np.repeat(mean_s, counts)) ** 2, edges) / counts
+    return mean_s, np.add.reduceat(values, edges) / counts, variance_s2
+
+
+def _nodes(times: Floats, progress: tuple[Floats, Floats], nodes: int) -> tuple[Floats, NDArray[np.int64]]:
+    """Return the nodes of a path, and which of them are the times of the samples.
+
+    Between two samples they are evenly spaced, so that no step is much shorter than those beside it.
+    """
+    pieces = np.ceil(np.diff(np.interp(times, *progress)) * nodes).astype(np.int64)
+    pieces = np.maximum(pieces, 1)
+    sample = np.concatenate([[0], np.cumsum(pieces)])
+    return np.interp(np.arange(sample[-1] + 1), sample, times), sample
+
+
+def _smooth_course(trace: Trace, nodes: Floats) -> tuple[Floats, Floats]:
+    """Return times and gaps around these nodes, averaged over the ticks between two nodes."""
+    known = np.isfinite(trace.gap_m)
+    times, gap = trace.t_s[known], trace.gap_m[known]
+    per_node = (nodes[-1] - nodes[0]) / MAX_NODES / max(float(np.median(np.diff(times))), 1e-9)
+    width = 2 * int(per_node // 2) + 1
+    if width > 1:
+        # A mean flattens a curved course. What it takes away, a second mean takes away once more: it is added again.
+        once = _moving_mean(gap, width)
+        gap = 2.0 * once - _moving_mean(once, width)
+    part = slice(
+        max(int(np.searchsorted(times, nodes[0] - MAX_LAG_S)) - 1, 0),
+        int(np.searchsorted(times, nodes[-1] + MAX_LAG_S)) + 2,
+    )
+    return times[part], gap[part]
+
+
+def _moving_mean(values: Floats, width: int) -> Floats:
+    padded = np.pad(values, width // 2, mode="edge")
+    return np.convolve(padded, np.full(width, 1.0 / width), mode="valid")
+
+
+def _stretches(t_s: Floats, gap: Floats, width: float, *, has_approach: bool) -> Stretches:
+    least = int(np.argmin(gap))
+    depth = max(width - float(gap[least]), 1e-9)
+    closing = np.flatnonzero((gap < width) & (gap > width - 0.95 * depth) & (np.arange(len(gap)) <= least))
+    load_s = float(t_s[closing[-1]] - t_s[closing[0]]) if len(closing) > 1 else 0.0
+    held = (
+        np.abs(gap - float(np.median(gap[gap < width - (1.0 - 5 * HOLD_SHARE) * depth]))) < HOLD_SHARE * depth
+    )
+    longest, begin = 0.0, math.nan
+    for i, is_held in enumerate(held):
+        if is_held and math.isnan(begin):
+            begin = float(t_s[i])
+        elif not is_held:
+            begin = math.nan
+        if is_held:
+            longest = max(longest, float(t_s[i]) - begin)
+    return Stretches(
+        load_s=load_s,
+        hold_s=longest,
+        speed_m_s=0.95 * depth / load_s if load_s > 0.0 else 0.0,
+        has_approach=has_approach,
+        has_release=bool(gap[-1] > width - 0.5 * depth),
+    )

@@ -1,0 +1,243 @@
+"""What the recordings do not determine, and what would determine it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+
+from graspsense.plugin_api import SqueezeFit, Undetermined, repeatability
+from graspsense_identify.fit import Fitted
+from graspsense_identify.held_out import CONFIRMS
+from graspsense_identify.laws import ELASTIC, GAS, SNAP
+from graspsense_identify.prepare import BREAK_SHARE, Squeeze
+from graspsense_identify.spread import LEAST_INSTANCES, Uncertainty
+
+LEAST_HOLD_S: Final = 0.2
+"""A shorter hold shows no relaxation."""
+SPEED_RATIO: Final = 2.0
+"""Squeezes whose speeds differ by this factor show a memory without a hold."""
+WIDE: Final = 4.0
+"""A parameter whose interval spans this factor is not determined."""
+HOLD_TIMES: Final = 5.0
+"""A hold of this many relaxation times determines one."""
+
+FALL_SHARE: Final = 0.25
+"""A fall of the force by this share of the peak between two samples needs a term of its own."""
+
+_NOT_FITTED: Final = (
+    (
+        "liquid",
+        "only two combinations of its five numbers change the force, and these by a ringing that pads are too slow for",
+        "measure area, neck and level, and write the term by hand",
+    ),
+    (
+        "slosh",
+        "beside the force of a squeeze, the oscillation of the contents is smaller than the error of a sensor",
+        "measure the mass of the contents, and the frequency on a free container, and write the term by hand",
+    ),
+    (
+        "surface",
+        "beside a spring, a branch and a damper, no number of it changes the force of a squeeze",
+        "tap the surface, measure its frequency and decay, and write the term by hand",
+    ),
+    (
+        "worn",
+        "one squeeze wears little, which looks like a change of stiffness; recordings have no number of uses",
+        "record one object many times in a row, and identify the first and the last ten apart",
+    ),
+)
+"""The terms that are not fitted, why, and what would determine them."""
+
+_GAS_UNTOLD: Final = Undetermined(
+    what="gas",
+    reason="gas that is hardly compressed and does not escape is a spring, and part of the other terms here",
+    remedy="squeeze once sealed and once open, or until a fifth of the volume is displaced",
+)
+_GAS_COMBINED: Final = (
+    "the squeezes determine the stiffness n p A^2 / V of the gas and {other}; fixed are {fixed}: every other gas with "
+    "these combinations has the same force"
+)
+_SHELL_OR_GAS: Final = "squeeze deeper, or squeeze the object open, too, which shows its shell alone"
+_REMEDIES: Final = {
+    "k1_n_m": "squeeze deeper",
+    "stiffness_n_m": "squeeze deeper",
+    "length_m": "squeeze deeper",
+    "resistance_n_s2_m2": "squeeze at two speeds that differ by a factor of two or more, and hold",
+    "k3_n_m3": "squeeze deeper",
+    "exponent": "squeeze deeper",
+    "critical_m": "squeeze beyond the drop of the force",
+    "drop_n": "squeeze beyond the drop of the force",
+    "fall_m": "squeeze beyond the drop of the force, more slowly",
+    "k2_n_m": "squeeze deeper beyond the drop of the force",
+    "damping_n_s_m": "squeeze at two speeds that differ by a factor of two or more",
+}
+
+
+def shows_memory(squeezes: Sequence[Squeeze]) -> bool:
+    """Return whether the squeezes can determine a term with a memory: by a hold, or by different speeds."""
+    if any(one.stretches.hold_s >= LEAST_HOLD_S for one in squeezes):
+        return True
+    speeds = [one.stretches.speed_m_s for one in squeezes if one.stretches.speed_m_s > 0.0]
+    return bool(speeds) and max(speeds) >= SPEED_RATIO * min(speeds)
+
+
+def undetermined(
+    fitted: Fitted, found: Uncertainty, squeezes: Sequence[Squeeze], shares: Sequence[float], cells: bool
+) -> list[Undetermined]:
+    """Return what these squeezes leave open. `shares`: those of each squeeze, `cells`: whether cells measured them."""
+    open_ = _memory(fitted, squeezes) if not shows_memory(squeezes) else []
+    open_ += _parameters(fitted, found, squeezes)
+    open_ += _falls(fitted, squeezes)
+    open_ += _spreads(found, squeezes)
+    if cells and not any(math.isfinite(share) for share in shares):
+        open_.append(
+            Undetermined(
+                what="share",
+                reason="the cells measure a share of the force, and the effort of the drive is not recorded",
+                remedy="record the effort, or weigh the object's contact with a force gauge",
+            )
+        )
+    if not all(one.stretches.has_approach for one in squeezes):
+        open_.append(
+            Undetermined(
+                what="width_m",
+                reason="a recording begins in contact: where the contact was follows from the law alone",
+                remedy="record from before the contact",
+                in_scene=True,
+            )
+        )
+    open_.append(_gas(fitted))
+    open_ += [Undetermined(what=what, reason=reason, remedy=remedy) for what, reason, remedy in _NOT_FITTED]
+    return open_
+
+
+def refusals(
+    open_: Sequence[Undetermined], fits: Sequence[SqueezeFit], held_out: Sequence[float]
+) -> tuple[str, ...]:
+    """Return why a scene is not to be used: figures that are not determined, or no squeeze that confirms it.
+
+    `held_out`: the errors of the squeezes predicted from others; none for a single one, which is judged by its fit.
+    """
+    found = [f"{one.what} is not determined: {one.reason}; {one.remedy}" for one in open_ if one.in_scene]
+    errors = held_out or [one.residual for one in fits]
+    limit = max(CONFIRMS, repeatability(fits)) if held_out else CONFIRMS
+    if not min(errors) <= limit:
+        what = "held-out squeeze" if held_out else "squeeze"
+        found.append(
+            f"no {what} confirms the scene: the closest is predicted to {100.0 * min(errors):.1f} % of its peak, and "
+            f"{100.0 * limit:.1f} % are needed"
+        )
+    return tuple(found)
+
+
+def _gas(fitted: Fitted) -> Undetermined:
+    """Return what stays open of a gas: whether there is one, or its numbers one by one."""
+    law = fitted.candidate
+    if GAS not in law.slots:
+        return _GAS_UNTOLD
+    vented = (GAS, "area_m2") in law.fixed
+    other = "rho A^3 / (2 C_d^2 vent^2)" if vented else "the length V / A"
+    fixed = ", ".join(f"{name} = {value:g}" for (slot, name), value in law.fixed.items() if slot == GAS)
+    return Undetermined(
+        what="gas: area, volume, pressure and vent one by one"
+        if vented
+        else "gas: pressure, exponent and bulge",
+        reason=_GAS_COMBINED.format(other=other, fixed=fixed),
+        remedy="measure the area that moves, or the volume, and write the others by hand",
+    )
+
+
+def _falls(fitted: Fitted, squeezes: Sequence[Squeeze]) -> list[Undetermined]:
+    """Return the falls of the force that are too small for a break, if no term of the candidate describes them."""
+    if SNAP in fitted.candidate.slots:
+        return []
+    forces = []
+    for squeeze in squeezes:
+        gap = squeeze.gap_m[squeeze.sample]
+        loading = slice(0, int(np.argmin(gap)) + 1)
+        drops = -np.diff(squeeze.force_n[loading])
+        if len(drops) and float(np.max(drops)) > FALL_SHARE * squeeze.peak_n:
+            forces.append(float(squeeze.force_n[loading][int(np.argmax(drops))]))
+    if not forces:
+        return []
+    return [
+        Undetermined(
+            what="a fall of the force",
+            reason=f"the force falls by more than {FALL_SHARE:.0%} of the peak in {len(forces)} of {len(squeezes)} "
+            f"squeezes (at {min(forces):.3g} to {max(forces):.3g} N) while the fingers close. It is neither a break (a "
+            f"fall by {BREAK_SHARE:.0%} at once) nor described by a snap",
+            remedy='cut the recordings there (cut = "rupture" in a manifest), or squeeze more slowly, so that the '
+            "fall has several measurements",
+        )
+    ]
+
+
+def _memory(fitted: Fitted, squeezes: Sequence[Squeeze]) -> list[Undetermined]:
+    load_s = max(one.stretches.load_s for one in squeezes)
+    return [
+        Undetermined(
+            what="relaxation (maxwell, loss)",
+            reason=f"a ramp only, of {load_s:.2g} s at one speed, shows no relaxation time",
+            remedy="hold for 5 s, or squeeze at two speeds that differ by a factor of two or more",
+        )
+    ]
+
+
+def _parameters(fitted: Fitted, found: Uncertainty, squeezes: Sequence[Squeeze]) -> list[Undetermined]:
+    hold_s = max(one.stretches.hold_s for one in squeezes)
+    depth_mm = 1e3 * max(one.depth_m for one in squeezes)
+    open_ = []
+    for i, parameter in enumerate(fitted.candidate.free):
+        at_bound = fitted.at_bound(i)
+        if not at_bound and found.high[i] <= WIDE * found.low[i]:
+            continue
+        interval = f"its 90 % interval is {found.low[i]:.3g} to {found.high[i]:.3g}"
+        reason = "the fit is at the end of the range" if at_bound else interval
+        if parameter.name == "tau_s" or parameter.term.startswith("maxwell"):
+            tau = next(
+                value
+                for other, value in zip(fitted.candidate.free, fitted.values, strict=True)
+                if other.slot == parameter.slot and other.name == "tau_s"
+            )
+            needed = max(HOLD_TIMES * tau, 2.0 * hold_s)
+            remedy = f"hold for {needed:.2g} s (the longest hold is {hold_s:.2g} s)"
+        elif parameter.slot == ELASTIC and GAS in fitted.candidate.slots:
+            remedy = _SHELL_OR_GAS
+        else:
+            remedy = _REMEDIES.get(parameter.name, "record more squeezes")
+            if "deeper" in remedy:
+                remedy += f" (the deepest is {depth_mm:.2g} mm)"
+        open_.append(Undetermined(what=parameter.label, reason=reason, remedy=remedy, in_scene=True))
+    return open_
+
+
+def _spreads(found: Uncertainty, squeezes: Sequence[Squeeze]) -> list[Undetermined]:
+    open_ = []
+    if math.isnan(found.between_objects):
+        names = {one.instance for one in squeezes if one.instance}
+        count = (
+            "one object"
+            if len(names) == 1
+            else f"{len(names)} objects"
+            if names
+            else "objects without numbers"
+        )
+        open_.append(
+            Undetermined(
+                what="spread between objects",
+                reason=f"the recordings are of {count}",
+                remedy=f"record {LEAST_INSTANCES} objects or more, labelled cup#1, cup#2, cup#3",
+            )
+        )
+    if len(squeezes) == 1:
+        open_.append(
+            Undetermined(
+                what="spread between squeezes",
+                reason="there is a single squeeze; its intervals hold for it alone",
+                remedy="record the same object three times or more, and put it down anew each time",
+            )
+        )
+    return open_

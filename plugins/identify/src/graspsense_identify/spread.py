@@ -1,0 +1,318 @@
+"""Uncertainty: from squeeze to squeeze and from object to object by leaving them out in turn, within one by bootstrap.
+
+With two or more squeezes the interval is that of the delete-a-group jackknife (Shao and Tu, The Jackknife and
+Bootstrap, 1995, section 2.3) with Student's t, on the logarithms. A group is an object if there are three of them,
+otherwise a squeeze. The scatter between groups is usually many times the standard deviation that one fit gives itself.
+One squeeze shows no such scatter: blocks of its residuals are drawn again. No interval is smaller than that of the
+linearised fit.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import chain
+from typing import Final, NamedTuple
+
+import numpy as np
+from attrs import evolve, frozen
+from numpy.typing import NDArray
+
+from graspsense_identify.choose import fit_residuals
+from graspsense_identify.fit import Fitted, fit, linear_covariance
+from graspsense_identify.forward import ForwardModel
+from graspsense_identify.gas import AREA_FACTOR
+from graspsense_identify.interval import normal, student
+from graspsense_identify.laws import GAS, SNAP
+from graspsense_identify.prepare import Squeeze
+from graspsense_identify.threads import in_threads
+
+Floats = NDArray[np.float64]
+
+MAX_GROUPS: Final = 10
+LEAST_INSTANCES: Final = 3
+BOOTSTRAPS: Final = 24
+BLOCKS: Final = 12
+"""Blocks of neighbouring residuals of a squeeze, which are drawn again together."""
+DRAWS: Final = 200
+LARGEST: Final = math.log(30.0)
+"""A logarithm changes by at most this in proportion to the force. A larger change is one of a value near zero."""
+MOVING_SHARE: Final = 0.3
+"""Where the gap changes by at least this share of its largest change between measurements, the fingers move."""
+LEAST_FALLING: Final = 2
+"""Samples on the falling part of a snap-through that determine its line."""
+MEAN_OVER_CORNER: Final = 0.015
+"""Rms error of the mean over a sample in which the law has a corner, over the change of its slope and the distance
+between samples: `Squeeze.at_samples` knows the forces at the ends and in the middle only. The rms is over corners that
+lie anywhere in the sample."""
+PATH_ERROR: Final = 3e-4
+"""Standard deviation of the logarithm of a value that the finite number of nodes of a path causes, at least."""
+PATH_FORCE_ERROR: Final = 3e-5
+"""The same of the force, over the peak. With both, the intervals from one squeeze with an ideal sensor cover more than
+nine of ten (`benchmarks/identify.py --true-terms --sensors ideal --recordings 1`): `path_error` takes most of the error
+away, and what is left is mostly that of the simulated recordings. No recording of a real sensor is as exact."""
+
+
+@frozen(kw_only=True, eq=False)
+class Uncertainty:
+    """The intervals of the parameters, draws of them, and the spreads between objects and between squeezes."""
+
+    low: tuple[float, ...]
+    high: tuple[float, ...]
+    basis: str
+    draws: Floats
+    """(draws, parameters)"""
+    between_objects: float
+    """Standard deviation of the logarithm of the stiffness; NaN with fewer than three objects."""
+    between_squeezes: float
+    """The same between squeezes of one object; NaN with a single squeeze of each."""
+    width_objects_m: float
+    width_squeezes_m: float
+
+
+def uncertainty(
+    model: ForwardModel,
+    fitted: Fitted,
+    squeezes: Sequence[Squeeze],
+    force_scale: float = 0.0,
+    lag_error_s: float = 0.0,
+    of_each: Fitted | None = None,
+) -> Uncertainty:
+    """Return the uncertainty of a fit.
+
+    `force_scale`: standard deviation of the logarithm of the force's scale. `lag_error_s`: that of the lag of the force
+    (s), beyond what the squeezes show by their scatter; 0 if the lag was not identified. `of_each`: a fit with other
+    widths and factors, of which the spreads are.
+    """
+    rng = np.random.default_rng(0)
+    at = np.log(fitted.values)
+    again = refits(model, fitted, squeezes, rng, has_lag=lag_error_s > 0.0)
+    table = np.log([one.values for one in again.fits])
+    deviations = table - table.mean(axis=0)
+    factor, basis = again.factor, again.basis
+    linear = linear_covariance(model, fitted, squeezes, PATH_FORCE_ERROR)
+    covariance = at_least(again.scale * deviations.T @ deviations, linear * (normal() / factor) ** 2)
+    own = _scale_errors(model, fitted, squeezes, force_scale) + PATH_ERROR**2 * np.eye(len(at))
+    own += np.diag(corner_errors(model, fitted, squeezes) ** 2)
+    if lag_error_s > 0.0:
+        later = fit(model, fitted.candidate, [one.delayed(lag_error_s) for one in squeezes], start=fitted)
+        shift = np.log(later.values) - at
+        own += np.outer(shift, shift)
+    own += _area_errors(model, fitted, squeezes)
+    covariance = covariance + own * (normal() / factor) ** 2
+    spread = np.sqrt(np.diag(covariance))
+    best = np.array(fitted.values)
+    low, high = best * _changed(-factor * spread), best * _changed(factor * spread)
+    values, vectors = np.linalg.eigh(covariance)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    widening = factor / normal()
+    draws = best * _changed(widening * rng.standard_normal((DRAWS, len(at))) @ root.T)
+    return Uncertainty(
+        low=tuple(low.tolist()),
+        high=tuple(high.tolist()),
+        basis=basis,
+        draws=draws,
+        **_spreads(fitted if of_each is None else of_each, squeezes),
+    )
+
+
+def _changed(logs: Floats) -> Floats:
+    """Return the factors by which values change for changes of their logarithms by the linearised fit.
+
+    A value near zero hardly changes the force: its linearised change is far more than its own size, and no exponential.
+    """
+    factors: Floats = np.maximum(np.exp(np.clip(logs, -LARGEST, LARGEST)), 1.0 + logs)
+    return factors
+
+
+def at_least(covariance: Floats, other: Floats) -> Floats:
+    """Return the covariance with each variance not smaller than in the other.
+
+    In a flat valley of the squares, a refit stays where it begins and does not scatter, and a few squeezes may agree by
+    chance.
+    """
+    both = covariance + other
+    own = np.sqrt(np.maximum(np.diag(covariance), np.diag(other)))
+    ratio = own / np.sqrt(np.diag(both))
+    return both * np.outer(ratio, ratio)
+
+
+def _scale_errors(
+    model: ForwardModel, fitted: Fitted, squeezes: Sequence[Squeeze], force_scale: float
+) -> Floats:
+    """Return the covariance of the logarithms that an error of the scale of the force causes.
+
+    It is common to all squeezes, so that none of them shows it. Through compliant fingertips, it changes lengths, too.
+    """
+    if force_scale == 0.0:
+        return np.zeros((len(fitted.values), len(fitted.values)))
+    more = math.exp(force_scale)
+    stronger = [evolve(one, force_n=more * one.force_n) for one in squeezes]
+    scaled = [
+        value * more if one.is_force else value
+        for one, value in zip(fitted.candidate.free, fitted.values, strict=True)
+    ]
+    found = fit(model, fitted.candidate, stronger, start=evolve(fitted, values=tuple(scaled)))
+    shift = np.log(found.values) - np.log(fitted.values)
+    return np.outer(shift, shift)
+
+
+class Refits(NamedTuple):
+    """Fits to parts of the data, or to data drawn again, and how their scatter gives an interval."""
+
+    fits: Sequence[Fitted]
+    scale: float
+    """The variance of the fit over the sum of their squared deviations."""
+    factor: float
+    """Half the width of the interval, in standard deviations."""
+    basis: str
+
+
+def refits(
+    model: ForwardModel,
+    fitted: Fitted,
+    squeezes: Sequence[Squeeze],
+    rng: np.random.Generator,
+    *,
+    has_lag: bool,
+) -> Refits:
+    """Return the fits without each group of squeezes in turn, or to a single squeeze with residuals drawn again."""
+    groups = _groups(squeezes)
+    if len(groups) < 2:
+        # The fit follows a part of the residuals' own errors, with as many directions as it has parameters.
+        degrees = max(BLOCKS - len(fitted.values) - int(has_lag) - 1, 1)
+        fits = _bootstrapped(model, fitted, squeezes[0], rng, has_lag=has_lag)
+        scale = BLOCKS / degrees / (BOOTSTRAPS - 1)
+        return Refits(fits, scale, student(degrees), "within one squeeze; not between squeezes")
+    kept = [[i for i in range(len(squeezes)) if i not in group] for group in groups]
+    fits = in_threads(lambda one: _refit(model, fitted, squeezes, one, has_lag=has_lag), kept)
+    g = len(groups)
+    what = "objects" if _instances(squeezes) >= LEAST_INSTANCES else "squeezes"
+    basis = f"between {g} {what if g == len(groups) else 'groups'}"
+    return Refits(fits, (g - 1) / g, student(g - 1), basis)
+
+
+def _area_errors(model: ForwardModel, fitted: Fitted, squeezes: Sequence[Squeeze]) -> Floats:
+    """Return the covariance of the logarithms that the conventional area of a vented gas causes."""
+    law, key = fitted.candidate, (GAS, "area_m2")
+    if key not in law.fixed:
+        return np.zeros((len(fitted.values), len(fitted.values)))
+    wider = evolve(law, fixed={**law.fixed, key: AREA_FACTOR * law.fixed[key]})
+    shift = np.log(fit(model, wider, squeezes, start=fitted).values) - np.log(fitted.values)
+    return np.outer(shift, shift)
+
+
+def corner_errors(model: ForwardModel, fitted: Fitted, squeezes: Sequence[Squeeze]) -> Floats:
+    """Return the relative errors of the parameters of a snap-through that the distance between two samples causes.
+
+    With two samples on the falling part, all three lines of the law are determined, and so are their corners. With
+    fewer, the corners that were fitted and the true ones lie anywhere between two samples, and a bootstrap leaves them
+    where they are.
+    """
+    values = {one.name: value for one, value in zip(fitted.candidate.free, fitted.values, strict=True)}
+    if "critical_m" not in values:
+        return np.zeros(len(fitted.values))
+    ways = [np.abs(np.diff(one.gap_m[one.sample])) for one in squeezes]
+    moving = np.concatenate([way[way > MOVING_SHARE * np.max(way)] for way in ways])
+    share = math.sqrt(1.0 / 6.0)
+    if _on_falling_part(model, fitted, squeezes, values["critical_m"], values["fall_m"]) >= LEAST_FALLING:
+        share = MEAN_OVER_CORNER if any(np.any(one.averaged_s2 > 0.0) for one in squeezes) else 0.0
+    error_m = share * float(np.median(moving)) / math.sqrt(len(squeezes))
+    along_n = error_m * (values["k1_n_m"] + values["k2_n_m"])
+    errors = {
+        "critical_m": error_m / values["critical_m"],
+        "fall_m": math.sqrt(2.0) * error_m / values["fall_m"],
+        "drop_n": along_n / values["drop_n"],
+    }
+    return np.array([errors.get(one.name, 0.0) if one.slot == SNAP else 0.0 for one in fitted.candidate.free])
+
+
+def _on_falling_part(
+    model: ForwardModel, fitted: Fitted, squeezes: Sequence[Squeeze], critical_m: float, fall_m: float
+) -> int:
+    """Return how many samples lie on the falling part of a snap-through while the fingers close."""
+    count = 0
+    for squeeze, width in zip(squeezes, fitted.widths_m, strict=True):
+        closure = width - squeeze.gap_m[squeeze.sample]
+        compression = (closure - model.compressed_m(squeeze.force_n))[: int(np.argmax(closure)) + 1]
+        count += int(np.sum((compression > critical_m) & (compression < critical_m + fall_m)))
+    return count
+
+
+def _instances(squeezes: Sequence[Squeeze]) -> int:
+    return len({one.instance for one in squeezes if one.instance})
+
+
+def _groups(squeezes: Sequence[Squeeze]) -> list[list[int]]:
+    """Return the squeezes that are left out together: those of an object, or each alone."""
+    n = len(squeezes)
+    if _instances(squeezes) >= LEAST_INSTANCES and all(one.instance for one in squeezes):
+        names = sorted({one.instance for one in squeezes})
+        groups = [[i for i, one in enumerate(squeezes) if one.instance == name] for name in names]
+    else:
+        groups = [[i] for i in range(n)]
+    if len(groups) > MAX_GROUPS:
+        groups = [list(chain.from_iterable(groups[k::MAX_GROUPS])) for k in range(MAX_GROUPS)]
+    return groups
+
+
+def _refit(
+    model: ForwardModel, fitted: Fitted, squeezes: Sequence[Squeeze], kept: Sequence[int], *, has_lag: bool
+) -> Fitted:
+    """Return the fit without some squeezes, whose stiffness is that of the mean of the others."""
+    start = evolve(
+        fitted,
+        widths_m=tuple(fitted.widths_m[i] for i in kept),
+        factors=tuple(fitted.factors[i] for i in kept),
+    )
+    return fit(model, fitted.candidate, [squeezes[i] for i in kept], start=start, has_lag=has_lag)
+
+
+def _bootstrapped(
+    model: ForwardModel,
+    fitted: Fitted,
+    squeeze: Squeeze,
+    rng: np.random.Generator,
+    *,
+    has_lag: bool,
+) -> list[Fitted]:
+    """Return refits to the fitted force with blocks of residuals drawn again."""
+    residuals = fit_residuals(model, fitted, squeeze) * squeeze.peak_n
+    clean = squeeze.force_n + residuals
+    length = max(len(residuals) // BLOCKS, 1)
+    drawn_again = []
+    for _ in range(BOOTSTRAPS):
+        starts = rng.integers(0, max(len(residuals) - length, 1), size=-(-len(residuals) // length))
+        drawn = np.concatenate([residuals[s : s + length] for s in starts])[: len(residuals)]
+        drawn_again.append(evolve(squeeze, force_n=clean - drawn * rng.choice((-1.0, 1.0))))
+    return in_threads(
+        lambda one: fit(model, fitted.candidate, [one], start=fitted, has_lag=has_lag), drawn_again
+    )
+
+
+def _spreads(fitted: Fitted, squeezes: Sequence[Squeeze]) -> dict[str, float]:
+    """Return the spreads between objects and between squeezes of an object, of stiffness and width."""
+    names = [one.instance or "" for one in squeezes]
+    stiffness = _components(np.log(fitted.factors), names)
+    width = _components(np.array(fitted.widths_m), names)
+    return {
+        "between_objects": stiffness[0],
+        "between_squeezes": stiffness[1],
+        "width_objects_m": width[0],
+        "width_squeezes_m": width[1],
+    }
+
+
+def _components(values: Floats, names: Sequence[str]) -> tuple[float, float]:
+    """Return the standard deviations between and within groups of these names (analysis of variance)."""
+    groups = [values[[i for i, one in enumerate(names) if one == name]] for name in sorted(set(names))]
+    degrees = sum(len(one) - 1 for one in groups)
+    within = math.nan
+    if degrees > 0:
+        within = math.sqrt(sum(float(np.sum((one - one.mean()) ** 2)) for one in groups) / degrees)
+    if len(groups) < LEAST_INSTANCES:
+        return math.nan, within
+    means = np.array([one.mean() for one in groups])
+    size = len(values) / len(groups)
+    inside = 0.0 if math.isnan(within) else within * within / size
+    return math.sqrt(max(float(np.var(means, ddof=1)) - inside, 0.0)), within

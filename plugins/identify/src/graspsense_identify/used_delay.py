@@ -1,0 +1,54 @@
+"""Which delay of the sensor is used: that of the settings, or that which the recordings show for the chosen terms.
+
+A lag is first found with all candidates, and may be one that only the terms of another choice need. So the terms are
+chosen anew with it, and it is used only if these show just this lag.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final, NamedTuple
+
+from attrs import evolve
+
+from graspsense.plugin_api import RecordedSqueeze
+from graspsense_identify.delay import PATH_ERROR_S, Delay, Lag
+from graspsense_identify.forward import ForwardModel
+from graspsense_identify.individual import Individual
+from graspsense_identify.prepare import Squeeze
+
+MAX_ROUNDS: Final = 3
+"""How often the lag is corrected by that which the terms chosen with it show."""
+
+
+class Timed(NamedTuple):
+    """The squeezes at the times that a lag of the force gives them, and the choice for these."""
+
+    recorded: list[RecordedSqueeze]
+    ready: list[Squeeze]
+    shares: list[float]
+    individual: Individual
+    lag: Lag
+
+
+def with_delay(
+    timed: Callable[[Lag], Timed], delay: Callable[[Timed], Delay], model: ForwardModel
+) -> tuple[Timed, Delay]:
+    """Return the choice with the delay that is used.
+
+    `timed` makes the choice with a lag, and `delay` returns what the recordings show for it. That of the settings is
+    used where the interval of the chosen terms holds it, and where the lag does not settle.
+    """
+    recorded = timed(Lag())
+    lag = recorded.individual.lag(model, recorded.ready)
+    for _ in range(MAX_ROUNDS):
+        if lag.lag_s == 0.0:
+            break
+        corrected = timed(lag)
+        shown = delay(corrected)
+        if shown.low_s <= shown.settings_s <= shown.high_s:
+            break
+        if abs(shown.shown_s - shown.used_s) <= PATH_ERROR_S:
+            return corrected, shown
+        lag = evolve(lag, lag_s=shown.shown_s - shown.settings_s)
+    return recorded, delay(recorded)

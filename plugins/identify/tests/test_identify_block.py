@@ -1,0 +1,81 @@
+"""Fingertips from squeezes of a rigid block."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from identify import delayed
+
+from graspsense.core.components.identification import RecordedSqueeze
+from graspsense.plugin_api import ConfigError, RunConfig, create
+from graspsense_identify.block import lag_of_block, with_fingertips_of_block
+from graspsense_identify.run import _settings, _shares, identify
+from graspsense_sim_gripper.config import SimConfig
+
+
+def squeezes(scene, gripper, seeds):
+    """Return recordings that say nothing of the fingertips they were made with."""
+    backend, controller = create("sensor-backend", "sim", **gripper), create("controller", "hybrid")
+    grasps = backend.run_many(controller, [scene] * len(seeds), seeds, run=RunConfig(hold_s=0.5), traces=True)
+    return [
+        RecordedSqueeze(name=f"{scene}-{seed}", sha256="0" * 64, trace=grasp.trace)
+        for seed, grasp in zip(seeds, grasps, strict=True)
+    ]
+
+
+@pytest.mark.parametrize("hardening", [None, 1e-3])
+def test_the_fingertips_of_known_squeezes_come_back(hardening):
+    block = squeezes(
+        "block", {"sensor": "ideal", "pad_stiffness_n_m": 6000.0, "pad_hardening_m": hardening}, [1, 2, 3]
+    )
+    config, said = with_fingertips_of_block(SimConfig(sensor="ideal"), block, [1.0] * 3)
+    assert config.pad_stiffness_n_m == pytest.approx(6000.0, rel=0.015)
+    low, high = map(float, re.search(r"90 %: (\S+) to (\S+)\)", said).groups())
+    assert low < 6000.0 < high
+    if hardening is None:
+        assert config.pad_hardening_m is None
+        assert "linear; residual" in said
+    else:
+        assert config.pad_hardening_m == pytest.approx(hardening, rel=0.05)
+        assert "twice the linear force at 1 mm" in said
+
+
+@pytest.mark.parametrize("gripper", [{"sensor": "ideal"}, {"sensor": "pads"}])
+def test_a_delay_of_which_the_settings_do_not_know_does_not_bias_the_fingertips(gripper):
+    config, soft = SimConfig(**gripper), {**gripper, "pad_stiffness_n_m": 6000.0}
+    block = squeezes("block", soft, [1, 2, 3])
+    late = [delayed(one, 0.01) for one in block]
+    assert lag_of_block(config, block) == 0.0
+    lag_s = lag_of_block(config, late)
+    assert lag_s == pytest.approx(0.01, abs=5e-4)
+    in_time, _ = _settings(config, late, block)
+    found, (said,) = _settings(config, late, late)
+    assert found.pad_stiffness_n_m == pytest.approx(in_time.pad_stiffness_n_m, rel=2e-3)
+    assert "which these squeezes show" in said
+    # With the delay of the settings, they seem 4 % stiffer with the ideal sensor, and 6 % with pads.
+    wrong, said = with_fingertips_of_block(config, late, _shares(config, late, 0.0))
+    assert wrong.pad_stiffness_n_m > 1.035 * in_time.pad_stiffness_n_m
+    assert "the delay of the settings" in said
+
+
+def test_a_squeeze_of_nothing_is_refused():
+    (empty,) = squeezes("none", {"sensor": "ideal"}, [1])
+    with pytest.raises(ConfigError, match="nothing was touched"):
+        with_fingertips_of_block(SimConfig(sensor="ideal"), [empty], [1.0])
+
+
+@pytest.mark.slow
+def test_an_object_is_identified_behind_the_fingertips_of_the_block(tmp_path):
+    scene = tmp_path / "shell.toml"
+    scene.write_text('width_m = 0.05\n[[terms]]\ntype = "elastic"\nk1_n_m = 1500.0\n')
+    gripper = {"sensor": "ideal", "pad_stiffness_n_m": 5000.0}
+    block, shells = squeezes("block", gripper, [1, 2, 3]), squeezes(str(scene), gripper, [4, 5, 6])
+    found = identify(SimConfig(sensor="ideal"), shells, lambda *_: None, block)
+    (k1,) = [one for one in found.parameters if one.name.endswith("k1_n_m")]
+    assert k1.value == pytest.approx(1500.0, rel=0.03)
+    assert found.notes[0].startswith("the fingertips follow from 3 squeezes of the block: ")
+    # With the default fingertips, which are twice as stiff or more, the shell would seem softer.
+    wrong = identify(SimConfig(sensor="ideal"), shells, lambda *_: None)
+    (other,) = [one for one in wrong.parameters if one.name.endswith("k1_n_m")]
+    assert other.value < 1400.0

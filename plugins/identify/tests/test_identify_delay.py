@@ -1,0 +1,154 @@
+"""The delay of the sensor: a lag of the force comes back, and does not bias what relaxes."""
+
+from __future__ import annotations
+
+import tomllib
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from attrs import evolve
+from identify import delayed
+from squeezes import recorded
+
+from graspsense.core.components.identification import RecordedSqueeze
+from graspsense.plugin_api import RunConfig, create
+from graspsense_identify.delay import Delay, Lag
+from graspsense_identify.forward import RIGID_PADS, ForwardModel
+from graspsense_identify.prepare import prepared
+from graspsense_identify.run import identify
+from graspsense_identify.used_delay import Timed, with_delay
+from graspsense_sim_gripper.config import SimConfig
+
+SCENE = """width_m = 0.05
+share = 0.6
+[[terms]]
+type = "elastic"
+k1_n_m = 1200.0
+[[terms]]
+type = "maxwell"
+k_n_m = 500.0
+tau_s = 0.2
+"""
+
+
+def late_recordings(gripper, late_s, seeds=(1, 2, 3)):
+    """Return recordings whose forces, and times of images, are late by a time that the settings do not contain."""
+    backend, controller = create("sensor-backend", "sim", **gripper), create("controller", "hybrid")
+    grasps = backend.run_many(
+        controller, [SCENE] * len(seeds), list(seeds), run=RunConfig(hold_s=1.0), traces=True
+    )
+    return [
+        delayed(RecordedSqueeze(name=str(seed), sha256="0" * 64, trace=grasp.trace, gripper=gripper), late_s)
+        for seed, grasp in zip(seeds, grasps, strict=True)
+    ]
+
+
+GRIPPERS = ({"sensor": "ideal"}, {"sensor": "pads"}, {"sensor": "pads", "pad_delay_s": 0.01})
+LATE_S = (0.0, 0.01, 0.025)
+IN_CI = ((0, 0.025), (1, 0.0), (1, 0.025), (2, 0.01))
+"""The place of a gripper, and a delay."""
+
+
+@pytest.mark.parametrize(
+    ("gripper", "late_s"),
+    [
+        pytest.param(gripper, late_s, marks=pytest.mark.slow if (i, late_s) in IN_CI else pytest.mark.long)
+        for i, gripper in enumerate(GRIPPERS)
+        for late_s in LATE_S
+    ],
+)
+def test_a_known_delay_comes_back_and_does_not_bias_relaxation(gripper, late_s):
+    settings_s = gripper.get("pad_delay_s", 0.0)
+    found = identify(SimConfig(), late_recordings(gripper, late_s), lambda *_: None)
+    named = {one.name: one for one in found.parameters}
+    delay, tau = named["delay_s"], named["maxwell.tau_s"]
+    assert delay.value == pytest.approx(settings_s + late_s, abs=0.002)
+    assert delay.high - delay.low < 0.01
+    assert tau.value == pytest.approx(0.2, rel=0.06)
+    assert [one.terms for one in found.candidates if one.chosen] == ["elastic (k1) + maxwell"]
+    used_s = tomllib.loads(found.scene)["identified"]["sensor"]["delay_s"]
+    assert used_s == pytest.approx(settings_s + late_s, abs=0.002)
+    assert delay.value == pytest.approx(used_s, rel=1e-5)
+    if late_s == 0.0:
+        assert used_s == settings_s
+
+
+@pytest.mark.parametrize("shown_s", [-0.0011, 0.0, 0.0102, 0.03])
+def test_the_delay_that_is_reported_is_the_one_that_is_used(shown_s):
+    delay = Delay(settings_s=0.0, used_s=0.01, shown_s=shown_s, low_s=shown_s - 1e-3, high_s=shown_s + 1e-3)
+    (found,) = delay.parameters
+    assert found.value == delay.used_s
+    assert found.low <= min(shown_s, 0.01) <= max(shown_s, 0.01) <= found.high
+    excluded = not delay.low_s <= 0.01 <= delay.high_s
+    assert (delay.error_s > 0.0) == excluded
+    assert any("the recordings rather show" in one.reason for one in delay.undetermined) == excluded
+
+
+class FoundWithAll(NamedTuple):
+    """A choice of terms, with the lag that was found with all candidates."""
+
+    lag_s: float
+
+    def lag(self, model, squeezes):
+        return Lag(lag_s=self.lag_s, error_s=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("found_s", "shown", "used_s"),
+    [
+        (0.0, lambda used_s: 0.0004, 0.0),
+        (-0.0032, lambda used_s: -0.00111, 0.0),  # the chosen terms show -2.62 to 0.40 ms, and so none
+        (0.0032, lambda used_s: 0.0051, 0.0051),  # they show another one, which is used
+        (0.0102, lambda used_s: 0.0100, 0.0102),  # they show this one
+        (0.0100, lambda used_s: used_s + 0.004, 0.0),  # they always show more
+    ],
+)
+def test_a_delay_is_used_only_if_the_terms_that_are_chosen_with_it_show_it(found_s, shown, used_s):
+    def timed(lag):
+        return Timed([], [], [], FoundWithAll(found_s), lag)
+
+    def delay(found):
+        shown_s = shown(found.lag.lag_s)
+        return Delay(
+            settings_s=0.0,
+            used_s=found.lag.lag_s,
+            shown_s=shown_s,
+            low_s=shown_s - 0.00151,
+            high_s=shown_s + 0.00151,
+        )
+
+    found, told = with_delay(timed, delay, ForwardModel(pads=RIGID_PADS))
+    assert told.used_s == pytest.approx(used_s, abs=1e-9)
+    assert found.lag.lag_s == told.used_s
+
+
+@pytest.mark.slow
+def test_a_ramp_at_one_speed_does_not_show_the_delay_and_says_so():
+    ramp = recorded(hold_s=0.0)
+    found = identify(SimConfig(sensor="ideal", pad_stiffness_n_m=float("inf")), [ramp], lambda *_: None)
+    (refused,) = [one for one in found.undetermined if one.what == "delay of the sensor"]
+    assert "at one speed" in refused.reason
+    assert "changing speed" in refused.remedy
+    assert not [one for one in found.parameters if one.name == "delay_s"]
+
+
+def test_an_image_has_its_own_force_whatever_the_settings_say_about_its_delay():
+    squeeze = recorded(period_s=0.041)
+    # Each image arrives 20 ms after it was taken.
+    late = delayed(squeeze, 0.02)
+    late = evolve(late, trace=evolve(late.trace, pad_t_s=squeeze.trace.pad_t_s))
+    for delay_s in (0.0, 0.02):
+        as_recorded, arrived_late = prepared(squeeze, 0.0), prepared(late, delay_s)
+        n = len(arrived_late.force_n) - 1
+        np.testing.assert_array_equal(as_recorded.force_n[:n], arrived_late.force_n[:n])
+
+
+def test_a_force_without_a_time_of_its_own_is_as_late_as_the_settings_say():
+    squeeze = recorded()
+    late = delayed(squeeze, 0.02)
+    for delay_s, lag_s in ((0.02, 0.0), (0.005, 0.015)):
+        path = prepared(late, delay_s, lag_s=lag_s)
+        loading = path.gap_m[path.sample] > 0.05 - 0.9 * 0.008
+        closure = np.maximum(0.05 - path.gap_m[path.sample][loading], 0.0)
+        assert np.abs(path.force_n[loading] - 1000.0 * closure).max() < 0.1
