@@ -33,21 +33,21 @@ from numpy.typing import NDArray
 from selection import controller_is_stable, error_of
 
 from graspsense.plugin_api import ConfigError, NotCompilable, RunConfig, bind, create
-from graspsense_sim_gripper.batch.job import FinishedGrasp, Job, grasp_plain
-from graspsense_sim_gripper.batch.threads import run_many
-from graspsense_sim_gripper.build import instantiate, problem_of
-from graspsense_sim_gripper.compiled.compose import plant_move
-from graspsense_sim_gripper.compiled.jit import compile_part
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.dynamics.state import PlantState
-from graspsense_sim_gripper.objects.library import find
-from graspsense_sim_gripper.objects.spec import ObjectSpec
-from graspsense_sim_gripper.problem import GraspController, GraspSetup
-from graspsense_sim_gripper.reduction.model import Reduction
-from graspsense_sim_gripper.reduction.propose import NOT_VERIFIED, grip_of, propose
-from graspsense_sim_gripper.reduction.select import select
-from graspsense_sim_gripper.stepping.scheme import PlantParams
-from graspsense_sim_gripper.terms.registry import laws_of
+from graspsense_sim_gripper.plant.state import PlantState
+from graspsense_sim_gripper.run.accuracy.model import Reduction
+from graspsense_sim_gripper.run.accuracy.propose import NOT_VERIFIED, grip_of, propose
+from graspsense_sim_gripper.run.accuracy.select import select
+from graspsense_sim_gripper.run.batch.job import FinishedGrasp, Job, grasp_plain
+from graspsense_sim_gripper.run.batch.threads import run_many
+from graspsense_sim_gripper.run.build import instantiate, problem_of
+from graspsense_sim_gripper.run.compiled.compose import plant_move
+from graspsense_sim_gripper.run.compiled.jit import compile_part
+from graspsense_sim_gripper.run.problem import GraspController, GraspSetup
+from graspsense_sim_gripper.scene.library import find
+from graspsense_sim_gripper.scene.spec import ObjectSpec
+from graspsense_sim_gripper.scene.terms.registry import laws_of
+from graspsense_sim_gripper.solve.scheme import PlantParams
 
 Row = dict[str, Any]
 FloatArray = NDArray[np.float64]

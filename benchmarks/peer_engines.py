@@ -23,11 +23,11 @@ from scipy.integrate import solve_ivp
 from simulation_scene import KC, LIGHT, TICK, TICKS, X0, B, C, K, Law, M, Run
 
 from graspsense.plugin_api import RunConfig
-from graspsense_sim_gripper.batch.job import Job, Storage, grasp_compiled
-from graspsense_sim_gripper.batch.scenes import Scenes
-from graspsense_sim_gripper.compiled.loop_code import CompiledLoops
-from graspsense_sim_gripper.compiled.padding import composition_of
 from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.run.batch.job import Job, Storage, grasp_compiled
+from graspsense_sim_gripper.run.batch.scenes import Scenes
+from graspsense_sim_gripper.run.compiled.loop_code import CompiledLoops
+from graspsense_sim_gripper.run.compiled.padding import composition_of
 
 REFERENCE_STEPS: Final = 64
 """Steps a millisecond of the reference: fourth order, with every event located. Four times as many change the trace of

@@ -23,7 +23,7 @@ from simulation_scene import CONFIG, KC, LIGHT, OPEN_M, X0, B, C, K, M, closed_l
 
 from graspsense.plugin_api import gap_and_rate, revolutions_at
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.drive_models import LINKAGES
+from graspsense_sim_gripper.plant.drive_models import LINKAGES
 
 OBJECTS: Final = Path(__file__).parent / "peer_objects"
 MODES: Final = 2

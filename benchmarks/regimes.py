@@ -6,8 +6,8 @@ The scenes are drawn from the ranges that gripper, object and controller may phy
 the simulator works, and apart from those of `benchmarks/selection.py`. Their seeds are fresh unless `--first` names the
 first. Each is grasped by the hybrid controller in the steps that are selected for 10, 1 and 0.1 %, in
 fixed steps of 1 ms, and in the reference. The error is that of
-`graspsense_sim_gripper.reduction.error`; a different outcome is an infinite error. A reference that has not settled in
-some tick, or that a selected grasp differs from, is compared with even steps of 10 us. Finished scenes are
+`graspsense_sim_gripper.run.accuracy.error`; a different outcome is an infinite error. A reference that has not settled
+in some tick, or that a selected grasp differs from, is compared with even steps of 10 us. Finished scenes are
 appended to the file of `--rows`, and are not run again if the program is started again with the same file. Times are
 processor times of the compiled loop that holds all kinds of terms; selecting the steps is measured apart.
 """
@@ -34,17 +34,17 @@ from selection import KINDS, Bench, Scene, controller_is_stable, record_of
 from graspsense.evaluation.intervals import wilson
 from graspsense.experiments.versions import where_measured
 from graspsense.plugin_api import ConfigError, RunConfig, create
-from graspsense_sim_gripper.batch.job import FinishedGrasp, Job, grasp_once, grasp_plain
-from graspsense_sim_gripper.build import instantiate, problem_of
-from graspsense_sim_gripper.compiled.padding import padded
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.objects.spec import ObjectSpec
-from graspsense_sim_gripper.problem import GraspController, GraspSetup
-from graspsense_sim_gripper.reduction.error import deviation
-from graspsense_sim_gripper.reduction.model import Reduction
-from graspsense_sim_gripper.reduction.propose import NOT_VERIFIED
-from graspsense_sim_gripper.reduction.select import select
-from graspsense_sim_gripper.terms.registry import in_order
+from graspsense_sim_gripper.run.accuracy.error import deviation
+from graspsense_sim_gripper.run.accuracy.model import Reduction
+from graspsense_sim_gripper.run.accuracy.propose import NOT_VERIFIED
+from graspsense_sim_gripper.run.accuracy.select import select
+from graspsense_sim_gripper.run.batch.job import FinishedGrasp, Job, grasp_once, grasp_plain
+from graspsense_sim_gripper.run.build import instantiate, problem_of
+from graspsense_sim_gripper.run.compiled.padding import padded
+from graspsense_sim_gripper.run.problem import GraspController, GraspSetup
+from graspsense_sim_gripper.scene.spec import ObjectSpec
+from graspsense_sim_gripper.scene.terms.registry import in_order
 
 Row = dict[str, Any]
 ACCURACIES: Final = (0.1, 0.01, 0.001)

@@ -41,13 +41,13 @@ from selection import KINDS, Bench, Scene, controller_is_stable
 
 from graspsense.experiments.versions import where_measured
 from graspsense.plugin_api import ConfigError, Features, Outcome, RunConfig, create
-from graspsense_sim_gripper.batch.job import Job, grasp_once, grasp_plain
-from graspsense_sim_gripper.build import instantiate, problem_of
-from graspsense_sim_gripper.compiled.padding import padded
-from graspsense_sim_gripper.model_report import accuracy_report, model_report
-from graspsense_sim_gripper.problem import GraspController
-from graspsense_sim_gripper.reduction.error import UNIT_SCALES
-from graspsense_sim_gripper.reduction.select import select
+from graspsense_sim_gripper.run.accuracy.error import UNIT_SCALES
+from graspsense_sim_gripper.run.accuracy.select import select
+from graspsense_sim_gripper.run.batch.job import Job, grasp_once, grasp_plain
+from graspsense_sim_gripper.run.build import instantiate, problem_of
+from graspsense_sim_gripper.run.compiled.padding import padded
+from graspsense_sim_gripper.run.model_report import accuracy_report, model_report
+from graspsense_sim_gripper.run.problem import GraspController
 
 Row = dict[str, Any]
 ACCURACY: Final = 0.01

@@ -5,7 +5,7 @@
 A scene is drawn from the distribution below by its number. It is grasped by the hybrid controller, with ideal sensors,
 in the steps that are chosen for an error of 10 %, 1 % and 0.1 %, and in the reference, in which the steps of each tick
 are halved until the result no longer changes, starting from an accuracy of 0.01 %. The error is that of
-`graspsense_sim_gripper.reduction.error`; a different outcome is an infinite error, and a refusal is a miss.
+`graspsense_sim_gripper.run.accuracy.error`; a different outcome is an infinite error, and a refusal is a miss.
 """
 
 from __future__ import annotations
@@ -25,19 +25,19 @@ import numpy as np
 from attrs import evolve, frozen
 
 from graspsense.plugin_api import HOLD, ConfigError, RunConfig, create
-from graspsense_sim_gripper.batch.job import FinishedGrasp, Job, Storage, grasp_once
-from graspsense_sim_gripper.build import instantiate, problem_of
-from graspsense_sim_gripper.compiled.compose import Composition
-from graspsense_sim_gripper.compiled.loop_code import CompiledLoops
-from graspsense_sim_gripper.compiled.padding import composition_of, padded
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.objects.spec import ObjectSpec
-from graspsense_sim_gripper.problem import GraspController, GraspSetup
-from graspsense_sim_gripper.reduction.error import GraspRecord, deviation
-from graspsense_sim_gripper.reduction.model import Reduction
-from graspsense_sim_gripper.reduction.select import select
-from graspsense_sim_gripper.sampled_loop import instability
-from graspsense_sim_gripper.terms.registry import in_order
+from graspsense_sim_gripper.run.accuracy.error import GraspRecord, deviation
+from graspsense_sim_gripper.run.accuracy.model import Reduction
+from graspsense_sim_gripper.run.accuracy.select import select
+from graspsense_sim_gripper.run.batch.job import FinishedGrasp, Job, Storage, grasp_once
+from graspsense_sim_gripper.run.build import instantiate, problem_of
+from graspsense_sim_gripper.run.compiled.compose import Composition
+from graspsense_sim_gripper.run.compiled.loop_code import CompiledLoops
+from graspsense_sim_gripper.run.compiled.padding import composition_of, padded
+from graspsense_sim_gripper.run.problem import GraspController, GraspSetup
+from graspsense_sim_gripper.run.sampled_loop import instability
+from graspsense_sim_gripper.scene.spec import ObjectSpec
+from graspsense_sim_gripper.scene.terms.registry import in_order
 
 ACCURACIES: Final = (0.1, 0.01, 0.001)
 REFERENCE: Final = 1e-4

@@ -21,7 +21,7 @@ from graspsense.core.components.config import resolve
 from graspsense.experiments.sensed import SensedTrade, sensed_trade
 from graspsense.experiments.versions import where_measured
 from graspsense.plugin_api import SimulationVariant
-from graspsense_sim_gripper.variants import variants
+from graspsense_sim_gripper.run.variants import variants
 
 
 def table(trade: SensedTrade, accuracy: float) -> list[str]:

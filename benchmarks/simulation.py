@@ -31,10 +31,10 @@ from typing import Any, Final
 from graspsense import __version__
 from graspsense.plugin_api import create
 from graspsense.sources.simulated import BATCH_WITHOUT_TRACES
-from graspsense_sim_gripper.backend import SimBackend
-from graspsense_sim_gripper.batch import run_many
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.objects.library import catalogue
+from graspsense_sim_gripper.run.backend import SimBackend
+from graspsense_sim_gripper.run.batch import run_many
+from graspsense_sim_gripper.scene.library import catalogue
 
 SENSORS: Final = ("ideal", "pads")
 

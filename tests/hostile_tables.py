@@ -28,7 +28,7 @@ from graspsense.sources.features_csv import read_labelled
 from graspsense.sources.grasp_csv import read_squeeze
 from graspsense.sources.manifest.reader import read_recordings
 from graspsense_c45.arff import ArffError, read_arff
-from graspsense_sim_gripper.objects.library import find
+from graspsense_sim_gripper.scene.library import find
 
 MEMORY_BYTES = 2**30
 """Memory that reading may take beside what the program itself has."""

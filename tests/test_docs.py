@@ -192,7 +192,7 @@ def test_a_module_or_name_that_a_page_mentions_exists():
 
 
 def test_a_file_that_a_page_mentions_exists():
-    folders = (ROOT, ROOT / "src" / "graspsense", *ROOT.glob("plugins/*"))
+    folders = (ROOT, ROOT / "src" / "graspsense", *ROOT.glob("plugins/*"), *ROOT.glob("plugins/*/src/*"))
     made_by_users = ("results/", "lab_", "OUT/", "~", "/")
     for page, name in in_backticks(r"[\w./]+/[\w.]+\.(?:py|toml|md|json)"):
         assert name.startswith(made_by_users) or any((folder / name).exists() for folder in folders), (

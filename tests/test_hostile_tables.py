@@ -29,7 +29,7 @@ from graspsense.sources.manifest.patterns import PatternError, file_template, re
 from graspsense.sources.manifest.reader import read_recordings
 from graspsense.sources.manifest.text_format import read_text
 from graspsense_c45.arff import ArffError, parse_arff
-from graspsense_sim_gripper.objects.library import find
+from graspsense_sim_gripper.scene.library import find
 
 HERE = Path(__file__).parent
 MANIFEST = 'files = "*.csv"\ntime = "t"\ngap = "g [mm]"\nforce = "F"\nlabel = "jar"\n'

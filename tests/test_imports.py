@@ -51,7 +51,7 @@ MAY_KNOW = {
 
 ROOMS = ("values", "files", "control", "components", "grasp", "compiling", "learn", "pipeline")
 """The rooms of core. Each may import from those before it."""
-OPENED_TO = {"identify": {"graspsense_sim_gripper.identification"}}
+OPENED_TO = {"identify": {"graspsense_sim_gripper.run.identification"}}
 """Distribution to the modules of others that it may import besides the doors."""
 
 HEAVY = {

@@ -1,14 +1,14 @@
 """The published numbers of the PR2 gripper are the same in its driver, in the simulator and in the reader of its bags.
 
 Each has them as data of its own, because none of them may import another: `graspsense_pr2_gripper.linkage`,
-`graspsense_sim_gripper.drive_models` and `sensing`, `graspsense.sources.rosbag`.
+`graspsense_sim_gripper.plant.drive_models` and `sensing`, `graspsense.sources.rosbag`.
 """
 
 from __future__ import annotations
 
 from graspsense.sources import rosbag
 from graspsense_pr2_gripper import linkage
-from graspsense_sim_gripper import drive_models, sensing
+from graspsense_sim_gripper.plant import drive_models, sensing
 
 
 def test_linkages_are_the_same():

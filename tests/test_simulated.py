@@ -26,7 +26,7 @@ from graspsense.store.dataset import labelled_store
 from graspsense.store.labels import labels_of
 from graspsense.store.record_grasp import record_grasp
 from graspsense.store.store import Store
-from graspsense_sim_gripper.backend import SimBackend
+from graspsense_sim_gripper.run.backend import SimBackend
 
 HERE = sys.modules[__name__]
 

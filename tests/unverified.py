@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from graspsense_sim_gripper.build import build, instantiate, problem_of
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.objects.spec import ObjectSpec
-from graspsense_sim_gripper.problem import GraspSetup
-from graspsense_sim_gripper.reduction.propose import grip_of, propose
+from graspsense_sim_gripper.run.accuracy.propose import grip_of, propose
+from graspsense_sim_gripper.run.build import build, instantiate, problem_of
+from graspsense_sim_gripper.run.problem import GraspSetup
+from graspsense_sim_gripper.scene.spec import ObjectSpec
 
 
 def unverified_setup(config: SimConfig, scene: str | ObjectSpec, seed: int) -> GraspSetup:

@@ -66,10 +66,10 @@ from graspsense_identify.interval import LEVEL, interval_of_mean, normal
 from graspsense_identify.laws import SLOTS
 from graspsense_identify.run import identify
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.objects.instance import _draws_of_number
-from graspsense_sim_gripper.objects.library import SCENE_IN_MEMORY
-from graspsense_sim_gripper.objects.library import find as find_object
-from graspsense_sim_gripper.terms.gas import Gas
+from graspsense_sim_gripper.scene.instance import _draws_of_number
+from graspsense_sim_gripper.scene.library import SCENE_IN_MEMORY
+from graspsense_sim_gripper.scene.library import find as find_object
+from graspsense_sim_gripper.scene.terms.gas import Gas
 
 WIDTH_M: Final = 0.05
 AT_M: Final = 0.01

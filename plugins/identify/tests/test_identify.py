@@ -22,8 +22,8 @@ from graspsense_identify.refuse import shows_memory
 from graspsense_identify.run import _fit_to_use, _own_settings, _used, share_spread
 from graspsense_identify.spread import refits
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.dynamics.contact import PadCompliance
-from graspsense_sim_gripper.objects.spec import parse_scene
+from graspsense_sim_gripper.plant.contact import PadCompliance
+from graspsense_sim_gripper.scene.spec import parse_scene
 
 PADS = PadCompliance(15000.0, 0.0, 0.0, 1.0)
 

@@ -16,8 +16,8 @@ from graspsense_identify.path_error import NODES_PER_TICK, on_fine_path, path_bi
 from graspsense_identify.prepare import prepared
 from graspsense_identify.run import _scale, identify
 from graspsense_identify.share import measured_share
-from graspsense_sim_gripper.build import build, drive_and_pads, instantiate
 from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.run.build import build, drive_and_pads, instantiate
 
 
 def squeeze_of(name, **gripper):

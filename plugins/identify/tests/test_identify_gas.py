@@ -21,8 +21,8 @@ from graspsense_identify.refuse import undetermined
 from graspsense_identify.run import identify
 from graspsense_identify.spread import _scale_errors, uncertainty
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.dynamics.contact import PadCompliance
-from graspsense_sim_gripper.terms.gas import Gas
+from graspsense_sim_gripper.plant.contact import PadCompliance
+from graspsense_sim_gripper.scene.terms.gas import Gas
 
 AIR = {"area_slope_m": 0.0, "pressure_pa": 101325.0, "exponent": 1.0, "bulge_m3_pa": 0.0}
 

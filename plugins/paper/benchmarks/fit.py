@@ -47,10 +47,10 @@ from graspsense.evaluation.folds import stratified
 from graspsense.plugin_api import Classifier, Features, create, table_of
 from graspsense.sources.simulated import OBJECTS_PER_SEED, TRIALS_PER_SEED, Group
 from graspsense_paper.published import published
-from graspsense_sim_gripper.batch import run_many
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.objects.library import catalogue, object_kinds
-from graspsense_sim_gripper.objects.spec import ObjectSpec
+from graspsense_sim_gripper.run.batch import run_many
+from graspsense_sim_gripper.scene.library import catalogue, object_kinds
+from graspsense_sim_gripper.scene.spec import ObjectSpec
 
 TRIALS: Final = {"odwalla": (66, 12), "naked": (41, 10), "can": (42, 12), "water": (80, 16)}
 """Grasps and things of each container: section III.E of the paper."""

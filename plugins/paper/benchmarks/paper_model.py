@@ -29,9 +29,9 @@ from graspsense_paper.claims import split_by
 from graspsense_paper.grasping import measures
 from graspsense_paper.inference import Prior
 from graspsense_paper.published import published
-from graspsense_sim_gripper.batch import run_many
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.objects.library import catalogue, object_kinds
+from graspsense_sim_gripper.run.batch import run_many
+from graspsense_sim_gripper.scene.library import catalogue, object_kinds
 
 Values = Mapping[str, float]
 """Name of a figure to its value."""

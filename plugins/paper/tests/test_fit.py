@@ -5,7 +5,7 @@ import tomllib
 import fit
 import pytest
 
-from graspsense_sim_gripper.objects.library import catalogue
+from graspsense_sim_gripper.scene.library import catalogue
 
 
 def test_what_is_fitted_is_three_figures_of_each_of_four_containers():

@@ -36,7 +36,7 @@ from graspsense_paper.verdict import within
 
 pytest.importorskip("graspsense_sim_gripper", reason="the paper is done again in simulation")
 pytest.importorskip("graspsense_c45", reason="the paper's classifier")
-from graspsense_sim_gripper.batch import run_many
+from graspsense_sim_gripper.run.batch import run_many
 
 
 def test_printed_matrices_have_the_truth_where_it_is_said_to_be():
@@ -82,7 +82,7 @@ def test_numbers_of_trials_are_the_papers():
 
 
 def test_the_number_of_fitted_parameters_is_that_of_the_catalogue():
-    text = files("graspsense_sim_gripper").joinpath("objects/catalogue.toml").read_text(encoding="utf-8")
+    text = files("graspsense_sim_gripper").joinpath("scene/catalogue.toml").read_text(encoding="utf-8")
     fresh = text[: text.index("[odwalla_worn]")] + text[text.index("[naked]") :]
     assert fresh.count('origin = "fitted to') == published().fitted.count
 

@@ -20,7 +20,7 @@ from graspsense_pr2_gripper.config import FaultConfig, Pr2Config
 from graspsense_pr2_gripper.faults import Wire
 from graspsense_pr2_gripper.linkage import FRICTION_N
 from graspsense_pr2_gripper.protocol import EFFORT_KIND, ProtocolError, decode_output
-from graspsense_sim_gripper.build import device_info
+from graspsense_sim_gripper.run.build import device_info
 
 BARE = "classifier.type=none"
 EMULATED = ("gripper.type=pr2", "gripper.transport=emulated", BARE)
@@ -72,7 +72,7 @@ def test_grasp_through_the_driver_is_the_direct_one(
     odwalla bottle with seed 2 they move it by 16: the speed there stays at the threshold of rest.)
     """
     monkeypatch.setattr(
-        "graspsense_sim_gripper.backend.device_info",
+        "graspsense_sim_gripper.run.backend.device_info",
         lambda config: evolve(device_info(config), harmless=False, friction_n=FRICTION_N),
     )
     direct = load_pipeline(options=["gripper.pad_delay_s=0.01", BARE]).grasp(object=thing, seed=seed)

@@ -18,11 +18,11 @@ from scipy.optimize import brentq
 from unverified import unverified_setup
 
 from graspsense.plugin_api import gap_and_rate, revolutions_at
-from graspsense_sim_gripper.compiled.compose import composed_move, composition
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.dynamics.state import Motion
-from graspsense_sim_gripper.objects.spec import ObjectSpec
-from graspsense_sim_gripper.terms.registry import TERMS
+from graspsense_sim_gripper.plant.state import Motion
+from graspsense_sim_gripper.run.compiled.compose import composed_move, composition
+from graspsense_sim_gripper.scene.spec import ObjectSpec
+from graspsense_sim_gripper.scene.terms.registry import TERMS
 
 TICK_S = 1e-3
 PEAK_S = 2e-5

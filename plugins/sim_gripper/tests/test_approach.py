@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from graspsense.plugin_api import APPROACH, create
-from graspsense_sim_gripper.batch import run_many
 from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.run.batch import run_many
 
 TICK_BY_TICK = {"fidelity": "fixed"}
 HYBRID = create("controller", "hybrid")

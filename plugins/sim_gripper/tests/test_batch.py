@@ -33,19 +33,19 @@ from graspsense.plugin_api import (
     create,
     hookimpl,
 )
-from graspsense_sim_gripper.backend import SimBackend
-from graspsense_sim_gripper.batch import compiled_grasps, threads, worker
-from graspsense_sim_gripper.batch import job as batch_job
-from graspsense_sim_gripper.batch.job import Job, grasp_plain
-from graspsense_sim_gripper.batch.scenes import Scenes
-from graspsense_sim_gripper.batch.threads import SLICE, WORTH_A_PROCESS, run_many, slices_of
-from graspsense_sim_gripper.batch.worker import NotHandedOver, PlainProcess
-from graspsense_sim_gripper.compiled import loop_code
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.model_report import model_report
-from graspsense_sim_gripper.objects.library import catalogue, kinds_in, shipped_scenes
-from graspsense_sim_gripper.terms.registry import TERMS
-from graspsense_sim_gripper.terms.term import Term
+from graspsense_sim_gripper.run.backend import SimBackend
+from graspsense_sim_gripper.run.batch import compiled_grasps, threads, worker
+from graspsense_sim_gripper.run.batch import job as batch_job
+from graspsense_sim_gripper.run.batch.job import Job, grasp_plain
+from graspsense_sim_gripper.run.batch.scenes import Scenes
+from graspsense_sim_gripper.run.batch.threads import SLICE, WORTH_A_PROCESS, run_many, slices_of
+from graspsense_sim_gripper.run.batch.worker import NotHandedOver, PlainProcess
+from graspsense_sim_gripper.run.compiled import loop_code
+from graspsense_sim_gripper.run.model_report import model_report
+from graspsense_sim_gripper.scene.library import catalogue, kinds_in, shipped_scenes
+from graspsense_sim_gripper.scene.terms.registry import TERMS
+from graspsense_sim_gripper.scene.terms.term import Term
 
 HYBRID = create("controller", "hybrid")
 FEATURES = create("feature-set", "chitta")
@@ -209,7 +209,7 @@ broken_n_m = 3000.0
 """
 INTERRUPTED = """
 from graspsense.plugin_api import create
-from graspsense_sim_gripper.batch.threads import grasps, job_of
+from graspsense_sim_gripper.run.batch.threads import grasps, job_of
 from graspsense_sim_gripper.config import SimConfig
 
 def told(done, of):
@@ -336,7 +336,7 @@ def test_where_numba_cannot_be_imported_grasps_run_in_the_interpreter(tmp_path):
     script = """
 import warnings
 from graspsense.plugin_api import create
-from graspsense_sim_gripper.batch.threads import run_many
+from graspsense_sim_gripper.run.batch.threads import run_many
 from graspsense_sim_gripper.config import SimConfig
 with warnings.catch_warnings(record=True) as told:
     warnings.simplefilter("always")

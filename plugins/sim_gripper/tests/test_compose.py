@@ -5,9 +5,9 @@ from typing import NamedTuple
 
 import pytest
 
-from graspsense_sim_gripper.binding import bind_reachable
-from graspsense_sim_gripper.compiled.compose import Composition, composed_move, grasp_loop
-from graspsense_sim_gripper.terms.elastic import elastic
+from graspsense_sim_gripper.run.binding import bind_reachable
+from graspsense_sim_gripper.run.compiled.compose import Composition, composed_move, grasp_loop
+from graspsense_sim_gripper.scene.terms.elastic import elastic
 
 
 class Pair(NamedTuple):

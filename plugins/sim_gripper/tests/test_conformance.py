@@ -11,8 +11,8 @@ import pytest
 from graspsense.core.components.registry import installed
 from graspsense.testing.conformance import checks_for
 from graspsense.testing.subject import package_of
-from graspsense_sim_gripper.conformance import check_terms
-from graspsense_sim_gripper.terms.registry import TERMS
+from graspsense_sim_gripper.run.conformance import check_terms
+from graspsense_sim_gripper.scene.terms.registry import TERMS
 
 
 class Params(NamedTuple):

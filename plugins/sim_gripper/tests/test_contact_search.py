@@ -8,18 +8,18 @@ import math
 import pytest
 from unverified import unverified_setup
 
-from graspsense_sim_gripper.compiled.compose import bind_reachable, sum_of, uncompressed
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.dynamics.contact import ObjectModel, PadCompliance, solve_contact
-from graspsense_sim_gripper.dynamics.state import ContactState
-from graspsense_sim_gripper.objects.library import find
-from graspsense_sim_gripper.reduction.levels import balance_rtol
-from graspsense_sim_gripper.terms.elastic import Elastic, elastic
-from graspsense_sim_gripper.terms.foam import Foam, foam
-from graspsense_sim_gripper.terms.loss import Loss, loss
-from graspsense_sim_gripper.terms.maxwell import Maxwell, MaxwellState, maxwell
-from graspsense_sim_gripper.terms.term import NoState
-from graspsense_sim_gripper.terms.worn import Worn, WornState, worn
+from graspsense_sim_gripper.plant.contact import ObjectModel, PadCompliance, solve_contact
+from graspsense_sim_gripper.plant.state import ContactState
+from graspsense_sim_gripper.run.accuracy.levels import balance_rtol
+from graspsense_sim_gripper.run.compiled.compose import bind_reachable, sum_of, uncompressed
+from graspsense_sim_gripper.scene.library import find
+from graspsense_sim_gripper.scene.terms.elastic import Elastic, elastic
+from graspsense_sim_gripper.scene.terms.foam import Foam, foam
+from graspsense_sim_gripper.scene.terms.loss import Loss, loss
+from graspsense_sim_gripper.scene.terms.maxwell import Maxwell, MaxwellState, maxwell
+from graspsense_sim_gripper.scene.terms.term import NoState
+from graspsense_sim_gripper.scene.terms.worn import Worn, WornState, worn
 
 SCENE = """
 summary = "a shell that earlier squeezes have dented by 12 mm"

@@ -10,18 +10,18 @@ from hypothesis import strategies as st
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.values.errors import ConfigError
 from graspsense.plugin_api import create
-from graspsense_sim_gripper.batch.drawn import can_be_drawn
-from graspsense_sim_gripper.batch.job import Job, started
-from graspsense_sim_gripper.batch.scenes import Scenes, scene_key
-from graspsense_sim_gripper.build import build
-from graspsense_sim_gripper.compiled.loop_code import loop_start
-from graspsense_sim_gripper.compiled.padding import padded
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.objects.library import catalogue
-from graspsense_sim_gripper.reduction.propose import grip_of, propose
+from graspsense_sim_gripper.run.accuracy.propose import grip_of, propose
+from graspsense_sim_gripper.run.batch.drawn import can_be_drawn
+from graspsense_sim_gripper.run.batch.job import Job, started
+from graspsense_sim_gripper.run.batch.scenes import Scenes, scene_key
+from graspsense_sim_gripper.run.build import build
+from graspsense_sim_gripper.run.compiled.loop_code import loop_start
+from graspsense_sim_gripper.run.compiled.padding import padded
+from graspsense_sim_gripper.scene.library import catalogue
 
 pytest.importorskip("numba", reason="grasps are drawn in compiled code with the extra `fast`")
-from graspsense_sim_gripper.compiled.drawing import compiled_drawing
+from graspsense_sim_gripper.run.compiled.drawing import compiled_drawing
 
 HELD = """
 width_m = 0.04

@@ -9,7 +9,7 @@ import pytest
 
 from graspsense.plugin_api import create
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.driven import RecordedPath, follow_many
+from graspsense_sim_gripper.run.driven import RecordedPath, follow_many
 
 SHELL = """width_m = 0.06
 [[terms]]

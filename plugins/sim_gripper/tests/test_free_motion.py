@@ -7,10 +7,10 @@ from attrs import fields
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.runner import run_grasp
 from graspsense.plugin_api import Controller, Trace, create
-from graspsense_sim_gripper.backend import SimBackend
-from graspsense_sim_gripper.batch import run_many
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.objects.library import catalogue
+from graspsense_sim_gripper.run.backend import SimBackend
+from graspsense_sim_gripper.run.batch import run_many
+from graspsense_sim_gripper.scene.library import catalogue
 
 CONTROLLERS = ("hybrid", "velocity", "force")
 COLUMNS = [f.name for f in fields(Trace) if f.name not in ("units", "signals", "events")]

@@ -5,10 +5,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from graspsense_sim_gripper.compiled import drawing, generator
-from graspsense_sim_gripper.compiled.drawing import compiled_drawing
-from graspsense_sim_gripper.compiled.generator import CompiledGenerator, compiled_generator, draws_like_numpy
-from graspsense_sim_gripper.random_numbers import NumpyGenerator
+from graspsense_sim_gripper.run.compiled import drawing, generator
+from graspsense_sim_gripper.run.compiled.drawing import compiled_drawing
+from graspsense_sim_gripper.run.compiled.generator import (
+    CompiledGenerator,
+    compiled_generator,
+    draws_like_numpy,
+)
+from graspsense_sim_gripper.scene.random_numbers import NumpyGenerator
 
 pytest.importorskip("numba", reason="the compiled generator needs the extra `fast`")
 

@@ -6,9 +6,9 @@ import pytest
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.runner import run_grasp
 from graspsense.plugin_api import Outcome, Phase, create
-from graspsense_sim_gripper.backend import SimBackend
-from graspsense_sim_gripper.batch import run_many
 from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.run.backend import SimBackend
+from graspsense_sim_gripper.run.batch import run_many
 
 FEATURES = create("feature-set", "chitta")
 

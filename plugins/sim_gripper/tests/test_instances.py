@@ -7,13 +7,13 @@ from unverified import unverified_setup
 
 from graspsense.core.values.errors import UnknownName
 from graspsense.plugin_api import RunConfig, create
-from graspsense_sim_gripper.build import build
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.objects.instance import sample
-from graspsense_sim_gripper.objects.library import find, split_number
-from graspsense_sim_gripper.problem import GraspController
-from graspsense_sim_gripper.reduction.select import select
-from graspsense_sim_gripper.sensing import with_listed_cells
+from graspsense_sim_gripper.plant.sensing import with_listed_cells
+from graspsense_sim_gripper.run.accuracy.select import select
+from graspsense_sim_gripper.run.build import build
+from graspsense_sim_gripper.run.problem import GraspController
+from graspsense_sim_gripper.scene.instance import sample
+from graspsense_sim_gripper.scene.library import find, split_number
 
 
 def drawn(name, seed):

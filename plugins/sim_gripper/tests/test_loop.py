@@ -7,14 +7,14 @@ from attrs import evolve, fields
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.runner import run_grasp
 from graspsense.plugin_api import EFFORT, Command, Trace, bind, create, fingerprint
-from graspsense_sim_gripper.backend import SimBackend
-from graspsense_sim_gripper.batch import run_many
-from graspsense_sim_gripper.compiled.compose import sum_of
-from graspsense_sim_gripper.compiled.jit import compile_part
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.terms.elastic import Elastic, elastic
-from graspsense_sim_gripper.terms.loss import Loss, loss
-from graspsense_sim_gripper.terms.term import NoState
+from graspsense_sim_gripper.run.backend import SimBackend
+from graspsense_sim_gripper.run.batch import run_many
+from graspsense_sim_gripper.run.compiled.compose import sum_of
+from graspsense_sim_gripper.run.compiled.jit import compile_part
+from graspsense_sim_gripper.scene.terms.elastic import Elastic, elastic
+from graspsense_sim_gripper.scene.terms.loss import Loss, loss
+from graspsense_sim_gripper.scene.terms.term import NoState
 
 numba = pytest.importorskip("numba", reason="the compiled loop needs the extra `fast`")
 
@@ -81,7 +81,7 @@ def test_steps_over_several_ticks_give_the_features_of_single_ticks(controller):
 @pytest.mark.slow
 @pytest.mark.parametrize("controller", ["velocity", "force", "hybrid"])
 def test_every_object_and_law_gives_one_trace_plain_and_compiled(controller):
-    from graspsense_sim_gripper.objects.library import catalogue
+    from graspsense_sim_gripper.scene.library import catalogue
 
     law, names = create("controller", controller), sorted(catalogue())
     config = SimConfig(**TICK_BY_TICK)

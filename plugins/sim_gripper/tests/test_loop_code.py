@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 
 from graspsense.plugin_api import bind
-from graspsense_sim_gripper.compiled.loop_code import (
+from graspsense_sim_gripper.plant.sensing import PadBuffers
+from graspsense_sim_gripper.run.compiled.loop_code import (
     FIRST_IMAGES,
     IMAGES_AT_ONCE,
     CellNoise,
     no_noise,
     stored_grasp,
 )
-from graspsense_sim_gripper.loop import Buffers
-from graspsense_sim_gripper.sensing import PadBuffers
+from graspsense_sim_gripper.run.loop import Buffers
 
 MOST = FIRST_IMAGES + 3 * IMAGES_AT_ONCE // 2
 

@@ -9,16 +9,16 @@ from unverified import unverified_setup
 
 from graspsense.core.components.run_config import RunConfig
 from graspsense.plugin_api import EFFORT, RELEASE, Command, create, gap_and_rate, revolutions_at
-from graspsense_sim_gripper.batch import job, run_many
-from graspsense_sim_gripper.binding import bind_reachable
-from graspsense_sim_gripper.compiled.compose import plant_move, step_parts, uncompressed
-from graspsense_sim_gripper.compiled.padding import composition_of
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.dynamics.state import Contact, Motion, PlantState
-from graspsense_sim_gripper.stepping.macro_step import HALF, macro_step, next_ticks, values_at
-from graspsense_sim_gripper.stepping.scheme import Steps
-from graspsense_sim_gripper.stepping.trend import UNKNOWN
-from graspsense_sim_gripper.terms.registry import laws_of
+from graspsense_sim_gripper.plant.state import Contact, Motion, PlantState
+from graspsense_sim_gripper.run.batch import job, run_many
+from graspsense_sim_gripper.run.binding import bind_reachable
+from graspsense_sim_gripper.run.compiled.compose import plant_move, step_parts, uncompressed
+from graspsense_sim_gripper.run.compiled.padding import composition_of
+from graspsense_sim_gripper.scene.terms.registry import laws_of
+from graspsense_sim_gripper.solve.macro_step import HALF, macro_step, next_ticks, values_at
+from graspsense_sim_gripper.solve.scheme import Steps
+from graspsense_sim_gripper.solve.trend import UNKNOWN
 
 CONFIG = SimConfig(sensor="ideal", spread=False)
 TICK = 1e-3

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from graspsense_sim_gripper.nested import (
+from graspsense_sim_gripper.run.nested import (
     TupleType,
     append_numbers,
     appender,

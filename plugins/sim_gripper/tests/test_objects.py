@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from graspsense.plugin_api import ConfigError, UnknownName
-from graspsense_sim_gripper.backend import SimBackend
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.objects.instance import cell_weights, sample
-from graspsense_sim_gripper.objects.library import catalogue, find, parse_entry
-from graspsense_sim_gripper.objects.spec import PATCHES, ObjectSpec
-from graspsense_sim_gripper.terms import NoState, Term
-from graspsense_sim_gripper.terms.registry import TERMS
+from graspsense_sim_gripper.run.backend import SimBackend
+from graspsense_sim_gripper.scene.instance import cell_weights, sample
+from graspsense_sim_gripper.scene.library import catalogue, find, parse_entry
+from graspsense_sim_gripper.scene.spec import PATCHES, ObjectSpec
+from graspsense_sim_gripper.scene.terms import NoState, Term
+from graspsense_sim_gripper.scene.terms.registry import TERMS
 
 
 def test_the_backend_declares_the_papers_containers_in_all_states_as_its_default_objects():
@@ -44,7 +44,7 @@ def test_the_four_containers_have_their_states_and_the_rest_is_there():
 
 
 def test_every_figure_has_its_reason():
-    text = files("graspsense_sim_gripper").joinpath("objects/catalogue.toml").read_text(encoding="utf-8")
+    text = files("graspsense_sim_gripper").joinpath("scene/catalogue.toml").read_text(encoding="utf-8")
 
     def figures(table):
         for value in table.values():

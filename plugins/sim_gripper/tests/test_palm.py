@@ -10,12 +10,9 @@ from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.runner import run_grasp
 from graspsense.core.values.signals import Phase
 from graspsense.plugin_api import create
-from graspsense_sim_gripper.backend import SimBackend
-from graspsense_sim_gripper.batch import run_many
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.drive_models import LINKAGES, STRAIGHT
-from graspsense_sim_gripper.dynamics.state import Contact, ContactState, Motion, PlantState
-from graspsense_sim_gripper.palm import (
+from graspsense_sim_gripper.plant.drive_models import LINKAGES, STRAIGHT
+from graspsense_sim_gripper.plant.palm import (
     ARM_HZ,
     AT_REST,
     FLOOR_M_S2,
@@ -28,6 +25,9 @@ from graspsense_sim_gripper.palm import (
     palm_signals,
     swing_force,
 )
+from graspsense_sim_gripper.plant.state import Contact, ContactState, Motion, PlantState
+from graspsense_sim_gripper.run.backend import SimBackend
+from graspsense_sim_gripper.run.batch import run_many
 
 HYBRID = create("controller", "hybrid")
 CAN = SimConfig(object="can:empty_open", acceleration=True)

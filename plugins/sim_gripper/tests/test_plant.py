@@ -10,27 +10,27 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from graspsense.plugin_api import gap_and_rate, revolutions_at, straight_linkage
-from graspsense_sim_gripper.binding import bind_reachable
-from graspsense_sim_gripper.compiled.compose import all_active, plant_move, sum_of, uncompressed
-from graspsense_sim_gripper.drive_models import LINKAGES, STRAIGHT
-from graspsense_sim_gripper.dynamics.contact import ObjectModel, PadCompliance, solve_contact
-from graspsense_sim_gripper.dynamics.drive import Drive, Friction, sliding_friction, stribeck_excess
-from graspsense_sim_gripper.dynamics.state import Contact, ContactState, Motion, PlantState
-from graspsense_sim_gripper.reduction.levels import PLAIN, steps_for
-from graspsense_sim_gripper.stepping.scheme import PlantParams, Steps
-from graspsense_sim_gripper.terms.elastic import Elastic, elastic
-from graspsense_sim_gripper.terms.foam import Foam
-from graspsense_sim_gripper.terms.gas import Gas
-from graspsense_sim_gripper.terms.liquid import Liquid, liquid
-from graspsense_sim_gripper.terms.loss import Loss, loss
-from graspsense_sim_gripper.terms.maxwell import Maxwell, MaxwellState, maxwell
-from graspsense_sim_gripper.terms.oscillator import Forcing, OscillatorState, moved
-from graspsense_sim_gripper.terms.registry import TERMS, laws_of, moving_of
-from graspsense_sim_gripper.terms.rigid import Rigid, RigidState, rigid
-from graspsense_sim_gripper.terms.slosh import Slosh
-from graspsense_sim_gripper.terms.surface import Surface, surface
-from graspsense_sim_gripper.terms.term import NoState
-from graspsense_sim_gripper.terms.worn import Worn
+from graspsense_sim_gripper.plant.contact import ObjectModel, PadCompliance, solve_contact
+from graspsense_sim_gripper.plant.drive import Drive, Friction, sliding_friction, stribeck_excess
+from graspsense_sim_gripper.plant.drive_models import LINKAGES, STRAIGHT
+from graspsense_sim_gripper.plant.state import Contact, ContactState, Motion, PlantState
+from graspsense_sim_gripper.run.accuracy.levels import PLAIN, steps_for
+from graspsense_sim_gripper.run.binding import bind_reachable
+from graspsense_sim_gripper.run.compiled.compose import all_active, plant_move, sum_of, uncompressed
+from graspsense_sim_gripper.scene.terms.elastic import Elastic, elastic
+from graspsense_sim_gripper.scene.terms.foam import Foam
+from graspsense_sim_gripper.scene.terms.gas import Gas
+from graspsense_sim_gripper.scene.terms.liquid import Liquid, liquid
+from graspsense_sim_gripper.scene.terms.loss import Loss, loss
+from graspsense_sim_gripper.scene.terms.maxwell import Maxwell, MaxwellState, maxwell
+from graspsense_sim_gripper.scene.terms.oscillator import Forcing, OscillatorState, moved
+from graspsense_sim_gripper.scene.terms.registry import TERMS, laws_of, moving_of
+from graspsense_sim_gripper.scene.terms.rigid import Rigid, RigidState, rigid
+from graspsense_sim_gripper.scene.terms.slosh import Slosh
+from graspsense_sim_gripper.scene.terms.surface import Surface, surface
+from graspsense_sim_gripper.scene.terms.term import NoState
+from graspsense_sim_gripper.scene.terms.worn import Worn
+from graspsense_sim_gripper.solve.scheme import PlantParams, Steps
 
 LINK = LINKAGES["pr2"]
 TICK = 1e-3

@@ -8,12 +8,12 @@ import pytest
 from attrs import evolve
 
 from graspsense.plugin_api import RunConfig, create
-from graspsense_sim_gripper.build import problem_of
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.objects.spec import ObjectSpec
-from graspsense_sim_gripper.problem import GraspController
-from graspsense_sim_gripper.reduction import cache
-from graspsense_sim_gripper.reduction import select as selection
+from graspsense_sim_gripper.run.accuracy import cache
+from graspsense_sim_gripper.run.accuracy import select as selection
+from graspsense_sim_gripper.run.build import problem_of
+from graspsense_sim_gripper.run.problem import GraspController
+from graspsense_sim_gripper.scene.spec import ObjectSpec
 
 CONFIG = SimConfig(sensor="ideal", spread=False)
 

@@ -8,9 +8,9 @@ from attrs import evolve
 
 from graspsense.core.grasp.runner import run_grasp
 from graspsense.plugin_api import APPROACH, HOLD, SQUEEZE, STEADY, RunConfig, Trace, create
-from graspsense_sim_gripper.backend import SimBackend
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.reduction.error import GraspRecord, deviation
+from graspsense_sim_gripper.run.accuracy.error import GraspRecord, deviation
+from graspsense_sim_gripper.run.backend import SimBackend
 
 SPEED, TAU, STIFFNESS = 0.01, 0.05, 2000.0
 

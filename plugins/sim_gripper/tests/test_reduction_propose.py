@@ -11,12 +11,12 @@ from attrs import evolve
 from click.testing import CliRunner
 
 from graspsense.cli.main import cli
-from graspsense_sim_gripper.build import instantiate, problem_of
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.objects.library import find
-from graspsense_sim_gripper.objects.spec import ObjectSpec
-from graspsense_sim_gripper.reduction.levels import PLAIN
-from graspsense_sim_gripper.reduction.propose import grip_of, propose
+from graspsense_sim_gripper.run.accuracy.levels import PLAIN
+from graspsense_sim_gripper.run.accuracy.propose import grip_of, propose
+from graspsense_sim_gripper.run.build import instantiate, problem_of
+from graspsense_sim_gripper.scene.library import find
+from graspsense_sim_gripper.scene.spec import ObjectSpec
 
 CONFIG = SimConfig(sensor="ideal", spread=False)
 SHELL = ("elastic", {"k1_n_m": 2000.0, "k3_n_m3": 2e6})

@@ -21,23 +21,23 @@ from graspsense.plugin_api import (
     RunConfig,
     create,
 )
-from graspsense_sim_gripper.backend import SimBackend, default_controller
-from graspsense_sim_gripper.batch import run_many
-from graspsense_sim_gripper.batch.job import Job, grasp_plain
-from graspsense_sim_gripper.build import instantiate, problem_of
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.objects.library import catalogue, find
-from graspsense_sim_gripper.objects.spec import ObjectSpec
-from graspsense_sim_gripper.problem import GraspController
-from graspsense_sim_gripper.reduction import select as selection
-from graspsense_sim_gripper.reduction import verify
-from graspsense_sim_gripper.reduction.error import GraspRecord, deviation
-from graspsense_sim_gripper.reduction.levels import CONTROLLED, PLAIN
-from graspsense_sim_gripper.reduction.propose import grip_of, propose
-from graspsense_sim_gripper.reduction.select import select
-from graspsense_sim_gripper.sampled_loop import instability
-from graspsense_sim_gripper.terms import Term
-from graspsense_sim_gripper.terms.registry import TERMS
+from graspsense_sim_gripper.run.accuracy import select as selection
+from graspsense_sim_gripper.run.accuracy import verify
+from graspsense_sim_gripper.run.accuracy.error import GraspRecord, deviation
+from graspsense_sim_gripper.run.accuracy.levels import CONTROLLED, PLAIN
+from graspsense_sim_gripper.run.accuracy.propose import grip_of, propose
+from graspsense_sim_gripper.run.accuracy.select import select
+from graspsense_sim_gripper.run.backend import SimBackend, default_controller
+from graspsense_sim_gripper.run.batch import run_many
+from graspsense_sim_gripper.run.batch.job import Job, grasp_plain
+from graspsense_sim_gripper.run.build import instantiate, problem_of
+from graspsense_sim_gripper.run.problem import GraspController
+from graspsense_sim_gripper.run.sampled_loop import instability
+from graspsense_sim_gripper.scene.library import catalogue, find
+from graspsense_sim_gripper.scene.spec import ObjectSpec
+from graspsense_sim_gripper.scene.terms import Term
+from graspsense_sim_gripper.scene.terms.registry import TERMS
 
 CONFIG = SimConfig(sensor="ideal", spread=False)
 SHELL = ("elastic", {"k1_n_m": 2000.0, "k3_n_m3": 2e6})

@@ -17,13 +17,13 @@ from graspsense.cli.main import cli
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.runner import run_grasp
 from graspsense.plugin_api import ConfigError, UnknownName, create
-from graspsense_sim_gripper.backend import SimBackend
-from graspsense_sim_gripper.batch import run_many
-from graspsense_sim_gripper.compiled.compose import plant_move
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.objects.instance import sample
-from graspsense_sim_gripper.objects.library import find, shipped_scenes, split_number
-from graspsense_sim_gripper.terms.registry import laws_of
+from graspsense_sim_gripper.run.backend import SimBackend
+from graspsense_sim_gripper.run.batch import run_many
+from graspsense_sim_gripper.run.compiled.compose import plant_move
+from graspsense_sim_gripper.scene.instance import sample
+from graspsense_sim_gripper.scene.library import find, shipped_scenes, split_number
+from graspsense_sim_gripper.scene.terms.registry import laws_of
 
 HYBRID = create("controller", "hybrid")
 
@@ -343,7 +343,7 @@ GEL = '''
 
     from typing import NamedTuple
 
-    from graspsense_sim_gripper.terms import NoState, Term
+    from graspsense_sim_gripper.scene.terms import NoState, Term
 
 
     class Gel(NamedTuple):
@@ -364,7 +364,7 @@ PROGRAM = """
     import sys
     import numpy as np
     from graspsense.plugin_api import create
-    from graspsense_sim_gripper.batch import run_many
+    from graspsense_sim_gripper.run.batch import run_many
     from graspsense_sim_gripper.config import SimConfig
 
     law, (scene, *compiled) = create("controller", "hybrid"), sys.argv[1:]

@@ -11,10 +11,10 @@ from graspsense.plugin_api import (
     create,
     revolutions_at,
 )
-from graspsense_sim_gripper.backend import SimBackend
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.drive_models import ENCODER_TICKS, LINKAGES
-from graspsense_sim_gripper.sensing import PAD_COUNTS_PER_N
+from graspsense_sim_gripper.plant.drive_models import ENCODER_TICKS, LINKAGES
+from graspsense_sim_gripper.plant.sensing import PAD_COUNTS_PER_N
+from graspsense_sim_gripper.run.backend import SimBackend
 
 HYBRID = create("controller", "hybrid")
 

@@ -8,9 +8,9 @@ import pytest
 
 from graspsense.plugin_api import create
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.objects.library import catalogue, shipped_scenes
-from graspsense_sim_gripper.objects.spec import ObjectSpec, parse_scene
-from graspsense_sim_gripper.terms.registry import TERMS
+from graspsense_sim_gripper.scene.library import catalogue, shipped_scenes
+from graspsense_sim_gripper.scene.spec import ObjectSpec, parse_scene
+from graspsense_sim_gripper.scene.terms.registry import TERMS
 
 PAGE = (Path(__file__).parents[3] / "docs" / "simulator.md").read_text(encoding="utf-8")
 

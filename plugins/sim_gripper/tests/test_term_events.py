@@ -13,14 +13,14 @@ from unverified import unverified_setup
 
 from graspsense.cli.main import cli
 from graspsense.plugin_api import ConfigError, create
-from graspsense_sim_gripper.batch import run_many
-from graspsense_sim_gripper.compiled.compose import composed_move, contact_solver, grasp_loop
-from graspsense_sim_gripper.compiled.padding import composition_of
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.objects.spec import ObjectSpec
-from graspsense_sim_gripper.stepping.scheme import Steps
-from graspsense_sim_gripper.terms import Term
-from graspsense_sim_gripper.terms.registry import TERMS
+from graspsense_sim_gripper.run.batch import run_many
+from graspsense_sim_gripper.run.compiled.compose import composed_move, contact_solver, grasp_loop
+from graspsense_sim_gripper.run.compiled.padding import composition_of
+from graspsense_sim_gripper.scene.spec import ObjectSpec
+from graspsense_sim_gripper.scene.terms import Term
+from graspsense_sim_gripper.scene.terms.registry import TERMS
+from graspsense_sim_gripper.solve.scheme import Steps
 
 CRUSH = """
 width_m = 0.05

@@ -7,22 +7,22 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from graspsense_sim_gripper.terms.elastic import LEAST_SLOPE, Elastic, elastic, shell_force
-from graspsense_sim_gripper.terms.foam import Foam, foam
-from graspsense_sim_gripper.terms.fracture import Fracture
-from graspsense_sim_gripper.terms.gas import Gas, GasState, gas
-from graspsense_sim_gripper.terms.liquid import GRAVITY_M_S2, Liquid, liquid
-from graspsense_sim_gripper.terms.loss import Loss, loss
-from graspsense_sim_gripper.terms.maxwell import Maxwell, MaxwellState, maxwell
-from graspsense_sim_gripper.terms.oscillator import Forcing, OscillatorState, moved
-from graspsense_sim_gripper.terms.registry import TERMS
-from graspsense_sim_gripper.terms.rigid import Rigid, RigidState, rigid
-from graspsense_sim_gripper.terms.slosh import Slosh, slosh
-from graspsense_sim_gripper.terms.snap import Snap, SnapState, snap
-from graspsense_sim_gripper.terms.surface import Surface, surface
-from graspsense_sim_gripper.terms.term import NoState, Term, WorkingPoint
-from graspsense_sim_gripper.terms.vent import LAMINAR_BELOW_PA, conductance, vented
-from graspsense_sim_gripper.terms.worn import Worn, WornState, worn
+from graspsense_sim_gripper.scene.terms.elastic import LEAST_SLOPE, Elastic, elastic, shell_force
+from graspsense_sim_gripper.scene.terms.foam import Foam, foam
+from graspsense_sim_gripper.scene.terms.fracture import Fracture
+from graspsense_sim_gripper.scene.terms.gas import Gas, GasState, gas
+from graspsense_sim_gripper.scene.terms.liquid import GRAVITY_M_S2, Liquid, liquid
+from graspsense_sim_gripper.scene.terms.loss import Loss, loss
+from graspsense_sim_gripper.scene.terms.maxwell import Maxwell, MaxwellState, maxwell
+from graspsense_sim_gripper.scene.terms.oscillator import Forcing, OscillatorState, moved
+from graspsense_sim_gripper.scene.terms.registry import TERMS
+from graspsense_sim_gripper.scene.terms.rigid import Rigid, RigidState, rigid
+from graspsense_sim_gripper.scene.terms.slosh import Slosh, slosh
+from graspsense_sim_gripper.scene.terms.snap import Snap, SnapState, snap
+from graspsense_sim_gripper.scene.terms.surface import Surface, surface
+from graspsense_sim_gripper.scene.terms.term import NoState, Term, WorkingPoint
+from graspsense_sim_gripper.scene.terms.vent import LAMINAR_BELOW_PA, conductance, vented
+from graspsense_sim_gripper.scene.terms.worn import Worn, WornState, worn
 
 
 def along(term, params, state, path, h):

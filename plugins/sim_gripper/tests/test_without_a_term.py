@@ -7,8 +7,8 @@ import pytest
 from graspsense.cli.model_table import print_without
 from graspsense.core.grasp.runner import run_grasp
 from graspsense.plugin_api import RunConfig, create
-from graspsense_sim_gripper.backend import SimBackend
 from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.run.backend import SimBackend
 
 SHELL = 'type = "elastic"\nk1_n_m = 1500.0\nk3_n_m3 = 2e6\n'
 GAS = """type = "gas"

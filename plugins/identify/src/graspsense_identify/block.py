@@ -19,7 +19,7 @@ from graspsense_identify.delay import EVIDENCE
 from graspsense_identify.fit import LAG_UNIT_S, LEAST_ERROR
 from graspsense_identify.interval import student
 from graspsense_identify.prepare import FULL, MAX_LAG_S, Squeeze, prepared
-from graspsense_sim_gripper.identification import SimConfig
+from graspsense_sim_gripper.run.identification import SimConfig
 
 HARDENS_BELOW: Final = 0.8
 """Fingertips count as nonlinear where this lowers the residual below this share of that of linear ones."""

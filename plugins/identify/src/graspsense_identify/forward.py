@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from graspsense.plugin_api import NotCompilable, entry_point, first_call
 from graspsense_identify.laws import N_NUMBERS, SLOTS, CandidateLaw, terms_of
 from graspsense_identify.prepare import Squeeze
-from graspsense_sim_gripper.identification import (
+from graspsense_sim_gripper.run.identification import (
     BALANCE_RTOL,
     LAW_ERRORS,
     ContactState,

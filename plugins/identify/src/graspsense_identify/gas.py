@@ -17,7 +17,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from graspsense_sim_gripper.identification import AIR_KG_M3, DISCHARGE, Gas
+from graspsense_sim_gripper.run.identification import AIR_KG_M3, DISCHARGE, Gas
 
 PRESSURE_PA: Final = 101325.0
 EXPONENT: Final = 1.0

@@ -12,7 +12,7 @@ from attrs import evolve, field, frozen
 from numpy.typing import NDArray
 
 from graspsense_identify.gas import AREA_M2, FIXED, LENGTH, RESISTANCE, STIFFNESS, parameters_of
-from graspsense_sim_gripper.identification import (
+from graspsense_sim_gripper.run.identification import (
     Elastic,
     Foam,
     Gas,

@@ -30,7 +30,7 @@ from graspsense_identify.spread import (
     LEAST_INSTANCES,
     corner_errors,
 )
-from graspsense_sim_gripper.identification import MOST_SPREAD
+from graspsense_sim_gripper.run.identification import MOST_SPREAD
 
 Floats = NDArray[np.float64]
 

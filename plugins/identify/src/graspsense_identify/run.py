@@ -36,7 +36,7 @@ from graspsense_identify.share import measured_share
 from graspsense_identify.spread import Uncertainty, uncertainty
 from graspsense_identify.used_delay import Timed, with_delay
 from graspsense_identify.write import SceneFacts, scene_text
-from graspsense_sim_gripper.identification import CELLS, Drive, SimConfig, drive_and_pads
+from graspsense_sim_gripper.run.identification import CELLS, Drive, SimConfig, drive_and_pads
 
 Progress = Callable[[str, int, int], None]
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from graspsense.plugin_api import Trace, gap_and_rate, revolutions_at
 from graspsense_identify.prepare import Squeeze
-from graspsense_sim_gripper.identification import Drive, stribeck_excess
+from graspsense_sim_gripper.run.identification import Drive, stribeck_excess
 
 SMALLEST: Final = 0.05
 LEAST_WORK_J: Final = 1e-4

@@ -14,7 +14,7 @@ def graspsense_sensor_backends() -> Iterable[SensorBackendEntry]:
     """Return the simulated gripper."""
     yield SensorBackendEntry(
         name="sim",
-        target="graspsense_sim_gripper.backend:SimBackend",
+        target="graspsense_sim_gripper.run.backend:SimBackend",
         # Declared here, so that printing the settings does not import the simulator.
         config="graspsense_sim_gripper.config:SimConfig",
         accepts=("effort",),
@@ -42,7 +42,7 @@ def graspsense_conformance_checks() -> Iterable[ConformanceCheckEntry]:
     """Return the check of terms that other distributions contribute through `graspsense_sim_terms`."""
     yield ConformanceCheckEntry(
         name="simulator-terms-are-laws",
-        target="graspsense_sim_gripper.conformance:check_terms",
+        target="graspsense_sim_gripper.run.conformance:check_terms",
         hook="graspsense_sim_terms",
         summary="A term of the simulator has a pure law with finite forces, and its linear form agrees with the law",
     )

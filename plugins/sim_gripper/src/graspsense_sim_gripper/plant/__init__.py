@@ -1,0 +1,1 @@
+"""What moves and what is measured: the drive, friction, the contact through the pads, and the sensors."""

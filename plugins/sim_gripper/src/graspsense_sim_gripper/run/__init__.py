@@ -1,0 +1,1 @@
+"""Grasps: the loop over ticks, plain and compiled, batches, and the backend."""

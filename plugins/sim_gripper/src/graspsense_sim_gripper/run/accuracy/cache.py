@@ -1,0 +1,246 @@
+"""The cache of chosen steps, in memory and on disk.
+
+A choice depends on the settings, the object and the controller, and on the code of the simulator, the terms and the
+controller. In memory the key holds the settings, the object and the controller. On disk the key is a digest of these
+and of the code, so that a choice is never used with other code. A file that cannot be read is ignored.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import sys
+import threading
+from collections import OrderedDict
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+from attrs import asdict
+
+import graspsense.plugin_api as plugin_api
+from graspsense.plugin_api import (
+    FeatureSet,
+    NotCompilable,
+    cache_folder,
+    fingerprint,
+    is_closed,
+    make_closed,
+    write_whole,
+)
+from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.run.accuracy.levels import Level
+from graspsense_sim_gripper.run.accuracy.model import Reduction, StepDecision, Verification
+from graspsense_sim_gripper.run.problem import ControllerStep, GraspController, Problem
+from graspsense_sim_gripper.scene.terms.registry import active_laws
+from graspsense_sim_gripper.scene.terms.term import OnSum, WorkingPoint
+from graspsense_sim_gripper.solve.scheme import Steps
+
+MAX_IN_MEMORY: Final = 512
+"""Models in memory, of some 5 kB each; the least recently used is dropped first."""
+_CONTENT: Final = "files with choices of models"
+MAX_FILES: Final = 4000
+"""Files on disk, of some 2 kB each; at that number the older half is deleted."""
+
+
+Json = Any
+"""A value that JSON can represent."""
+
+
+class Key(NamedTuple):
+    """Everything that a model depends on, except the code."""
+
+    config: SimConfig
+    kinds: tuple[str, ...]
+    """The kinds of the object's terms."""
+    spec: str
+    """`ObjectSpec.content`."""
+    step: ControllerStep
+    controller: str
+    """`GraspController.content`."""
+    features: str
+    """The feature set with its settings and its files; empty if there is none."""
+
+
+class ReductionCache:
+    """Reduced models by `Key`. Threads may share a cache."""
+
+    def __init__(self) -> None:
+        self._models: OrderedDict[Key, Reduction] = OrderedDict()
+        self._lock = threading.Lock()
+
+    def key(self, problem: Problem, controller: GraspController) -> Key:
+        """Return the key of the model for a problem under a controller. Raises TypeError if there is no object."""
+        if problem.spec is None:
+            raise TypeError("where there is no object there is no model to reduce")
+        spec = problem.spec
+        features = _features_content(controller.features)
+        return Key(
+            problem.model_config, spec.kinds, spec.content, controller.step, controller.content, features
+        )
+
+    def get(self, key: Key) -> Reduction | None:
+        """Return the model of this key, from memory or else from disk; None if there is none."""
+        with self._lock:
+            if key in self._models:
+                self._models.move_to_end(key)
+                return self._models[key]
+        name = _file_name(key)
+        model = None if name is None else _read(name)
+        if model is not None:
+            self._remember(key, model)
+        return model
+
+    def put(self, key: Key, model: Reduction) -> None:
+        """Cache a model: in memory, and on disk if it was verified by trial grasps."""
+        self._remember(key, model)
+        if model.verification is not None:
+            name = _file_name(key)
+            if name is not None:
+                _write(name, model)
+
+    def clear(self) -> None:
+        """Remove the models in memory; those on disk remain."""
+        with self._lock:
+            self._models.clear()
+
+    def __len__(self) -> int:
+        return len(self._models)
+
+    def _remember(self, key: Key, model: Reduction) -> None:
+        with self._lock:
+            self._models[key] = model
+            self._models.move_to_end(key)
+            while len(self._models) > MAX_IN_MEMORY:
+                self._models.popitem(last=False)
+
+
+def _file_name(key: Key) -> str | None:
+    """Return the name of a model's file: a digest of its key and of all code that it depends on.
+
+    None if the code of a term or of the controller cannot be identified.
+    """
+    digest = hashlib.sha256(_own_code())
+    functions = (key.step, *(law.law if isinstance(law, OnSum) else law for law in active_laws(key.kinds)))
+    try:
+        marks = [fingerprint(function) for function in functions]
+        # The rates and limits of a term are in the same file as its law: the file is identified as well.
+        stamps = [_stamp(Path(str(sys.modules[function.__module__].__file__))) for function in functions]
+    except (NotCompilable, KeyError, AttributeError, OSError):
+        return None
+    for item in (key.spec, repr(key.config), key.controller, key.features, *marks, *stamps):
+        digest.update(item.encode())
+        digest.update(b"\0")
+    return f"{digest.hexdigest()[:32]}.json"
+
+
+@cache
+def _own_code() -> bytes:
+    """Return text that identifies the files of the simulator and of the core: their paths, sizes and times."""
+    packages = (Path(__file__).parent.parent, Path(plugin_api.__file__).parent / "core")
+    return "".join(_stamp(source) for folder in packages for source in sorted(folder.rglob("*.py"))).encode()
+
+
+def _features_content(feature_set: FeatureSet[Any] | None) -> str:
+    """Return text that identifies a feature set: its class, its settings, and the files in the folder of its code."""
+    if feature_set is None:
+        return ""
+    kind = type(feature_set)
+    return f"{kind.__module__}.{kind.__qualname__} {feature_set.config!r} {_folder_of(kind)}"
+
+
+@cache
+def _folder_of(kind: type) -> str:
+    source = getattr(sys.modules.get(kind.__module__), "__file__", None)
+    if source is None:
+        return ""
+    with suppress(OSError):
+        return "".join(_stamp(one) for one in sorted(Path(source).parent.glob("*.py")))
+    return ""
+
+
+def _stamp(source: Path) -> str:
+    status = source.stat()
+    return f"{source} {status.st_size} {status.st_mtime_ns}\n"
+
+
+def _read(name: str) -> Reduction | None:
+    folder = _folder()
+    if folder is None or not (folder / name).is_file() or not is_closed(folder / name, _CONTENT):
+        return None
+    with suppress(OSError, ValueError, TypeError, KeyError):
+        kept = json.loads((folder / name).read_text(encoding="utf-8"))
+        # A choice that was edited would change what is simulated, and nothing else would tell.
+        if kept["sha256"] == _digest(kept["model"]):
+            return restored(kept["model"])
+    return None
+
+
+def _write(name: str, model: Reduction) -> None:
+    """Write a model to disk. If that is not possible, nothing happens."""
+    folder = _folder()
+    if folder is None:
+        return
+    with suppress(OSError):
+        _delete_old_files(folder)
+        values = json.loads(json.dumps(stored(model)))
+        content = json.dumps({"model": values, "sha256": _digest(values)})
+        write_whole(folder / name, content.encode(), mode=0o600)
+
+
+def _digest(values: Json) -> str:
+    return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()
+
+
+def _folder() -> Path | None:
+    """Return the folder for models, or None where there is none that is closed to other users."""
+    parent = cache_folder()
+    if parent is None:
+        return None
+    folder = parent / "reductions"
+    try:
+        make_closed(folder)
+    except OSError:
+        return None
+    return folder if is_closed(folder, _CONTENT) else None
+
+
+def _delete_old_files(folder: Path) -> None:
+    files = list(folder.iterdir())
+    if len(files) < MAX_FILES:
+        return
+    for path in sorted(files, key=lambda path: path.stat().st_mtime)[: len(files) // 2]:
+        path.unlink(missing_ok=True)
+
+
+def stored(model: Reduction) -> dict[str, Json]:
+    """Return a model as values that JSON can represent."""
+    values = asdict(model, recurse=True, filter=lambda attribute, _: attribute.init)
+    tuples = {
+        "point": model.point._asdict(),
+        "steps": model.steps._asdict(),
+        "level": model.level._asdict(),
+    }
+    return {**values, **tuples}
+
+
+def restored(values: dict[str, Json]) -> Reduction:
+    """Return the model of which `stored` has given these values. Raises KeyError or TypeError for others."""
+    verification = values["verification"]
+    return Reduction(
+        **{
+            **values,
+            "point": WorkingPoint(**values["point"]),
+            "steps": Steps(**values["steps"]),
+            "decisions": tuple(StepDecision(**decision) for decision in values["decisions"]),
+            "unresolved": tuple(values["unresolved"]),
+            "left_out": tuple(values["left_out"]),
+            "level": Level(**values["level"]),
+            "verification": None if verification is None else _verification(verification),
+        }
+    )
+
+
+def _verification(values: dict[str, Json]) -> Verification:
+    return Verification(**{**values, "features": tuple(values["features"])})

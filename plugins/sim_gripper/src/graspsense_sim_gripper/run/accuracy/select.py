@@ -1,0 +1,356 @@
+"""Selecting the steps of the grasps of an object: the first level whose trial grasp is accurate enough.
+
+The first trial grasp has a step per tick. It gives the speed at the contact and the peak force, for which steps are
+proposed; a second one, in finer steps, corrects them where it has others. The steps of each level are then tried in a
+trial grasp, and compared with a trial grasp in finer ones. A step per tick is tried first, since it costs least; then
+steps whose error is controlled, for the accuracy, a tenth and a hundredth of it.
+
+Steps that pass are tried twice more, with a controller that reads slightly larger and slightly smaller values of force
+and travel. This finds a threshold that is met so closely that an error of this size makes the grasp continue a tick
+earlier or later. Both compared grasps may then be on the wrong side of the threshold, and a level with smaller steps is
+tried. If the last level fails as well, no steps have the accuracy, and ConfigError says so.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import suppress
+from itertools import islice
+from typing import Final, NamedTuple
+
+from attrs import evolve
+
+from graspsense.plugin_api import ConfigError
+from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.run.accuracy.cache import ReductionCache
+from graspsense_sim_gripper.run.accuracy.error import deviation
+from graspsense_sim_gripper.run.accuracy.levels import CONTROLLED, PLAIN, REFERENCE_SCALES, LevelScale
+from graspsense_sim_gripper.run.accuracy.model import QUANTITIES, Reduction, StepDecision, Verification
+from graspsense_sim_gripper.run.accuracy.own_features import NOT_READ
+from graspsense_sim_gripper.run.accuracy.probe import Grip
+from graspsense_sim_gripper.run.accuracy.propose import fixed, grip_of, plain, propose
+from graspsense_sim_gripper.run.accuracy.verify import (
+    MOST_WORK,
+    Sensitivity,
+    TooMuchWork,
+    TrialGrasps,
+    trial_grasps,
+    without_term,
+)
+from graspsense_sim_gripper.run.problem import GraspController, Problem
+from graspsense_sim_gripper.run.term_failure import raised_in_term
+from graspsense_sim_gripper.scene.spec import ObjectSpec
+from graspsense_sim_gripper.scene.terms.term import LAW_ERRORS
+
+ACCEPTED_WITH_SPREAD: Final = 0.5
+ACCEPTED: Final = 0.8
+"""Steps are accepted if the trial grasps differ by at most this share of the accuracy. With spread, the rest allows
+for the differences between instances. Without spread, it allows for pad sensors and the errors of the trial grasps."""
+COARSE: Final = 0.03
+"""From this accuracy upwards, a threshold that is met too closely is examined again with a tenth of the accuracy."""
+FINE: Final = 0.003
+"""Down from this accuracy, the grasp to compare with takes twice as many steps per tick, because one of two grasps may
+resolve a short contact that the other misses."""
+CULPRIT: Final = 0.2
+"""A term is named as the cause of an error if less than this share of the error remains without the term."""
+
+MOST_FOR_FEATURES: Final = 2
+"""Further models that are tried where features of the pipeline are less accurate than those of the paper. A feature
+that shorter steps do not give is one that depends on ticks."""
+
+_SELECTED: Final = ReductionCache()
+_UNKNOWN: Final = (None, None)
+"""What `_gripped` returns for a trial grasp that fails; `grip_of` then has the values of the paper."""
+
+
+def select(
+    problem: Problem,
+    controller: GraspController,
+    *,
+    compiled: bool = False,
+    padding: tuple[str, ...] | None = None,
+) -> Reduction:
+    """Return the steps for a problem's object, verified by trial grasps under the controller.
+
+    They are cached in memory and on disk, by everything that they depend on. They are not verified, and their
+    `verification` is None, if the settings prescribe the steps or ask for the reference, if the controller raises in
+    the first trial grasp, if something cannot be resolved (`Reduction.unresolved`), or if the trial grasps would take
+    too much work (`MOST_WORK`).
+
+    `compiled`: run the trial grasps compiled, if the controller can be compiled. `padding`: the kinds of terms in the
+    compiled code, by default those of a batch. Both change the run time only.
+
+    Raises ConfigError if no steps reach the requested accuracy or a term raises an exception, TypeError if there is no
+    object.
+    """
+    if problem.config.fidelity == "fixed":
+        return fixed(problem)
+    key = _SELECTED.key(problem, controller)
+    reduction = _SELECTED.get(key)
+    if reduction is None:
+        reduction = select_anew(problem, controller, compiled=compiled, padding=padding)
+        _SELECTED.put(key, reduction)
+    return reduction
+
+
+def select_anew(
+    problem: Problem,
+    controller: GraspController,
+    *,
+    compiled: bool = False,
+    padding: tuple[str, ...] | None = None,
+) -> Reduction:
+    """Return the model as `select` does, without the cache. Raises as it does."""
+    try:
+        return _select_within_limit(
+            problem, trial_grasps(problem, controller, compiled=compiled, padding=padding)
+        )
+    except LAW_ERRORS as error:
+        reason = raised_in_term(error, problem.nominal.kinds if problem.nominal else ())
+        if not reason:
+            raise
+        raise ConfigError(f"{_scene_in_words(problem)}: {reason}") from error
+
+
+def _select_within_limit(problem: Problem, trial: TrialGrasps) -> Reduction:
+    """Return the steps as `_select` does, or unverified ones if the trial grasps take too much work."""
+    try:
+        return _select(problem, trial)
+    except TooMuchWork:
+        found = propose(problem, grip_of(problem))
+    limit = StepDecision(
+        subject="trial grasps",
+        decision="stopped at the limit: not verified",
+        what="ticks and steps",
+        number=float(MOST_WORK),
+    )
+    return evolve(found, decisions=(*found.decisions, limit), unresolved=QUANTITIES)
+
+
+def _select(problem: Problem, trial: TrialGrasps) -> Reduction:
+    """Return the model as `select` does, without the cache."""
+    config = problem.model_config
+    if config.has_forced_steps or config.fidelity == "reference":
+        return propose(problem, grip_of(problem))
+    scale = _reference_scale(config, CONTROLLED[0])
+    expected = _gripped(trial, plain(problem))
+    grip = grip_of(problem, *expected)
+    reference = propose(problem, grip, scale)
+    if reference.unresolved:
+        expected, grip = _UNKNOWN, grip_of(problem)
+        reference = propose(problem, grip, scale)
+    if reference.unresolved:
+        return propose(problem, grip)
+    found = _gripped(trial, reference)
+    if found == _UNKNOWN:
+        return propose(problem, grip)
+    if found != expected:
+        grip = grip_of(problem, *found)
+        reference = propose(problem, grip, scale)
+        if reference.unresolved:
+            return propose(problem, grip)
+    return _best(problem, grip, trial)
+
+
+def _gripped(trial: TrialGrasps, reduction: Reduction) -> tuple[float | None, float | None]:
+    """Return the peak force and the speed at the contact of a trial grasp in these steps, to two digits.
+
+    They suffice: similar grasps then get the same proposals. `_UNKNOWN` if the grasp fails; a controller that raises
+    does so in the grasp of the run as well, and is reported there. Raises TooMuchWork, and what a term raises.
+    """
+    try:
+        grasp = trial.record(reduction)
+    except TooMuchWork:
+        raise
+    except Exception as error:
+        if isinstance(error, LAW_ERRORS) and raised_in_term(error, trial.setup.kinds):
+            raise
+        return _UNKNOWN
+    force_n, speed_m_s = (float(f"{value:.1e}") for value in (grasp.peak_n, grasp.contact_speed_m_s()))
+    return (force_n, speed_m_s) if math.isfinite(force_n + speed_m_s) else _UNKNOWN
+
+
+def _best(problem: Problem, grip: Grip, trial: TrialGrasps) -> Reduction:
+    """Return the first accepted model in which the features of the pipeline are accurate too, or else the first.
+
+    Raises ConfigError if no model is accepted.
+    """
+    accepted = _accepted(problem, grip, trial)
+    first = next(accepted)
+    if first.not_verified in ((), NOT_READ):
+        return first
+    further = islice(accepted, MOST_FOR_FEATURES)
+    return next((model for model in further if not model.not_verified), first)
+
+
+def _accepted(problem: Problem, grip: Grip, trial: TrialGrasps) -> Iterator[Reduction]:
+    """Yield the models that trial grasps accept, the fastest first. Raises ConfigError if there is none."""
+    config = problem.model_config
+    least, quantity, grasps, n_accepted = math.inf, "", 1, 0
+    near_threshold: Sensitivity | None = None
+    # A step per tick would not be stable with dampers that are faster than the tick.
+    scales = CONTROLLED if propose(problem, grip).is_stiff else (PLAIN, *CONTROLLED)
+    for scale in scales:
+        if near_threshold and scale.at(config.accuracy).step_tol >= near_threshold.step_tol:
+            continue
+        reduction = propose(problem, grip, scale)
+        full = propose(problem, grip, _reference_scale(config, scale))
+        expected = trial.record(full)
+        error, of = deviation(trial.record(reduction), expected)
+        grasps += 1
+        if error > _accepted_share(config) * config.accuracy:
+            if error < least:
+                least, quantity = error, of
+            continue
+        verification = Verification(
+            error=error, quantity=of, grasps=grasps, features=trial.features_beyond(reduction, full)
+        )
+        if scale.plain == 1 and config.spread:
+            # Which thresholds are near differs between instances.
+            accepted = _accepted_for_instances(problem, reduction, full, trial, verification)
+            if accepted:
+                n_accepted += 1
+                yield accepted
+            continue
+        sensitivity = trial.sensitivity(reduction, expected)
+        near = error + sensitivity.change > config.accuracy
+        if scale.plain == 1:
+            # Steps whose error is controlled may still tell on which side of a threshold the grasp is.
+            near = near or not sensitivity.covers
+        else:
+            near_threshold = sensitivity
+        grasps += 2
+        if not near and _is_confirmed(problem, grip, trial, reduction, scale):
+            n_accepted += 1
+            yield evolve(reduction, verification=evolve(verification, grasps=grasps))
+    if n_accepted == 0:
+        yield _with_finer_steps(problem, grip, trial, near_threshold, _Miss(least, quantity))
+
+
+def _is_confirmed(
+    problem: Problem, grip: Grip, trial: TrialGrasps, reduction: Reduction, scale: LevelScale
+) -> bool:
+    """Return whether the grasp also agrees with one in still smaller steps.
+
+    A grasp that meets a threshold closely may be on one side of it in both grasps that were compared, and on the other
+    in the exact grasp.
+    """
+    finer = scale._replace(refinement=min(10.0 * scale.refinement, max(REFERENCE_SCALES)))
+    exact = trial.record(propose(problem, grip, _reference_scale(problem.model_config, finer)))
+    return deviation(trial.record(reduction), exact)[0] <= problem.model_config.accuracy
+
+
+class _Miss(NamedTuple):
+    """The least error of the models that were not accepted, and the quantity that has it."""
+
+    error: float
+    quantity: str
+
+
+def _with_finer_steps(
+    problem: Problem, grip: Grip, trial: TrialGrasps, near_threshold: Sensitivity | None, miss: _Miss
+) -> Reduction:
+    """Return a model for a tenth of the accuracy, where steps for the accuracy itself decide no threshold.
+
+    Raises ConfigError if there is none, or if the reason is no threshold.
+    """
+    config = problem.model_config
+    if near_threshold is None:
+        raise ConfigError(_refusal(problem, *miss, _culprit(problem, grip, trial)))
+    if config.accuracy >= COARSE:
+        # With steps this coarse, the trial grasps cannot tell on which side of the threshold the grasp is.
+        finer = evolve(problem, model_config=evolve(config, accuracy=0.1 * config.accuracy))
+        with suppress(ConfigError):
+            return evolve(_select(finer, evolve(trial)), accuracy=config.accuracy)
+    raise ConfigError(_undecided(problem, near_threshold))
+
+
+def _accepted_for_instances(
+    problem: Problem, reduction: Reduction, full: Reduction, trial: TrialGrasps, verification: Verification
+) -> Reduction | None:
+    """Return a model, verified by grasps of some instances; None if it is not accurate enough for one of them.
+
+    `full` is the model to compare with, and `verification` the result for the nominal object. The expected force of the
+    returned model is the largest peak force of all these grasps.
+    """
+    force_n = reduction.point.force_n
+    for setup in problem.examples():
+        trial = trial.of(setup)
+        try:
+            grasp, expected = trial.record(reduction), trial.record(full)
+        except Exception:
+            # A single instance that fails, or takes too much work, is no reason to refuse the object.
+            return None
+        error, quantity = deviation(grasp, expected)
+        if error > _accepted_share(problem.model_config) * problem.model_config.accuracy:
+            return None
+        features = dict.fromkeys((*verification.features, *trial.features_beyond(reduction, full)))
+        if error > verification.error:
+            verification = evolve(verification, error=error, quantity=quantity)
+        verification = evolve(verification, grasps=verification.grasps + 1, features=tuple(features))
+        force_n = max(force_n, grasp.peak_n)
+    return evolve(reduction, verification=verification, point=reduction.point._replace(force_n=force_n))
+
+
+def _reference_scale(config: SimConfig, scale: LevelScale) -> LevelScale:
+    """Return the scale of the steps that a candidate of this scale is compared with."""
+    reference = REFERENCE_SCALES[scale.refinement]
+    factor = 2 if config.accuracy <= FINE else 1
+    return reference._replace(min_steps=factor * reference.min_steps)
+
+
+def _accepted_share(config: SimConfig) -> float:
+    """Return the share of the accuracy by which trial grasps may differ."""
+    return ACCEPTED_WITH_SPREAD if config.spread else ACCEPTED
+
+
+def _culprit(problem: Problem, grip: Grip, trial: TrialGrasps) -> str:
+    """Return the kind of the term that makes the grasp depend on its steps; empty if no single term does."""
+    scale = CONTROLLED[1]
+    pair = [propose(problem, grip, s) for s in (scale, _reference_scale(problem.model_config, scale))]
+    fine, finer = pair
+    errors = {}
+    for i, kind in enumerate(grip.kinds):
+        without = trial.of(without_term(trial.setup, i))
+        errors[kind] = deviation(*(without.record(steps) for steps in pair))[0]
+    with_all, _ = deviation(trial.record(fine), trial.record(finer))
+    term = min(errors, key=errors.__getitem__, default="")
+    return term if term and errors[term] < CULPRIT * with_all else ""
+
+
+def _undecided(problem: Problem, found: Sensitivity) -> str:
+    changes = f"{found.quantity} by {found.change:.2g}" if math.isfinite(found.change) else "the outcome"
+    return (
+        f"{_inaccurate(problem)}: the controller compares with a threshold that is met at a tick within "
+        f"{found.force_n:.1g} N, or {found.travel:.1g} of the travel, so that the grasp may continue a tick earlier or "
+        f"later, which changes {changes}. Change where the ticks fall (gripper.open_gap_m, or the controller's speed "
+        f"or threshold), or {_advice(2.0 * found.change)}"
+    )
+
+
+def _refusal(problem: Problem, error: float, quantity: str, term: str) -> str:
+    found = f"{quantity} differs by {error:.2g}" if math.isfinite(error) else "even the outcome differs"
+    cause = (
+        f"the steps because of the term {term!r}" if term else "the steps, and not because of a single term"
+    )
+    return (
+        f"{_inaccurate(problem)}: with every term and the smallest steps, {found} between two step lengths. The grasp "
+        f"depends on {cause}; {_advice(2.0 * error / _accepted_share(problem.model_config))}"
+    )
+
+
+def _inaccurate(problem: Problem) -> str:
+    accuracy = problem.model_config.accuracy
+    return f"{_scene_in_words(problem)}: no model of it reaches gripper.accuracy = {accuracy:g}"
+
+
+def _scene_in_words(problem: Problem) -> str:
+    spec: ObjectSpec | None = problem.spec
+    return "the scene" if spec is None else spec.file or f"object {spec.name!r}"
+
+
+def _advice(reachable: float) -> str:
+    """Return the advice of an error message; `reachable` is an accuracy that a model would probably reach."""
+    advice = f"ask for {reachable:.1g} (gripper.accuracy), or " if reachable <= 0.5 else ""
+    return f'{advice}accept an unverified result with gripper.fidelity = "reference"'

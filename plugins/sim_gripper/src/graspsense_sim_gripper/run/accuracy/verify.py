@@ -1,0 +1,434 @@
+"""Trial grasps of the nominal object, in the steps of one level after another.
+
+A trial grasp uses ideal sensors and the controller of the run. It begins with open fingers and ends with the release.
+The approach is simulated once for each set of steps.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+import time
+from collections.abc import Callable
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from attrs import define, evolve, field
+from numpy.typing import NDArray
+
+from graspsense.plugin_api import (
+    CONTACT_FORCE_N,
+    HOLD,
+    FeatureSet,
+    NotCompilable,
+    TickParams,
+    first_state,
+    gap_and_rate,
+    revolutions_at,
+    seconds_at_most,
+    tick_params,
+)
+from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.plant.fingertip import CELLS
+from graspsense_sim_gripper.plant.palm import NUMBERS, PalmBuffers
+from graspsense_sim_gripper.plant.sensing import Bias, PadBuffers
+from graspsense_sim_gripper.plant.state import Motion, PlantState
+from graspsense_sim_gripper.run.accuracy.error import SCALES, UNIT_SCALES, GraspRecord, deviation
+from graspsense_sim_gripper.run.accuracy.model import Reduction
+from graspsense_sim_gripper.run.accuracy.own_features import OwnFeatures, beyond, own_features
+from graspsense_sim_gripper.run.compiled.compose import composition, grasp_loop
+from graspsense_sim_gripper.run.compiled.loop_code import CompiledLoops
+from graspsense_sim_gripper.run.compiled.padding import padded
+from graspsense_sim_gripper.run.loop import (
+    COLUMNS,
+    EVENT_SHIFT,
+    NOT_STARTED,
+    ROWS_AT_ONCE,
+    Buffers,
+    GraspParams,
+    SimulationState,
+    before_failure,
+    has_ended,
+    uses_macro_steps,
+)
+from graspsense_sim_gripper.run.problem import GraspController, GraspSetup, Problem
+from graspsense_sim_gripper.run.term_failure import TermFailed, not_finite_in_tick
+from graspsense_sim_gripper.scene.terms.switchable import switched_off
+from graspsense_sim_gripper.solve.scheme import Steps
+
+_LOG: Final = logging.getLogger(__name__)
+MAX_SECONDS: Final = 40.0
+"""Longest simulated time of an approach, and of the grasp after it."""
+NEAR_M: Final = 3e-3
+"""An approach longer than `MAX_SECONDS` is repeated from this distance to the object."""
+MIN_CLOSING_M_S: Final = 0.01
+"""The remaining time of an approach is estimated with this closing speed, or with a higher present one."""
+MAX_HOLD_S: Final = 0.3
+"""A longer hold is shortened to this in a trial grasp."""
+CLOSED_AT_ONCE: Final = 0.9
+"""Share of the distance to the object that the fingers close in at their present speed before it is checked again; a
+quarter of it where they touched the object meanwhile."""
+LEAST_TICKS: Final = 32
+"""An approach ends where fewer ticks than this are left: repeating them costs less than a further check."""
+CAPACITY: Final = 1024
+"""Largest number of ticks in a buffer; after each buffer the work is counted."""
+MOST_WORK: Final = 1_000_000
+"""Largest number of ticks and steps of all trial grasps of one object together: about a minute in the interpreter. It
+counts work and not time, so that the model that is chosen does not depend on the machine."""
+PROGRESS_S: Final = 3.0
+"""Trial grasps that take longer report how far they are, and again after as long."""
+SENSITIVITY: Final = 10.0
+MIN_FORCE_ERROR_N: Final = 0.01
+MAX_FORCE_ERROR_N: Final = 1.0
+"""The assumed error of the forces that the controller reads: SENSITIVITY times the difference of two models at the
+contact, limited to between MIN_FORCE_ERROR_N and MAX_FORCE_ERROR_N times the step tolerance of the level."""
+TRAVEL_ERROR: Final = 0.025
+"""The assumed relative error of the distance since the contact is this times the step tolerance of the level."""
+
+
+class TooMuchWork(Exception):
+    """The trial grasps would take more than `MOST_WORK` ticks and steps."""
+
+
+class Sensitivity(NamedTuple):
+    """How much a grasp changes if its controller reads slightly wrong values."""
+
+    force_n: float
+    """Error of the forces that are read (N)."""
+    travel: float
+    """Relative error of the distance since the contact that is read."""
+    change: float
+    """The largest relative change of a quantity, see `error.deviation`."""
+    quantity: str
+    """The quantity with that change."""
+    step_tol: float
+    """The `step_tol` of the level."""
+    covers: bool
+    """Whether the error of the forces is as large as the difference of the two models."""
+
+
+class _Stage(NamedTuple):
+    """A trial grasp in progress: its state, and what was recorded."""
+
+    progress: SimulationState
+    rows: tuple[Any, ...]
+    """Arrays of shape (len(COLUMNS) + 1, n) in the order of time: the columns, and the phases as the last row."""
+    from_open: bool
+    """Whether it began with the fingers open."""
+
+
+@define(eq=False)
+class TrialGrasps:
+    """Trial grasps of one object under one controller, each simulated once.
+
+    `compiled` becomes False if the controller or a term turns out not to be compilable.
+    """
+
+    config: SimConfig
+    setup: GraspSetup
+    """The nominal object with all its terms and ideal sensors."""
+    controller: GraspController
+    params: TickParams
+    """Parameters of the controller, from the open fingers to the release."""
+    params_near: TickParams
+    """The same without opening and release, for a grasp that begins near the object."""
+    compiled: bool
+    padding: tuple[str, ...] | None
+    """The kinds of terms in compiled code, see `compiled.padding`; None: those of a batch."""
+    features: FeatureSet[Any] | None = None
+    """The feature set of the pipeline; None: only the features of the paper are compared."""
+    only_near: bool = False
+    """Whether they begin `NEAR_M` from the object, with no approach that is simulated apart."""
+    _records: dict[Any, GraspRecord] = field(factory=dict, init=False)
+    _features: dict[Any, OwnFeatures | None] = field(factory=dict, init=False)
+    """The features of the pipeline in the grasps of `_records`."""
+    _starts: dict[Steps | None, _Stage] = field(factory=dict, init=False)
+    """The grasp shortly before the first contact, by the steps of the approach; one for all where `only_near`."""
+    _loops: CompiledLoops = field(init=False)
+    work: int = field(default=0, init=False)
+    """Ticks and steps of all trial grasps so far."""
+    _reported_s: float = field(factory=time.monotonic, init=False)
+    """When progress was reported last."""
+
+    @_loops.default
+    def _new_loops(self) -> CompiledLoops:
+        return CompiledLoops(self.controller.step)
+
+    def record(self, reduction: Reduction, force_n: float = 0.0, travel: float = 0.0) -> GraspRecord:
+        """Return the grasp in these steps; the controller reads values with these errors (see `Sensitivity`)."""
+        key = (reduction.steps, reduction.left_out, force_n, travel)
+        if key not in self._records:
+            try:
+                self._records[key] = self._grasp(reduction, force_n, travel)
+            except NotCompilable:
+                self.compiled = False
+                self._records[key] = self._grasp(reduction, force_n, travel)
+        return self._records[key]
+
+    def features_beyond(self, reduction: Reduction, full: Reduction) -> tuple[str, ...]:
+        """Return the features of the pipeline that differ from those in finer steps by more than the accuracy.
+
+        Empty without a feature set, `own_features.NOT_READ` for one that ideal sensors do not suffice for.
+        """
+        if self.features is None:
+            return ()
+        self.record(reduction)
+        self.record(full)
+        grasp, expected = (self._features[one.steps] for one in (reduction, full))
+        return beyond(grasp, expected, self.config.accuracy)
+
+    def values(self, reduction: Reduction) -> dict[str, tuple[float, float]]:
+        """Return the features of the pipeline and the peak force in these steps, each with the scale of its unit.
+
+        The features of the paper, if the pipeline has none or ideal sensors do not suffice for them.
+        """
+        record = self.record(reduction)
+        own = self._features.get(reduction.steps)
+        if own is None:
+            return {name: (value, SCALES[name]) for name, value in record.quantities.items()}
+        names, values, units = own.features.names, own.features.values, own.features.units
+        scales = [UNIT_SCALES.get(unit, 0.0) for unit in units]
+        return dict(zip(names, zip(values, scales, strict=True), strict=True)) | {
+            "peak": (record.peak_n, SCALES["peak"])
+        }
+
+    def sensitivity(self, reduction: Reduction, expected: GraspRecord) -> Sensitivity:
+        """Return the change of the grasp if the controller reads values that are as wrong as the model may be.
+
+        `expected` is the grasp in finer steps. The grasp is simulated twice, with errors of either sign.
+        """
+        exact, scale = self.record(reduction), reduction.level.step_tol
+        difference_n = _force_difference_n(exact, expected)
+        force_n = max(SENSITIVITY * difference_n, MIN_FORCE_ERROR_N * scale)
+        force_n, travel = min(force_n, MAX_FORCE_ERROR_N * scale), TRAVEL_ERROR * scale
+        others = [self.record(reduction, sign * force_n, sign * travel) for sign in (-1.0, 1.0)]
+        change, quantity = max(deviation(other, exact) for other in others)
+        return Sensitivity(force_n, travel, change, quantity, scale, difference_n <= force_n)
+
+    def _grasp(self, reduction: Reduction, force_n: float, travel: float) -> GraspRecord:
+        """Simulate what `record` returns. Raises NotCompilable."""
+        setup = evolve(self.setup, plant=reduction.applied_to(self.setup.plant))
+        steps = None if self.only_near else _approach_steps(setup)
+        if steps not in self._starts:
+            self._starts[steps] = self._approach(setup)
+        start = self._starts[steps]
+        bias = Bias(force_n, travel, setup.plant.object.width_m)
+        setup = evolve(setup, sensor=setup.sensor._replace(bias=bias))
+        until = start.progress.loop.ticks + self._max_ticks()
+        end = self._runner(setup, start.from_open)(setup.plant.steps, start, until)
+        rows = np.concatenate(end.rows, axis=1)
+        if self.features is not None and force_n == 0.0:
+            self._features[reduction.steps] = own_features(
+                self.features, rows[:-1], rows[-1], compiled=self.compiled
+            )
+        return _record(end, rows, bias, setup.dt_s)
+
+    def of(self, setup: GraspSetup) -> TrialGrasps:
+        """Return trial grasps of another instance of the object, which begin near it and go on counting the work."""
+        other = evolve(self, setup=setup, only_near=True)
+        other.work, other._loops = self.work, self._loops
+        return other
+
+    def _max_ticks(self) -> int:
+        return math.ceil(min(MAX_SECONDS, seconds_at_most(self.controller.run)) / self.setup.dt_s)
+
+    def _approach(self, setup: GraspSetup) -> _Stage:
+        """Return the grasp shortly before the first contact; it begins near the object if it would take too long."""
+        if self.only_near:
+            return self._begun_near(setup)
+        stage, came_near = self._closed_in(setup, self._begun(setup.state, setup, from_open=True))
+        if not came_near and not has_ended(stage.progress.controller):
+            stage, _ = self._closed_in(setup, self._begun_near(setup))
+        return stage
+
+    def _begun_near(self, setup: GraspSetup) -> _Stage:
+        """Return a grasp that begins `NEAR_M` from the object."""
+        state, link = setup.state, setup.plant.drive.link
+        near = revolutions_at(link, min(state.motion.gap_m, _reach_m(setup) + NEAR_M))
+        state = state._replace(motion=Motion(near, state.motion.speed_rev_s, *gap_and_rate(link, near)))
+        return self._begun(state, setup, from_open=False)
+
+    def _begun(self, state: PlantState, setup: GraspSetup, *, from_open: bool) -> _Stage:
+        controller = first_state(self.controller.controller.init())
+        progress = SimulationState(NOT_STARTED, state, setup.sensor_state, controller, setup.palm_state)
+        return _Stage(progress, (), from_open)
+
+    def _closed_in(self, setup: GraspSetup, stage: _Stage) -> tuple[_Stage, bool]:
+        """Return the grasp shortly before the first contact, or at its end, and whether it reached the contact."""
+        steps, reach = _approach_steps(setup), _reach_m(setup)
+        run, share = self._runner(setup, stage.from_open), CLOSED_AT_ONCE
+        while not has_ended(stage.progress.controller) and stage.progress.loop.ticks < self._max_ticks():
+            motion = stage.progress.plant.motion
+            closing = max(-motion.speed_rev_s * motion.jacobian_m_rev, MIN_CLOSING_M_S)
+            ticks = share * (motion.gap_m - reach) / (closing * setup.dt_s)
+            if ticks < LEAST_TICKS:
+                return stage, True
+            after = run(steps, stage, stage.progress.loop.ticks + min(int(ticks), CAPACITY))
+            if after.progress.plant.contact.touched == 1:
+                share *= 0.25
+            else:
+                stage = after
+        return stage, False
+
+    def _runner(self, setup: GraspSetup, from_open: bool) -> Callable[[Steps, _Stage, int], _Stage]:
+        """Return a function `run(steps, stage, until)` that continues a grasp of this model up to the tick `until`."""
+        on_arrays, loop, made = self._loop(setup)
+        buffers = _ideal_buffers(on_arrays)
+        params = self.params if from_open else self.params_near
+
+        def run(steps: Steps, stage: _Stage, until: int) -> _Stage:
+            progress, rows, _ = stage
+            if progress.plant.contact.touched == 0:
+                # The stage may come from another composition: the untouched object in the terms of this one.
+                fresh = made.state.contact
+                contact = progress.plant.contact._replace(left=fresh.left, right=fresh.right)
+                progress = progress._replace(plant=progress.plant._replace(contact=contact))
+            plant = made.plant._replace(steps=steps)
+            grasp_params = GraspParams(
+                plant,
+                made.sensor,
+                params,
+                setup.dt_s,
+                until,
+                made.palm,
+                macro_steps=uses_macro_steps(steps),
+            )
+            while not has_ended(progress.controller) and progress.loop.ticks < until:
+                n_rows = min(until - progress.loop.ticks, CAPACITY) + ROWS_AT_ONCE
+                table = np.zeros((len(COLUMNS), n_rows))
+                phases = np.zeros(table.shape[1], np.int64)
+                recorded = (table, phases) if on_arrays else (table.tolist(), phases.tolist())
+                progress = progress._replace(loop=progress.loop._replace(recorded=0))
+                palm = _palm_buffers(on_arrays, table.shape[1]) if made.has_palm else ()
+                start, written = progress, Buffers(*buffers, *recorded)._replace(palm=palm)
+                progress = loop(grasp_params, start, written)
+                if progress.loop.failed == 1:
+                    before = before_failure(loop, grasp_params, start, written, progress.loop.ticks)
+                    raise TermFailed(
+                        not_finite_in_tick(
+                            made.kinds,
+                            made.plant._replace(steps=steps),
+                            before,
+                            progress.loop.effort_n,
+                            setup.dt_s,
+                        )
+                    )
+                n = progress.loop.recorded
+                rows = (
+                    *rows,
+                    np.vstack((np.asarray(written.columns)[:, :n], np.asarray(written.phases)[:n])),
+                )
+                self._count(start, progress)
+            return _Stage(progress, rows, from_open)
+
+        return run
+
+    def _count(self, before: SimulationState, after: SimulationState) -> None:
+        """Count the work between two states. Raises TooMuchWork."""
+        self.work += after.loop.ticks - before.loop.ticks
+        self.work += after.plant.step.n_steps - before.plant.step.n_steps
+        if self.work > MOST_WORK:
+            raise TooMuchWork
+        percent = 100 * self.work // MOST_WORK
+        # Compiling takes seconds too, but no work.
+        if percent > 0 and time.monotonic() - self._reported_s > PROGRESS_S:
+            _LOG.warning(
+                "selecting the steps for the object: %d %% of the allowed ticks and steps used", percent
+            )
+            self._reported_s = time.monotonic()
+
+    def _loop(self, setup: GraspSetup) -> tuple[bool, Callable[..., SimulationState], GraspSetup]:
+        """Return whether the loop is compiled, the loop, and its setup. Raises NotCompilable."""
+        on_arrays = self.compiled
+        made = padded(setup, self.padding) if on_arrays else setup
+        composed = composition(made.kinds, made.plant, has_palm=made.has_palm)
+        if not on_arrays:
+            return False, grasp_loop(composed, self.controller.step), made
+        return True, self._loops.of(composed), made
+
+
+def trial_grasps(
+    problem: Problem, controller: GraspController, *, compiled: bool, padding: tuple[str, ...] | None
+) -> TrialGrasps:
+    """Return the trial grasps of a problem. Raises TypeError if there is no object."""
+    if problem.nominal is None:
+        raise TypeError("where there is no object there is nothing to grasp")
+    law, run = controller.controller, evolve(controller.run, hold_s=min(controller.run.hold_s, MAX_HOLD_S))
+    near = evolve(problem.device, opening=None)
+    return TrialGrasps(
+        config=evolve(problem.model_config, spread=False),
+        setup=problem.nominal,
+        controller=controller,
+        params=tick_params(problem.device, law, run),
+        params_near=tick_params(near, law, run),
+        compiled=compiled,
+        padding=padding,
+        features=controller.features,
+    )
+
+
+def _reach_m(setup: GraspSetup) -> float:
+    """Return the gap (m) at which the nearer finger touches the object."""
+    return setup.plant.object.width_m + 2.0 * abs(setup.state.contact.offset_m)
+
+
+def _approach_steps(setup: GraspSetup) -> Steps:
+    """Return the steps up to the contact: without contact the motion is smooth, and long ones suffice."""
+    return setup.plant.steps._replace(longest_s=math.inf)
+
+
+def _ideal_buffers(on_arrays: bool) -> tuple[PadBuffers, Any]:
+    """Return minimal buffers for cell images and their times, which an ideal sensor does not use."""
+    zero, noise, images = np.zeros((2, CELLS)), np.zeros((1, 2 * CELLS)), np.full((1, 2, CELLS), math.nan)
+    if on_arrays:
+        return PadBuffers(zero[0], zero[1], noise, images), np.zeros(1)
+    left, right = zero.tolist()
+    return PadBuffers(left, right, noise.tolist(), images.tolist()), [0.0]
+
+
+def _palm_buffers(on_arrays: bool, ticks: int) -> PalmBuffers:
+    """Return buffers for the palm of an ideal sensor, which reads the first row of the noise only."""
+    noise, samples = np.zeros((1, NUMBERS)), np.zeros((NUMBERS, ticks))
+    return PalmBuffers(noise, samples) if on_arrays else PalmBuffers(noise.tolist(), samples.tolist())
+
+
+def _record(end: _Stage, columns: NDArray[np.float64], bias: Bias, dt_s: float) -> GraspRecord:
+    """Return the record of a grasp with these rows, from which the errors of the readings are subtracted."""
+    progress, phases = end.progress, np.mod(columns[-1], 1 << EVENT_SHIFT)
+    gap_m, left_n, right_n = (
+        columns[COLUMNS.index(name)] for name in ("gap_m", "force_left_n", "force_right_n")
+    )
+    if bias.travel_share != 0.0:
+        share = bias.travel_share
+        gap_m = gap_m + (bias.from_m - np.minimum(gap_m, bias.from_m)) * share / (1.0 + share)
+    if bias.force_n != 0.0:
+        left_n, right_n = (np.where(force != 0.0, force - bias.force_n, 0.0) for force in (left_n, right_n))
+    return GraspRecord(
+        outcome=int(progress.controller.law.outcome) if progress.controller.guard.stopped == 0 else -1,
+        dt_s=dt_s,
+        gap_m=gap_m,
+        speed_m_s=columns[COLUMNS.index("velocity_m_s")],
+        left_n=left_n,
+        right_n=right_n,
+        n_rows=int(np.sum(phases <= HOLD)),
+        hold_from=int(np.sum(phases < HOLD)),
+        peak_n=progress.plant.peak_n,
+    )
+
+
+def _force_difference_n(grasp: GraspRecord, expected: GraspRecord) -> float:
+    """Return the difference (N) of the forces of two grasps at the tick of the contact and at the tick before it.
+
+    The force is that of the pad with the smaller one.
+    """
+    forces, others = (np.minimum(record.left_n, record.right_n) for record in (grasp, expected))
+    i = min(int(np.argmax(force >= CONTACT_FORCE_N)) for force in (forces, others))
+    there = slice(max(i - 1, 0), i + 1)
+    return float(np.max(np.abs(forces[there] - others[there])))
+
+
+def without_term(setup: GraspSetup, i: int) -> GraspSetup:
+    """Return the same grasp of the object without its term `i`."""
+    model = setup.plant.object
+    model = model._replace(terms=switched_off(model.terms, (i,)))
+    return evolve(setup, plant=setup.plant._replace(object=model))

@@ -1,0 +1,332 @@
+"""The simulated gripper as a backend: one grasp in the interpreter, many grasps compiled."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import repeat
+from typing import Any, Final, Unpack
+
+from attrs import evolve
+
+from graspsense.plugin_api import (
+    BatchBackend,
+    BatchOptions,
+    Channel,
+    Command,
+    Controller,
+    DeviceInfo,
+    FeatureSet,
+    Frame,
+    FreeRun,
+    Grasped,
+    ObjectKind,
+    Pads,
+    Reading,
+    RunConfig,
+    SimulationVariant,
+    TickParams,
+    TickState,
+    create,
+    maker,
+    no_pads,
+    tare,
+)
+from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.plant.fingertip import CELL_OFFSET, CELLS, FIRST_PAD_CELL, fingertips
+from graspsense_sim_gripper.plant.palm import PalmBuffers, PalmSignals, channel, palm_signals
+from graspsense_sim_gripper.plant.sensing import (
+    PAD_COUNTS_PER_N,
+    PadBuffers,
+    apply_tare,
+    sense,
+    with_listed_cells,
+)
+from graspsense_sim_gripper.plant.state import PlantReadings, PlantState, is_finite, right_of
+from graspsense_sim_gripper.run.accuracy.propose import FORCE_N, SPEED_M_S
+from graspsense_sim_gripper.run.accuracy.select import select
+from graspsense_sim_gripper.run.binding import bind_reachable
+from graspsense_sim_gripper.run.build import EFFORT_LIMIT_N, build, device_info, instantiate
+from graspsense_sim_gripper.run.compiled.compose import INTERPRETED, composed_move, composition, free_motion
+from graspsense_sim_gripper.run.explain import explain
+from graspsense_sim_gripper.run.loop import COLUMNS, GraspParams, LoopProgress
+from graspsense_sim_gripper.run.model_report import accuracy_report, model_report
+from graspsense_sim_gripper.run.perturbed import perturbed
+from graspsense_sim_gripper.run.problem import IMAGES_PER_BLOCK, GraspController
+from graspsense_sim_gripper.run.sampled_loop import instability
+from graspsense_sim_gripper.run.term_failure import TermFailed, not_finite_in_tick, raised_in_term
+from graspsense_sim_gripper.scene.library import kinds_in, object_kinds
+from graspsense_sim_gripper.scene.scaled import ScaledParameter
+from graspsense_sim_gripper.scene.terms.term import LAW_ERRORS
+
+SIDES: Final = ("left", "right")
+
+NOISE_TICKS: Final = 512
+"""Ticks for which the noise of the palm is drawn at once."""
+
+MOST_FREE_TICKS: Final = 1024
+"""Largest number of ticks of free motion that are run at once."""
+
+
+_sense = bind_reachable(sense, {}, INTERPRETED)
+_reading = maker(Reading)
+_COMPILED: Final[Mapping[str, bool | None]] = {"worth": None, "always": True, "never": False}
+
+
+def default_controller(config: SimConfig) -> GraspController:
+    """Return the controller for which a model is selected if none is given: that of the paper.
+
+    Its probing force and closing speed are those that the config expects, or those of the paper.
+    """
+    force = min(config.expected_force_n or FORCE_N, EFFORT_LIMIT_N)
+    speed = config.expected_speed_m_s or SPEED_M_S
+    controller = create("controller", "hybrid", probing_force_n=force, closing_speed_m_s=speed)
+    return GraspController(controller, RunConfig())
+
+
+class SimBackend(BatchBackend[SimConfig]):
+    """A model of a PR2 gripper, its fingertips and an object."""
+
+    def __init__(self, config: SimConfig) -> None:
+        super().__init__(config)
+        self._controller: GraspController | None = None
+        self._features: FeatureSet[Any] | None = None
+        self._scaled: ScaledParameter | None = None
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """The channels of a PR2 gripper. Forces and cells have the rate of cell images, others that of frames."""
+        frames_hz = self.config.rate_hz
+        pads_hz = min(1.0 / self.config.pad_period_s, frames_hz)
+        forces = tuple(
+            Channel(f"{what}_{side}", "N", pads_hz) for what in ("force", "edge") for side in SIDES
+        )
+        return (
+            Channel("gap", "m", frames_hz),
+            Channel("velocity", "m/s", frames_hz),
+            Channel("effort", "N", frames_hz),
+            *forces,
+            fingertips(pads_hz),
+            *((channel(frames_hz),) if self.config.acceleration else ()),
+        )
+
+    def objects(self) -> tuple[ObjectKind, ...]:
+        """Return the objects of the catalogue and of the shipped scenes."""
+        return object_kinds()
+
+    def with_object(self, name: str) -> SimBackend:
+        """Return this gripper with another object in it: a name, a scene file, or `none`.
+
+        Raises UnknownName for another name, ConfigError for a file that cannot be read as an object.
+        """
+        kinds_in(name)
+        return SimBackend(evolve(self.config, object=name))
+
+    def expect(self, controller: Controller[Any], run: RunConfig) -> None:
+        """Set the controller for which the model of the object is selected."""
+        self._controller = GraspController(controller, run, self._features)
+
+    def expect_features(self, feature_set: FeatureSet[Any]) -> None:
+        """Set the feature set whose features are verified where the model of the object is selected."""
+        self._features = feature_set
+        if self._controller is not None:
+            self._controller = evolve(self._controller, features=feature_set)
+
+    def open(self, seed: int) -> DeviceInfo:
+        """Prepare the grasp that the config and the seed describe.
+
+        Raises UnknownName for an unknown object, ConfigError if no model has the accuracy asked for.
+        """
+        problem = build(self.config, self.config.object)
+        self._reduction = None
+        if problem.spec is not None:
+            self._reduction = select(problem, self._controller or default_controller(self.config))
+        setup = instantiate(problem, self._reduction, seed)
+        self._setup = setup = evolve(setup, sensor=with_listed_cells(setup.sensor))
+        composed = composition(setup.kinds, setup.plant, has_palm=setup.has_palm)
+        self._move = composed_move(composed)
+        self._free_ticks = None if self._controller is None else free_motion(composed, self._controller.step)
+        self._table = [[0.0] * MOST_FREE_TICKS for _ in COLUMNS]
+        self._phases = [0] * MOST_FREE_TICKS
+        self._moved_on = False
+        self._state, self._sensor = setup.state, setup.sensor_state
+        self._ticks = 0
+        zero = (CELL_OFFSET[0],) * CELLS
+        self._noise = setup.noise()
+        self._buffers = PadBuffers(zero, zero, [], [])
+        self._palm, self._palm_state = setup.palm, setup.palm_state
+        self._palm_noise = setup.palm_noise() if setup.has_palm else None
+        self._palm_buffers = PalmBuffers([], ())
+        self._pads = no_pads(CELLS)
+        self._effort_n: float | None = None
+        self._explains = self.config.explain
+        # Compression and force at each tick since the first contact, where they are to be explained.
+        self._compressions: list[tuple[float, float]] = []
+        return device_info(self.config)
+
+    def read(self, timeout_s: float) -> Reading:
+        """Return the next tick, which is always available."""
+        del timeout_s
+        setup, effort = self._setup, self._effort_n
+        dt = setup.dt_s
+        if effort is None:
+            effort = 0.0
+        elif self._moved_on:
+            self._moved_on = False
+        else:
+            self._move_on(effort)
+        buffers = self._buffers
+        if self._sensor.images >= len(buffers.images):
+            self._draw_noise()
+        contact = self._state.contact
+        measured = PlantReadings(self._state.motion, contact.left_n, contact.right_n)
+        frame, self._sensor = _sense(
+            setup.sensor, self._sensor, measured, self._ticks * dt, dt, effort, buffers
+        )
+        count = self._sensor.images
+        if count != self._pads.counter:
+            image = buffers.images[count - 1]
+            self._pads = Pads(self._sensor.image_t_s, count, tuple(image[0]), tuple(image[1]))
+        return _reading(frame, self._pads, self._further_signals(frame) if self._palm else ())
+
+    def _move_on(self, effort_n: float) -> None:
+        """Move the plant to the next tick. Raises TermFailed."""
+        self._state = self._moved(effort_n)
+        self._ticks += 1
+        contact = self._state.contact
+        if self._explains and contact.touched == 1:
+            # Of an object that is fixed in place, the half that is pressed harder.
+            half = max(contact.left, right_of(contact.left, contact.right), key=lambda half: half.force_n)
+            self._compressions.append((half.compression_m, half.force_n))
+
+    def free_ticks(self, params: TickParams, state: TickState, frame: Frame, most: int) -> FreeRun | None:
+        """Run ticks of free motion. Raises TermFailed."""
+        effort = self._effort_n
+        contact = self._state.contact
+        pressed = contact.left.force_n > 0.0 or right_of(contact.left, contact.right).force_n > 0.0
+        if self._free_ticks is None or self._explains or pressed or effort is None:
+            return None
+        self._move_on(effort)
+        self._moved_on = True
+        setup, table, first = self._setup, self._table, self._ticks
+        most = min(most, MOST_FREE_TICKS)
+        constants = GraspParams(setup.plant, setup.sensor, params, setup.dt_s, first + most)
+        at = LoopProgress(first, 0, effort, self._state, self._sensor, state)
+        at = self._free_ticks(constants, at, frame, table, self._phases)
+        if at.ticks == first:
+            return FreeRun(0, [], [], state)
+        self._ticks, n, self._effort_n, self._state, self._sensor, state = at
+        t, gap, velocity, efforts, left, right, edge_left, edge_right, commands = (row[:n] for row in table)
+        columns = t, repeat(setup.dt_s), gap, velocity, efforts, left, right, edge_left, edge_right, repeat(0)
+        frames = list(map(Frame._make, zip(*columns, strict=False)))
+        return FreeRun(self._ticks - first, frames, commands, state)
+
+    def _further_signals(self, frame: Frame) -> PalmSignals:
+        """Return the samples of the palm in this tick."""
+        noise = self._palm_buffers.noise
+        if self._palm_noise is not None and self._ticks >= len(noise):
+            noise.extend(self._palm_noise(NOISE_TICKS).tolist())
+        signals, self._palm_state = palm_signals(
+            self._palm, self._palm_state, self._state, frame.t_s, frame.dt_s, self._ticks, self._palm_buffers
+        )
+        return signals
+
+    def _moved(self, effort_n: float) -> PlantState:
+        """Return the plant after a tick. Raises TermFailed."""
+        setup, before = self._setup, self._state
+        try:
+            after = self._move(setup.plant, before, effort_n, setup.dt_s)
+        except LAW_ERRORS as error:
+            raise TermFailed(raised_in_term(error, setup.kinds) or str(error)) from error
+        if not is_finite(after):
+            raise TermFailed(not_finite_in_tick(setup.kinds, setup.plant, before, effort_n, setup.dt_s))
+        return after
+
+    def apply(self, command: Command) -> None:
+        """Set the effort of the next tick."""
+        self._effort_n = command.value
+
+    def tare(self, images: Sequence[Pads]) -> None:
+        """Set the zeros of the cells to the mean of these images; an ideal sensor has none."""
+        if self.config.sensor == "ideal":
+            return
+        left, right = tare(images, PAD_COUNTS_PER_N, FIRST_PAD_CELL)
+        self._buffers = self._buffers._replace(left_zero=left, right_zero=right)
+        self._sensor = apply_tare(self._sensor, self._buffers)
+
+    def close(self) -> None:
+        """Do nothing: there is no device to release."""
+
+    def report(self) -> Mapping[str, Any]:
+        """Return what only the model knows, such as the true peak force on the pads and whether something broke.
+
+        `selection` describes the steps. With `explain` in the settings, `model` gives the contribution of each term,
+        and what each feature would lose without it.
+        """
+        setup, reduction = self._setup, self._reduction
+        report = model_report(self._state, setup.kinds)
+        if reduction is not None:
+            report["selection"] = {
+                "fidelity": self.config.fidelity,
+                **reduction.as_values(),
+                "steps": self._state.step.n_steps,
+                "within": reduction.valid_for(self._state.peak_n),
+            }
+            controller = self._controller or default_controller(self.config)
+            report |= accuracy_report(report, reduction, instability(setup, controller, reduction))
+        if self.config.explain:
+            report["model"] = explain(setup, self._compressions) | {"without": self._without()}
+        return report
+
+    def _without(self) -> list[dict[str, Any]]:
+        """Return what each feature would lose without each term, see `reduction.without`."""
+        # Imported here, since only `explain` needs it.
+        from graspsense_sim_gripper.run.accuracy.without import without_each_term
+
+        if self._reduction is None:
+            return []
+        controller = self._controller or default_controller(self.config)
+        return without_each_term(build(self.config, self.config.object), controller, self._reduction)
+
+    def _draw_noise(self) -> None:
+        """Draw the noise of the next images, and extend the buffer of images by as many."""
+        noise, images = self._buffers.noise, self._buffers.images
+        noise.extend(self._noise.standard_normal((IMAGES_PER_BLOCK, 2 * CELLS)).tolist())
+        images.extend(([0.0] * CELLS, [0.0] * CELLS) for _ in range(len(noise) - len(images)))
+
+    def variants(self) -> tuple[SimulationVariant, ...]:
+        """Return the settings that `graspsense tradeoff simulation` compares, see `variants`."""
+        from graspsense_sim_gripper.run.variants import variants
+
+        return variants()
+
+    def perturbed(self, scenes: Sequence[str], share: float) -> Mapping[str, SimBackend]:
+        """Return this gripper, and this gripper with each parameter larger by this share, see `perturbed`."""
+        changed = {}
+        for name, one in perturbed(self.config, scenes, share).items():
+            changed[name] = SimBackend(one.config)
+            changed[name]._scaled = one.scaled
+        return changed
+
+    def run_many(
+        self,
+        controller: Controller[Any],
+        scenes: Sequence[str],
+        seeds: Sequence[int],
+        **options: Unpack[BatchOptions],
+    ) -> list[Grasped]:
+        """Grasp each object with its seed; compiled, on all cores, where numba is installed and it saves time."""
+        # Imported here, since a single grasp needs neither threads nor compiling.
+        from graspsense_sim_gripper.run.batch.threads import grasps, job_of
+
+        job = job_of(self.config, controller, options, features=self._features, scaled=self._scaled)
+        done = grasps(job, scenes, seeds, _COMPILED[self.config.compile], options)
+        return [
+            Grasped(
+                outcome=grasp.outcome,
+                reason=grasp.reason,
+                extracted=grasp.extracted,
+                trace=grasp.kept,
+                report=grasp.report(),
+            )
+            for grasp in done
+        ]

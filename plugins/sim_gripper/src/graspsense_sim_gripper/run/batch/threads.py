@@ -1,0 +1,302 @@
+"""Simulating many grasps on all cores: compiled if numba is installed, otherwise in the interpreter.
+
+Threads process slices of the batch in turn. A compiled loop runs in its thread without the interpreter lock. Grasps in
+the interpreter run in one new process per thread (`worker`). The result of a grasp depends on its scene and seed only;
+the number of workers changes the run time only.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import threading
+import warnings
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from contextlib import ExitStack
+from importlib.util import find_spec
+from operator import index
+from typing import Any, Final, Unpack
+
+from attrs import define, field
+
+from graspsense.plugin_api import BatchOptions, Controller, FeatureSet, NotCompilable, RunConfig
+from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.run.batch.compiled_grasps import CompiledGrasps
+from graspsense_sim_gripper.run.batch.job import (
+    FinishedGrasp,
+    Job,
+    Measure,
+    grasp_plain,
+)
+from graspsense_sim_gripper.run.batch.scenes import Scenes, scene_key
+from graspsense_sim_gripper.run.batch.worker import NotHandedOver, PlainProcess
+from graspsense_sim_gripper.run.compiled.compose import Composition
+from graspsense_sim_gripper.run.compiled.drawing import compiled_drawing
+from graspsense_sim_gripper.run.compiled.extraction import compiled_measure
+from graspsense_sim_gripper.run.compiled.generator import compiled_generator
+from graspsense_sim_gripper.run.compiled.loop_code import CompiledLoops
+from graspsense_sim_gripper.run.compiled.padding import compiled_kinds, composition_of
+from graspsense_sim_gripper.scene.library import kinds_in
+from graspsense_sim_gripper.scene.scaled import ScaledParameter
+
+WORTH_COMPILING: Final = 50
+"""Number of grasps of one composition from which compiling saves more time than it takes."""
+WORTH_A_PROCESS: Final = 16
+"""Number of grasps per worker in the interpreter from which a process, which starts in half a second, saves time."""
+WORTH_A_WORKER: Final = 16
+"""Number of grasps from which another worker is started."""
+SLICE: Final = 32
+"""Most grasps that a worker takes at once."""
+SLICES_PER_WORKER: Final = 4
+"""Number of slices of a worker in a batch too small for slices of `SLICE` grasps. With fewer, some workers would wait
+for the last ones."""
+MAX_AHEAD: Final = 8
+"""Number of slices per worker that may be ahead of the earliest unfinished slice."""
+PROGRESS_S: Final = 0.2
+"""Time between two calls of the progress callback."""
+
+
+def run_many(
+    config: SimConfig,
+    controller: Controller[Any],
+    scenes: Sequence[str],
+    seeds: Sequence[int],
+    *,
+    compiled: bool | None = None,
+    **options: Unpack[BatchOptions],
+) -> list[FinishedGrasp]:
+    """Simulate a grasp of each scene with its seed, and return the results in that order.
+
+    The results are the same for any number of workers. Traces are kept unless the options say otherwise. `compiled`:
+    True compiles every loop, False none; None compiles a composition that at least `WORTH_COMPILING` grasps have. If
+    numba is missing, or a controller or term cannot be compiled, the loop runs in the interpreter, and a warning gives
+    the reason.
+
+    Raises TypeError for an unknown option, ValueError if there are not as many seeds as scenes, UnknownName for an
+    unknown object, and ConfigError if the object cannot be read or no model reaches the accuracy.
+    """
+    options = {"traces": True, **options}
+    return list(grasps(job_of(config, controller, options), scenes, seeds, compiled, options))
+
+
+def job_of(
+    config: SimConfig,
+    controller: Controller[Any],
+    options: BatchOptions,
+    *,
+    features: FeatureSet[Any] | None = None,
+    scaled: ScaledParameter | None = None,
+) -> Job:
+    """Return the settings of a batch. Raises TypeError for an unknown option.
+
+    `features`: the feature set whose features are verified. `scaled`: a parameter of the objects that is larger by a
+    share.
+    """
+    unknown = options.keys() - BatchOptions.__annotations__.keys()
+    if unknown:
+        raise TypeError(f"run_many has no {sorted(unknown)}; it has {sorted(BatchOptions.__annotations__)}")
+    return Job(
+        config=config,
+        controller=controller,
+        run=options.get("run") or RunConfig(),
+        extract=options.get("extract"),
+        traces=options.get("traces", False),
+        features=features,
+        scaled=scaled,
+    )
+
+
+def grasps(
+    job: Job, scenes: Sequence[str], seeds: Sequence[int], compiled: bool | None, options: BatchOptions
+) -> Iterator[FinishedGrasp]:
+    """Yield the results of `run_many` one by one, in order. Raises as `run_many` does."""
+    if len(scenes) != len(seeds):
+        raise ValueError(f"{len(scenes)} scenes and {len(seeds)} seeds: give one seed a scene")
+    workers = options.get("workers") or os.cpu_count() or 1
+    batch = _Batch(job, scenes, seeds, max(1, workers), compiled)
+    try:
+        yield from batch.grasps(options.get("progress"))
+    finally:
+        for note in batch.notes:
+            warnings.warn(note, stacklevel=2)
+
+
+@define(eq=False)
+class _Batch:
+    job: Job
+    scenes: Sequence[str]
+    seeds: Sequence[int]
+    workers: int
+    compiled: bool | None
+    notes: dict[str, None] = field(factory=dict, init=False)
+    """Remarks on how the grasps ran, as keys, so that each is given once."""
+    measure: Measure | None = field(default=None, init=False)
+    """The compiled form of `Job.extraction`."""
+    models: Scenes = field(init=False)
+    counts: Counter[Composition] = field(factory=Counter, init=False)
+    """Number of grasps of each composition."""
+    is_compiled: dict[Composition, bool] = field(factory=dict, init=False)
+    loops: CompiledLoops = field(init=False)
+    local: threading.local = field(factory=threading.local, init=False)
+    """The compiled grasps of each thread, and its process for those in the interpreter."""
+    processes: ExitStack = field(factory=ExitStack, init=False)
+
+    @loops.default
+    def _loops(self) -> CompiledLoops:
+        return CompiledLoops(type(self.job.controller).step)
+
+    @models.default
+    def _models(self) -> Scenes:
+        return Scenes(self.job)
+
+    def grasps(self, progress: Callable[[int, int], None] | None) -> Iterator[FinishedGrasp]:
+        """Run all grasps and yield their results in order; `progress(finished, total)` is called now and then.
+
+        Results are not collected here, so that a caller that keeps little needs little memory.
+        """
+        total = len(self.scenes)
+        self._plan()
+        workers = max(1, min(self.workers, math.ceil(total / WORTH_A_WORKER)))
+        running: dict[Future[list[FinishedGrasp]], int] = {}
+        ready: dict[int, list[FinishedGrasp]] = {}
+        asked = given = finished = 0
+        with self.processes, ThreadPoolExecutor(max_workers=workers) as pool:
+            slices = slices_of(total, workers)
+            try:
+                while True:
+                    # Two slices per worker, one in reserve: few results wait, and an interruption takes effect soon.
+                    while len(running) < 2 * workers and asked < min(
+                        len(slices), given + MAX_AHEAD * workers
+                    ):
+                        running[pool.submit(self._slice, slices[asked])] = asked
+                        asked += 1
+                    if progress is not None:
+                        progress(finished, total)
+                    if not running:
+                        break
+                    for future in wait(running, PROGRESS_S, FIRST_COMPLETED).done:
+                        k = running.pop(future)
+                        ready[k] = future.result()
+                        finished += len(slices[k])
+                    while given in ready:
+                        yield from self._with_models(ready.pop(given), slices[given])
+                        given += 1
+            except BaseException:
+                pool.shutdown(wait=False, cancel_futures=True)
+                # This ends the processes, so that no thread keeps waiting for one.
+                self.processes.close()
+                raise
+
+    def _plan(self) -> None:
+        """Select the models, and decide which compositions are compiled. Raises as `Scenes.add` does."""
+        # In the order of the scenes, so that an error names the first unknown scene.
+        counts = Counter(scene_key(scene) for scene in self.scenes)
+        examples = {scene_key(scene): scene for scene in reversed(self.scenes)}
+        of_kinds: Counter[tuple[str, ...]] = Counter()
+        for key, n in counts.items():
+            of_kinds[compiled_kinds(kinds_in(examples[key]))] += n
+        for key, n in counts.items():
+            worth = self._worth(of_kinds[compiled_kinds(kinds_in(examples[key]))])
+            self.models.add(examples[key], compiled=worth)
+            self.counts[composition_of(self.models.example(examples[key]))] += n
+        for composition, n in self.counts.items():
+            self.is_compiled[composition] = self._worth(n)
+        if any(self.is_compiled.values()):
+            self._compile_around_the_loop()
+
+    def _compile_around_the_loop(self) -> None:
+        """Compile what each compiled grasp does before and after its loop."""
+        if find_spec("numba") is None:
+            return
+        try:
+            # Here, so that the threads find the code of the drawing.
+            compiled_drawing()
+            self.models.generator_of = compiled_generator()
+        except NotCompilable:
+            # The loop cannot be compiled either, and says why.
+            return
+        if self.job.extraction is not None:
+            try:
+                self.measure = compiled_measure(self.job.extraction)
+            except NotCompilable as error:
+                self.notes[f"features are extracted from traces, which takes longer: {error}"] = None
+
+    def _with_models(self, done: list[FinishedGrasp], which: range) -> list[FinishedGrasp]:
+        """Return the results of the grasps with these indices, each with its model."""
+        part = zip(done, self._part(which), strict=True)
+        return [grasp.in_model(self.models.model_of(*one)) for grasp, one in part]
+
+    def _part(self, which: range) -> list[tuple[str, int]]:
+        """Return the scene and the seed of the grasps with these indices."""
+        part = slice(which.start, which.stop)
+        return list(zip(self.scenes[part], map(index, self.seeds[part]), strict=True))
+
+    def _worth(self, n: int) -> bool:
+        return n >= WORTH_COMPILING if self.compiled is None else self.compiled
+
+    def _slice(self, which: range) -> list[FinishedGrasp]:
+        """Run the grasps with these indices."""
+        part = self._part(which)
+        done: dict[int, FinishedGrasp] = {}
+        plain: list[int] = []
+        for i, one in enumerate(part):
+            grasp = self._compiled(*one)
+            if grasp is None:
+                plain.append(i)
+            else:
+                done[i] = grasp
+        if plain:
+            grasps = self._plain([part[i] for i in plain])
+            done.update(zip(plain, grasps, strict=True))
+        return [done[i] for i in range(len(part))]
+
+    def _compiled(self, scene: str, seed: int) -> FinishedGrasp | None:
+        """Return the result of a compiled grasp; None if it has to run in the interpreter."""
+        if not any(self.is_compiled.values()):
+            return None
+        try:
+            if not hasattr(self.local, "grasps"):
+                self.local.grasps = CompiledGrasps(self.models, self.loops, self.measure, self._is_compiled)
+            grasps: CompiledGrasps = self.local.grasps
+            return grasps.grasp(scene, seed)
+        except NotCompilable as error:
+            self._note_not_compilable(composition_of(self.models.setup(scene, seed)), error)
+            return None
+
+    def _is_compiled(self, composition: Composition) -> bool:
+        if composition not in self.is_compiled:
+            # The friction that is drawn may make one trial of a scene piecewise linear, and the next not.
+            self.is_compiled[composition] = any(
+                compiled for other, compiled in self.is_compiled.items() if other.kinds == composition.kinds
+            )
+        return self.is_compiled[composition]
+
+    def _note_not_compilable(self, composition: Composition, error: NotCompilable) -> None:
+        self.is_compiled[composition] = False
+        how = f"on {self.workers} cores" if self._worth_processes() else "on one core"
+        self.notes[f"these grasps run in plain Python {how}, about a hundred times slower: {error}"] = None
+
+    def _worth_processes(self) -> bool:
+        """Return whether separate processes save time for the grasps in the interpreter."""
+        plain = sum(n for composition, n in self.counts.items() if not self.is_compiled[composition])
+        return self.workers > 1 and plain >= WORTH_A_PROCESS * self.workers
+
+    def _plain(self, grasps: Sequence[tuple[str, int]]) -> list[FinishedGrasp]:
+        local = self.local
+        if self._worth_processes() and not getattr(local, "without_process", False):
+            try:
+                if not hasattr(local, "process"):
+                    local.process = self.processes.enter_context(PlainProcess(self.models))
+                return local.process.run(*zip(*grasps, strict=True))  # type: ignore[no-any-return]
+            except NotHandedOver as error:
+                local.without_process = True
+                self.notes[f"plain grasps run on one core: {error}"] = None
+        return [grasp_plain(self.job, self.models.setup(*grasp)) for grasp in grasps]
+
+
+def slices_of(total: int, workers: int) -> list[range]:
+    """Return the indices of the grasps that a worker takes at once, slice by slice."""
+    length = max(1, min(SLICE, math.ceil(total / (SLICES_PER_WORKER * workers))))
+    return [range(begin, min(begin + length, total)) for begin in range(0, total, length)]

@@ -1,0 +1,236 @@
+"""Simulating grasps in the interpreter of a separate process, because loops in one process share the interpreter lock.
+
+The process is a new interpreter that runs `main`, so that the script of the caller is not imported a second time. It
+reads one line of JSON with the settings and the registered name of the controller, and then lines with scenes and
+seeds. It answers each of these with a line of JSON, followed by the traces in numpy's npy format. The caller extracts
+the features.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Sequence
+from functools import partial
+from types import TracebackType
+from typing import IO, Any, Final
+
+import numpy as np
+from attrs import asdict, evolve, fields
+
+from graspsense.plugin_api import Controller, GraspEvent, Outcome, Phase, RunConfig, Trace, create, recipe_of
+from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.run.accuracy.cache import restored, stored
+from graspsense_sim_gripper.run.batch.job import FinishedGrasp, Job, grasp_plain
+from graspsense_sim_gripper.run.batch.scenes import Scenes
+from graspsense_sim_gripper.run.nested import like
+
+_ARRAYS: Final = tuple(
+    column.name for column in fields(Trace) if column.name not in ("units", "signals", "events")
+)
+
+
+Json = Any
+"""A value that JSON can represent."""
+
+
+class NotHandedOver(Exception):
+    """A job cannot run in another process; the text gives the reason."""
+
+
+class PlainProcess:
+    """A process that runs the grasps of a job in the interpreter. Use it as a context manager, which ends the process.
+
+    Raises NotHandedOver if the controller cannot be created again from its name and settings.
+    """
+
+    def __init__(self, scenes: Scenes) -> None:
+        self._scenes = scenes
+        job = scenes.job
+        if job.scaled is not None:
+            raise NotHandedOver(
+                "a parameter of the objects is scaled, and another process finds them by name"
+            )
+        try:
+            self._greeting = _line(
+                {
+                    # The process has to find the same classes: the same folders, in the same order.
+                    "path": [folder or os.getcwd() for folder in sys.path],
+                    "config": asdict(job.config),
+                    "controller": _named(job.controller),
+                    "run": asdict(job.run),
+                    "models": [
+                        [*key, None if model is None else stored(model)]
+                        for key, model in scenes.models().items()
+                    ],
+                    "traces": job.traces or job.extract is not None,
+                    "ends_with_hold": job.ends_with_hold,
+                }
+            )
+        except Exception as error:
+            raise NotHandedOver(f"the controller cannot be given to other processes: {error}") from error
+
+    def __enter__(self) -> PlainProcess:
+        self._process = subprocess.Popen(
+            [sys.executable, "-P", "-c", "from graspsense_sim_gripper.run.batch.worker import main; main()"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+        )
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, tb: TracebackType | None
+    ) -> None:
+        self._process.kill()
+        self._process.communicate()
+
+    def run(self, scenes: Sequence[str], seeds: Sequence[int]) -> list[FinishedGrasp]:
+        """Simulate these scenes with these seeds, and return the results in that order.
+
+        Raises NotHandedOver if the process has ended, and if a grasp raises an exception in it. The caller then runs
+        the grasps itself, which raises the original exception.
+        """
+        to, of = self._process.stdin, self._process.stdout
+        assert to is not None
+        assert of is not None
+        try:
+            to.write(self._greeting + _line({"scenes": list(scenes), "seeds": [int(seed) for seed in seeds]}))
+            to.flush()
+            self._greeting = b""
+            answer = _read_line(of)
+            traces = io.BytesIO(_read(of, answer["bytes"]))
+        except (OSError, EOFError) as error:
+            raise NotHandedOver(f"the process for plain grasps has ended ({error})") from error
+        if "refused" in answer:
+            raise NotHandedOver(answer["refused"])
+        job = self._scenes.job
+        results = []
+        for scene, seed, (outcome, reason, values, told) in zip(scenes, seeds, answer["done"], strict=True):
+            initial = self._scenes.setup(scene, seed).state
+            trace = _read_trace(traces) if job.traces or job.extract is not None else None
+            if trace is not None:
+                trace = evolve(trace, events=tuple(_event(*event) for event in told))
+            results.append(
+                FinishedGrasp(
+                    outcome=Outcome(outcome),
+                    reason=reason,
+                    end=partial(like, initial, values),
+                    extracted=None if job.extract is None or trace is None else job.extract(trace),
+                    kept=trace if job.traces else None,
+                )
+            )
+        return results
+
+
+def _told(grasp: FinishedGrasp) -> list[list[Any]]:
+    """Return the events that the controller told, as JSON values."""
+    events = () if grasp.kept is None else grasp.kept.events
+    return [[event.t_s, int(event.phase), event.what] for event in events]
+
+
+def _event(t_s: float, phase: int, what: str) -> GraspEvent:
+    return GraspEvent(t_s, Phase(phase), what, "controller")
+
+
+def main() -> None:
+    """Answer the requests on the standard input until it ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    answers = os.fdopen(os.dup(1), "wb")
+    # Text that other code prints must not appear between the answers.
+    os.dup2(2, 1)
+    asked = sys.stdin.buffer
+    try:
+        greeting = _read_line(asked)
+    except EOFError:
+        return
+    sys.path[:] = greeting["path"]
+    scenes: Scenes | None = None
+    while True:
+        try:
+            wanted = _read_line(asked)
+        except EOFError:
+            return
+        traces = io.BytesIO()
+        try:
+            scenes = scenes or _scenes(greeting)
+            setups = (scenes.setup(*grasp) for grasp in zip(wanted["scenes"], wanted["seeds"], strict=True))
+            done = [grasp_plain(scenes.job, setup) for setup in setups]
+            for grasp in done:
+                if grasp.kept is not None:
+                    _write_trace(traces, grasp.kept)
+            answer = {
+                "done": [[grasp.outcome.value, grasp.reason, grasp.state, _told(grasp)] for grasp in done]
+            }
+            line = _line({**answer, "bytes": traces.tell()})
+        except Exception as error:
+            what = "a plain grasp" if scenes is not None else "the controller"
+            traces = io.BytesIO()
+            refused = f"{what} fails in another process: {type(error).__name__}: {error}"
+            line = _line({"refused": refused, "bytes": 0})
+        answers.write(line + traces.getbuffer())
+        answers.flush()
+
+
+def _scenes(greeting: dict[str, Json]) -> Scenes:
+    models = {
+        (scene, numbered): None if values is None else restored(values)
+        for scene, numbered, values in greeting["models"]
+    }
+    return Scenes(_job(greeting), models)
+
+
+def _job(greeting: dict[str, Json]) -> Job:
+    name, values = greeting["controller"]
+    return Job(
+        config=SimConfig(**greeting["config"]),
+        controller=create("controller", name, **values),
+        run=RunConfig(**greeting["run"]),
+        extract=None,
+        traces=greeting["traces"],
+        ends_with_hold=greeting["ends_with_hold"],
+    )
+
+
+def _named(controller: Controller[Any]) -> tuple[str, dict[str, Json]]:
+    """Return the registered name and the settings of a controller.
+
+    Raises ValueError if a controller that is created from these has other parameters or another initial state.
+    """
+    name, values = recipe_of("controller", controller)
+    twin = create("controller", name, **values)
+    # Compared as text, because NaN is not equal to itself.
+    if repr((twin.params(), twin.init())) != repr((controller.params(), controller.init())):
+        raise ValueError(f"another {name} with its settings has other numbers")
+    return name, values
+
+
+def _line(value: Json) -> bytes:
+    return json.dumps(value).encode() + b"\n"
+
+
+def _read_line(stream: IO[bytes]) -> Json:
+    line = stream.readline()
+    if not line.endswith(b"\n"):
+        raise EOFError("it gave no answer")
+    return json.loads(line)
+
+
+def _read(stream: IO[bytes], n: int) -> bytes:
+    data = stream.read(n)
+    if len(data) < n:
+        raise EOFError("an answer is incomplete")
+    return data
+
+
+def _write_trace(to: IO[bytes], trace: Trace) -> None:
+    for name in _ARRAYS:
+        np.lib.format.write_array(to, getattr(trace, name), allow_pickle=False)
+
+
+def _read_trace(of: IO[bytes]) -> Trace:
+    parts: dict[str, Any] = {name: np.lib.format.read_array(of, allow_pickle=False) for name in _ARRAYS}
+    return Trace(**parts)

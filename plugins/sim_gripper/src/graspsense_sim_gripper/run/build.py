@@ -1,0 +1,345 @@
+"""Building the parameters and initial states of a grasp from a config, the name of an object, and a seed.
+
+This takes three steps: `build` gives the problem, `reduction.select` its steps, and `instantiate` one grasp.
+"""
+
+from __future__ import annotations
+
+import math
+from contextlib import suppress
+from functools import lru_cache, partial
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from attrs import evolve, fields
+
+from graspsense.plugin_api import (
+    EFFORT,
+    Command,
+    ConfigError,
+    DeviceInfo,
+    ScrewLinkage,
+    gap_and_rate,
+    revolutions_at,
+)
+from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.plant.contact import ObjectModel, PadCompliance
+from graspsense_sim_gripper.plant.drive import Drive, Friction, FrictionSpread, drawn_friction
+from graspsense_sim_gripper.plant.drive_models import LINKAGES, STRAIGHT
+from graspsense_sim_gripper.plant.fingertip import CELL_OFFSET, CELLS, cell_offset
+from graspsense_sim_gripper.plant.palm import AT_REST, palm_params
+from graspsense_sim_gripper.plant.sensing import (
+    ImageClock,
+    PadCells,
+    SensorParams,
+    SensorState,
+    initial_sensor,
+)
+from graspsense_sim_gripper.plant.state import Contact, ContactState, Motion, PlantState
+from graspsense_sim_gripper.run.accuracy.levels import step_tolerance
+from graspsense_sim_gripper.run.accuracy.model import Reduction
+from graspsense_sim_gripper.run.compiled.compose import all_active, uncompressed
+from graspsense_sim_gripper.run.problem import GraspSetup, Problem
+from graspsense_sim_gripper.scene.instance import PAD_CELLS, Instance, cell_weights, present_cells, sample
+from graspsense_sim_gripper.scene.library import find, split_number
+from graspsense_sim_gripper.scene.random_numbers import Generator, GeneratorOf, NumpyGenerator
+from graspsense_sim_gripper.scene.scaled import ScaledParameter
+from graspsense_sim_gripper.scene.spec import PATCHES, ObjectSpec
+from graspsense_sim_gripper.solve.scheme import PlantParams, Steps
+
+EFFORT_LIMIT_N: Final = 100.0
+SPEED_LIMIT_M_S: Final = 0.2
+"""Software limits of the PR2 gripper at the time of the paper."""
+OPENING_N: Final = -20.0
+"""The effort that opens the fingers. The recordings of the paper's authors show 17 and 20 N between squeezes."""
+TARE_IMAGES: Final = 6
+"""Number of cell images in a tare."""
+EVEN_WEIGHTS: Final = (1.0 / PAD_CELLS,) * PAD_CELLS
+"""The share of each cell of the gripping face in the force, if there is no object."""
+IDEAL_CELLS: Final = PadCells(np.array(EVEN_WEIGHTS), np.full(CELLS, CELL_OFFSET[0]))
+"""The cells of an ideal sensor; they are never read."""
+EXAMPLES: Final = 4
+"""Number of instances whose trial grasps verify a model whose steps have no estimate of their error."""
+_SENSOR_SETTINGS: Final = ("noise_counts", "pad_period_s", "pad_cells", "pad_delay_s")
+_NOT_OF_THE_MODEL: Final[dict[str, Any]] = {
+    field.name: field.default
+    for field in fields(SimConfig)
+    if field.name in ("object", "explain", "compile", *_SENSOR_SETTINGS)
+} | {"sensor": "ideal"}
+"""The settings that the choice of steps does not depend on, with the values that they have in its trial grasps."""
+
+
+def device_info(config: SimConfig) -> DeviceInfo:
+    """Return the properties of this gripper as a device: rate, limits, opening command, and tare."""
+    return DeviceInfo(
+        name="simulated PR2 gripper",
+        clock="virtual",
+        simulated=True,
+        harmless=True,
+        rate_hz=config.rate_hz,
+        effort_limit_n=EFFORT_LIMIT_N,
+        speed_limit_m_s=SPEED_LIMIT_M_S,
+        opening=Command(EFFORT, OPENING_N, math.inf, math.inf),
+        relaxed=Command(EFFORT, 0.0, math.inf, math.inf),
+        tare_images=0 if config.sensor == "ideal" else TARE_IMAGES,
+        notes=("simulated: every figure comes from a model",),
+    )
+
+
+def build(config: SimConfig, scene: str, scaled: ScaledParameter | None = None) -> Problem:
+    """Return the problem of grasping an object: a name, a scene file (`*.toml`), or `none` for no object.
+
+    `scaled`: a parameter of the object that is larger by a share.
+
+    Raises UnknownName for an unknown name, ConfigError for a file that cannot be read as an object.
+    """
+    if scene == "none":
+        return problem_of(config, None)
+    name, number = split_number(scene)
+    spec = find(name)
+    return problem_of(config, spec if scaled is None else scaled.applied_to(spec), number)
+
+
+def problem_of(config: SimConfig, spec: ObjectSpec | None, number: int | None = None) -> Problem:
+    """Return the problem of an object, or of its instance with this number; `spec` None: no object."""
+    model_config = _model_config(config, config.spread)
+    nominal = None
+    if spec is not None:
+        nominal = _setup(_model_config(config, False), sample(spec, None), 0, NumpyGenerator(0))
+        if number is not None:
+            # A numbered instance differs from the nominal object, like the instances that a seed draws.
+            model_config = _model_config(config, True)
+    return Problem(
+        config=config,
+        spec=spec,
+        number=number,
+        model_config=model_config,
+        device=device_info(model_config),
+        nominal=nominal,
+        examples=partial(_examples, model_config, spec),
+    )
+
+
+@lru_cache(maxsize=64)
+def _model_config(config: SimConfig, spread: bool) -> SimConfig:
+    """Return the settings that the choice of steps depends on, with this `spread`. A batch shares them."""
+    return evolve(config, **_NOT_OF_THE_MODEL, spread=spread)
+
+
+def _examples(config: SimConfig, spec: ObjectSpec | None) -> tuple[GraspSetup, ...]:
+    """Return what `Problem.examples` returns. An instance that does not fit between the open fingers is left out."""
+    if spec is None or not config.spread:
+        return ()
+    setups = []
+    for seed in range(EXAMPLES):
+        rng = NumpyGenerator(seed)
+        instance = sample(spec, rng)
+        with suppress(ConfigError):
+            check_fit(config, spec, instance.width_m, instance.offset_m)
+            setups.append(_setup(config, instance, seed, rng))
+    return tuple(setups)
+
+
+def instantiate(
+    problem: Problem,
+    reduction: Reduction | None,
+    seed: int,
+    generator_of: GeneratorOf = NumpyGenerator,
+) -> GraspSetup:
+    """Return the grasp with this seed, of an instance; `reduction` None: in steps that are not chosen for it.
+
+    `generator_of`: draws all that the seed gives.
+
+    Raises ConfigError for an object of a scene file that the open fingers would cut into.
+    """
+    rng = generator_of(seed)
+    instance = _instance(problem, rng)
+    if instance is not None:
+        check_fit(problem.config, instance.spec, instance.width_m, instance.offset_m)
+    return _setup(problem.config, instance, seed, rng, reduction)
+
+
+def example_of(problem: Problem, reduction: Reduction | None) -> GraspSetup:
+    """Return any grasp of a scene, for what all of them have in common; it may not fit between the fingers."""
+    rng = NumpyGenerator(0)
+    return _setup(problem.config, _instance(problem, rng), 0, rng, reduction)
+
+
+def _instance(problem: Problem, rng: Generator) -> Instance | None:
+    """Return the instance that `rng` draws; None if there is no object."""
+    if problem.spec is None:
+        return None
+    return sample(problem.spec, rng if problem.config.spread else None, problem.number)
+
+
+def _setup(
+    config: SimConfig,
+    instance: Instance | None,
+    seed: int,
+    rng: Generator,
+    reduction: Reduction | None = None,
+) -> GraspSetup:
+    """Return the grasp of an instance; `reduction` None: in steps that are not chosen for it."""
+    plant, state = _plant(config, instance, rng)
+    if instance is not None and reduction is not None:
+        plant = reduction.applied_to(plant)
+    sensor = _sensor(config, instance, rng)
+    palm: dict[str, Any] = {}
+    if config.acceleration:
+        params = palm_params(_linkage(config), 1.0 / config.rate_hz, ideal=config.sensor == "ideal")
+        palm = {"palm": params, "palm_state": AT_REST}
+    return GraspSetup(
+        kinds=instance.kinds if instance else (),
+        terms=instance.terms if instance else (),
+        plant=plant,
+        state=state,
+        sensor=sensor,
+        sensor_state=_gripper(config).sensor_state,
+        dt_s=1.0 / config.rate_hz,
+        seed=seed,
+        rng=rng,
+        **palm,
+    )
+
+
+def check_fit(config: SimConfig, spec: ObjectSpec, width_m: float, offset_m: float) -> None:
+    """Raise ConfigError if an instance of a scene file does not fit between the fingers, or has no width or terms."""
+    where = spec.file
+    needed_m = width_m + 2.0 * abs(offset_m)
+    if where and width_m <= 0.0:
+        raise ConfigError(f"{where}: width_m: this instance is {width_m:g} m wide (width_spread_m)")
+    if where and needed_m >= config.open_gap_m:
+        what = "width_m" if width_m >= config.open_gap_m else "offset_m"
+        raise ConfigError(
+            f"{where}: {what}: {width_m:g} m wide and {offset_m:g} m off the centre, it needs "
+            f"{needed_m:g} m, and the fingers open to {config.open_gap_m:g} m (gripper.open_gap_m)"
+        )
+    if where and not spec.terms:
+        raise ConfigError(
+            f"{where}: terms: there are none, so nothing resists the fingers: add a table [[terms]] for each law"
+        )
+
+
+def _plant(config: SimConfig, instance: Instance | None, rng: Generator) -> tuple[PlantParams, PlantState]:
+    """Return the parameters of the plant, and its state before the grasp: open, at rest, without contact.
+
+    With spread, the Coulomb friction of the trial is drawn here.
+    """
+    gripper = _gripper(config)
+    drive = gripper.drive
+    if config.spread:
+        # `_replace` would take several times as long.
+        link, inertia, (_, _, *rest), closed_rev, open_rev, lag_s = drive
+        drawn = drawn_friction(friction_spread(config), float(rng.standard_normal(1)[0]))
+        friction = Friction(*drawn, *rest)
+        drive = Drive(link, inertia, friction, closed_rev, open_rev, lag_s)
+    if instance is None:
+        # A negative width: the fingers close without touching anything.
+        model = ObjectModel(-1.0, 0.0, gripper.pads, all_active(()))
+        at_rest, offset = _uncompressed(()), 0.0
+    else:
+        model = ObjectModel(
+            width_m=instance.width_m,
+            table_friction_n=instance.table_n,
+            terms=all_active(instance.terms),
+            pads=gripper.pads,
+            held=1 if instance.spec.held else 0,
+        )
+        at_rest, offset = _uncompressed(instance.kinds), instance.offset_m
+    right = (at_rest,) if model.held == 1 else ()
+    state = PlantState(gripper.motion, Contact(0.0, 0.0, offset, 0, at_rest, right))
+    return PlantParams(drive, model, gripper.steps), state
+
+
+def friction_spread(config: SimConfig) -> FrictionSpread:
+    """Return how friction differs between the trials of these settings."""
+    return FrictionSpread(float(config.coulomb_n), float(config.coulomb_spread_n), float(config.breakaway_n))
+
+
+@lru_cache(maxsize=256)
+def _uncompressed(kinds: tuple[str, ...]) -> ContactState:
+    return uncompressed(kinds)
+
+
+class _Gripper(NamedTuple):
+    """The parameters that all grasps of a config share."""
+
+    drive: Drive
+    pads: PadCompliance
+    steps: Steps
+    """The steps of a model that is not reduced."""
+    motion: Motion
+    """At rest with open fingers."""
+    sensor_state: SensorState
+    """What the sensors show then."""
+
+
+@lru_cache(maxsize=64)
+def _gripper(config: SimConfig) -> _Gripper:
+    link = _linkage(config)
+    drive = Drive(
+        link=link,
+        inertia=_inertia(config),
+        friction=Friction(
+            coulomb_n=float(config.coulomb_n),
+            breakaway_n=max(float(config.breakaway_n), float(config.coulomb_n)),
+            stribeck_m_s=float(config.stribeck_m_s),
+            load_friction_coefficient=float(config.load_friction_coefficient),
+            damping_n_s_m=float(config.damping_n_s_m),
+        ),
+        closed_rev=revolutions_at(link, 0.0),
+        open_rev=revolutions_at(link, config.open_gap_m),
+        lag_s=float(config.drive_lag_s),
+    )
+    pads = PadCompliance(
+        stiffness_n_m=0.5 * float(config.pad_stiffness_n_m),
+        damping_n_s_m=0.5 * float(config.pad_damping_n_s_m),
+        branch_n_m=0.5 * float(config.pad_creep_n_m),
+        branch_tau_s=float(config.pad_creep_s),
+        # Two pads in series compress twice as far.
+        hardening_m=math.inf if config.pad_hardening_m is None else 2.0 * config.pad_hardening_m,
+        exponent=float(config.pad_exponent),
+    )
+    motion = Motion(drive.open_rev, 0.0, *gap_and_rate(link, drive.open_rev))
+    return _Gripper(drive, pads, Steps(step_tolerance(config.accuracy)), motion, initial_sensor(link, motion))
+
+
+def drive_and_pads(config: SimConfig) -> tuple[Drive, PadCompliance]:
+    """Return the drive and the fingertips of these settings."""
+    gripper = _gripper(config)
+    return gripper.drive, gripper.pads
+
+
+def _linkage(config: SimConfig) -> ScrewLinkage:
+    return LINKAGES[config.transmission]
+
+
+def _inertia(config: SimConfig) -> float:
+    """Return the inertia `Drive.inertia`: m g^2 of straight jaws, (2 pi)^2 J of a rotor."""
+    if config.transmission == "straight":
+        return config.moving_mass_kg * STRAIGHT.pitch_m * STRAIGHT.pitch_m
+    return 4.0 * math.pi * math.pi * config.rotor_kg_m2
+
+
+def _sensor(config: SimConfig, instance: Instance | None, rng: Generator) -> SensorParams:
+    """Return the sensors of a grasp. The offsets of the cells and the time of the first image are drawn here."""
+    period = float(config.pad_period_s)
+    if config.sensor == "ideal":
+        clock = ImageClock(0.0, period, 0.0)
+        return SensorParams(1, _linkage(config), clock, 1.0, 0.0, IDEAL_CELLS, IDEAL_CELLS)
+    offsets = cell_offset(rng.standard_normal((2, CELLS)))
+    weights = list(EVEN_WEIGHTS)
+    if instance is not None:
+        cell_weights(PATCHES.index(instance.spec.patch), instance.patch_row, weights)
+    shares = np.array(weights)
+    if config.pad_cells < PAD_CELLS:
+        shares *= present_cells(config.pad_cells)
+    return SensorParams(
+        ideal=0,
+        link=_linkage(config),
+        clock=ImageClock(rng.random() * period, period, float(config.pad_delay_s)),
+        share=float(instance.share) if instance else 1.0,
+        noise_counts=float(config.noise_counts),
+        left=PadCells(shares, offsets[0]),
+        right=PadCells(shares, offsets[1]),
+    )

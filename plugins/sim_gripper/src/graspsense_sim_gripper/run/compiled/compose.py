@@ -1,0 +1,403 @@
+"""Composing the functions of a scene: the sum of its terms, the motion of the plant, and the loop of a grasp.
+
+A generic function reads its parts, such as the law of a term, as globals. `binding.bind_reachable` makes a copy of the
+function, and of the functions that it calls, in which these globals are the given parts. The result runs in the
+interpreter as it is, and `compiled.jit` compiles it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from functools import lru_cache
+from typing import Any, Final, NamedTuple
+
+from graspsense.plugin_api import Frame, bind, events_of, free_parts, maker, tick
+from graspsense_sim_gripper.plant.contact import (
+    BalanceSearch,
+    ObjectModel,
+    PadLoad,
+    hardening,
+    no_event,
+    solve_contact,
+)
+from graspsense_sim_gripper.plant.palm import keep_samples, palm_signals
+from graspsense_sim_gripper.plant.sensing import SensorState
+from graspsense_sim_gripper.plant.state import Contact, ContactState, Motion, Past, PlantState, StepState
+from graspsense_sim_gripper.run.approach import approach_ticks
+from graspsense_sim_gripper.run.binding import Constructors, bind_reachable
+from graspsense_sim_gripper.run.free_ticks import approach_or_free_ticks, free_ticks
+from graspsense_sim_gripper.run.loop import GraspParams, LoopProgress, SimulationState, grasp
+from graspsense_sim_gripper.run.macro_ticks import begin_macro_step
+from graspsense_sim_gripper.run.problem import ControllerStep
+from graspsense_sim_gripper.scene.terms.registry import active_laws, find_term, laws_of, moving_of, phases_of
+from graspsense_sim_gripper.scene.terms.switchable import Switchable, switched_on_sum
+from graspsense_sim_gripper.scene.terms.term import LAW_ERRORS, Law, Moves, OnSum, Phase, SumLaw
+from graspsense_sim_gripper.solve.advance import advance, move
+from graspsense_sim_gripper.solve.coast import can_glide, glide
+from graspsense_sim_gripper.solve.converge import refine_until_converged
+from graspsense_sim_gripper.solve.scheme import Attempt, PlantParams, Start
+
+TermsStates = Any
+"""A tuple with a state of its own type for each term."""
+TermsParams = Any
+"""A tuple with parameters of its own type for each term."""
+PlantMove = Callable[[Any, PlantState, float, float], PlantState]
+"""`move(model, state, effort_n, dt_s) -> state` over one tick."""
+ContactSolver = Callable[[ObjectModel, ContactState, float, float, float], tuple[ContactState, int]]
+"""`dynamics.contact.solve_contact` with the terms of an object."""
+
+INTERPRETED: Final[Constructors] = {
+    kind: maker(kind)
+    for kind in (
+        *(PlantState, Motion, Contact, ContactState, Past, StepState, SensorState, Frame),
+        *(Start, Attempt, PadLoad, BalanceSearch),
+    )
+}
+"""The named tuples that a tick creates, each with a constructor that takes the interpreter half the time."""
+
+
+# ------------------------------------------------------------------------------------------ the object's terms
+
+
+def _no_terms(
+    params: TermsParams, states: TermsStates, d0: float, d1: float, h: float, v1: float
+) -> tuple[float, TermsStates]:
+    return 0.0, ()
+
+
+first: Law = _no_terms
+second: Law = _no_terms
+third: Law = _no_terms
+rest: Law = _no_terms
+
+
+def _sum_of_1(
+    params: TermsParams, states: TermsStates, d0: float, d1: float, h: float, v1: float
+) -> tuple[float, TermsStates]:
+    force, state = first(params[0], states[0], d0, d1, h, v1)
+    return force, (state,)
+
+
+def _sum_of_2(
+    params: TermsParams, states: TermsStates, d0: float, d1: float, h: float, v1: float
+) -> tuple[float, TermsStates]:
+    force1, state1 = first(params[0], states[0], d0, d1, h, v1)
+    force2, state2 = second(params[1], states[1], d0, d1, h, v1)
+    return force1 + force2, (state1, state2)
+
+
+def _sum_of_3(
+    params: TermsParams, states: TermsStates, d0: float, d1: float, h: float, v1: float
+) -> tuple[float, TermsStates]:
+    force1, state1 = first(params[0], states[0], d0, d1, h, v1)
+    force2, state2 = second(params[1], states[1], d0, d1, h, v1)
+    force3, state3 = third(params[2], states[2], d0, d1, h, v1)
+    return force1 + (force2 + force3), (state1, state2, state3)
+
+
+def _sum_of_more(
+    params: TermsParams, states: TermsStates, d0: float, d1: float, h: float, v1: float
+) -> tuple[float, TermsStates]:
+    force1, state1 = first(params[0], states[0], d0, d1, h, v1)
+    force2, state2 = second(params[1], states[1], d0, d1, h, v1)
+    force3, state3 = third(params[2], states[2], d0, d1, h, v1)
+    force, others = rest(params[3:], states[3:], d0, d1, h, v1)
+    return force1 + (force2 + (force3 + force)), (state1, state2, state3, *others)
+
+
+summands: Law = _no_terms
+on_sum: SumLaw = switched_on_sum
+
+
+def _acted_on(
+    params: TermsParams, states: TermsStates, d0: float, d1: float, h: float, v1: float
+) -> tuple[float, TermsStates]:
+    total, before = summands(params[:-1], states[:-1], d0, d1, h, v1)
+    force, state = on_sum(params[-1], states[-1], total, d1)
+    return force, (*before, state)
+
+
+def sum_of(laws: Sequence[Law | OnSum]) -> Law:
+    """Return one law that is the sum of these; its parameters and states are tuples in the same order.
+
+    Forces are added from the last to the first. A term without force then changes no bit of the sum, and a padded
+    object has exactly the force of the original one. The last law may act on the sum of the others.
+    """
+    *others, last = laws or [OnSum(switched_on_sum)]
+    if isinstance(last, OnSum):
+        return bind(_acted_on, summands=_summed(others), on_sum=last.law) if laws else _no_terms
+    return _summed(laws)
+
+
+def _summed(laws: Sequence[Any]) -> Law:
+    if not laws:
+        return _no_terms
+    if len(laws) == 1:
+        return bind(_sum_of_1, first=laws[0])
+    if len(laws) == 2:
+        return bind(_sum_of_2, first=laws[0], second=laws[1])
+    if len(laws) == 3:
+        return bind(_sum_of_3, first=laws[0], second=laws[1], third=laws[2])
+    return bind(_sum_of_more, first=laws[0], second=laws[1], third=laws[2], rest=_summed(laws[3:]))
+
+
+def sum_of_active(laws: Sequence[Law | OnSum]) -> Law:
+    """Return what `sum_of` computes with `laws_of`, bit for bit, in a form that suits the interpreter.
+
+    It takes the `active_laws`, calls those of the active terms only, and cannot be compiled.
+    """
+    from_last = tuple([(i, law) for i, law in reversed(list(enumerate(laws))) if not isinstance(law, OnSum)])
+
+    # The active terms of the last parameters, which a grasp does not change: one tuple, so that threads may share it.
+    active_of: tuple[TermsParams, Sequence[tuple[int, Law, Any]]] = ((), ())
+
+    def force_of_active(
+        params: TermsParams, states: TermsStates, d0: float, d1: float, h: float, v1: float
+    ) -> tuple[float, TermsStates]:
+        nonlocal active_of
+        known, active = active_of
+        if known is not params:
+            active = [(i, law, params[i].params) for i, law in from_last if params[i].active == 1]
+            active_of = params, active
+        total, after = 0.0, list(states)
+        for i, law, term in active:
+            force, after[i] = law(term, after[i], d0, d1, h, v1)
+            total = force + total
+        return total, tuple(after)
+
+    last = laws[-1] if laws else None
+    if not isinstance(last, OnSum):
+        return force_of_active
+    on_sum = last.law
+
+    def acted_on(
+        params: TermsParams, states: TermsStates, d0: float, d1: float, h: float, v1: float
+    ) -> tuple[float, TermsStates]:
+        total, after = force_of_active(params, states, d0, d1, h, v1)
+        active, term = params[-1]
+        if active == 0:
+            return total, after
+        force, state = on_sum(term, after[-1], total, d1)
+        return force, (*after[:-1], state)
+
+    return acted_on
+
+
+def _no_phase(states: TermsStates) -> int:
+    return 0
+
+
+N_PHASES: Final = 8
+PLACE: int = 0
+phase: Phase = _no_phase
+others: Phase = _no_phase
+
+
+def _phase_and_others(states: TermsStates) -> int:
+    return phase(states[PLACE]) + N_PHASES * others(states)
+
+
+def phase_of_all(phases: Sequence[tuple[int, Phase]]) -> Phase:
+    """Return one number for the phases of these terms, each given with its place among the states."""
+    combined: Phase = _no_phase
+    for place, one in reversed(phases):
+        combined = bind(_phase_and_others, PLACE=place, phase=one, others=combined)
+    return combined
+
+
+def _no_move(states: TermsStates) -> bool:
+    return False
+
+
+moves: Moves = _no_move
+others_move: Moves = _no_move
+
+
+def _one_moves(states: TermsStates) -> bool:
+    return moves(states[PLACE]) or others_move(states)
+
+
+def any_moves(moving: Sequence[tuple[int, Moves]]) -> Moves:
+    """Return whether one of these terms moves, each given with its place among the states."""
+    combined: Moves = _no_move
+    for place, one in reversed(moving):
+        combined = bind(_one_moves, PLACE=place, moves=one, others_move=combined)
+    return combined
+
+
+def all_active(terms: Sequence[Any]) -> tuple[Switchable, ...]:
+    """Return the parameters of these terms as the sum of `laws_of` takes them: all active."""
+    return tuple([Switchable(1, params) for params in terms])
+
+
+def uncompressed(kinds: Sequence[str]) -> ContactState:
+    """Return the state of an object of these terms that nothing has pressed yet."""
+    states = tuple([find_term(kind)[1].at_rest for kind in kinds])
+    return ContactState(0.0, 0.0, 0.0, states, 0.0, 0.0, Past(0.0, 0.0, math.inf, math.inf))
+
+
+# ------------------------------------------------------------------------------------------ plant and loop
+
+
+class Composition(NamedTuple):
+    """What the code of a loop depends on, besides the controller. Loops are cached and compiled by it."""
+
+    kinds: tuple[str, ...]
+    """The kinds of the object's terms."""
+    converges: bool
+    """Whether the steps of a tick are halved until the result no longer changes."""
+    lags: bool = False
+    """Whether the force of the drive lags behind the command."""
+    has_palm: bool = False
+    """Whether the gripper has an accelerometer."""
+    hardens: bool = False
+    """Whether the pads are nonlinear."""
+    held: bool = False
+    """Whether the object is held fast, so that its state has two halves."""
+
+
+def composition(kinds: tuple[str, ...], plant: PlantParams, *, has_palm: bool = False) -> Composition:
+    """Return the composition of a loop for this plant."""
+    converges, lags = plant.steps.settle > 0.0, plant.drive.lag_s > 0.0
+    held = plant.object.held == 1
+    return Composition(kinds, converges, lags, has_palm, hardens(plant.object), held)
+
+
+def hardens(model: ObjectModel) -> bool:
+    """Return whether the pads are nonlinear."""
+    return model.pads.hardening_m < math.inf
+
+
+def pad_parts(nonlinear: bool) -> dict[str, Any]:
+    """Return what `bind_reachable` binds for nonlinear pads; nothing for linear ones."""
+    return {"pad_excess": hardening} if nonlinear else {}
+
+
+@lru_cache(maxsize=64)
+def contact_solver(kinds: tuple[str, ...], hardens: bool = False) -> ContactSolver:
+    """Return `solve_contact` for an object of these terms. `hardens`: whether the pads are nonlinear."""
+    parts = {"object_force": sum_of_active(active_laws(kinds)), **pad_parts(hardens)}
+    return bind_reachable(solve_contact, parts, INTERPRETED)
+
+
+def plant_move(
+    laws: Sequence[Law | OnSum],
+    phases: Sequence[tuple[int, Phase]] = (),
+    moving: Sequence[tuple[int, Moves]] = (),
+    *,
+    converges: bool = True,
+    lags: bool = True,
+    hardens: bool = False,
+) -> Callable[[PlantParams, PlantState, float, float], PlantState]:
+    """Return `move` for an object whose force is the sum of these laws, with the events of `phases_of`.
+
+    `moving`: the terms that move in a free object, as `moving_of` returns them.
+
+    `converges`: whether the steps of a tick may be halved until the result no longer changes; `lags`: whether the force
+    of the drive may lag behind the command; `hardens`: whether the pads are nonlinear.
+    """
+    over_a_tick: PlantMove = refine_until_converged if converges else advance
+    if lags:
+        over_a_tick = bind(move, advance=over_a_tick)
+    return bind_reachable(over_a_tick, _object_parts(laws, phases, moving, hardens))
+
+
+def _object_parts(
+    laws: Sequence[Law | OnSum],
+    phases: Sequence[tuple[int, Phase]],
+    moving: Sequence[tuple[int, Moves]],
+    hardens: bool,
+) -> dict[str, Any]:
+    """Return what the contact of the object calls: its force, its events, and the law of the pads."""
+    events: dict[str, Any] = {"object_phase": phase_of_all(phases)} if phases else {"has_event": no_event}
+    if moving:
+        events["object_moves"] = any_moves(moving)
+    return {"object_force": sum_of(laws), **events, **pad_parts(hardens)}
+
+
+@lru_cache(maxsize=64)
+def composed_move(composition: Composition, *, interpreted: bool = True) -> PlantMove:
+    """Return the function that advances the plant by a tick; `interpreted` False: in the form that is compiled."""
+    kinds = composition.kinds
+    move = plant_move(
+        laws_of(kinds),
+        phases_of(kinds),
+        moving_of(kinds),
+        converges=composition.converges,
+        lags=composition.lags,
+        hardens=composition.hardens,
+    )
+    if not interpreted:
+        return move
+    return bind_reachable(move, {"object_force": sum_of_active(active_laws(kinds))}, INTERPRETED)
+
+
+def step_parts(composition: Composition) -> dict[str, Any]:
+    """Return what the steps of this plant call."""
+    kinds = composition.kinds
+    return _object_parts(laws_of(kinds), phases_of(kinds), moving_of(kinds), composition.hardens)
+
+
+@lru_cache(maxsize=64)
+def grasp_loop(
+    composition: Composition, step: ControllerStep, *, interpreted: bool = True
+) -> Callable[..., SimulationState]:
+    """Return the loop of a grasp for a controller with this step; `interpreted` False: in the form that is compiled."""
+    force = sum_of_active(active_laws(composition.kinds)) if interpreted else None
+    return _loop_of(composed_move(composition, interpreted=False), step, force, composition)
+
+
+@lru_cache(maxsize=64)
+def guarded_loop(composition: Composition, step: ControllerStep) -> Callable[..., SimulationState]:
+    """Return the loop of a grasp in the interpreter, in which a law that raises an exception gives NaN."""
+    laws = [law if isinstance(law, OnSum) else _guarded(law) for law in active_laws(composition.kinds)]
+    force = sum_of_active(laws)
+    return _loop_of(composed_move(composition, interpreted=False), step, force, composition)
+
+
+@lru_cache(maxsize=64)
+def free_motion(
+    composition: Composition, step: ControllerStep
+) -> Callable[[GraspParams, LoopProgress, Frame, Any, Any], LoopProgress] | None:
+    """Return `free_ticks` for the interpreter; None where every tick needs the controller and all sensors."""
+    parts = free_parts(step)
+    if not parts or not _may_last_several_ticks(composition):
+        return None
+    return bind_reachable(free_ticks, {**parts, "can_glide": can_glide, "glide": glide}, INTERPRETED)
+
+
+def _may_last_several_ticks(composition: Composition) -> bool:
+    """Return whether a step of this plant may last several ticks."""
+    return not (composition.converges or composition.lags or composition.has_palm)
+
+
+def _loop_of(
+    move: PlantMove, step: ControllerStep, force: Law | None, composition: Composition
+) -> Callable[..., SimulationState]:
+    """Return the loop with this plant; `force`: of the object, in the form that suits the interpreter."""
+    control = bind_reachable(tick, {"step": step, "events_told": events_of(step)})
+    parts: dict[str, Any] = {"move": move, "control": control}
+    if _may_last_several_ticks(composition):
+        parts["begin_macro_step"] = bind_reachable(begin_macro_step, step_parts(composition))
+        if law := free_parts(step):
+            glides = {"can_glide": can_glide, "glide": glide}
+            parts["run_approach_ticks"] = (
+                bind_reachable(approach_or_free_ticks, {**law, **glides}, INTERPRETED)
+                if force
+                else bind_reachable(approach_ticks, law)
+            )
+    if composition.has_palm:
+        parts |= {"further_signals": palm_signals, "keep_signals": keep_samples}
+    loop = bind_reachable(grasp, parts)
+    return bind_reachable(loop, {"object_force": force}, INTERPRETED) if force else loop
+
+
+def _guarded(law: Law) -> Law:
+    def guarded(params: Any, state: Any, d0: float, d1: float, h: float, v1: float) -> tuple[float, Any]:
+        try:
+            return law(params, state, d0, d1, h, v1)
+        except LAW_ERRORS:
+            return math.nan, state
+
+    return guarded

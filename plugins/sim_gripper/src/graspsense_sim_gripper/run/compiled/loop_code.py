@@ -1,0 +1,244 @@
+"""The compiled loop of a grasp. It begins with an array of numbers, and its end is one.
+
+The interpreter takes a tenth of the time of a grasp for the named tuples of a state, and a batch reads few of them.
+"""
+
+from __future__ import annotations
+
+import math
+from array import array
+from collections.abc import Callable
+from functools import cache, lru_cache
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graspsense.plugin_api import NotCompilable, bind, entry_point
+from graspsense_sim_gripper.plant.sensing import PadBuffers
+from graspsense_sim_gripper.run.compiled.compose import Composition, grasp_loop
+from graspsense_sim_gripper.run.compiled.generator import WORD, Words, draw_normals, with_wide_product
+from graspsense_sim_gripper.run.compiled.jit import COMPILING, OPTIONS, compile_part, generating
+from graspsense_sim_gripper.run.compiled.ziggurat import Ziggurat
+from graspsense_sim_gripper.run.loop import Buffers, Ending, GraspParams, LoopEnd, SimulationState, ending
+from graspsense_sim_gripper.run.nested import (
+    Append,
+    Pattern,
+    Stored,
+    TupleType,
+    appender,
+    count_numbers,
+    structure,
+)
+from graspsense_sim_gripper.run.problem import ControllerStep
+
+FIRST_IMAGES: Final = 80
+IMAGES_AT_ONCE: Final = 16
+"""Number of images whose noise is drawn before a grasp, and for how many more each time that these are used up."""
+
+Numbers = NDArray[np.float64]
+Arrays = tuple[NDArray[Any], ...]
+
+
+def _grasp_unbound(params: GraspParams, progress: SimulationState, buffers: Buffers) -> SimulationState:
+    raise TypeError("no loop is bound: use CompiledLoops")
+
+
+def _tuples_unbound(pattern: Pattern, numbers: Any, arrays: Any) -> Any:
+    raise TypeError("only compiled code makes tuples of numbers: use CompiledLoops")
+
+
+def _store_unbound(array: Any, values: Any) -> None:
+    raise TypeError("only compiled code stores numbers: use CompiledLoops")
+
+
+grasp: Callable[[GraspParams, SimulationState, Buffers], SimulationState] = _grasp_unbound
+tuples_of: Callable[[Pattern, Any, Any], Any] = _tuples_unbound
+store_numbers: Callable[[Any, Any], None] = _store_unbound
+
+
+class CellNoise(NamedTuple):
+    """The noise of the cells of a grasp."""
+
+    is_drawn: int
+    """1: it is drawn to the buffers where the grasp comes to it; 0: it is in them, or there is none."""
+    words: Words
+    """The state of its generator, which changes."""
+    tables: Ziggurat
+    """The tables of its generator."""
+
+
+@cache
+def no_noise() -> CellNoise:
+    """Return that nothing is drawn."""
+    tables = Ziggurat(np.zeros(512), np.zeros(256, WORD), np.zeros(256))
+    return CellNoise(0, np.zeros(4, WORD), tables)
+
+
+def stored_grasp(
+    pattern: Pattern, start: Any, arrays: Any, buffers: Buffers, noise: CellNoise, end: Any
+) -> Ending:
+    """Run `grasp` from the numbers and arrays of its parameters and its state, which have the types of `pattern`.
+
+    Write the numbers of the state at its end to `end`, and return those that all callers read. The noise of the cells
+    is drawn where the grasp comes to it.
+    """
+    params, state = tuples_of(pattern, start, arrays)
+    pads, image_times, columns, phases, palm = buffers
+    left_zero, right_zero, of_images, images = pads
+    most, n = len(images), FIRST_IMAGES if noise.is_drawn == 1 else len(images)
+    drawn, going = 0, True
+    while going:
+        n = min(n, most)
+        if noise.is_drawn == 1:
+            for image in range(drawn, n):
+                draw_normals(noise.words, noise.tables, of_images[image])
+        if state.sensor.images == 0:
+            # The loop reads it as the image before the first one.
+            images[n - 1] = math.nan
+        part = PadBuffers(left_zero, right_zero, of_images, images[:n])
+        state = grasp(params, state, Buffers(part, image_times, columns, phases, palm))
+        done = ending(state)
+        going = done.ended == 0 and done.failed == 0 and done.images == n and n < most
+        drawn, n = n, n + IMAGES_AT_ONCE
+    store_numbers(end, state)
+    return done
+
+
+class LoopStart(NamedTuple):
+    """The parameters of a grasp and a state of it, in the form that a compiled loop takes."""
+
+    types: LoopTypes
+    numbers: Numbers
+    """Those of the parameters, then those of the state."""
+    arrays: Arrays
+
+    def after(self, end: LoopEnd) -> LoopStart:
+        """Return the same grasp in the state in which a compiled loop ended."""
+        state = end.state
+        assert isinstance(state, Stored)
+        of_params = self.numbers[: len(self.numbers) - len(state.numbers)]
+        return LoopStart(self.types, np.concatenate([of_params, state.numbers]), self.arrays)
+
+
+class LoopTypes(NamedTuple):
+    """The types of the parameters and the states of the grasps of a compiled loop."""
+
+    pattern: Pattern
+    """Parameters and state."""
+    state: TupleType
+    plant: TupleType
+    before_plant: int
+    """Number of numbers of the state before those of the plant."""
+    append: Append
+    """Appends the numbers and the arrays of parameters and state."""
+    n_numbers: int
+    """Number of numbers of both."""
+
+    @classmethod
+    def of(cls, params: GraspParams, state: SimulationState) -> LoopTypes:
+        """Return the types of these parameters and of this state."""
+        begun = params, state
+        key = structure(begun)
+        known = _TYPES.get(key)
+        if known is None:
+            if len(_TYPES) >= MOST_TYPES:
+                _TYPES.clear()
+            types = TupleType.of(state), TupleType.of(state.plant)
+            known = cls(
+                Pattern(begun), *types, count_numbers(state.loop), appender(begun), count_numbers(begun)
+            )
+            _TYPES[key] = known
+        return known
+
+
+MOST_TYPES: Final = 64
+_TYPES: Final[dict[Any, LoopTypes]] = {}
+"""Those that are known, by the structure of parameters and state: making them takes a millisecond."""
+
+
+def loop_start(params: GraspParams, state: SimulationState, types: LoopTypes | None = None) -> LoopStart:
+    """Return a state of a grasp in the form that a compiled loop takes; `types`: its types, if they are known.
+
+    Raises NotCompilable if something in it is neither a number nor an array, TypeError if it is not of these types.
+    """
+    numbers, arrays, types = array("d"), list[NDArray[Any]](), types or LoopTypes.of(params, state)
+    try:
+        types.append((params, state), numbers, arrays)
+    except TypeError as error:
+        raise NotCompilable(f"the parameters or the state of a grasp are not all numbers: {error}") from error
+    if len(numbers) != types.n_numbers:
+        raise TypeError(f"a grasp with {len(numbers)} numbers in a loop for grasps with {types.n_numbers}")
+    return LoopStart(types, np.frombuffer(numbers), tuple(arrays))
+
+
+class CompiledLoop:
+    """The compiled loop of a composition for a controller. Its first grasp decides which numbers are integers."""
+
+    def __init__(self, compiled: Callable[..., Ending]) -> None:
+        """Take the function that `compile_function` returned; its first call makes machine code."""
+        self._compiled = compiled
+        self._machine_code: Callable[..., Ending] | None = None
+        self._types: LoopTypes | None = None
+
+    def run(self, params: GraspParams, progress: SimulationState, buffers: Buffers) -> LoopEnd:
+        """Run the grasp from a state to its end, as `loop.grasp` does. Raises NotCompilable if numba refuses."""
+        return self.run_from(loop_start(params, progress, self._types), buffers)
+
+    def run_from(self, start: LoopStart, buffers: Buffers, noise: CellNoise | None = None) -> LoopEnd:
+        """Run the grasp from its start to its end; `noise` None: it is in the buffers.
+
+        Raises NotCompilable if numba refuses.
+        """
+        types, state = start.types, np.empty(start.types.state.count)
+        arguments = types.pattern, start.numbers, start.arrays, buffers, noise or no_noise(), state
+        if self._machine_code is not None:
+            end = self._machine_code(*arguments)
+        else:
+            with generating():
+                end = self._compiled(*arguments)
+            self._types, self._machine_code = types, entry_point(self._compiled)
+        plant = state[types.before_plant : types.before_plant + types.plant.count]
+        return LoopEnd(end, Stored(types.state, state), Stored(types.plant, plant))
+
+    def __call__(self, params: GraspParams, progress: SimulationState, buffers: Buffers) -> SimulationState:
+        """Return the state at the end of what `run` runs."""
+        state: SimulationState = self.run(params, progress, buffers).state()
+        return state
+
+
+class CompiledLoops:
+    """The compiled loops of a batch.
+
+    Another batch, whose controller may be set to a whole number where this one is not, takes loops of its own.
+    """
+
+    def __init__(self, step: ControllerStep) -> None:
+        """Take the step of the controller."""
+        self._step = step
+        self._loops: dict[Composition, CompiledLoop] = {}
+
+    def of(self, composition: Composition) -> CompiledLoop:
+        """Return the loop of a composition. Raises NotCompilable."""
+        if composition not in self._loops:
+            # Threads wait for each other, so that the functions of a loop are not found twice.
+            with COMPILING:
+                if composition not in self._loops:
+                    self._loops[composition] = CompiledLoop(_compiled(composition, self._step))
+        return self._loops[composition]
+
+
+@lru_cache(maxsize=64)
+def _compiled(composition: Composition, step: ControllerStep) -> Callable[..., Ending]:
+    """Return `stored_grasp` of a composition for a controller with this step, compiled. Raises NotCompilable."""
+    try:
+        from graspsense_sim_gripper.run.compiled.nested_numbers import store_numbers, tuples_of
+    except ImportError as error:
+        raise NotCompilable(f'numba is not installed: pip install "{OPTIONS.install}"') from error
+    parts = {
+        "grasp": grasp_loop(composition, step, interpreted=False),
+        "tuples_of": tuples_of,
+        "store_numbers": store_numbers,
+        "draw_normals": with_wide_product(draw_normals),
+    }
+    return compile_part(bind(stored_grasp, **parts))

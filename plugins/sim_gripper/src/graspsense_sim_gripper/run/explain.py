@@ -1,0 +1,97 @@
+"""The contribution of each term of the object to a grasp: its law, evaluated again along the recorded compressions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+from graspsense_sim_gripper.plant.contact import pad_compression
+from graspsense_sim_gripper.run.problem import GraspSetup
+from graspsense_sim_gripper.scene.spec import TermParams
+from graspsense_sim_gripper.scene.terms.registry import find_term
+from graspsense_sim_gripper.scene.terms.term import WorkingPoint
+
+
+def explain(setup: GraspSetup, compressions: Sequence[tuple[float, float]]) -> dict[str, Any]:
+    """Return the contribution of each term as plain values.
+
+    `compressions` holds the compression (m) and the force (N) of the object at each tick from the first contact on.
+    Ticks in which the fingers do not press the object are left out: what its terms do to each other while it recovers
+    is faster than a tick. For each term, `terms` gives
+
+    - `peak_n`: its largest force (N),
+    - `at_peak_n` and `share`: its force (N) when the force of the object is largest, and its share of the sum of terms,
+    - `work_j`: the work done on it until then (J),
+    - `lost_j`: the work that it has not returned when the object separates (J),
+    - `expected_n`: the largest force (N) that `Term.importance` predicts for such a grasp,
+    - `rates`: its rates (1/s).
+    """
+    if not compressions:
+        return {"touched": False, "terms": []}
+    path = [0.0, *(compression_m for compression_m, _ in compressions)]
+    forces_n = [force_n for _, force_n in compressions]
+    peak = max(range(len(forces_n)), key=forces_n.__getitem__)
+    deepest = max(path)
+    point = WorkingPoint(
+        compression_m=deepest,
+        speed_m_s=deepest / (max(path.index(deepest), 1) * setup.dt_s),
+        seconds=len(forces_n) * setup.dt_s,
+    )
+    along = _Path(path, [force_n > 0.0 for force_n in forces_n], peak, setup.dt_s)
+    rows = [
+        _contribution(kind, params, along, point)
+        for kind, params in zip(setup.kinds, setup.terms, strict=True)
+    ]
+    total = sum(row["at_peak_n"] for row in rows)
+    for row in rows:
+        row["share"] = row["at_peak_n"] / total if total != 0.0 else 0.0
+    return {
+        "touched": True,
+        "peak_n": forces_n[peak],
+        "compression_m": deepest,
+        "pads_m": pad_compression(setup.plant.object.pads, forces_n[peak]),
+        "speed_m_s": point.speed_m_s,
+        "seconds": point.seconds,
+        "terms": rows,
+    }
+
+
+class _Path(NamedTuple):
+    """The compression of the object in the ticks of a grasp."""
+
+    compression_m: Sequence[float]
+    """Before the first tick and after each tick."""
+    pressed: Sequence[bool]
+    """Whether the fingers press the object at the end of each tick."""
+    peak: int
+    """The tick of the largest force."""
+    dt_s: float
+
+
+def _contribution(kind: str, params: TermParams, along: _Path, point: WorkingPoint) -> dict[str, Any]:
+    """Return the contribution of a term."""
+    term, (path, pressed, peak, dt_s) = find_term(kind)[1], along
+    state, force, work, work_to_peak = term.at_rest, 0.0, 0.0, 0.0
+    forces: list[float] = []
+    for i in range(len(path) - 1):
+        before = force
+        # The mean rate over this tick and the next, if the object is still pressed in it.
+        ticks = 2 if i + 2 < len(path) and pressed[i + 1] else 1
+        speed = (path[i + ticks] - path[i]) / (ticks * dt_s)
+        force, state = term.law(params, state, path[i], path[i + 1], dt_s, speed)
+        if not pressed[i]:
+            force = 0.0
+        else:
+            work += 0.5 * (before + force) * (path[i + 1] - path[i])
+        forces.append(force)
+        if i == peak:
+            work_to_peak = work
+    return {
+        "term": kind,
+        "peak_n": max(forces, key=abs),
+        "at_peak_n": forces[peak],
+        "work_j": work_to_peak,
+        "lost_j": work,
+        "expected_n": term.importance(params, point),
+        "rates": [{"what": rate.what, "per_s": rate.per_s} for rate in term.rates(params, point)],
+    }

@@ -1,0 +1,87 @@
+"""What `graspsense-identify` may use of the simulator: force laws, the contact through the fingertips, the drive."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, TypeVar, cast
+
+from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.plant.contact import (
+    BALANCE_RTOL,
+    ObjectModel,
+    PadCompliance,
+    pad_compression,
+    solve_contact,
+)
+from graspsense_sim_gripper.plant.drive import Drive, stribeck_excess
+from graspsense_sim_gripper.plant.fingertip import CELLS
+from graspsense_sim_gripper.plant.state import ContactState
+from graspsense_sim_gripper.run.binding import bind_reachable
+from graspsense_sim_gripper.run.build import drive_and_pads
+from graspsense_sim_gripper.run.compiled.compose import (
+    INTERPRETED,
+    pad_parts,
+    sum_of,
+    sum_of_active,
+    uncompressed,
+)
+from graspsense_sim_gripper.run.compiled.jit import compile_part
+from graspsense_sim_gripper.scene.spec import MOST_SPREAD
+from graspsense_sim_gripper.scene.terms.elastic import Elastic
+from graspsense_sim_gripper.scene.terms.foam import Foam
+from graspsense_sim_gripper.scene.terms.gas import Gas
+from graspsense_sim_gripper.scene.terms.loss import Loss
+from graspsense_sim_gripper.scene.terms.maxwell import Maxwell
+from graspsense_sim_gripper.scene.terms.registry import active_laws, find_term, laws_of
+from graspsense_sim_gripper.scene.terms.rigid import Rigid
+from graspsense_sim_gripper.scene.terms.snap import Snap
+from graspsense_sim_gripper.scene.terms.switchable import Switchable
+from graspsense_sim_gripper.scene.terms.term import LAW_ERRORS
+from graspsense_sim_gripper.scene.terms.vent import AIR_KG_M3, DISCHARGE
+
+__all__ = [
+    "AIR_KG_M3",
+    "BALANCE_RTOL",
+    "CELLS",
+    "DISCHARGE",
+    "LAW_ERRORS",
+    "MOST_SPREAD",
+    "ContactState",
+    "Drive",
+    "Elastic",
+    "Foam",
+    "Gas",
+    "Loss",
+    "Maxwell",
+    "ObjectModel",
+    "PadCompliance",
+    "Rigid",
+    "SimConfig",
+    "Snap",
+    "Switchable",
+    "compiled_with_laws",
+    "drive_and_pads",
+    "find_term",
+    "interpreted_with_laws",
+    "pad_compression",
+    "solve_contact",
+    "stribeck_excess",
+    "uncompressed",
+]
+
+FunctionT = TypeVar("FunctionT", bound=Callable[..., Any])
+
+
+def compiled_with_laws(function: FunctionT, kinds: Sequence[str], *, hardens: bool) -> FunctionT:
+    """Return a function that calls `solve_contact`, compiled with the force laws of these kinds of terms.
+
+    `hardens`: whether the fingertips are nonlinear. Raises NotCompilable, at the first call at the latest.
+    """
+    parts = {"object_force": sum_of(laws_of(kinds)), **pad_parts(hardens)}
+    return cast("FunctionT", compile_part(bind_reachable(function, parts)))
+
+
+def interpreted_with_laws(function: FunctionT, kinds: Sequence[str], *, hardens: bool) -> FunctionT:
+    """Return the same function for the interpreter, which skips the terms that are switched off."""
+    parts = {"object_force": sum_of_active(active_laws(kinds)), **pad_parts(hardens)}
+    return bind_reachable(function, parts, INTERPRETED)

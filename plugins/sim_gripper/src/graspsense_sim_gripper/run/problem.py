@@ -1,0 +1,116 @@
+"""The description of what is simulated: the object in the gripper, the controller, and one grasp before it begins."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property
+from typing import Any, Final
+
+import numpy as np
+from attrs import frozen
+from numpy.typing import NDArray
+
+from graspsense.plugin_api import Controller, DeviceInfo, FeatureSet, RunConfig
+from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.plant.palm import NUMBERS
+from graspsense_sim_gripper.plant.sensing import SensorParams, SensorState
+from graspsense_sim_gripper.plant.state import PlantState
+from graspsense_sim_gripper.scene.random_numbers import Generator
+from graspsense_sim_gripper.scene.spec import ObjectSpec, TermParams
+from graspsense_sim_gripper.solve.scheme import PlantParams
+
+IMAGES_PER_BLOCK: Final = 64
+"""Number of cell images whose noise is drawn at once where it is not known how many a grasp needs."""
+
+PalmNoise = Callable[[int], NDArray[np.float64]]
+"""Draws the noise of the palm in the next ticks: standard normal numbers (ticks, NUMBERS)."""
+ControllerStep = Callable[..., Any]
+"""The step of a controller, with parameters and state of its own types."""
+
+
+@frozen(eq=False)
+class GraspController:
+    """A controller with the settings of its runs, and the feature set that is to follow."""
+
+    controller: Controller[Any]
+    run: RunConfig
+    features: FeatureSet[Any] | None = None
+    """The feature set that extracts from the grasps; its features are verified too. None: those of the paper only."""
+
+    @property
+    def step(self) -> ControllerStep:
+        """The step function of the controller's class."""
+        return type(self.controller).step
+
+    @cached_property
+    def content(self) -> str:
+        """All of the controller, besides its step, that a grasp depends on, as text: NaN is not equal to itself.
+
+        Whether it declares free motion is part of it: an approach of steps over several ticks changes the force that
+        the trial grasps measure by some 1e-8 of it.
+        """
+        law, run = self.controller, self.run
+        return repr((law.params(), law.init(), law.free_motion is not None, run.hold_s, run.grasp_timeout_s))
+
+
+@frozen(kw_only=True)
+class GraspSetup:
+    """One grasp before it begins: parameters and initial states of plant and sensors, and the random generator."""
+
+    kinds: tuple[str, ...]
+    """The kinds of the object's terms."""
+    terms: tuple[TermParams, ...]
+    """Their parameters."""
+    plant: PlantParams
+    state: PlantState
+    sensor: SensorParams
+    sensor_state: SensorState
+    dt_s: float
+    seed: int
+    rng: Generator
+    """The generator of the seed, after all of the above was drawn from it. The noise of the cells follows."""
+    palm: Any = ()
+    """`PalmParams` of a gripper with an accelerometer, otherwise ()."""
+    palm_state: Any = ()
+    """Its `PalmState`, otherwise ()."""
+
+    @property
+    def has_palm(self) -> bool:
+        """Whether the gripper has an accelerometer."""
+        return bool(self.palm)
+
+    def noise(self) -> Generator:
+        """Return a generator of the noise of the cell images: standard normal numbers, 2 CELLS for each image.
+
+        Those of all calls give the same numbers.
+        """
+        return self.rng.copy()
+
+    def palm_noise(self) -> PalmNoise:
+        """Return a function that draws the noise of the palm in the next ticks, as many as it is asked for.
+
+        Its numbers are another stream of the same seed, so that all others are the same without an accelerometer.
+        """
+        rng = np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(0,)))
+        return lambda ticks: rng.standard_normal((ticks, NUMBERS))
+
+
+@frozen(kw_only=True)
+class Problem:
+    """An object in the gripper, before a seed draws an instance of it."""
+
+    config: SimConfig
+    spec: ObjectSpec | None
+    """None: there is no object."""
+    number: int | None
+    """The number of a particular instance; None: the seed draws the instance."""
+    model_config: SimConfig
+    """The settings that the choice of steps depends on; all others have fixed values, such as ideal sensors. `spread`
+    is True for a numbered instance, which also differs from the nominal object."""
+    device: DeviceInfo
+    """The properties of the gripper with ideal sensors, for the controller of a trial grasp."""
+    nominal: GraspSetup | None
+    """The grasp of the nominal object with all its terms, with `model_config`; None if there is no object."""
+    examples: Callable[[], tuple[GraspSetup, ...]]
+    """Returns grasps of some instances with all their terms and ideal sensors, always the same ones; none if there is
+    no object or if instances do not differ."""

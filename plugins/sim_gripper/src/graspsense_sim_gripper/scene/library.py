@@ -1,0 +1,249 @@
+"""Finding an object by name: in the catalogue, among the scenes that are shipped, or in a scene of the user.
+
+A scene of the user is a file, or the text of such a file: then no file is needed.
+
+In the catalogue every value has an origin and a reason; a scene file needs neither.
+"""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Mapping
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+from typing import Final
+
+from attrs import fields_dict
+
+from graspsense.plugin_api import (
+    ConfigError,
+    ObjectKind,
+    UnknownName,
+    fitted_results,
+    given_claims,
+    suggestion,
+)
+from graspsense_sim_gripper.scene.spec import (
+    ObjectSpec,
+    TomlTable,
+    TomlValue,
+    parse_scene,
+    parse_term,
+    spec_with_sorted_terms,
+)
+
+CONTAINERS: Final = ("odwalla", "naked", "can", "water")
+"""The containers of Chitta, Piccoli and Sturm (ICRA 2010), section III.E: trials are simulated with them by default."""
+LONGEST_SCENE: Final = 2**18
+"""Limit on the characters of a scene file; those that are shipped have some thousand."""
+SCENE_IN_MEMORY: Final = "scene in memory"
+"""The name of an object that is given by the text of its scene."""
+FITTED_RESULTS: Final = frozenset(("table_2", "table_3", "authors_tree", "section_3f", "fig_6_contact"))
+"""The published results that values may be fitted to."""
+
+
+@cache
+def catalogue() -> Mapping[str, ObjectSpec]:
+    """Return every object of the catalogue in every state, by name (`odwalla:full_open`, `block`)."""
+    text = files("graspsense_sim_gripper.scene").joinpath("catalogue.toml").read_text(encoding="utf-8")
+    specs: dict[str, ObjectSpec] = {}
+    for name, table in tomllib.loads(text).items():
+        states = table.pop("states", None)
+        if states is None:
+            specs[name] = parse_entry(name, table)
+            continue
+        for state, extra in states.items():
+            both = {**table, **extra, "terms": [*table.get("terms", []), *extra.get("terms", [])]}
+            specs[f"{name}:{state}"] = parse_entry(f"{name}:{state}", both)
+    return specs
+
+
+@cache
+def shipped_scenes() -> Mapping[str, str]:
+    """Return the text of each scene that is installed with the simulator, by name.
+
+    In a checkout, `specs/scenes` links to their folder.
+    """
+    folder = files("graspsense_sim_gripper.scene").joinpath("scenes")
+    return {
+        file.name.removesuffix(".toml"): file.read_text(encoding="utf-8")
+        for file in sorted(folder.iterdir(), key=lambda file: file.name)
+        if file.name.endswith(".toml")
+    }
+
+
+def object_kinds() -> tuple[ObjectKind, ...]:
+    """Return the kinds of the catalogue with their states, in its order, and then the shipped scenes."""
+    states: dict[str, list[str]] = {}
+    fitted_to: dict[str, frozenset[str]] = {}
+    given: dict[str, frozenset[str]] = {}
+    for full_name, spec in catalogue().items():
+        name, colon, state = full_name.partition(":")
+        states.setdefault(name, []).extend([state] if colon else [])
+        fitted_to[name] = fitted_to.get(name, frozenset()).union(spec.fitted_to)
+        given[name] = given.get(name, frozenset()) | given_claims(spec)
+    kinds = [
+        ObjectKind(
+            name=name,
+            states=tuple(of),
+            default=name in CONTAINERS,
+            fitted_to=fitted_to[name],
+            gives=given[name],
+        )
+        for name, of in states.items()
+    ]
+    return (*kinds, *(ObjectKind(name=name) for name in shipped_scenes() if name not in states))
+
+
+def is_scene_text(name: str) -> bool:
+    """Return whether this is the text of a scene file instead of a name: whether it has a line break."""
+    return "\n" in name
+
+
+def split_number(name: str) -> tuple[str, int | None]:
+    """Return the name without the number of an instance, and the number or None; `can:full_open#3` gives 3.
+
+    Of the text of a scene, a last line `#3` is the number. Raises UnknownName if the text after `#` is not a whole
+    number.
+    """
+    if is_scene_text(name):
+        text, _, last = name.rpartition("\n#")
+        return (f"{text}\n", int(last)) if last.isascii() and last.isdigit() else (name, None)
+    plain, mark, number = name.partition("#")
+    if not mark:
+        return plain, None
+    if not (number.isascii() and number.isdigit()):
+        raise UnknownName(f"object {name!r}: the number of an instance follows #, as in {plain}#3")
+    return plain, int(number)
+
+
+def find(name: str) -> ObjectSpec:
+    """Return the object of this name, of the scene file if the name ends in `.toml`, or of the text of a scene.
+
+    A name is looked up in the catalogue, and then among the shipped scenes. Raises UnknownName with the known names,
+    ConfigError for a file or a text that cannot be read as an object.
+    """
+    if is_scene_text(name):
+        return parse_scene(name, SCENE_IN_MEMORY, SCENE_IN_MEMORY)
+    if name.endswith(".toml"):
+        return _read_scene(Path(name))
+    known = catalogue()
+    if name in known:
+        return known[name]
+    kind, _, state = name.partition(":")
+    states = [n.partition(":")[2] for n in known if n.startswith(f"{kind}:")]
+    if kind in known:
+        raise UnknownName(f"object {kind!r} has no states, but {name!r} names one. Write {kind}")
+    if states and not state:
+        raise UnknownName(f"object {kind!r} needs a state: {', '.join(states)}. Write {kind}:{states[0]}")
+    if states:
+        raise UnknownName(
+            f"object {kind!r} has no state {state!r}. Known: {', '.join(states)}.{suggestion(state, states)}"
+        )
+    shipped = shipped_scenes()
+    if name in shipped:
+        return parse_scene(shipped[name], name, f"scene {name}")
+    kinds = sorted({n.partition(":")[0] for n in known} | shipped.keys())
+    raise UnknownName(
+        f"no object named {kind!r}. Known: {', '.join(kinds)}, and none.{suggestion(kind, kinds)} A scene of your own "
+        "is a file: write its name with .toml"
+    )
+
+
+def kinds_in(scene: str) -> tuple[str, ...]:
+    """Return the kinds of the terms of a scene's object; none for `none`. Raises UnknownName and ConfigError."""
+    if scene == "none":
+        return ()
+    return find(split_number(scene)[0]).kinds
+
+
+def _read_scene(path: Path) -> ObjectSpec:
+    try:
+        if path.exists() and not path.is_file():
+            raise ConfigError(f"{path}: is not a file")
+        with path.open(encoding="utf-8") as file:
+            text = file.read(LONGEST_SCENE + 1)
+    except FileNotFoundError:
+        raise ConfigError(f"no scene file {str(path)!r} (looked in {Path.cwd()})") from None
+    except UnicodeDecodeError as error:
+        raise ConfigError(f"{path}: is not UTF-8 text ({error})") from error
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read: {error.strerror}") from error
+    if len(text) > LONGEST_SCENE:
+        raise ConfigError(f"{path}: a scene has at most {LONGEST_SCENE} characters, and this has more")
+    return parse_scene(text, path.stem, str(path))
+
+
+def parse_entry(name: str, table: TomlTable) -> ObjectSpec:
+    """Return the object of an entry of the catalogue. Each value must have an origin and a reason, and no key may lack.
+
+    Raises ConfigError that names the object and the key.
+    """
+    reasons: dict[str, str] = {}
+    fitted_to: set[str] = set()
+
+    def figure(where: str, entry: TomlValue, signed: bool = False) -> float:
+        value = _figure(where, entry, signed)
+        reasons[where] = entry["reason"]
+        fitted_to.update(_fitted_to(where, entry["origin"]))
+        return value
+
+    values: dict[str, TomlValue] = {"name": name}
+    for key, entry in table.items():
+        if key != "terms":
+            values[key] = entry if key in ("summary", "patch") else figure(f"{name}.{key}", entry)
+    fields = fields_dict(ObjectSpec)
+    unknown = values.keys() - fields.keys()
+    missing = (
+        fields.keys()
+        - values.keys()
+        - {"terms", "spreads", "reasons", "fitted_to", "offset_m", "held", "file"}
+    )
+    if unknown or missing:
+        raise ConfigError(f"object {name!r}: unknown {sorted(unknown)}, missing {sorted(missing)}")
+    problems: list[str] = []
+    terms = []
+    for entry in table.get("terms", []):
+        kind = entry.get("type")
+        term = parse_term(entry, f"object {name!r}, term {kind!r}", f"{name}.{kind}.", problems, figure)
+        if term is not None:
+            terms.append(term)
+    if problems:
+        raise ConfigError("\n".join(problems))
+    try:
+        return spec_with_sorted_terms(
+            {**values, "reasons": reasons, "fitted_to": tuple(sorted(fitted_to))}, terms
+        )
+    except ValueError as error:
+        raise ConfigError(f"object {name!r}: {error}") from error
+
+
+def _figure(where: str, entry: TomlValue, signed: bool) -> float:
+    if not isinstance(entry, Mapping) or set(entry) != {"value", "origin", "reason"} or not entry["reason"]:
+        raise ConfigError(
+            f"{where}: write {{ value = NUMBER, origin = ORIGIN, reason = TEXT }}, not {entry!r}"
+        )
+    value = entry["value"]
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise ConfigError(f"{where}: {value!r} is not a finite number")
+    if value < 0.0 and not signed:
+        raise ConfigError(f"{where}: {value!r} is negative")
+    return float(value)
+
+
+def _fitted_to(where: str, origin: TomlValue) -> list[str]:
+    """Return the published results that a value of this origin was fitted to.
+
+    Raises ConfigError if the text is not an origin.
+    """
+    try:
+        results = list(fitted_results(str(origin)))
+    except ValueError as error:
+        raise ConfigError(f"{where}: {error}") from error
+    if not set(results) <= FITTED_RESULTS:
+        raise ConfigError(
+            f"{where}: {origin!r} names an unknown result. Known: {', '.join(sorted(FITTED_RESULTS))}"
+        )
+    return results

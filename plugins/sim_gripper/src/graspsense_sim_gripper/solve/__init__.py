@@ -1,0 +1,1 @@
+"""Integration in time: schemes, step control, events, and the reference."""

@@ -1,0 +1,93 @@
+"""A tick that is repeated in shorter steps until its end no longer changes, for a reference or a tight tolerance."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from graspsense_sim_gripper.plant.state import PlantState, StepState, right_of
+from graspsense_sim_gripper.solve.advance import rests, take_steps
+from graspsense_sim_gripper.solve.coast import SHAPE_SCALE_M, coast
+from graspsense_sim_gripper.solve.control import MAX_STEPS, fits_a_step
+from graspsense_sim_gripper.solve.scheme import FORCE_SCALE_N, SPEED_SCALE_M_S, PlantParams, Steps
+
+MAX_HALVINGS: Final = 4
+"""Halvings after which a change of `LOOSE` times the tolerance is accepted too."""
+LOOSE: Final = 1e4
+LAST_HALVING: Final = 10
+"""After so many halvings the tick is accepted in any case, and counted as unresolved if it has not converged."""
+ERROR_RATIO: Final = 0.125
+"""Ratio of the error of a step to that of a step of half the length."""
+MIN_TOLERANCE: Final = 1e-8
+"""Smallest tolerance that halving uses. Below it the error of a step is rounding, which shorter steps increase."""
+
+
+def refine_until_converged(params: PlantParams, state: PlantState, effort_n: float, dt: float) -> PlantState:
+    """Return what `advance` does, from steps that are halved until the end of the tick has converged.
+
+    The state before the tick has to be kept for this, which costs compiled code 5 % where no tick is refined.
+    """
+    drive, model, steps = params
+    if state.motion.speed_rev_s == 0.0:
+        if rests(drive, state, effort_n):
+            return state
+    elif steps.settle <= 0.0 and fits_a_step(steps, state.step, dt):
+        coasts, after = coast(params, state, effort_n, dt)
+        if coasts:
+            return after
+    before = after = state
+    n_before = n_halvings = 0
+    while True:
+        after, n = take_steps(PlantParams(drive, model, steps), state, effort_n, dt)
+        if steps.settle <= 0.0 or (after.contact.touched == 0 and after.motion.speed_rev_s == 0.0):
+            return after
+        # The steps of the next attempt are the same if half of the tick was their limit already.
+        if n > n_before > 0 and _alike(before, after, steps.settle):
+            return after
+        # Steps of half the length would be too many, and too short to be of use.
+        too_many = 4 * n > MAX_STEPS
+        if too_many or n_halvings >= MAX_HALVINGS:
+            converged = n_halvings > 0 and _alike(before, after, LOOSE * steps.settle)
+            if converged or too_many or n_halvings >= LAST_HALVING:
+                return after if converged else _unresolved(after)
+        steps = _halved(steps, dt)
+        before, n_before, n_halvings = after, n, n_halvings + 1
+
+
+def _unresolved(state: PlantState) -> PlantState:
+    """Return the plant after a tick that has not converged."""
+    next_s, n, unresolved = state.step
+    return PlantState(
+        state.motion, state.contact, StepState(next_s, n, unresolved + 1), state.effort_n, state.peak_n
+    )
+
+
+def _alike(before: PlantState, after: PlantState, share: float) -> bool:
+    """Return whether speed, force and shapes agree within this relative tolerance."""
+    speed0 = before.motion.speed_rev_s * before.motion.jacobian_m_rev
+    speed1 = after.motion.speed_rev_s * after.motion.jacobian_m_rev
+    force0 = before.contact.left_n + before.contact.right_n
+    force1 = after.contact.left_n + after.contact.right_n
+    # The shape of a released object affects no force until the object touches the fingers again.
+    left0, left1 = before.contact.left.compression_m, after.contact.left.compression_m
+    right0, right1 = (
+        right_of(before.contact.left, before.contact.right).compression_m,
+        right_of(after.contact.left, after.contact.right).compression_m,
+    )
+    return (
+        abs(speed1 - speed0) <= share * max(abs(speed1), SPEED_SCALE_M_S)
+        and abs(force1 - force0) <= share * max(force1, FORCE_SCALE_N)
+        and abs(left1 - left0) <= share * max(abs(left1), SHAPE_SCALE_M)
+        and abs(right1 - right0) <= share * max(abs(right1), SHAPE_SCALE_M)
+    )
+
+
+def _halved(steps: Steps, dt: float) -> Steps:
+    """Return steps of half the length, also where the end of the tick `dt` cut them."""
+    return Steps(
+        max(ERROR_RATIO * steps.tolerance, min(steps.tolerance, MIN_TOLERANCE)),
+        0.5 * min(steps.longest_s, dt),
+        steps.settle,
+        1.0 + 0.5 * (steps.growth - 1.0),
+        0.5 * min(steps.longest_touched_s, dt),
+        0.0,
+    )
