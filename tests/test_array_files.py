@@ -193,7 +193,8 @@ def _run_that_dies(run):
 @pytest.mark.parametrize("gaps", [("0.06", "0.06"), ("0.05", "0.06")])
 def test_a_gap_that_does_not_change_is_no_width(gaps, tmp_path):
     for label, gap in zip("ab", gaps, strict=True):
-        np.savez(tmp_path / f"{label}.npz", data=solid(4)[:, :, [0, 2]], nominal=np.full((4, N), float(gap)))
+        data = solid(4)[:, :, [0, 2]] + (label == "b") * np.array([0.0, 0.01])
+        np.savez(tmp_path / f"{label}.npz", data=data, nominal=np.full((4, N), float(gap)))
     text = 'files = "{label}.npz"\naxes = "grasp, time, column"\ntime = "data[0]"\ngap = "nominal"\nforce = "data[1]"\n'
     (tmp_path / "m.toml").write_text(text)
     found = load_trials(f"manifest:{tmp_path / 'm.toml'}")

@@ -196,7 +196,7 @@ def test_a_local_dask_cluster_without_shared_memory_is_refused_with_the_other_ch
             raise OSError(errno.ENOSYS, os.strerror(errno.ENOSYS))
 
     monkeypatch.setattr(_multiprocessing, "SemLock", NoSemaphores)
-    with pytest.raises(ConfigError, match="--executor processes"):
+    with pytest.raises(ConfigError, match="executor=processes"):
         DaskCluster(None, 1)
 
 

@@ -94,7 +94,14 @@ def store(tmp_path):
     with Store.open(tmp_path / "t") as store:
         for label in (HOSTILE, FORGED):
             for value in (0.06, 0.07, 0.065):
-                keep(store, label, f"{label}#1", values=(value, 5.5), device=evolve(BENCH, name=HOSTILE))
+                keep(
+                    store,
+                    label,
+                    f"{label}#1",
+                    values=(value, 5.5),
+                    grasp=round(1e6 * value),
+                    device=evolve(BENCH, name=HOSTILE),
+                )
         set_aside(store, [1], HOSTILE)
         relabel(store, [2], {"label": FORGED + "2"}, FORGED)
     return tmp_path / "t"

@@ -225,7 +225,7 @@ def test_more_of_a_row_has_a_stronger_colour(share):
 
 @pytest.mark.parametrize(
     ("words", "kind"),
-    [("holds", 'good">✓'), ("does not hold", 'bad">✗'), ("yes", 'good">✓'), ("not known", None)],
+    [("agrees", 'good">✓'), ("differs", 'bad">✗'), ("yes", 'good">✓'), ("not known", None)],
 )
 def test_verdicts_have_a_mark_a_colour_and_words(words, kind):
     found = table("x", ("claim", "result"), [("c", words)], verdicts=(1,))

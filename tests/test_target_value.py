@@ -218,7 +218,13 @@ def folder(tmp_path):
             fill = 10.0 * (k // 2 * 7 % 12)
             labels = {"fill [ml]": str(fill)} if k < 22 else {"colour": "red"}
             keep(
-                store, "bottle", f"bottle#{k // 2}", values=(0.06, 1.0 + fill + k % 2), ticks=9, labels=labels
+                store,
+                "bottle",
+                f"bottle#{k // 2}",
+                values=(0.06, 1.0 + fill + k % 2),
+                ticks=9,
+                labels=labels,
+                grasp=k,
             )
     return tmp_path / "trials"
 

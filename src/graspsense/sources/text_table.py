@@ -256,9 +256,11 @@ class _Layout:
         if ended or len(rows) < 4:
             return rows
         number, last = rows[-1]
-        others = {_decimals(row[-1]) for _, row in rows[:-1] if len(row) == width}
+        ends = [row[-1] for _, row in rows[:-1] if len(row) == width]
+        others = set(map(_decimals, ends))
         shorter = len(others) == 1 and -1 < _decimals(last[-1]) < max(others)
-        if len(last) == width and last[-1] and not shorter:
+        # An empty last cell may be a missing value, as in other rows.
+        if len(last) == width and (last[-1] or not all(ends)) and not shorter:
             return rows
         self.notes.append(f"line {number} is cut off, and left out")
         return rows[:-1]

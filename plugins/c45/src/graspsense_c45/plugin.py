@@ -138,7 +138,7 @@ class C45(Classifier[C45Config]):
         from graspsense_c45.prediction import leaf_weights
 
         tree = self._fitted()
-        return leaf_weights(tree, table.columns([one.name for one in tree.schema.attributes]).values)
+        return leaf_weights(tree, codes_of(_coded_columns(tree), table))
 
     def explain(self, features: Features) -> Prediction:
         """Return the prediction with the path through the tree."""
