@@ -13,7 +13,7 @@ from graspsense.core.values.units import display_unit, without_underscores
 from graspsense.report.heat import HeatScale, heat_rows
 from graspsense.report.html import figure
 from graspsense.report.moments import contact_time, shown_from
-from graspsense.report.svg import INKS, AxisScale, Picture, number, reaching
+from graspsense.report.svg import DASHES, INKS, AxisScale, Picture, number, reaching
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -81,7 +81,13 @@ def _figure(
     with picture.plot(x_scale, y_scale, 44.0, 150.0):
         for k, (axis, line) in enumerate(lines.items()):
             points = [(x_scale(at), y_scale(factor * value)) for at, value in envelope(t, line)]
-            picture.line(points, INKS[k % len(INKS)], width=1.0, name=f"{axis} {unit}".strip())
+            picture.line(
+                points,
+                INKS[k % len(INKS)],
+                width=1.0,
+                dash=DASHES[k % len(DASHES)],
+                name=f"{axis} {unit}".strip(),
+            )
     height = 184.0
     caption = f"{title[0].upper()}{title[1:]}, in {unit}"
     if len(lines) > 1:
@@ -89,7 +95,9 @@ def _figure(
         for k, axis in enumerate(lines):
             x = 42 + 70.0 * (k % 4)
             y = height + 15.0 * (k // 4) + 4
-            picture.line([(x, y - 4), (x + 18, y - 4)], INKS[k % len(INKS)], width=2)
+            picture.line(
+                [(x, y - 4), (x + 18, y - 4)], INKS[k % len(INKS)], width=2, dash=DASHES[k % len(DASHES)]
+            )
             picture.text(x + 22, y, axis)
         height += 15.0 * ((len(lines) + 3) // 4)
     words = f"{title} over time, from {number(float(every.min()))} to {number(float(every.max()))} {unit}"

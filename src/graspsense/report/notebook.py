@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from html import escape
+from itertools import cycle
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -15,6 +16,7 @@ from graspsense.core.values.trace import SampleTrace, Trace
 from graspsense.core.values.trial import Trial
 from graspsense.core.values.units import display_unit, quantity, without_underscores
 from graspsense.report.moments import array_images, contact_time, images_at, moments, phase_spans, shown_from
+from graspsense.report.svg import DASHES
 from graspsense.report.trace_plot import plot as plot
 
 if TYPE_CHECKING:
@@ -189,14 +191,15 @@ def _panel(
     for value, y in ((high, top + 8.0), (low, top + PANEL)):
         yield f'<text x="{LEFT_MARGIN - 5}" y="{y:g}" text-anchor="end" fill="currentColor">{value:.3g}</text>'
     every = np.linspace(0, len(t) - 1, min(len(t), POINTS)).round().astype(int)
-    for line, ink, dash in zip(lines, inks, ("", ' stroke-dasharray="5 3"', ""), strict=False):
+    for line, ink, dash in zip(lines, inks, cycle(DASHES), strict=False):
+        dashes = f' stroke-dasharray="{dash}"' if dash else ""
         points = [
             f"{_x(t, float(t[k])):.1f},{top + PANEL * (high - float(line[k])) / ((high - low) or 1.0):.1f}"
             for k in every
             if not np.isnan(line[k])
         ]
         if points:
-            yield f'<polyline points="{" ".join(points)}" fill="none" stroke="{ink}" stroke-width="1.6"{dash}/>'
+            yield f'<polyline points="{" ".join(points)}" fill="none" stroke="{ink}" stroke-width="1.6"{dashes}/>'
 
 
 def _phases(trace: Trace, start: int, t: Floats, top: float, bottom: float) -> Iterable[str]:

@@ -23,6 +23,7 @@ PHASE_COLOURS: Final = {Phase.APPROACH: "#e9eff6", Phase.SQUEEZE: "#fbdcb4", Pha
 OTHER_PHASE: Final = "#f3f3f3"
 LEAST_NAMED: Final = 0.05
 """A phase that lasts less than this share of the grasp is shaded but not named."""
+AXIS_STYLES: Final = ("-", "--", ":", "-.")
 LEFT, RIGHT, GAP = "#0b5fa5", "#b3400a", "#3d3d3d"
 
 
@@ -59,7 +60,9 @@ def _draw_samples(trace: Trace, axes: Any, name: str, signal: SampleTrace) -> No
     zero = contact_time(trace) or 0.0
     begin = trace.t_s[shown_from(trace)]
     shown = signal.t_s >= begin
-    axes.plot(signal.t_s[shown] - zero, signal.values[shown], lw=0.6)
+    for k, values in enumerate(signal.values[shown].T):
+        # Lines of equal values are told apart by their dashes.
+        axes.plot(signal.t_s[shown] - zero, values, ls=AXIS_STYLES[k % len(AXIS_STYLES)], lw=0.6)
     axes.set_ylabel(without_underscores(name), fontsize=8)
 
 
