@@ -51,7 +51,8 @@ def filled(folder):
                 ("can:full_open", (0.066, 5.5 + 0.1 * k)),
                 ("can:empty_open", (0.05, 1.0 + 0.1 * k)),
             )
-            keep(store, *(label, values)[k % 2][:1], values=(label, values)[k % 2][1], device=REAL, ticks=60)
+            name, measured = (label, values)[k % 2]
+            keep(store, name, values=measured, device=REAL, ticks=60, grasp=k)
     return folder
 
 
