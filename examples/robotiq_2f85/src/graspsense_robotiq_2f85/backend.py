@@ -7,7 +7,8 @@ from collections import deque
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from math import inf, nan
-from typing import ClassVar, Final, final
+from types import MappingProxyType
+from typing import Final, final
 
 from attrs import evolve, frozen
 
@@ -105,11 +106,13 @@ class Robotiq2F85(SensorBackend[Robotiq2F85Config]):
         Channel("effort", "N", RATE_HZ),
     )
     accepts = ("velocity", "position", "force")
-    closes_itself: ClassVar[Mapping[str, str]] = {
-        "velocity": "the open or closed position, with this speed; below 20 mm/s a target that moves at it",
-        "position": "the target, with the limits of the command as speed and force",
-        "force": "the closed position, with this force and at most 20 mm/s",
-    }
+    closes_itself: Mapping[str, str] = MappingProxyType(
+        {
+            "velocity": "the open or closed position, with this speed; below 20 mm/s a target that moves at it",
+            "position": "the target, with the limits of the command as speed and force",
+            "force": "the closed position, with this force and at most 20 mm/s",
+        }
+    )
     least_force_n = FORCES_N[0]
     least_step_m = OPEN_M / (CLOSED_BYTE - OPEN_BYTE)
     _client: Client | None = None
