@@ -76,7 +76,7 @@ def long_page():
             (
                 f"claim {k} " + 6 * "of many words ",
                 "fitted",
-                "holds" if k % 3 else "does not hold",
+                "agrees" if k % 3 else "differs",
                 f"{7 * k % 10}.5",
                 LABELS[0],
             )
