@@ -32,9 +32,6 @@ from graspsense.evaluation.doubt import calibrated
 from graspsense.plugin_api import create
 from graspsense.testing.model_gripper import ModelGripper
 
-pytestmark = pytest.mark.filterwarnings("ignore:.*scaled by a power of two")
-"""The features of these short grasps vary by less than a millimetre."""
-
 CHECKPOINTS = (0.02, 0.05)
 CHANNELS = frozenset({"gap", "velocity", "effort", "force_left", "force_right"})
 RUN = RunConfig(hold_s=0.1)

@@ -36,7 +36,7 @@ def store(tmp_path_factory):
 
 @pytest.mark.slow
 def test_recordings_of_two_objects_need_a_name(store):
-    with pytest.raises(ConfigError, match=r"of 2 objects.*--class"):
+    with pytest.raises(ConfigError, match=r"of 2 objects.*name="):
         recorded_squeezes([store])
     (squeeze,) = recorded_squeezes([store], "sponge")
     assert squeeze.label == "sponge"

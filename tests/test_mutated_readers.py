@@ -147,8 +147,10 @@ def read_set(folder, fmt, imported):
     """Read a set of a good file and a changed one by its manifest."""
     found = load_trials(f"manifest:{folder / 'manifest.toml'}")
     left_out = [note for note in found.notes if "cannot be read" in note]
-    assert "good" in found.labels or any("another label" in note for note in found.notes)
-    assert "bad" in found.labels or any("bad_2" in note for note in left_out)
+    # The changed file may still hold the same grasp: then one of them is left out as a copy.
+    copies = any("another label" in note for note in found.notes)
+    assert "good" in found.labels or copies
+    assert "bad" in found.labels or copies or any("bad_2" in note for note in left_out)
     if imported:
         recordings, unreadable = recordings_to_import([str(folder / "manifest.toml")], {}, None)
         assert all("bad_2" in one.line for one in unreadable)

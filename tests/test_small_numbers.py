@@ -9,6 +9,7 @@ from graspsense.core.components.config import select_component
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.values.features import FeatureTable
 from graspsense.evaluation.evaluate import evaluate
+from graspsense.sources.features_csv import read_labelled
 
 
 def measured(factor):
@@ -30,4 +31,17 @@ def test_a_classifier_recognises_what_differs_by_micrometres(classifier, factor)
         learning_curve=False,
     )
     assert found.headline.rate >= 0.9
-    assert any(note.startswith("compliance: ") for note in found.notes) is (classifier == "c45")
+
+
+def test_a_table_whose_columns_vary_by_little_is_read_with_a_note(tmp_path):
+    path = tmp_path / "t.csv"
+    lines = [f"{label},{value!r},{7 * k % 5}" for k, (label, value) in enumerate(small_values())]
+    path.write_text("\n".join(["what,compliance [m/N],force", *lines]))
+    (note,) = [note for note in read_labelled(path, "what").notes if "compliance" in note]
+    assert "0.001" in note
+    assert "1e-05" in note
+
+
+def small_values():
+    trials = measured(1e-6)
+    return zip(trials.labels, trials.table.values[:, 0].tolist(), strict=True)

@@ -340,7 +340,7 @@ def test_trials_are_not_collected_with_a_number_in_another_unit(store, run):
 def test_the_page_of_a_store_has_a_section_for_a_number(store, run, tmp_path):
     for k in range(24):
         fill = 100.0 + 5.0 * k
-        keep(store, "can:full_open", f"can#{k % 12}", device=REAL, ticks=3, values=(0.066, fill / 20.0),
+        keep(store, "can:full_open", f"can#{k % 12}", device=REAL, ticks=3, values=(0.066, fill / 20.0), grasp=k,
              labels={"fill [ml]": repr(fill)})  # fmt: skip
 
     code, out, _ = run(

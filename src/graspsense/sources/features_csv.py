@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
@@ -28,6 +29,9 @@ from graspsense.sources.arff_columns import ArffColumns
 from graspsense.sources.csv_columns import CsvColumns
 from graspsense.sources.exported_table import ExportedTable, exported
 from graspsense.sources.identifiers import identifies, text_identifies
+
+SMALL: Final = 1e-3
+"""A column that varies by less than this has few values that differ by J48's 1e-5."""
 
 
 def read_labelled(
@@ -278,6 +282,12 @@ def _note_uninformative_columns(path: Path, table: FeatureTable, notes: list[str
         notes.append(f"without any value: {listed(blank)}")
     if constant:
         notes.append(f"constant, and so without information: {listed(constant)}")
+    small = [name for name, values in having if len(values) and 0.0 < np.ptp(values) < SMALL]
+    if small:
+        notes.append(
+            f"{listed(small)} varies by less than {SMALL:g} in its unit: c45 scales it exactly, as a smaller unit "
+            "does; J48 itself takes values within 1e-05 for equal"
+        )
     share = float(np.isnan(table.values).mean())
     if share > 0.0:
         notes.append(f"{share:.1%} of all values are missing")

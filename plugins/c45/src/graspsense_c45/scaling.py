@@ -6,8 +6,6 @@ that varies by few gaps is multiplied by a power of two, which is exact: the tre
 
 from __future__ import annotations
 
-import warnings
-
 import numpy as np
 from attrs import evolve
 
@@ -26,16 +24,10 @@ _ROUNDING = 1e-9
 
 
 def fit_scaled(table: Table, options: Options) -> Tree:
-    """Return the tree of a table whose columns that vary by little are scaled, with a warning that names them."""
+    """Return the tree of a table whose columns that vary by little are scaled."""
     doublings = _doublings(table)
     if not doublings.any():
         return fit(table, options)
-    names = [table.schema.attributes[k].name for k in np.flatnonzero(doublings).tolist()]
-    warnings.warn(
-        f"{', '.join(names)}: varies by less than {_GAPS * GAP:g} in its unit, where C4.5 as J48 takes values within "
-        f"{GAP:g} for equal; it is scaled by a power of two, as in a smaller unit. Weka needs the smaller unit itself",
-        stacklevel=3,
-    )
     tree = fit(evolve(table, values=np.ldexp(table.values, doublings)), options)
     feature, threshold = tree.splits.feature, tree.splits.threshold.copy()
     inner = np.flatnonzero(feature != LEAF)
