@@ -41,7 +41,10 @@ def main() -> int:
     parser.add_argument("pipeline", nargs="?", default="default")
     parser.add_argument("--seed", type=int, default=7001)
     parser.add_argument("--instances", type=int, default=67)
+    parser.add_argument("--short", action="store_true", help="few grasps: shows that the program works")
     asked = parser.parse_args()
+    if asked.short:
+        asked.instances = 2
     model = model_for(resolve(asked.pipeline), installed())
     assert model is not None
     trials = load_trials(pipeline=asked.pipeline, seed=asked.seed, instances=asked.instances, trials=1)

@@ -10,7 +10,6 @@ import ctypes
 import math
 import time
 from collections.abc import Callable, Iterator
-from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Final
@@ -483,7 +482,7 @@ def mujoco_engine(scene: PeerScene, integrator: str, count: int, *, native: bool
     grasp()
     how = "own springs" if native else "forces applied"
     return Engine(
-        name=f"MuJoCo {version('mujoco')} {integrator}, {how}", setting=f"{1e3 / count:g} us", grasp=grasp
+        name=f"MuJoCo {mujoco.__version__} {integrator}, {how}", setting=f"{1e3 / count:g} us", grasp=grasp
     )
 
 
