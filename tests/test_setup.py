@@ -50,7 +50,7 @@ def test_an_installation_for_use_has_every_distribution_with_the_same_versions()
     assert lines[0] == "-c constraints.txt"
     assert [line for line in lines if line.startswith(".")] == [
         ".",
-        *(f"./plugins/{folder.name}" for folder in FOLDERS if folder.name != "mujoco_gripper"),
+        *(f"./plugins/{folder.name}" for folder in FOLDERS),
     ]
     tools = PROJECT["dependency-groups"]["dev"]
     assert [line for line in lines if not line.startswith((".", "-"))] == [
