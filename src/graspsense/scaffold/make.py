@@ -133,9 +133,9 @@ def words_of(name: str, roles: Sequence[str]) -> dict[str, str]:
     kinds = _kinds(roles)
     part, together = name.removeprefix("graspsense-"), _together(kinds)
     # The law sends a kind of command that the package's own gripper accepts, or else the simulated gripper.
-    kind, command = ("effort", "EFFORT, effort, inf, 0.03")
+    kind, command = ("effort", "EFFORT, effort, inf, SPEED_M_S")
     if "sensor-backend" in kinds:
-        kind, command = ("velocity", "VELOCITY, -0.03, effort, inf")
+        kind, command = ("velocity", "VELOCITY, -SPEED_M_S, effort, inf")
     entries = [one.entry for one in kinds.values() if one.entry] + ["PipelineEntry"] * together
     needs = dict.fromkeys(need for one in kinds.values() for need in one.needs)
     simulator = KINDS["sim-term"].needs
