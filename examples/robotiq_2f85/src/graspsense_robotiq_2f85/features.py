@@ -24,11 +24,12 @@ class WithoutPadsConfig:
         meaning="Effort at contact, above that for moving the fingers freely.",
     )
     rest_speed_m_s: float = setting(
-        default=1e-3,
+        default=2.5e-3,
         unit="m/s",
         above=0.0,
         plausible=(1e-6, 0.05),
-        meaning="Speed below which the fingers are at rest, if throughout the window.",
+        meaning="Speed below which the fingers are at rest, if throughout the window. The gap has steps of 0.37 mm, so "
+        "that a slower motion does not show within 0.15 s.",
     )
     rest_window_s: float = setting(
         default=0.15,
