@@ -139,6 +139,12 @@ def test_a_gripper_file_that_is_wrong_says_what_is(tmp_path, changed, said):
     assert all(word in str(error.value) for word in said), error.value
 
 
+def test_a_gripper_file_that_is_missing_is_told_as_such():
+    with pytest.raises(ConfigError, match="cannot be read") as error:
+        load_pipeline("default", options=["gripper.type=mujoco", "gripper.file=nosuch.toml"])
+    assert "pip install" not in str(error.value)
+
+
 def test_a_model_includes_nothing_outside_of_its_folder(tmp_path):
     inside = tmp_path / "model"
     inside.mkdir()

@@ -39,7 +39,7 @@ from graspsense.core.components.registry.declaration import (
     declared_by,
     left_out,
 )
-from graspsense.core.values.errors import FAILURES, PluginUnavailable
+from graspsense.core.values.errors import FAILURES, ConfigError, PluginUnavailable
 
 if TYPE_CHECKING:
     from importlib.resources.abc import Traversable
@@ -184,12 +184,13 @@ class Component(Declared[ComponentEntry]):
 
         `config` is an instance of its config class, by default that of its defaults; what the class declares by a
         property may depend on it. Raises PluginUnavailable if the class cannot be imported, or does not declare
-        something.
+        something, and ConfigError where the property refuses this config.
         """
         if not left_out(self.entry, self.role):
             return self.entry
         cls = self.component_class()
         part: Any = cls
+        chosen = config is not None
         if any(self._varies(name) for name in left_out(self.entry, self.role)):
             if config is None:
                 with contextlib.suppress(TypeError, ValueError):
@@ -200,6 +201,8 @@ class Component(Declared[ComponentEntry]):
         except NotDeclared as error:
             raise self._unavailable(str(error)) from error
         except FAILURES as error:
+            if chosen and isinstance(error, ConfigError):
+                raise  # the settings are wrong, and the error says how
             raise self._unavailable(f"what it declares raised {type(error).__name__}: {error}") from error
 
     def channels_vary(self) -> bool:
