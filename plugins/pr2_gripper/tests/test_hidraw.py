@@ -107,6 +107,17 @@ def test_writes_that_never_arrive_are_noticed_by_their_echo(machine: Any, board:
     backend.close()
 
 
+def test_a_host_that_stood_still_is_no_loss(machine: Any, board: Any) -> None:
+    """One command without an echo, and 0.2 s of the device's time until the host reads again."""
+    machine.plug("/dev/hidraw3", board(faults=FaultConfig(drop_command=1.0)))
+    backend = Pr2Backend(Pr2Config())
+    backend.open(0)
+    following(backend, machine)
+    backend.apply(RELAX)
+    assert all(following(backend, machine) is not None for _ in range(200))
+    backend.close()
+
+
 def test_closing_tells_the_gripper_to_let_go(machine: Any, board: Any) -> None:
     wire = board()
     machine.plug("/dev/hidraw3", wire)

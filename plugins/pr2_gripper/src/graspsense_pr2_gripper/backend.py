@@ -62,7 +62,9 @@ OPENING_N: Final = -20.0
 TARE_IMAGES: Final = 6
 RELEASE_REPORT: Final = OutputReport(0, RELEASE_KIND, 0, 0, 0)
 UNHEARD_S: Final = 0.1
-"""Time without the echo of a command after which the device counts as lost."""
+"""Device time without the echo of a command after which the device counts as lost."""
+UNHEARD_COMMANDS: Final = 5
+"""Commands that must be without an echo by then: a host that stops for a moment has sent only one or two."""
 UNCALIBRATED: Final = "none"
 TEST_NUMBER: Final = (0x1209, 0x0001)
 
@@ -125,7 +127,7 @@ class Pr2Backend(SensorBackend[Pr2Config]):
         if behind and self._sent:
             if report.echo != self._echo:
                 self._heard_us = report.time_us
-            elif report.time_us - self._heard_us > UNHEARD_S * 1e6:
+            elif behind >= UNHEARD_COMMANDS and report.time_us - self._heard_us > UNHEARD_S * 1e6:
                 raise DeviceLost(
                     f"the PR2 gripper reports but takes no commands: {behind} were not echoed in {UNHEARD_S} s; its "
                     "watchdog lets go. Unplug it and plug it in again"

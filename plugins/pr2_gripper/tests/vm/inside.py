@@ -284,9 +284,18 @@ def options_of(way: Way) -> tuple[str, ...]:
     )
 
 
-def grasp(way: Way, at: At) -> Trial:
+def grasp(way: Way, phase: Phase, tick: int, act: Callable[[], None]) -> tuple[At, Trial]:
+    """Grasp, and act at the n-th tick of a phase; again where the grasp was lost before that moment."""
     settings = settings_of(None, "pr2", None, options_of(way), 0)
-    return grasp_with(settings, installed(), sinks=[at], on_event=at.event)
+    for _ in range(ATTEMPTS):
+        at = At(phase, tick, act)
+        trial = grasp_with(settings, installed(), sinks=[at], on_event=at.event)
+        if at.when_s or trial.outcome is Outcome.STEADY:
+            break
+        # The emulated processor was held up.
+        print(f"note   {way.name}: {trial.outcome.words} before {phase.name.lower()}: {trial.reason}")
+        appeared(way)
+    return at, trial
 
 
 def lost_in_a_grasp(way: Way, device: Emulator, what: str, trial: Trial, at: At) -> None:
@@ -310,14 +319,7 @@ def unplugged(way: Way, device: Emulator, pulls: int) -> None:
     moments = [(Phase.TARING, 0), (Phase.APPROACH, 2), (Phase.SQUEEZE, 1), (Phase.HOLD, 2)]
     moments += [(chance.choice(phases), chance.randrange(1, way.grasp_hz // 5)) for _ in range(pulls)]
     for phase, tick in moments:
-        for _ in range(ATTEMPTS):
-            at = At(phase, tick, lambda: device.say("unplug"))
-            trial = grasp(way, at)
-            if at.when_s or trial.outcome is Outcome.STEADY:
-                break
-            # The emulated processor was held up: the grasp ended before its moment came.
-            print(f"note   {way.name}: {trial.outcome.words} before {phase.name.lower()}: {trial.reason}")
-            appeared(way)
+        at, trial = grasp(way, phase, tick, lambda: device.say("unplug"))
         if at.when_s:
             lost_in_a_grasp(way, device, "unplugged", trial, at)
         else:
@@ -342,8 +344,7 @@ def unplugged_and_kept(way: Way, device: Emulator, store: Path) -> None:
 
 def silent(way: Way, device: Emulator) -> None:
     for word in ("silent", "stalled"):
-        at = At(Phase.SQUEEZE, 3, lambda word=word: device.say(word))  # type: ignore[misc]
-        trial = grasp(way, at)
+        at, trial = grasp(way, Phase.SQUEEZE, 3, lambda word=word: device.say(word))  # type: ignore[misc]
         lost_in_a_grasp(way, device, word, trial, at)
         device.tell("well")
         if way.wire == "usb":
@@ -355,8 +356,7 @@ def silent(way: Way, device: Emulator) -> None:
 
 def halted(way: Way, device: Emulator) -> None:
     """A stalled endpoint is cleared, by the kernel or by the driver, and the grasp goes on."""
-    at = At(Phase.SQUEEZE, 3, lambda: device.say("halt"))
-    trial = grasp(way, at)
+    _, trial = grasp(way, Phase.SQUEEZE, 3, lambda: device.say("halt"))
     check(
         trial.outcome is Outcome.STEADY,
         f"{way.name}: endpoint halted in squeeze: {trial.outcome.words} {trial.reason}",
@@ -398,8 +398,7 @@ def replugged(way: Way, device: Emulator) -> None:
 def killed(way: Way) -> None:
     device = Emulator(way, way.grasp_hz)
     appeared(way)
-    at = At(Phase.SQUEEZE, 3, device.kill)
-    trial = grasp(way, at)
+    at, trial = grasp(way, Phase.SQUEEZE, 3, device.kill)
     told_s = time.monotonic() - at.when_s
     check(
         trial.outcome is Outcome.DEVICE_LOST,
