@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from attrs import evolve, field, frozen
 
-from graspsense.core.components.channels import signal_type
+from graspsense.core.components.channels import cells_of, no_signals, signal_type
 from graspsense.core.values.channel import Channel, FastChannel, TactileArray
 from graspsense.core.values.errors import DataDamaged
 from graspsense.core.values.signals import NO_PADS, Frame, Image, Reading, Samples
@@ -378,13 +378,14 @@ def _series(columns: GraspColumns, channel: Channel, values: Numbers) -> list[An
             return sample_blocks(times, own, values, channel)
         return _blocks(times.tolist(), values, channel)
     at = times if own is None else own
-    rows: list[Any] = values.tolist()
+    rows: list[Any] = [] if isinstance(channel, TactileArray) else values.tolist()
     nothing: Any = math.nan
     if isinstance(channel, TactileArray):
         rows = [
-            Image(t_s, k, tuple(row)) for k, (t_s, row) in enumerate(zip(at.tolist(), rows, strict=True), 1)
+            Image(t_s, k, cells_of(channel, row))
+            for k, (t_s, row) in enumerate(zip(at.tolist(), values, strict=True), 1)
         ]
-        nothing = Image(0.0, 0, (math.nan,) * channel.cells)
+        nothing = no_signals((channel,))[0]
     if own is None:
         return rows
     there = np.searchsorted(own, times, side="right").tolist()
