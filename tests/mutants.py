@@ -41,11 +41,14 @@ from graspsense.plugin_api import (
     Features,
     FreeLimits,
     FreeMotion,
+    Image,
     ObjectKind,
     Reading,
     StatusBit,
+    TactileArray,
     UnknownName,
     setting,
+    signal_type,
 )
 from graspsense.testing.gentle import GentleState, step
 
@@ -639,6 +642,48 @@ def _(reading):
 def _(reading):
     block = reading.signals.acceleration
     return reading._replace(signals=type(reading.signals)(block._replace(new=2)))
+
+
+CAMERA = TactileArray("camera", "counts", rows=2, columns=2, dtype="uint8")
+
+
+def seeing(says):
+    """Keep a mutant with a camera, whose image the decorated function makes of the pixels of the driver."""
+
+    def keep(image):
+        class Seeing(Hand):
+            pixels = np.zeros((2, 2), np.uint8)
+
+            def read(self, timeout_s):
+                frame, pads, signals = super().read(timeout_s)
+                self.pixels[:] = frame.t_s * 100.0 % 256.0
+                seen = Image(frame.t_s, 1 + round(frame.t_s * 1000.0), image(self.pixels))
+                channels = ENTRIES["sensor-backend"].channels
+                return Reading(frame, pads, signal_type((*channels, CAMERA))(*signals, seen))
+
+        channels = (*ENTRIES["sensor-backend"].channels, CAMERA)
+        mutant("sensor-backend", "images-stay-as-they-were-delivered", says, channels=channels)(Seeing)
+
+    return keep
+
+
+@seeing("can still be changed")
+def _(pixels):
+    return pixels.copy()
+
+
+@seeing("changed after it was delivered")
+def _(pixels):
+    # Numpy does not know who else writes to the memory.
+    shown = np.frombuffer(memoryview(pixels).toreadonly(), np.uint8)
+    return shown.reshape(2, 2)
+
+
+@seeing("is not contiguous")
+def _(pixels):
+    turned = pixels.copy()
+    turned.setflags(write=False)
+    return turned.T
 
 
 @mutant("sensor-backend", "channels-follow-from-the-settings", "once it is open", channels=None)

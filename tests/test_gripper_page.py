@@ -9,6 +9,7 @@ from math import nan
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
+import numpy as np
 import pytest
 
 from graspsense import load_pipeline
@@ -24,7 +25,12 @@ class Plugin:
 
     @hookimpl
     def graspsense_sensor_backends(self):
-        return [SensorBackendEntry(name="lab-hand", target="lab_hand:TcpHand", summary="a hand on a socket")]
+        return [
+            SensorBackendEntry(name="lab-hand", target="lab_hand:TcpHand", summary="a hand on a socket"),
+            SensorBackendEntry(
+                name="seeing", target="lab_hand:TcpHandWithCamera", summary="a hand with a camera"
+            ),
+        ]
 
 
 @pytest.fixture
@@ -34,6 +40,8 @@ def hand(monkeypatch):
     module = ModuleType("lab_hand")
     monkeypatch.setitem(sys.modules, "lab_hand", module)
     exec(compile(code, "tcp_gripper.md", "exec", dont_inherit=True), vars(module))
+    (camera,) = re.findall(r"<!-- example: camera -->\n```python\n(.*?)```", PAGE, re.DOTALL)
+    exec(compile(camera, "tcp_gripper.md", "exec", dont_inherit=True), vars(module))
     now_s = 0.0
 
     def sleep(seconds):
@@ -73,7 +81,8 @@ def test_it_conforms(plugins):
     assert report.failures == []
     assert {one.check for one in report.results if one.state == "skipped"} <= {
         *("images-count-up", "pads-can-be-zeroed", "same-seed-same-frames"),
-        "signals-have-no-gaps-or-repeats",  # it has no further channels
+        # It has no further channels.
+        *("signals-have-no-gaps-or-repeats", "images-stay-as-they-were-delivered"),
         *("dry-run-accepts-the-same-commands", "objects-can-be-grasped"),
     }
 
@@ -84,6 +93,23 @@ def test_it_grasps_with_the_default_pipeline(plugins):
     assert trial.outcome.words == "steady"
     assert trial.features.as_dict()["p_first"] == pytest.approx(0.05, abs=1e-3)
     assert trial.features.as_dict()["f_steady"] == pytest.approx(20.0, abs=1.5)
+
+
+def test_its_camera_conforms_and_sees_the_force(hand, plugins):
+    keys = {"reply_timeout_s": 60.0}
+    examined = examine("lab-hand/seeing", keys=keys, unplugged={"vanishes_s": 0.5}, plugins=plugins)
+    report = examined.report()
+    assert report.failures == []
+    passed = {one.check for one in report.results if one.state == "passed"}
+    assert {"images-stay-as-they-were-delivered", "what-it-delivers-is-kept"} <= passed
+
+    options = ["gripper.type=lab-hand/seeing", "gripper.reply_timeout_s=60", "classifier.type=none"]
+    trace = load_pipeline(options=options, plugins=plugins).grasp().trace
+    eye = trace.signals["eye"]
+    assert eye.cells.shape == (len(eye.t_s), *hand.EYE.shape)
+    forces = np.interp(eye.t_s, trace.t_s, trace.force_left_n)
+    assert eye.cells[:, 100, 150, 0] == pytest.approx(40 + np.minimum(10 * forces, 200), abs=1)
+    assert (eye.cells[:, 0, 0] == 40).all()
 
 
 @pytest.mark.parametrize("second", [nan, 0.0])

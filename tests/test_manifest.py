@@ -689,7 +689,9 @@ def test_cells_of_three_components(tmp_path):
     assert column(one, "force_left_n") == pytest.approx(6 * force)
     assert column(one, "force_right_n") == pytest.approx(6 * 0.8 * force)
     (channel,) = one.recording.channels
-    assert (channel.rows, channel.columns) == (2, 9)
+    assert (channel.rows, channel.columns, channel.components) == (2, 3, 3)
+    image = one.recording.readings[200].signals.cells
+    assert image.cells == tuple(map(tuple, cells[200].reshape(6, 3).tolist()))
 
 
 @pytest.mark.parametrize("side", ["left", "right"])

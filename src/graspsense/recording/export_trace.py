@@ -12,7 +12,7 @@ import numpy as np
 
 from graspsense.core.components.channels import as_json
 from graspsense.core.files.csv_text import csv_text
-from graspsense.core.values.channel import FastChannel
+from graspsense.core.values.channel import FLOATS, FastChannel, TactileArray
 from graspsense.core.values.trace import PAD_COLUMNS, TICK_COLUMNS, ImageTrace
 from graspsense.recording.atomic_file import write_new
 from graspsense.recording.layout import SIGNAL_TOPIC, TICK_FIELDS
@@ -28,13 +28,14 @@ def write_csv(path: Path, grasp: RecordedGrasp) -> None:
     """Write one line per tick, with an empty cell for a missing channel.
 
     Images of the fingertips go to `NAME-pads.csv`, and each other topic to a file that is named after it. That of a
-    fast channel has one line per sample, with the time and each axis. `FILE.json` has the channels, units and
+    fast channel has one line per sample, with the time and each axis. Images that are numpy arrays go to
+    `NAME-CHANNEL.npz`, with the arrays `t_s`, `counter` and `cells`. `FILE.json` has the channels, units and
     rate of the gripper, so that `import csv:FILE` reads the grasp back.
     """
     tables = dict(_tables(grasp))
     for name, (rows, fields) in tables.items():
         write_new(beside(path, name), _csv(rows, fields))
-    _write_declared(path, grasp, list(tables))
+    _write_declared(path, grasp, [*tables, *_write_cameras(path, grasp)])
     write_new(path, _csv(grasp.ticks.tolist(), TICK_FIELDS))
 
 
@@ -71,7 +72,7 @@ def write_parquet(path: Path, grasp: RecordedGrasp) -> None:
         write_new(
             beside(path, name), parquet({n: (np.array(c), "") for n, c in zip(fields, columns, strict=True)})
         )
-    _write_declared(path, grasp, list(tables))
+    _write_declared(path, grasp, [*tables, *_write_cameras(path, grasp)])
     write_new(path, ticks)
 
 
@@ -105,12 +106,15 @@ WRITERS: Final[Mapping[str, Callable[[Path, RecordedGrasp], None]]] = {
 
 
 def _tables(grasp: RecordedGrasp) -> Iterator[tuple[str, Table]]:
-    """Yield each topic beside the ticks, with its rows and the names of their columns."""
+    """Yield each topic beside the ticks and the cameras, with its rows and the names of their columns."""
+    cameras = _cameras(grasp)
     fast = {
         SIGNAL_TOPIC + channel.name: channel for channel in grasp.channels if isinstance(channel, FastChannel)
     }
     signals = grasp.trace().signals if fast else {}
     for name, found in grasp.topics.items():
+        if name in cameras:
+            continue
         channel = fast.get(name)
         if channel is None:
             yield name, _flat(found.rows)
@@ -118,6 +122,23 @@ def _tables(grasp: RecordedGrasp) -> Iterator[tuple[str, Table]]:
             samples = signals[channel.name]
             rows = np.column_stack([samples.t_s, samples.values]).tolist()
             yield name, (list(map(tuple, rows)), ("t_s", *channel.axes))
+
+
+def _cameras(grasp: RecordedGrasp) -> dict[str, TactileArray]:
+    """Return the arrays whose images are numpy arrays, by their topics."""
+    arrays = [channel for channel in grasp.channels if isinstance(channel, TactileArray)]
+    return {SIGNAL_TOPIC + array.name: array for array in arrays if array.dtype != FLOATS}
+
+
+def _write_cameras(path: Path, grasp: RecordedGrasp) -> list[str]:
+    """Write the images that are numpy arrays, a file each, and return their topics: a table has no room for them."""
+    cameras = {name: array for name, array in _cameras(grasp).items() if name in grasp.topics}
+    for name, array in cameras.items():
+        rows, out = grasp.topics[name].rows, io.BytesIO()
+        cells = rows["cells"].reshape(len(rows), *array.shape)
+        np.savez_compressed(out, allow_pickle=False, t_s=rows["t_s"], counter=rows["counter"], cells=cells)
+        write_new(beside(path, name).with_suffix(".npz"), out.getvalue())
+    return list(cameras)
 
 
 def _flat(rows: NDArray[np.void]) -> Table:

@@ -11,7 +11,7 @@ import io
 import math
 import struct
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from attrs import define, frozen
@@ -35,6 +35,8 @@ PICTURE_TOPIC: Final = "/grasp/pictures/"
 """Before the name of an array; the fingertips are `pads_left` and `pads_right`."""
 CELL_PIXELS: Final = 16
 """Side of a cell in a picture: panels smooth a picture that they enlarge, so that smaller cells would run together."""
+LARGE: Final = 16
+"""Cells along a side from which on they are drawn smaller, so that a picture of a camera has a pixel for each."""
 RAW_IMAGE: Final = "foxglove_msgs/msg/RawImage"
 DEFINITION: Final = f"""builtin_interfaces/Time timestamp
 string frame_id
@@ -53,17 +55,19 @@ NS: Final = 1_000_000_000
 
 @frozen(eq=False)
 class _Grid:
-    """Where the cells of an array are in its picture: their numbers, rows and columns."""
+    """Where the cells of an array are in its picture: their numbers, rows and columns, and the side of a cell."""
 
     cells: NDArray[np.int64]
     rows: NDArray[np.int64]
     columns: NDArray[np.int64]
 
     def picture(self, brightness: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """Return the picture, given the brightness of every cell of the array."""
-        small = np.zeros((int(self.rows.max()) + 1, int(self.columns.max()) + 1), np.uint8)
+        """Return the picture, given the brightness of every cell, shape (cells,), or its colour, shape (cells, 3)."""
+        height, width = int(self.rows.max()) + 1, int(self.columns.max()) + 1
+        small = np.zeros((height, width, *brightness.shape[1:]), np.uint8)
         small[self.rows, self.columns] = brightness[self.cells]
-        return small.repeat(CELL_PIXELS, axis=0).repeat(CELL_PIXELS, axis=1)
+        side = max(CELL_PIXELS // (1 + max(height, width) // LARGE), 1)
+        return small.repeat(side, axis=0).repeat(side, axis=1)
 
 
 @define(eq=False)
@@ -82,7 +86,8 @@ def with_pictures(grasp: RecordedGrasp) -> bytes:
     """Return the recording of this grasp with a picture after each tactile image.
 
     A cell is black at its value in the first image and white at the largest rise of any cell of the array (of both
-    fingertips together); cells without a position are left out. Raises ConfigError if there is no tactile image.
+    fingertips together), of several components at their largest change; cells without a position are left out. Grey
+    and coloured images of a camera (`uint8`) are shown as they are. Raises ConfigError if there is no tactile image.
     """
     of_topic = _pictures(grasp)
     if not of_topic:
@@ -119,12 +124,13 @@ def with_pictures(grasp: RecordedGrasp) -> bytes:
 
 
 def raw_image_message(time_ns: int, frame_id: str, picture: NDArray[np.uint8]) -> bytes:
-    """Return a RawImage with the encoding `mono8` in CDR, given its pixels, shape (height, width)."""
-    height, width = picture.shape
+    """Return a RawImage in CDR, given its pixels: (height, width) of grey, (height, width, 3) of colours."""
+    height, width = picture.shape[:2]
+    encoding, step = ("rgb8", 3 * width) if picture.ndim == 3 else ("mono8", width)
     # The format ends in 2038; a viewer places the message by its own time, which does not.
     body = struct.pack("<iI", min(time_ns // NS, 2**31 - 1), time_ns % NS) + _text(frame_id)
-    body += struct.pack("<II", width, height) + _text("mono8")
-    return CDR_HEADER + body + struct.pack("<II", width, picture.size) + picture.tobytes()
+    body += struct.pack("<II", width, height) + _text(encoding)
+    return CDR_HEADER + body + struct.pack("<II", step, picture.size) + picture.tobytes()
 
 
 def _text(value: str) -> bytes:
@@ -145,7 +151,7 @@ def _pictures(grasp: RecordedGrasp) -> Mapping[str, Sequence[_Pictures]]:
             array = declared.get("pads")
             if array is None or array.cells != cells:
                 array = TactileArray("pads", "unknown", rows=1, columns=cells)
-            left, right = np.split(_brightness(values), 2, axis=1)
+            left, right = np.split(np.array([*_brightness(values[:, :, np.newaxis])]), 2, axis=1)
             grid = _grid_of(array)
             drawn[name] = (
                 _Pictures(f"{PICTURE_TOPIC}pads_left", "left", grid, iter(left)),
@@ -153,7 +159,10 @@ def _pictures(grasp: RecordedGrasp) -> Mapping[str, Sequence[_Pictures]]:
             )
         elif name.startswith(SIGNAL_TOPIC) and "cells" in fields:
             array = declared[name.removeprefix(SIGNAL_TOPIC)]
-            images = iter(_brightness(np.asarray(found.rows["cells"], dtype=float)))
+            cells = found.rows["cells"].reshape(len(found.rows), array.cells, array.components)
+            images = iter(cells.squeeze(axis=2) if array.components == 1 else cells)
+            if array.dtype != "uint8" or array.components == 2:
+                images = _brightness(cells)
             picture = _Pictures(
                 PICTURE_TOPIC + array.name, array.finger or array.name, _grid_of(array), images
             )
@@ -161,13 +170,20 @@ def _pictures(grasp: RecordedGrasp) -> Mapping[str, Sequence[_Pictures]]:
     return drawn
 
 
-def _brightness(values: NDArray[np.float64]) -> NDArray[np.uint8]:
-    """Return the brightness of each cell in each image, given the values, shape (images, cells)."""
-    rise = np.nan_to_num(values - values[0], nan=0.0, posinf=0.0, neginf=0.0)
-    most = float(rise.max())
+def _brightness(cells: NDArray[Any]) -> Iterator[NDArray[np.uint8]]:
+    """Yield the brightness of each cell in each image, shape (images, cells, components), one image after the other."""
+
+    def rise(image: NDArray[Any]) -> NDArray[np.float64]:
+        change = np.nan_to_num(image - cells[0].astype(float), nan=0.0, posinf=0.0, neginf=0.0)
+        numbers: NDArray[np.float64] = (
+            change[:, 0] if change.shape[1] == 1 else np.linalg.norm(change, axis=1)
+        )
+        return numbers
+
+    most = max(float(rise(image).max()) for image in cells)
     scale = 255.0 / most if most > 0.0 else 0.0
-    brightness: NDArray[np.uint8] = np.clip(np.rint(rise * scale), 0, 255).astype(np.uint8)
-    return brightness
+    for image in cells:
+        yield np.clip(np.rint(rise(image) * scale), 0, 255).astype(np.uint8)
 
 
 def _grid_of(array: TactileArray) -> _Grid:

@@ -1,14 +1,16 @@
 """The layout of a recording: topics, fields and metadata of its MCAP file, and the protocol to the writer process.
 
 Messages are ROS 2 messages in CDR (schema encoding `ros2msg`, message encoding `cdr`). Every field is a number of 8
-bytes or a fixed number of them, so a message is 4 bytes of CDR header and a packed structure. One topic holds the
-control ticks. Another holds the images of the fingertips, which come at their own, lower rate. Each tactile array and
-each fast channel has a topic of its own, and one topic has the other channels. A message precedes the first tick that
-used it. A topic but that of the ticks exists if it has a message.
+bytes or a fixed number of them, and the last one may be a fixed number of smaller ones, the pixels of a camera; so a
+message is 4 bytes of CDR header and a packed structure. The chunks of the file are compressed with zstd. One topic
+holds the control ticks. Another holds the images of the fingertips, which come at their own, lower rate. Each tactile
+array and each fast channel has a topic of its own, and one topic has the other channels. A message precedes the first
+tick that used it. A topic but that of the ticks exists if it has a message.
 """
 
 from __future__ import annotations
 
+import math
 import re
 import struct
 from collections.abc import Callable
@@ -17,6 +19,8 @@ from typing import Any, Final
 
 from attrs import field, frozen
 
+from graspsense.core.components.channels import dtype_of, shape_of
+from graspsense.core.values.channel import FLOATS
 from graspsense.core.values.limits import CHANNEL_NUMBERS
 from graspsense.core.values.signals import Frame, Image, Pads, Reading, Samples
 
@@ -61,15 +65,15 @@ TICK_SCHEMA: Final = ("graspsense_msgs/msg/Tick", _schema(TICK_FIELDS))
 class Topic:
     """A topic beside the ticks: its name, the name of its message type, the definition of the type.
 
-    Every type begins with `t_s`. Its other fields are float64 or int64, alone or a fixed number of them. Raises
-    ValueError for any other definition.
+    Every type begins with `t_s`. Its other fields are float64 or int64, alone or a fixed number of them; the last one
+    may be a fixed number of uint8, uint16 or float32. Raises ValueError for any other definition.
     """
 
     name: str
     type_name: str
     definition: str
     fields: tuple[tuple[str, str, int], ...] = field(init=False)
-    """Name, kind (`d` or `q`) and number of values of each field; a number of 0 stands for a field that is no array."""
+    """Name, kind (a key of `KINDS`) and number of values of each field; 0 stands for a field that is no array."""
 
     @fields.default
     def _fields(self) -> tuple[tuple[str, str, int], ...]:
@@ -79,20 +83,28 @@ class Topic:
             if match is None:
                 raise ValueError(f"{self.name} has the field {line[:40]!r}")
             kind, number, name = match.groups()
-            fields.append((name, "d" if kind == "float64" else "q", int(number or 0)))
+            fields.append((name, _KIND_OF[kind], int(number or 0)))
         # The images of the fingertips have the numbers of a channel twice.
         most = 2 * CHANNEL_NUMBERS.most + _BESIDE_A_CHANNEL
-        if fields[:1] != [("t_s", "d", 0)] or sum(max(n, 1) for _, _, n in fields) > most:
+        aligned = all(kind in "dq" for _, kind, _ in fields[:-1]) and (fields[-1][1] in "dq" or fields[-1][2])
+        if fields[:1] != [("t_s", "d", 0)] or not aligned or sum(max(n, 1) for _, _, n in fields) > most:
             raise ValueError(f"{self.name} has other fields than graspsense writes")
         return tuple(fields)
 
     @property
     def wire(self) -> struct.Struct:
-        """The structure of a message."""
-        return struct.Struct("<" + "".join(f"{max(number, 1)}{kind}" for _, kind, number in self.fields))
+        """The structure of a message; an array of small numbers is packed as its bytes."""
+        return struct.Struct("<" + "".join(_packed(kind, number) for _, kind, number in self.fields))
 
 
-_FIELD: Final = re.compile(r"(float64|int64)(?:\[([1-9][0-9]{0,17})\])? ([a-z][a-z0-9_]*)")
+def _packed(kind: str, number: int) -> str:
+    return f"{max(number, 1)}{kind}" if kind in "dq" else f"{number * struct.calcsize('<' + kind)}s"
+
+
+KINDS: Final = {"d": "float64", "q": "int64", "f": "float32", "H": "uint16", "B": "uint8"}
+"""The types of the numbers of a field, by their code in a packed structure."""
+_KIND_OF: Final = {name: kind for kind, name in KINDS.items()}
+_FIELD: Final = re.compile(rf"({'|'.join(_KIND_OF)})(?:\[([1-9][0-9]{{0,17}})\])? ([a-z][a-z0-9_]*)")
 
 
 def pads_topic(cells: int) -> Topic:
@@ -125,7 +137,7 @@ def signal_topics(signals: Any) -> list[tuple[Topic, Callable[[Reading], tuple[A
     for i, name in enumerate(getattr(signals, "_fields", ())):
         value = signals[i]
         if isinstance(value, Image):
-            topics.append((image_topic(name, len(value.cells)), _image_source(i)))
+            topics.append((image_topic(name, value), _image_source(i, value)))
         elif isinstance(value, Samples):
             topics.append((samples_topic(name, len(value.values), len(value.values[0])), _samples_source(i)))
         else:
@@ -138,10 +150,12 @@ def signal_topics(signals: Any) -> list[tuple[Topic, Callable[[Reading], tuple[A
     return topics
 
 
-def image_topic(name: str, cells: int) -> Topic:
-    """Return the topic of a tactile array."""
-    definition = f"float64 t_s\nint64 counter\nfloat64[{cells}] cells\n"
-    return Topic(SIGNAL_TOPIC + name, f"graspsense_msgs/msg/Array{cells}", definition)
+def image_topic(name: str, image: Image) -> Topic:
+    """Return the topic of a tactile array, given an image of it."""
+    numbers, dtype = math.prod(shape_of(image)), dtype_of(image)
+    definition = f"float64 t_s\nint64 counter\n{dtype}[{numbers}] cells\n"
+    kind = "" if dtype == FLOATS else dtype.capitalize()
+    return Topic(SIGNAL_TOPIC + name, f"graspsense_msgs/msg/{kind}Array{numbers}", definition)
 
 
 def samples_topic(name: str, samples: int, axes: int) -> Topic:
@@ -155,8 +169,8 @@ def pads_numbers(pads: Pads) -> tuple[Any, ...]:
     return (pads.t_s, pads.counter, *pads.left, *pads.right)
 
 
-def _image_source(i: int) -> Callable[[Reading], tuple[Any, ...] | None]:
-    last = 0
+def _image_source(i: int, example: Image) -> Callable[[Reading], tuple[Any, ...] | None]:
+    last, dtype, several = 0, dtype_of(example), len(shape_of(example)) > 1
 
     def numbers(reading: Reading) -> tuple[Any, ...] | None:
         nonlocal last
@@ -164,7 +178,9 @@ def _image_source(i: int) -> Callable[[Reading], tuple[Any, ...] | None]:
         if counter == last:
             return None
         last = counter
-        return (t_s, counter, *cells)
+        if dtype != FLOATS:
+            return (t_s, counter, cells.tobytes())
+        return (t_s, counter, *(chain.from_iterable(cells) if several else cells))
 
     return numbers
 

@@ -16,7 +16,7 @@ from attrs import evolve, field, frozen
 from mcap.exceptions import McapError
 from mcap.records import Channel, Chunk, DataEnd, Footer, Header, McapRecord, Message, Metadata, Schema
 
-from graspsense.core.components.channels import declared_shape, further, no_signals, signal_type
+from graspsense.core.components.channels import cells_of, declared_shape, further, no_signals, signal_type
 from graspsense.core.values.channel import Channel as DeclaredChannel
 from graspsense.core.values.channel import FastChannel, TactileArray
 from graspsense.core.values.errors import ConfigError, DataDamaged, TooLarge, named
@@ -28,6 +28,7 @@ from graspsense.recording.layout import (
     CDR_HEADER,
     DEVICE,
     EVENT,
+    KINDS,
     PADS_TOPIC,
     PART,
     SCALARS_TOPIC,
@@ -132,12 +133,12 @@ class RecordedGrasp:
         shown: list[DeclaredChannel] = []
         for name, found in self.topics.items():
             numbers = {field: max(number, 1) for field, _, number in found.topic.fields}
+            dtype: Any = KINDS[found.topic.fields[-1][1]]
             if name == SCALARS_TOPIC:
                 shown += [DeclaredChannel(field, "unknown") for field in numbers if field != "t_s"]
             elif name.startswith(SIGNAL_TOPIC) and "cells" in numbers:
-                shown.append(
-                    TactileArray(name[len(SIGNAL_TOPIC) :], "unknown", rows=1, columns=numbers["cells"])
-                )
+                array = name[len(SIGNAL_TOPIC) :]
+                shown.append(TactileArray(array, "unknown", rows=1, columns=numbers["cells"], dtype=dtype))
             elif name.startswith(SIGNAL_TOPIC):
                 axes = int(found.rows["axes"][0]) if len(found.rows) else numbers["values"]
                 shown.append(
@@ -151,8 +152,7 @@ class RecordedGrasp:
         kept = []
         for channel in shown:
             said = declared.get(channel.name)
-            same = said is not None and declared_shape(said) == declared_shape(channel)
-            kept.append(said if same and said is not None else channel)
+            kept.append(said if said is not None and _have_same_numbers(said, channel) else channel)
         return (*(channel for channel in self.device.channels if channel.name == "pads"), *kept)
 
     def events(self) -> tuple[GraspEvent, ...]:
@@ -244,7 +244,7 @@ class RecordedGrasp:
             if scalar:
                 last = float(row[names.index(channel.name)])
             elif isinstance(channel, TactileArray):
-                last = Image(float(row["t_s"]), int(row["counter"]), tuple(row["cells"].tolist()))
+                last = Image(float(row["t_s"]), int(row["counter"]), cells_of(channel, row["cells"]))
             else:
                 rows = row["values"].reshape(declared_shape(channel)).tolist()
                 new = min(max(int(row["new"]), 0), len(rows))
@@ -356,7 +356,9 @@ class _PartialGrasp:
         self.lost = 0
         self.base_ns: int | None = None
         self.ended = self.started = False
-        self._unpacked = Unpacked(f"the recording {path}")
+        # What is packed counts beside the limit: the images of a camera fill a file of that size.
+        size = path.stat().st_size if path.is_file() else 0
+        self._unpacked = Unpacked(f"the recording {path}", allowance=size)
 
     def records(self, file: BinaryIO) -> Iterator[McapRecord]:
         """Yield the records of the file. Raises TooLarge, and what the library raises on a damaged file."""
@@ -493,10 +495,19 @@ def _is_ours(topic: Topic) -> bool:
         return topic.definition == pads_topic_by_cell((len(names) - 2) // 2).definition
     if topic.name == SCALARS_TOPIC:
         return len(names) > 1 and all(kind == "d" and not number for _, kind, number in topic.fields)
-    return names in (["t_s", "counter", "cells"], ["t_s", "counter", "new", "axes", "values"])
+    if names == ["t_s", "counter", "cells"]:
+        return True
+    return names == ["t_s", "counter", "new", "axes", "values"] and topic.fields[-1][1] == "d"
 
 
-_KINDS: Final = {"d": "<f8", "q": "<i8"}
+def _have_same_numbers(said: DeclaredChannel, shown: DeclaredChannel) -> bool:
+    """Return whether what the gripper declared fits what the messages show; these do not show rows and components."""
+    if isinstance(said, TactileArray) and isinstance(shown, TactileArray):
+        return (said.numbers, said.dtype) == (shown.numbers, shown.dtype)
+    return declared_shape(said) == declared_shape(shown)
+
+
+_KINDS: Final = {kind: np.dtype(name).newbyteorder("<") for kind, name in KINDS.items()}
 
 
 def _row_type(topic: Topic) -> np.dtype[np.void]:

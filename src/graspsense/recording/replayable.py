@@ -10,10 +10,11 @@ from typing import Final
 
 from attrs import field, frozen
 
+from graspsense.core.components.channels import dtype_of
 from graspsense.core.components.delivered import Delivered
-from graspsense.core.values.channel import Channel
+from graspsense.core.values.channel import FLOATS, Channel
 from graspsense.core.values.errors import DataDamaged
-from graspsense.core.values.signals import Frame, Reading
+from graspsense.core.values.signals import Frame, Image, Reading
 
 _FRAME: Final = struct.Struct(f"<{len(Frame._fields)}d")
 REPLAY_NOTE: Final = "a recording cannot react: the controller's commands have no effect on it"
@@ -58,6 +59,7 @@ def content_sha256(recording: Recording) -> str:
     """Return a hash of the frames, images and channels: equal for the same grasp under another file name or label."""
     content = hashlib.sha256()
     counter = 0
+    seen: dict[int, int] = {}
     for reading in recording.readings:
         content.update(_FRAME.pack(*reading.frame))
         pads = reading.pads
@@ -65,5 +67,12 @@ def content_sha256(recording: Recording) -> str:
             counter = pads.counter
             content.update(struct.pack(f"<{2 * len(pads.left)}d", *pads.left, *pads.right))
         if reading.signals:
-            content.update(repr(tuple(reading.signals)).encode())
+            shown = list(reading.signals)
+            for i, value in enumerate(shown):
+                if isinstance(value, Image) and dtype_of(value) != FLOATS:
+                    # The text of a large array shows some of its cells only.
+                    if seen.get(i) != value.counter:
+                        content.update(value.cells.tobytes())
+                    seen[i], shown[i] = value.counter, value[:2]
+            content.update(repr(tuple(shown)).encode())
     return content.hexdigest()

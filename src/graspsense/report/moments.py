@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from attrs import frozen
@@ -13,6 +13,8 @@ from graspsense.core.values.trace import ImageTrace
 from graspsense.core.values.units import without_underscores
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from graspsense.core.values.trace import Floats, Integers, Trace
 
 
@@ -74,21 +76,32 @@ class ImagesAtMoments:
 def images_at(images: ImageTrace, factor: float, times: Mapping[str, float]) -> ImagesAtMoments:
     """Return the change of each cell since shortly before contact, times `factor`, at each of these times (s).
 
-    Where there is no image before contact, these are the values themselves.
+    Where there is no image before contact, these are the values themselves. Of a cell with several components it is
+    their length.
     """
-
-    def last(t_s: float) -> int:
-        return int(np.searchsorted(images.t_s, t_s, side="right")) - 1
-
     before = int(np.searchsorted(images.t_s, times["contact"], side="left")) - 1 if "contact" in times else -1
     # The image shortly before contact can already show it, so the zero is one image earlier where there is one.
-    zero = images.cells[max(before - 1, 0)] if before >= 0 else np.zeros(images.cells.shape[1])
-    missing = np.full(images.cells.shape[1], np.nan)
-    values = {
-        moment: factor * (images.cells[last(t)] - zero) if last(t) >= 0 else missing
-        for moment, t in times.items()
-    }
+    zero = images.cells[max(before - 1, 0)].astype(np.float64) if before >= 0 else 0.0
+    missing = np.full(images.cells.shape[1:], np.nan)
+    values = {}
+    for moment, t in times.items():
+        cells = last_image(images, t)
+        values[moment] = number_of_each(images, factor * ((missing if cells is None else cells) - zero))
     return ImagesAtMoments(values, before >= 0)
+
+
+def last_image(images: ImageTrace, t_s: float) -> NDArray[Any] | None:
+    """Return the cells of the last image that is not later than `t_s`, or None."""
+    k = int(np.searchsorted(images.t_s, t_s, side="right")) - 1
+    return images.cells[k] if k >= 0 else None
+
+
+def number_of_each(images: ImageTrace, cells: NDArray[Any]) -> Floats:
+    """Return a number for each cell of one of these images, in a row: of several components it is their length."""
+    # Floats have the shape (cells, components), and other types (rows, columns, components).
+    several = images.cells.ndim == (3 if images.cells.dtype == np.float64 else 4)
+    numbers: Floats = np.linalg.norm(cells, axis=-1) if several else cells
+    return numbers.ravel()
 
 
 def array_images(trace: Trace) -> dict[str, ImageTrace]:
@@ -98,6 +111,6 @@ def array_images(trace: Trace) -> dict[str, ImageTrace]:
         arrays["left fingertip"] = ImageTrace(t_s=trace.pad_t_s, cells=trace.pad_left)
         arrays["right fingertip"] = ImageTrace(t_s=trace.pad_t_s, cells=trace.pad_right)
     for name, signal in trace.signals.items():
-        if isinstance(signal, ImageTrace) and len(signal.t_s) and signal.cells.shape[1]:
+        if isinstance(signal, ImageTrace) and len(signal.t_s) and signal.cells[0].size:
             arrays[without_underscores(name)] = signal
     return arrays

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from graspsense.core.values.trace import Floats
 
 WIDTH, HEIGHT, LEFT_MARGIN, PANEL = 560.0, 264.0, 48.0, 92.0
+MOST_DRAWN = 256
+"""Of an array with more cells the means of groups of neighbours are drawn."""
 POINTS: Final = 300
 """Largest number of points of a line."""
 LEAST_SHOWN: Final = 0.005
@@ -128,17 +130,16 @@ def arrays_html(trace: Trace) -> str:
     parts = []
     for name, images in array_images(trace).items():
         shown = images_at(images, 1.0, times)
-        known = np.concatenate(
-            [cells[np.isfinite(cells)] for cells in shown.values.values()] or [np.empty(0)]
-        )
+        fewer = {moment: _means(cells) for moment, cells in shown.values.items()}
+        known = np.concatenate([cells[np.isfinite(cells)] for cells in fewer.values()] or [np.empty(0)])
         if not len(known):
             continue
         low, high = float(known.min()), float(known.max())
-        cell = min(16.0, (WIDTH - LEFT_MARGIN) / images.cells.shape[1])
+        cell = min(16.0, (WIDTH - LEFT_MARGIN) / max(map(len, fewer.values())))
         change = "change since before contact" if shown.relative else "values"
         words = f"{name}: {change}, by cell, {low:.4g} to {high:.4g}"
         drawn = [f'<text x="0" y="11" fill="currentColor">{escape(words)}</text>']
-        for row, (moment, cells) in enumerate(shown.values.items()):
+        for row, (moment, cells) in enumerate(fewer.items()):
             y = 18.0 + 14.0 * row
             drawn.append(f'<text x="0" y="{y + 10:g}" fill="currentColor">{moment}</text>')
             drawn += [
@@ -149,6 +150,13 @@ def arrays_html(trace: Trace) -> str:
             ]
         parts.append(_svg(drawn, 18.0 + 14.0 * len(shown.values) + 2.0, words))
     return "".join(parts)
+
+
+def _means(cells: Floats) -> Floats:
+    """Return the cells, or the means of groups of neighbours where there are too many to draw each."""
+    if len(cells) <= MOST_DRAWN:
+        return cells
+    return np.array([part.mean() for part in np.array_split(cells, MOST_DRAWN)])
 
 
 def samples_html(trace: Trace) -> str:

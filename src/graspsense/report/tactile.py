@@ -14,9 +14,10 @@ from attrs import frozen
 from graspsense.core.values.channel import Channel, TactileArray
 from graspsense.core.values.trace import ImageTrace
 from graspsense.core.values.units import display_unit, without_underscores
+from graspsense.report.camera import camera_figure, is_picture
 from graspsense.report.heat import COLOURS, HeatScale
 from graspsense.report.html import figure
-from graspsense.report.moments import images_at, moments
+from graspsense.report.moments import images_at, moments, number_of_each
 from graspsense.report.svg import QUIET, Picture, number
 
 if TYPE_CHECKING:
@@ -57,10 +58,12 @@ def tactile_figures(trace: Trace, channels: Sequence[Channel]) -> list[str]:
     """Return one figure for each tactile array that delivered an image.
 
     A map shows the change of each cell since shortly before contact, in the unit of the array, or the values
-    themselves where there is no image before contact. Both fingertips of `pads` share a figure.
+    themselves where there is no image before contact. Both fingertips of `pads` share a figure. Large arrays and
+    cameras are drawn as pictures instead.
     """
     declared = {channel.name: channel for channel in channels if isinstance(channel, TactileArray)}
     arrays: list[tuple[str, dict[str, ImageTrace], TactileArray]] = []
+    pictures: list[str] = []
     if len(trace.pad_t_s) and trace.pad_left.shape[1]:
         cells = trace.pad_left.shape[1]
         fingertips = {
@@ -70,14 +73,24 @@ def tactile_figures(trace: Trace, channels: Sequence[Channel]) -> list[str]:
         shape = declared.get("pads")
         if shape is None or shape.cells != cells:
             shape = TactileArray("pads", trace.units.get("pads", "counts"), rows=1, columns=cells)
-        arrays.append(("fingertips", fingertips, shape))
+        if is_picture(shape):
+            pictures += [
+                camera_figure(f"{side} fingertip", of, shape, moments(trace))
+                for side, of in fingertips.items()
+            ]
+        else:
+            arrays.append(("fingertips", fingertips, shape))
     for name, signal in trace.signals.items():
-        if isinstance(signal, ImageTrace) and len(signal.t_s) and signal.cells.shape[1]:
+        if isinstance(signal, ImageTrace) and len(signal.t_s) and signal.cells[0].size:
             shape = declared.get(name)
-            if shape is None or shape.cells != signal.cells.shape[1]:
-                shape = TactileArray(name, "unknown", rows=1, columns=signal.cells.shape[1])
+            if shape is None or signal.cells.shape[1:] != shape.shape:
+                cells = len(number_of_each(signal, signal.cells[0]))
+                shape = TactileArray(name, "unknown", rows=1, columns=cells)
+            if is_picture(shape):
+                pictures.append(camera_figure(without_underscores(name), signal, shape, moments(trace)))
+                continue
             arrays.append((without_underscores(name), {shape.finger: signal}, shape))
-    return [_figure(title, of, shape, moments(trace)) for title, of, shape in arrays]
+    return [*(_figure(title, of, shape, moments(trace)) for title, of, shape in arrays), *pictures]
 
 
 def _figure(

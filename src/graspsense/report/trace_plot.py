@@ -11,7 +11,15 @@ from graspsense.core.values.signals import Phase
 from graspsense.core.values.trace import SampleTrace
 from graspsense.core.values.units import display_unit, without_underscores
 from graspsense.report.literal_text import show_literally
-from graspsense.report.moments import array_images, contact_time, images_at, moments, phase_spans, shown_from
+from graspsense.report.moments import (
+    array_images,
+    contact_time,
+    images_at,
+    moments,
+    number_of_each,
+    phase_spans,
+    shown_from,
+)
 
 if TYPE_CHECKING:
     from graspsense.core.values.trace import Floats, ImageTrace, Integers, Trace
@@ -69,7 +77,11 @@ def _draw_samples(trace: Trace, axes: Any, name: str, signal: SampleTrace) -> No
 def _draw_array(trace: Trace, axes: Any, name: str, images: ImageTrace) -> Any:
     """Draw the cells of an array at contact, peak and rest, a row each; return the picture for its colour bar."""
     shown = images_at(images, 1.0, moments(trace))
-    values = np.array(list(shown.values.values())) if shown.values else images.cells[-1:]
+    values = (
+        np.array(list(shown.values.values()))
+        if shown.values
+        else number_of_each(images, images.cells[-1])[np.newaxis]
+    )
     picture = axes.imshow(values, aspect="auto", interpolation="nearest", cmap="Blues")
     axes.xaxis.get_major_locator().set_params(integer=True)
     axes.set_yticks(range(len(values)), list(shown.values) or ["last"])

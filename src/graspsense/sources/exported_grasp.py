@@ -13,8 +13,15 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from graspsense.core.components.channels import from_json, further, signal_type
-from graspsense.core.values.channel import Channel, FastChannel, TactileArray
+from graspsense.core.components.channels import (
+    cells_of,
+    from_json,
+    further,
+    no_signals,
+    read_only,
+    signal_type,
+)
+from graspsense.core.values.channel import FLOATS, Channel, FastChannel, TactileArray
 from graspsense.core.values.signals import Frame, Image, Pads, Reading, no_pads
 from graspsense.recording.readable import readable
 from graspsense.recording.replayable import REPLAY_NOTE, Recording
@@ -92,11 +99,13 @@ def _series(times: NDArray[np.float64], arrays: Arrays, channel: Channel) -> lis
     values = arrays[f"signal_{channel.name}"]
     if isinstance(channel, TactileArray):
         at = arrays[f"signal_{channel.name}_t_s"]
+        if channel.dtype != FLOATS:
+            values = read_only(values, channel.dtype)  # once, so that its images are passed by reference
         images = [
-            Image(t_s, k, tuple(cells))
-            for k, (t_s, cells) in enumerate(zip(at.tolist(), values.tolist(), strict=True), 1)
+            Image(t_s, k, cells_of(channel, cells))
+            for k, (t_s, cells) in enumerate(zip(at.tolist(), values, strict=True), 1)
         ]
-        return _latest(times, at, images, Image(0.0, 0, (float("nan"),) * channel.cells))
+        return _latest(times, at, images, no_signals((channel,))[0])
     if isinstance(channel, FastChannel):
         return sample_blocks(times, arrays[f"signal_{channel.name}_t_s"], values, channel)
     return list(values.tolist())

@@ -13,12 +13,13 @@ import numpy as np
 
 from graspsense.core.components.channels import from_json, further
 from graspsense.core.files.csv_text import text_of_cell
-from graspsense.core.values.channel import Channel, FastChannel, TactileArray
+from graspsense.core.values.channel import FLOATS, Channel, FastChannel, TactileArray
 from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.core.values.limits import CELLS, CHANNEL_NUMBERS
 from graspsense.core.values.written_numbers import NotNumbers, columns_of_numbers
 from graspsense.recording.export_trace import beside, declared_beside
 from graspsense.recording.layout import PADS_TOPIC, SCALARS_TOPIC, SIGNAL_TOPIC, TICK_FIELDS
+from graspsense.sources.numpy_files import npz_arrays
 from graspsense.sources.text_table import check_columns, check_lines, text_of
 
 if TYPE_CHECKING:
@@ -82,10 +83,17 @@ def _add_channel(arrays: Columns, path: Path, channel: Channel, scalars: Columns
     if not isinstance(channel, (TactileArray, FastChannel)):
         arrays[name] = scalars[channel.name]
         return
+    if isinstance(channel, TactileArray) and channel.dtype != FLOATS:
+        file = beside(path, SIGNAL_TOPIC + channel.name).with_suffix(".npz")
+        images = (
+            npz_arrays(file) if has_table else {"t_s": np.empty(0), "cells": np.empty((0, *channel.shape))}
+        )
+        arrays[f"{name}_t_s"], arrays[name] = images["t_s"], images["cells"]
+        return
     table = _columns(beside(path, SIGNAL_TOPIC + channel.name)) if has_table else {"t_s": np.empty(0)}
     arrays[f"{name}_t_s"] = table["t_s"]
     if isinstance(channel, TactileArray):
-        arrays[name] = _numbered(table, "cells_", channel.cells)
+        arrays[name] = _numbered(table, "cells_", channel.numbers)
     elif has_table:
         arrays[name] = np.column_stack([table[axis] for axis in channel.axes])
     else:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from attrs import evolve, field, frozen
 
-from graspsense.core.components.channels import signal_type
+from graspsense.core.components.channels import cells_of, no_signals, signal_type
 from graspsense.core.values.channel import Channel, FastChannel, TactileArray
 from graspsense.core.values.errors import DataDamaged
 from graspsense.core.values.signals import NO_PADS, Frame, Image, Reading, Samples
@@ -53,8 +53,9 @@ class GraspColumns:
     velocity_m_s: Numbers | None = None
     scalars: Mapping[str, Numbers] = field(factory=dict)
     arrays: Mapping[str, Numbers] = field(factory=dict)
-    shapes: Mapping[str, tuple[int, int]] = field(factory=dict)
-    """Rows and columns of the cells of an array (else there is one row), or samples and axes of a fast channel.
+    shapes: Mapping[str, tuple[int, ...]] = field(factory=dict)
+    """Rows and columns of the cells of an array (else there is one row), with the components of a cell as a third
+    number where there are several, or samples and axes of a fast channel.
 
     A fast channel with several numbers in a sample of `t_s` needs it, unless it has `times`."""
     times: Mapping[str, Numbers] = field(factory=dict)
@@ -239,10 +240,10 @@ def _check_shape(columns: GraspColumns, name: str, width: int) -> None:
             f"write shapes={{{name!r}: (1, {width})}} for {width} axes, ({width}, 1) for {width} samples, or give the "
             "times of its own samples in `times`"
         )
-    per_row = 1 if shape is None else (shape[1] if own and name in columns.fast else shape[0] * shape[1])
+    per_row = 1 if shape is None else (shape[1] if own and name in columns.fast else math.prod(shape))
     if shape is not None and per_row != width:
         raise DataDamaged(
-            f"{columns.source}: {name!r} has {width} numbers a sample, and `shapes` says {shape[0]} x {shape[1]}"
+            f"{columns.source}: {name!r} has {width} numbers a sample, and `shapes` says {' x '.join(map(str, shape))}"
         )
 
 
@@ -347,9 +348,12 @@ def _channels(columns: GraspColumns) -> tuple[Channel, ...]:
 def _array(columns: GraspColumns, name: str, values: Numbers) -> Channel:
     """Return the tactile array or the fast channel that several columns are."""
     width = values.shape[1]
-    first, second = columns.shapes.get(name, (1, width))
+    shape = columns.shapes.get(name, (1, width))
+    first, second, components = shape if len(shape) > 2 else (*shape, 1)
     if name not in columns.fast:
-        return TactileArray(name, columns.units.get(name, "counts"), finger=name, rows=first, columns=second)
+        unit = columns.units.get(name, "counts")
+        return TactileArray(name, unit, finger=name, rows=first, columns=second, components=components)
+    second *= components
     samples, axes = (first, second) if name not in columns.times else (_most_in_a_tick(columns, name), width)
     names = (
         ("value",)
@@ -378,13 +382,14 @@ def _series(columns: GraspColumns, channel: Channel, values: Numbers) -> list[An
             return sample_blocks(times, own, values, channel)
         return _blocks(times.tolist(), values, channel)
     at = times if own is None else own
-    rows: list[Any] = values.tolist()
+    rows: list[Any] = [] if isinstance(channel, TactileArray) else values.tolist()
     nothing: Any = math.nan
     if isinstance(channel, TactileArray):
         rows = [
-            Image(t_s, k, tuple(row)) for k, (t_s, row) in enumerate(zip(at.tolist(), rows, strict=True), 1)
+            Image(t_s, k, cells_of(channel, row))
+            for k, (t_s, row) in enumerate(zip(at.tolist(), values, strict=True), 1)
         ]
-        nothing = Image(0.0, 0, (math.nan,) * channel.cells)
+        nothing = no_signals((channel,))[0]
     if own is None:
         return rows
     there = np.searchsorted(own, times, side="right").tolist()

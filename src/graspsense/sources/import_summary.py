@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from attrs import frozen
 
-from graspsense.core.components.channels import further
+from graspsense.core.components.channels import dtype_of, further
+from graspsense.core.values.channel import FLOATS
 from graspsense.core.values.signals import Frame, Image, Samples
 from graspsense.core.values.trace import SI_UNITS
 from graspsense.recording.labelled_recording import LabelledRecording
@@ -94,25 +95,31 @@ def _measured(recordings: Sequence[Recording]) -> tuple[ChannelFacts, ...]:
     for recording in recordings:
         units = {**SI_UNITS, **recording.units, **{one.name: one.unit for one in recording.channels}}
         t_s = np.array([reading.frame.t_s for reading in recording.readings])
-        for name, values in _series(recording):
-            facts = channel_facts(name, units.get(name, "1"), values, t_s)
+        for name, values, new in _series(recording):
+            facts = channel_facts(name, units.get(name, "1"), values, t_s[new])
             parts.setdefault(name, []).append(facts)
     return tuple(map(together, parts.values()))
 
 
-def _series(recording: Recording) -> Iterator[tuple[str, Numbers]]:
-    """Yield the values of each channel that the recording has: those of the frame, numbers, and images."""
+def _series(recording: Recording) -> Iterator[tuple[str, Numbers, Any]]:
+    """Yield the values of each channel that the recording has, and their ticks: of the frame, numbers, and images."""
+    every = slice(None)
     frames = np.array([reading.frame for reading in recording.readings], dtype=np.float64)
     for k, field in enumerate(Frame._fields):
         name = CHANNEL_OF.get(field)
         if name is not None and np.isfinite(frames[:, k]).any():
-            yield name, frames[:, k]
+            yield name, frames[:, k], every
     for channel in further(recording.channels):
         values = [getattr(reading.signals, channel.name) for reading in recording.readings]
-        if isinstance(values[0], Image):
-            yield channel.name, np.array([one.cells for one in values], dtype=np.float64)
+        if isinstance(values[0], Image) and dtype_of(values[0]) != FLOATS:
+            counters = np.array([0, *(one.counter for one in values)])
+            new = np.flatnonzero(np.diff(counters))
+            if len(new):
+                yield channel.name, np.array([values[k].cells for k in new]), new
+        elif isinstance(values[0], Image):
+            yield channel.name, np.array([one.cells for one in values], dtype=np.float64), every
         elif not isinstance(values[0], Samples):
-            yield channel.name, np.array(values, dtype=np.float64)
+            yield channel.name, np.array(values, dtype=np.float64), every
 
 
 def _label(label: str, recordings: Sequence[LabelledRecording]) -> LabelSummary:

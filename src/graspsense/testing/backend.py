@@ -10,8 +10,11 @@ from math import inf, isfinite, isnan, nan
 from statistics import fmean, median
 from typing import Any, Final
 
-from graspsense.core.components.channels import further, no_signals, shape_of
+import numpy as np
+
+from graspsense.core.components.channels import declared_dtype, dtype_of, further, no_signals, shape_of
 from graspsense.core.components.config import create
+from graspsense.core.components.delivered import Delivered
 from graspsense.core.components.entries import KINDS
 from graspsense.core.components.roles import SensorBackend
 from graspsense.core.components.run_config import RunConfig
@@ -19,7 +22,7 @@ from graspsense.core.components.strict import keys_of
 from graspsense.core.control.guard import GuardState, guard
 from graspsense.core.grasp.protection.effort_ceiling import MARGIN
 from graspsense.core.grasp.runner import Grasp, run_uninterrupted
-from graspsense.core.values.channel import Channel, FastChannel, TactileArray
+from graspsense.core.values.channel import FLOATS, Channel, FastChannel, TactileArray
 from graspsense.core.values.errors import DeviceLost, NoDevice, RecordingEnded, TareRefused, named
 from graspsense.core.values.signals import (
     CHANNELS,
@@ -30,6 +33,7 @@ from graspsense.core.values.signals import (
     VELOCITY,
     Command,
     Frame,
+    Image,
     Outcome,
     Pads,
     Reading,
@@ -39,7 +43,7 @@ from graspsense.testing import component, protection, recorded
 from graspsense.testing.checks import CheckFailed, CheckSkipped, checks_of, demand
 from graspsense.testing.gentle import EFFORT_N, FORCE_N, GentleController, kind_of
 from graspsense.testing.model_gripper import CHANNELS_OF_FIELD
-from graspsense.testing.session import TIMEOUT_S, limits_of, readings_of
+from graspsense.testing.session import TIMEOUT_S, limits_of, readings_of, sums_of
 from graspsense.testing.subject import Subject
 
 WIDEST_M: Final = 0.5
@@ -177,13 +181,20 @@ def signals_are_those_declared(subject: Subject) -> None:
         )
         for channel, empty, value in zip(channels, nothing, reading.signals, strict=True):
             demand(
-                type(value) is type(empty) and shape_of(value) == shape_of(empty),
+                type(value) is type(empty)
+                and (shape_of(value), dtype_of(value)) == (shape_of(empty), dtype_of(empty)),
                 f"{channel.name!r} is {value!r:.80}: give {type(empty).__name__}"
-                + (f" of the declared shape {shape_of(empty)}" if shape_of(empty) else ""),
+                + (f" of the declared shape {shape_of(empty)}" if shape_of(empty) else "")
+                + (f" and the declared dtype {dtype_of(empty)}" if dtype_of(empty) != FLOATS else ""),
             )
     for channel in channels:
         values = [getattr(reading.signals, channel.name) for reading in session.readings]
-        if isinstance(channel, TactileArray):
+        if isinstance(channel, TactileArray) and channel.dtype != FLOATS:
+            _demand_images(channel.name, [value.cells for value in values if value.counter])
+            continue
+        if isinstance(channel, TactileArray) and channel.components > 1:
+            numbers = [number for value in values if value.counter for cell in value.cells for number in cell]
+        elif isinstance(channel, TactileArray):
             numbers = [cell for value in values if value.counter for cell in value.cells]
         elif isinstance(channel, FastChannel):
             numbers = [number for value in values for row in value.values[: value.new] for number in row]
@@ -195,6 +206,33 @@ def signals_are_those_declared(subject: Subject) -> None:
             not all(map(isnan, numbers)),
             f"no number of the declared channel {channel.name!r} came in {len(values)} readings: fill it in "
             "`Reading.signals`, or take it out of `channels`",
+        )
+
+
+def _demand_images(name: str, images: Sequence[Any]) -> None:
+    """Raise CheckFailed if no image of numpy arrays came, or none has a number; infinite numbers are none, either."""
+    demand(
+        any(not np.isnan(cells).all() for cells in images),
+        f"no image of the declared channel {name!r} came: fill it in `Reading.signals`, or take it out of `channels`",
+    )
+    demand(
+        not any(np.isinf(cells).any() for cells in images),
+        f"{name!r} has an infinite number: give finite ones, or NaN",
+    )
+
+
+def images_stay_as_they_were_delivered(subject: Subject) -> None:
+    """An image that is a numpy array is contiguous and read-only, and nobody changes it after it was delivered."""
+    if all(declared_dtype(one) == FLOATS for one in further(subject.entry.channels)):
+        raise CheckSkipped("this gripper has no images that are numpy arrays")
+    problem, session = Delivered(subject.entry.channels).problem, subject.session
+    for reading, before in zip(session.readings, session.sums, strict=True):
+        found = problem(reading)
+        demand(not found, f"a reading is not as declared: {found}")
+        demand(
+            sums_of(reading) == before,
+            "an image was changed after it was delivered, and laws and recordings refer to it: fill a new array for "
+            "each image",
         )
 
 
@@ -223,7 +261,7 @@ def signals_have_no_gaps_or_repeats(subject: Subject) -> None:
             else:
                 taken += came
                 demand(
-                    came >= 0 and (came > 0 or repr(now) == repr(before)),
+                    came >= 0 and (came > 0 or _is_same(now, before)),
                     f"an image of {channel.name!r} changes while its counter stays at {now.counter}: count up",
                 )
             if came:
@@ -239,6 +277,12 @@ def signals_have_no_gaps_or_repeats(subject: Subject) -> None:
                 abs(rate - channel.rate_hz) <= FORGIVEN * channel.rate_hz,
                 f"{channel.name!r} comes at {rate:.3g} Hz and is declared at {channel.rate_hz:g} Hz: declare its rate",
             )
+
+
+def _is_same(now: Image, before: Image) -> bool:
+    if dtype_of(now) == FLOATS:
+        return repr(now) == repr(before)
+    return now[:2] == before[:2] and np.array_equal(now.cells, before.cells, equal_nan=True)
 
 
 def channels_follow_from_the_settings(subject: Subject) -> None:
@@ -816,6 +860,7 @@ CHECKS: Final = (
         channels_follow_from_the_settings,
         channels_are_those_declared,
         signals_are_those_declared,
+        images_stay_as_they_were_delivered,
         signals_have_no_gaps_or_repeats,
         time_runs_forward,
         rate_is_as_declared,

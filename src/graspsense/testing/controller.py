@@ -8,7 +8,9 @@ from collections.abc import Iterator, Sequence
 from math import inf, isfinite, isinf, nan
 from typing import Any, Final, NamedTuple, get_type_hints
 
-from graspsense.core.components.channels import further, no_signals
+import numpy as np
+
+from graspsense.core.components.channels import can_change, further, no_signals, read_only
 from graspsense.core.components.entries import KINDS
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.control.free_motion import FreeMotion, free_motion_of
@@ -112,6 +114,8 @@ def _made_again(value: Any) -> Any:
         return type(value)(*(_made_again(one) for one in value))
     if isinstance(value, tuple):
         return tuple(_made_again(one) for one in value)
+    if isinstance(value, np.ndarray):
+        return read_only(value.copy(), str(value.dtype))
     return json.loads(json.dumps(value))
 
 
@@ -132,10 +136,16 @@ def _demand_numbers(value: Any, what: str) -> None:
         f"{what} is {value!r} of type {type(value).__name__}: make it a typing.NamedTuple of numbers",
     )
     for path, one, annotated in _leaves(value, what):
+        if what == "state" and isinstance(one, np.ndarray):
+            demand(
+                not can_change(one),
+                f"{path} is an array that can be changed: hold the cells of an image as they come, or a read-only copy",
+            )
+            continue
         demand(
             type(one) in (float, int),
             f"{path} is {one!r} of type {type(one).__name__}: hold plain floats and ints only (write float(...), or 0 "
-            "and 1 for a truth)",
+            "and 1 for a truth), and in a state the cells of an image",
         )
         demand(
             annotated not in (float, int) or type(one) is annotated,
@@ -168,7 +178,7 @@ def params_are_numbers(subject: Subject) -> None:
 
 
 def state_is_numbers(subject: Subject) -> None:
-    """`init()` is a named tuple of floats and ints, with the annotated types."""
+    """`init()` is a named tuple of floats and ints, with the annotated types, and of read-only arrays of an image."""
     _demand_numbers(subject.create().init(), "state")
 
 
@@ -195,7 +205,7 @@ def types_do_not_change(subject: Subject) -> None:
             _leaves(tick.before, "state"), _leaves(tick.after, "state"), strict=True
         ):
             demand(
-                type(a) is type(b),
+                type(a) is type(b) and getattr(a, "dtype", "") == getattr(b, "dtype", ""),
                 f"{path} goes from {a!r} ({type(a).__name__}) to {b!r} ({type(b).__name__}) at t = "
                 f"{tick.frame.t_s:.3f} "
                 "s: keep one type throughout",

@@ -6,7 +6,9 @@ from collections.abc import Sequence
 from math import inf, nan
 from typing import TYPE_CHECKING, Any, Final
 
-from graspsense.core.components.channels import declared_shape, further, no_signals
+import numpy as np
+
+from graspsense.core.components.channels import cells_of, declared_shape, further, no_signals
 from graspsense.core.components.roles import Controller, SensorBackend
 from graspsense.core.values.channel import Channel, FastChannel, TactileArray
 from graspsense.core.values.device import DeviceInfo
@@ -108,7 +110,7 @@ class ModelGripper(SensorBackend[None]):
         if isinstance(channel, TactileArray):
             if self._ticks % TICKS_OF_AN_IMAGE:
                 return last
-            return Image(frame.t_s, last.counter + 1, (force,) * channel.cells)
+            return Image(frame.t_s, last.counter + 1, cells_of(channel, np.full(channel.numbers, force)))
         if isinstance(channel, FastChannel):
             rows, axes = declared_shape(channel)
             return Samples(frame.t_s, last.counter + rows, rows, ((force,) * axes,) * rows)

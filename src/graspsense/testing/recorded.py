@@ -102,7 +102,8 @@ def _demand_same(before: Trace, now: Trace, where: str) -> None:
     for name, (delivered, found) in columns.items():
         # Arrays without an image have no size to compare.
         demand(
-            not (delivered.size or found.size) or np.array_equal(delivered, found, equal_nan=True),
+            not (delivered.size or found.size)
+            or (delivered.dtype == found.dtype and np.array_equal(delivered, found, equal_nan=True)),
             f"{name!r} is not in {where} as it was delivered: {_shown(delivered)} came, {_shown(found)} is there",
         )
 

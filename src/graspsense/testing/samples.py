@@ -103,8 +103,11 @@ def with_signals(trace: Trace, channels: Iterable[Channel]) -> Trace:
     for channel in further(channels):
         force = trace.force_left_n
         if isinstance(channel, TactileArray):
-            cells = np.linspace(0.0, 1.0, channel.cells)
-            signals[channel.name] = ImageTrace(t_s=trace.t_s[::20], cells=force[::20, np.newaxis] * cells)
+            cells = np.linspace(0.0, 1.0, channel.numbers).reshape(channel.shape)
+            felt = force[::20].reshape(-1, *(1,) * cells.ndim)
+            signals[channel.name] = ImageTrace(
+                t_s=trace.t_s[::20], cells=(felt * cells).astype(channel.dtype)
+            )
         elif isinstance(channel, FastChannel):
             n = channel.samples
             back = np.arange(n - 1, -1, -1) / (n * RATE_HZ)

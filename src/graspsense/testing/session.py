@@ -6,16 +6,19 @@ import time
 from contextlib import suppress
 from math import ceil
 from typing import Any, Final, Protocol
+from zlib import crc32
 
 from attrs import define, field
 
+from graspsense.core.components.channels import dtype_of
 from graspsense.core.components.roles import SensorBackend
 from graspsense.core.control.contact import CONTACT_FORCE_N
 from graspsense.core.control.garbage_collection import no_collection
 from graspsense.core.control.guard import GuardParams, GuardState, guard
+from graspsense.core.values.channel import FLOATS
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import GraspsenseError, RecordingEnded
-from graspsense.core.values.signals import Command, Frame, Pads, Reading
+from graspsense.core.values.signals import Command, Frame, Image, Pads, Reading
 from graspsense.testing.checks import CheckFailed
 from graspsense.testing.gentle import EFFORT_N, closing, kind_of
 
@@ -32,6 +35,8 @@ class Session:
 
     info: DeviceInfo
     stages: dict[str, list[Reading]] = field(factory=dict)
+    sums: list[tuple[int, ...]] = field(factory=list)
+    """The checksums of the images of each reading when it came, of those that are numpy arrays."""
     longest_read_s: float = 0.0
     silent: int = 0
 
@@ -95,6 +100,12 @@ def readings_of(gripper: Gripper) -> Session:
     return session
 
 
+def sums_of(reading: Reading) -> tuple[int, ...]:
+    """Return a checksum of each image of a reading that is a numpy array."""
+    images = [value for value in getattr(reading, "signals", ()) if isinstance(value, Image)]
+    return tuple(crc32(image.cells.tobytes()) for image in images if dtype_of(image) != FLOATS)
+
+
 def limits_of(info: DeviceInfo) -> GuardParams:
     """Return the limits for the first use of a gripper."""
     return GuardParams(info.effort_limit_n, info.speed_limit_m_s, EFFORT_N, FIRST_SPEED_M_S, CONTACT_FORCE_N)
@@ -120,6 +131,7 @@ def _use(
                 return
             continue
         readings.append(reading)
+        session.sums.append(sums_of(reading))
         if command is None:
             continue
         frame = reading.frame

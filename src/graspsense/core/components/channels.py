@@ -6,12 +6,15 @@ from collections import namedtuple
 from collections.abc import Iterable, Mapping
 from functools import lru_cache
 from math import nan
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from attrs import asdict
 
-from graspsense.core.values.channel import Channel, FastChannel, TactileArray
+from graspsense.core.values.channel import FLOATS, Channel, FastChannel, TactileArray
 from graspsense.core.values.signals import CHANNELS, Image, Samples
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 KINDS: Final[Mapping[str, type[Channel]]] = {
     "scalar": Channel,
@@ -41,7 +44,8 @@ def signal_type(channels: Iterable[Channel]) -> type[tuple[Any, ...]]:
 def no_signals(channels: Iterable[Channel]) -> Any:
     """Return the value of `Reading.signals` before anything was measured: NaN, counters 0, in the declared shapes.
 
-    It is `()` where there are no further channels.
+    The cells of an array of whole numbers are 0, since these have no NaN. It is `()` where there are no further
+    channels.
 
     >>> from graspsense.plugin_api import TactileArray
     >>> no_signals((TactileArray("palm", "counts", rows=1, columns=2),))
@@ -52,9 +56,13 @@ def no_signals(channels: Iterable[Channel]) -> Any:
 
 
 def shape_of(value: Any) -> tuple[int, ...]:
-    """Return the shape of a value of `Reading.signals`: () of a number, (cells,) of an image, (samples, axes)."""
+    """Return the shape of a value of `Reading.signals`: () of a number, `TactileArray.shape`, (samples, axes)."""
     if isinstance(value, Image):
-        return (len(value.cells),)
+        cells = value.cells
+        shape: tuple[int, ...] | None = getattr(cells, "shape", None)
+        if shape is None:
+            shape = (len(cells), len(cells[0])) if cells and isinstance(cells[0], tuple) else (len(cells),)
+        return shape
     if isinstance(value, Samples):
         return len(value.values), len(value.values[0]) if value.values else 0
     return ()
@@ -62,7 +70,50 @@ def shape_of(value: Any) -> tuple[int, ...]:
 
 def declared_shape(channel: Channel) -> tuple[int, ...]:
     """Return the shape that the values of a channel have, as `shape_of`."""
-    return shape_of(_nothing_yet(channel))
+    if isinstance(channel, TactileArray):
+        return channel.shape
+    if isinstance(channel, FastChannel):
+        return channel.samples, len(channel.axes)
+    return ()
+
+
+def dtype_of(value: Any) -> str:
+    """Return the type of the numbers of a value of `Reading.signals`: that of an image which is a numpy array."""
+    return str(getattr(value.cells, "dtype", FLOATS)) if isinstance(value, Image) else FLOATS
+
+
+def declared_dtype(channel: Channel) -> str:
+    """Return the type that the numbers of a channel have, as `dtype_of`."""
+    return channel.dtype if isinstance(channel, TactileArray) else FLOATS
+
+
+def cells_of(array: TactileArray, numbers: NDArray[Any]) -> Any:
+    """Return the cells of an `Image` of this array, given its numbers in any shape of the same order.
+
+    A numpy array is returned by reference where that is read-only. Raises ValueError for another number of numbers.
+    """
+    numbers = numbers.reshape(array.shape)
+    if array.dtype == FLOATS:
+        return tuple(map(tuple, numbers.tolist())) if array.components > 1 else tuple(numbers.tolist())
+    return read_only(numbers, array.dtype)
+
+
+def read_only(numbers: NDArray[Any], dtype: str) -> NDArray[Any]:
+    """Return the numbers as a read-only numpy array of this type: the same one if it is that, else a copy."""
+    if numbers.dtype == dtype and numbers.flags.c_contiguous and not can_change(numbers):
+        return numbers
+    copied = numbers.astype(dtype, order="C")
+    copied.setflags(write=False)
+    return copied
+
+
+def can_change(array: Any) -> bool:
+    """Return whether a numpy array can be written to, or the one whose numbers it shows."""
+    while hasattr(array, "flags"):
+        if array.flags.writeable:
+            return True
+        array = array.base
+    return False
 
 
 def as_json(channel: Channel) -> dict[str, Any]:
@@ -92,9 +143,20 @@ def _named_tuple(names: tuple[str, ...]) -> type[tuple[Any, ...]]:
     return namedtuple("Signals", names)
 
 
+@lru_cache(maxsize=64)
+def _no_cells(shape: tuple[int, ...], dtype: str) -> Any:
+    if dtype == FLOATS:
+        return ((nan,) * shape[1] if len(shape) > 1 else nan,) * shape[0]
+    import numpy as np
+
+    cells = np.full(shape, nan if dtype == "float32" else 0, dtype)
+    cells.setflags(write=False)
+    return cells
+
+
 def _nothing_yet(channel: Channel) -> Any:
     if isinstance(channel, TactileArray):
-        return Image(0.0, 0, (nan,) * channel.cells)
+        return Image(0.0, 0, _no_cells(channel.shape, channel.dtype))
     if isinstance(channel, FastChannel):
         return Samples(0.0, 0, 0, ((nan,) * len(channel.axes),) * channel.samples)
     return nan

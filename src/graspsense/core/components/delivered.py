@@ -8,8 +8,15 @@ from collections.abc import Iterable
 from itertools import chain
 from typing import Any, Final
 
-from graspsense.core.components.channels import declared_shape, further, shape_of
-from graspsense.core.values.channel import Channel, TactileArray
+from graspsense.core.components.channels import (
+    can_change,
+    declared_dtype,
+    declared_shape,
+    dtype_of,
+    further,
+    shape_of,
+)
+from graspsense.core.values.channel import FLOATS, Channel, TactileArray
 from graspsense.core.values.signals import Frame, Image, Pads, Reading, Samples
 
 _FRAME: Final = struct.Struct(f"<{len(Frame._fields) - 1}dq")
@@ -20,8 +27,10 @@ class Delivered:
 
     def __init__(self, channels: Iterable[Channel]) -> None:
         channels = tuple(channels)
-        self._shapes = {channel.name: declared_shape(channel) for channel in further(channels)}
-        self._declared = tuple(self._shapes)
+        self._forms = {
+            channel.name: (declared_shape(channel), declared_dtype(channel)) for channel in further(channels)
+        }
+        self._declared = tuple(self._forms)
         self._names: tuple[str, ...] | None = None
         arrays = [one.cells for one in channels if one.name == "pads" and isinstance(one, TactileArray)]
         self._cells = arrays[0] if arrays else None
@@ -67,19 +76,24 @@ class Delivered:
         if names != self._names:
             return f"its further channels are {', '.join(names) or 'none'}, and were {', '.join(self._names)}"
         for name, value in zip(names, signals, strict=True):
-            shape = self._shapes.setdefault(name, shape_of(value))
-            problem = _problem(value, shape)
+            shape, dtype = self._forms.setdefault(name, (shape_of(value), dtype_of(value)))
+            problem = _problem(value, shape, dtype)
             if problem:
                 return f"the channel {name!r} {problem}"
         return ""
 
 
-def _problem(value: Any, shape: tuple[int, ...]) -> str:
-    """Return what is wrong with the value of a channel that has this shape."""
+def _problem(value: Any, shape: tuple[int, ...], dtype: str) -> str:
+    """Return what is wrong with the value of a channel that has this shape, and numbers of this type."""
+    if dtype_of(value) != dtype:
+        return f"has cells of type {dtype_of(value)} instead of {dtype}: convert them, or declare their dtype"
+    sized = _image_sized if isinstance(value, Image) else _sized
     if shape_of(value) != shape:
-        return f"has {_sized(shape_of(value))} instead of {_sized(shape)}"
+        return f"has {sized(shape_of(value))} instead of {sized(shape)}"
+    if isinstance(value, Image) and dtype != FLOATS:
+        return _array_problem(value.cells)
     if isinstance(value, Image):
-        numbers: Iterable[Any] = value.cells
+        numbers: Iterable[Any] = chain.from_iterable(value.cells) if len(shape) > 1 else value.cells
     elif isinstance(value, Samples):
         if any(len(row) != shape[1] for row in value.values) or not 0 <= value.new <= shape[0]:
             return f"does not have {_sized(shape)} in each tick"
@@ -87,6 +101,22 @@ def _problem(value: Any, shape: tuple[int, ...]) -> str:
     else:
         numbers = (value,)
     return "" if _are_numbers(numbers) else "has a value that is not a number"
+
+
+def _array_problem(cells: Any) -> str:
+    """Return what is wrong with a numpy array that has the declared shape and type."""
+    if not cells.flags.c_contiguous:
+        return "is an array that is not contiguous: deliver numpy.ascontiguousarray(array)"
+    if can_change(cells):
+        return (
+            "is an array that can still be changed: deliver a copy of it that is read-only (array = array.copy(); "
+            "array.setflags(write=False))"
+        )
+    return ""
+
+
+def _image_sized(shape: tuple[int, ...]) -> str:
+    return f"{shape[0]} cells" if len(shape) == 1 else f"the shape {' x '.join(map(str, shape))}"
 
 
 def _sized(shape: tuple[int, ...]) -> str:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from graspsense.core.components.channels import declared_shape
+from graspsense.core.components.channels import declared_dtype, declared_shape
 from graspsense.core.components.config import SelectedComponent, Settings, select_component
 from graspsense.core.components.entries import Role
 from graspsense.core.components.registry import Component, installed
-from graspsense.core.values.channel import Channel, FastChannel, TactileArray
+from graspsense.core.values.channel import FLOATS, Channel, FastChannel, TactileArray
 from graspsense.core.values.errors import GraspsenseError, PluginUnavailable, WiringError
 
 
@@ -124,12 +124,13 @@ def _fits(wanted: Channel, have: Channel, role: Role) -> bool:
         return False
     if role == "feature-set" and isinstance(wanted, FastChannel):
         return declared_shape(have)[1:] == declared_shape(wanted)[1:]
-    return declared_shape(have) == declared_shape(wanted)
+    return (declared_shape(have), declared_dtype(have)) == (declared_shape(wanted), declared_dtype(wanted))
 
 
 def _layout(channel: Channel) -> str:
     if isinstance(channel, TactileArray):
-        return f"an array of {channel.cells} cells"
+        cells = " x ".join(map(str, channel.shape))
+        return f"an array of {cells} {'cells' if channel.dtype == FLOATS else channel.dtype}"
     if isinstance(channel, FastChannel):
         return f"{channel.samples} samples a tick of {', '.join(channel.axes)}"
     return "one number a tick"

@@ -67,14 +67,21 @@ def _refuse_too_many(channel: Channel, numbers: int) -> None:
         raise ValueError(f"channel {channel.name!r} has {too_many}")
 
 
+CellType = Literal["float64", "float32", "uint16", "uint8"]
+FLOATS: Final[CellType] = "float64"
+"""The type of cells that a reading has as Python floats; those of every other type are a numpy array."""
+
+
 @frozen
 class TactileArray(Channel):
-    """An array of tactile cells. An image of it has one number for each cell.
+    """An array of tactile cells, or the pixels of a camera. An image has one to three numbers for each cell.
 
     The array named `pads` stands for both fingertips, whose images are `Reading.pads`; every other array has its
     `Image` in `Reading.signals`. Its cells are given by `rows` and `columns` (row by row), by `positions_m`, or by
-    both. Raises ValueError if there is no cell, if these do not have the same number of cells, or if there are more
-    than `GRASPSENSE_MAX_CHANNEL_NUMBERS`.
+    both. With the default `dtype` an image is a tuple of floats, which compiled laws take. With every other one it is
+    a read-only numpy array of that type, which is passed on by reference: choose it for a camera. Raises ValueError
+    if there is no cell, if these do not have the same number of cells, if there are more numbers than
+    `GRASPSENSE_MAX_CHANNEL_NUMBERS`, and if `pads` has another type or several components.
     """
 
     finger: str = field(default="", validator=instance_of(str), kw_only=True)
@@ -85,6 +92,12 @@ class TactileArray(Channel):
     """The place of each cell on its surface, along the finger and across it; NaN for a cell that is elsewhere."""
     facing: tuple[bool, ...] = field(default=(), kw_only=True)
     """Whether each cell faces the object; empty if all do."""
+    components: int = field(default=1, validator=[instance_of(int), in_((1, 2, 3))], kw_only=True)
+    """The numbers of a cell: 3 for a force in three directions, or for red, green and blue."""
+    dtype: CellType = field(
+        default=FLOATS, validator=in_((FLOATS, "float32", "uint16", "uint8")), kw_only=True
+    )
+    """The type of the numbers: `float64`, a Python float each, or `float32`, `uint16`, `uint8`, a numpy array."""
 
     def __attrs_post_init__(self) -> None:
         super().__attrs_post_init__()
@@ -94,7 +107,12 @@ class TactileArray(Channel):
                 f"array {self.name!r} has {self.rows} rows, {self.columns} columns and {placed} positions: give rows "
                 "and columns, the position of each cell, or both with the same number of cells"
             )
-        _refuse_too_many(self, self.cells)
+        _refuse_too_many(self, self.numbers)
+        if self.name == "pads" and (self.dtype != FLOATS or self.components != 1):
+            raise ValueError(
+                f"'pads' has {self.components} numbers of {self.dtype} a cell, and the fingertips have one float64 a "
+                "cell: declare an array for each finger, such as TactileArray('camera_left', ..., finger='left')"
+            )
         if self.facing and len(self.facing) != self.cells:
             raise ValueError(
                 f"array {self.name!r} has {self.cells} cells, and 'facing' has {len(self.facing)} values"
@@ -104,6 +122,21 @@ class TactileArray(Channel):
     def cells(self) -> int:
         """The number of cells."""
         return self.rows * self.columns or len(self.positions_m)
+
+    @property
+    def numbers(self) -> int:
+        """The number of numbers of an image."""
+        return self.cells * self.components
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """The shape of an image, as a trace has it: (cells,), or (cells, components) of several components.
+
+        Of a numpy array with rows and columns it is (rows, columns), or (rows, columns, components).
+        """
+        grid = self.dtype != FLOATS and self.rows
+        cells = (self.rows, self.columns) if grid else (self.cells,)
+        return cells if self.components == 1 else (*cells, self.components)
 
 
 @frozen

@@ -70,14 +70,17 @@ NO_PADS: Final = no_pads(0)
 
 
 class Image(NamedTuple):
-    """The last image of a tactile array other than the fingertips': one number for each cell, as the array declares.
+    """The last image of a tactile array other than the fingertips': the cells, as the array declares them.
 
-    `counter` increases by one with each new image. It is 0, and the cells are NaN, before the first image.
+    `cells` has a float for each cell, or of several components a tuple of these. Of an array with another `dtype`
+    than float64 it is a numpy array of the shape `TactileArray.shape`: contiguous, read-only, and not changed by
+    anyone after it was delivered. NaN stands for a cell without a value. `counter` increases by one with each new
+    image. It is 0, and the cells are NaN (0 in whole numbers), before the first image.
     """
 
     t_s: float
     counter: int
-    cells: tuple[float, ...]
+    cells: Any
 
 
 class Samples(NamedTuple):

@@ -10,6 +10,7 @@ import numpy as np
 from attrs import define, evolve, field, frozen
 
 from graspsense.core.values.display import html, plot
+from graspsense.core.values.kept_images import KeptImages
 from graspsense.core.values.signals import CHANNELS, NO_PADS, Command, Frame, Image, Pads, Reading, Samples
 from graspsense.core.values.units import quantity
 
@@ -32,10 +33,14 @@ PAD_COLUMNS: Final = ("pad_t_s", "pad_left", "pad_right")
 
 @frozen(eq=False, kw_only=True)
 class ImageTrace:
-    """The images of a tactile array: their times (m,), and the cells (m, number of cells)."""
+    """The images of a tactile array: their times (m,), and the cells (m, number of cells).
+
+    Of several components the cells are (m, number of cells, components). Those of an array with another `dtype` than
+    float64 have this type and the shape (m, rows, columns), or (m, rows, columns, components), and are read-only.
+    """
 
     t_s: Floats
-    cells: Floats
+    cells: NDArray[Any]
 
     def until(self, t_s: float) -> ImageTrace:
         """Return the images that are not later than `t_s`."""
@@ -144,7 +149,10 @@ class Trace:
 
 @define(eq=False)
 class TraceRecorder:
-    """Collects the ticks of a running grasp; `trace()` returns those collected so far."""
+    """Collects the ticks of a running grasp; `trace()` returns those collected so far.
+
+    Images that are numpy arrays are copied to a temporary file, so that they do not fill the memory.
+    """
 
     units: Mapping[str, str] = field(factory=lambda: dict(SI_UNITS))
     frames: list[Frame] = field(factory=list, init=False)
@@ -157,6 +165,8 @@ class TraceRecorder:
     """The frames that were converted to numbers before, in whole blocks."""
     pads: Pads = field(default=NO_PADS, init=False)
     """The last image, which has as many cells also before the first one."""
+    _kept: tuple[tuple[int, KeptImages], ...] | None = field(default=None, init=False)
+    """The images that are numpy arrays, with the numbers of their channels; None before the first tick."""
 
     def add(self, reading: Reading, phase: int, command: Command) -> None:
         """Add one tick, and its cell image if the counter of the image is new."""
@@ -164,12 +174,27 @@ class TraceRecorder:
         self.frames.append(frame)
         self.pads = pads
         if signals:
-            self.signals.append(signals)
+            self.signals.append(self._without_arrays(signals))
         self.phases.append(phase)
         self.commands.append(command.value)
         images = self.images
         if pads.counter and (not images or images[-1].counter != pads.counter):
             images.append(pads)
+
+    def _without_arrays(self, signals: Any) -> Any:
+        """Keep the images that are numpy arrays, and return the signals with a reference to each."""
+        if self._kept is None:
+            self._kept = tuple(
+                (i, KeptImages(value.cells))
+                for i, value in enumerate(signals)
+                if isinstance(value, Image) and isinstance(value.cells, np.ndarray)
+            )
+        if not self._kept:
+            return signals
+        values = list(signals)
+        for i, images in self._kept:
+            values[i] = images.add(values[i])
+        return type(signals)._make(values)
 
     def extend(self, frames: Sequence[Frame], phase: int, commands: Sequence[float]) -> None:
         """Add ticks of one phase without a new cell image, of a gripper without further channels."""
@@ -265,13 +290,24 @@ def _signal(values: Sequence[Any]) -> SignalTrace:
     if isinstance(values[0], Image):
         counters = [0, *(image.counter for image in values)]
         images = [image for image, last in zip(values, counters, strict=False) if image.counter != last]
-        return ImageTrace(
-            t_s=np.array([image.t_s for image in images], dtype=np.float64),
-            cells=_rows([image.cells for image in images]),
-        )
+        t_s = np.array([image.t_s for image in images], dtype=np.float64)
+        return ImageTrace(t_s=t_s, cells=_cells([image.cells for image in images], values[0].cells))
     if isinstance(values[0], Samples):
         return _samples([block for block in values if block.new])
     return np.array(values, dtype=np.float64)
+
+
+def _cells(images: Sequence[Any], example: Any) -> NDArray[Any]:
+    """Return the cells of these images in one array. `example` are cells of the same type where there is no image."""
+    if isinstance(example, KeptImages):
+        return example.first_images(len(images))
+    if isinstance(example, np.ndarray):
+        cells = np.array(images, dtype=example.dtype).reshape(len(images), *example.shape)
+        cells.setflags(write=False)
+        return cells
+    if example and isinstance(example[0], tuple):
+        return np.array(images, dtype=np.float64).reshape(len(images), len(example), len(example[0]))
+    return _rows(images)
 
 
 def _samples(blocks: Sequence[Samples]) -> SampleTrace:

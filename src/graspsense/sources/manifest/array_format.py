@@ -184,7 +184,7 @@ def _of_arrays(path: Path, arrays: Arrays, rows: int = 0) -> ColumnTable:
     if not rows:
         rows = len(numeric[_ALONE]) if _ALONE in numeric else _common_length(numeric)
     columns: dict[str, Numbers] = {}
-    shapes = {}
+    shapes: dict[str, tuple[int, ...]] = {}
     for name, array in numeric.items():
         if rows not in (array.shape[0], array.shape[-1]):
             continue
@@ -192,7 +192,8 @@ def _of_arrays(path: Path, arrays: Arrays, rows: int = 0) -> ColumnTable:
         if (
             values.ndim > 2
         ):  # cells in rows and columns, each with its components if there are four dimensions
-            shapes[name] = (values.shape[1], int(np.prod(values.shape[2:])))
+            cells = values.shape[1:] if values.ndim == 4 and values.shape[3] in (2, 3) else ()
+            shapes[name] = cells or (values.shape[1], int(np.prod(values.shape[2:])))
         values = values.reshape(rows, -1)
         if name:
             columns[name] = values[:, 0] if values.shape[1] == 1 else values

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from keyword import iskeyword
@@ -202,18 +203,18 @@ def _channels(
 
 def _shapes(
     manifest: ReadManifest, table: ColumnTable, found: AvailableColumns, arrays: Mapping[str, Numbers]
-) -> dict[str, tuple[int, int]]:
+) -> dict[str, tuple[int, ...]]:
     """Return the shape of each channel that is computed from a column with a shape, such as an image.
 
     The numbers of a fast channel without one are samples of one axis.
     """
-    shapes = {}
+    shapes: dict[str, tuple[int, ...]] = {}
     for name, values in arrays.items():
         width = values.shape[1]
         columns = manifest.channels[name].columns(tuple(found))
         known = [table.shapes[column] for column in columns if column in table.shapes]
         # An expression may have taken some of the cells.
-        if known and known[-1][0] * known[-1][1] == width:
+        if known and math.prod(known[-1]) == width:
             shapes[name] = known[-1]
         elif name in manifest.fast:
             shapes[name] = (width, 1)

@@ -26,8 +26,9 @@ class ColumnTable:
     source: str
     """The file, and the part of it, in words."""
     numbers: Mapping[str, Numbers] = field(factory=dict)
-    shapes: Mapping[str, tuple[int, int]] = field(factory=dict)
-    """Rows and columns of a column that is an image, or samples and axes of a fast channel."""
+    shapes: Mapping[str, tuple[int, ...]] = field(factory=dict)
+    """Rows and columns of an image, with the components of a cell if there are several; samples and axes of a fast
+    channel."""
     texts: Mapping[str, Sequence[str]] = field(factory=dict)
     fields: Mapping[str, str] = field(factory=dict)
     t_s: Numbers | None = None

@@ -1,0 +1,493 @@
+"""Images as numpy arrays, and cells of several components: declared, delivered, recorded, replayed and exported."""
+
+from __future__ import annotations
+
+import errno
+import io
+import os
+import re
+import sys
+from math import inf, nan
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+from attrs import evolve, frozen
+from mcap.reader import make_reader
+
+from graspsense import load_pipeline
+from graspsense.core.components.channels import as_json, cells_of, from_json, no_signals, read_only
+from graspsense.core.components.registry import IsolatedPlugins
+from graspsense.core.components.run_config import RunConfig
+from graspsense.core.grasp.runner import run_grasp
+from graspsense.core.values.kept_images import KeptImages
+from graspsense.core.values.signals import Outcome
+from graspsense.core.values.trace import TraceRecorder, trace_of
+from graspsense.plugin_api import (
+    EFFORT,
+    NAMES_INPUT,
+    NO_PADS,
+    Channel,
+    Command,
+    DeviceInfo,
+    Frame,
+    Image,
+    ObjectKind,
+    Reading,
+    SensorBackend,
+    SensorBackendEntry,
+    TactileArray,
+    hookimpl,
+    setting,
+    signal_type,
+)
+from graspsense.recording.export_trace import write_csv, write_npz, write_parquet
+from graspsense.recording.reader import read_recorded
+from graspsense.recording.replayable import content_sha256
+from graspsense.sources.replay import read_named
+from graspsense.store.record_grasp import record_grasp
+from graspsense.store.store import Store
+from graspsense.testing.conformance import examine
+from graspsense.testing.gentle import GentleController
+from graspsense.testing.model_gripper import ModelGripper
+
+HERE = sys.modules[__name__]
+EYE = TactileArray("eye", "counts", 50.0, finger="left", rows=6, columns=8, components=3, dtype="uint8")
+DEPTH = TactileArray("depth", "um", 50.0, rows=4, columns=5, dtype="uint16")
+HEAT = TactileArray("heat", "K", 50.0, rows=3, columns=2, dtype="float32")
+FORCES = TactileArray("forces", "N", 50.0, rows=2, columns=2, components=3)
+IMAGES = (EYE, DEPTH, HEAT, FORCES)
+FRAME = tuple(
+    Channel(name, unit, 1000.0)
+    for name, unit in (
+        *(("gap", "m"), ("velocity", "m/s"), ("effort", "N")),
+        *(("force_left", "N"), ("force_right", "N")),
+    )
+)
+TICKS_OF_AN_IMAGE = 20
+
+
+def numbers_of(array: TactileArray, counter: int):
+    """The numbers of an image, which follow from its counter: no two images are equal."""
+    numbers = (np.arange(array.numbers) * 3 + counter * 7) % 251
+    return numbers.astype(array.dtype)
+
+
+@frozen(kw_only=True)
+class Held:
+    object: str = setting(default="cup:full", effect=NAMES_INPUT, meaning="What it holds.")
+
+
+class Eyes(SensorBackend[Held]):
+    """The model gripper with a camera, an image of 16 bits, one of floats with a missing cell, and force vectors."""
+
+    channels = (*FRAME, *IMAGES)
+    accepts = ("effort",)
+
+    def open(self, seed):
+        self._fingers = ModelGripper(frozenset(FRAME), 0.05, 1500.0)
+        self._fingers.open(seed)
+        self._tick, self._signals = -1, no_signals(self.channels)
+        return DeviceInfo(
+            name="eyes",
+            clock="virtual",
+            simulated=True,
+            rate_hz=1000.0,
+            effort_limit_n=100.0,
+            speed_limit_m_s=0.2,
+            opening=Command(EFFORT, -15.0, inf, inf),
+            relaxed=Command(EFFORT, 0.0, inf, inf),
+        )
+
+    def objects(self):
+        return (ObjectKind(name="cup", states=("full",)),)
+
+    def with_object(self, name):
+        return type(self)(evolve(self.config, object=name))
+
+    def image(self, array, t_s, counter):
+        numbers = numbers_of(array, counter)
+        if array is HEAT:
+            numbers[1] = nan
+        return Image(t_s, counter, cells_of(array, numbers))
+
+    def read(self, timeout_s):
+        frame, _, _ = self._fingers.read(timeout_s)
+        self._tick += 1
+        if self._tick % TICKS_OF_AN_IMAGE == 0:
+            counter = 1 + self._tick // TICKS_OF_AN_IMAGE
+            images = (self.image(array, frame.t_s, counter) for array in IMAGES)
+            self._signals = signal_type(self.channels)(*images)
+        return Reading(frame, NO_PADS, self._signals)
+
+    def apply(self, command):
+        self._fingers.apply(command)
+
+    def tare(self, images):
+        pass
+
+    def close(self):
+        pass
+
+
+@hookimpl
+def graspsense_sensor_backends():
+    return [
+        SensorBackendEntry(
+            name="eyes",
+            target=f"{__name__}:Eyes",
+            config=f"{__name__}:Held",
+            summary="a gripper with cameras",
+        )
+    ]
+
+
+GRASPSENSE_API = (2, 0)
+
+
+@pytest.fixture(scope="module")
+def seen(tmp_path_factory):
+    """One grasp, which no test changes: the trial, the path of its recording, and the plugins."""
+    folder = tmp_path_factory.mktemp("seen") / "trials"
+    options = ["gripper.type=eyes", "features.type=chitta", "classifier.type=none", "run.hold_s=0.1"]
+    with (
+        pytest.MonkeyPatch.context() as patch,
+        IsolatedPlugins() as plugins,
+        Store.open(folder) as store,
+    ):
+        patch.setitem(sys.modules, __name__, HERE)
+        plugins.add(HERE, "lab-hand")
+        settings = load_pipeline(options=options, plugins=plugins).settings
+        trial = record_grasp(store, settings, plugins, labels={}, origin="run").trial
+        (path,) = (folder / "recordings").glob("*.mcap")
+        yield trial, path, plugins
+
+
+def demand_same(signals, trace):
+    for array in IMAGES:
+        before, now = signals[array.name], trace.signals[array.name]
+        assert now.cells.dtype == before.cells.dtype == array.dtype
+        assert now.cells.shape == (len(before.t_s), *array.shape)
+        assert now.cells.tobytes() == before.cells.tobytes()
+        assert now.t_s.tobytes() == before.t_s.tobytes()
+
+
+def replayed(recording):
+    recorder = TraceRecorder()
+    for reading in recording.readings:
+        recorder.add(reading, 2, Command(EFFORT, 0.0, inf, inf))
+    return recorder.trace()
+
+
+def test_the_trace_has_each_image_once_with_its_type_and_shape(seen):
+    trial, _, _ = seen
+    signals = trial.trace.signals
+    counters = 1 + np.rint(signals["eye"].t_s * 1000.0 / TICKS_OF_AN_IMAGE).astype(int)
+    assert counters.tolist() == list(range(counters[0], counters[0] + len(counters)))
+    assert len(counters) > 20
+    for array in IMAGES:
+        expected = [numbers_of(array, k).reshape(array.shape) for k in counters.tolist()]
+        if array is HEAT:
+            for numbers in expected:
+                numbers[0, 1] = nan
+        assert signals[array.name].cells.dtype == array.dtype
+        assert np.array_equal(signals[array.name].cells, expected, equal_nan=True)
+    assert signals["eye"].until(signals["eye"].t_s[5]).cells.shape == (6, 6, 8, 3)
+
+
+def test_images_come_back_from_the_recording_and_a_replay_as_they_were(seen):
+    trial, path, _ = seen
+    grasp = read_recorded(path)
+    assert [one for one in grasp.channels if one.name not in {c.name for c in FRAME}] == list(IMAGES)
+    demand_same(trial.trace.signals, grasp.trace())
+    demand_same(trial.trace.signals, replayed(read_named("mcap", str(path))))
+
+
+@pytest.mark.parametrize(
+    ("ending", "write"), [("npz", write_npz), ("csv", write_csv), ("parquet", write_parquet)]
+)
+def test_images_come_back_from_an_export_as_they_were(seen, tmp_path, ending, write):
+    trial, path, _ = seen
+    write(tmp_path / f"grasp.{ending}", read_recorded(path))
+    demand_same(trial.trace.signals, replayed(read_named(ending, str(tmp_path / f"grasp.{ending}"))))
+
+
+def test_an_export_as_columns_has_the_images_of_a_camera_in_a_file_of_arrays(seen, tmp_path):
+    trial, path, _ = seen
+    write_csv(tmp_path / "grasp.csv", read_recorded(path))
+    with np.load(tmp_path / "grasp-eye.npz") as found:
+        assert np.array_equal(found["cells"], trial.trace.signals["eye"].cells)
+        assert set(np.diff(found["counter"])) == {1}
+        assert found["t_s"].tobytes() == trial.trace.signals["eye"].t_s.tobytes()
+
+
+@pytest.mark.slow
+def test_a_gripper_with_cameras_conforms(seen):
+    _, _, plugins = seen
+    report = examine("lab-hand/eyes", plugins=plugins).report()
+    assert [(one.check, one.text) for one in report.results if one.state == "failed"] == []
+    assert "images-stay-as-they-were-delivered" in {
+        one.check for one in report.results if one.state == "passed"
+    }
+
+
+def grasped(image, monkeypatch, array=EYE):
+    """Return the grasp of a gripper that delivers these cells as every image of the camera."""
+    monkeypatch.setattr(Eyes, "channels", (*FRAME, array))
+    signals = signal_type((array,))
+    monkeypatch.setattr(
+        Eyes,
+        "read",
+        lambda self, timeout_s: Reading(
+            self._fingers.read(timeout_s).frame, NO_PADS, signals(Image(0.0, 1, image))
+        ),
+    )
+    return run_grasp(Eyes(Held()), GentleController(EFFORT), RunConfig())
+
+
+def fixed(array):
+    array.setflags(write=False)
+    return array
+
+
+@pytest.mark.parametrize(
+    ("image", "word"),
+    [
+        (fixed(np.zeros((8, 6, 3), np.uint8)), "8 x 6 x 3 instead of the shape 6 x 8 x 3"),
+        (fixed(np.zeros((6, 8), np.uint8)), "6 x 8 instead of"),
+        (fixed(np.zeros((6, 8, 3), np.int16)), "int16 instead of uint8"),
+        (fixed(np.zeros((6, 8, 3), np.uint8)).tolist(), "float64 instead of uint8"),
+        (np.zeros((6, 8, 3), np.uint8), "can still be changed"),
+        (fixed(np.zeros((6, 8, 3), np.uint8)[::1, ::-1][:, ::-1]), "can still be changed"),
+        (fixed(fixed(np.zeros((6, 16, 3), np.uint8))[:, ::2]), "not contiguous"),
+    ],
+)
+def test_an_image_that_is_not_as_declared_ends_the_grasp_and_is_told(image, word, monkeypatch):
+    ended = grasped(image, monkeypatch)
+    assert ended.outcome is Outcome.ABORTED
+    assert "'eye'" in ended.reason
+    assert word in ended.reason
+
+
+def test_a_read_only_view_of_an_array_that_can_be_changed_is_refused(monkeypatch):
+    view = np.zeros((6, 8, 3), np.uint8)[:]
+    view.setflags(write=False)
+    assert "can still be changed" in grasped(view, monkeypatch).reason
+
+
+def test_floats_of_three_components_are_tuples_of_three_in_each_cell(monkeypatch):
+    right = ((1.0, 2.0, nan),) * 4
+    assert grasped(right, monkeypatch, FORCES).outcome is not Outcome.ABORTED
+    ended = grasped(((1.0, 2.0),) * 4, monkeypatch, FORCES)
+    assert "4 x 2 instead of the shape 4 x 3" in ended.reason
+
+
+def test_an_array_says_its_type_and_components_or_is_refused():
+    with pytest.raises(ValueError, match="dtype"):
+        TactileArray("eye", "counts", rows=2, columns=2, dtype="int64")
+    with pytest.raises(ValueError, match="components"):
+        TactileArray("eye", "counts", rows=2, columns=2, components=4)
+    with pytest.raises(ValueError, match="GRASPSENSE_MAX_CHANNEL_NUMBERS"):
+        TactileArray("eye", "counts", rows=1024, columns=1024, components=2, dtype="uint8")
+    with pytest.raises(ValueError, match="camera_left"):
+        TactileArray("pads", "counts", rows=240, columns=320, components=3, dtype="uint8")
+    for array in IMAGES:
+        assert from_json(as_json(array)) == array
+    spread = TactileArray("skin", "N", positions_m=((0.0, 0.0),) * 5, components=2, dtype="float32")
+    assert spread.shape == (5, 2)
+
+
+def test_an_array_is_passed_by_reference_if_nobody_can_change_it():
+    pixels = fixed(np.arange(144, dtype=np.uint8))
+    assert np.shares_memory(cells_of(EYE, pixels), pixels)
+    changing = np.arange(144, dtype=np.uint8)
+    kept = cells_of(EYE, changing)
+    changing[:] = 0
+    assert kept.ravel().tolist() == list(range(144))
+    with pytest.raises(ValueError, match="read-only"):
+        kept[0, 0, 0] = 1
+    assert read_only(np.zeros(3), "float32").dtype == "float32"
+
+
+def test_before_the_first_image_there_are_numbers_of_the_same_type():
+    eye, _, heat, forces = no_signals(IMAGES)
+    assert (eye.counter, eye.cells.dtype, eye.cells.max()) == (0, "uint8", 0)
+    assert np.isnan(heat.cells).all()
+    assert np.isnan(forces.cells).all()
+    assert not eye.cells.flags.writeable
+
+
+def test_the_hash_of_a_grasp_tells_images_apart_that_differ_in_one_cell(seen):
+    _, path, _ = seen
+    recording = read_recorded(path).recording()
+    big = TactileArray("eye", "counts", rows=100, columns=100, dtype="uint8")
+
+    def seeing(pixel):
+        cells = np.zeros((100, 100), np.uint8)
+        cells[50, 50] = pixel
+        reading = Reading(
+            recording.readings[0].frame, NO_PADS, signal_type((big,))(Image(0.0, 1, fixed(cells)))
+        )
+        return content_sha256(evolve(recording, readings=(reading,), channels=(big,)))
+
+    assert seeing(1) != seeing(2)
+    assert seeing(1) == seeing(1)
+
+
+def images_of(number):
+    return [Image(0.1 * k, k + 1, fixed(np.full((2, 3), k, np.uint16))) for k in range(number)]
+
+
+def test_images_for_which_the_disk_has_no_room_stay_in_memory(monkeypatch):
+    write = os.pwrite
+    left = [3]
+
+    def pwrite(fd, data, at):
+        if not left[0]:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        left[0] -= 1
+        return write(fd, data, at)
+
+    monkeypatch.setattr(os, "pwrite", pwrite)
+    kept = KeptImages(np.zeros((2, 3), np.uint16))
+    for image in images_of(6):
+        kept.add(image)
+        kept.add(image)  # the same image, in the next tick
+    for number in range(7):
+        shown = kept.first_images(number)
+        assert shown.shape == (number, 2, 3)
+        assert shown.dtype == "uint16"
+        assert shown[:, 0, 0].tolist() == list(range(number))
+
+
+def test_the_trace_of_a_running_grasp_grows_and_keeps_what_it_had():
+    array = TactileArray("depth", "um", rows=2, columns=3, dtype="uint16")
+    recorder, make = TraceRecorder(), signal_type((array,))
+    frame = Frame(0.0, 0.1, 0.05, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0)
+    readings = [Reading(frame, NO_PADS, make(image)) for image in (*no_signals((array,)), *images_of(5))]
+    traces = []
+    for reading in readings:
+        recorder.add(reading, 2, Command(EFFORT, 0.0, inf, inf))
+        traces.append(recorder.trace().signals["depth"].cells)
+    assert [len(cells) for cells in traces] == [0, 1, 2, 3, 4, 5]
+    assert all(cells.tobytes() == traces[-1][: len(cells)].tobytes() for cells in traces)
+    # The same from readings at hand, without a file.
+    again = trace_of([frame] * 6, [2] * 6, [0.0] * 6, [], signals=[one.signals for one in readings])
+    assert again.signals["depth"].cells.tobytes() == traces[-1].tobytes()
+
+
+class Reference(NamedTuple):
+    phase: int
+    outcome: int
+    counter: int
+    before: Any
+    change: float
+
+
+def step_with_reference(params, state, reading):
+    """Keeps the first image, and tells how much the last one differs from it."""
+    image = reading.signals.eye
+    before = image.cells if state.counter == 0 and image.counter else state.before
+    change = float(abs(image.cells.astype(float) - before).mean()) if image.counter else 0.0
+    ended = 1 if change > 40.0 else 0
+    after = Reference(2 if not ended else 4, ended, max(state.counter, image.counter), before, change)
+    return Command(EFFORT, 5.0, inf, inf), after
+
+
+class Watching(GentleController):
+    """A law that compares each image with the first one."""
+
+    step = staticmethod(step_with_reference)
+
+    def init(self):
+        return Reference(2, 0, 0, no_signals((EYE,)).eye.cells, 0.0)
+
+
+def test_a_law_keeps_a_reference_image():
+    law = Watching(EFFORT)
+    ended = run_grasp(Eyes(Held()), law, RunConfig())
+    assert ended.outcome is Outcome.STEADY
+    cells = ended.trace.signals["eye"].cells.astype(float)
+    changes = abs(cells - cells[0]).mean(axis=(1, 2, 3))
+    held_s = ended.trace.t_s[np.flatnonzero(ended.trace.phase == 4)[0]]
+    seen_until_then = changes[: np.searchsorted(ended.trace.signals["eye"].t_s, held_s, "right")]
+    assert seen_until_then[-1] > 40.0 > seen_until_then[:-1].max()
+
+
+def test_pictures_for_foxglove_have_the_colours_of_the_camera(seen):
+    from graspsense.recording.foxglove import with_pictures
+
+    trial, path, _ = seen
+    made = make_reader(io.BytesIO(with_pictures(read_recorded(path))))
+    messages = [m.data for _, c, m in made.iter_messages(topics=["/grasp/pictures/eye"])]
+    cells = trial.trace.signals["eye"].cells
+    assert len(messages) == len(cells)
+    large = cells.repeat(16, axis=1).repeat(16, axis=2)
+    assert all(data.endswith(image.tobytes()) for data, image in zip(messages, large, strict=True))
+    assert b"rgb8" in messages[0]
+
+
+def test_a_camera_is_a_small_picture_in_the_report():
+    import base64
+    import zlib
+
+    from graspsense.report.tactile import tactile_figures
+    from graspsense.testing.samples import squeeze, with_signals
+
+    arrays = (
+        TactileArray("eye", "counts", 30.0, rows=240, columns=320, components=3, dtype="uint8"),
+        TactileArray("floats", "counts", 30.0, rows=120, columns=160),
+        TactileArray("shear", "N", 30.0, rows=60, columns=80, components=3),
+        TactileArray("line", "K", 30.0, rows=1, columns=2000, dtype="float32"),
+    )
+    trace = with_signals(squeeze(), arrays)
+    cells = np.zeros((len(trace.signals["eye"].t_s), 240, 320, 3), np.uint8)
+    cells[:, :120] = (200, 100, 50)
+    trace = evolve(trace, signals={**trace.signals, "eye": evolve(trace.signals["eye"], cells=cells)})
+    _, *figures = tactile_figures(trace, arrays)
+    assert [one.count("<image") for one in figures] == [3, 3, 3, 3]
+    assert sum(map(len, figures)) < 200_000
+    data = base64.b64decode(re.search(r'base64,([^"]+)"', figures[0]).group(1))
+    width, height = int.from_bytes(data[16:20]), int.from_bytes(data[20:24])
+    assert (width, height) == (106, 80)
+    body = zlib.decompress(data[data.index(b"IDAT") + 4 : data.index(b"IEND") - 8])
+    rows = np.frombuffer(body, np.uint8).reshape(height, 1 + 3 * width)[:, 1:].reshape(height, width, 3)
+    assert (rows[:40] == (200, 100, 50)).all()
+    assert (rows[41:] == 0).all()
+
+
+def test_a_plot_and_a_notebook_show_cameras():
+    from graspsense.report.notebook import trace_html
+    from graspsense.testing.samples import squeeze, with_signals
+
+    arrays = (TactileArray("eye", "counts", 30.0, rows=240, columns=320, components=3, dtype="uint8"), FORCES)
+    trace = with_signals(squeeze(), arrays)
+    page = trace_html(trace)
+    assert "eye" in page
+    assert "forces" in page
+    assert len(page) < 300_000
+
+
+def test_the_conformance_check_tells_of_an_image_that_is_changed_later(seen, monkeypatch):
+    from graspsense.testing.backend import images_stay_as_they_were_delivered
+    from graspsense.testing.checks import CheckFailed
+    from graspsense.testing.subject import Subject
+
+    _, _, plugins = seen
+    bytes_of_all = bytearray(EYE.numbers)
+    shared = np.frombuffer(bytes_of_all, np.uint8).reshape(EYE.shape)
+    shared.setflags(write=False)
+    shared.base.setflags(write=False)
+    image = Eyes.image
+
+    def refilled(self, array, t_s, counter):
+        if array is not EYE:
+            return image(self, array, t_s, counter)
+        bytes_of_all[:] = numbers_of(EYE, counter).tobytes()
+        return Image(t_s, counter, shared)
+
+    (eyes,) = (one for one in plugins.components("sensor-backend") if one.name == "eyes")
+    images_stay_as_they_were_delivered(Subject(component=eyes))
+    monkeypatch.setattr(Eyes, "image", refilled)
+    with pytest.raises(CheckFailed, match="changed after it was delivered"):
+        images_stay_as_they_were_delivered(Subject(component=eyes))
