@@ -18,6 +18,7 @@ from graspsense.core.values.errors import ConfigError
 from graspsense.core.values.signals import EFFORT, FORCE, POSITION, VELOCITY, Command, Outcome, Phase, Reading
 from graspsense.plugin_api import CHANNELS, Channel, ObjectKind, SensorBackend, SensorBackendEntry, hookimpl
 from graspsense.plugins.controllers.force import ForceConfig, ForceController
+from graspsense.plugins.controllers.hybrid import HybridConfig, HybridController
 from graspsense.plugins.controllers.send_and_watch import SendAndWatchConfig, SendAndWatchController
 from graspsense.testing.model_gripper import OBJECTS, ModelGripper
 
@@ -86,6 +87,48 @@ def test_it_approaches_gently_stops_raises_the_force_in_steps_and_waits_for_rest
     contact_s = trace.t_s[trace.phase == Phase.SQUEEZE][0]
     before_step = (trace.t_s >= contact_s) & (trace.t_s < contact_s + 0.1)
     assert trace.effort_n[before_step].max() < 8.0
+
+
+def held_n(trace):
+    return trace.force_left_n[trace.phase == Phase.HOLD][-1]
+
+
+HYBRIDS = [{"sends": "position"}, {"sends": "velocity"}, {"sends": "position", "loop": "closed"}]
+
+
+@pytest.mark.parametrize("keys", HYBRIDS)
+@pytest.mark.parametrize("thing", ["a soft object", "a hard object"])
+def test_hybrid_approaches_gently_and_raises_the_force_in_steps(thing, keys):
+    body = Body(WITH_PADS, thing)
+    grasp = run_grasp(body, HybridController(HybridConfig(**keys)), RUN)
+    assert grasp.outcome is Outcome.STEADY, grasp.reason
+    trace = grasp.trace
+    assert -trace.velocity_m_s[trace.phase == Phase.APPROACH].min() < 0.0105
+    closing = [one.effort_limit_n for one in body.sent if one.effort_limit_n < 25.0]
+    assert [force for force in dict.fromkeys(closing) if force < 19.5] == [5.0, 10.0, 15.0]
+    assert held_n(trace) == pytest.approx(20.0, abs=0.5)
+    # Until the first step, the fingers stop where both pads touched.
+    contact_s = trace.t_s[trace.phase == Phase.SQUEEZE][0]
+    assert trace.force_left_n[(trace.t_s >= contact_s) & (trace.t_s < contact_s + 0.1)].max() < 8.0
+
+
+@pytest.mark.parametrize("law", [HybridController, SendAndWatchController])
+def test_an_approach_with_the_force_of_the_squeeze_closes_on_after_the_contact(law):
+    config = {HybridController: HybridConfig, SendAndWatchController: SendAndWatchConfig}[law]
+    body = Body(WITH_PADS)
+    grasp = run_grasp(body, law(config(sends="position", approach_force_n=20.0)), RUN)
+    assert grasp.outcome is Outcome.STEADY, grasp.reason
+    assert held_n(grasp.trace) == pytest.approx(20.0, abs=0.5)
+
+
+@pytest.mark.parametrize("sends", ["position", "force"])
+def test_force_sends_its_force_with_the_closed_position(sends):
+    body = Body(WITH_PADS, "a hard object")
+    grasp = run_grasp(body, ForceController(ForceConfig(sends=sends)), RUN)
+    assert grasp.outcome is Outcome.STEADY, grasp.reason
+    assert held_n(grasp.trace) == pytest.approx(20.0, abs=0.5)
+    closing = body.sent[len(body.sent) // 4]
+    assert closing[:2] == ((POSITION, 0.0) if sends == "position" else (FORCE, 20.0))
 
 
 def test_nothing_between_the_fingers_is_said():
@@ -167,6 +210,36 @@ def pipeline(monkeypatch):
 def test_what_its_commands_become_is_told_with_the_grasp(pipeline):
     notes = pipeline("controller.type=send-and-watch", "controller.sends=velocity").grasp().device.notes
     assert "the gripper closes by itself: a velocity becomes a far target" in notes
+    assert any(note.startswith("as a velocity, the controller sends the closing speed") for note in notes)
+
+
+LAWS = [
+    ("hybrid", "position"),
+    ("hybrid", "velocity"),
+    ("velocity", "position"),
+    ("velocity", "velocity"),
+    ("force", "position"),
+    ("force", "force"),
+    ("send-and-watch", "position"),
+    ("send-and-watch", "velocity"),
+    ("send-and-watch", "force"),
+]
+
+
+@pytest.mark.parametrize(("law", "sends"), LAWS)
+def test_what_every_law_becomes_is_told(pipeline, law, sends):
+    loaded = pipeline(f"controller.type={law}", f"controller.sends={sends}")
+    assert any(f"as a {sends}, the controller sends" in note for note in loaded.grasp().device.notes)
+
+
+@pytest.mark.parametrize("law", ["hybrid", "send-and-watch"])
+def test_steps_shorter_than_the_delay_of_a_command_are_refused(pipeline, law, monkeypatch):
+    monkeypatch.setattr(Hand, "command_delay_s", 0.15)
+    options = [f"controller.type={law}", "controller.sends=position"]
+    with pytest.raises(WiringError, match="150 ms"):
+        pipeline(*options)
+    notes = pipeline(*options, "controller.step_time_s=0.2").grasp().device.notes
+    assert "the gripper acts on a command up to 150 ms after it is sent" in notes
 
 
 def test_an_effort_is_refused_where_the_gripper_closes_by_itself(pipeline):

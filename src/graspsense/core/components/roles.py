@@ -90,6 +90,8 @@ class SensorBackend(ABC, Generic[ConfigT]):
     """The least speed (m/s) of the gap at which it can move; 0 if there is none."""
     least_step_m: float = 0.0
     """The least change of the gap (m) that it can be commanded; 0 if there is none."""
+    command_delay_s: float = 0.0
+    """The longest time (s) from a command to the first motion or force that follows from it; 0 if it is not known."""
 
     @property
     def channels(self) -> tuple[Channel, ...]:
@@ -348,6 +350,8 @@ class Controller(ABC, Generic[ConfigT]):
     """The kinds of command that `step` may return: any of effort, velocity, position, force."""
     alternatives: ClassVar[tuple[str, ...]] = ()
     """The kinds that it can send instead, each alone; the key `sends` of its config then names one kind."""
+    becomes: ClassVar[Mapping[str, str]] = {}
+    """What the law does with a gripper that closes by itself, for each kind that it can send there. `run` shows it."""
     events: ClassVar[tuple[str, ...]] = ()
     """The names of the events that it tells by the field `events` of its state: `("contact", "slip")`."""
     free_motion: ClassVar[FreeMotion | None] = None
@@ -395,6 +399,13 @@ class Controller(ABC, Generic[ConfigT]):
         """Return the least change of the gap (m) that this law commands by a position; None if it commands none.
 
         A gripper that cannot carry out so small a step is refused before it is opened.
+        """
+        return None
+
+    def asked_interval_s(self) -> float | None:
+        """Return the time (s) for which this law waits for a command to act; None if it waits for none.
+
+        A gripper that takes longer is refused before it is opened.
         """
         return None
 

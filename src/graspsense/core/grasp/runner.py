@@ -295,16 +295,22 @@ def _opened(backend: SensorBackend[Any], seed: int) -> DeviceInfo:
 
 
 def _becoming(backend: SensorBackend[Any], controller: Controller[Any]) -> tuple[str, ...]:
-    """Return sentences on what the commands of this controller become on a gripper that closes by itself."""
+    """Return sentences on what the controller becomes with a gripper that closes by itself."""
     sends = getattr(controller.config, "sends", None)
     sent = (
         (sends,) if sends is not None else getattr(type(controller), "commands", tuple(backend.closes_itself))
     )
-    return tuple(
-        f"the gripper closes by itself: a {kind} becomes {backend.closes_itself[kind]}"
-        for kind in sent
-        if kind in backend.closes_itself
-    )
+    becomes = type(controller).becomes
+    notes = []
+    for kind in filter(backend.closes_itself.__contains__, sent):
+        notes.append(f"the gripper closes by itself: a {kind} becomes {backend.closes_itself[kind]}")
+        if kind in becomes:
+            notes.append(f"as a {kind}, the controller sends {becomes[kind]}")
+    if notes and backend.command_delay_s:
+        notes.append(
+            f"the gripper acts on a command up to {backend.command_delay_s * 1e3:g} ms after it is sent"
+        )
+    return tuple(notes)
 
 
 def _declared(backend: SensorBackend[Any]) -> tuple[Channel, ...]:

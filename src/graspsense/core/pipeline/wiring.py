@@ -50,6 +50,12 @@ def _too_small(settings: Settings) -> Iterator[str]:
                 f"{asks} asks for a {what} of {asked * factor:g} {unit}, and the least {what} of {cannot} is "
                 f"{can * factor:g} {unit}. Ask for at least that, or choose another gripper"
             )
+    interval_s = law.asked_interval_s()
+    if interval_s is not None and interval_s < gripper.command_delay_s:
+        yield (
+            f"{asks} waits {interval_s * 1e3:g} ms for a command to act, and {cannot} may take "
+            f"{gripper.command_delay_s * 1e3:g} ms. Let it wait at least as long"
+        )
     limits = (
         ("first_effort_n", "force", "N", run.first_effort_n, gripper.least_force_n),
         ("effort_ceiling_n", "force", "N", run.effort_ceiling_n, gripper.least_force_n),

@@ -5,14 +5,18 @@ Driven from an open gripper it arrives at full speed: the impact of Fig. 5.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import inf
-from typing import Literal, NamedTuple
+from typing import ClassVar, Literal, NamedTuple
 
 from attrs import frozen
 
 from graspsense.plugin_api import (
     APPROACH,
     EFFORT,
+    FORCE,
+    NOT_FREE,
+    POSITION,
     Command,
     Controller,
     Frame,
@@ -77,6 +81,12 @@ class ForceLoopConfig:
 class ForceConfig(SupervisionConfig, ForceLoopConfig):
     """Settings of the force controller."""
 
+    sends: Literal["effort", "position", "force"] = setting(
+        default="effort",
+        meaning="What is commanded. position and force are for a gripper that closes by itself: the closed position "
+        "with the effort as its force, or the effort as a force.",
+    )
+
 
 class ForceLoop(NamedTuple):
     """The parameters of `ForceLoopConfig`; `closed` is 0 or 1."""
@@ -114,9 +124,10 @@ def settling(config: ForceLoopConfig) -> dict[str, float]:
 
 
 class ForceParams(NamedTuple):
-    """Parameters of the law."""
+    """Parameters of the law; `kind` is the command kind that it sends."""
 
     loop: ForceLoop
+    kind: int
     supervision: Supervision
 
 
@@ -138,14 +149,17 @@ def step(params: ForceParams, state: ForceState, reading: Reading) -> tuple[Comm
     effort = params.loop.probing_force_n
     if progress.phase != APPROACH:
         effort = squeezing_effort(params.loop, state.effort_n, frame)
-    return Command(EFFORT, effort, inf, inf), ForceState(
+    value, limit = effort, inf
+    if params.kind == POSITION:
+        value, limit = 0.0, effort
+    return Command(params.kind, value, limit, inf), ForceState(
         progress.phase, progress.outcome, progress, effort, events_of(state.progress, progress)
     )
 
 
 def free_begin(params: ForceParams, state: ForceState, frame: Frame) -> tuple[float, FreeLimits]:
     """Begin free motion, whose effort is constant: its memory is unused."""
-    return 0.0, free_limits(params.supervision, state.progress)
+    return 0.0, free_limits(params.supervision, state.progress) if params.kind == EFFORT else NOT_FREE
 
 
 def free_command(
@@ -167,6 +181,11 @@ class ForceController(Controller[ForceConfig]):
 
     requires = LAW_CHANNELS
     commands = ("effort",)
+    alternatives = ("position", "force")
+    becomes: ClassVar[Mapping[str, str]] = {
+        "position": "the closed position with the probing force, at the greatest speed that is allowed",
+        "force": "the probing force, at the greatest speed that is allowed",
+    }
     step = staticmethod(step)
     events = EVENTS
     free_motion = FreeMotion(free_begin, free_command, free_end)
@@ -182,7 +201,9 @@ class ForceController(Controller[ForceConfig]):
     def params(self) -> ForceParams:
         """Return the parameters of the law."""
         return ForceParams(
-            loop=force_loop(self.config), supervision=supervision(self.config, **settling(self.config))
+            loop=force_loop(self.config),
+            kind={"effort": EFFORT, "position": POSITION, "force": FORCE}[self.config.sends],
+            supervision=supervision(self.config, **settling(self.config)),
         )
 
     def init(self) -> ForceState:

@@ -6,8 +6,9 @@ switches hard to a constant effort, which is the default; a ramp is an option.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import inf
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 from attrs import frozen
 
@@ -22,6 +23,7 @@ from graspsense.plugin_api import (
     FreeLimits,
     FreeMotion,
     Reading,
+    at_rest,
     setting,
 )
 from graspsense.plugins.controllers.force import (
@@ -30,6 +32,16 @@ from graspsense.plugins.controllers.force import (
     force_loop,
     settling,
     squeezing_effort,
+)
+from graspsense.plugins.controllers.own_loop import (
+    STEPS,
+    OwnLoop,
+    OwnLoopConfig,
+    Raised,
+    approaching,
+    own_loop,
+    raised,
+    rises,
 )
 from graspsense.plugins.controllers.supervision import (
     EVENTS,
@@ -40,6 +52,7 @@ from graspsense.plugins.controllers.supervision import (
     events_of,
     free_limits,
     not_begun,
+    not_resting,
     supervise,
     supervision,
 )
@@ -53,7 +66,7 @@ from graspsense.plugins.controllers.velocity import (
 
 
 @frozen(kw_only=True, slots=False)
-class HybridConfig(SupervisionConfig, ForceLoopConfig, VelocityLoopConfig):
+class HybridConfig(SupervisionConfig, ForceLoopConfig, VelocityLoopConfig, OwnLoopConfig):
     """Settings of the hybrid controller."""
 
     ramp_s: float = setting(
@@ -74,6 +87,7 @@ class HybridParams(NamedTuple):
     force: ForceLoop
     supervision: Supervision
     ramp_s: float
+    own: OwnLoop
 
 
 class HybridState(NamedTuple):
@@ -87,6 +101,8 @@ class HybridState(NamedTuple):
     approach_effort_n: float
     approached_t_s: float
     """Time of the last tick of the velocity loop, at which the ramp starts."""
+    sent: Raised
+    """What is sent to a gripper that closes by itself."""
     events: int = 0
     """The bits of `EVENTS` in this tick."""
 
@@ -94,26 +110,34 @@ class HybridState(NamedTuple):
 def step(params: HybridParams, state: HybridState, reading: Reading) -> tuple[Command, HybridState]:
     """Control the velocity until both pads touch, then the force."""
     frame = reading.frame
-    progress = supervise(params.supervision, state.progress, frame)
-    _, _, _, integral, force_effort, approach_effort, contact_t, _ = state
+    before = state.progress
+    sent = state.sent
+    if params.kind != EFFORT and rises(sent, params.force.probing_force_n):
+        before = not_resting(before, frame)
+    progress = supervise(params.supervision, before, frame)
+    _, _, _, integral, force_effort, approach_effort, contact_t, _, _ = state
     if progress.phase == APPROACH:
         effort, integral = closing_effort(params.velocity, integral, frame.velocity_m_s, frame.dt_s)
         approach_effort = effort
         contact_t = frame.t_s
+        # The fingers stop where both pads touch.
+        sent = Raised(sent.force_n, frame.t_s, frame.gap_m)
     else:
-        force_effort = squeezing_effort(params.force, force_effort, frame)
+        # A gripper that closes by itself is corrected when its own loop has come to rest.
+        if params.kind == EFFORT or (
+            not rises(sent, params.force.probing_force_n)
+            and at_rest(progress.still, frame.t_s, params.supervision.rest_window_s)
+        ):
+            force_effort = squeezing_effort(params.force, force_effort, frame)
         effort = force_effort
         elapsed = frame.t_s - contact_t
         if elapsed < params.ramp_s:
             effort = approach_effort + (effort - approach_effort) * (elapsed / params.ramp_s)
-    value, limit, speed = effort, inf, inf
+        sent = raised(params.own, sent, frame.t_s, params.force.probing_force_n)
+    command = Command(EFFORT, effort, inf, inf)
     if params.kind != EFFORT:
-        value = -params.velocity.closing_speed_m_s
-        if params.kind == POSITION:
-            value, speed = 0.0, params.velocity.closing_speed_m_s
-        if progress.phase != APPROACH:
-            limit = effort
-    return Command(params.kind, value, limit, speed), HybridState(
+        command = own_command(params, progress.phase, sent, effort)
+    return command, HybridState(
         progress.phase,
         progress.outcome,
         progress,
@@ -121,8 +145,20 @@ def step(params: HybridParams, state: HybridState, reading: Reading) -> tuple[Co
         force_effort,
         approach_effort,
         contact_t,
+        sent,
         events_of(state.progress, progress),
     )
+
+
+def own_command(params: HybridParams, phase: int, sent: Raised, effort_n: float) -> Command:
+    """Return what a gripper is sent that closes by itself; its force follows the loop once it has been raised."""
+    speed = params.velocity.closing_speed_m_s
+    force, stops = sent.force_n, phase != APPROACH and sent.stop_gap_m == sent.stop_gap_m
+    if phase != APPROACH and not stops and force >= params.force.probing_force_n:
+        force = effort_n
+    if params.kind == POSITION:
+        return Command(POSITION, sent.stop_gap_m if stops else 0.0, force, speed)
+    return Command(params.kind, 0.0 if stops else -speed, force, inf)
 
 
 def free_begin(params: HybridParams, state: HybridState, frame: Frame) -> tuple[float, FreeLimits]:
@@ -142,8 +178,8 @@ def free_end(
     params: HybridParams, state: HybridState, integral_n: float, effort_n: float, t_s: float
 ) -> HybridState:
     """Return the state after free motion."""
-    phase, outcome, progress, _, force_effort, _, _, _ = state
-    return HybridState(phase, outcome, progress, integral_n, force_effort, effort_n, t_s, 0)
+    phase, outcome, progress, _, force_effort, _, _, sent, _ = state
+    return HybridState(phase, outcome, progress, integral_n, force_effort, effort_n, t_s, sent, 0)
 
 
 class HybridController(Controller[HybridConfig]):
@@ -152,13 +188,30 @@ class HybridController(Controller[HybridConfig]):
     requires = LAW_CHANNELS
     commands = ("effort",)
     alternatives = ("velocity", "position")
+    becomes: ClassVar[Mapping[str, str]] = {
+        "position": f"the closed position at the closing speed with {STEPS}",
+        "velocity": f"the closing speed with {STEPS}",
+    }
     step = staticmethod(step)
     events = EVENTS
     free_motion = FreeMotion(free_begin, free_command, free_end)
 
     def asked_force_n(self) -> float:
         """Return the probing force (N)."""
-        return float(self.config.probing_force_n)
+        config = self.config
+        return float(max(config.probing_force_n, config.approach_force_n if self._own_loop else 0.0))
+
+    def gentlest_force_n(self) -> float:
+        """Return the probing force (N), or that of the approach where one is sent."""
+        return float(self.config.approach_force_n if self._own_loop else self.config.probing_force_n)
+
+    def asked_interval_s(self) -> float | None:
+        """Return the time of a step of the force (s), where it is raised in steps."""
+        return float(self.config.step_time_s) if self._own_loop else None
+
+    @property
+    def _own_loop(self) -> bool:
+        return bool(self.config.sends != "effort")
 
     def asked_speed_m_s(self) -> float:
         """Return the closing speed (m/s)."""
@@ -178,6 +231,7 @@ class HybridController(Controller[HybridConfig]):
                 self.config, slowest_m_s=self.config.closing_speed_m_s, **settling(self.config)
             ),
             ramp_s=float(self.config.ramp_s),
+            own=own_loop(self.config),
         )
 
     def init(self) -> HybridState:
@@ -191,5 +245,6 @@ class HybridController(Controller[HybridConfig]):
             float(self.config.probing_force_n),
             0.0,
             0.0,
+            approaching(own_loop(self.config)),
             0,
         )

@@ -6,8 +6,9 @@ stops at the contact, raises the force in steps, and waits until the fingers res
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import inf, nan
-from typing import Any, Literal, NamedTuple
+from typing import ClassVar, Literal, NamedTuple
 
 from attrs import frozen
 
@@ -33,41 +34,30 @@ from graspsense.plugin_api import (
     setting,
     update_rest,
 )
+from graspsense.plugins.controllers.own_loop import (
+    STEPS,
+    OwnLoop,
+    OwnLoopConfig,
+    Raised,
+    approaching,
+    own_loop,
+    raised,
+    rises,
+)
 
 MOVED_M = 1e-3
 """Travel after which fingers that stand still have met something: they have begun to move before."""
 
 
 @frozen(kw_only=True)
-class SendAndWatchConfig:
+class SendAndWatchConfig(OwnLoopConfig):
     """Settings of the law."""
 
     closing_speed_m_s: float = setting(
         default=0.010, unit="m/s", above=0.0, plausible=(1e-4, 0.2), meaning="Closing speed of the gap."
     )
-    approach_force_n: float = setting(
-        default=5.0,
-        unit="N",
-        above=0.0,
-        plausible=(0.1, 200.0),
-        meaning="Force with which the fingers approach; at least what moves them.",
-    )
     probing_force_n: float = setting(
         default=20.0, unit="N", above=0.0, plausible=(0.1, 200.0), meaning="Force of the squeeze."
-    )
-    force_step_n: float = setting(
-        default=5.0,
-        unit="N",
-        above=0.0,
-        plausible=(0.01, 200.0),
-        meaning="By how much the force rises in a step.",
-    )
-    step_time_s: float = setting(
-        default=0.1,
-        unit="s",
-        above=0.0,
-        plausible=(0.01, 5.0),
-        meaning="Time of a step, and for which the fingers stop at the contact.",
     )
     pads: bool = setting(
         default=False,
@@ -116,32 +106,48 @@ class SendAndWatchConfig:
 
 
 class SendAndWatchState(NamedTuple):
-    """State of the law: where and when it began, the force that is sent and since when, and where the contact was."""
+    """State of the law: where and when it began, what is sent, and since when the fingers rest."""
 
     phase: int
     outcome: int
     began_t_s: float
     began_gap_m: float
-    force_n: float
-    since_t_s: float
-    contact_gap_m: float
+    sent: Raised
     still: RestState
 
 
-def command_of(params: Any, force_n: float, target_m: float) -> Command:
-    """Return the command that closes to this target with this force; a target above 0 is where the fingers stop."""
-    if params.sends == FORCE:
+class SendAndWatchParams(NamedTuple):
+    """Numbers of the law; `kind` is the command kind that it sends, `pads` is 0 or 1."""
+
+    own: OwnLoop
+    kind: int
+    closing_speed_m_s: float
+    probing_force_n: float
+    pads: int
+    contact_force_n: float
+    rest_speed_m_s: float
+    rest_window_s: float
+    closed_gap_m: float
+    timeout_s: float
+
+
+def command_of(params: SendAndWatchParams, sent: Raised) -> Command:
+    """Return the command that closes, or stops at a gap, with this force."""
+    force_n, _, stop_gap_m = sent
+    stops = stop_gap_m == stop_gap_m
+    if params.kind == FORCE:
         return Command(FORCE, force_n, inf, params.closing_speed_m_s)
-    if params.sends == VELOCITY:
-        speed = -params.closing_speed_m_s if target_m == 0.0 else 0.0
-        return Command(VELOCITY, speed, force_n, inf)
-    return Command(POSITION, target_m, force_n, params.closing_speed_m_s)
+    if params.kind == VELOCITY:
+        return Command(VELOCITY, 0.0 if stops else -params.closing_speed_m_s, force_n, inf)
+    return Command(POSITION, stop_gap_m if stops else 0.0, force_n, params.closing_speed_m_s)
 
 
-def step(params: Any, state: SendAndWatchState, reading: Reading) -> tuple[Command, SendAndWatchState]:
+def step(
+    params: SendAndWatchParams, state: SendAndWatchState, reading: Reading
+) -> tuple[Command, SendAndWatchState]:
     """Approach, stop at the contact, raise the force in steps, and hold when the fingers are at rest."""
     frame = reading.frame
-    phase, outcome, began, began_gap, force, since, contact_gap, still = state
+    phase, outcome, began, began_gap, sent, still = state
     if began != began:
         began, began_gap, still = frame.t_s, frame.gap_m, RestState(frame.t_s, frame.gap_m)
     still = update_rest(still, frame.t_s, frame.gap_m, params.rest_speed_m_s, params.rest_window_s)
@@ -154,24 +160,21 @@ def step(params: Any, state: SendAndWatchState, reading: Reading) -> tuple[Comma
         if frame.gap_m <= params.closed_gap_m:
             outcome = NOTHING_THERE
         elif felt or (stopped and params.pads == 0):
-            phase, since, contact_gap = SQUEEZE, frame.t_s, frame.gap_m
+            phase, sent = SQUEEZE, Raised(sent.force_n, frame.t_s, frame.gap_m)
         elif stopped:
             outcome = ONE_FINGER
     elif outcome == RUNNING:
         if frame.gap_m <= params.closed_gap_m:
             outcome = NOTHING_THERE
-        elif force < params.probing_force_n:
-            if frame.t_s - since >= params.step_time_s:
-                force = min(force + params.force_step_n, params.probing_force_n)
-                since, contact_gap, still = frame.t_s, nan, RestState(frame.t_s, frame.gap_m)
+        elif rises(sent, params.probing_force_n):
+            sent = raised(params.own, sent, frame.t_s, params.probing_force_n)
+            if sent.since_t_s == frame.t_s:
+                still = RestState(frame.t_s, frame.gap_m)
         elif rests:
             phase, outcome = HOLD, STEADY
     if outcome == RUNNING and frame.t_s - began > params.timeout_s:
         outcome = NOTHING_THERE if phase == APPROACH else NEVER_STEADY
-    target = contact_gap if contact_gap == contact_gap else 0.0
-    return command_of(params, force, target), SendAndWatchState(
-        phase, outcome, began, began_gap, force, since, contact_gap, still
-    )
+    return command_of(params, sent), SendAndWatchState(phase, outcome, began, began_gap, sent, still)
 
 
 class SendAndWatchController(Controller[SendAndWatchConfig]):
@@ -179,6 +182,11 @@ class SendAndWatchController(Controller[SendAndWatchConfig]):
 
     commands = ("position",)
     alternatives = ("force", "velocity")
+    becomes: ClassVar[Mapping[str, str]] = {
+        "position": f"the closed position at the closing speed with {STEPS}",
+        "velocity": f"the closing speed with {STEPS}",
+        "force": f"{STEPS}, at the closing speed",
+    }
     step = staticmethod(step)
 
     @property
@@ -199,11 +207,32 @@ class SendAndWatchController(Controller[SendAndWatchConfig]):
         """Return the closing speed (m/s)."""
         return float(self.config.closing_speed_m_s)
 
+    def asked_interval_s(self) -> float:
+        """Return the time of a step (s)."""
+        return float(self.config.step_time_s)
+
     def contact_force_n(self) -> float:
         """Return the contact force (N)."""
         return float(self.config.contact_force_n)
 
+    def params(self) -> SendAndWatchParams:
+        """Return the parameters of the law."""
+        config = self.config
+        return SendAndWatchParams(
+            own=own_loop(config),
+            kind={"position": POSITION, "force": FORCE, "velocity": VELOCITY}[config.sends],
+            closing_speed_m_s=float(config.closing_speed_m_s),
+            probing_force_n=float(config.probing_force_n),
+            pads=1 if config.pads else 0,
+            contact_force_n=float(config.contact_force_n),
+            rest_speed_m_s=float(config.rest_speed_m_s),
+            rest_window_s=float(config.rest_window_s),
+            closed_gap_m=float(config.closed_gap_m),
+            timeout_s=float(config.timeout_s),
+        )
+
     def init(self) -> SendAndWatchState:
         """Return the state before the first tick."""
-        approach_n = float(self.config.approach_force_n)
-        return SendAndWatchState(APPROACH, RUNNING, nan, nan, approach_n, 0.0, nan, RestState(0.0, 0.0))
+        return SendAndWatchState(
+            APPROACH, RUNNING, nan, nan, approaching(own_loop(self.config)), RestState(0.0, 0.0)
+        )

@@ -216,6 +216,13 @@ def not_begun() -> GraspProgress:
     return GraspProgress(APPROACH, RUNNING, 0, 0.0, 0.0, RestState(0.0, 0.0), 0.0, 0.0, 0.0)
 
 
+def not_resting(now: GraspProgress, frame: Frame) -> GraspProgress:
+    """Return the progress with the rest begun anew in this frame."""
+    phase, outcome, begun, start_gap, deadline, _, peak_force, peak_gap, felt_t = now
+    still = RestState(frame.t_s, frame.gap_m)
+    return GraspProgress(phase, outcome, begun, start_gap, deadline, still, peak_force, peak_gap, felt_t)
+
+
 def supervise(params: Supervision, now: GraspProgress, frame: Frame) -> GraspProgress:
     """Return the progress after this frame; the same object if nothing has changed."""
     if now.outcome != RUNNING:

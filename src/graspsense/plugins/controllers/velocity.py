@@ -6,8 +6,9 @@ the paper); the hybrid controller uses it only until both fingers touch.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import inf
-from typing import Literal, NamedTuple
+from typing import ClassVar, Literal, NamedTuple
 
 from attrs import frozen
 
@@ -69,8 +70,7 @@ class VelocityLoopConfig:
     sends: Literal["effort", "velocity", "position"] = setting(
         default="effort",
         meaning="What is commanded. velocity is for a gripper with a velocity loop of its own, position for one that "
-        "closes by itself at this speed: the gains then have no effect, and the squeeze closes on with the effort as a "
-        "limit.",
+        "closes by itself at this speed: the gains then have no effect.",
     )
 
 
@@ -179,6 +179,10 @@ class VelocityController(Controller[VelocityConfig]):
     requires = LAW_CHANNELS
     commands = ("effort",)
     alternatives = ("velocity", "position")
+    becomes: ClassVar[Mapping[str, str]] = {
+        "position": "the closed position at the closing speed with the greatest force that is allowed",
+        "velocity": "the closing speed with the greatest force that is allowed",
+    }
     step = staticmethod(step)
     events = EVENTS
     free_motion = FreeMotion(free_begin, free_command, free_end)
