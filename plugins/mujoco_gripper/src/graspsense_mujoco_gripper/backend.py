@@ -33,7 +33,7 @@ from graspsense_mujoco_gripper.catalogue import catalogue, thing_named
 from graspsense_mujoco_gripper.config import MujocoConfig
 from graspsense_mujoco_gripper.drive import ActuatorDrive, Travel, instability, test_move
 from graspsense_mujoco_gripper.gripper_file import read_gripper
-from graspsense_mujoco_gripper.measurement import ForceGauge, GapGauge, between_fingers, cells_of, geoms_of
+from graspsense_mujoco_gripper.measurement import ForceGauge, GapGauge, cells_of, geoms_of, width_m
 from graspsense_mujoco_gripper.model import OBJ, compiled, gripper_spec, identifier, read_spec
 
 PREFIX: Final = "thing/"
@@ -89,25 +89,20 @@ class MujocoGripper(SensorBackend[MujocoConfig]):
         self._thing, fragment = thing_named(config.object)
         self._steps = ceil(1.0 / (config.rate_hz * config.timestep_s) - 1e-9)
         timestep_s = 1.0 / (config.rate_hz * self._steps)
-        model = compiled(gripper_spec(path, timestep_s), str(path))
-        travel = test_move(model, self._gripper)
+        model = compiled(gripper_spec(path, self._gripper, timestep_s), str(path))
+        width = None if fragment is None else width_m(compiled(read_spec(fragment), str(fragment)))
+        travel = test_move(model, self._gripper, width)
         generator = np.random.default_rng(seed)
         if fragment is not None:
-            model = self._with_thing(gripper_spec(path, timestep_s), fragment, travel, model)
+            model = self._with_thing(gripper_spec(path, self._gripper, timestep_s), fragment, travel)
             if config.spread:
                 _vary(model, generator)
         self._begin(model, travel, generator)
         return self._described()
 
-    def _with_thing(
-        self, spec: mujoco.MjSpec, fragment: Path, travel: Travel, empty: mujoco.MjModel
-    ) -> mujoco.MjModel:
+    def _with_thing(self, spec: mujoco.MjSpec, fragment: Path, travel: Travel) -> mujoco.MjModel:
         """Return the model with the thing in the middle of the fingers, its x axis along the closing direction."""
-        data = mujoco.MjData(empty)
-        data.qpos[:] = travel.qpos_open
-        mujoco.mj_forward(empty, data)
-        place = between_fingers(empty, data, self._gripper)
-        frame = spec.worldbody.add_frame(pos=place, quat=_turned(travel.axis))
+        frame = spec.worldbody.add_frame(pos=travel.place, quat=_turned(travel.axis))
         child = read_spec(fragment)
         try:
             spec.attach(child, frame=frame, prefix=PREFIX)
