@@ -32,7 +32,7 @@ from graspsense_mujoco_gripper.catalogue import catalogue
 from graspsense_mujoco_gripper.config import MujocoConfig
 from graspsense_mujoco_gripper.drive import ActuatorDrive, Travel, instability, test_move
 from graspsense_mujoco_gripper.gripper_file import read_gripper
-from graspsense_mujoco_gripper.measurement import ForceGauge, GapGauge, between_fingers, cells_of, geoms_of
+from graspsense_mujoco_gripper.measurement import ForceGauge, GapGauge, cells_of, geoms_of, width_m
 from graspsense_mujoco_gripper.model import OBJ, compiled, gripper_spec, identifier
 from graspsense_mujoco_gripper.scene import PREFIX, Motion, add_thing, is_thing, put_on_arm, read_scene, vary
 
@@ -88,18 +88,16 @@ class MujocoGripper(SensorBackend[MujocoConfig]):
         self._thing, self._scene = scene.thing, scene.scene
         self._steps = ceil(1.0 / (config.rate_hz * config.timestep_s) - 1e-9)
         timestep_s = 1.0 / (config.rate_hz * self._steps)
-        spec = gripper_spec(path, timestep_s)
+        spec = gripper_spec(path, self._gripper, timestep_s)
         if scene.scene.arm:
             put_on_arm(spec)
         _integrate(spec, config.integrator, soft=scene.spec is not None and len(scene.spec.flexes) > 0)
         model = compiled(spec, str(path))
-        travel = test_move(model, self._gripper)
+        width = None if scene.spec is None else width_m(compiled(scene.spec, config.object))
+        travel = test_move(model, self._gripper, width)
         generator = np.random.default_rng(seed)
         if scene.spec is not None:
-            data = mujoco.MjData(model)
-            data.qpos[:] = travel.qpos_open
-            mujoco.mj_forward(model, data)
-            place = between_fingers(model, data, self._gripper)
+            place = travel.place
             if config.spread:
                 place = place + vary(scene, generator) * travel.axis
             add_thing(spec, scene, place, travel.axis)
