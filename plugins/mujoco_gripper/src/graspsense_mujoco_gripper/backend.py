@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import ceil, inf, nan
-from typing import Any, Final, final
+from typing import Any, Final, Unpack, final
 
 import mujoco
 import numpy as np
@@ -15,19 +15,24 @@ from graspsense.plugin_api import (
     EFFORT,
     NO_PADS,
     POSITION,
+    BatchBackend,
+    BatchOptions,
     Channel,
     Command,
     ConfigError,
+    Controller,
     DeviceInfo,
     DeviceLost,
     Frame,
+    Grasped,
     ObjectKind,
     Pads,
     Reading,
-    SensorBackend,
+    SimulationVariant,
     TactileArray,
     signal_type,
 )
+from graspsense_mujoco_gripper.batch import Job, grasps
 from graspsense_mujoco_gripper.catalogue import catalogue
 from graspsense_mujoco_gripper.config import MujocoConfig
 from graspsense_mujoco_gripper.drive import ActuatorDrive, Travel, instability, test_move
@@ -36,6 +41,9 @@ from graspsense_mujoco_gripper.measurement import ForceGauge, GapGauge, cells_of
 from graspsense_mujoco_gripper.model import OBJ, compiled, gripper_spec, identifier
 from graspsense_mujoco_gripper.scene import PREFIX, Motion, add_thing, is_thing, put_on_arm, read_scene, vary
 
+INTEGRATORS: Final = ("Euler", "implicitfast", "implicit", "RK4", "discrete")
+STEPS_S: Final = (1e-3, 5e-4, 2e-4, 1e-4)
+REFERENCE: Final = ("implicitfast", 5e-5)
 OPENING_M_S: Final = 0.1
 SOFT: Final = -1
 """The number of the geom of a contact with a soft body."""
@@ -46,7 +54,7 @@ SWING, MOST_SWINGS = 0.1, 20
 
 
 @final
-class MujocoGripper(SensorBackend[MujocoConfig]):
+class MujocoGripper(BatchBackend[MujocoConfig]):
     """Steps the model between two reads, and closes its actuators as commanded."""
 
     accepts = ("effort", "velocity", "position", "force")
@@ -78,6 +86,24 @@ class MujocoGripper(SensorBackend[MujocoConfig]):
     def with_object(self, name: str) -> MujocoGripper:
         """Return this gripper with another thing between its fingers."""
         return MujocoGripper(evolve(self.config, object=name))
+
+    def variants(self) -> Sequence[SimulationVariant]:
+        """Return each integrator of MuJoCo with steps from 0.1 ms to 1 ms; the reference has 0.05 ms."""
+        curve = [(integrator, step_s) for integrator in INTEGRATORS for step_s in STEPS_S]
+        return [_step_variant(*one) for one in (REFERENCE, *curve)]
+
+    def run_many(
+        self,
+        controller: Controller[Any],
+        scenes: Sequence[str],
+        seeds: Sequence[int],
+        **options: Unpack[BatchOptions],
+    ) -> list[Grasped]:
+        """Grasp each thing with its seed, in a process on each core."""
+        for name in dict.fromkeys(scenes):
+            read_scene(name)
+        gripper, _ = read_gripper(self.config.file)
+        return grasps(Job(self.config, controller, options, bool(gripper.channels)), scenes, seeds)
 
     def open(self, seed: int) -> DeviceInfo:
         """Build the model with the thing between the open fingers. Raises ConfigError, UnknownName."""
@@ -260,6 +286,22 @@ class MujocoGripper(SensorBackend[MujocoConfig]):
                 "-o controller.sends=velocity"
             )
         return report
+
+
+def _step_variant(integrator: str, timestep_s: float) -> SimulationVariant:
+    is_reference = (integrator, timestep_s) == REFERENCE
+    return SimulationVariant(
+        method=integrator,
+        fidelity="fixed step",
+        step=f"{timestep_s * 1e3:g} ms",
+        settings={
+            "integrator": integrator,
+            "timestep_s": timestep_s,
+            "force_noise_n": 0.0,
+            "gap_step_m": 0.0,
+        },
+        role="reference" if is_reference else "curve",
+    )
 
 
 def _integrate(spec: mujoco.MjSpec, integrator: str, *, soft: bool) -> None:
