@@ -85,6 +85,7 @@ _TABLE: Final[Table] = {
     },
     "Sensor backends that do many grasps at once": {
         "core.components.roles": ("BatchBackend", "BatchOptions", "Grasped", "SimulationVariant"),
+        "core.grasp.runner": ("run_uninterrupted",),
     },
     "Identifying an object from recorded squeezes": {
         "core.components.identification": (

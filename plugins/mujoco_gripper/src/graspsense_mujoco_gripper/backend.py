@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import ceil, inf, nan
-from pathlib import Path
-from typing import Any, Final, final
+from typing import Any, Final, Unpack, final
 
 import mujoco
 import numpy as np
@@ -16,39 +15,46 @@ from graspsense.plugin_api import (
     EFFORT,
     NO_PADS,
     POSITION,
+    BatchBackend,
+    BatchOptions,
     Channel,
     Command,
     ConfigError,
+    Controller,
     DeviceInfo,
     DeviceLost,
     Frame,
+    Grasped,
     ObjectKind,
     Pads,
     Reading,
-    SensorBackend,
+    SimulationVariant,
     TactileArray,
     signal_type,
 )
-from graspsense_mujoco_gripper.catalogue import catalogue, thing_named
+from graspsense_mujoco_gripper.batch import Job, grasps
+from graspsense_mujoco_gripper.catalogue import catalogue
 from graspsense_mujoco_gripper.config import MujocoConfig
 from graspsense_mujoco_gripper.drive import ActuatorDrive, Travel, instability, test_move
 from graspsense_mujoco_gripper.gripper_file import read_gripper
-from graspsense_mujoco_gripper.measurement import ForceGauge, GapGauge, between_fingers, cells_of, geoms_of
-from graspsense_mujoco_gripper.model import OBJ, compiled, gripper_spec, identifier, read_spec
+from graspsense_mujoco_gripper.measurement import ForceGauge, GapGauge, cells_of, geoms_of, width_m
+from graspsense_mujoco_gripper.model import OBJ, compiled, gripper_spec, identifier
+from graspsense_mujoco_gripper.scene import PREFIX, Motion, add_thing, is_thing, put_on_arm, read_scene, vary
 
-PREFIX: Final = "thing/"
-"""Before each name of the thing in the combined model."""
+INTEGRATORS: Final = ("Euler", "implicitfast", "implicit", "RK4", "discrete")
+STEPS_S: Final = (1e-3, 5e-4, 2e-4, 1e-4)
+REFERENCE: Final = ("implicitfast", 5e-5)
 OPENING_M_S: Final = 0.1
+SOFT: Final = -1
+"""The number of the geom of a contact with a soft body."""
 DEEPEST_M: Final = 1e-3
 """A thing that begins deeper in a finger is refused."""
 SWING, MOST_SWINGS = 0.1, 20
 """The loop counts as unstable if the effort changes its sign above this share of its limit more often than this."""
-MASS_SPREAD, FRICTION_SPREAD, PLACE_SPREAD_M = 0.1, 0.15, 0.001
-"""Standard deviations with which seeds draw: of the mass and friction (shares), and of the place along the gap."""
 
 
 @final
-class MujocoGripper(SensorBackend[MujocoConfig]):
+class MujocoGripper(BatchBackend[MujocoConfig]):
     """Steps the model between two reads, and closes its actuators as commanded."""
 
     accepts = ("effort", "velocity", "position", "force")
@@ -81,39 +87,49 @@ class MujocoGripper(SensorBackend[MujocoConfig]):
         """Return this gripper with another thing between its fingers."""
         return MujocoGripper(evolve(self.config, object=name))
 
+    def variants(self) -> Sequence[SimulationVariant]:
+        """Return each integrator of MuJoCo with steps from 0.1 ms to 1 ms; the reference has 0.05 ms."""
+        curve = [(integrator, step_s) for integrator in INTEGRATORS for step_s in STEPS_S]
+        return [_step_variant(*one) for one in (REFERENCE, *curve)]
+
+    def run_many(
+        self,
+        controller: Controller[Any],
+        scenes: Sequence[str],
+        seeds: Sequence[int],
+        **options: Unpack[BatchOptions],
+    ) -> list[Grasped]:
+        """Grasp each thing with its seed, in a process on each core."""
+        for name in dict.fromkeys(scenes):
+            read_scene(name)
+        gripper, _ = read_gripper(self.config.file)
+        return grasps(Job(self.config, controller, options, bool(gripper.channels)), scenes, seeds)
+
     def open(self, seed: int) -> DeviceInfo:
         """Build the model with the thing between the open fingers. Raises ConfigError, UnknownName."""
         self.close()
         config = self.config
         self._gripper, path = read_gripper(config.file)
-        self._thing, fragment = thing_named(config.object)
+        scene = read_scene(config.object)
+        self._thing, self._scene = scene.thing, scene.scene
         self._steps = ceil(1.0 / (config.rate_hz * config.timestep_s) - 1e-9)
         timestep_s = 1.0 / (config.rate_hz * self._steps)
-        model = compiled(gripper_spec(path, timestep_s), str(path))
-        travel = test_move(model, self._gripper)
+        spec = gripper_spec(path, self._gripper, timestep_s)
+        if scene.scene.arm:
+            put_on_arm(spec)
+        _integrate(spec, config.integrator, soft=scene.spec is not None and len(scene.spec.flexes) > 0)
+        model = compiled(spec, str(path))
+        width = None if scene.spec is None else width_m(compiled(scene.spec, config.object))
+        travel = test_move(model, self._gripper, width)
         generator = np.random.default_rng(seed)
-        if fragment is not None:
-            model = self._with_thing(gripper_spec(path, timestep_s), fragment, travel, model)
+        if scene.spec is not None:
+            place = travel.place
             if config.spread:
-                _vary(model, generator)
+                place = place + vary(scene, generator) * travel.axis
+            add_thing(spec, scene, place, travel.axis)
+            model = compiled(spec, f"the gripper with {config.object}")
         self._begin(model, travel, generator)
         return self._described()
-
-    def _with_thing(
-        self, spec: mujoco.MjSpec, fragment: Path, travel: Travel, empty: mujoco.MjModel
-    ) -> mujoco.MjModel:
-        """Return the model with the thing in the middle of the fingers, its x axis along the closing direction."""
-        data = mujoco.MjData(empty)
-        data.qpos[:] = travel.qpos_open
-        mujoco.mj_forward(empty, data)
-        place = between_fingers(empty, data, self._gripper)
-        frame = spec.worldbody.add_frame(pos=place, quat=_turned(travel.axis))
-        child = read_spec(fragment)
-        try:
-            spec.attach(child, frame=frame, prefix=PREFIX)
-        except ValueError as error:
-            raise ConfigError(f"MuJoCo refuses to attach {fragment} to the gripper: {error}") from error
-        return compiled(spec, f"the gripper with {fragment}")
 
     def _begin(self, model: mujoco.MjModel, travel: Travel, generator: np.random.Generator) -> None:
         data = mujoco.MjData(model)
@@ -121,7 +137,9 @@ class MujocoGripper(SensorBackend[MujocoConfig]):
         mujoco.mj_forward(model, data)
         self._model, self._travel, self._generator = model, travel, generator
         self._gauge = GapGauge(model, self._gripper.gap)
-        things = {k for k in range(model.ngeom) if _is_thing(model, int(model.geom_bodyid[k]))}
+        things = {k for k in range(model.ngeom) if self._of_thing(k)}
+        if model.nflex:
+            things.add(SOFT)
         left, right = self._gripper.left, self._gripper.right
         self._left = ForceGauge(model, left, things | geoms_of(model, right), -1.0)
         self._right = ForceGauge(model, right, things | geoms_of(model, left), 1.0)
@@ -135,6 +153,7 @@ class MujocoGripper(SensorBackend[MujocoConfig]):
             identifier(model, OBJ.mjOBJ_EQUALITY, PREFIX + name, "equality") for name in self._thing.shell
         ]
         self._drive = ActuatorDrive(model, self._gripper, travel)
+        self._motion = Motion(model, self._scene)
         self._data = data
         self._check_start(data)
         self._gap_m = self._gauge.gap_m(data, travel.axis)
@@ -155,7 +174,7 @@ class MujocoGripper(SensorBackend[MujocoConfig]):
             )
 
     def _of_thing(self, geom: int) -> bool:
-        return _is_thing(self._model, int(self._model.geom_bodyid[geom]))
+        return geom == SOFT or is_thing(self._model, int(self._model.geom_bodyid[geom]))
 
     def _described(self) -> DeviceInfo:
         limit = self._drive.effort_limit_n
@@ -201,6 +220,7 @@ class MujocoGripper(SensorBackend[MujocoConfig]):
         self._measured_m = measured_m
         forces = [gauge.force_n(data, axis) for gauge in (self._left, self._right)]
         self._greatest_n = max(self._greatest_n, *forces)
+        self._motion.set(data, self._ticks * tick_s, touched=min(forces) > 0.0)
         left, right = (force + self._noise() for force in forces)
         t_s = self._ticks * tick_s
         frame = Frame(t_s, tick_s, measured_m, velocity, self._drive.effort_n, left, right, nan, nan, 0)
@@ -257,6 +277,8 @@ class MujocoGripper(SensorBackend[MujocoConfig]):
             "greatest_force_n": self._greatest_n,
             "steps": self._ticks * self._steps,
         }
+        if self._motion.moves:
+            report |= self._motion.report()
         if self._swings > MOST_SWINGS:
             report["unstable_loop"] = (
                 f"the effort changes its sign {self._swings} times: the gains of the controller are too high for a "
@@ -266,43 +288,25 @@ class MujocoGripper(SensorBackend[MujocoConfig]):
         return report
 
 
-def _vary(model: mujoco.MjModel, generator: np.random.Generator) -> None:
-    """Draw mass, friction and place of the thing."""
-    factor = float(np.exp(generator.normal(0.0, MASS_SPREAD)))
-    friction = float(np.exp(generator.normal(0.0, FRICTION_SPREAD)))
-    offset = float(generator.normal(0.0, PLACE_SPREAD_M))
-    for k in range(model.nbody):
-        if _is_thing(model, k):
-            model.body_mass[k] *= factor
-            model.body_inertia[k] *= factor
-            if model.body_parentid[k] == 0:
-                joint = int(model.body_jntadr[k])
-                axis = _rotated_x(model.body_quat[k])
-                if joint >= 0:
-                    address = int(model.jnt_qposadr[joint])
-                    model.qpos0[address : address + 3] += offset * axis
-    for k in range(model.ngeom):
-        if _is_thing(model, int(model.geom_bodyid[k])):
-            model.geom_friction[k] *= friction
-    mujoco.mj_setConst(model, mujoco.MjData(model))
+def _step_variant(integrator: str, timestep_s: float) -> SimulationVariant:
+    is_reference = (integrator, timestep_s) == REFERENCE
+    return SimulationVariant(
+        method=integrator,
+        fidelity="fixed step",
+        step=f"{timestep_s * 1e3:g} ms",
+        settings={
+            "integrator": integrator,
+            "timestep_s": timestep_s,
+            "force_noise_n": 0.0,
+            "gap_step_m": 0.0,
+        },
+        role="reference" if is_reference else "curve",
+    )
 
 
-def _is_thing(model: mujoco.MjModel, body: int) -> bool:
-    return (mujoco.mj_id2name(model, OBJ.mjOBJ_BODY, body) or "").startswith(PREFIX)
-
-
-def _rotated_x(quaternion: NDArray[np.float64]) -> NDArray[np.float64]:
-    turned = np.zeros(3)
-    mujoco.mju_rotVecQuat(turned, np.array([1.0, 0.0, 0.0]), quaternion)
-    return turned
-
-
-def _turned(axis: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the quaternion of the smallest turn of the x axis onto this one."""
-    quaternion = np.zeros(4)
-    mujoco.mju_quatZ2Vec(quaternion, axis)
-    # mju_quatZ2Vec turns the z axis; before it, x is turned onto z.
-    first = np.array([np.sqrt(0.5), 0.0, -np.sqrt(0.5), 0.0])
-    turned = np.zeros(4)
-    mujoco.mju_mulQuat(turned, quaternion, first)
-    return turned
+def _integrate(spec: mujoco.MjSpec, integrator: str, *, soft: bool) -> None:
+    """Set the integrator; MuJoCo's implicit ones, which grippers name, do not integrate soft bodies."""
+    if integrator == "model" and soft:
+        integrator = "discrete"
+    if integrator != "model":
+        spec.option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{integrator.upper()}")

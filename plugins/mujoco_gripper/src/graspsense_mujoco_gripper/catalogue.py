@@ -1,4 +1,4 @@
-"""The things that can be grasped: a catalogue of MJCF fragments, and files of users."""
+"""The things that can be grasped: a catalogue, and files of users."""
 
 from __future__ import annotations
 
@@ -8,20 +8,90 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Final
 
-from attrs import frozen
+import mujoco
+from attrs import field, frozen
 
 from graspsense.plugin_api import UnknownName, structured, suggestion, toml_values
+from graspsense_mujoco_gripper.model import read_spec
 
 FOLDER: Final = Path(str(files("graspsense_mujoco_gripper") / "things"))
+WALL_RAD_S: Final = 100.0
+HALF_WALL_M: Final = 0.001
+HALF_HEIGHT_M: Final = 0.03
+HALF_DEPTH_M: Final = 0.02
+WALL_SHARE: Final = 0.1
+"""Share of the mass in each wall."""
+TRAVEL_SHARE: Final = 0.4
+"""Share of the width by which each wall can yield."""
+
+
+@frozen(kw_only=True)
+class Walls:
+    """Two walls on springs and dampers: what both fingers feel together (SI units).
+
+    `armature_kg` is an inertia of each wall that has no weight, so that the steps need not be short. Not set: with it,
+    a wall swings with 100 rad/s.
+    """
+
+    width_m: float
+    stiffness_n_m: float
+    damping_n_s_m: float
+    mass_kg: float
+    friction: float = 0.5
+    armature_kg: float | None = None
+
+    def spec(self, name: str) -> mujoco.MjSpec:
+        """Return the model, not compiled: each wall has twice the stiffness, as both yield in series."""
+        armature = self.armature_kg
+        if armature is None:
+            armature = 2.0 * self.stiffness_n_m / WALL_RAD_S**2
+        spec = mujoco.MjSpec()
+        core = spec.worldbody.add_body(name=name)
+        core.add_freejoint()
+        box = mujoco.mjtGeom.mjGEOM_BOX
+        core_size = [self.width_m * (0.5 - TRAVEL_SHARE), 0.9 * HALF_DEPTH_M, HALF_HEIGHT_M]
+        core.add_geom(
+            type=box, size=core_size, mass=self.mass_kg * (1.0 - 2.0 * WALL_SHARE), contype=0, conaffinity=0
+        )
+        for side, sign in (("left", -1.0), ("right", 1.0)):
+            wall = core.add_body(
+                name=f"{name}_{side}", pos=[sign * (self.width_m / 2.0 - HALF_WALL_M), 0.0, 0.0]
+            )
+            wall.add_joint(
+                name=f"{name}_{side}",
+                type=mujoco.mjtJoint.mjJNT_SLIDE,
+                axis=[-sign, 0.0, 0.0],
+                range=[0.0, TRAVEL_SHARE * self.width_m],
+                limited=mujoco.mjtLimited.mjLIMITED_TRUE,
+                armature=armature,
+                stiffness=[2.0 * self.stiffness_n_m, 0.0, 0.0],
+                damping=[2.0 * self.damping_n_s_m, 0.0, 0.0],
+            )
+            wall.add_geom(
+                name=f"{name}_{side}",
+                type=box,
+                size=[HALF_WALL_M, HALF_DEPTH_M, HALF_HEIGHT_M],
+                mass=self.mass_kg * WALL_SHARE,
+                friction=[self.friction, 0.005, 0.0001],
+                condim=4,
+                solref=[0.001, 1.0],
+                solimp=[0.99, 0.999, 0.0001, 0.5, 2.0],
+            )
+        return spec
 
 
 @frozen(kw_only=True)
 class Thing:
-    """A thing: what it is, and the force (N) at which the equalities of its shell are switched off."""
+    """A thing: what it is, and the force (N) at which the equalities of its shell are switched off.
+
+    `figures` says of its figures where they are from.
+    """
 
     summary: str = ""
     breaks_at_n: float = float("inf")
     shell: tuple[str, ...] = ()
+    walls: Walls | None = None
+    figures: Mapping[str, str] = field(factory=dict)
 
 
 @lru_cache(maxsize=1)
@@ -31,19 +101,24 @@ def catalogue() -> Mapping[str, Thing]:
     return {name: structured(table, Thing, name) for name, table in values.items()}
 
 
-def thing_named(name: str) -> tuple[Thing, Path | None]:
-    """Return a thing and its MJCF file; no file for `none`. What follows `#` is ignored. Raises UnknownName."""
-    name = name.partition("#")[0]
+def thing_named(name: str, beside: Path = Path()) -> tuple[Thing, mujoco.MjSpec | None]:
+    """Return a thing and its model, not compiled; no model for `none`.
+
+    `name` is of the catalogue, or an MJCF file (relative to `beside`). Raises UnknownName, ConfigError.
+    """
     if name == "none":
         return Thing(), None
     if name.endswith(".xml"):
-        path = Path(name).expanduser()
+        path = beside / Path(name).expanduser()
         if not path.is_file():
             raise UnknownName(f"gripper.object: there is no file {path}")
-        return Thing(summary=path.stem), path
+        return Thing(summary=path.stem), read_spec(path)
     if name not in catalogue():
         raise UnknownName(
-            f"gripper.object: there is no thing {name!r}. Known: {', '.join(catalogue())}, none, or an MJCF file "
-            f"(.xml).{suggestion(name, catalogue())}"
+            f"gripper.object: there is no thing {name!r}. Known: {', '.join(catalogue())}, none, an MJCF file (.xml), "
+            f"or a scene file (.toml).{suggestion(name, catalogue())}"
         )
-    return catalogue()[name], FOLDER / f"{name}.xml"
+    thing = catalogue()[name]
+    if thing.walls is not None:
+        return thing, thing.walls.spec(name)
+    return thing, read_spec(FOLDER / f"{name}.xml")

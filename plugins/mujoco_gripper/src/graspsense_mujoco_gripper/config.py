@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from attrs import frozen
 
 from graspsense.plugin_api import NAMES_INPUT, setting
@@ -19,7 +21,8 @@ class MujocoConfig:
     object: str = setting(
         default="block",
         effect=NAMES_INPUT,
-        meaning="A thing of the catalogue (block, egg, can, ...), none, or the path of an MJCF file (.xml) with one.",
+        meaning="A thing of the catalogue (block, egg, can, ...), none, the path of an MJCF file (.xml) with one, or "
+        "a scene file (.toml).",
     )
     rate_hz: float = setting(
         default=1000.0,
@@ -35,8 +38,12 @@ class MujocoConfig:
         unit="s",
         meaning="Longest step of the integrator of MuJoCo; a tick has a whole number of steps.",
     )
+    integrator: Literal["model", "Euler", "implicit", "implicitfast", "RK4", "discrete"] = setting(
+        default="model", meaning="The integrator of MuJoCo; model: the one that the gripper's model names."
+    )
     spread: bool = setting(
-        default=True, meaning="Whether mass, friction and place of the thing vary with the seed."
+        default=True,
+        meaning="Whether mass, friction, stiffness, size and place of the thing vary with the seed.",
     )
     force_noise_n: float = setting(
         default=0.01,

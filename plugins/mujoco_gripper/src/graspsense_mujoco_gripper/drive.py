@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from graspsense.plugin_api import EFFORT, FORCE, POSITION, VELOCITY, Command, ConfigError
 from graspsense_mujoco_gripper.gripper_file import GripperFile
-from graspsense_mujoco_gripper.measurement import GapGauge, closing_axis
+from graspsense_mujoco_gripper.measurement import GapGauge, closing_axis, faces
 from graspsense_mujoco_gripper.model import identifier
 
 Floats = NDArray[np.float64]
@@ -23,6 +23,8 @@ TEST_S = 1.0
 """Time of each half of the test move: opening, and closing."""
 POINTS = 64
 LEAST_TRAVEL_M = 1e-3
+CLEARANCE_M = 0.004
+"""A thing is put where the fingers have this much more room than it needs, so that one that stands still is clear."""
 MASS_STEPS = 4
 LEAST_MASS_KG = 1e-3
 UNKNOWN_MASS_KG = 0.5
@@ -40,6 +42,9 @@ class Travel:
     mass_kg: float
     """The mass that moves with the gap."""
     axis: Floats
+    """The closing direction, where the fingers touch the thing."""
+    place: Floats
+    """The point in the middle of the fingers, where they touch the thing."""
     qpos_open: Floats
 
     @property
@@ -58,8 +63,12 @@ class Travel:
         return slopes
 
 
-def test_move(model: mujoco.MjModel, gripper: GripperFile) -> Travel:
-    """Open and close the empty gripper. Raises ConfigError where the fingers do not move, or move the wrong way."""
+def test_move(model: mujoco.MjModel, gripper: GripperFile, width_m: float | None) -> Travel:
+    """Open and close the empty gripper. Raises ConfigError where the fingers do not move, or move the wrong way.
+
+    `width_m` is that of the thing to be grasped: fingers that turn are looked at where they touch it. Without a thing
+    they are looked at half closed.
+    """
     data = mujoco.MjData(model)
     ids = actuator_ids(model, gripper)
     gauge = GapGauge(model, gripper.gap)
@@ -68,17 +77,18 @@ def test_move(model: mujoco.MjModel, gripper: GripperFile) -> Travel:
     for _ in range(steps):
         mujoco.mj_step(model, data)
     _check(model, data)
-    axis = closing_axis(model, data, gripper)
+    axis = closing_axis(gripper, *faces(model, data, gripper))
     qpos_open = data.qpos.copy()
     start_m = gauge.gap_m(data, axis)
     data.ctrl[ids] = gripper.closed
-    gaps, lengths = [start_m], [data.actuator_length[ids].copy()]
+    gaps, lengths, states = [start_m], [data.actuator_length[ids].copy()], [qpos_open]
     for _ in range(steps):
         mujoco.mj_step(model, data)
         gap_m = gauge.gap_m(data, axis)
         if gap_m < gaps[-1] - 1e-6:
             gaps.append(gap_m)
             lengths.append(data.actuator_length[ids].copy())
+            states.append(data.qpos.copy())
     _check(model, data)
     end_m = gauge.gap_m(data, axis)
     if end_m > start_m - LEAST_TRAVEL_M:
@@ -86,12 +96,23 @@ def test_move(model: mujoco.MjModel, gripper: GripperFile) -> Travel:
             f"gripper.file: with the controls `closed` the gap goes from {start_m * 1e3:.3g} to {end_m * 1e3:.3g} mm, "
             "so the fingers do not close: look at actuators, open, closed and gap"
         )
-    grid = np.linspace(gaps[-1], gaps[0], POINTS)
+    touch_m = (start_m + end_m) / 2.0 if width_m is None else width_m + CLEARANCE_M
+    data.qpos[:] = states[int(np.argmin(np.abs(np.array(gaps) - touch_m)))]
+    mujoco.mj_kinematics(model, data)
+    left, right = faces(model, data, gripper)
+    axis = closing_axis(gripper, left, right)
+    if gauge.along_axis:
+        for k, state in enumerate(states):
+            data.qpos[:] = state
+            mujoco.mj_kinematics(model, data)
+            gaps[k] = gauge.gap_m(data, axis)
+    grid = np.linspace(min(gaps), gaps[0], POINTS)
     order = np.argsort(gaps)
     table = np.array(
         [np.interp(grid, np.array(gaps)[order], column) for column in np.array(lengths)[order].T]
     )
-    return Travel(grid, table, _mass(model, gripper, qpos_open, axis), axis, qpos_open)
+    mass_kg = _mass(model, gripper, qpos_open, axis)
+    return Travel(grid, table, mass_kg, axis, (left + right) / 2.0, qpos_open)
 
 
 def _mass(model: mujoco.MjModel, gripper: GripperFile, qpos: Floats, axis: Floats) -> float:
@@ -194,13 +215,26 @@ class ActuatorDrive:
         effort = min(max(effort, -limit), limit)
         slopes = self._travel.slopes(gap_m)
         share = np.abs(slopes).sum()
-        wanted = -np.sign(slopes) * effort / share
         length, velocity = data.actuator_length[self._ids], data.actuator_velocity[self._ids]
+        wanted = -np.sign(slopes) * effort / share
+        wanted += self._kept_together(slopes, length, velocity, gap_m, rate_m_s)
         bias = self._bias[:, 0] + self._bias[:, 1] * length + self._bias[:, 2] * velocity
         controls = np.clip((wanted - bias) / self._gain, self._controls[:, 0], self._controls[:, 1])
         data.ctrl[self._ids] = controls
         force = np.clip(self._gain * controls + bias, self._forces[:, 0], self._forces[:, 1])
         self.effort_n = float(-force @ slopes)
+
+    def _kept_together(
+        self, slopes: Floats, length: Floats, velocity: Floats, gap_m: float, rate_m_s: float
+    ) -> Floats:
+        """Return forces that keep several actuators at the positions of the test move for this gap, without effort."""
+        if len(slopes) == 1:
+            return np.zeros(1)
+        inertia = self._travel.mass_kg / float(slopes @ slopes)
+        behind = self._travel.lengths(gap_m) - length
+        forces = inertia * SERVO_RAD_S * (SERVO_RAD_S * behind + 2.0 * (slopes * rate_m_s - velocity))
+        forces -= slopes * float(slopes @ forces) / float(slopes @ slopes)
+        return np.asarray(forces)
 
     def _effort(self, command: Command, gap_m: float, rate_m_s: float, dt_s: float) -> float:
         """Return the effort for a command; a servo on the gap keeps the speed, or reaches the position."""

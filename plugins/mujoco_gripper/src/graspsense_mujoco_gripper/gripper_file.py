@@ -31,21 +31,38 @@ LARGEST_BYTES: Final = 512 * 1024
 
 
 @frozen(kw_only=True)
-class Gap:
-    """How the gap is measured: as the distance of two sites, of two geoms, or from a joint; exactly one of them.
+class Point:
+    """A point on a body, in the frame of the body (m)."""
 
-    The gap of a joint is `offset_m` plus `scale` times its position.
+    body: str
+    at: tuple[float, ...]
+
+    def __attrs_post_init__(self) -> None:
+        if len(self.at) != 3:
+            raise ValueError(f"at has {len(self.at)} numbers: a point has three")
+
+
+@frozen(kw_only=True)
+class Gap:
+    """How the gap is measured: by two sites, points on the fingers, two geoms, or a joint; exactly one of them.
+
+    That of sites, and of the means of `left` and `right` points, is their distance along the closing direction; that of
+    geoms is the distance of their surfaces; that of a joint is `offset_m` plus `scale` times its position.
     """
 
     sites: tuple[str, ...] = ()
+    left: tuple[Point, ...] = ()
+    right: tuple[Point, ...] = ()
     geoms: tuple[str, ...] = ()
     joint: str = ""
     scale: float = 1.0
     offset_m: float = 0.0
 
     def __attrs_post_init__(self) -> None:
-        if bool(self.sites) + bool(self.geoms) + bool(self.joint) != 1:
-            raise ValueError("give the gap by one of sites, geoms and joint")
+        if bool(self.left) != bool(self.right):
+            raise ValueError("the points of the gap are given for both fingers: left and right")
+        if bool(self.sites) + bool(self.left) + bool(self.geoms) + bool(self.joint) != 1:
+            raise ValueError("give the gap by one of sites, geoms and joint, or by left and right points")
         for name, pair in (("sites", self.sites), ("geoms", self.geoms)):
             if pair and len(pair) != 2:
                 raise ValueError(f"{name} has {len(pair)} names: give two, one of each finger")
@@ -87,7 +104,9 @@ class GripperFile:
     """A gripper: its model, the actuators that close it, and its measurements.
 
     `open` and `closed` are the controls of each actuator with the fingers open and closed. `closing` is the direction
-    in which the left finger moves (a vector of the world); empty: from the left finger to the right one.
+    in which the left finger moves (a vector of the world); empty: from the left finger to the right one. `angle` is the
+    unit of angles in a model that leaves it to those that include it. With `only_fingers`, only the geoms of the fingers
+    touch: the hull of a mesh may fill the space between them.
     """
 
     model: str
@@ -98,6 +117,8 @@ class GripperFile:
     left: Finger
     right: Finger
     closing: tuple[float, ...] = ()
+    angle: str = ""
+    only_fingers: bool = False
     effort_limit_n: float = field(default=0.0)
     speed_limit_m_s: float = field(default=0.1)
     channels: Mapping[str, ModelSensor] = field(factory=dict)
@@ -110,6 +131,8 @@ class GripperFile:
                 raise ValueError(f"{name} has {len(values)} values for {len(self.actuators)} actuators")
         if self.closing and len(self.closing) != 3:
             raise ValueError(f"closing has {len(self.closing)} numbers: a direction has three")
+        if self.angle not in ("", "radian", "degree"):
+            raise ValueError(f"angle is {self.angle!r}: give radian or degree, or leave it out")
         if self.effort_limit_n < 0.0 or self.speed_limit_m_s <= 0.0:
             raise ValueError("effort_limit_n is at least 0 (0: from the model), speed_limit_m_s above 0")
         if self.left.rows * self.left.columns != self.right.rows * self.right.columns:

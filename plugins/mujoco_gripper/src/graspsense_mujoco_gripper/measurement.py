@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from graspsense.plugin_api import ConfigError
 from graspsense_mujoco_gripper.gripper_file import Finger, Gap, GripperFile
-from graspsense_mujoco_gripper.model import OBJ, identifier
+from graspsense_mujoco_gripper.model import OBJ, POINT, identifier
 
 Floats = NDArray[np.float64]
 FARTHEST_M = 10.0
@@ -23,8 +23,9 @@ class GapGauge:
 
     def __init__(self, model: mujoco.MjModel, gap: Gap) -> None:
         self._gap = gap
-        if gap.sites:
-            self._ids = [identifier(model, OBJ.mjOBJ_SITE, name, "site") for name in gap.sites]
+        self._faces = _face_sites(model, gap)
+        if self._faces:
+            self._ids = []
         elif gap.geoms:
             self._ids = [identifier(model, OBJ.mjOBJ_GEOM, name, "geom") for name in gap.geoms]
         else:
@@ -32,10 +33,15 @@ class GapGauge:
             self._ids = [int(model.jnt_qposadr[joint])]
         self._model = model
 
+    @property
+    def along_axis(self) -> bool:
+        """Whether the gap depends on the closing direction."""
+        return bool(self._faces)
+
     def gap_m(self, data: mujoco.MjData, axis: Floats) -> float:
-        """Return the gap; that of two sites is their distance along the closing direction."""
-        if self._gap.sites:
-            left, right = (data.site_xpos[k] for k in self._ids)
+        """Return the gap."""
+        if self._faces:
+            left, right = (data.site_xpos[sites].mean(axis=0) for sites in self._faces)
             return float((right - left) @ axis)
         if self._gap.geoms:
             return float(mujoco.mj_geomDistance(self._model, data, *self._ids, FARTHEST_M, None))
@@ -122,13 +128,9 @@ def cells_of(model: mujoco.MjModel, gripper: GripperFile) -> Cells | None:
     return Cells((addresses[0], addresses[1]), gripper.left.rows * gripper.left.columns)
 
 
-def closing_axis(model: mujoco.MjModel, data: mujoco.MjData, gripper: GripperFile) -> Floats:
+def closing_axis(gripper: GripperFile, left: Floats, right: Floats) -> Floats:
     """Return the unit vector from the left finger to the right one. Raises ConfigError where they coincide."""
-    if gripper.closing:
-        axis = np.asarray(gripper.closing, float)
-    else:
-        left, right = _faces(model, data, gripper)
-        axis = right - left
+    axis = np.asarray(gripper.closing, float) if gripper.closing else right - left
     length = float(np.linalg.norm(axis))
     if not length > 1e-9:
         raise ConfigError(
@@ -137,19 +139,41 @@ def closing_axis(model: mujoco.MjModel, data: mujoco.MjData, gripper: GripperFil
     return axis / length
 
 
-def between_fingers(model: mujoco.MjModel, data: mujoco.MjData, gripper: GripperFile) -> Floats:
-    """Return the point in the middle of both fingers."""
-    left, right = _faces(model, data, gripper)
-    return (left + right) / 2.0
+def width_m(model: mujoco.MjModel) -> float:
+    """Return how wide a thing is along its x axis: from its geoms that touch, and its flexible parts."""
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    ends = [float(x) for x in data.flexvert_xpos[:, 0]] if model.nflexvert else []
+    for k in range(model.ngeom):
+        if model.geom_contype[k] or model.geom_conaffinity[k]:
+            row = data.geom_xmat[k].reshape(3, 3)[0]
+            centre = float(data.geom_xpos[k][0] + row @ model.geom_aabb[k][:3])
+            reach = float(np.abs(row) @ model.geom_aabb[k][3:])
+            ends += [centre - reach, centre + reach]
+    return max(ends) - min(ends) if ends else 0.0
 
 
-def _faces(model: mujoco.MjModel, data: mujoco.MjData, gripper: GripperFile) -> tuple[Floats, Floats]:
+def _face_sites(model: mujoco.MjModel, gap: Gap) -> tuple[list[int], ...]:
+    """Return the sites of the left and the right face; nothing where the gap has neither sites nor points."""
+    if gap.sites:
+        return tuple([identifier(model, OBJ.mjOBJ_SITE, name, "site")] for name in gap.sites)
+    if gap.left:
+        return tuple(
+            [identifier(model, OBJ.mjOBJ_SITE, f"{POINT}{side}{k}", "site") for k in range(len(points))]
+            for side, points in (("left", gap.left), ("right", gap.right))
+        )
+    return ()
+
+
+def faces(model: mujoco.MjModel, data: mujoco.MjData, gripper: GripperFile) -> tuple[Floats, Floats]:
     """Return where the left and the right finger touch things: what the gap is measured between, or their geoms."""
     gap = gripper.gap
-    if gap.sites:
-        left, right = (data.site_xpos[identifier(model, OBJ.mjOBJ_SITE, name, "site")] for name in gap.sites)
+    if sites := _face_sites(model, gap):
+        left, right = (data.site_xpos[one].mean(axis=0) for one in sites)
     elif gap.geoms:
-        left, right = (data.geom_xpos[identifier(model, OBJ.mjOBJ_GEOM, name, "geom")] for name in gap.geoms)
+        left, right = (
+            data.geom_xpos[identifier(model, OBJ.mjOBJ_GEOM, name, "geom")].copy() for name in gap.geoms
+        )
     else:
         left, right = (
             np.mean([data.geom_xpos[k] for k in geoms_of(model, finger)], axis=0)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import mujoco
 
 from graspsense.plugin_api import ConfigError
+from graspsense_mujoco_gripper.gripper_file import GripperFile
 
 OBJ: Final = mujoco.mjtObj
 # MuJoCo would print each warning and write it to MUJOCO_LOG.TXT in the current folder; `instability` tells them.
@@ -28,19 +30,67 @@ def read_spec(path: Path) -> mujoco.MjSpec:
         raise ConfigError(f"MuJoCo {mujoco.mj_versionString()} refuses {path}: {error}") from error
 
 
-def gripper_spec(path: Path, timestep_s: float) -> mujoco.MjSpec:
-    """Return the model of a gripper with this step, not compiled.
+POINT: Final = "graspsense/"
+"""Before the names of the sites that stand for the points of a gripper file."""
 
-    Bodies that are hinged to one another do not touch, as in a gripper on a moving arm: MuJoCo leaves such contacts
-    out, but not where the palm is fixed to the world.
+
+def gripper_spec(path: Path, gripper: GripperFile, timestep_s: float) -> mujoco.MjSpec:
+    """Return the model of a gripper with this step, not compiled; with sites at the points of its file.
+
+    Geoms that are named as part of a finger touch, even where the model has switched their contacts off.
     """
     spec = read_spec(path)
     spec.option.timestep = timestep_s
-    for body in spec.bodies:
-        parent = body.parent
-        if parent is not None and parent.name not in ("", "world") and body.name:
-            spec.add_exclude(bodyname1=parent.name, bodyname2=body.name)
+    if gripper.angle:
+        spec.compiler.degree = gripper.angle == "degree"
+    _exclude_neighbours(spec)
+    fingers = (gripper.left, gripper.right)
+    geoms = {name for finger in fingers for name in finger.geoms}
+    bodies = {name for finger in fingers for name in finger.bodies}
+    for geom in spec.geoms:
+        if geom.name in geoms:
+            geom.contype |= 1
+            geom.conaffinity |= 1
+        elif gripper.only_fingers and geom.parent.name not in bodies:
+            geom.contype = geom.conaffinity = 0
+    for side, points in (("left", gripper.gap.left), ("right", gripper.gap.right)):
+        for k, point in enumerate(points):
+            body = spec.body(point.body)
+            if body is None:
+                raise ConfigError(
+                    f"gripper.file: the model has no body {point.body!r}; there are {named(spec.bodies)}"
+                )
+            body.add_site(name=f"{POINT}{side}{k}", pos=point.at, group=5)
     return spec
+
+
+def _exclude_neighbours(spec: mujoco.MjSpec) -> None:
+    """Exclude contacts of bodies that are hinged to one another, or to a palm of several bodies.
+
+    MuJoCo leaves such contacts out in a gripper on a moving arm, but not where the palm is fixed to the world.
+    """
+    groups: dict[str, list[str]] = {}
+    bodies = [body for body in spec.bodies if body.parent is not None]
+    for k, body in enumerate(bodies):
+        body.name = body.name or f"{POINT}body{k}"
+        groups.setdefault(_rigid_root(body), []).append(body.name)
+    for body in bodies:
+        if body.joints:
+            for neighbour in groups.get(_rigid_root(body.parent), ()):
+                for moving in groups[body.name]:
+                    spec.add_exclude(bodyname1=neighbour, bodyname2=moving)
+
+
+def _rigid_root(body: mujoco.MjsBody) -> str:
+    """Return the name of the body that this one moves with: the nearest one above it that has a joint, or the world."""
+    while body.parent is not None and not body.joints:
+        body = body.parent
+    return str(body.name)
+
+
+def named(parts: Iterable[Any]) -> str:
+    """Return the names of parts of a model, for a message."""
+    return ", ".join(part.name for part in parts if part.name) or "none with a name"
 
 
 def compiled(spec: mujoco.MjSpec, called: str) -> mujoco.MjModel:

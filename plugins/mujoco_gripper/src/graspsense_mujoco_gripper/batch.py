@@ -1,0 +1,235 @@
+"""Many grasps at once: in several processes, as the interpreter runs between the steps of MuJoCo.
+
+A process is a new interpreter that runs `main`, so that the script of the caller is not imported a second time. It
+reads lines of JSON, and answers with a line of JSON and the columns of the trace as numpy writes them. The caller
+extracts the features. A grasp follows from its thing and its seed alone, whoever runs it.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from queue import SimpleQueue
+from typing import IO, Any, Final
+
+import numpy as np
+from attrs import asdict, evolve, fields, frozen
+
+from graspsense.plugin_api import (
+    BatchOptions,
+    ConfigError,
+    Controller,
+    Grasped,
+    GraspEvent,
+    Outcome,
+    Phase,
+    RunConfig,
+    Trace,
+    UnknownName,
+    create,
+    recipe_of,
+    run_uninterrupted,
+)
+from graspsense_mujoco_gripper.config import MujocoConfig
+
+WORTH_A_PROCESS: Final = 4
+"""Grasps that take about as long as the start of a process."""
+_COLUMNS: Final = tuple(one.name for one in fields(Trace) if one.name not in ("units", "signals", "events"))
+
+
+class NotHandedOver(Exception):
+    """A grasp cannot run in another process, or failed there; the caller runs it, which shows the reason."""
+
+
+@frozen(eq=False)
+class Job:
+    """What all grasps of a batch have in common."""
+
+    config: MujocoConfig
+    controller: Controller[Any]
+    options: BatchOptions
+    makes_signals: bool
+    """Whether the gripper has further channels, which are not handed over."""
+
+    def grasp(self, thing: str, seed: int) -> Grasped:
+        """Run one grasp here."""
+        from graspsense_mujoco_gripper.backend import MujocoGripper
+
+        run = evolve(self.options.get("run") or RunConfig(), seed=int(seed))
+        done = run_uninterrupted(MujocoGripper(evolve(self.config, object=thing)), self.controller, run)
+        return self._grasped(done.outcome, done.reason, done.trace, done.report)
+
+    def _grasped(self, outcome: Outcome, reason: str, trace: Trace, report: dict[str, Any] | Any) -> Grasped:
+        extract = self.options.get("extract")
+        return Grasped(
+            outcome=outcome,
+            reason=reason,
+            extracted=None if extract is None else extract(trace),
+            trace=trace if self.options.get("traces") else None,
+            report=report,
+        )
+
+    def greeting(self) -> bytes:
+        """Return what a process has to know before its first grasp. Raises NotHandedOver."""
+        if self.makes_signals:
+            raise NotHandedOver
+        try:
+            name, values = recipe_of("controller", self.controller)
+            twin = create("controller", name, **values)
+            # Compared as text, because NaN is not equal to itself.
+            if repr((twin.params(), twin.init())) != repr((self.controller.params(), self.controller.init())):
+                raise NotHandedOver
+            return _line(
+                {
+                    "path": [folder or os.getcwd() for folder in sys.path],
+                    "config": asdict(self.config),
+                    "controller": [name, values],
+                    "run": asdict(self.options.get("run") or RunConfig()),
+                }
+            )
+        except (ConfigError, UnknownName, TypeError, ValueError) as error:
+            raise NotHandedOver from error
+
+    def grasp_in(self, process: subprocess.Popen[bytes], thing: str, seed: int) -> Grasped:
+        """Run one grasp in a process. Raises NotHandedOver."""
+        to, answers = process.stdin, process.stdout
+        assert to is not None
+        assert answers is not None
+        try:
+            to.write(_line([thing, int(seed)]))
+            to.flush()
+            line = answers.readline()
+            if not line.endswith(b"\n"):
+                raise NotHandedOver
+            answer = json.loads(line)
+            columns = io.BytesIO(answers.read(answer["bytes"]))
+            if "failed" in answer:
+                raise NotHandedOver
+            trace = _trace(columns, answer["events"])
+        except (OSError, ValueError) as error:
+            raise NotHandedOver from error
+        return self._grasped(Outcome(answer["outcome"]), answer["reason"], trace, answer["report"])
+
+
+def grasps(job: Job, things: Sequence[str], seeds: Sequence[int]) -> list[Grasped]:
+    """Return the grasp of each thing with its seed, in order. Raises ValueError if their numbers differ."""
+    if len(things) != len(seeds):
+        raise ValueError(f"{len(things)} scenes and {len(seeds)} seeds: give one seed a scene")
+    wanted = job.options.get("workers") or os.cpu_count() or 1
+    workers = max(1, min(wanted, len(things) // WORTH_A_PROCESS))
+    progress = job.options.get("progress")
+    with _processes(job, workers) as free:
+
+        def grasp(k: int) -> Grasped:
+            process = free.get()
+            try:
+                if process is not None:
+                    return job.grasp_in(process, things[k], seeds[k])
+            except NotHandedOver:
+                if process is not None:
+                    process.kill()
+                process = None
+            finally:
+                free.put(process)
+            return job.grasp(things[k], seeds[k])
+
+        done: list[Grasped] = []
+        if workers == 1:
+            for k in range(len(things)):
+                done.append(grasp(k))
+                if progress is not None:
+                    progress(k + 1, len(things))
+            return done
+        with ThreadPoolExecutor(max_workers=workers) as pool:
+            try:
+                for one in pool.map(grasp, range(len(things))):
+                    done.append(one)
+                    if progress is not None:
+                        progress(len(done), len(things))
+            except BaseException:
+                pool.shutdown(wait=False, cancel_futures=True)
+                raise
+    return done
+
+
+@contextmanager
+def _processes(job: Job, workers: int) -> Iterator[SimpleQueue[subprocess.Popen[bytes] | None]]:
+    """Yield the processes that are free, and end them; None stands for this process."""
+    free: SimpleQueue[subprocess.Popen[bytes] | None] = SimpleQueue()
+    started: list[subprocess.Popen[bytes]] = []
+    try:
+        try:
+            greeting = job.greeting() if workers > 1 else b""
+        except NotHandedOver:
+            greeting = b""
+        for _ in range(workers):
+            if not greeting:
+                free.put(None)
+                continue
+            process = subprocess.Popen(
+                [sys.executable, "-P", "-c", "from graspsense_mujoco_gripper.batch import main; main()"],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+            )
+            started.append(process)
+            assert process.stdin is not None
+            process.stdin.write(greeting)
+            free.put(process)
+        yield free
+    finally:
+        for process in started:
+            process.kill()
+            process.communicate()
+
+
+def main() -> None:
+    """Answer the requests on the standard input until it ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    answers = os.fdopen(os.dup(1), "wb")
+    # Text that other code prints must not appear between the answers.
+    os.dup2(2, 1)
+    asked = sys.stdin.buffer
+    greeting = json.loads(asked.readline() or b"null")
+    if greeting is None:
+        return
+    sys.path[:] = greeting["path"]
+    name, values = greeting["controller"]
+    job = Job(
+        MujocoConfig(**greeting["config"]),
+        create("controller", name, **values),
+        {"run": RunConfig(**greeting["run"]), "traces": True},
+        makes_signals=False,
+    )
+    for line in asked:
+        columns = io.BytesIO()
+        try:
+            done = job.grasp(*json.loads(line))
+            assert done.trace is not None
+            for column in _COLUMNS:
+                np.lib.format.write_array(columns, getattr(done.trace, column), allow_pickle=False)
+            told = [[event.t_s, int(event.phase), event.what, event.source] for event in done.trace.events]
+            outcome = done.outcome.value
+            answer: dict[str, Any] = {"outcome": outcome, "reason": done.reason, "report": dict(done.report)}
+            head = _line({**answer, "events": told, "bytes": columns.tell()})
+        except Exception:
+            columns = io.BytesIO()
+            head = _line({"failed": True, "bytes": 0})
+        answers.write(head + columns.getbuffer())
+        answers.flush()
+
+
+def _trace(of: IO[bytes], told: Sequence[Sequence[Any]]) -> Trace:
+    parts: dict[str, Any] = {name: np.lib.format.read_array(of, allow_pickle=False) for name in _COLUMNS}
+    events = tuple(GraspEvent(t_s, Phase(phase), what, source) for t_s, phase, what, source in told)
+    return Trace(**parts, events=events)
+
+
+def _line(value: Any) -> bytes:
+    return json.dumps(value).encode() + b"\n"

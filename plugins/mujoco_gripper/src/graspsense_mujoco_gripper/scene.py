@@ -1,0 +1,359 @@
+"""A scene: a thing between the fingers, or on a table, an arm that lifts the gripper, and a cord that pulls.
+
+thing = "can"
+table = true
+arm = [[0.3, 0.0], [0.8, 0.05]]              # seconds after both fingers touch, height of the gripper (m)
+
+[cord]
+direction = [0.0, 0.0, -1.0]
+force = [[0.8, 0.0], [1.8, 5.0]]             # seconds after both fingers touch, force (N)
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from math import isfinite
+from pathlib import Path
+from typing import Final
+from zlib import crc32
+
+import mujoco
+import numpy as np
+from attrs import field, frozen
+from numpy.typing import NDArray
+
+from graspsense.plugin_api import ConfigError, TomlError, ValidationFailed, structured, toml_values
+from graspsense_mujoco_gripper.catalogue import Thing, Walls, thing_named
+from graspsense_mujoco_gripper.model import compiled
+
+Floats = NDArray[np.float64]
+PREFIX: Final = "thing/"
+"""Before each name of the thing in the combined model."""
+ARM: Final = "arm"
+"""Before each name of a slide of the arm."""
+TABLE_BIT: Final = 8
+"""Of `contype` and `conaffinity`: the table touches things, and not the gripper."""
+TABLE_HALF_M: Final = (0.3, 0.3, 0.02)
+ARM_KG: Final = 1000.0
+"""Inertia of the arm: so heavy that the gripper does not move it."""
+ARM_RAD_S: Final = 200.0
+"""Natural frequency of the servo of the arm, critically damped."""
+LARGEST_BYTES: Final = 64 * 1024
+MASS_SPREAD, FRICTION_SPREAD, STIFFNESS_SPREAD, SIZE_SPREAD = 0.1, 0.15, 0.1, 0.01
+"""Standard deviations of the logarithms of what instances and seeds draw."""
+PLACE_SPREAD_M = 0.001
+Schedule = tuple[tuple[float, ...], ...]
+
+
+@frozen(kw_only=True)
+class Cord:
+    """A cord on the thing: where it pulls (a vector of the world), its force (N) over the time (s) since contact."""
+
+    direction: tuple[float, ...] = (0.0, 0.0, -1.0)
+    force: Schedule
+
+    def __attrs_post_init__(self) -> None:
+        _check_schedule("force", self.force)
+        if len(self.direction) != 3 or not 0.0 < float(np.linalg.norm(self.direction)) < float("inf"):
+            raise ValueError("direction is a vector of three numbers, not all zero")
+
+    def pull_n(self, t_s: float) -> Floats:
+        """Return the force (N, in the world) at a time."""
+        direction = np.asarray(self.direction) / np.linalg.norm(self.direction)
+        pull: Floats = _value(self.force, t_s) * direction
+        return pull
+
+
+@frozen(kw_only=True)
+class Scene:
+    """What the gripper grasps, and what happens to it. Without a table the thing has no weight.
+
+    `arm` is the height (m) of the gripper over the time (s) since both fingers touched. `mass_kg` and `friction`
+    replace those of the thing.
+    """
+
+    thing: str
+    walls: Walls | None = None
+    table: bool = False
+    arm: Schedule = ()
+    cord: Cord | None = None
+    mass_kg: float | None = field(default=None)
+    friction: float | None = field(default=None)
+
+    def __attrs_post_init__(self) -> None:
+        if self.arm:
+            _check_schedule("arm", self.arm)
+        if self.mass_kg is not None and not 0.0 < self.mass_kg < float("inf"):
+            raise ValueError(f"mass_kg is {self.mass_kg}: it is above 0")
+        if self.friction is not None and not 0.0 <= self.friction < float("inf"):
+            raise ValueError(f"friction is {self.friction}: it is at least 0")
+
+
+@frozen(eq=False)
+class Model:
+    """A scene that is read: its thing and the thing's model, not compiled; no model where there is no thing."""
+
+    scene: Scene
+    thing: Thing
+    spec: mujoco.MjSpec | None
+    instance: str
+
+
+def read_scene(name: str) -> Model:
+    """Return the scene of this name: a thing of the catalogue, an MJCF file, or a scene file (TOML).
+
+    What follows `#` names an instance. Raises UnknownName, ConfigError.
+    """
+    name, number, instance = name.partition("#")
+    scene, beside = Scene(thing=name), Path()
+    if name.endswith(".toml"):
+        beside = Path(name).expanduser().parent
+        scene = _scene_of(Path(name).expanduser())
+    if scene.walls is not None:
+        thing, spec = Thing(walls=scene.walls), scene.walls.spec(scene.thing)
+    else:
+        thing, found = thing_named(scene.thing, beside)
+        if found is None:
+            return Model(scene, thing, None, "")
+        spec = found
+    return Model(scene, thing, spec, f"{name}#{instance}" if number else "")
+
+
+def _scene_of(path: Path) -> Scene:
+    try:
+        if path.stat().st_size > LARGEST_BYTES:
+            raise ConfigError(f"{path} is no scene file: it has more than {LARGEST_BYTES} bytes")
+        return structured(toml_values(path.read_text(encoding="utf-8")), Scene, "a scene file")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError(f"gripper.object: {path} cannot be read: {error}") from error
+    except TomlError as error:
+        raise ConfigError(f"gripper.object: {path}, line {error.line}: {error}") from error
+    except ValidationFailed as misfit:
+        said = [f"{'.'.join(map(str, one.path)) or 'the file'}: {one.text}" for one in misfit.problems]
+        raise ConfigError(f"gripper.object: {path}\n  " + "\n  ".join(said)) from None
+
+
+def _check_schedule(name: str, rows: Schedule) -> None:
+    if not rows or any(len(row) != 2 or not all(map(isfinite, row)) for row in rows):
+        raise ValueError(
+            f"{name} is a list of pairs of a time (s) and a value, as in [[0.3, 0.0], [0.8, 0.05]]"
+        )
+    times = [row[0] for row in rows]
+    if any(after <= before for before, after in pairwise(times)):
+        raise ValueError(f"the times of {name} rise from pair to pair")
+
+
+def _value(rows: Schedule, t_s: float) -> float:
+    """Return the value at a time: straight between the pairs, the nearest one before and after them."""
+    times, values = zip(*rows, strict=True)
+    return float(np.interp(t_s, times, values))
+
+
+def put_on_arm(spec: mujoco.MjSpec) -> None:
+    """Put each body of the gripper that is fixed to the world on an upright slide with a servo.
+
+    Raises ConfigError where one has joints of its own.
+    """
+    whole = compiled(spec, "the gripper")
+    for body in spec.worldbody.bodies:
+        if body.joints:
+            raise ConfigError(
+                f"gripper.object: the scene has an arm, and the body {body.name!r} of the gripper has joints of its own"
+            )
+        back, axis = np.zeros(4), np.zeros(3)
+        mujoco.mju_negQuat(back, whole.body_quat[body.id])
+        mujoco.mju_rotVecQuat(axis, np.array([0.0, 0.0, 1.0]), back)
+        name = f"{ARM}/{body.id}"
+        body.add_joint(
+            name=name,
+            type=mujoco.mjtJoint.mjJNT_SLIDE,
+            axis=axis,
+            armature=ARM_KG,
+            damping=[2.0 * ARM_KG * ARM_RAD_S, 0.0, 0.0],
+            limited=mujoco.mjtLimited.mjLIMITED_FALSE,
+        )
+        servo = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+        servo.set_to_position(kp=ARM_KG * ARM_RAD_S**2)
+    for body in spec.bodies:
+        body.gravcomp = 1.0
+
+
+def add_thing(spec: mujoco.MjSpec, model: Model, place: Floats, axis: Floats) -> None:
+    """Add the thing at a place, its x axis along the closing direction, and the table under it.
+
+    Raises ConfigError with MuJoCo's message.
+    """
+    child, scene = model.spec, model.scene
+    assert child is not None
+    for body in child.bodies:
+        body.gravcomp = float(not scene.table)
+    # MuJoCo would else take the larger friction of thing and finger, and the mean of their stiffness.
+    for part in (*child.geoms, *child.flexes):
+        part.priority = max(part.priority, 1)
+    if scene.friction is not None:
+        _scale_friction(child, scene.friction, absolute=True)
+    try:
+        whole = child.compile()
+        if scene.mass_kg is not None:
+            _scale_mass(child, scene.mass_kg / float(np.sum(whole.body_mass)))
+        lowest_m = _lowest(whole)
+        if scene.table:
+            _set_bits(child)
+            half = TABLE_HALF_M[2]
+            spec.worldbody.add_geom(
+                name=PREFIX + "table",
+                type=mujoco.mjtGeom.mjGEOM_BOX,
+                size=list(TABLE_HALF_M),
+                pos=[float(place[0]), float(place[1]), float(place[2]) + lowest_m - half],
+                contype=TABLE_BIT,
+                conaffinity=TABLE_BIT,
+                friction=[0.5, 0.005, 0.0001],
+            )
+        frame = spec.worldbody.add_frame(pos=place, quat=turned(axis))
+        spec.attach(child, frame=frame, prefix=PREFIX)
+    except ValueError as error:
+        raise ConfigError(f"MuJoCo refuses to attach {scene.thing} to the gripper: {error}") from error
+
+
+def _set_bits(child: mujoco.MjSpec) -> None:
+    """Let what touches fingers touch the table too."""
+    for geom in child.geoms:
+        if geom.contype & 1 or geom.conaffinity & 1:
+            geom.contype |= TABLE_BIT
+            geom.conaffinity |= TABLE_BIT
+    for flex in child.flexes:
+        flex.contype |= TABLE_BIT
+        flex.conaffinity |= TABLE_BIT
+
+
+def _lowest(model: mujoco.MjModel) -> float:
+    """Return the height (m) of the lowest point of a thing above its origin."""
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    lowest = [float(z) - model.flex_radius[0] for z in data.flexvert_xpos[:, 2]]
+    for k in range(model.ngeom):
+        if model.geom_contype[k] or model.geom_conaffinity[k]:
+            centre, half = model.geom_aabb[k, :3], model.geom_aabb[k, 3:]
+            turn = data.geom_xmat[k].reshape(3, 3)
+            middle = data.geom_xpos[k] + turn @ centre
+            lowest.append(float(middle[2] - np.abs(turn[2]) @ half))
+    return min(lowest, default=0.0)
+
+
+def vary(model: Model, generator: np.random.Generator) -> float:
+    """Draw mass, friction, stiffness and size of the thing, and return its place along the gap (m).
+
+    An instance has the same mass, stiffness and size in every trial.
+    """
+    own = np.random.default_rng(crc32(model.instance.encode())) if model.instance else generator
+    mass, stiffness, size = np.exp(own.normal(0.0, [MASS_SPREAD, STIFFNESS_SPREAD, SIZE_SPREAD]))
+    friction, place_m = np.exp(generator.normal(0.0, FRICTION_SPREAD)), generator.normal(0.0, PLACE_SPREAD_M)
+    child = model.spec
+    assert child is not None
+    _scale_friction(child, float(friction))
+    _scale_size(child, float(size))
+    _scale_mass(child, float(mass))
+    for joint in child.joints:
+        joint.stiffness = joint.stiffness * stiffness
+    for flex in child.flexes:
+        flex.young *= stiffness
+    return float(place_m)
+
+
+def _scale_friction(child: mujoco.MjSpec, factor: float, *, absolute: bool = False) -> None:
+    for part in (*child.geoms, *child.flexes):
+        friction = np.array(part.friction)
+        friction[0] = factor if absolute else friction[0] * factor
+        part.friction = friction
+
+
+def _scale_mass(child: mujoco.MjSpec, factor: float) -> None:
+    for geom in child.geoms:
+        if isfinite(geom.mass):
+            geom.mass *= factor
+        else:
+            geom.density *= factor
+    for body in child.bodies:
+        if any(flex for flex in child.flexes) and not body.geoms:
+            body.mass *= factor
+            body.inertia = np.array(body.inertia) * factor
+
+
+def _scale_size(child: mujoco.MjSpec, factor: float) -> None:
+    """Scale what is rigid; a mesh and a soft body keep their size."""
+    if child.flexes or child.meshes:
+        return
+    for body in child.bodies:
+        body.pos = np.array(body.pos) * factor
+    for geom in child.geoms:
+        geom.size = np.array(geom.size) * factor
+        geom.pos = np.array(geom.pos) * factor
+        geom.fromto = np.array(geom.fromto) * factor
+
+
+class Motion:
+    """Moves the arm and pulls the cord, by the time since both fingers touched."""
+
+    def __init__(self, model: mujoco.MjModel, scene: Scene) -> None:
+        self._scene, self._contact_s = scene, float("inf")
+        self._servos = [k for k in range(model.nu) if _actuator(model, k).startswith(f"{ARM}/")]
+        things = [k for k in range(model.nbody) if is_thing(model, k)]
+        heaviest = model.body_mass[things] if things else np.zeros(0)
+        self._body = things[0] if things else -1
+        self._bodies, self._masses = things, heaviest
+        self.moves = bool(things) and (scene.cord is not None or bool(scene.arm))
+        schedules = (scene.arm, () if scene.cord is None else scene.cord.force)
+        self._end_s = max((rows[-1][0] for rows in schedules if rows), default=0.0)
+        self._start_m: Floats = np.zeros(3)
+        self._highest_m, self._height_m = 0.0, 0.0
+
+    def set(self, data: mujoco.MjData, t_s: float, *, touched: bool) -> None:
+        """Set the servo of the arm and the force of the cord for the time after this tick."""
+        if not self.moves:
+            return
+        if touched and not isfinite(self._contact_s):
+            self._contact_s = t_s
+            self._start_m = self._centre(data)
+        if not isfinite(self._contact_s):
+            return
+        since_s = t_s - self._contact_s
+        if since_s > self._end_s:
+            return
+        self._height_m = float((self._centre(data) - self._start_m)[2])
+        self._highest_m = max(self._highest_m, self._height_m)
+        if self._servos:
+            data.ctrl[self._servos] = _value(self._scene.arm, since_s)
+        if self._scene.cord is not None:
+            data.xfrc_applied[self._body, :3] = self._scene.cord.pull_n(since_s)
+
+    def _centre(self, data: mujoco.MjData) -> Floats:
+        """Return the centre of mass of the thing."""
+        centre: Floats = self._masses @ data.xipos[self._bodies] / self._masses.sum()
+        return centre
+
+    def report(self) -> dict[str, float]:
+        """Return how high above where it was touched the thing was lifted, and how high it was at the end (m).
+
+        The end is that of the motion and the pull that the scene gives; the release comes after it.
+        """
+        return {"highest_m": self._highest_m, "height_m": self._height_m}
+
+
+def _actuator(model: mujoco.MjModel, number: int) -> str:
+    return mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_ACTUATOR, number) or ""
+
+
+def is_thing(model: mujoco.MjModel, body: int) -> bool:
+    """Return whether a body is part of the thing."""
+    return (mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_BODY, body) or "").startswith(PREFIX)
+
+
+def turned(axis: Floats) -> Floats:
+    """Return the quaternion of the smallest turn of the x axis onto this one."""
+    quaternion = np.zeros(4)
+    mujoco.mju_quatZ2Vec(quaternion, axis)
+    # mju_quatZ2Vec turns the z axis; before it, x is turned onto z.
+    x_onto_z = np.array([np.sqrt(0.5), 0.0, -np.sqrt(0.5), 0.0])
+    whole = np.zeros(4)
+    mujoco.mju_mulQuat(whole, quaternion, x_onto_z)
+    return whole

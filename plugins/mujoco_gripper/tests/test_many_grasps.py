@@ -1,0 +1,87 @@
+"""Many grasps at once: each follows from its thing and its seed alone, whoever runs it and in whatever order."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import pytest
+from attrs import evolve
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from graspsense.plugin_api import RunConfig, UnknownName, create, run_uninterrupted
+
+HYBRID = create("controller", "hybrid", sends="velocity", closing_speed_m_s=0.15)
+FEATURES = create("feature-set", "chitta")
+RUN = RunConfig(hold_s=0.05)
+GRASPS = [
+    ("block", 1),
+    ("can", 1),
+    ("egg", 2),
+    ("block", 2),
+    ("can#1", 3),
+    ("ball", 1),
+    ("block#1", 1),
+    ("egg", 1),
+]
+GRIPPER = create("sensor-backend", "mujoco")
+
+
+class Values:
+    """Features and every measured force of a trace, as text that tells each bit."""
+
+    def __call__(self, trace):
+        return repr((FEATURES.extract(trace).values, trace.force_left_n.tolist(), trace.gap_m.tolist()))
+
+
+def felt(grasps, **options):
+    things, seeds = zip(*grasps, strict=True)
+    done = GRIPPER.run_many(HYBRID, things, seeds, run=RUN, extract=Values(), **options)
+    return [(one.outcome, one.extracted, one.report["greatest_force_n"]) for one in done]
+
+
+@pytest.fixture(scope="module")
+def alone():
+    """Each grasp by itself."""
+    return {grasp: felt([grasp])[0] for grasp in GRASPS}
+
+
+def test_processes_grasp_as_one_process_does(alone):
+    assert felt(GRASPS, workers=2) == [alone[grasp] for grasp in GRASPS]
+    assert len(set(map(repr, alone.values()))) == len(GRASPS)
+
+
+@pytest.mark.slow
+@given(order=st.permutations(range(len(GRASPS))), count=st.integers(1, 3), workers=st.integers(1, 3))
+@settings(max_examples=5, deadline=None)
+def test_order_and_number_change_no_grasp(alone, order, count, workers):
+    grasps = [GRASPS[k] for k in order[:count]]
+    assert felt(grasps, workers=workers) == [alone[grasp] for grasp in grasps]
+
+
+def test_a_batch_grasps_as_the_runner_does(alone):
+
+    for thing, seed in GRASPS[:2]:
+        grasp = run_uninterrupted(GRIPPER.with_object(thing), HYBRID, evolve(RUN, seed=seed))
+        assert (grasp.outcome, Values()(grasp.trace)) == alone[thing, seed][:2]
+
+
+def test_progress_is_told_and_an_unknown_thing_ends_the_batch_before_any_grasp():
+    told = []
+    felt(GRASPS, workers=2, progress=lambda done, total: told.append((done, total)))
+    assert told[-1] == (len(GRASPS), len(GRASPS))
+    assert all(after >= before for before, after in pairwise(told))
+    told.clear()
+    with pytest.raises(UnknownName, match="blok"):
+        felt([*GRASPS, ("blok", 1)], progress=lambda done, total: told.append(done))
+    assert told == []
+
+
+def test_a_controller_that_other_processes_cannot_make_again_grasps_here(alone):
+    class Unregistered(type(HYBRID)):
+        pass
+
+    things, seeds = zip(*GRASPS, strict=True)
+    own = Unregistered(HYBRID.config)
+    done = GRIPPER.run_many(own, things, seeds, run=RUN, extract=Values(), workers=2)
+    assert [one.extracted for one in done] == [alone[grasp][1] for grasp in GRASPS]
