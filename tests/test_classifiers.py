@@ -14,7 +14,7 @@ from graspsense.core.values.errors import ConfigError
 from graspsense.core.values.features import Features, FeatureTable
 from graspsense.plugin_api import create
 
-ALL = ["c45", "svm", "mlp", "backprop", "forest", "boosted", "ebm", "knn", "tree"]
+ALL = ["c45", "svm", "mlp", "backprop", "forest", "extra-trees", "boosted", "ebm", "knn", "tree"]
 NAMES, UNITS = ("p_first", "f_steady", "noise"), ("m", "N", "")
 
 

@@ -32,13 +32,14 @@ from graspsense.regression.model import is_regression
 
 SMALL = {
     "forest": {"trees": 3},
+    "extra-trees": {"trees": 3},
     "boosted": {"stages": 3},
     "mlp": {"hidden": 3},
     "backprop": {"epochs": 5},
     "ebm": {"bags": 1, "pairs": 1},
 }
-KINDS = ["c45", "svm", "mlp", "backprop", "forest", "boosted", "ebm", "knn", "tree"]
-KEPT_AS_SKOPS = ["svm", "mlp", "forest", "tree"]
+KINDS = ["c45", "svm", "mlp", "backprop", "forest", "extra-trees", "boosted", "ebm", "knn", "tree"]
+KEPT_AS_SKOPS = ["svm", "mlp", "forest", "extra-trees", "tree"]
 
 
 def labelled(n=5):
@@ -76,6 +77,15 @@ def read_damaged(seed, places, damages, *files):
     return int(done.stdout.split()[1])
 
 
+def other_trees(estimator):
+    """Trees of a random forest with the labels and the number of features of this estimator."""
+    from sklearn.ensemble import RandomForestClassifier
+
+    rows = np.random.default_rng(0).normal(size=(30, estimator.n_features_in_))
+    labels = np.resize(estimator.classes_, 30)
+    return RandomForestClassifier(n_estimators=estimator.n_estimators).fit(rows, labels).estimators_
+
+
 def resealed(path, change):
     """Change the content of a model, and give it the hash of the changed one."""
     content = json.loads(path.read_text())
@@ -88,7 +98,7 @@ def test_a_damaged_model_is_refused_or_answers(tmp_path):
     files = [tmp_path / f"{name}.json" for name in KINDS]
     for name, file in zip(KINDS, files, strict=True):
         write_model(file, trained(name))
-    assert read_damaged(1, 3, 8, *files) == 9 * 3 * 8
+    assert read_damaged(1, 3, 8, *files) == len(KINDS) * 3 * 8
 
 
 SOME = pytest.param((2, 40, 8), 300, marks=pytest.mark.slow, id="some")
@@ -319,6 +329,7 @@ class TestKeptAsSkops:
     def test_a_forest_of_other_trees(self, tmp_path):
         self.refused(tmp_path, "forest", lambda forest: forest.estimators_.pop())
         self.refused(tmp_path, "forest", lambda forest: setattr(forest, "n_jobs", 10**6))
+        self.refused(tmp_path, "extra-trees", lambda trees: setattr(trees, "estimators_", other_trees(trees)))
 
     def test_an_archive_that_is_larger_than_it_looks(self, tmp_path):
         model = trained("tree", kept_as="skops")

@@ -7,12 +7,14 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from graspsense.cli.choosing import chosen, pipeline_text, refuse_with_choice, say_chosen
 from graspsense.cli.output import check_outputs, echo_json, file_to_write, file_to_write_as
 from graspsense.cli.sources import (
     SOURCES,
     checkpoints_option,
     classifier_option,
     command_line,
+    is_csv,
     learner_of,
     source_argument,
     source_options,
@@ -40,6 +42,9 @@ _NOT_EVALUATED: Final = ("out", "keep", "overwrite", "as_json", "calibration_ins
     The model is a JSON file without code. Use it with -o classifier.model=FILE. To measure its recognition rate, run
     `graspsense evaluate` with the same arguments.
 
+    With --choose, classifier and features are those that recognise most of these trials, and the pipeline FILE.toml
+    with them is written beside the model. The printed rate is that of the choice as a whole.
+
     {SOURCES}""",
 )
 @source_argument
@@ -65,6 +70,11 @@ _NOT_EVALUATED: Final = ("out", "keep", "overwrite", "as_json", "calibration_ins
     help="simulated: measure certainty and sets on so many further instances of each object.  "
     "[default: by cross-validation on the training trials]",
 )
+@click.option(
+    "--choose",
+    is_flag=True,
+    help="Choose classifier and features by the trials; one that is given by --classifier or -o stays.",
+)
 @source_options
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def train(
@@ -76,28 +86,40 @@ def train(
     classifier: str | None,
     checkpoints: str | None,
     calibration_instances: int | None,
+    choose: bool,
     as_json: bool,
     **given: Any,
 ) -> None:
     """Train a model, write it, and print what it was trained on."""
     from functools import partial
 
+    from graspsense.core.files.whole_file import write_whole
     from graspsense.core.learn.checkpoints import checkpoints_of
     from graspsense.core.learn.model import train as trained
     from graspsense.core.learn.model import write_model
     from graspsense.evaluation.gathered_warnings import gathered_warnings
 
-    check_outputs(out, keep, overwrite=overwrite, sources=[source])
+    pipeline = str(Path(out).with_suffix(".toml")) if choose and not is_csv(source) else None
+    check_outputs(out, keep, pipeline, overwrite=overwrite, sources=[source])
     times = checkpoints_of(checkpoints)
+    found = None
+    if choose:
+        further = {"checkpoints": checkpoints, "calibration_instances": calibration_instances}
+        refuse_with_choice({**given, **further})
     if given["target_value"]:
         from graspsense.cli.target_value import train_value
 
         train_value(source, classifier, out, keep, as_json, given)
         return
-    learner = learner_of(source, classifier, given)
     _refuse_single_scene(source)
-    labelled, held_out = _trials(source, given, times, target, calibration_instances)
-    notes = list(labelled.notes)
+    if choose:
+        found = chosen(source, classifier, given, target)
+        learner, labelled, held_out = found.learner, found.labelled, None
+        notes: list[str] = []
+    else:
+        learner = learner_of(source, classifier, given)
+        labelled, held_out = _trials(source, given, times, target, calibration_instances)
+        notes = list(labelled.notes)
     with gathered_warnings(notes):
         made = partial(
             trained,
@@ -110,13 +132,26 @@ def train(
         )
         labelled, model = _made(made, learner, labelled, held_out, times, given["seed"])
     write_model(Path(out), model)
+    if found is not None and pipeline is not None:
+        write_whole(Path(pipeline), pipeline_text(found, out).encode())
     _keep(keep, labelled)
     for note in notes:
         talk(f"note: {note}")
     if as_json:
-        echo_json({"model": out, **_as_values(model), "trials": len(labelled)})
+        choice = {} if found is None else {"pipeline": pipeline, "choice": found.as_values()}
+        echo_json({"model": out, **_as_values(model), "trials": len(labelled), **choice})
+        return
+    _say_trained(out, model)
+    if found is not None:
+        say_chosen(found, pipeline)
     else:
-        _say_trained(out, model)
+        # In one line, so that it can be copied.
+        echo_as_it_is(f"how good    {command_line(_NOT_EVALUATED, 'evaluate')}")
+        if classifier is None and not given["options"]:
+            echo_entry(
+                "choice",
+                "classifier and features are the defaults; --choose finds those that suit the trials",
+            )
 
 
 def _made(
@@ -195,7 +230,7 @@ def _as_values(model: Model) -> dict[str, Any]:
 
 
 def _say_trained(out: str, model: Model) -> None:
-    """Print what was trained, and the command that tells how good it is."""
+    """Print what was trained."""
     echo(f"{out}: {model.in_a_line}", indent=2)
     echo_entry("labels", ", ".join(model.classifier.classes()))
     if model.sets is not None:
@@ -206,8 +241,6 @@ def _say_trained(out: str, model: Model) -> None:
     for after_s, part in model.checkpoints:
         sets = "" if part.sets is None else f", sets {part.sets.in_words}"
         echo_entry(f"{after_s:g} s", f"after the contact: {part.provenance['trials']} grasps{sets}")
-    # In one line, so that it can be copied.
-    echo_as_it_is(f"how good    {command_line(_NOT_EVALUATED, 'evaluate')}")
 
 
 def _refuse_single_scene(source: str) -> None:

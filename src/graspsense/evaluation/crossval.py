@@ -111,7 +111,7 @@ def cross_validate(
             if share < 1.0:
                 training = thinned(training, labels, share, seed)
             known = [labels[i] for i in training]
-            classes, shares, support[test] = _predict(learner, table, training, known, test, seed)
+            classes, shares, support[test] = fit_and_predict(learner, table, training, known, test, seed)
             columns = np.array([all_classes.index(name) for name in classes])
             probabilities[np.ix_(test, columns)] = shares
             novelty = novelty_of(table.rows(training), known)
@@ -139,7 +139,7 @@ def thinned(rows: NDArray[np.int64], labels: Sequence[str], share: float, seed: 
     return np.sort(np.concatenate(kept))
 
 
-def _predict(
+def fit_and_predict(
     learner: ClassifierFactory,
     table: FeatureTable,
     training: NDArray[np.int64],
@@ -147,7 +147,10 @@ def _predict(
     test: NDArray[np.int64],
     seed: int,
 ) -> tuple[tuple[str, ...], NDArray[np.float64], NDArray[np.float64] | float]:
-    """Return the classes, their probabilities for the test trials, and the support of the answers."""
+    """Return the classes, their probabilities for the test trials, and the support of the answers.
+
+    `known` are the labels of the training trials. Raises FitRefused.
+    """
     if len(set(known)) == 1:
         return (known[0],), np.ones((len(test), 1)), nan
     classifier = learner.create()

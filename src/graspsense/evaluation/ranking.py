@@ -76,26 +76,33 @@ class Ranking:
         """The best, those that are equivalent to it, and the cheapest of these, in words."""
         best = self.candidates[0]
         rate = 100 * best.rates[self.protocol].rate
-        equal = [one for one in self.candidates if one.standing in ("best", "equivalent")]
-        open_ = [one for one in self.candidates if one.standing == "undecided"]
         text = f"{best.name} has the highest rate, {rate:.1f} %."
         if self.chosen is not None:
             text += f" As the best of {self.chosen.of} it was lucky too: of new trials expect {self.chosen.words}."
-        if len(equal) > 1:
-            cheapest = min(equal, key=lambda one: one.training_s)
-            others = ", ".join(one.name for one in equal[1:])
-            text += f" Equivalent within {100 * MARGIN:.0f} points: {others}. The cheapest to train is {cheapest.name}."
-        else:
-            text += f" None is shown to be equivalent within {100 * MARGIN:.0f} points."
-        if open_:
-            cheapest = min((best, *open_), key=lambda one: one.training_s)
-            verb = "is" if len(open_) == 1 else "are"
-            text += f" {len(open_)} more {verb} undecided. Of these and the best, {cheapest.name} is the cheapest."
+        text += f" {self.equals}"
         controls = [one for one in self.candidates if one.standing == "control"]
         if controls:
             early = max(controls, key=lambda one: one.rates[self.protocol].rate)
             share = 100 * early.rates[self.protocol].rate
             text += f" From before the contact alone, {early.classifier} recognises {share:.1f} %."
+        return text
+
+    @property
+    def equals(self) -> str:
+        """Those that are equivalent to the best or undecided, and the cheapest of them, in words."""
+        best = self.candidates[0]
+        equal = [one for one in self.candidates if one.standing in ("best", "equivalent")]
+        open_ = [one for one in self.candidates if one.standing == "undecided"]
+        if len(equal) > 1:
+            cheapest = min(equal, key=lambda one: one.training_s)
+            others = ", ".join(one.name for one in equal[1:])
+            text = f"Equivalent within {100 * MARGIN:.0f} points: {others}. The cheapest to train is {cheapest.name}."
+        else:
+            text = f"None is shown to be equivalent within {100 * MARGIN:.0f} points."
+        if open_:
+            cheapest = min((best, *open_), key=lambda one: one.training_s)
+            verb = "is" if len(open_) == 1 else "are"
+            text += f" {len(open_)} more {verb} undecided. Of these and the best, {cheapest.name} is the cheapest."
         return text
 
 
@@ -111,7 +118,7 @@ class OutsideAnswers:
 
 
 @frozen(kw_only=True)
-class _Measured:
+class Measured:
     """What is known of a classifier with a feature set: which trials are right under each protocol, and the sets."""
 
     right: Mapping[str, list[bool]]
@@ -146,7 +153,7 @@ def rank(
     tables = {name: one.table for name, one in trials.items()}
     if first.before_contact is not None:
         tables[BEFORE_CONTACT] = first.before_contact.table
-    measured: dict[tuple[str, str], _Measured] = {}
+    measured: dict[tuple[str, str], Measured] = {}
     notes: list[str] = []
     pairs = [(learner, name) for name in tables for learner in learners]
     for done, (learner, name) in enumerate(pairs):
@@ -163,18 +170,36 @@ def rank(
             protocol: [a == b for a, b in zip(predicted, first.labels, strict=True)]
             for protocol, predicted in answers.predicted.items()
         }
-        measured[key] = _Measured(right=right, training_s=answers.training_s)
+        measured[key] = Measured(right=right, training_s=answers.training_s)
+    return ranking_of(measured, headline, first, (*first.notes, *dict.fromkeys(notes)))
+
+
+def ranking_of(
+    measured: Mapping[tuple[str, str], Measured],
+    headline: str,
+    trials: Labelled,
+    notes: Sequence[str],
+    chosen: ChosenRate | None = None,
+) -> Ranking:
+    """Return the candidates of these trials, by the names of classifier and features, under the protocol `headline`.
+
+    `chosen` is the rate of the best without the luck of the choice; by default it is estimated from these answers.
+    Raises ConfigError without a candidate.
+    """
     judged = [key for key in measured if key[1] != BEFORE_CONTACT]
     if not judged:
-        raise ConfigError("no classifier could be trained on these trials")
+        raise ConfigError(
+            "no classifier could be trained on these trials" + "".join(f"\n{one}" for one in notes)
+        )
     right_of = np.array([measured[key].right[headline] for key in judged])
-    chosen = rate_of_chosen(right_of, first.instances, first.no_interval) if len(judged) > 1 else None
+    if chosen is None and len(judged) > 1:
+        chosen = rate_of_chosen(right_of, trials.instances, trials.no_interval)
     return Ranking(
-        source=first.source,
+        source=trials.source,
         protocol=headline,
-        trials=len(first),
-        candidates=_ranked(measured, headline, first, chosen, comparisons_of(right_of, first.instances)),
-        notes=(*first.notes, *dict.fromkeys(notes)),
+        trials=len(trials),
+        candidates=_ranked(measured, headline, trials, chosen, comparisons_of(right_of, trials.instances)),
+        notes=tuple(notes),
         chosen=chosen,
     )
 
@@ -197,7 +222,7 @@ def _measured(
     trials: Labelled,
     protocols: Mapping[str, Folds],
     seed: int,
-) -> _Measured:
+) -> Measured:
     """Return the answers of a classifier under each protocol. Raises FitRefused."""
     labels, groups = trials.labels, [np.arange(len(trials))]
     right, seconds, sets = {}, [], None
@@ -210,7 +235,7 @@ def _measured(
             sets = set_coverage(
                 pooled, labels, exchangeable_instances(trials), groups, [of], _rate_among(trials)
             )
-    return _Measured(right=right, training_s=seconds[0], sets=sets)
+    return Measured(right=right, training_s=seconds[0], sets=sets)
 
 
 def _rate_among(trials: Labelled) -> Callable[[Sequence[bool], Sequence[int] | None], RecognitionRate]:
@@ -225,7 +250,7 @@ def _rate_among(trials: Labelled) -> Callable[[Sequence[bool], Sequence[int] | N
 
 
 def _ranked(
-    measured: Mapping[tuple[str, str], _Measured],
+    measured: Mapping[tuple[str, str], Measured],
     headline: str,
     trials: Labelled,
     chosen: ChosenRate | None,

@@ -63,6 +63,11 @@ def graspsense_feature_sets() -> Iterable[FeatureSetEntry]:
         summary="22 characteristics of the force over time (pycatch22)",
         needs="pip install 'graspsense[catch22]' (pycatch22 has the licence GPL-3.0)",
     )
+    yield FeatureSetEntry(
+        name="union",
+        target="graspsense.plugins.features.union:UnionFeatures",
+        summary="the features of several sets together, by default of chitta, curve and quantiles",
+    )
 
 
 @hookimpl
@@ -83,6 +88,7 @@ def graspsense_classifiers() -> Iterable[ClassifierEntry]:
         ("mlp", "Mlp", "neural network with one hidden layer (scikit-learn)"),
         ("backprop", "Backprop", "neural network trained trial by trial, as Weka's by default"),
         ("forest", "Forest", "random forest (scikit-learn)"),
+        ("extra-trees", "ExtraTrees", "extremely randomised trees (scikit-learn)"),
         ("boosted", "Boosted", "gradient-boosted trees (scikit-learn)"),
         ("ebm", "Ebm", "explainable boosting: a sum of functions of the features (interpret)"),
         ("knn", "Knn", "nearest neighbours (scikit-learn)"),
@@ -90,7 +96,7 @@ def graspsense_classifiers() -> Iterable[ClassifierEntry]:
     ):
         yield ClassifierEntry(
             name=name,
-            target=f"graspsense.plugins.classifiers.{name}:{cls}",
+            target=f"graspsense.plugins.classifiers.{name.replace('-', '_')}:{cls}",
             summary=summary,
         )
 

@@ -65,7 +65,10 @@ def _refuse_forest(estimator: Any, labels: int) -> None:
     if len(trees) != estimator.n_estimators or estimator.n_outputs_ != 1 or estimator.n_classes_ != labels:
         raise ValueError("its trees, outputs or labels are not as many as it says")
     for tree in trees:
-        if type(tree).__name__ != "DecisionTreeClassifier" or tree.n_features_in_ != estimator.n_features_in_:
+        if (
+            type(tree).__name__ != _TREES[type(estimator).__name__]
+            or tree.n_features_in_ != estimator.n_features_in_
+        ):
             raise ValueError("one of its trees is not a tree of its features")
         if tree.classes_.shape != (labels,):
             raise ValueError("one of its trees has other labels")
@@ -125,9 +128,14 @@ def _refuse_numbers(what: str, values: Any, shape: Sequence[int], least: float =
         raise ValueError(f"the {what} are not finite, or not in their range")
 
 
+_TREES: Final = {
+    "RandomForestClassifier": "DecisionTreeClassifier",
+    "ExtraTreesClassifier": "ExtraTreeClassifier",
+}
 _CHECKS: Final[dict[str, Callable[[Any, int], None]]] = {
     "DecisionTreeClassifier": _refuse_tree,
     "RandomForestClassifier": _refuse_forest,
+    "ExtraTreesClassifier": _refuse_forest,
     "SVC": _refuse_machine,
     "MLPClassifier": _refuse_network,
 }

@@ -1,0 +1,220 @@
+"""`graspsense train --choose`: which classifier and which features, and the pipeline that has them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import click
+from attrs import evolve, frozen
+
+from graspsense.cli.sources import is_csv, learner_of, trials_of
+from graspsense.cli.terminal import echo_as_it_is, echo_entry
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from graspsense.cli.progress import ProgressLine
+    from graspsense.core.components.config import SelectedComponent
+    from graspsense.core.components.registry import Component
+    from graspsense.core.learn.labelled import Labelled
+    from graspsense.evaluation.choosing import Choice
+
+CLASSIFIERS: Final = ("c45", "knn", "svm", "forest", "extra-trees", "mlp")
+"""The classifiers to choose from, unless one is given."""
+UNION: Final = "graspsense/union"
+SUITED: Final = 0.5
+"""Least share of the trials in which a feature set finds a feature; else the recordings lack what it needs."""
+
+
+@frozen(kw_only=True, eq=False)
+class Chosen:
+    """What was chosen, and the trials with the features of it."""
+
+    choice: Choice
+    learner: SelectedComponent
+    labelled: Labelled
+
+    def as_values(self) -> dict[str, Any]:
+        """Return the choice as plain values."""
+        from graspsense.evaluation.json_codec import to_json
+
+        best = self.choice.best
+        values: dict[str, Any] = to_json(self.choice)
+        return {"classifier": best.classifier, "features": best.features, **values}
+
+
+def refuse_with_choice(given: Mapping[str, Any]) -> None:
+    """Raise UsageError if options are given that do not go together with --choose."""
+    for name in ("checkpoints", "calibration_instances", "target_value"):
+        if given.get(name):
+            raise click.UsageError(f"--choose does not go with --{name.replace('_', '-')}")
+
+
+def chosen(source: str, classifier: str | None, given: Mapping[str, Any], target: str) -> Chosen:
+    """Choose among the classifiers with the feature sets that suit the trials. Raises ConfigError."""
+    from graspsense.cli.progress import ProgressLine
+    from graspsense.evaluation.choosing import choose
+
+    names = (classifier or "given",) if classifier or _sets(given, "classifier.type") else CLASSIFIERS
+    learners = {name: learner_of(source, None if name == "given" else name, given) for name in names}
+    learners = {one.component.name: one for one in learners.values()}
+    notes: list[str] = []
+    with ProgressLine() as progress:
+        trials = {name: one.aimed(target) for name, one in _tables(source, progress, given, notes).items()}
+        choice = choose(learners, trials, seed=given["seed"], notes=notes, progress=progress)
+    return Chosen(
+        choice=choice,
+        learner=learners[choice.best.classifier],
+        labelled=trials[choice.best.features],
+    )
+
+
+def _sets(given: Mapping[str, Any], key: str) -> bool:
+    """Return whether an option -o gives this key."""
+    return any(one.partition("=")[0].strip() == key for one in given["options"])
+
+
+def _tables(
+    source: str, progress: ProgressLine, given: Mapping[str, Any], notes: list[str]
+) -> dict[str, Labelled]:
+    """Return the trials with each feature set that suits them, and with the union of these; `notes` has the others.
+
+    The recordings are read once, for all sets together.
+    """
+    import numpy as np
+
+    from graspsense.core.components.registry import installed
+    from graspsense.core.values.errors import ConfigError, GraspsenseError
+
+    if is_csv(source):
+        return {"columns": trials_of(source, progress, given)}
+    if _sets(given, "features.type"):
+        trials = trials_of(source, progress, given)
+        features = trials.provenance.get("settings", {}).get("features", {})
+        return {str(features.get("type", "given")).rpartition("/")[2]: trials}
+    known = [one for one in installed().components("feature-set") if one.qualified != UNION]
+    available = [one for one in known if _available(one, notes)]
+    try:
+        united = _with_union(source, progress, given, available)
+    except GraspsenseError as error:
+        own = [one for one in available if one.distribution == "graspsense"]
+        if len(own) == len(available):
+            raise
+        notes.append(f"only the features of graspsense are used: {error}")
+        available = own
+        united = _with_union(source, progress, given, available)
+    suited: dict[str, NDArray[np.int64]] = {}
+    tables: dict[str, Labelled] = {}
+    end = 0
+    for component in available:
+        columns = np.arange(end, end + len(component.declared(_config(united, component)).features))
+        end += len(columns)
+        part = _part(united, component, columns)
+        having = int((~np.isnan(part.table.values)).any(axis=1).sum())
+        if having >= SUITED * len(part):
+            tables[component.name], suited[component.qualified] = part, columns
+        else:
+            notes.append(
+                f"features {component.name} are left out: {having} of {len(part)} trials have one of them"
+            )
+    if not suited:
+        raise ConfigError(f"no feature set suits the trials of {source}:\n" + "\n".join(notes))
+    if len(suited) > 1:
+        union = installed().find("feature-set", UNION)
+        tables["union"] = _part(united, union, np.concatenate(list(suited.values())), sets=tuple(suited))
+    return tables
+
+
+def _available(component: Component, notes: list[str]) -> bool:
+    """Return whether the code of a feature set can be imported; `notes` gets the reason if it cannot."""
+    from graspsense.core.values.errors import PluginUnavailable
+
+    try:
+        component.declared()
+    except PluginUnavailable as error:
+        notes.append(f"features {component.name} are left out: {str(error).splitlines()[0]}")
+        return False
+    return True
+
+
+def _with_union(
+    source: str, progress: ProgressLine, given: Mapping[str, Any], sets: Sequence[Component]
+) -> Labelled:
+    """Return the trials with the features of these sets together."""
+    names = ", ".join(f'"{one.qualified}"' for one in sets)
+    options = (*given["options"], f'features.type="{UNION}"', f"features.sets=[{names}]")
+    return trials_of(source, progress, {**given, "options": options})
+
+
+def _config(united: Labelled, component: Component, **keys: Any) -> Any:
+    """Return the config that a feature set has in the union; `keys` replace some of it."""
+    from graspsense.core.components.config import build
+    from graspsense.core.components.strict import keys_of
+
+    known = keys_of(component.config_class())
+    given = {**united.provenance.get("settings", {}).get("features", {}), **keys}
+    return build(component, {key: one for key, one in given.items() if key in known})
+
+
+def _part(united: Labelled, component: Component, columns: NDArray[np.int64], **keys: Any) -> Labelled:
+    """Return the trials with the features of one set, which are these columns of the union."""
+    from graspsense.core.components.strict import plain
+    from graspsense.core.values.features import FeatureTable
+
+    config = _config(united, component, **keys)
+    table = FeatureTable(
+        names=tuple(feature.name for feature in component.declared(config).features),
+        units=tuple(united.table.units[k] for k in columns.tolist()),
+        values=united.table.values[:, columns],
+    )
+    settings = {
+        **united.provenance.get("settings", {}),
+        "features": {"type": component.qualified, **plain(config)},
+    }
+    return evolve(united, table=table, provenance={**united.provenance, "settings": settings})
+
+
+def pipeline_text(chosen: Chosen, model: str) -> str:
+    """Return a pipeline file with what was chosen, and with the gripper and the controller of the trials."""
+    from graspsense.core.components.config import toml_key, toml_value
+    from graspsense.core.components.strict import plain
+    from graspsense.recording.provenance import recipe
+
+    settings = recipe(chosen.labelled.provenance.get("settings") or {})
+    if settings.get("gripper", {}).get("type", "replay").endswith("replay"):
+        settings.pop("gripper", None)  # that of the recordings is not known
+    learner = chosen.learner
+    settings["classifier"] = {
+        "type": learner.component.qualified,
+        **plain(learner.config),
+        "model": str(Path(model).resolve()),
+    }
+    rate = chosen.choice.rate.words
+    lines = [
+        f"# Chosen by graspsense train --choose from {chosen.labelled.source}.".replace("\n", " "),
+        f"# The rate of the whole procedure is {rate}.",
+        'extends = "default"',
+    ]
+    for table, values in settings.items():
+        lines += ["", f"[{table}]"]
+        lines += [f"{toml_key(key)} = {toml_value(one)}" for key, one in values.items() if one is not None]
+    return "\n".join(lines) + "\n"
+
+
+def say_chosen(chosen: Chosen, pipeline: str | None) -> None:
+    """Print what was chosen, the rate of the procedure, what is as good, and how to use it."""
+    choice = chosen.choice
+    echo_entry("chosen", f"{choice.best.name}, of {len(choice.ranking.candidates)} candidates")
+    echo_entry(
+        "rate",
+        f"{choice.rate.words}, of the whole procedure by {choice.ranking.protocol}: no trial takes part in the choice "
+        "that it is predicted by",
+    )
+    echo_entry("as good", choice.ranking.equals)
+    for note in choice.ranking.notes:
+        echo_entry("note", note)
+    if pipeline is not None:
+        echo_as_it_is(f"use it      graspsense run --pipeline {pipeline}")

@@ -1,0 +1,171 @@
+"""Choosing a classifier with its features, and the rate of the whole procedure (nested cross-validation).
+
+The folds are those of a comparison. For each outer fold, the choice is made among the other folds: each of them is
+predicted by models of the remaining ones, and the candidate with the most right answers predicts the outer fold. So no
+trial takes part in the choice that it is predicted by, and the rate over all outer folds is not raised by the choice.
+A model without the folds i and j serves both the choice for i and that for j. The choice that is used in the end is
+made in the same way, among all folds.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from itertools import combinations
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from attrs import frozen
+
+from graspsense.core.values.errors import ConfigError, named
+from graspsense.evaluation.chosen import ChosenRate
+from graspsense.evaluation.crossval import ClassifierFactory, fit_and_predict
+from graspsense.evaluation.gathered_warnings import gathered_warnings
+from graspsense.evaluation.intervals import RecognitionRate, rate_of
+from graspsense.evaluation.ranking import Candidate, Measured, Ranking, protocols_of, ranking_of
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from graspsense.core.learn.labelled import Labelled
+    from graspsense.core.values.features import FeatureTable
+    from graspsense.evaluation.folds import Folds
+
+FOLDS: Final = 5
+LEAST_FOLDS: Final = 3
+"""One fold is predicted, one decides the choice, and one is learned from."""
+
+
+@frozen(kw_only=True)
+class Choice:
+    """The candidate that was chosen, and what its choice is worth.
+
+    `rate` is that of the whole procedure: choice and training on trials that are not predicted. `chosen_in` counts in
+    how many outer folds each candidate was chosen. `ranking` compares all candidates; the first is the chosen one.
+    """
+
+    rate: RecognitionRate
+    chosen_in: Mapping[str, int]
+    ranking: Ranking
+
+    @property
+    def best(self) -> Candidate:
+        """The chosen candidate."""
+        return self.ranking.candidates[0]
+
+
+@frozen(kw_only=True, eq=False)
+class _Answers:
+    """Which trials a candidate recognises.
+
+    `inner` has shape (folds, trials): the row of a fold says it for models that know neither this fold nor that of the
+    trial. `outer` says it for models that only do not know the fold of the trial.
+    """
+
+    inner: NDArray[np.bool_]
+    outer: NDArray[np.bool_]
+    training_s: float
+
+
+def choose(
+    learners: Mapping[str, ClassifierFactory],
+    trials: Mapping[str, Labelled],
+    *,
+    seed: int = 0,
+    notes: Sequence[str] = (),
+    progress: Callable[[str, int, int], None] | None = None,
+) -> Choice:
+    """Choose one of the classifiers with one of the feature sets.
+
+    `trials` are the same trials with different features. Of candidates with equal rates the first is chosen, in the
+    order of features and of `learners`. A candidate that fails is left out, with a note after `notes`. Raises
+    ConfigError if nothing can be chosen from these trials.
+    """
+    known = next(iter(trials.values()))
+    protocol, folds = _folds(known, seed)
+    notes = [*dict.fromkeys(note for one in trials.values() for note in one.notes), *notes]
+    pairs = [(learner, name) for name in trials for learner in learners]
+    answers: dict[tuple[str, str], _Answers] = {}
+    with gathered_warnings(notes):
+        for done, (learner, name) in enumerate(pairs):
+            if progress is not None:
+                progress(f"{learner} with {name}", done, len(pairs))
+            try:
+                answers[learner, name] = _answers(learners[learner], trials[name], folds, seed)
+            except Exception as error:  # the code of any plugin
+                notes.append(f"{learner} with {name} is left out: {named(error)}")
+    right, chosen_in = _nested(answers, folds)
+    rate = rate_of(right, known.instances, known.no_interval)
+    ranking = ranking_of(
+        {
+            key: Measured(right={protocol: one.outer.tolist()}, training_s=one.training_s)
+            for key, one in answers.items()
+        },
+        protocol,
+        known,
+        tuple(dict.fromkeys(notes)),
+        ChosenRate(rate=rate.rate, interval=rate.interval, of=len(answers)),
+    )
+    return Choice(rate=rate, chosen_in=chosen_in, ranking=ranking)
+
+
+def _folds(trials: Labelled, seed: int) -> tuple[str, Folds]:
+    """Return the protocol of a comparison of these trials, and its folds. Raises ConfigError if they are too few."""
+    if len(trials.classes) < 2:
+        raise ConfigError(
+            f"every trial of {trials.source} has the label {trials.labels[0]!r}: there is nothing to choose by"
+        )
+    if len(trials) < FOLDS:
+        raise ConfigError(f"{len(trials)} trials are too few to choose by: record at least {FOLDS}")
+    protocol, folds = next(iter(protocols_of(trials, FOLDS, seed).items()))
+    if int(folds.max()) + 1 < LEAST_FOLDS:
+        raise ConfigError(
+            f"{int(folds.max()) + 1} instances are too few to choose by: record at least {LEAST_FOLDS}"
+        )
+    return protocol, folds
+
+
+def _nested(answers: Mapping[tuple[str, str], _Answers], folds: Folds) -> tuple[list[bool], dict[str, int]]:
+    """Return which trials the procedure recognises, and how often it chose each candidate."""
+    right = np.zeros(len(folds), dtype=np.bool_)
+    chosen: Counter[str] = Counter()
+    for fold in range(int(folds.max()) + 1) if answers else ():
+        name, best = max(answers.items(), key=lambda one: int(one[1].inner[fold].sum()))
+        right[folds == fold] = best.outer[folds == fold]
+        chosen[" with ".join(name)] += 1
+    return right.tolist(), dict(chosen.most_common())
+
+
+def _answers(learner: ClassifierFactory, trials: Labelled, folds: Folds, seed: int) -> _Answers:
+    """Return the answers of a candidate. Raises what its classifier raises."""
+    count = int(folds.max()) + 1
+    inner = np.zeros((count, len(folds)), dtype=np.bool_)
+    outer = np.zeros(len(folds), dtype=np.bool_)
+    began = time.perf_counter()
+    for fold in range(count):
+        test = np.flatnonzero(folds == fold)
+        outer[test] = _right(learner, trials.table, trials.labels, np.flatnonzero(folds != fold), test, seed)
+    training_s = (time.perf_counter() - began) / count
+    for one, other in combinations(range(count), 2):
+        away = (folds == one) | (folds == other)
+        test = np.flatnonzero(away)
+        right = _right(learner, trials.table, trials.labels, np.flatnonzero(~away), test, seed)
+        inner[one, test] |= right & (folds[test] == other)
+        inner[other, test] |= right & (folds[test] == one)
+    return _Answers(inner=inner, outer=outer, training_s=training_s)
+
+
+def _right(
+    learner: ClassifierFactory,
+    table: FeatureTable,
+    labels: Sequence[str],
+    training: NDArray[np.int64],
+    test: NDArray[np.int64],
+    seed: int,
+) -> NDArray[np.bool_]:
+    """Return which test trials a classifier recognises that learned from the training trials."""
+    known = [labels[i] for i in training]
+    classes, shares, _ = fit_and_predict(learner, table, training, known, test, seed)
+    predicted = shares.argmax(axis=1).tolist()
+    return np.array([classes[k] == labels[i] for k, i in zip(predicted, test.tolist(), strict=True)])

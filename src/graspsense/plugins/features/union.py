@@ -1,0 +1,124 @@
+"""The features of several feature sets together.
+
+A classifier that ignores features without information, such as randomised trees, gains from what each set measures. A
+feature keeps its name, unless a set before has one of this name: then its set is named in front of it.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any, Final
+
+from attrs import evolve, fields_dict, frozen
+
+from graspsense.plugin_api import (
+    REST_SPEED_M_S,
+    REST_WINDOW_S,
+    Channel,
+    ConfigError,
+    Feature,
+    Features,
+    FeatureSet,
+    Trace,
+    create,
+    setting,
+)
+from graspsense.plugins.features.contact_threshold import ContactThreshold
+
+
+@frozen(kw_only=True)
+class UnionConfig(ContactThreshold):
+    """The sets, and the thresholds that those of them get which have such a setting."""
+
+    sets: tuple[str, ...] = setting(
+        default=("chitta", "curve", "quantiles"),
+        meaning="Names of the feature sets; their other settings are the defaults.",
+    )
+    rest_speed_m_s: float = setting(
+        default=REST_SPEED_M_S,
+        unit="m/s",
+        above=0.0,
+        plausible=(1e-7, 0.05),
+        meaning="Speed of the gap below which the fingers rest; that of the controller unless it is given here.",
+        follows="controller.rest_speed_m_s",
+    )
+    rest_window_s: float = setting(
+        default=REST_WINDOW_S,
+        unit="s",
+        above=0.0,
+        plausible=(0.001, 5.0),
+        meaning="Time of rest; that of the controller unless it is given here.",
+        follows="controller.rest_window_s",
+    )
+
+
+THRESHOLDS: Final = tuple(name for name in fields_dict(UnionConfig) if name != "sets")
+
+
+class UnionFeatures(FeatureSet[UnionConfig]):
+    """Extracts the features of each set; one that its set does not define is missing with the reason given there."""
+
+    @property
+    def requires(self) -> tuple[Channel, ...]:  # type: ignore[override]
+        """The channels of all sets, each with the largest rate that a set needs."""
+        channels: dict[str, Channel] = {}
+        for part in self._parts.values():
+            for channel in part.requires:
+                known = channels.get(channel.name)
+                if known is None or channel.rate_hz > known.rate_hz:
+                    channels[channel.name] = channel
+        return tuple(channels.values())
+
+    @property
+    def features(self) -> tuple[Feature, ...]:  # type: ignore[override]
+        """The features of all sets; the first width among them is the width."""
+        found: list[Feature] = []
+        for name, part in self._parts.items():
+            for feature in part.features:
+                width = feature.width and not any(one.width for one in found)
+                found.append(
+                    evolve(feature, name=_distinct(feature.name, name, [f.name for f in found]), width=width)
+                )
+        return tuple(found)
+
+    def extract(self, trace: Trace) -> Features:
+        """Return the features of all sets."""
+        names: list[str] = []
+        values: list[float] = []
+        units: list[str] = []
+        reasons: dict[str, str] = {}
+        for set_name, part in self._parts.items():
+            found = part.extract(trace)
+            own = {name: _distinct(name, set_name, names) for name in found.names}
+            names += own.values()
+            values += found.values
+            units += found.units
+            reasons |= {own[name]: why for name, why in found.reasons.items()}
+        return Features(names=tuple(names), values=tuple(values), units=tuple(units), reasons=reasons)
+
+    @cached_property
+    def _parts(self) -> dict[str, FeatureSet[Any]]:
+        """The sets by their names. Raises ConfigError for no set, a set twice, or a union in a union."""
+        wanted = self.config.sets
+        if not wanted or len(set(wanted)) < len(wanted):
+            raise ConfigError(
+                f"features.sets is {list(wanted)}: name at least one feature set, and each of them once"
+            )
+        parts = {name: create("feature-set", name) for name in wanted}
+        if any(isinstance(part, UnionFeatures) for part in parts.values()):
+            raise ConfigError("features.sets names a union: name the sets that are to be united")
+        return {name: self._with_thresholds(part) for name, part in parts.items()}
+
+    def _with_thresholds(self, part: FeatureSet[Any]) -> FeatureSet[Any]:
+        """Return a set with those thresholds of this one that it has."""
+        own = {
+            name: getattr(self.config, name) for name in THRESHOLDS if name in fields_dict(type(part.config))
+        }
+        return type(part)(evolve(part.config, **own)) if own else part
+
+
+def _distinct(name: str, set_name: str, taken: list[str]) -> str:
+    """Return the name of a feature, with that of its set in front if the name is taken."""
+    if name not in taken:
+        return name
+    return f"{set_name.rpartition('/')[2].replace('-', '_')}_{name}"

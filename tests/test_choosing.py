@@ -1,0 +1,156 @@
+"""Choosing a classifier with its features: the right one where it is known, and a rate that is not raised by it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from attrs import evolve
+from parts import Nearest
+from scipy.stats import binom
+from test_evaluate import learner
+
+from graspsense.core.learn.labelled import Labelled
+from graspsense.core.values.errors import ConfigError
+from graspsense.core.values.features import FeatureTable
+from graspsense.evaluation.choosing import choose
+from graspsense.plugin_api import ClassifierConfig
+
+
+def trials(values, labels, instances=None):
+    table = FeatureTable(
+        names=tuple(f"f{k}" for k in range(values.shape[1])), units=("N",) * values.shape[1], values=values
+    )
+    return Labelled(source="made up", table=table, labels=tuple(labels), instances=instances)
+
+
+def objects(label_count=3, instances=8, each=3, columns=3, seed=0):
+    """Trials of several objects of each label; the features say nothing of it."""
+    labels = [f"l{k % label_count}" for k in range(label_count * instances) for _ in range(each)]
+    names = tuple(f"o{k}" for k in range(label_count * instances) for _ in range(each))
+    rng = np.random.default_rng(seed)
+    of_object = np.repeat(rng.normal(size=(label_count * instances, columns)), each, axis=0)
+    return trials(of_object + 0.3 * rng.normal(size=(len(labels), columns)), labels, names)
+
+
+def informed(noise):
+    """The trials with one feature more, from which the label follows."""
+    number = [[float(label[1:])] for label in noise.labels]
+    return trials(np.hstack([noise.table.values, number]), noise.labels, noise.instances)
+
+
+class Made:
+    """Makes classifiers of this class."""
+
+    def __init__(self, cls):
+        self.cls = cls
+
+    def create(self):
+        return self.cls(ClassifierConfig())
+
+
+LEARNERS = {name: learner(name) for name in ("tree", "knn")}
+NEAREST = {"nearest": Made(Nearest)}
+
+
+def test_the_features_that_tell_the_labels_are_chosen_in_each_fold():
+    noise = objects()
+    found = choose(LEARNERS, {"noise": noise, "informed": informed(noise)})
+
+    assert (found.best.classifier, found.best.features) == ("tree", "informed")
+    assert found.chosen_in == {"tree with informed": 5}
+    assert found.rate.rate == 1.0
+    assert found.ranking.protocol == "instance_held_out"
+    assert {one.standing for one in found.ranking.candidates if one.features == "noise"} == {"worse"}
+
+
+def test_a_feature_that_names_the_object_does_not_pass_for_one_of_the_label():
+    """Whole objects are held out of the choice: knowing an object again is of no use there."""
+    noise = objects(each=6)
+    known = evolve(noise, table=evolve(noise.table, values=1e-3 * noise.table.values))
+    found = choose({"knn": learner("knn")}, {"noise": known, "informed": informed(noise)})
+
+    assert found.best.features == "informed"
+
+
+def test_each_trial_is_predicted_by_a_model_that_was_chosen_and_trained_without_it():
+    seen = []
+
+    class Watching(Nearest):
+        def fit(self, table, labels, seed):
+            seen.append({tuple(row) for row in table.values.tolist()})
+            super().fit(table, labels, seed)
+
+    noise = objects()
+    choose({"watching": Made(Watching)}, {"noise": noise})
+    rows = [tuple(row) for row in noise.table.values.tolist()]
+    sizes = sorted(len(one) for one in seen)
+
+    # Five models without one fold, and ten without two.
+    assert len(seen) == 15
+    assert sizes[:10] < sizes[10:]
+    for row, instance in zip(rows, noise.instances, strict=True):
+        apart = [one for one in seen if row not in one]
+        same = {r for r, other in zip(rows, noise.instances, strict=True) if other == instance}
+        assert len(apart) == 1 + 4
+        assert all(not same & one for one in apart)
+
+
+def test_the_rate_of_labels_without_information_is_that_of_guessing():
+    """Twelve candidates on labels that were drawn at random; the best of them seems better than it is."""
+    rng = np.random.default_rng(7)
+    right = best = total = 0
+    for repeat in range(20):
+        labels = [f"l{k}" for k in rng.permutation(np.repeat(np.arange(2), 20))]
+        sets = {f"set{k}": trials(rng.normal(size=(40, 2)), labels) for k in range(12)}
+        found = choose(NEAREST, sets, seed=repeat)
+        right += found.rate.correct
+        best += found.best.rates[found.ranking.protocol].correct
+        total += found.rate.n
+    low, high = binom.interval(0.999, total, 0.5)
+
+    assert right <= high
+    assert right >= low - 0.05 * total  # labels that are held out are rarer in training: below one half
+    assert best > high
+
+
+class Failing(Nearest):
+    def fit(self, table, labels, seed):
+        raise RuntimeError("it broke")
+
+
+def test_a_classifier_that_fails_is_told_and_left_out():
+    noise = objects()
+    found = choose({"broken": Made(Failing), **NEAREST}, {"informed": informed(noise)})
+
+    assert {one.classifier for one in found.ranking.candidates} == {"nearest"}
+    assert any("broken" in note and "it broke" in note for note in found.ranking.notes)
+    with pytest.raises(ConfigError, match="it broke"):
+        choose({"broken": Made(Failing)}, {"informed": informed(noise)})
+
+
+def test_too_little_to_choose_by_is_refused():
+    noise = objects()
+    same = evolve(noise, labels=("a",) * len(noise))
+    with pytest.raises(ConfigError, match="'a'"):
+        choose(NEAREST, {"noise": same})
+    with pytest.raises(ConfigError, match="4 trials"):
+        choose(NEAREST, {"noise": noise.rows(np.array([0, 1, 4, 5]))})
+
+
+def test_a_label_with_a_single_object_is_cross_validated_by_trials():
+    found = choose(NEAREST, {"informed": informed(objects(instances=1, each=6))})
+
+    assert found.ranking.protocol == "stratified_5_fold"
+    assert found.rate.n == 18
+
+
+def test_the_same_seed_gives_the_same_choice():
+    noise = objects()
+    sets = {"noise": noise, "other": objects(seed=3)}
+    first, second = (choose({"tree": learner("tree")}, sets, seed=4) for _ in range(2))
+
+    assert (first.rate, first.chosen_in, first.best.name) == (
+        second.rate,
+        second.chosen_in,
+        second.best.name,
+    )

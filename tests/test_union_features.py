@@ -1,0 +1,53 @@
+"""The union of feature sets: its values are those of the sets, its names are distinct, and it refuses wrong lists."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from graspsense.core.components.registry import installed
+from graspsense.core.values.errors import ConfigError, UnknownName
+from graspsense.plugin_api import create
+from graspsense.testing.samples import squeeze
+
+
+def union(**settings):
+    return create("feature-set", "graspsense/union", **settings)
+
+
+def test_each_set_gives_what_it_gives_alone():
+    found = union(sets=("curve", "quantiles")).extract(squeeze())
+    curve, quantiles = (create("feature-set", name).extract(squeeze()) for name in ("curve", "quantiles"))
+
+    assert found.values == pytest.approx((*curve.values, *quantiles.values), nan_ok=True)
+    assert found.names[: len(curve.names)] == curve.names
+    assert len(set(found.names)) == len(found.names)
+    # Both sets have a gap at the contact: that of the second is named after its set.
+    assert found["quantiles_contact_gap"] == found["contact_gap"]
+
+
+def test_the_thresholds_of_the_union_are_those_of_its_sets():
+    strict = union(sets=("chitta", "curve"), contact_force_n=1000.0).extract(squeeze())
+
+    assert all(math.isnan(value) for value in strict.values)
+    assert set(strict.reasons) == set(strict.names)
+
+
+def test_it_declares_the_features_of_its_sets_and_one_width():
+    component = installed().find("feature-set", "graspsense/union")
+    declared = component.declared(union(sets=("curve", "chitta")).config)
+
+    assert [one.name for one in declared.features if one.width] == ["contact_gap"]
+    assert {one.name for one in declared.requires} == {"gap", "force_left", "force_right"}
+
+
+@pytest.mark.parametrize("sets", [(), ("curve", "curve"), ("curve", "union")])
+def test_a_list_that_cannot_be_united_is_refused(sets):
+    with pytest.raises(ConfigError, match="sets"):
+        union(sets=sets).extract(squeeze())
+
+
+def test_a_set_that_is_not_installed_is_named():
+    with pytest.raises(UnknownName, match="curv"):
+        union(sets=("curv",)).extract(squeeze())
