@@ -236,3 +236,19 @@ def test_a_time_out_that_is_shorter_than_a_recording_is_extended():
     chosen = thresholds_for([squeeze()], {"move_timeout_s": 10.0, "steady_timeout_s": 1.5})
     assert chosen.settings == {"controller.steady_timeout_s": 2.0}
     assert "steady_timeout_s 2 s (recordings last up to 2 s)" in chosen.words
+
+
+def test_recordings_that_begin_in_contact_with_different_forces_are_in_contact_from_the_beginning():
+    """Pressures in counts that hold from the first sample: their offsets differ by more than their noise."""
+    held = []
+    for k, offset in enumerate((950.0, 1000.0, 1050.0, 1200.0, 1400.0)):
+        one = squeeze(seed=k, units={"force_left": "counts", "force_right": "counts"})
+        noise = np.random.default_rng(k).normal(size=len(one.readings))
+        readings = tuple(
+            reading._replace(frame=reading.frame._replace(force_left_n=offset + n, force_right_n=offset + n))
+            for reading, n in zip(one.readings, noise.tolist(), strict=True)
+        )
+        held.append(evolve(one, readings=readings))
+    found = thresholds_for(held)
+    assert 0.0 < found.settings["controller.contact_force_n"] <= 950.0
+    assert "from the beginning" in found.words

@@ -20,7 +20,11 @@ from graspsense.cli.sources import (
 from graspsense.cli.terminal import Style, echo, echo_entry, echo_table
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from graspsense.cli.progress import ProgressLine
     from graspsense.core.components.entries import Role
+    from graspsense.core.learn.labelled import Labelled
     from graspsense.evaluation.ranking import Candidate, Ranking
 
 
@@ -70,21 +74,9 @@ def compare(
             "compare is for classifiers; --target-value is for train, predict and evaluate"
         )
     names = _names(classifiers, "--classifiers", "classifier")
-    sets = () if is_csv(source) else _names(feature_sets or "chitta", "--feature-sets", "feature-set")
     learners = {name: learner_of(source, name, given) for name in names}
     with ProgressLine() as progress:
-        if is_csv(source):
-            trials = {"columns": trials_of(source, progress, given)}
-        else:
-            trials = {
-                name: trials_of(
-                    source,
-                    progress,
-                    {**given, "options": (*given["options"], f"features.type={name}")},
-                    folds=folds,
-                )
-                for name in sets
-            }
+        trials = compared_trials(source, feature_sets, folds, progress, given)
         found = rank(learners, trials, folds=folds, seed=given["seed"], progress=progress)
     if out is not None:
         from graspsense.report.ranking_page import ranking_page
@@ -98,6 +90,24 @@ def compare(
     _print(found)
     if out is not None:
         echo_entry("page", out)
+
+
+def compared_trials(
+    source: str, feature_sets: str | None, folds: int, progress: ProgressLine, given: Mapping[str, Any]
+) -> dict[str, Labelled]:
+    """Return the trials of a source with the features of each set, by the name of the set; copies count once.
+
+    `given` holds the options of `source_options`. Raises UsageError, ConfigError, DataDamaged.
+    """
+    if is_csv(source):
+        return {"columns": trials_of(source, progress, given)}
+    sets = _names(feature_sets or "chitta", "--feature-sets", "feature-set")
+    return {
+        name: trials_of(
+            source, progress, {**given, "options": (*given["options"], f"features.type={name}")}, folds=folds
+        )
+        for name in sets
+    }
 
 
 def _print(found: Ranking) -> None:

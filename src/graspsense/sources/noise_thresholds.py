@@ -10,6 +10,9 @@ that begins in contact, or whose force grows from the beginning, it is that of i
 of the gap. Scatter is the median absolute deviation times 1.4826, which is the standard deviation of normal noise; the
 second difference of independent noise has sqrt(6) times its standard deviation.
 
+A force without a known zero, where the noise so measured is above what most recordings reach, is that of recordings
+which begin in contact: nothing in them is without contact, so the contact force is below all that they begin with.
+
 The window of rest is the time in which the rest speed makes the least step that the gap shows. If most recordings do
 not hold so long, the speed is raised until they do, at most to a quarter of the speed of the squeeze.
 """
@@ -230,6 +233,12 @@ def _contact_force(measured: Sequence[_Noise], scale: _Scale) -> tuple[dict[str,
     typical = _TYPICAL * (float(np.median(peaks)) - base)
     above = max(needed - base, min(typical, most), _LEAST_FORCE_N if si else 0.0)
     chosen = base + (min(_rounded_up(above), _MOST_FORCE_N) if si else _rounded_up(above))
+    if not si and chosen > float(np.quantile(peaks, 1.0 - _REACHING, method="lower")):
+        chosen = max(_rounded_down(min(one.baseline for one in measured)), _LEAST_FORCE_N)
+        return {"controller.contact_force_n": chosen}, (
+            f"contact_force_n {chosen:g} {scale.force}, so that recordings are in contact from the beginning (their "
+            "forces at the beginning differ by more than they grow later; if the fingers were free then, write zero)"
+        )
     if chosen <= 0.0:  # a force below zero throughout
         chosen = _LEAST_FORCE_N
     doubt = "" if above <= 2.0 * most else ", which many recordings hardly reach: check the unit and the zero"
@@ -455,6 +464,14 @@ def _scatter_of_differences(values: NDArray[np.float64]) -> float:
     """Return the standard deviation of the noise of a smooth course, from its second differences."""
     second = np.diff(values, n=2)
     return _NORMAL * float(np.median(np.abs(second - np.median(second)))) / math.sqrt(6.0)
+
+
+def _rounded_down(value: float) -> float:
+    """Return the value with two significant digits, not larger; 0 for one that is not positive."""
+    if value <= 0.0:
+        return 0.0
+    digits = 1 - math.floor(math.log10(value))
+    return math.floor(round(value * 10.0**digits, 6)) / 10.0**digits
 
 
 def _rounded_up(value: float) -> float:

@@ -107,7 +107,8 @@ def _groups(path: Path, arrays: Arrays, pattern: str) -> Iterator[tuple[dict[str
     if too_many := RECORDINGS.exceeded(len(groups)):
         raise DataDamaged(f"{path}: {too_many}")
     for facts, group in groups.items():
-        yield dict(facts), {**common, **group}
+        # The arrays of the grasp come first: their shape says how many grasps and times there are.
+        yield dict(facts), group | {name: array for name, array in common.items() if name not in group}
 
 
 def _grasps(path: Path, arrays: Arrays, rules: ArrayRules) -> Iterator[ColumnTable]:

@@ -1,0 +1,99 @@
+"""Layouts of public sets whose arrays or gaps are unlike those of a gripper, with the manifests of docs/manifests."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+from graspsense.core.values.signals import NO_GAP
+from graspsense.core.values.trace import signals_of
+from graspsense.recording.labelled_recording import UnreadableRecording
+from graspsense.sources.dataset_recordings import readable_or_not
+
+MANIFESTS = Path(__file__).parents[1] / "docs" / "manifests"
+
+
+def recordings(folder, name):
+    path = folder / "manifest.toml"
+    path.write_text((MANIFESTS / f"{name}.toml").read_text())
+    found = list(readable_or_not("manifest", str(path)))
+    assert not [one.error for one in found if isinstance(one, UnreadableRecording)]
+    return found
+
+
+def forces(one):
+    return np.array([(r.frame.force_left_n, r.frame.force_right_n) for r in one.recording.readings])
+
+
+def test_presses_in_named_arrays_of_three_dimensions_beside_arrays_of_other_shapes(tmp_path):
+    """Each array holds three presses along its last axis; arrays of other motions and a legend are in the same file."""
+    depth = np.arange(41) // 2
+    taxels = np.arange(1, 8)[:, np.newaxis] * depth
+    presses = np.array([np.vstack([depth, 1000 + k * taxels]).T for k in (1, 2, 3)])
+    arrays = {f"Vertical_{i}_{j}": np.moveaxis(presses * 1, 0, -1) for i in (1, 2) for j in (1, 2)}
+    turns = {f"Rotate_1_1_d{d}_r100": np.ones((61, 8, 3)) for d in (100, 120)}
+    (tmp_path / "data").mkdir()
+    savemat(tmp_path / "data" / "properties_exp.mat", {"nodules": np.ones((4, 4, 4)), **turns, **arrays})
+
+    found = recordings(tmp_path, "palpation")
+
+    assert sorted((one.label, one.order) for one in found) == [
+        (f"place{i}{j}", k) for i in (1, 2) for j in (1, 2) for k in (0.0, 1.0, 2.0)
+    ]
+    second = next(one for one in found if (one.label, one.order) == ("place21", 1.0))
+    gaps = [reading.frame.gap_m for reading in second.recording.readings]
+    assert gaps == pytest.approx(0.02 - 0.001 * depth)
+    # The mean of 1 to 7 is 4; the zero is the first sample.
+    assert forces(second)[:, 0] == pytest.approx(2 * 4.0 * depth)
+    assert second.recording.units["force_left"] == "counts"
+
+
+def test_a_glove_without_a_gap_and_without_names_of_columns(tmp_path):
+    for label, press in (("bottle", 300.0), ("rest", 0.0)):
+        rows = np.zeros((50, 33))
+        rows[:, 0] = 4680 + 10 * np.arange(50)
+        rows[:, 1] = 4.79 + 0.01 * np.arange(50)
+        rows[:, 16:21] = 999.0
+        rows[25:, 18] -= press
+        rows[:, 10] = np.arange(50)
+        (tmp_path / "datasets/dataset" / label).mkdir(parents=True)
+        lines = [f"{row[0]:.0f}, {', '.join(map(str, row[1:]))}" for row in rows]
+        (tmp_path / "datasets/dataset" / label / "7.txt").write_text("\n".join(lines) + "\n")
+
+    bottle, rest = recordings(tmp_path, "dataglove")
+
+    assert (bottle.label, bottle.order, rest.label) == ("bottle", 7.0, "rest")
+    assert bottle.recording.units["gap"] == NO_GAP
+    assert forces(bottle).tolist() == [[0.0, 0.0]] * 25 + [[300.0, 300.0]] * 25
+    assert not forces(rest).any()
+    little = signals_of([reading.signals for reading in bottle.recording.readings])["little"]
+    assert np.ravel(little).tolist() == list(range(50))
+
+
+def test_a_slide_with_electrodes_and_a_fast_vibration_and_a_comma_at_the_end_of_each_row(tmp_path):
+    names = [
+        "timestamp",
+        "tdc",
+        "tac",
+        "pdc",
+        *(f"pac{k}" for k in range(1, 23)),
+        *(f"ele{k}" for k in range(1, 20)),
+    ]
+    rows = [
+        [f"{1581073084.69 + 0.01 * k:.9f}", 3, 100, 90 + k, *range(22 * k, 22 * k + 22), *range(19)]
+        for k in range(30)
+    ]
+    (tmp_path / "raw_data/mat4").mkdir(parents=True)
+    lines = [",".join(names), *(",".join(map(str, row)) + "," for row in rows)]
+    (tmp_path / "raw_data/mat4/mat4_12_bio.csv").write_text("\n".join(lines) + "\n")
+
+    (one,) = recordings(tmp_path, "biotac_slide")
+
+    assert (one.label, one.order) == ("mat4", 12.0)
+    assert forces(one)[:, 0].tolist() == [90.0 + k for k in range(30)]
+    signals = signals_of([reading.signals for reading in one.recording.readings])
+    assert signals["vibration"].values[:, 0].tolist() == list(range(660))
+    assert signals["electrodes"].cells.tolist() == [list(range(19))] * 30
