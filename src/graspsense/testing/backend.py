@@ -35,7 +35,7 @@ from graspsense.core.values.signals import (
     Reading,
     Samples,
 )
-from graspsense.testing import component, protection, recorded
+from graspsense.testing import component, fingers, protection, recorded
 from graspsense.testing.checks import CheckFailed, CheckSkipped, checks_of, demand
 from graspsense.testing.gentle import EFFORT_N, FORCE_N, GentleController, kind_of
 from graspsense.testing.model_gripper import CHANNELS_OF_FIELD
@@ -817,6 +817,7 @@ CHECKS: Final = (
         channels_are_those_declared,
         signals_are_those_declared,
         signals_have_no_gaps_or_repeats,
+        fingers.fingers_are_those_declared,
         time_runs_forward,
         rate_is_as_declared,
         images_count_up,

@@ -11,12 +11,14 @@ from typing import Any, Final
 from attrs import asdict
 
 from graspsense.core.values.channel import Channel, FastChannel, TactileArray
+from graspsense.core.values.fingers import FingerForce
 from graspsense.core.values.signals import CHANNELS, Image, Samples
 
 KINDS: Final[Mapping[str, type[Channel]]] = {
     "scalar": Channel,
     "array": TactileArray,
     "fast": FastChannel,
+    "finger": FingerForce,
 }
 """The kinds of channel, as a recording names them."""
 

@@ -51,6 +51,7 @@ from graspsense.core.values.errors import (
 )
 from graspsense.core.values.events import EventSource, GraspEvent, event_name
 from graspsense.core.values.faults import Fault
+from graspsense.core.values.fingers import fingers_in_words, fingers_of
 from graspsense.core.values.signals import (
     APPROACH,
     EFFORT,
@@ -211,7 +212,7 @@ def run_grasp(
             info = _opened(backend, run.seed)
             if not info.channels:
                 info = evolve(info, channels=_declared(backend))
-            info = evolve(info, notes=(*info.notes, *_becoming(backend, controller)))
+            info = evolve(info, notes=_notes(info, backend, controller))
             if on_open is not None:
                 on_open(info)
             grasp = _Grasp(backend, controller, run, info, sinks, on_event, interrupts)
@@ -292,6 +293,13 @@ def _opened(backend: SensorBackend[Any], seed: int) -> DeviceInfo:
             f"`open` of the gripper {name} returned {info!r}: return graspsense.plugin_api.DeviceInfo"
         )
     return info
+
+
+def _notes(info: DeviceInfo, backend: SensorBackend[Any], controller: Controller[Any]) -> tuple[str, ...]:
+    """Return what a reader of the result must know: of the gripper, of its commands, and of its fingers."""
+    fingers = fingers_in_words(fingers_of(info.channels))
+    further = (*_becoming(backend, controller), *([fingers] if fingers else []))
+    return (*info.notes, *(note for note in further if note not in info.notes))
 
 
 def _becoming(backend: SensorBackend[Any], controller: Controller[Any]) -> tuple[str, ...]:
