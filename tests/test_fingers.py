@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import subprocess
 import sys
 from math import isnan, nan, sqrt
 
@@ -17,6 +18,7 @@ from graspsense.core.components.channels import as_json, from_json
 from graspsense.core.components.registry import IsolatedPlugins
 from graspsense.core.control.contact import both_touch
 from graspsense.core.pipeline.pipeline import grasp_with
+from graspsense.core.values.errors import ConfigError
 from graspsense.core.values.fingers import fingers_of
 from graspsense.plugin_api import (
     NAMES_INPUT,
@@ -35,15 +37,18 @@ from graspsense.plugin_api import (
     signal_type,
 )
 from graspsense.recording.export_trace import WRITERS
+from graspsense.recording.labelled_recording import UnreadableRecording
 from graspsense.recording.reader import read_recorded
 from graspsense.report.further_channels import channel_figures
 from graspsense.report.trace_plot import plot
+from graspsense.sources.dataset_recordings import readable_or_not
 from graspsense.sources.exported_grasp import read_exported
 from graspsense.store.record_grasp import record_grasp
 from graspsense.store.store import Store
 from graspsense.testing.conformance import Examined
 from graspsense.testing.subject import Subject
 
+GRASPSENSE = (sys.executable, "-m", "graspsense")
 HERE = sys.modules[__name__]
 FORCES = st.lists(st.floats(0.0, 50.0), min_size=5, max_size=5)
 HALF = sqrt(0.75)
@@ -285,3 +290,106 @@ def test_a_hand_with_three_fingers_conforms(grasped):
     report = Examined((Subject(component=plugins.find("sensor-backend", "jaws")),)).report()
 
     assert report.failures == []
+
+
+# ------------------------------------------------------------------------------------------------- recordings
+
+
+FINGERS = ("thumb", "index", "middle", "ring", "little")
+LOADS_N = dict(zip(FINGERS, (10.0, 4.0, 3.0, 2.0, 0.0), strict=True))
+"""What each finger bears at rest; the little finger touches nothing."""
+NAMED = (
+    'fingers = { thumb = "F1 [N]", index = "F2 [N]", middle = "F3 [N]", ring = "F4 [N]", little = "F5 [N]" }'
+)
+
+
+def five_fingers(folder, manifest_lines, offset_n=0.0):
+    """Write a text file of a squeeze with five fingers, and a manifest of it; return the recordings."""
+    t_s = np.arange(300) / 100.0
+    gap_mm = np.maximum(60.0 - 10.0 * t_s, 40.0)
+    pressed = np.clip(0.1 * (50.0 - gap_mm), 0.0, 1.0)
+    forces = [offset_n + load * pressed for load in LOADS_N.values()]
+    rows = [
+        f"{t:.2f},{gap:.3f}," + ",".join(f"{force[k]:.4f}" for force in forces)
+        for k, (t, gap) in enumerate(zip(t_s, gap_mm, strict=True))
+    ]
+    (folder / "cup-1.csv").write_text("\n".join(["t,gap,F1,F2,F3,F4,F5", *rows]) + "\n")
+    text = ['files = "{label}-{order:d}.csv"', 'time = "t [s]"', 'gap = "gap [mm]"', *manifest_lines]
+    (folder / "manifest.toml").write_text("\n".join(text) + "\n")
+    found = list(readable_or_not("manifest", str(folder / "manifest.toml")))
+    for one in found:
+        if isinstance(one, UnreadableRecording):
+            raise one.error
+    return found
+
+
+def last_frame(found):
+    return found[0].recording.readings[-1].frame
+
+
+@pytest.mark.parametrize(
+    ("touch", "left_n", "right_n"),
+    [("thumb", 10.0, 9.0), ("thumb, index", 14.0, 5.0), ("each", 0.0, 10.0), ("any", 10.0, 4.0)],
+)
+def test_a_recording_of_five_fingers_has_the_forces_of_its_rule(tmp_path, touch, left_n, right_n):
+    frame = last_frame(five_fingers(tmp_path, [NAMED, f'touch = "{touch}"']))
+
+    assert sorted((frame.force_left_n, frame.force_right_n)) == pytest.approx(sorted((left_n, right_n)))
+
+
+def test_each_finger_of_a_recording_has_its_own_zero(tmp_path):
+    found = five_fingers(tmp_path, [NAMED, 'touch = "thumb"', 'zero = "10 samples"'], offset_n=0.7)
+
+    last = found[0].recording.readings[-1]
+    assert [getattr(last.signals, f"force_{name}") for name in FINGERS] == pytest.approx(
+        list(LOADS_N.values())
+    )
+    assert last.frame.force_right_n == pytest.approx(9.0)
+
+
+def test_a_resampled_recording_keeps_the_rule(tmp_path):
+    found = five_fingers(tmp_path, [NAMED, 'touch = "each"', "resample_hz = 37.0"])
+    (recording,) = (one.recording for one in found)
+
+    for reading in recording.readings:
+        assert reading.frame.force_left_n == min(reading.signals)
+        assert reading.frame.force_right_n == max(reading.signals)
+
+
+def test_an_imported_trial_of_five_fingers_says_of_which_fingers_its_features_are(tmp_path):
+    five_fingers(tmp_path, [NAMED, 'touch = "thumb"'])
+    manifest = tmp_path / "manifest.toml"
+
+    code = subprocess.run(
+        [*GRASPSENSE, "import", str(manifest), "--save", str(tmp_path / "store")],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+    assert code.returncode == 0, code.stderr
+    (path,) = (tmp_path / "store" / "recordings").glob("*.mcap")
+    recorded = read_recorded(path)
+    assert [one.finger for one in fingers_of(recorded.channels)] == list(FINGERS)
+    (note,) = [one for one in recorded.device.notes if "fingers" in one]
+    assert "left force is of thumb" in note
+    assert recorded.record().result.features.values
+
+
+@pytest.mark.parametrize(
+    ("lines", "says"),
+    [
+        ([NAMED], 'touch = "thumb"'),
+        ([NAMED, 'touch = "pinky"'], "pinky"),
+        ([NAMED, 'touch = "each"', 'left = "F1 [N]"'], "leave out"),
+        (['left = "F1 [N]"', 'touch = "each"'], "rule of fingers"),
+        (['fingers = { thumb = "F1 [N]" }'], "one finger"),
+        (['fingers = { Thumb = "F1 [N]", index = "F2 [N]" }'], "small letters"),
+        (['fingers = { thumb = "F1 [N]", index = "F2 [counts]" }'], "one unit"),
+        (['fingers = { thumb = "F1 [N]", index = "F9 [N]" }'], "fingers.index"),
+    ],
+    ids=["no rule", "no such finger", "two meanings", "no fingers", "one", "name", "units", "no such column"],
+)
+def test_a_manifest_with_fingers_that_cannot_be_is_refused(tmp_path, lines, says):
+    with pytest.raises(ConfigError, match=says):
+        five_fingers(tmp_path, lines)
