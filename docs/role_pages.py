@@ -30,6 +30,7 @@ from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.events import GraspEvent
 from graspsense.core.values.features import Features, FeatureTable, Prediction
 from graspsense.core.values.fingers import FingerForce
+from graspsense.core.values.mounting import Mounting
 from graspsense.core.values.reasons import Contribution, FeatureValue, Reason
 from graspsense.core.values.trace import ImageTrace, SampleTrace, Trace
 from graspsense.core.values.trial import RunInfo, Trial
@@ -104,7 +105,7 @@ FASTER: dict[str, tuple[str, str, Any, tuple[Any, ...]]] = {
 """What a role may declare so that simulated grasps take less time: title, attribute, module and classes."""
 FLOWING: tuple[Any, ...] = (
     *(signals.Reading, signals.Frame, signals.Pads, signals.Image, signals.Samples, signals.Command),
-    *(Channel, TactileArray, FastChannel, FingerForce, DeviceInfo),
+    *(Channel, TactileArray, FastChannel, FingerForce, DeviceInfo, Mounting),
     *(
         Trace,
         ImageTrace,

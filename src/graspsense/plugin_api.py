@@ -81,6 +81,7 @@ _TABLE: Final[Table] = {
     "Sensor backends": {
         "core.values.faults": ("StatusBit",),
         "core.values.device": ("DeviceInfo",),
+        "core.values.mounting": ("Mounting",),
         "core.components.roles": ("ObjectKind", "SensorBackend"),
         "core.components.channels": ("no_signals", "signal_type"),
         "core.values.fingers": ("opposed_forces",),

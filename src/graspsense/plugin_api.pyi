@@ -73,6 +73,7 @@ from graspsense.core.control.tick import TARING as TARING
 # Sensor backends
 from graspsense.core.values.faults import StatusBit as StatusBit
 from graspsense.core.values.device import DeviceInfo as DeviceInfo
+from graspsense.core.values.mounting import Mounting as Mounting
 from graspsense.core.components.roles import ObjectKind as ObjectKind
 from graspsense.core.components.roles import SensorBackend as SensorBackend
 from graspsense.core.components.channels import no_signals as no_signals

@@ -13,6 +13,7 @@ from attrs import field, frozen
 from graspsense.core.components.delivered import Delivered
 from graspsense.core.values.channel import Channel
 from graspsense.core.values.errors import DataDamaged
+from graspsense.core.values.mounting import Mounting
 from graspsense.core.values.signals import Frame, Reading
 
 _FRAME: Final = struct.Struct(f"<{len(Frame._fields)}d")
@@ -38,6 +39,8 @@ class Recording:
     has_release: bool = False
     channels: tuple[Channel, ...] = ()
     notices: tuple[str, ...] = ()
+    mounting: Mapping[str, Mounting] = field(factory=dict)
+    """Where the frames of tool and fingers were, if this is known."""
 
 
 def check_recording(recording: Recording) -> None:

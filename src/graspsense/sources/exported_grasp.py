@@ -15,6 +15,7 @@ import numpy as np
 
 from graspsense.core.components.channels import from_json, further, signal_type
 from graspsense.core.values.channel import Channel, FastChannel, TactileArray
+from graspsense.core.values.mounting import mounting_from_json
 from graspsense.core.values.signals import Frame, Image, Pads, Reading, no_pads
 from graspsense.recording.readable import readable
 from graspsense.recording.replayable import REPLAY_NOTE, Recording
@@ -61,6 +62,7 @@ def read_exported(name: str) -> Recording:
             commands=None if np.isnan(arrays["command"]).any() else tuple(arrays["command"].tolist()),
             has_release=bool(about["has_release"]),
             channels=channels,
+            mounting=mounting_from_json(about.get("mounting", {})),
         )
 
 

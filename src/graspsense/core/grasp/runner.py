@@ -212,7 +212,11 @@ def run_grasp(
             info = _opened(backend, run.seed)
             if not info.channels:
                 info = evolve(info, channels=_declared(backend))
-            info = evolve(info, notes=_notes(info, backend, controller))
+            info = evolve(
+                info,
+                notes=_notes(info, backend, controller),
+                mounting={**info.mounting, **run.mountings()},
+            )
             if on_open is not None:
                 on_open(info)
             grasp = _Grasp(backend, controller, run, info, sinks, on_event, interrupts)
