@@ -210,13 +210,7 @@ def run_grasp(
         try:
             backend.expect(controller, run)
             info = _opened(backend, run.seed)
-            if not info.channels:
-                info = evolve(info, channels=_declared(backend))
-            info = evolve(
-                info,
-                notes=_notes(info, backend, controller),
-                mounting={**info.mounting, **run.mountings()},
-            )
+            info = _described(info, backend, controller, run)
             if on_open is not None:
                 on_open(info)
             grasp = _Grasp(backend, controller, run, info, sinks, on_event, interrupts)
@@ -299,11 +293,19 @@ def _opened(backend: SensorBackend[Any], seed: int) -> DeviceInfo:
     return info
 
 
-def _notes(info: DeviceInfo, backend: SensorBackend[Any], controller: Controller[Any]) -> tuple[str, ...]:
-    """Return what a reader of the result must know: of the gripper, of its commands, and of its fingers."""
-    fingers = fingers_in_words(fingers_of(info.channels))
+def _described(
+    info: DeviceInfo, backend: SensorBackend[Any], controller: Controller[Any], run: RunConfig
+) -> DeviceInfo:
+    """Return the open gripper with its channels, its mounting, and notes on its commands and its fingers."""
+    channels = info.channels or _declared(backend)
+    fingers = fingers_in_words(fingers_of(channels))
     further = (*_becoming(backend, controller), *([fingers] if fingers else []))
-    return (*info.notes, *(note for note in further if note not in info.notes))
+    return evolve(
+        info,
+        channels=channels,
+        notes=(*info.notes, *(note for note in further if note not in info.notes)),
+        mounting={**info.mounting, **run.mountings()},
+    )
 
 
 def _becoming(backend: SensorBackend[Any], controller: Controller[Any]) -> tuple[str, ...]:
