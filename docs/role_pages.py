@@ -29,6 +29,8 @@ from graspsense.core.values.channel import Channel, FastChannel, TactileArray
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.events import GraspEvent
 from graspsense.core.values.features import Features, FeatureTable, Prediction
+from graspsense.core.values.fingers import FingerForce
+from graspsense.core.values.mounting import Mounting
 from graspsense.core.values.reasons import Contribution, FeatureValue, Reason
 from graspsense.core.values.trace import ImageTrace, SampleTrace, Trace
 from graspsense.core.values.trial import RunInfo, Trial
@@ -74,7 +76,7 @@ HELPERS = {
     ),
     "Kinds of command": ("EFFORT", "VELOCITY", "POSITION", "FORCE"),
     "Features and tables": ("missing", "in_words", "table_of"),
-    "Further channels": ("signal_type", "no_signals", "no_pads"),
+    "Further channels": ("signal_type", "no_signals", "no_pads", "opposed_forces"),
     "Tests of a plugin": (
         *("parametrize_checks", "create", "model_gripper", "drive"),
         *("squeeze", "with_channels", "sample_table", "a_trial"),
@@ -103,7 +105,7 @@ FASTER: dict[str, tuple[str, str, Any, tuple[Any, ...]]] = {
 """What a role may declare so that simulated grasps take less time: title, attribute, module and classes."""
 FLOWING: tuple[Any, ...] = (
     *(signals.Reading, signals.Frame, signals.Pads, signals.Image, signals.Samples, signals.Command),
-    *(Channel, TactileArray, FastChannel, DeviceInfo),
+    *(Channel, TactileArray, FastChannel, FingerForce, DeviceInfo, Mounting),
     *(
         Trace,
         ImageTrace,

@@ -39,6 +39,7 @@ from graspsense.plugin_api import (
     Command,
     CompiledFeatures,
     Features,
+    FingerForce,
     FreeLimits,
     FreeMotion,
     Image,
@@ -618,6 +619,30 @@ mutant(
     "signals-are-those-declared",
     "declared are acceleration, motor_temperature, and read delivers acceleration",
     channels=(*ENTRIES["sensor-backend"].channels, Channel("motor_temperature", "K", 1.0)),
+)(Hand)
+
+
+FINGERS = (FingerForce("force_thumb", "N", side="left"), FingerForce("force_index", "N", side="right"))
+
+
+@mutant(
+    "sensor-backend",
+    "fingers-are-those-declared",
+    "where the fingers bear 1, 2 N",
+    channels=(*ENTRIES["sensor-backend"].channels, *FINGERS),
+)
+class OwnFrame(Hand):
+    def read(self, timeout_s):
+        reading = super().read(timeout_s)
+        signals = signal_type((ACCELERATION, *FINGERS))
+        return reading._replace(signals=signals(*reading.signals, 1.0, 2.0))
+
+
+mutant(
+    "sensor-backend",
+    "fingers-are-those-declared",
+    "declare two or more fingers",
+    channels=(*ENTRIES["sensor-backend"].channels, FINGERS[0]),
 )(Hand)
 
 

@@ -128,6 +128,17 @@ def test_what_was_not_recorded_is_missing(tmp_path: Path) -> None:
     assert reading.pads == NO_PADS
 
 
+def test_each_of_the_five_fingers_is_kept_beside_the_two_forces(tmp_path: Path) -> None:
+    pressed = frame_lines(pressed={0: 20, 1: 5, 3: 50})
+    recording = read_recording(str(write(tmp_path / "g.txt", frame_lines(), pressed)))
+
+    last = recording.readings[-1]
+
+    assert [one.name for one in recording.channels] == list(last.signals._fields)
+    assert list(last.signals) == pytest.approx([2.0, 0.5, 0.0, 5.0, 0.0])
+    assert (last.frame.force_left_n, last.frame.force_right_n) == pytest.approx((2.0, 5.0))
+
+
 @given(data=st.data())
 def test_mapping_depends_on_no_later_frame_and_on_no_offset(data: st.DataObject) -> None:
     n = data.draw(st.integers(2, 6))

@@ -15,6 +15,7 @@ _TABLE: Final[Table] = {
     "Declaring what a plugin brings": {
         "core.components.hookspecs": ("hookimpl",),
         "core.values.channel": ("Channel", "FastChannel", "TactileArray"),
+        "core.values.fingers": ("FingerForce",),
         "core.components.entries": (
             "ClassifierEntry",
             "CommandEntry",
@@ -80,8 +81,10 @@ _TABLE: Final[Table] = {
     "Sensor backends": {
         "core.values.faults": ("StatusBit",),
         "core.values.device": ("DeviceInfo",),
+        "core.values.mounting": ("Mounting",),
         "core.components.roles": ("ObjectKind", "SensorBackend"),
         "core.components.channels": ("no_signals", "signal_type"),
+        "core.values.fingers": ("opposed_forces",),
     },
     "Sensor backends that do many grasps at once": {
         "core.components.roles": ("BatchBackend", "BatchOptions", "Grasped", "SimulationVariant"),

@@ -5,6 +5,7 @@ from graspsense.core.components.hookspecs import hookimpl as hookimpl
 from graspsense.core.values.channel import Channel as Channel
 from graspsense.core.values.channel import FastChannel as FastChannel
 from graspsense.core.values.channel import TactileArray as TactileArray
+from graspsense.core.values.fingers import FingerForce as FingerForce
 from graspsense.core.components.entries import ClassifierEntry as ClassifierEntry
 from graspsense.core.components.entries import CommandEntry as CommandEntry
 from graspsense.core.components.entries import ConformanceCheckEntry as ConformanceCheckEntry
@@ -72,10 +73,12 @@ from graspsense.core.control.tick import TARING as TARING
 # Sensor backends
 from graspsense.core.values.faults import StatusBit as StatusBit
 from graspsense.core.values.device import DeviceInfo as DeviceInfo
+from graspsense.core.values.mounting import Mounting as Mounting
 from graspsense.core.components.roles import ObjectKind as ObjectKind
 from graspsense.core.components.roles import SensorBackend as SensorBackend
 from graspsense.core.components.channels import no_signals as no_signals
 from graspsense.core.components.channels import signal_type as signal_type
+from graspsense.core.values.fingers import opposed_forces as opposed_forces
 
 # Sensor backends that do many grasps at once
 from graspsense.core.components.roles import BatchBackend as BatchBackend

@@ -25,7 +25,7 @@ from graspsense.cli.terminal import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from graspsense.core.components.config import Settings
     from graspsense.core.grasp.runner import Sink
@@ -59,6 +59,12 @@ MANY_GUARDED: Final = 0.1
     is_flag=True,
     help="Simulated: list what every term contributed, and what each feature would lose without it. (gripper.explain)",
 )
+@click.option(
+    "--beside",
+    metavar="PIPELINE",
+    help="Grasp with a second gripper at the same time: its pipeline, by name or file. --seed, --object and -o are of "
+    "the first.",
+)
 @click.option("--plot", metavar="FILE.png", help="Draw the grasp: forces, gap, phases, features, prediction.")
 @click.option("--dry-run", is_flag=True, help="Print what would be done, and open nothing.")
 @click.option("--json", "as_json", is_flag=True, help="Print the trial as JSON.")
@@ -73,6 +79,7 @@ def run(
     label: str | None,
     changed: bool,
     explain_model: bool,
+    beside: str | None,
     plot: str | None,
     dry_run: bool,
     as_json: bool,
@@ -83,8 +90,9 @@ def run(
     whatever its outcome; 2 wrong settings; 3 device not found; 4 grasp aborted or device lost.
     """
     from graspsense.core.pipeline.wiring import check
-    from graspsense.core.values.trial import trial_as_json
 
+    if beside and (plot or explain_model or dry_run):
+        raise click.UsageError("--beside goes without --plot, --explain-model and --dry-run")
     if explain_model:
         options = (*options, "gripper.explain=true")
     settings = _labelled_settings(label, pipeline, gripper, object_name, options, seed, force)
@@ -96,12 +104,10 @@ def run(
     if dry_run:
         _say_what_would_be_done(settings, as_json)
         return
-    if label is not None and save is None:
-        raise click.UsageError("--label goes with a trial that is kept: add --save DIR")
-    if plot is not None:
-        from graspsense.report.grasp_picture import require_picture
-
-        require_picture(Path(plot))
+    _require_places(save, label, plot)
+    if beside is not None:
+        _run_beside(settings, beside, save, label, as_json)
+        return
     sinks = () if as_json else (LiveRows(),)
     kept: dict[str, Any] | None = None
     if save is None:
@@ -115,13 +121,58 @@ def run(
     condition = _condition(settings) if asked else None
     if as_json:
         further = {} if condition is None else {"condition": condition.as_values()}
-        echo_json({**trial_as_json(trial), **({} if kept is None else {"kept": kept}), **further})
+        echo_json({**_as_json(trial, kept), **further})
     else:
         print_trial(trial)
         _print_further(settings, trial, condition)
     if plot is not None:
         draw_grasp(trial, Path(plot))
     _exit(trial, interrupted, "" if kept is None else kept["problem"])
+
+
+def _require_places(save: str | None, label: str | None, plot: str | None) -> None:
+    """Check before a grasp that what is asked for can be written. Raises as `require_picture`, and UsageError."""
+    if label is not None and save is None:
+        raise click.UsageError("--label goes with a trial that is kept: add --save DIR")
+    if plot is not None:
+        from graspsense.report.grasp_picture import require_picture
+
+        require_picture(Path(plot))
+
+
+def _run_beside(
+    settings: Settings, pipeline: str, save: str | None, label: str | None, as_json: bool
+) -> None:
+    """Grasp with the grippers of these settings and of another pipeline at once, and print both trials.
+
+    Ends the command with the exit code of the first trial that was not kept or did not end by itself.
+    """
+    from graspsense.cli.run_beside import grasp_beside
+    from graspsense.core.pipeline.wiring import check
+
+    other = _labelled_settings(label, pipeline, None, None, (), None, False)
+    if save is not None and other.origins["run.seed"] == "default":
+        drawn = randbelow(LARGEST_DRAWN_SEED + 1)
+        other = _labelled_settings(label, pipeline, None, None, (), drawn, False)
+    check(other)
+    both = grasp_beside(settings, other, save, label)
+    if as_json:
+        echo_json({"grippers": [_as_json(trial, kept) for trial, _, kept in both]})
+    for trial, _, kept in () if as_json else both:
+        echo()
+        echo_entry("gripper", trial.device.name)
+        print_trial(trial)
+        if kept is not None and kept["trial"] is not None:
+            talk(f"kept as trial {kept['trial']} in {save}")
+    for trial, interrupted, kept in both:
+        _exit(trial, interrupted, "" if kept is None else kept["problem"])
+
+
+def _as_json(trial: Trial, kept: Mapping[str, Any] | None) -> dict[str, Any]:
+    """Return a trial as JSON values, with what is known of its place in a store."""
+    from graspsense.core.values.trial import trial_as_json
+
+    return {**trial_as_json(trial), **({} if kept is None else {"kept": kept})}
 
 
 def _print_further(settings: Settings, trial: Trial, condition: Conditions | None) -> None:

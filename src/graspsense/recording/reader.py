@@ -283,6 +283,7 @@ class RecordedGrasp:
             commands=tuple(self.ticks["command"].tolist()) if known else None,
             has_release=known and bool((self.ticks["phase"] == Phase.RELEASE).any()),
             channels=self.channels,
+            mounting=self.device.mounting,
         )
 
 

@@ -14,6 +14,7 @@ from graspsense.core.components.channels import dtype_of
 from graspsense.core.components.delivered import Delivered
 from graspsense.core.values.channel import FLOATS, Channel
 from graspsense.core.values.errors import DataDamaged
+from graspsense.core.values.mounting import Mounting
 from graspsense.core.values.signals import Frame, Image, Reading
 
 _FRAME: Final = struct.Struct(f"<{len(Frame._fields)}d")
@@ -39,6 +40,8 @@ class Recording:
     has_release: bool = False
     channels: tuple[Channel, ...] = ()
     notices: tuple[str, ...] = ()
+    mounting: Mapping[str, Mounting] = field(factory=dict)
+    """Where the frames of tool and fingers were, if this is known."""
 
 
 def check_recording(recording: Recording) -> None:

@@ -23,6 +23,7 @@ from graspsense.core.files.toml_text import toml_values
 from graspsense.core.values.channel import Channel, TactileArray
 from graspsense.core.values.errors import DataDamaged
 from graspsense.core.values.json_values import json_text
+from graspsense.core.values.mounting import Mounting, mounting_from_json
 from graspsense.core.values.signals import Outcome
 from graspsense.core.values.trial import trial_as_json
 from graspsense.recording.before_contact import before_contact, contact_force_of
@@ -121,6 +122,7 @@ class DeviceRecord:
     notes: tuple[str, ...] = ()
     channels: tuple[Channel, ...] = ()
     """Its tactile arrays, and the channels that are not part of a frame."""
+    mounting: Mapping[str, Mounting] = field(factory=dict)
 
     @classmethod
     def of(cls, device: DeviceInfo) -> DeviceRecord:
@@ -138,6 +140,9 @@ class DeviceRecord:
         """Return canonical JSON."""
         values = {name: getattr(self, name) for name in DeviceRecord.__annotations__}
         values["channels"] = [as_json(channel) for channel in self.channels]
+        values["mounting"] = {name: one.as_json() for name, one in self.mounting.items()}
+        if not self.mounting:
+            del values["mounting"]
         return json_text(values)
 
     @classmethod
@@ -161,6 +166,7 @@ class DeviceRecord:
             units=units,
             notes=tuple(str(note) for note in notes),
             channels=_channels(value.get("channels", [])),
+            mounting=mounting_from_json(value.get("mounting", {})),
         )
 
 

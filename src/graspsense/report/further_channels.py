@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from graspsense.core.values.channel import Channel, FastChannel
+from graspsense.core.values.fingers import fingers_of
 from graspsense.core.values.trace import SampleTrace
 from graspsense.core.values.units import display_unit, without_underscores
 from graspsense.report.heat import HeatScale, heat_rows
@@ -32,13 +33,23 @@ RANGE_DB: Final = 60.0
 
 
 def channel_figures(trace: Trace, channels: Sequence[Channel]) -> list[str]:
-    """Return a figure for each further channel with one number a tick, and one for each fast channel."""
+    """Return a figure of the forces of all fingers, one for each other number a tick, and one for each fast channel."""
     declared = {channel.name: channel for channel in channels}
     contact = contact_time(trace)
     zero = float(contact) if contact is not None else (float(trace.t_s[0]) if len(trace) else 0.0)
     begin = float(trace.t_s[shown_from(trace)]) if len(trace) else 0.0
     figures = []
+    fingers = {
+        one.name: one for one in fingers_of(channels) if isinstance(trace.signals.get(one.name), np.ndarray)
+    }
+    if fingers:
+        shown = trace.t_s >= begin
+        lines = {without_underscores(one.finger): trace.signals[name][shown] for name, one in fingers.items()}
+        channel = Channel("forces_of_the_fingers", next(iter(fingers.values())).unit)
+        figures.append(_figure(trace, channel, trace.t_s[shown] - zero, lines, contact is not None))
     for name, signal in trace.signals.items():
+        if name in fingers:
+            continue
         channel = declared.get(name) or Channel(name, "unknown")
         if isinstance(signal, np.ndarray):
             shown = trace.t_s >= begin

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from graspsense.core.values.errors import PluginUnavailable
+from graspsense.core.values.fingers import PREFIX
 from graspsense.core.values.signals import Phase
 from graspsense.core.values.trace import SampleTrace
 from graspsense.core.values.units import display_unit, without_underscores
@@ -98,6 +99,13 @@ def draw_trace(trace: Trace, force: Any, gap: Any) -> None:
     t = trace.t_s[start:] - zero
     force.plot(t, trace.force_left_n[start:], color=LEFT, lw=1.6, label="left pad")
     force.plot(t, trace.force_right_n[start:], color=RIGHT, lw=1.6, ls="--", label="right pad")
+    fingers = {
+        name.removeprefix(PREFIX): signal
+        for name, signal in trace.signals.items()
+        if name.startswith(PREFIX) and isinstance(signal, np.ndarray)
+    }
+    for k, (name, signal) in enumerate(fingers.items()):
+        force.plot(t, signal[start:], color=f"C{k + 2}", lw=0.8, label=without_underscores(name))
     force.set_ylabel(f"force, {trace.units['force_left']}")
     # Noise alone does not fill the axis.
     force.set_ylim(top=max(force.get_ylim()[1], 1.0))

@@ -22,6 +22,7 @@ from graspsense.core.components.channels import (
     signal_type,
 )
 from graspsense.core.values.channel import FLOATS, Channel, FastChannel, TactileArray
+from graspsense.core.values.mounting import mounting_from_json
 from graspsense.core.values.signals import Frame, Image, Pads, Reading, no_pads
 from graspsense.recording.readable import readable
 from graspsense.recording.replayable import REPLAY_NOTE, Recording
@@ -68,6 +69,7 @@ def read_exported(name: str) -> Recording:
             commands=None if np.isnan(arrays["command"]).any() else tuple(arrays["command"].tolist()),
             has_release=bool(about["has_release"]),
             channels=channels,
+            mounting=mounting_from_json(about.get("mounting", {})),
         )
 
 

@@ -12,6 +12,7 @@ from attrs import evolve, field, frozen
 from graspsense.core.components.channels import cells_of, no_signals, signal_type
 from graspsense.core.values.channel import Channel, FastChannel, TactileArray
 from graspsense.core.values.errors import DataDamaged
+from graspsense.core.values.fingers import FingerForce, opposed_forces
 from graspsense.core.values.signals import NO_PADS, Frame, Image, Reading, Samples
 from graspsense.recording.replayable import Recording
 from graspsense.sources.fast_samples import sample_blocks
@@ -52,6 +53,8 @@ class GraspColumns:
     effort_n: Numbers | None = None
     velocity_m_s: Numbers | None = None
     scalars: Mapping[str, Numbers] = field(factory=dict)
+    fingers: tuple[FingerForce, ...] = ()
+    """Those of `scalars` that are the forces of single fingers; `finger_sides` gives `left_n` and `right_n`."""
     arrays: Mapping[str, Numbers] = field(factory=dict)
     shapes: Mapping[str, tuple[int, ...]] = field(factory=dict)
     """Rows and columns of the cells of an array (else there is one row), with the components of a cell as a third
@@ -112,6 +115,14 @@ class GraspColumns:
                 rows = (at >= t_s[0]) & (at <= t_s[-1]) if len(t_s) else np.zeros(len(at), bool)
             found[name] = values[rows]
         return found
+
+
+def finger_sides(fingers: Sequence[FingerForce], forces: Mapping[str, Numbers]) -> tuple[Numbers, Numbers]:
+    """Return `left_n` and `right_n` of a hand from the force of each finger, by the rule of its fingers."""
+    forces_of = opposed_forces(fingers)
+    rows = np.column_stack([forces[one.name] for one in fingers]).tolist()
+    left, right = np.array([forces_of(row) for row in rows], dtype=np.float64).reshape(-1, 2).T
+    return left, right
 
 
 def without_missing(columns: GraspColumns) -> GraspColumns:
@@ -341,7 +352,8 @@ def _units(units: Mapping[str, str]) -> dict[str, str]:
 
 
 def _channels(columns: GraspColumns) -> tuple[Channel, ...]:
-    scalars = [Channel(name, columns.units.get(name, "1")) for name in columns.scalars]
+    fingers = {one.name: one for one in columns.fingers}
+    scalars = [fingers.get(name) or Channel(name, columns.units.get(name, "1")) for name in columns.scalars]
     return (*scalars, *(_array(columns, name, values) for name, values in columns.arrays.items()))
 
 

@@ -22,7 +22,9 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from attrs import frozen
 
+from graspsense.core.components.channels import signal_type
 from graspsense.core.values.errors import ConfigError, DataDamaged, suggestion
+from graspsense.core.values.fingers import PREFIX, FingerForce, opposed_forces
 from graspsense.core.values.signals import NO_PADS, Frame, Reading
 from graspsense.recording.readable import not_opened
 from graspsense.recording.replayable import Recording
@@ -40,6 +42,11 @@ _FULL_SCALE: Final = 255.0
 
 UNITS: Final = {"t": "frame", "velocity": "m/frame"}
 """Units of a recording that are not SI: without time stamps, time is counted in frames."""
+HAND: Final = tuple(
+    FingerForce(f"{PREFIX}{name}", "N", side="left" if name == "thumb" else "right", touch="any")
+    for name in FINGERS
+)
+"""The five fingertips, of which the thumb opposes the others: the thumb and the strongest of these count."""
 THUMB_FLEXION: Final = (9, 10)
 FINGER_FLEXION: Final = (11, 12, 13, 14)
 START_GAP_M: Final = 0.08
@@ -82,6 +89,7 @@ def read_recording(name: str) -> Recording:
         readings=relative_readings(grasp),
         rate_hz=1.0,
         units=UNITS,
+        channels=HAND,
         notes=(
             f"{len(grasp)} frames of an iCub hand without time stamps: times are frame numbers, not seconds",
             "metres and newtons are nominal: gap from the encoders, forces from the taxels, "
@@ -142,6 +150,9 @@ def relative_readings(grasp: IcubGrasp) -> tuple[Reading, ...]:
     flexion_deg = (thumb_deg + finger_deg) / 2.0
     gap_m = START_GAP_M - GAP_M_PER_DEG * (flexion_deg - flexion_deg[0])
     velocity = np.diff(gap_m, prepend=gap_m[0])
+    forces = [tuple(row) for row in pressure.tolist()]
+    sides = list(map(opposed_forces(HAND), forces))
+    signals = signal_type(HAND)
     return tuple(
         Reading(
             Frame(
@@ -150,13 +161,14 @@ def relative_readings(grasp: IcubGrasp) -> tuple[Reading, ...]:
                 gap_m=float(gap_m[k]),
                 velocity_m_s=float(velocity[k]),
                 effort_n=math.nan,
-                force_left_n=float(pressure[k, 0]),
-                force_right_n=float(pressure[k, 1:].max()),
+                force_left_n=sides[k][0],
+                force_right_n=sides[k][1],
                 edge_left_n=math.nan,
                 edge_right_n=math.nan,
                 status=0,
             ),
             NO_PADS,
+            signals(*forces[k]),
         )
         for k in range(len(grasp))
     )

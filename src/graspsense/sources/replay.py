@@ -186,6 +186,7 @@ class ReplayBackend(SensorBackend[ReplayConfig]):
             relaxed=Command(EFFORT, 0.0, inf, inf),
             has_release=recording.has_release,
             units=recording.units,
+            mounting=recording.mounting,
             notes=(*recording.notes, *recording.notices),
         )
 

@@ -70,8 +70,8 @@ def check_device(store: Store, before: StoredTrial, device: DeviceInfo) -> None:
 
 def _passive(settings: Settings, table: str) -> frozenset[str]:
     """Return the keys of a table that change no result."""
-    selected = next((one for one in settings.chosen if one.component.table == table), None)
-    return frozenset() if selected is None else settings_marked(type(selected.config), CHANGES_NO_RESULT)
+    configs = {one.component.table: one.config for one in settings.chosen} | {"run": settings.run}
+    return settings_marked(type(configs[table]), CHANGES_NO_RESULT) if table in configs else frozenset()
 
 
 def _difference(name: str, was: Any, is_now: Any) -> str:

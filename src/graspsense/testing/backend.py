@@ -39,7 +39,7 @@ from graspsense.core.values.signals import (
     Reading,
     Samples,
 )
-from graspsense.testing import component, protection, recorded
+from graspsense.testing import component, fingers, protection, recorded
 from graspsense.testing.checks import CheckFailed, CheckSkipped, checks_of, demand
 from graspsense.testing.gentle import EFFORT_N, FORCE_N, GentleController, kind_of
 from graspsense.testing.model_gripper import CHANNELS_OF_FIELD
@@ -862,6 +862,7 @@ CHECKS: Final = (
         signals_are_those_declared,
         images_stay_as_they_were_delivered,
         signals_have_no_gaps_or_repeats,
+        fingers.fingers_are_those_declared,
         time_runs_forward,
         rate_is_as_declared,
         images_count_up,

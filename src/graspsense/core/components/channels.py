@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 from attrs import asdict
 
 from graspsense.core.values.channel import FLOATS, Channel, FastChannel, TactileArray
+from graspsense.core.values.fingers import FingerForce
 from graspsense.core.values.signals import CHANNELS, Image, Samples
 
 if TYPE_CHECKING:
@@ -20,6 +21,7 @@ KINDS: Final[Mapping[str, type[Channel]]] = {
     "scalar": Channel,
     "array": TactileArray,
     "fast": FastChannel,
+    "finger": FingerForce,
 }
 """The kinds of channel, as a recording names them."""
 

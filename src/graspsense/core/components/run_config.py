@@ -2,11 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import inf
+from typing import Any
 
-from attrs import frozen
+from attrs import Attribute, frozen
 
-from graspsense.core.components.setting import setting
+from graspsense.core.components.setting import CHANGES_NO_RESULT, setting
+from graspsense.core.values.mounting import Mounting
+
+
+def _are_mountings(_config: object, _attribute: Attribute[Any], values: Mapping[str, str]) -> None:
+    for name, text in values.items():
+        try:
+            Mounting.of(text)
+        except ValueError as error:
+            raise ValueError(f"{name}: {error}") from None
 
 
 @frozen(kw_only=True)
@@ -81,3 +92,14 @@ class RunConfig:
         meaning="Whether the squeeze ends as soon as the prediction set has one label; needs a model with checkpoints "
         "(graspsense train --checkpoints).",
     )
+    mounting: Mapping[str, str] = setting(
+        factory=dict,
+        validator=_are_mountings,
+        effect=CHANGES_NO_RESULT,
+        meaning='Where frames of the gripper are, kept with each trial: `tool = "tool0 of arm.urdf"`, '
+        '`thumb = "0 20 95 mm, 0 0 90 deg in tool"`.',
+    )
+
+    def mountings(self) -> dict[str, Mounting]:
+        """Return where the frames of `mounting` are."""
+        return {name: Mounting.of(text) for name, text in self.mounting.items()}

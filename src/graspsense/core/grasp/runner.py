@@ -51,6 +51,7 @@ from graspsense.core.values.errors import (
 )
 from graspsense.core.values.events import EventSource, GraspEvent, event_name
 from graspsense.core.values.faults import Fault
+from graspsense.core.values.fingers import fingers_in_words, fingers_of
 from graspsense.core.values.signals import (
     APPROACH,
     EFFORT,
@@ -209,9 +210,7 @@ def run_grasp(
         try:
             backend.expect(controller, run)
             info = _opened(backend, run.seed)
-            if not info.channels:
-                info = evolve(info, channels=_declared(backend))
-            info = evolve(info, notes=(*info.notes, *_becoming(backend, controller)))
+            info = _described(info, backend, controller, run)
             if on_open is not None:
                 on_open(info)
             grasp = _Grasp(backend, controller, run, info, sinks, on_event, interrupts)
@@ -292,6 +291,21 @@ def _opened(backend: SensorBackend[Any], seed: int) -> DeviceInfo:
             f"`open` of the gripper {name} returned {info!r}: return graspsense.plugin_api.DeviceInfo"
         )
     return info
+
+
+def _described(
+    info: DeviceInfo, backend: SensorBackend[Any], controller: Controller[Any], run: RunConfig
+) -> DeviceInfo:
+    """Return the open gripper with its channels, its mounting, and notes on its commands and its fingers."""
+    channels = info.channels or _declared(backend)
+    fingers = fingers_in_words(fingers_of(channels))
+    further = (*_becoming(backend, controller), *([fingers] if fingers else []))
+    return evolve(
+        info,
+        channels=channels,
+        notes=(*info.notes, *(note for note in further if note not in info.notes)),
+        mounting={**info.mounting, **run.mountings()},
+    )
 
 
 def _becoming(backend: SensorBackend[Any], controller: Controller[Any]) -> tuple[str, ...]:

@@ -13,6 +13,7 @@ from graspsense.core.components.config import Flag, Settings, resolve
 from graspsense.core.components.registry import Plugins, installed
 from graspsense.core.components.roles import Controller, FeatureSet, SensorBackend
 from graspsense.core.control.garbage_collection import no_collection
+from graspsense.core.grasp.pair import Member
 from graspsense.core.grasp.runner import Grasp, Sink, run_grasp
 from graspsense.core.learn.model import Model, model_for
 from graspsense.core.pipeline.anytime import Anytime, anytime_of
@@ -97,22 +98,19 @@ def grasp_with(
     sinks: Iterable[Sink] = (),
     on_event: Callable[[GraspEvent], None] | None = None,
     on_open: Callable[[DeviceInfo], None] | None = None,
+    beside: Member | None = None,
 ) -> Trial:
     """Run one grasp with these settings: build the components, grasp, extract features, predict, notify observers.
 
-    Raises GraspInterrupted, which has the trial, if the user asked for an end; the gripper was then released.
+    `beside` makes its gripper the one of a pair (`run_pair`). Raises GraspInterrupted, which has the trial,
+    if the user asked for an end; the gripper was then released.
     """
     # The model is loaded first, because a missing model must be reported before the grasp.
     model = model_for(settings, plugins)
-    backend, controller = settings.gripper.create(), settings.controller.create()
+    backend, controller = _gripper(settings, beside), settings.controller.create()
     feature_set = settings.features.create()
     anytime = anytime_of(model, feature_set, settings)
-    run = RunInfo(
-        components=settings.components,
-        settings=settings.values,
-        seed=settings.run.seed,
-        labels=dict(labels or {}),
-    )
+    run = _run_info(settings, labels)
 
     def tell(event: GraspEvent) -> None:
         plugins.grasp_event(run, event)
@@ -149,6 +147,20 @@ def grasp_with(
     if grasp.interrupted:
         raise GraspInterrupted(trial)
     return trial
+
+
+def _run_info(settings: Settings, labels: Mapping[str, str] | None) -> RunInfo:
+    return RunInfo(
+        components=settings.components,
+        settings=settings.values,
+        seed=settings.run.seed,
+        labels=dict(labels or {}),
+    )
+
+
+def _gripper(settings: Settings, beside: Member | None) -> SensorBackend[Any]:
+    backend: SensorBackend[Any] = settings.gripper.create()
+    return backend if beside is None else beside.gripper(backend)
 
 
 def _grasped(

@@ -10,6 +10,7 @@ from graspsense.core.components.entries import Role
 from graspsense.core.components.registry import Component, installed
 from graspsense.core.values.channel import FLOATS, Channel, FastChannel, TactileArray
 from graspsense.core.values.errors import GraspsenseError, PluginUnavailable, WiringError
+from graspsense.core.values.fingers import FingerForce
 
 
 def check(settings: Settings) -> None:
@@ -126,7 +127,7 @@ def _fits(wanted: Channel, have: Channel, role: Role) -> bool:
     """
     if wanted.name == "pads" and not isinstance(wanted, TactileArray):
         return True  # the images of fingertips of any size
-    if type(have) is not type(wanted):
+    if type(have) is not type(wanted) and not (type(wanted) is Channel and isinstance(have, FingerForce)):
         return False
     if role == "feature-set" and isinstance(wanted, FastChannel):
         return declared_shape(have)[1:] == declared_shape(wanted)[1:]

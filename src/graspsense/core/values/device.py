@@ -9,6 +9,7 @@ from attrs import field, frozen
 
 from graspsense.core.values.channel import Channel
 from graspsense.core.values.faults import StatusBit
+from graspsense.core.values.mounting import Mounting
 from graspsense.core.values.signals import Command
 
 
@@ -25,6 +26,7 @@ class DeviceInfo:
     raw numbers of the device mean (counts per newton, transmission); a stored calibration is valid for these only.
     `units` names the units that are not SI, as in a recording: `{"t": "frame"}`. `notes` are sentences that a
     reader of the result must know. `channels` are those of the backend; the runner sets them where they are empty.
+    `mounting` says where the frames of the tool and of the fingers are; the settings may add to it (`run.mounting`).
 
     `friction_n` is the greatest friction of the drive while it closes (N, on the scale of the effort), measured or
     declared: the guard adds it to the force that the controller asks for. `status_bits` says what the bits of
@@ -49,6 +51,7 @@ class DeviceInfo:
     units: Mapping[str, str] = field(factory=dict)
     notes: tuple[str, ...] = ()
     channels: tuple[Channel, ...] = ()
+    mounting: Mapping[str, Mounting] = field(factory=dict)
     friction_n: float = field(default=0.0, converter=float)
     status_bits: tuple[StatusBit, ...] = ()
     harmless: bool = False

@@ -90,6 +90,7 @@ def trial_as_json(trial: Trial) -> dict[str, Any]:
             "rate_hz": device.rate_hz,
             "calibration": dict(device.calibration),
             "notes": list(device.notes),
+            "mounting": {name: one.as_json() for name, one in device.mounting.items()},
         },
         "report": dict(trial.report),
         "counts": dict(trial.counts),

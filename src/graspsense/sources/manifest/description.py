@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final, Literal
 
@@ -13,7 +13,8 @@ from attrs import Attribute, frozen
 from graspsense.core.components.layers import read_toml
 from graspsense.core.components.setting import setting
 from graspsense.core.components.strict import ValidationFailed, structured
-from graspsense.core.values.errors import ConfigError
+from graspsense.core.values.errors import ConfigError, listed
+from graspsense.core.values.fingers import PREFIX, FingerForce
 from graspsense.core.values.limits import ENTRIES
 from graspsense.sources.manifest.expression import Expression, ExpressionError, parse
 from graspsense.sources.manifest.patterns import file_template, regular_expression
@@ -101,6 +102,13 @@ class Manifest:
         default=(), meaning="Force of the left pad, or of the finger or fingers of one side."
     )
     right: Text = setting(default=(), meaning="Force of the right pad.")
+    fingers: Mapping[str, str] = setting(
+        factory=dict, meaning='Force of each finger of a hand: a name and an expression, `thumb = "F1 [N]"`.'
+    )
+    touch: str = setting(
+        default="",
+        meaning='When the fingers touch: the names of those that oppose the others ("thumb"), "each", or "any".',
+    )
     effort: Text = setting(default=(), meaning="Effort of the drive, positive when squeezing.")
     velocity: Text = setting(default=(), meaning="Rate of the gap, negative on closing.")
     channels: Mapping[str, str] = setting(
@@ -182,7 +190,11 @@ def read_manifest(place: Path) -> ReadManifest:
     values = {
         name: parsed(("values", name), text) for name, text in keys.values.items() if name not in beside
     }
-    problems += [f"{layer.where(path)}: {why}" for path, why in _contradictions(keys)]
+    for name, text in keys.fingers.items():
+        found[f"{PREFIX}{name}"] = [parsed(("fingers", name), text)]
+    problems += [
+        f"{layer.where(path)}: {why}" for path, why in (*_contradictions(keys), *_finger_problems(keys))
+    ]
     if problems:
         raise ConfigError("\n".join(problems))
     return ReadManifest(
@@ -200,7 +212,10 @@ def read_manifest(place: Path) -> ReadManifest:
 
 def _too_many(keys: Manifest) -> list[tuple[tuple[str, ...], str]]:
     """Return which keys have more entries than are accepted, each with the reason."""
-    entries = {"files": _texts(keys.files), "channels": keys.channels, "values": keys.values}
+    entries = {
+        "files": _texts(keys.files),
+        **{name: getattr(keys, name) for name in ("channels", "values", "fingers")},
+    }
     entries |= {name: _texts(getattr(keys, name)) for name in QUANTITIES}
     return [((name,), why) for name, found in entries.items() if (why := ENTRIES.exceeded(len(found)))]
 
@@ -214,8 +229,8 @@ def _contradictions(keys: Manifest) -> list[tuple[tuple[str, ...], str]]:
         )
     if keys.force and (keys.left or keys.right):
         found.append((("force",), "force stands for both pads: give it alone, or left and right"))
-    if not keys.force and not keys.left and not keys.right:
-        found.append((("force",), "a grasp needs its force: force, or left and right"))
+    if not keys.force and not keys.left and not keys.right and not keys.fingers:
+        found.append((("force",), "a grasp needs its force: force, left and right, or fingers"))
     unknown = [name for name in _texts(keys.fast) if name not in keys.channels]
     if unknown:
         found.append((("fast",), f"{unknown[0]!r} is not among the channels: name it there with its columns"))
@@ -230,6 +245,57 @@ def _contradictions(keys: Manifest) -> list[tuple[tuple[str, ...], str]]:
     ):
         found.append((("label",), 'no label: write label = "{field}", or {label} in the pattern of files'))
     return found
+
+
+def hand_of(keys: Manifest, unit: str) -> tuple[FingerForce, ...]:
+    """Return the fingers that a manifest names. Raises ValueError for a name that no finger can have."""
+    rule, opposed = keys.touch, _opposing(keys)
+    if rule in ("each", "any"):
+        return tuple(FingerForce(f"{PREFIX}{name}", unit, touch=rule) for name in keys.fingers)  # type: ignore[arg-type]
+    return tuple(
+        FingerForce(f"{PREFIX}{name}", unit, side="left" if name in opposed else "right")
+        for name in keys.fingers
+    )
+
+
+def _opposing(keys: Manifest) -> tuple[str, ...]:
+    """Return the fingers of the left side; of two fingers, the first one."""
+    named = axes_of(keys.touch)
+    return named or (tuple(keys.fingers)[:1] if len(keys.fingers) == 2 else ())
+
+
+def _finger_problems(keys: Manifest) -> Iterator[tuple[tuple[str, ...], str]]:
+    """Yield what is wrong with the fingers, each with the key it belongs to."""
+    names = tuple(keys.fingers)
+    if not names:
+        if keys.touch:
+            yield ("touch",), 'touch is the rule of fingers: name them, fingers = { thumb = "F1 [N]", ... }'
+        return
+    if keys.force or keys.left or keys.right:
+        yield ("fingers",), "the fingers give the forces of both sides: leave out force, left and right"
+    if len(names) == 1:
+        yield ("fingers",), "one finger is the force of both pads: write it as force"
+    twice = [name for name in names if f"{PREFIX}{name}" in keys.channels]
+    if twice:
+        yield ("channels",), f"{PREFIX}{twice[0]} is the force of the finger {twice[0]}: leave it out here"
+    if keys.touch not in ("each", "any"):
+        opposing = _opposing(keys)
+        unknown = [name for name in opposing if name not in names]
+        if unknown:
+            yield (
+                ("touch",),
+                f"{unknown[0]!r} is no finger: there are {listed(names)}, and the rules each and any",
+            )
+        elif not opposing or len(opposing) == len(names):
+            yield (
+                ("touch",),
+                f'say when the fingers touch: touch = "{names[0]}" where it opposes the others, "each" where every '
+                'finger has to touch, "any" for any two',
+            )
+    try:
+        hand_of(keys, "N")
+    except ValueError as error:
+        yield ("fingers",), str(error)
 
 
 def _patterns(keys: Manifest) -> tuple[str, ...]:

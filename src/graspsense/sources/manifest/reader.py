@@ -17,7 +17,7 @@ from graspsense.recording.readable import each_readable, refuse_devices
 from graspsense.recording.replayable import Recording
 from graspsense.sources.grasp_columns import GraspColumns, checked_recording
 from graspsense.sources.manifest.array_format import ARRAY_SUFFIXES, ArrayRules, read_arrays
-from graspsense.sources.manifest.description import QUANTITIES, ReadManifest, axes_of, read_manifest
+from graspsense.sources.manifest.description import ReadManifest, axes_of, read_manifest
 from graspsense.sources.manifest.facts import instance_of, label_of, order_of, recorded_at_of, values_of
 from graspsense.sources.manifest.files import NamedFile, files_of
 from graspsense.sources.manifest.notices import notices_of
@@ -133,7 +133,7 @@ def _format(manifest: ReadManifest, path: Path) -> Callable[[Path], list[ColumnT
 
         return lambda file: read_text(file, manifest.keys.start)
     if suffix in ARRAY_SUFFIXES:
-        parts = [one for quantity in QUANTITIES for one in manifest.expressions[quantity]]
+        parts = [one for alternatives in manifest.expressions.values() for one in alternatives]
         used = frozenset(name for one in parts for name in one.names)
         rules = ArrayRules(pattern=manifest.keys.arrays, axes=axes_of(manifest.keys.axes), used=used)
         return lambda file: read_arrays(file, rules)

@@ -11,10 +11,11 @@ from typing import Final
 import numpy as np
 
 from graspsense.core.values.errors import ConfigError, DataDamaged, listed
+from graspsense.core.values.fingers import PREFIX, FingerForce
 from graspsense.core.values.signals import CHANNELS, NO_GAP
-from graspsense.sources.grasp_columns import GraspColumns, without_missing
+from graspsense.sources.grasp_columns import GraspColumns, finger_sides, without_missing
 from graspsense.sources.manifest.available import TO_SI, AvailableColumns
-from graspsense.sources.manifest.description import ReadManifest, samples_of
+from graspsense.sources.manifest.description import ReadManifest, hand_of, samples_of
 from graspsense.sources.manifest.expression import Expression
 from graspsense.sources.manifest.steps import without_duplicates
 from graspsense.sources.manifest.table import ColumnTable, Numbers
@@ -54,21 +55,15 @@ def samples(manifest: ReadManifest, table: ColumnTable) -> GraspColumns:
     found.update(scalars)
     found.update(arrays)
     expressions = manifest.expressions
-    both = found.value("force", expressions["force"], "force")
-    left = both or found.value("left", expressions["left"], "force")
-    right = both or found.value("right", expressions["right"], "force") or left
-    left = left or right
     gap = found.value("gap", expressions["gap"], "gap") or (np.zeros(len(table)), NO_GAP)
-    assert left is not None  # the manifest was checked for them
-    assert right is not None
-    if left[1] != right[1]:
-        raise ConfigError(
-            f"{manifest.place}: left is in {left[1] or 'N'} and right in {right[1] or 'N'}: use one unit"
-        )
-    left_n, right_n = left[0].copy(), right[0].copy()
-    if zero:
-        left_n -= np.nanmean(left_n[:zero])
-        right_n -= np.nanmean(right_n[:zero])
+    hand, each = _fingers(manifest, found, zero)
+    scalars |= each
+    units |= {one.name: one.unit for one in hand}
+    if hand:
+        left_n, right_n = finger_sides(hand, each)
+        unit = "" if hand[0].unit == "N" else hand[0].unit
+    else:
+        left_n, right_n, unit = _sides(manifest, found, zero)
     notes += _folds(manifest)
     effort = found.value("effort", expressions["effort"], "effort")
     velocity = found.value("velocity", expressions["velocity"], "velocity")
@@ -81,13 +76,14 @@ def samples(manifest: ReadManifest, table: ColumnTable) -> GraspColumns:
         effort_n=None if effort is None else effort[0],
         velocity_m_s=None if velocity is None else velocity[0],
         scalars=scalars,
+        fingers=hand,
         arrays=arrays,
         shapes=_shapes(manifest, table, found, arrays),
         fast=manifest.fast,
         units={
             **units,
             "gap": gap[1],
-            "force": left[1],
+            "force": unit,
             "t": "" if _has_time(manifest, table, found) else "sample",
         },
         notes=tuple(notes),
@@ -98,10 +94,48 @@ def samples(manifest: ReadManifest, table: ColumnTable) -> GraspColumns:
     return without_duplicates(whole) if keys.duplicates == "drop" else whole
 
 
+def _sides(manifest: ReadManifest, found: AvailableColumns, zero: int) -> tuple[Numbers, Numbers, str]:
+    """Return the forces of the two pads that a manifest names, and their unit. Raises ConfigError."""
+    expressions = manifest.expressions
+    both = found.value("force", expressions["force"], "force")
+    left = both or found.value("left", expressions["left"], "force")
+    right = both or found.value("right", expressions["right"], "force") or left
+    left = left or right
+    assert left is not None  # the manifest was checked for them
+    assert right is not None
+    if left[1] != right[1]:
+        raise ConfigError(
+            f"{manifest.place}: left is in {left[1] or 'N'} and right in {right[1] or 'N'}: use one unit"
+        )
+    return _zeroed(left[0], zero), _zeroed(right[0], zero), left[1]
+
+
+def _zeroed(force: Numbers, zero: int) -> Numbers:
+    zeroed: Numbers = force - np.nanmean(force[:zero]) if zero else force.copy()
+    return zeroed
+
+
+def _fingers(
+    manifest: ReadManifest, found: AvailableColumns, zero: int
+) -> tuple[tuple[FingerForce, ...], dict[str, Numbers]]:
+    """Return the fingers that a manifest names, and the force of each by its channel. Raises ConfigError."""
+    forces: dict[str, Numbers] = {}
+    units: dict[str, str] = {}
+    for name in manifest.keys.fingers:
+        key = f"{PREFIX}{name}"
+        given = found.value(f"fingers.{name}", manifest.expressions[key], "force")
+        assert given is not None  # each finger has an expression
+        forces[key], units[name] = _zeroed(given[0], zero), given[1] or "N"
+    if len(set(units.values())) > 1:
+        words = listed([f"{name} in {unit}" for name, unit in units.items()])
+        raise ConfigError(f"{manifest.place}: fingers: {words}: use one unit")
+    return hand_of(manifest.keys, next(iter(units.values()), "N")), forces
+
+
 def _doubtful_units(manifest: ReadManifest, found: AvailableColumns) -> Iterator[str]:
     """Yield a sentence for each quantity whose unit the file states otherwise than the manifest."""
     for key, parts in manifest.expressions.items():
-        quantity = "force" if key in ("left", "right") else key
+        quantity = "force" if key in ("left", "right") or key.startswith(PREFIX) else key
         chosen = found.chosen(parts) if parts else None
         if chosen is None or not found.has(chosen):
             continue
@@ -127,7 +161,9 @@ def _gram_force(expression: Expression, stated: str, known: Sequence[str]) -> st
 def _folds(manifest: ReadManifest) -> list[str]:
     """Return sentences on what stands for the two pads and for the gap."""
     expressions = manifest.expressions
-    if expressions["force"] or not (expressions["left"] and expressions["right"]):
+    if manifest.keys.fingers:
+        notes = []  # the runner says which fingers the forces are of
+    elif expressions["force"] or not (expressions["left"] and expressions["right"]):
         notes = ["a single force was recorded; it is used for both pads"]
     else:
         texts = [expressions[side][0].text for side in ("left", "right")]

@@ -11,7 +11,7 @@ from attrs import evolve
 from graspsense.core.grasp.gap_resolution import gap_resolution
 from graspsense.core.values.errors import DataDamaged
 from graspsense.core.values.limits import SAMPLES
-from graspsense.sources.grasp_columns import PLAUSIBLE, GraspColumns, check_increasing, only
+from graspsense.sources.grasp_columns import PLAUSIBLE, GraspColumns, check_increasing, finger_sides, only
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -140,16 +140,22 @@ def resampled(columns: GraspColumns, rate_hz: float) -> GraspColumns:
     def along_own(name: str, values: NDArray[np.float64]) -> NDArray[np.float64]:
         return values if name in columns.times else along(values)
 
+    scalars = {name: along_own(name, values) for name, values in columns.scalars.items()}
+    sides = (
+        finger_sides(columns.fingers, scalars)
+        if columns.fingers
+        else (along(columns.left_n), along(columns.right_n))
+    )
     return evolve(
         columns,
         lines=None,
         t_s=times,
         gap_m=columns.gap_m[np.searchsorted(t, times, side="right") - 1] if coarse else along(columns.gap_m),
-        left_n=along(columns.left_n),
-        right_n=along(columns.right_n),
+        left_n=sides[0],
+        right_n=sides[1],
         effort_n=None if columns.effort_n is None else along(columns.effort_n),
         velocity_m_s=None if columns.velocity_m_s is None else along(columns.velocity_m_s),
-        scalars={name: along_own(name, values) for name, values in columns.scalars.items()},
+        scalars=scalars,
         arrays={name: along_own(name, values) for name, values in columns.arrays.items()},
         notes=(*columns.notes, f"resampled to {rate_hz:g} Hz"),
     )

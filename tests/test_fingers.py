@@ -1,0 +1,395 @@
+"""Hands with any number of fingers: the rule by which they touch, a whole grasp, its record, its pictures."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from math import isnan, nan, sqrt
+
+import numpy as np
+import pytest
+from attrs import evolve, frozen
+from hypothesis import given
+from hypothesis import strategies as st
+
+import graspsense_sim_gripper.plugin as simulator
+from graspsense import load_pipeline
+from graspsense.core.components.channels import as_json, from_json
+from graspsense.core.components.registry import IsolatedPlugins
+from graspsense.core.control.contact import both_touch
+from graspsense.core.pipeline.pipeline import grasp_with
+from graspsense.core.values.errors import ConfigError
+from graspsense.core.values.fingers import fingers_of
+from graspsense.plugin_api import (
+    NAMES_INPUT,
+    Channel,
+    Feature,
+    FeatureSet,
+    FeatureSetEntry,
+    FingerForce,
+    Reading,
+    SensorBackend,
+    SensorBackendEntry,
+    create,
+    hookimpl,
+    opposed_forces,
+    setting,
+    signal_type,
+)
+from graspsense.recording.export_trace import WRITERS
+from graspsense.recording.labelled_recording import UnreadableRecording
+from graspsense.recording.reader import read_recorded
+from graspsense.report.further_channels import channel_figures
+from graspsense.report.trace_plot import plot
+from graspsense.sources.dataset_recordings import readable_or_not
+from graspsense.sources.exported_grasp import read_exported
+from graspsense.store.record_grasp import record_grasp
+from graspsense.store.store import Store
+from graspsense.testing.conformance import Examined
+from graspsense.testing.subject import Subject
+
+GRASPSENSE = (sys.executable, "-m", "graspsense")
+HERE = sys.modules[__name__]
+FORCES = st.lists(st.floats(0.0, 50.0), min_size=5, max_size=5)
+HALF = sqrt(0.75)
+JAWS = tuple(
+    FingerForce(f"force_{name}", "N", 1000.0, side=side, closing=closing)
+    for name, side, closing in (
+        ("thumb", "left", (1.0, 0.0, 0.0)),
+        ("index", "right", (-0.5, HALF, 0.0)),
+        ("ring", "right", (-0.5, -HALF, 0.0)),
+    )
+)
+"""Three fingers that close at 120 degrees to each other."""
+
+
+def five(touch, **sides):
+    names = ("thumb", "index", "middle", "ring", "little")
+    return tuple(
+        FingerForce(f"force_{name}", "N", side=sides.get(name, "right"), touch=touch) for name in names
+    )
+
+
+@frozen(kw_only=True)
+class JawsConfig:
+    object: str = setting(default="water:full_closed", effect=NAMES_INPUT, meaning="What it holds.")
+
+
+class ThreeJaws(SensorBackend[JawsConfig]):
+    """The simulated gripper, of which two fingers at 120 degrees share what its right pad feels."""
+
+    accepts = ("effort",)
+
+    def __init__(self, config):
+        super().__init__(config)
+        self._gripper = create("sensor-backend", "sim", object=config.object)
+        self._forces = opposed_forces(JAWS)
+
+    @property
+    def channels(self):
+        return (*self._gripper.channels, *JAWS)
+
+    def objects(self):
+        return self._gripper.objects()
+
+    def with_object(self, name):
+        return type(self)(evolve(self.config, object=name))
+
+    def open(self, seed):
+        return self._gripper.open(seed)
+
+    def read(self, timeout_s):
+        frame, pads, _ = self._gripper.read(timeout_s)
+        # At 60 degrees to the axis of the thumb, two fingers bear together twice what one on the axis would.
+        felt = (frame.force_left_n, 1.2 * frame.force_right_n, 0.8 * frame.force_right_n)
+        left, right = self._forces(felt)
+        frame = frame._replace(force_left_n=left, force_right_n=right)
+        return Reading(frame, pads, signal_type(self.channels)(*felt))
+
+    def apply(self, command):
+        self._gripper.apply(command)
+
+    def tare(self, images):
+        self._gripper.tare(images)
+
+    def close(self):
+        self._gripper.close()
+
+
+class ThumbPeak(FeatureSet[JawsConfig]):
+    requires = (Channel("force_thumb", "N"),)
+    features = (Feature("thumb_peak", "N", "largest force of the thumb"),)
+
+    def extract(self, trace):
+        return self.result({"thumb_peak": trace.signals["force_thumb"].max()})
+
+
+GRASPSENSE_API = (2, 0)
+
+
+@hookimpl
+def graspsense_sensor_backends():
+    return [SensorBackendEntry(name="jaws", target=f"{__name__}:ThreeJaws", summary="three fingers")]
+
+
+@hookimpl
+def graspsense_feature_sets():
+    return [FeatureSetEntry(name="thumb-peak", target=f"{__name__}:ThumbPeak", summary="peak of the thumb")]
+
+
+@pytest.fixture(scope="module")
+def grasped(tmp_path_factory):
+    """One grasp with three fingers: the trial, its store, its recording, and the plugins."""
+    folder = tmp_path_factory.mktemp("recorded") / "trials"
+    with (
+        pytest.MonkeyPatch.context() as patch,
+        IsolatedPlugins() as plugins,
+        Store.open(folder) as store,
+    ):
+        patch.setitem(sys.modules, __name__, HERE)
+        plugins.add(simulator, "graspsense-sim-gripper")
+        plugins.add(HERE, "lab-hand")
+        settings = load_pipeline(
+            options=["gripper.type=jaws", "classifier.type=none"], plugins=plugins
+        ).settings
+        trial = record_grasp(store, settings, plugins, labels={}, origin="run").trial
+        (path,) = (folder / "recordings").glob("*.mcap")
+        yield trial, folder, path, plugins
+
+
+# ------------------------------------------------------------------------------------------------- the rule
+
+
+@given(FORCES)
+def test_two_sides_touch_where_each_bears_the_contact_force(forces):
+    left, right = opposed_forces(five("sides", thumb="left"))(forces)
+
+    assert (left, right) == (forces[0], pytest.approx(sum(forces[1:])))
+
+
+@given(FORCES, st.floats(0.1, 10.0))
+def test_each_finger_touches_where_both_forces_are_those_of_a_contact(forces, contact_n):
+    both = both_touch(*opposed_forces(five("each"))(forces), contact_n)
+
+    assert both == all(force >= contact_n for force in forces)
+
+
+@given(FORCES, st.floats(0.1, 10.0))
+def test_any_two_opposed_fingers_touch_where_the_thumb_and_another_one_do(forces, contact_n):
+    both = both_touch(*opposed_forces(five("any", thumb="left"))(forces), contact_n)
+
+    assert both == (forces[0] >= contact_n and max(forces[1:]) >= contact_n)
+
+
+def test_the_forces_of_a_side_count_along_its_direction_so_that_three_jaws_balance():
+    left, right = opposed_forces(JAWS)((8.0, 8.0, 8.0))
+
+    assert right == pytest.approx(left)
+
+
+def test_a_finger_without_a_number_is_no_contact_of_its_side_or_of_every_finger():
+    forces = (5.0, nan, 5.0, 5.0, 5.0)
+
+    assert isnan(opposed_forces(five("sides", thumb="left"))(forces)[1])
+    assert isnan(opposed_forces(five("each"))(forces)[0])
+    assert opposed_forces(five("any", thumb="left"))(forces) == (5.0, 5.0)
+
+
+@pytest.mark.parametrize(
+    ("fingers", "says"),
+    [
+        (five("sides"), "one of two sides"),
+        (five("any"), "opposed"),
+        (five("each")[:1], "two or more"),
+        ((*five("each"), FingerForce("force_sixth", "N", touch="any")), "one rule"),
+    ],
+    ids=["all on one side", "none opposed", "one finger", "two rules"],
+)
+def test_fingers_that_cannot_touch_are_refused(fingers, says):
+    with pytest.raises(ValueError, match=says):
+        opposed_forces(fingers)
+
+
+@pytest.mark.parametrize("name", ["thumb", "force_left", "force_"])
+def test_the_name_of_a_finger_is_not_that_of_another_channel(name):
+    with pytest.raises(ValueError, match="finger"):
+        FingerForce(name, "N")
+
+
+def test_a_declared_finger_survives_json():
+    assert [from_json(as_json(one)) for one in JAWS] == list(JAWS)
+
+
+# ------------------------------------------------------------------------------------------------- a grasp
+
+
+def test_a_grasp_with_three_fingers_says_of_which_fingers_its_features_are(grasped):
+    trial, _, _, _ = grasped
+
+    assert trial.outcome.words == "steady"
+    assert not isnan(trial.features.as_dict()["f_steady"])
+    (note,) = [one for one in trial.device.notes if "fingers" in one]
+    assert "left force is of thumb" in note
+    assert "index and ring" in note
+
+
+def test_every_finger_is_in_trace_recording_and_replay(grasped):
+    trial, _, path, plugins = grasped
+    recorded = read_recorded(path)
+    options = ["gripper.type=replay", f"gripper.recording={path}", "classifier.type=none"]
+    replayed = grasp_with(load_pipeline(options=options, plugins=plugins).settings, plugins)
+
+    assert [one for one in recorded.channels if isinstance(one, FingerForce)] == list(JAWS)
+    assert [note for note in replayed.device.notes if "fingers" in note] == [
+        note for note in trial.device.notes if "fingers" in note
+    ]
+    for one in JAWS:
+        before = trial.trace.signals[one.name]
+        assert before.max() > 1.0
+        assert np.array_equal(before, recorded.trace().signals[one.name])
+        assert np.array_equal(before, replayed.trace.signals[one.name])
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".npz"])
+def test_an_export_declares_the_fingers_and_has_their_forces(grasped, tmp_path, suffix):
+    _, _, path, _ = grasped
+    file = tmp_path / f"grasp{suffix}"
+    WRITERS[suffix](file, read_recorded(path))
+
+    back = read_exported(str(file))
+
+    assert fingers_of(back.channels) == JAWS
+    most = max(reading.signals.force_index for reading in back.readings)
+    assert most == read_recorded(path).trace().signals["force_index"].max()
+
+
+def test_the_pages_and_the_picture_draw_the_force_of_each_finger(grasped):
+    trial, _, _, _ = grasped
+    figures = channel_figures(trial.trace, trial.device.channels)
+    axes, _ = plot(trial.trace)
+
+    (fingers,) = [one for one in figures if "Forces of the fingers" in one]
+    assert len(figures) == 1
+    assert all(name in fingers for name in ("thumb", "index", "ring"))
+    assert {"thumb", "index", "ring"} <= {line.get_label() for line in axes.lines}
+
+
+def test_features_may_require_the_force_of_a_finger(grasped):
+    trial, _, _, plugins = grasped
+    options = ["gripper.type=jaws", "features.type=thumb-peak", "classifier.type=none"]
+
+    settings = load_pipeline(
+        options=options, plugins=plugins
+    ).settings  # raises WiringError if they do not fit
+
+    assert settings.features.create().extract(trial.trace).values == (trial.trace.force_left_n.max(),)
+
+
+def test_a_hand_with_three_fingers_conforms(grasped):
+    _, _, _, plugins = grasped
+    report = Examined((Subject(component=plugins.find("sensor-backend", "jaws")),)).report()
+
+    assert report.failures == []
+
+
+# ------------------------------------------------------------------------------------------------- recordings
+
+
+FINGERS = ("thumb", "index", "middle", "ring", "little")
+LOADS_N = dict(zip(FINGERS, (10.0, 4.0, 3.0, 2.0, 0.0), strict=True))
+"""What each finger bears at rest; the little finger touches nothing."""
+NAMED = (
+    'fingers = { thumb = "F1 [N]", index = "F2 [N]", middle = "F3 [N]", ring = "F4 [N]", little = "F5 [N]" }'
+)
+
+
+def five_fingers(folder, manifest_lines, offset_n=0.0):
+    """Write a text file of a squeeze with five fingers, and a manifest of it; return the recordings."""
+    t_s = np.arange(300) / 100.0
+    gap_mm = np.maximum(60.0 - 10.0 * t_s, 40.0)
+    pressed = np.clip(0.1 * (50.0 - gap_mm), 0.0, 1.0)
+    forces = [offset_n + load * pressed for load in LOADS_N.values()]
+    rows = [
+        f"{t:.2f},{gap:.3f}," + ",".join(f"{force[k]:.4f}" for force in forces)
+        for k, (t, gap) in enumerate(zip(t_s, gap_mm, strict=True))
+    ]
+    (folder / "cup-1.csv").write_text("\n".join(["t,gap,F1,F2,F3,F4,F5", *rows]) + "\n")
+    text = ['files = "{label}-{order:d}.csv"', 'time = "t [s]"', 'gap = "gap [mm]"', *manifest_lines]
+    (folder / "manifest.toml").write_text("\n".join(text) + "\n")
+    found = list(readable_or_not("manifest", str(folder / "manifest.toml")))
+    for one in found:
+        if isinstance(one, UnreadableRecording):
+            raise one.error
+    return found
+
+
+def last_frame(found):
+    return found[0].recording.readings[-1].frame
+
+
+@pytest.mark.parametrize(
+    ("touch", "left_n", "right_n"),
+    [("thumb", 10.0, 9.0), ("thumb, index", 14.0, 5.0), ("each", 0.0, 10.0), ("any", 10.0, 4.0)],
+)
+def test_a_recording_of_five_fingers_has_the_forces_of_its_rule(tmp_path, touch, left_n, right_n):
+    frame = last_frame(five_fingers(tmp_path, [NAMED, f'touch = "{touch}"']))
+
+    assert sorted((frame.force_left_n, frame.force_right_n)) == pytest.approx(sorted((left_n, right_n)))
+
+
+def test_each_finger_of_a_recording_has_its_own_zero(tmp_path):
+    found = five_fingers(tmp_path, [NAMED, 'touch = "thumb"', 'zero = "10 samples"'], offset_n=0.7)
+
+    last = found[0].recording.readings[-1]
+    assert [getattr(last.signals, f"force_{name}") for name in FINGERS] == pytest.approx(
+        list(LOADS_N.values())
+    )
+    assert last.frame.force_right_n == pytest.approx(9.0)
+
+
+def test_a_resampled_recording_keeps_the_rule(tmp_path):
+    found = five_fingers(tmp_path, [NAMED, 'touch = "each"', "resample_hz = 37.0"])
+    (recording,) = (one.recording for one in found)
+
+    for reading in recording.readings:
+        assert reading.frame.force_left_n == min(reading.signals)
+        assert reading.frame.force_right_n == max(reading.signals)
+
+
+def test_an_imported_trial_of_five_fingers_says_of_which_fingers_its_features_are(tmp_path):
+    five_fingers(tmp_path, [NAMED, 'touch = "thumb"'])
+    manifest = tmp_path / "manifest.toml"
+
+    code = subprocess.run(
+        [*GRASPSENSE, "import", str(manifest), "--save", str(tmp_path / "store")],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+    assert code.returncode == 0, code.stderr
+    (path,) = (tmp_path / "store" / "recordings").glob("*.mcap")
+    recorded = read_recorded(path)
+    assert [one.finger for one in fingers_of(recorded.channels)] == list(FINGERS)
+    (note,) = [one for one in recorded.device.notes if "fingers" in one]
+    assert "left force is of thumb" in note
+    assert recorded.record().result.features.values
+
+
+@pytest.mark.parametrize(
+    ("lines", "says"),
+    [
+        ([NAMED], 'touch = "thumb"'),
+        ([NAMED, 'touch = "pinky"'], "pinky"),
+        ([NAMED, 'touch = "each"', 'left = "F1 [N]"'], "leave out"),
+        (['left = "F1 [N]"', 'touch = "each"'], "rule of fingers"),
+        (['fingers = { thumb = "F1 [N]" }'], "one finger"),
+        (['fingers = { Thumb = "F1 [N]", index = "F2 [N]" }'], "small letters"),
+        (['fingers = { thumb = "F1 [N]", index = "F2 [counts]" }'], "one unit"),
+        (['fingers = { thumb = "F1 [N]", index = "F9 [N]" }'], "fingers.index"),
+    ],
+    ids=["no rule", "no such finger", "two meanings", "no fingers", "one", "name", "units", "no such column"],
+)
+def test_a_manifest_with_fingers_that_cannot_be_is_refused(tmp_path, lines, says):
+    with pytest.raises(ConfigError, match=says):
+        five_fingers(tmp_path, lines)
