@@ -215,7 +215,7 @@ def test_images_come_back_from_an_export_as_they_were(seen, tmp_path, ending, wr
 def test_an_export_as_columns_has_the_images_of_a_camera_in_a_file_of_arrays(seen, tmp_path):
     trial, path, _ = seen
     write_csv(tmp_path / "grasp.csv", read_recorded(path))
-    with np.load(tmp_path / "grasp-eye.npz") as found:
+    with np.load(tmp_path / "grasp-eye.csv.npz") as found:
         assert np.array_equal(found["cells"], trial.trace.signals["eye"].cells)
         assert set(np.diff(found["counter"])) == {1}
         assert found["t_s"].tobytes() == trial.trace.signals["eye"].t_s.tobytes()
