@@ -7,6 +7,7 @@ import io
 import os
 import re
 import sys
+import weakref
 from math import inf, nan
 from typing import Any, NamedTuple
 
@@ -20,15 +21,21 @@ from graspsense.core.components.channels import as_json, cells_of, from_json, no
 from graspsense.core.components.registry import IsolatedPlugins
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.runner import run_grasp
+from graspsense.core.pipeline import wiring
+from graspsense.core.values.errors import WiringError
 from graspsense.core.values.kept_images import KeptImages
 from graspsense.core.values.signals import Outcome
 from graspsense.core.values.trace import TraceRecorder, trace_of
 from graspsense.plugin_api import (
     EFFORT,
+    HOLD,
     NAMES_INPUT,
     NO_PADS,
+    STEADY,
     Channel,
     Command,
+    Controller,
+    ControllerEntry,
     DeviceInfo,
     Frame,
     Image,
@@ -47,9 +54,14 @@ from graspsense.recording.replayable import content_sha256
 from graspsense.sources.replay import read_named
 from graspsense.store.record_grasp import record_grasp
 from graspsense.store.store import Store
+from graspsense.testing.backend import images_stay_as_they_were_delivered
+from graspsense.testing.checks import CheckFailed
 from graspsense.testing.conformance import examine
-from graspsense.testing.gentle import GentleController
+from graspsense.testing.controller import state_holds_everything, state_is_numbers
+from graspsense.testing.gentle import GentleController, GentleParams, GentleState
+from graspsense.testing.gentle import step as gentle_step
 from graspsense.testing.model_gripper import ModelGripper
+from graspsense.testing.subject import Subject
 
 HERE = sys.modules[__name__]
 EYE = TactileArray("eye", "counts", 50.0, finger="left", rows=6, columns=8, components=3, dtype="uint8")
@@ -142,6 +154,28 @@ def graspsense_sensor_backends():
     ]
 
 
+@hookimpl
+def graspsense_controllers():
+    return [
+        ControllerEntry(
+            name="watching",
+            target=f"{__name__}:Watching",
+            config=f"{__name__}:NoKeys",
+            summary="compares each image with the first one",
+            requires=(Channel("gap", "m"), Channel("velocity", "m/s"), EYE),
+            commands=("effort",),
+        ),
+        ControllerEntry(
+            name="deep",
+            target=f"{__name__}:Watching",
+            config=f"{__name__}:NoKeys",
+            summary="needs another type of cells",
+            requires=(evolve(EYE, dtype="uint16"),),
+            commands=("effort",),
+        ),
+    ]
+
+
 GRASPSENSE_API = (2, 0)
 
 
@@ -215,7 +249,7 @@ def test_images_come_back_from_an_export_as_they_were(seen, tmp_path, ending, wr
 def test_an_export_as_columns_has_the_images_of_a_camera_in_a_file_of_arrays(seen, tmp_path):
     trial, path, _ = seen
     write_csv(tmp_path / "grasp.csv", read_recorded(path))
-    with np.load(tmp_path / "grasp-eye.npz") as found:
+    with np.load(tmp_path / "grasp-eye.csv.npz") as found:
         assert np.array_equal(found["cells"], trial.trace.signals["eye"].cells)
         assert set(np.diff(found["counter"])) == {1}
         assert found["t_s"].tobytes() == trial.trace.signals["eye"].t_s.tobytes()
@@ -376,36 +410,92 @@ def test_the_trace_of_a_running_grasp_grows_and_keeps_what_it_had():
     assert again.signals["depth"].cells.tobytes() == traces[-1].tobytes()
 
 
+def test_the_trace_of_a_running_grasp_holds_no_image_in_memory():
+    array = TactileArray("depth", "um", rows=2, columns=3, dtype="uint16")
+    recorder, make = TraceRecorder(), signal_type((array,))
+    frame = Frame(0.0, 0.1, 0.05, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0)
+    held = []
+    for k in range(50):
+        image = Image(0.1 * k, k + 1, fixed(np.full((2, 3), k, np.uint16)))
+        held.append(weakref.ref(image.cells))
+        recorder.add(Reading(frame, NO_PADS, make(image)), 2, Command(EFFORT, 0.0, inf, inf))
+        del image
+    assert [one() for one in held] == [None] * 50
+    assert recorder.trace().signals["depth"].cells[:, 0, 0].tolist() == list(range(50))
+
+
 class Reference(NamedTuple):
     phase: int
     outcome: int
+    gentle: GentleState
     counter: int
     before: Any
-    change: float
 
 
 def step_with_reference(params, state, reading):
-    """Keeps the first image, and tells how much the last one differs from it."""
+    """Closes gently until an image differs much from the first one."""
+    command, gentle = gentle_step(params, state.gentle, reading)
     image = reading.signals.eye
     before = image.cells if state.counter == 0 and image.counter else state.before
-    change = float(abs(image.cells.astype(float) - before).mean()) if image.counter else 0.0
-    ended = 1 if change > 40.0 else 0
-    after = Reference(2 if not ended else 4, ended, max(state.counter, image.counter), before, change)
-    return Command(EFFORT, 5.0, inf, inf), after
+    new = image.counter > state.counter
+    changed = new and float(abs(image.cells.astype(float) - before).mean()) > 40.0
+    phase, outcome = (HOLD, STEADY) if changed else (gentle.phase, gentle.outcome)
+    return command, Reference(phase, outcome, gentle, max(state.counter, image.counter), before)
 
 
-class Watching(GentleController):
+@frozen(kw_only=True)
+class NoKeys:
+    pass
+
+
+class Watching(Controller[NoKeys]):
     """A law that compares each image with the first one."""
 
     step = staticmethod(step_with_reference)
 
+    def params(self):
+        return GentleParams(EFFORT)
+
     def init(self):
-        return Reference(2, 0, 0, no_signals((EYE,)).eye.cells, 0.0)
+        gentle = GentleController(EFFORT).init()
+        return Reference(gentle.phase, gentle.outcome, gentle, 0, no_signals((EYE,)).eye.cells)
+
+
+def test_a_law_for_cells_of_another_type_does_not_fit(seen):
+    _, _, plugins = seen
+    options = ["gripper.type=eyes", "controller.type=deep", "features.type=chitta", "classifier.type=none"]
+    with pytest.raises(
+        WiringError, match=r"6 x 8 x 3 uint16, but .* gives it as an array of 6 x 8 x 3 uint8"
+    ):
+        wiring.check(load_pipeline(options=options, plugins=plugins).settings)
+
+
+def watching(plugins):
+    (law,) = (one for one in plugins.components("controller") if one.name == "watching")
+    return Subject(component=law)
+
+
+@pytest.mark.slow
+def test_a_law_with_a_reference_image_conforms(seen):
+    _, _, plugins = seen
+    report = examine("lab-hand/watching", plugins=plugins).report()
+    assert [(one.check, one.text) for one in report.results if one.state == "failed"] == []
+
+
+def test_the_state_of_a_law_holds_images_that_nobody_changes(seen, monkeypatch):
+    _, _, plugins = seen
+    state_is_numbers(watching(plugins))
+    state_holds_everything(watching(plugins))
+    sound = Watching.init
+    monkeypatch.setattr(
+        Watching, "init", lambda self: sound(self)._replace(before=np.zeros(EYE.shape, EYE.dtype))
+    )
+    with pytest.raises(CheckFailed, match=r"state\.before is an array that can be changed"):
+        state_is_numbers(watching(plugins))
 
 
 def test_a_law_keeps_a_reference_image():
-    law = Watching(EFFORT)
-    ended = run_grasp(Eyes(Held()), law, RunConfig())
+    ended = run_grasp(Eyes(Held()), Watching(NoKeys()), RunConfig())
     assert ended.outcome is Outcome.STEADY
     cells = ended.trace.signals["eye"].cells.astype(float)
     changes = abs(cells - cells[0]).mean(axis=(1, 2, 3))
@@ -469,10 +559,6 @@ def test_a_plot_and_a_notebook_show_cameras():
 
 
 def test_the_conformance_check_tells_of_an_image_that_is_changed_later(seen, monkeypatch):
-    from graspsense.testing.backend import images_stay_as_they_were_delivered
-    from graspsense.testing.checks import CheckFailed
-    from graspsense.testing.subject import Subject
-
     _, _, plugins = seen
     bytes_of_all = bytearray(EYE.numbers)
     shared = np.frombuffer(bytes_of_all, np.uint8).reshape(EYE.shape)

@@ -29,7 +29,7 @@ def write_csv(path: Path, grasp: RecordedGrasp) -> None:
 
     Images of the fingertips go to `NAME-pads.csv`, and each other topic to a file that is named after it. That of a
     fast channel has one line per sample, with the time and each axis. Images that are numpy arrays go to
-    `NAME-CHANNEL.npz`, with the arrays `t_s`, `counter` and `cells`. `FILE.json` has the channels, units and
+    `NAME-CHANNEL.csv.npz`, with the arrays `t_s`, `counter` and `cells`. `FILE.json` has the channels, units and
     rate of the gripper, so that `import csv:FILE` reads the grasp back.
     """
     tables = dict(_tables(grasp))
@@ -137,7 +137,7 @@ def _write_cameras(path: Path, grasp: RecordedGrasp) -> list[str]:
         rows, out = grasp.topics[name].rows, io.BytesIO()
         cells = rows["cells"].reshape(len(rows), *array.shape)
         np.savez_compressed(out, allow_pickle=False, t_s=rows["t_s"], counter=rows["counter"], cells=cells)
-        write_new(beside(path, name).with_suffix(".npz"), out.getvalue())
+        write_new(images_beside(path, name), out.getvalue())
     return list(cameras)
 
 
@@ -183,6 +183,11 @@ def _write_declared(path: Path, grasp: RecordedGrasp, tables: Sequence[str]) -> 
 def declared_beside(path: Path) -> Path:
     """Return the file beside an exported grasp that says what its gripper declared."""
     return path.with_name(f"{path.name}.json")
+
+
+def images_beside(path: Path, topic: str) -> Path:
+    """Return the file of the images of a topic beside an exported grasp."""
+    return path.with_name(f"{beside(path, topic).name}.npz")
 
 
 def beside(path: Path, topic: str) -> Path:

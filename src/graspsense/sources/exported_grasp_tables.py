@@ -17,7 +17,7 @@ from graspsense.core.values.channel import FLOATS, Channel, FastChannel, Tactile
 from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.core.values.limits import CELLS, CHANNEL_NUMBERS
 from graspsense.core.values.written_numbers import NotNumbers, columns_of_numbers
-from graspsense.recording.export_trace import beside, declared_beside
+from graspsense.recording.export_trace import beside, declared_beside, images_beside
 from graspsense.recording.layout import PADS_TOPIC, SCALARS_TOPIC, SIGNAL_TOPIC, TICK_FIELDS
 from graspsense.sources.numpy_files import npz_arrays
 from graspsense.sources.text_table import check_columns, check_lines, text_of
@@ -84,7 +84,7 @@ def _add_channel(arrays: Columns, path: Path, channel: Channel, scalars: Columns
         arrays[name] = scalars[channel.name]
         return
     if isinstance(channel, TactileArray) and channel.dtype != FLOATS:
-        file = beside(path, SIGNAL_TOPIC + channel.name).with_suffix(".npz")
+        file = images_beside(path, SIGNAL_TOPIC + channel.name)
         images = (
             npz_arrays(file) if has_table else {"t_s": np.empty(0), "cells": np.empty((0, *channel.shape))}
         )
