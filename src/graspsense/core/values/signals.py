@@ -47,7 +47,8 @@ class Pads(NamedTuple):
     """The last cell image of the two fingertips, raw, which comes at a lower rate than frames.
 
     `left` and `right` have one number for each cell, in the order of the array that the backend declares as `pads`.
-    `counter` increases by one with each new image. It is 0, and the cells are NaN, before the first image.
+    `counter` increases by one with each new image, and by more where images were lost. It is 0, and the cells are NaN,
+    before the first image.
     """
 
     t_s: float
@@ -72,7 +73,8 @@ NO_PADS: Final = no_pads(0)
 class Image(NamedTuple):
     """The last image of a tactile array other than the fingertips': one number for each cell, as the array declares.
 
-    `counter` increases by one with each new image. It is 0, and the cells are NaN, before the first image.
+    `counter` increases by one with each new image, and by more where images were lost. It is 0, and the cells are NaN,
+    before the first image.
     """
 
     t_s: float
