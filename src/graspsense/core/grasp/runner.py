@@ -39,7 +39,7 @@ from graspsense.core.control.tick import (
 )
 from graspsense.core.grasp.interrupts import Interrupts
 from graspsense.core.grasp.losses import Losses, lost_in_words
-from graspsense.core.grasp.protection.protection import Protection
+from graspsense.core.grasp.protection.protection import LIMITED, Protection
 from graspsense.core.values.channel import Channel
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import (
@@ -579,9 +579,10 @@ class _Grasp:
                 f"run.first_speed_m_s ({guard_params.first_speed_m_s:g} m/s) held throughout"
             )
         elif self.protection is not None and self.protection.acted:
-            why = "see run.effort_ceiling_n"
-        told = f"squeeze limited: {self.squeezed_guarded} of its {self.squeezed} commands were lowered; {why}"
-        return (*seen, told)
+            why = f"the ceiling is {self.protection.ceiling_n:.1f} N; run.effort_ceiling_n allows more"
+        told = f"{LIMITED}: {self.squeezed_guarded} of its {self.squeezed} commands were lowered; {why}"
+        # With its share, instead of the first sight of it.
+        return (*(warning for warning in seen if not warning.startswith(LIMITED)), told)
 
     def _told(self, frame: Frame, phase: int, events: int) -> None:
         """Log the events that the controller told in this tick, one for each bit that is set."""
