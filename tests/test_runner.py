@@ -695,5 +695,7 @@ def test_an_effort_limit_above_the_ceiling_counts_and_is_told():
     understating = pushing(90.0)
     type(understating).asked_force_n = lambda self: 20.0
     grasp = run_grasp(Scripted(squeezing, bottle, clock="device"), understating, RUN)
-    assert any("effort at its ceiling" in warning for warning in grasp.warnings)
+    (told,) = [warning for warning in grasp.warnings if "squeeze limited" in warning]
+    assert "run.effort_ceiling_n" in told
+    assert "25.0 N" in told
     assert grasp.counts["guarded"] >= (grasp.trace.phase == Phase.SQUEEZE).sum()

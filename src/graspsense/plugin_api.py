@@ -85,6 +85,8 @@ _TABLE: Final[Table] = {
         "core.components.roles": ("ObjectKind", "SensorBackend"),
         "core.components.channels": ("no_signals", "signal_type"),
         "core.values.fingers": ("opposed_forces",),
+        "core.grasp.reading_thread": ("ReadingThread",),
+        "core.grasp.device_clock": ("ClockLine", "DeviceClock"),
     },
     "Sensor backends that do many grasps at once": {
         "core.components.roles": ("BatchBackend", "BatchOptions", "Grasped", "SimulationVariant"),

@@ -79,6 +79,9 @@ from graspsense.core.components.roles import SensorBackend as SensorBackend
 from graspsense.core.components.channels import no_signals as no_signals
 from graspsense.core.components.channels import signal_type as signal_type
 from graspsense.core.values.fingers import opposed_forces as opposed_forces
+from graspsense.core.grasp.reading_thread import ReadingThread as ReadingThread
+from graspsense.core.grasp.device_clock import ClockLine as ClockLine
+from graspsense.core.grasp.device_clock import DeviceClock as DeviceClock
 
 # Sensor backends that do many grasps at once
 from graspsense.core.components.roles import BatchBackend as BatchBackend

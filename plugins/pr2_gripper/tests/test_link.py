@@ -6,13 +6,11 @@ import queue
 import threading
 import time
 from types import SimpleNamespace
-from typing import Any
 
 import pytest
 
-from graspsense.plugin_api import DeviceLost
+from graspsense.plugin_api import DeviceClock, DeviceLost
 from graspsense_pr2_gripper import link as links
-from graspsense_pr2_gripper.clock import WINDOW_S, DeviceClock
 from graspsense_pr2_gripper.link import ThreadedLink
 from graspsense_pr2_gripper.protocol import InputReport, encode_input
 from graspsense_pr2_gripper.transports.interface import Transport, TransportGone
@@ -152,8 +150,7 @@ def test_closing_is_bounded_where_the_library_hangs(monkeypatch: pytest.MonkeyPa
     link = ThreadedLink(wire, 0.001)
     if where == "stuck_in_close":
         # The reader has ended already, so that what is waited for in vain is the device alone.
-        link._stop.set()
-        link._reader.join(60.0)
+        assert link._reader.close(60.0)
     assert link.close() is False
     assert not wire.closed.is_set(), "never closed under a read"
     wire.freed.set()
@@ -162,13 +159,3 @@ def test_closing_is_bounded_where_the_library_hangs(monkeypatch: pytest.MonkeyPa
     for thread in threading.enumerate():
         if thread.name.startswith("PR2"):
             thread.join(60.0)
-
-
-def test_offset_follows_a_drifting_clock_and_forgets_a_lucky_one() -> None:
-    """A device clock 100 parts in a million fast drifts from the first offset; two windows bound the error."""
-    clock = DeviceClock()
-    ages: list[Any] = []
-    for i in range(40_000):
-        host_s = i * 1e-3
-        ages.append(clock.age_s(host_s * (1 - 100e-6), host_s))
-    assert max(ages) <= 2 * WINDOW_S * 100e-6 + 1e-6

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from math import isfinite
 from typing import Final, final
 
 from attrs import asdict, evolve
@@ -253,8 +254,15 @@ class Pr2Backend(SensorBackend[Pr2Config]):
             bad_cells=self._measure.bad_cells,
             commands_sent=self._sent,
         )
-        if link.clock.offset_s == link.clock.offset_s:
-            counted["clock_offset_s"] = link.clock.offset_s
+        line = link.clock.line()
+        if isfinite(line.offset_s):
+            counted.update(
+                clock_offset_s=line.offset_s,
+                clock_drift=line.drift,
+                clock_uncertainty_s=line.uncertainty_s,
+                latency_frame_s=link.clock.latency_s(),
+                latency_pads_s=link.clock.latency_s() + self._measure.image_age_s,
+            )
         return counted
 
     def _open(self) -> Opened:

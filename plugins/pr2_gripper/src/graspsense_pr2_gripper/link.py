@@ -13,8 +13,7 @@ import time
 from abc import ABC, abstractmethod
 from typing import Final, NamedTuple, final
 
-from graspsense.plugin_api import DeviceLost
-from graspsense_pr2_gripper.clock import DeviceClock
+from graspsense.plugin_api import DeviceClock, DeviceLost, ReadingThread
 from graspsense_pr2_gripper.device_time import ClockFault, CountedTime, HostTime, PassingTime
 from graspsense_pr2_gripper.protocol import MAX_SAMPLES, InputReport
 from graspsense_pr2_gripper.stream import RawImage, Restarted, Stream
@@ -55,19 +54,18 @@ class Link(ABC):
         self._counted = CountedTime(round(period_s * 1e6), numbers_all)
         self.discarded = 0
         """Number of reports that were too old."""
-        self.skipped = 0
-        """Number of reports that a newer one replaced before the driver read them."""
         self.gone = ""
         """The reason why the device counts as lost; empty while it does not."""
         self.reachable = True
         """Whether commands are still sent: a device that restarted, or whose clock is wrong, can let go."""
 
-    def _arrival(self, report: InputReport, host_s: float, skipped: Arrival | None) -> Arrival:
-        """Return a report of the stream as an arrival; `skipped`: the arrival that it replaces."""
-        stream, words = self.stream, report.samples
-        if skipped is not None and skipped.sampled + len(words) == stream.sampled:
-            words = (*skipped.words, *words)[-MAX_SAMPLES:]
-        return Arrival(report, stream.image, host_s, words, stream.sampled)
+    @property
+    def skipped(self) -> int:
+        """Number of reports that a newer one replaced before the driver read them."""
+        return 0
+
+    def _arrival(self, report: InputReport, host_s: float) -> Arrival:
+        return Arrival(report, self.stream.image, host_s, report.samples, self.stream.sampled)
 
     def _passes(self, report: InputReport) -> bool:
         """Return whether a report of the stream has a later time than those before. Raises ClockFault."""
@@ -119,7 +117,8 @@ class LockStepLink(Link):
                 while data:
                     report = take(data)
                     if report is not None and self._passes(report):
-                        newest = self._arrival(report, time.monotonic(), newest)
+                        arrival = self._arrival(report, time.monotonic())
+                        newest = arrival if newest is None else joined(newest, arrival)
                     data = read(0.0)
                 if newest is not None:
                     return newest
@@ -136,73 +135,55 @@ class LockStepLink(Link):
 
 @final
 class ThreadedLink(Link):
-    """Reads in a daemon thread that starts at construction."""
+    """Reads in a thread that starts at construction."""
 
     def __init__(self, transport: Transport, period_s: float) -> None:
         super().__init__(transport, period_s, numbers_all=False)
-        self._arrived = threading.Condition()
-        self._newest: Arrival | None = None
-        self._stop = threading.Event()
         self._closed = False
         self._host = HostTime()
         self._old = 0
         """Number of consecutive reports that were too old."""
-        self._reader = threading.Thread(target=self._run, name="PR2 reader", daemon=True)
-        self._reader.start()
+        self._reader = ReadingThread(self._read, name="PR2 reader", joined=joined)
+
+    @property
+    def skipped(self) -> int:
+        """Number of reports that a newer one replaced before the driver read them."""
+        return self._reader.replaced
 
     def next(self, timeout_s: float) -> Arrival | None:
         """Wait for a report newer than the last one returned."""
-        give_up = time.monotonic() + timeout_s
-        with self._arrived:
-            while self._newest is None:
-                if self.gone:
-                    raise DeviceLost(self.gone)
-                left = give_up - time.monotonic()
-                if left <= 0.0:
-                    if self._old <= BUFFERED:
-                        return None
-                    self._lose(
-                        ClockFault(
-                            "its clock falls behind that of this computer, or this computer does not keep up: the last "
-                            f"{self._old} reports were more than {OLDEST_S:g} s old"
-                        )
-                    )
-                    continue
-                self._arrived.wait(left)
-            newest, self._newest = self._newest, None
-            return newest
+        arrival = self._reader.newest(timeout_s)
+        if arrival is None and self._old > BUFFERED:
+            self._lose(
+                ClockFault(
+                    "its clock falls behind that of this computer, or this computer does not keep up: the last "
+                    f"{self._old} reports were more than {OLDEST_S:g} s old"
+                )
+            )
+            raise DeviceLost(self.gone)
+        return arrival
 
     def close(self) -> bool:
         """Stop the reader, then close the device, never during a read; a thread that hangs is abandoned."""
         if self._closed:
             return True
         self._closed = True
-        self._stop.set()
-        self._reader.join(JOIN_S)
-        if self._reader.is_alive():
-            return False
-        return close_within(self.transport, JOIN_S)
+        return self._reader.close(JOIN_S) and close_within(self.transport, JOIN_S)
 
-    def _run(self) -> None:
-        stream = self.stream
+    def _read(self) -> Arrival | None:
+        """Return the next report that is new enough, or None. Raises DeviceLost."""
         try:
-            while not self._stop.is_set():
-                data = self.transport.read(READ_S)
-                if not data:
-                    continue
-                host_s = time.monotonic()
-                report = stream.take(data)
-                if report is None or not self._in_time(report, host_s):
-                    continue
-                with self._arrived:
-                    if self._newest is not None:
-                        self.skipped += 1
-                    self._newest = self._arrival(report, host_s, self._newest)
-                    self._arrived.notify()
+            data = self.transport.read(READ_S)
+            if not data:
+                return None
+            host_s = time.monotonic()
+            report = self.stream.take(data)
+            if report is None or not self._in_time(report, host_s):
+                return None
+            return self._arrival(report, host_s)
         except (TransportGone, Restarted, ClockFault) as gone:
-            with self._arrived:
-                self._lose(gone)
-                self._arrived.notify()
+            self._lose(gone)
+            raise DeviceLost(self.gone) from gone
 
     def _in_time(self, report: InputReport, host_s: float) -> bool:
         """Return whether a report is new enough to be acted on. Raises ClockFault."""
@@ -216,6 +197,13 @@ class ThreadedLink(Link):
         self.discarded += 1
         self._old += 1
         return False
+
+
+def joined(before: Arrival, now: Arrival) -> Arrival:
+    """Return the later of two arrivals, with the samples of both where none is missing between them."""
+    if before.sampled + len(now.words) != now.sampled:
+        return now
+    return now._replace(words=(*before.words, *now.words)[-MAX_SAMPLES:])
 
 
 def close_within(transport: Transport, time_s: float) -> bool:

@@ -106,6 +106,8 @@ class Measure:
         self._last_us = 0
         self.bad_cells = 0
         """Largest number of dead cells in one image."""
+        self.image_age_s = 0.0
+        """Time from the last cell image to the report in which it was complete."""
 
     def reading(
         self, report: InputReport, image: RawImage | None, words: tuple[int, ...] = (), sampled: int = 0
@@ -116,6 +118,7 @@ class Measure:
             self._last_us = report.time_us - self._period_us
         if image is not None and image.counter != self._pads.counter:
             self._take(image)
+            self.image_age_s = 1e-6 * (report.time_us - image.time_us)
         gap, rate = gap_and_rate(self._link, report.encoder_ticks / self._ticks_rev)
         forces, status = self._forces, report.status | self._encoder_status(report, gap)
         if report.command_result in RESULT_BITS:

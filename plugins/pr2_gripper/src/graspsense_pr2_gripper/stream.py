@@ -137,4 +137,4 @@ class Stream:
         self._cells[first : first + SLICE_CELLS] = map(float, report.cells)
         if self._have == _ALL_SLICES:
             counts.images += 1
-            self.image = RawImage(counts.images, self._taken_us, tuple(self._cells))
+            self.image = RawImage(counts.images + counts.images_lost, self._taken_us, tuple(self._cells))

@@ -38,7 +38,8 @@ from graspsense.core.control.tick import (
     tick,
 )
 from graspsense.core.grasp.interrupts import Interrupts
-from graspsense.core.grasp.protection.protection import Protection
+from graspsense.core.grasp.losses import Losses, lost_in_words
+from graspsense.core.grasp.protection.protection import LIMITED, Protection
 from graspsense.core.values.channel import Channel
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import (
@@ -230,16 +231,17 @@ def run_grasp(
         # After closing, so that the report covers it.
         report = _report_of(backend)
     frames = grasp.recorder.frames
+    losses = grasp.losses.counts() if grasp.losses is not None else {}
     commands = backend.recorded_commands()
     if commands is not None:
         grasp.recorder.commands[:] = commands[: len(frames)]
     return Grasp(
         trace=grasp.recorder.trace(),
         outcome=outcome,
-        reason="; ".join(filter(None, (reason, *grasp.failed_sinks))),
+        reason="; ".join(filter(None, (reason, grasp.lost(), *grasp.failed_sinks))),
         device=info,
-        report=report,
-        counts={"ticks": len(frames), "late": grasp.late, "guarded": grasp.guarded},
+        report={**report, **losses},
+        counts={"ticks": len(frames), "late": grasp.late, "guarded": grasp.guarded, **losses},
         events=tuple(grasp.events),
         seconds_simulated=grasp.seconds() if info.clock == "virtual" else None,
         seconds_wall=time.perf_counter() - began,
@@ -369,6 +371,8 @@ class _Grasp:
         self.params = tick_params(info, controller, run)
         self.protection = None if info.harmless else Protection(info, controller, run, self._fault_seen)
         self.delivered = Delivered(info.channels)
+        # The times of a recording are those of its own devices.
+        self.losses = Losses(info.rate_hz) if info.opening is not None else None
         self.state: TickState = first_state(controller.init())
         self.recorder = TraceRecorder({**SI_UNITS, **info.units})
         self.events: list[GraspEvent] = []
@@ -423,6 +427,10 @@ class _Grasp:
         """Return the time (s) from the first frame to the last, by the clock of the gripper."""
         return 0.0 if self.last is None or self.first_t_s is None else self.last.t_s - self.first_t_s
 
+    def lost(self) -> str:
+        """Return what was lost on the way from the gripper, in words; empty if nothing was."""
+        return "" if self.losses is None else lost_in_words(self.losses.lost)
+
     def _loop(self) -> None:
         read, apply, run = self.backend.read, self.backend.apply, self.run
         step = with_plain_commands(self.step)
@@ -434,7 +442,7 @@ class _Grasp:
         state, phase, watcher = self.state, self.state.phase, self.state.guard
         images: list[Pads] = []
         newest = n_ticks = 0
-        most_ticks, leaps = self._most_ticks(), self._leaps()
+        most_ticks, leaps, losses = self._most_ticks(), self._leaps(), self.losses
         while n_ticks < most_ticks:
             n_ticks += 1
             reading = self._checked(read(timeout_s))
@@ -461,6 +469,8 @@ class _Grasp:
             recorded = phase >= APPROACH and stepped
             if recorded:
                 self.late += frame.dt_s > late_s
+                if losses is not None:
+                    losses.see(reading)
                 self._count(phase, self._acted(state) > acted)
             try:
                 apply(command)
@@ -583,9 +593,10 @@ class _Grasp:
                 f"run.first_speed_m_s ({guard_params.first_speed_m_s:g} m/s) held throughout"
             )
         elif self.protection is not None and self.protection.acted:
-            why = "see run.effort_ceiling_n"
-        told = f"squeeze limited: {self.squeezed_guarded} of its {self.squeezed} commands were lowered; {why}"
-        return (*seen, told)
+            why = f"the ceiling is {self.protection.ceiling_n:.1f} N; run.effort_ceiling_n allows more"
+        told = f"{LIMITED}: {self.squeezed_guarded} of its {self.squeezed} commands were lowered; {why}"
+        # With its share, instead of the first sight of it.
+        return (*(warning for warning in seen if not warning.startswith(LIMITED)), told)
 
     def _told(self, frame: Frame, phase: int, events: int) -> None:
         """Log the events that the controller told in this tick, one for each bit that is set."""

@@ -47,7 +47,8 @@ class Pads(NamedTuple):
     """The last cell image of the two fingertips, raw, which comes at a lower rate than frames.
 
     `left` and `right` have one number for each cell, in the order of the array that the backend declares as `pads`.
-    `counter` increases by one with each new image. It is 0, and the cells are NaN, before the first image.
+    `counter` increases by one with each new image, and by more where images were lost. It is 0, and the cells are NaN,
+    before the first image.
     """
 
     t_s: float
@@ -75,7 +76,8 @@ class Image(NamedTuple):
     `cells` has a float for each cell, or of several components a tuple of these. Of an array with another `dtype`
     than float64 it is a numpy array of the shape `TactileArray.shape`: contiguous, read-only, and not changed by
     anyone after it was delivered. NaN stands for a cell without a value. `counter` increases by one with each new
-    image. It is 0, and the cells are NaN (0 in whole numbers), before the first image.
+    image, and by more where images were lost. It is 0, and the cells are NaN (0 in whole numbers), before the first
+    image.
     """
 
     t_s: float

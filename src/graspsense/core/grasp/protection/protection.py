@@ -39,6 +39,8 @@ from graspsense.core.values.signals import (
 )
 
 RELEASE: Final = int(Phase.RELEASE)
+LIMITED: Final = "squeeze limited"
+"""The warning of a squeeze that is not the one that the controller commanded."""
 
 
 class Protection:
@@ -60,14 +62,14 @@ class Protection:
         self.ending: Fault | None = None
         self.acted = 0
         rates = {channel.name: channel.rate_hz for channel in info.channels}
-        self._ceiling_n = effort_ceiling_n(info, controller, run)
+        self.ceiling_n = effort_ceiling_n(info, controller, run)
         self._effort_limit_n = info.effort_limit_n
-        self._approach_n = max(self._ceiling_n, run.first_effort_n if run.first_effort_n < inf else 0.0)
+        self._approach_n = max(self.ceiling_n, run.first_effort_n if run.first_effort_n < inf else 0.0)
         self._relaxed = info.relaxed
         opening_n = (
             abs(info.opening.value) if info.opening is not None and info.opening.kind == EFFORT else 0.0
         )
-        self._opening_n = max(self._ceiling_n, opening_n)
+        self._opening_n = max(self.ceiling_n, opening_n)
         contact_n = controller.contact_force_n()
         # Where only the entry of a plugin declares the channels, the frames show which there are.
         self._declared = bool(rates)
@@ -163,11 +165,11 @@ class Protection:
     def _limited(self, phase: int, command: Command) -> Command:
         if self.ending is not None:
             return self._relaxed
-        closing_n = self._approach_n if phase == APPROACH else self._ceiling_n
+        closing_n = self._approach_n if phase == APPROACH else self.ceiling_n
         if phase in (SQUEEZE, HOLD) and self._gives(command) > closing_n:
             self._see(
                 Fault(
-                    "effort at its ceiling",
+                    LIMITED,
                     f"the controller asks for more than {closing_n:.1f} N; run.effort_ceiling_n allows more",
                 )
             )

@@ -1,0 +1,64 @@
+"""Frames, images and samples that did not arrive are in the outcome, the counts and the report of a grasp."""
+
+from __future__ import annotations
+
+import pytest
+
+from graspsense.core.components.run_config import RunConfig
+from graspsense.core.grasp.runner import run_grasp
+from graspsense.plugin_api import CHANNELS, Channel, FastChannel, TactileArray, create
+from graspsense.testing.model_gripper import OBJECTS, TICKS_OF_AN_IMAGE, ModelGripper
+
+PADS = TactileArray("pads", "counts", 24.0, rows=2, columns=3)
+SKIN = TactileArray("skin", "N", 24.0, rows=2, columns=2)
+SHAKING = FastChannel("shaking", "m/s2", 3000.0, samples=3)
+AN_IMAGE = 1 + 25 * TICKS_OF_AN_IMAGE
+"""The reading, counted from 1, in which an image is new."""
+NAMES = ("gap", "velocity", "effort", "force_left", "force_right")
+
+
+class Lossy(ModelGripper):
+    """Loses two frames, and images and samples, while it closes."""
+
+    def __init__(self, loses=True):
+        plain = (Channel(name, CHANNELS[name], 1000.0) for name in NAMES)
+        super().__init__(frozenset((*plain, PADS, SKIN, SHAKING)), *OBJECTS["a hard object"])
+        self.loses, self.k = loses, 0
+
+    def read(self, timeout_s):
+        self.k += 1
+        reading = super().read(timeout_s)
+        frame, pads, signals = reading
+        past = self.k >= AN_IMAGE and self.loses
+        if past:
+            if pads.counter:
+                pads = pads._replace(counter=pads.counter + 1)
+            shaking = signals.shaking._replace(counter=signals.shaking.counter + 6)
+            signals = signals._replace(
+                skin=signals.skin._replace(counter=signals.skin.counter + 2), shaking=shaking
+            )
+        if self.k == AN_IMAGE and self.loses:
+            frame = frame._replace(dt_s=0.003)
+        return reading._replace(frame=frame, pads=pads, signals=signals)
+
+
+def test_losses_are_told_with_the_outcome_and_counted():
+    grasp = run_grasp(Lossy(), create("controller", "hybrid"), RunConfig())
+    lost = {"lost_frames": 2, "lost_pads": 1, "lost_skin": 2, "lost_shaking": 6}
+    assert {name: count for name, count in grasp.counts.items() if name.startswith("lost")} == lost
+    assert {name: grasp.report[name] for name in lost} == lost
+    assert "2 frames" in grasp.reason
+    assert "1 of pads" in grasp.reason
+    assert grasp.outcome.words == "steady"
+
+
+def test_nothing_is_told_where_nothing_was_lost():
+    grasp = run_grasp(Lossy(loses=False), create("controller", "hybrid"), RunConfig())
+    assert grasp.reason == ""
+    assert not [name for name in grasp.counts if name.startswith("lost")]
+
+
+@pytest.mark.parametrize("scene", ["block"])
+def test_a_simulated_gripper_loses_nothing(scene):
+    gripper = create("sensor-backend", "sim", object=scene)
+    assert "lost" not in run_grasp(gripper, create("controller", "hybrid"), RunConfig()).reason

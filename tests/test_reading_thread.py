@@ -1,0 +1,96 @@
+"""A thread that reads a device: the newest value, its age, what was replaced, and the error that ended it."""
+
+from __future__ import annotations
+
+import queue
+import threading
+
+import pytest
+
+from graspsense.plugin_api import DeviceLost, ReadingThread
+
+
+class Wire:
+    """Gives what the test puts in; `taken` counts what the thread has asked for."""
+
+    def __init__(self):
+        self.values = queue.Queue()
+        self.idle = threading.Semaphore(0)
+
+    def read(self):
+        if self.values.empty():
+            self.idle.release()
+        try:
+            value = self.values.get(timeout=0.01)
+        except queue.Empty:
+            return None
+        if isinstance(value, BaseException):
+            raise value
+        return value
+
+    def drained(self):
+        """Wait until the thread has taken all values, and come back for more."""
+        while not self.values.empty():
+            self.idle.acquire()
+        while self.idle.acquire(blocking=False):
+            pass
+        self.idle.acquire()
+        self.idle.acquire()
+
+
+@pytest.fixture
+def wire():
+    return Wire()
+
+
+@pytest.fixture
+def reading(wire):
+    threads = []
+
+    def reading(**options):
+        threads.append(ReadingThread(wire.read, **options))
+        return threads[-1]
+
+    yield reading
+    for thread in threads:
+        assert thread.close(60.0)
+
+
+def test_the_newest_value_is_given_once_and_the_replaced_are_counted(wire, reading):
+    thread = reading()
+    assert thread.age_s() == float("inf")
+    for value in range(5):
+        wire.values.put(value)
+    wire.drained()
+    assert thread.newest(60.0) == 4
+    assert thread.replaced == 4
+    assert 0.0 <= thread.age_s() < 60.0
+    assert thread.newest(0.0) is None
+
+
+def test_values_that_nobody_asked_for_are_joined(wire, reading):
+    thread = reading(joined=lambda before, now: before + now)
+    for value in ([1], [2], [3]):
+        wire.values.put(value)
+    wire.drained()
+    assert thread.newest(60.0) == [1, 2, 3]
+
+
+def test_an_error_comes_after_the_values_before_it_and_stays(wire, reading):
+    thread = reading()
+    wire.values.put(7)
+    wire.drained()
+    wire.values.put(DeviceLost("unplugged"))
+    assert thread.newest(60.0) == 7
+    for _ in range(2):
+        with pytest.raises(DeviceLost, match="unplugged"):
+            thread.newest(60.0)
+
+
+def test_closing_is_bounded_where_a_read_hangs():
+    freed = threading.Event()
+    thread = ReadingThread(freed.wait)
+    assert not thread.close(0.05)
+    freed.set()
+    assert thread.close(60.0)
+    assert thread.close(60.0), "twice"
