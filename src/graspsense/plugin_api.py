@@ -80,7 +80,7 @@ _TABLE: Final[Table] = {
     "Sensor backends": {
         "core.values.faults": ("StatusBit",),
         "core.values.device": ("DeviceInfo",),
-        "core.components.roles": ("ObjectKind", "SensorBackend"),
+        "core.components.roles": ("ObjectKind", "SensorBackend", "Viewer"),
         "core.components.channels": ("no_signals", "signal_type"),
     },
     "Sensor backends that do many grasps at once": {

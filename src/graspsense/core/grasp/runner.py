@@ -17,7 +17,7 @@ from typing import Any, Final, Protocol, runtime_checkable
 from attrs import evolve, frozen
 
 from graspsense.core.components.delivered import Delivered
-from graspsense.core.components.roles import Controller, SensorBackend
+from graspsense.core.components.roles import Controller, SensorBackend, Viewer
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.control.binding import bind, maker
 from graspsense.core.control.contact import RestState, at_rest, update_rest
@@ -97,6 +97,11 @@ class EventSink(Protocol):
 
     def event(self, event: GraspEvent) -> None:
         """Receive one event."""
+
+
+@runtime_checkable
+class PictureSink(Viewer, Protocol):
+    """A sink that also receives pictures of the gripper, see `SensorBackend.see`."""
 
 
 @frozen(kw_only=True, eq=False)
@@ -208,6 +213,10 @@ def run_grasp(
     with Interrupts() as interrupts:
         try:
             backend.expect(controller, run)
+            sinks = tuple(sinks)
+            for sink in sinks:
+                if isinstance(sink, PictureSink):
+                    backend.see(sink)
             info = _opened(backend, run.seed)
             if not info.channels:
                 info = evolve(info, channels=_declared(backend))
