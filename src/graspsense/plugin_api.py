@@ -82,7 +82,7 @@ _TABLE: Final[Table] = {
         "core.values.faults": ("StatusBit",),
         "core.values.device": ("DeviceInfo",),
         "core.values.mounting": ("Mounting",),
-        "core.components.roles": ("ObjectKind", "SensorBackend"),
+        "core.components.roles": ("ObjectKind", "SensorBackend", "Viewer"),
         "core.components.channels": ("no_signals", "signal_type"),
         "core.values.fingers": ("opposed_forces",),
         "core.grasp.reading_thread": ("ReadingThread",),

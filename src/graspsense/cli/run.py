@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from graspsense.core.values.features import Prediction
     from graspsense.core.values.trial import Trial
     from graspsense.experiments.condition import Conditions
+    from graspsense.report.film import Film
 
 EXIT_ABORTED: Final = 4
 EXIT_NOT_KEPT: Final = 2
@@ -66,6 +67,13 @@ MANY_GUARDED: Final = 0.1
     "the first.",
 )
 @click.option("--plot", metavar="FILE.png", help="Draw the grasp: forces, gap, phases, features, prediction.")
+@click.option(
+    "--picture",
+    metavar="FILE.png",
+    help="Take a picture of a gripper that can be seen, before it opens again.",
+)
+@click.option("--video", metavar="FILE", help="Film a gripper that can be seen: .mp4, .webp or .gif.")
+@click.option("--viewer", is_flag=True, help="Show a gripper that can be seen, in a window.")
 @click.option("--dry-run", is_flag=True, help="Print what would be done, and open nothing.")
 @click.option("--json", "as_json", is_flag=True, help="Print the trial as JSON.")
 def run(
@@ -81,6 +89,9 @@ def run(
     explain_model: bool,
     beside: str | None,
     plot: str | None,
+    picture: str | None,
+    video: str | None,
+    viewer: bool,
     dry_run: bool,
     as_json: bool,
 ) -> None:
@@ -106,9 +117,12 @@ def run(
         return
     _require_places(save, label, plot)
     if beside is not None:
+        if picture or video or viewer:
+            raise click.UsageError("--picture, --video and --viewer show one gripper: leave them or --beside out")
         _run_beside(settings, beside, save, label, as_json)
         return
-    sinks = () if as_json else (LiveRows(),)
+    film = None if picture is None and video is None and not viewer else _film(picture, video, viewer)
+    sinks = (*(() if as_json else (LiveRows(),)), *(() if film is None else (film,)))
     kept: dict[str, Any] | None = None
     if save is None:
         trial, interrupted = _grasped(settings, sinks)
@@ -127,6 +141,8 @@ def run(
         _print_further(settings, trial, condition)
     if plot is not None:
         draw_grasp(trial, Path(plot))
+    if film is not None:
+        _write_film(film, save, None if kept is None else kept["trial"])
     _exit(trial, interrupted, "" if kept is None else kept["problem"])
 
 
@@ -272,6 +288,23 @@ def draw_grasp(trial: Trial, path: Path) -> None:
 
     grasp_png(trial, path)
     talk(f"picture written to {path}")
+
+
+def _film(picture: str | None, video: str | None, viewer: bool) -> Film:
+    from graspsense.report.film import Film
+
+    return Film(picture, video, window=viewer)
+
+
+def _write_film(film: Film, save: str | None, number: int | None) -> None:
+    """Write the pictures; that of a kept trial also beside the store, for its page."""
+    from graspsense.report.film import picture_of_trial
+
+    for path in film.write():
+        talk(f"written: {path}")
+    png = film.png()
+    if save is not None and number is not None and png is not None:
+        picture_of_trial(save, number).write_bytes(png)
 
 
 def _kept(

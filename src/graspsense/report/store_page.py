@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 from collections import Counter
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Final
@@ -18,9 +19,21 @@ from graspsense.recording.readable import note_on, readable
 from graspsense.recording.reader import read_recorded
 from graspsense.report.evaluation_page import beside, features_section, result_sections
 from graspsense.report.evaluation_sections import code
+from graspsense.report.film import picture_of_trial
 from graspsense.report.further_channels import channel_figures
 from graspsense.report.grasp_curve import GraspCurve, grasp_curve
-from graspsense.report.html import Page, Section, bullets, facts, folded, pair, panels, paragraph, table
+from graspsense.report.html import (
+    Page,
+    Section,
+    bullets,
+    facts,
+    figure,
+    folded,
+    pair,
+    panels,
+    paragraph,
+    table,
+)
 from graspsense.report.tactile import tactile_figures
 from graspsense.report.traces import features_table, one_grasp, traces_by_class
 from graspsense.report.trial_curves import trial_curves
@@ -40,6 +53,8 @@ GRASPS: Final = 3
 """Grasps of each label that are drawn over each other."""
 CURVES: Final = 60
 """Largest number of trials that are shown as small curves."""
+PNG: Final = b"\x89PNG\r\n\x1a\n"
+LARGEST_PICTURE: Final = 4 * 1024 * 1024
 NO_LABEL: Final = "no label"
 LISTED: Final = 200
 """Largest number of trials in the list at the end; the newest are listed."""
@@ -97,6 +112,7 @@ def store_page(
     if evaluation is not None and labelled is not None:
         sections += result_sections(evaluation, learner, labelled)
     sections += _measurement_sections(trial, curves, unreadable)
+    sections += _picture_section(folder, trial)
     if curves:
         sections.append(trial_curves(curves[:CURVES]))
     if labelled is not None:
@@ -207,6 +223,20 @@ def _measurement_sections(
         body = paragraph(text) + traces_by_class(newest) + bullets(notes, "warning")
         sections.append(Section(id="traces", title="Force and gap over time", body=body))
     return sections
+
+
+def _picture_section(folder: str, trial: StoredTrial) -> list[Section]:
+    """Return the picture that `run --picture` took of this trial, if there is one."""
+    path = picture_of_trial(folder, trial.summary.id)
+    if not path.is_file() or path.stat().st_size > LARGEST_PICTURE:
+        return []
+    data = path.read_bytes()
+    if not data.startswith(PNG):
+        return []
+    source = f"data:image/png;base64,{base64.b64encode(data).decode()}"
+    caption = f"Trial {trial.summary.id}, before the fingers opened again."
+    image = f'<img src="{source}" alt="The gripper in trial {trial.summary.id}" style="max-width:100%">'
+    return [Section(id="picture", title="The same grasp, seen", body=figure(image, caption))]
 
 
 def _provenance(

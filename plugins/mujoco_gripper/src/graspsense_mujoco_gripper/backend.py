@@ -30,9 +30,11 @@ from graspsense.plugin_api import (
     Reading,
     SimulationVariant,
     TactileArray,
+    Viewer,
     signal_type,
 )
 from graspsense_mujoco_gripper.batch import Job, grasps
+from graspsense_mujoco_gripper.camera import Camera, Window, offscreen, require_screen
 from graspsense_mujoco_gripper.catalogue import catalogue
 from graspsense_mujoco_gripper.config import MujocoConfig
 from graspsense_mujoco_gripper.drive import ActuatorDrive, Travel, instability, test_move
@@ -59,6 +61,9 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
 
     accepts = ("effort", "velocity", "position", "force")
     _data: mujoco.MjData | None = None
+    _viewer: Viewer | None = None
+    _camera: Camera | None = None
+    _window: Window | None = None
 
     @property
     def channels(self) -> tuple[Channel, ...]:
@@ -105,6 +110,14 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
         gripper, _ = read_gripper(self.config.file)
         return grasps(Job(self.config, controller, options, bool(gripper.channels)), scenes, seeds)
 
+    def see(self, viewer: Viewer) -> None:
+        """Make pictures of the next grasp without a screen, or show it in MuJoCo's own viewer."""
+        if viewer.frames_hz > 0.0:
+            offscreen()
+        if viewer.window:
+            require_screen()
+        self._viewer = viewer
+
     def open(self, seed: int) -> DeviceInfo:
         """Build the model with the thing between the open fingers. Raises ConfigError, UnknownName."""
         self.close()
@@ -129,6 +142,11 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
             add_thing(spec, scene, place, travel.axis)
             model = compiled(spec, f"the gripper with {config.object}")
         self._begin(model, travel, generator)
+        if self._viewer is not None and self._viewer.frames_hz > 0.0:
+            self._camera = Camera(model, travel.place, travel.axis, travel.open_m)
+            self._next_picture_s = 0.0
+        if self._viewer is not None and self._viewer.window:
+            self._window = Window(model, self._opened())
         return self._described()
 
     def _begin(self, model: mujoco.MjModel, travel: Travel, generator: np.random.Generator) -> None:
@@ -210,7 +228,16 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
         if problem := instability(data):
             raise DeviceLost(f"the simulation became unstable: {problem}. Use a smaller gripper.timestep_s")
         self._ticks += 1
+        if self._viewer is not None:
+            self._show(self._viewer, data, self._ticks / self.config.rate_hz)
         return self._reading(data)
+
+    def _show(self, viewer: Viewer, data: mujoco.MjData, t_s: float) -> None:
+        if self._camera is not None and t_s >= self._next_picture_s:
+            self._next_picture_s += 1.0 / viewer.frames_hz
+            viewer.picture(self._camera.image(data))
+        if self._window is not None:
+            self._window.follow(t_s)
 
     def _reading(self, data: mujoco.MjData) -> Reading:
         axis, tick_s = self._travel.axis, 1.0 / self.config.rate_hz
@@ -266,7 +293,10 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
 
     def close(self) -> None:
         """Forget the model."""
-        self._data = None
+        for part in (self._camera, self._window):
+            if part is not None:
+                part.close()
+        self._data = self._camera = self._window = None
 
     def report(self) -> dict[str, float | int | str | bool]:
         """Return what only the model knows: whether the thing broke, and the largest true force on a finger."""

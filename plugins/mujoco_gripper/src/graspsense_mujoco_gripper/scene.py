@@ -187,6 +187,8 @@ def add_thing(spec: mujoco.MjSpec, model: Model, place: Floats, axis: Floats) ->
     assert child is not None
     for body in child.bodies:
         body.gravcomp = float(not scene.table)
+    spec.visual.headlight.ambient = [0.4, 0.4, 0.4]
+    spec.visual.headlight.diffuse = [0.6, 0.6, 0.6]
     # MuJoCo would else take the larger friction of thing and finger, and the mean of their stiffness.
     for part in (*child.geoms, *child.flexes):
         part.priority = max(part.priority, 1)
@@ -208,6 +210,7 @@ def add_thing(spec: mujoco.MjSpec, model: Model, place: Floats, axis: Floats) ->
                 contype=TABLE_BIT,
                 conaffinity=TABLE_BIT,
                 friction=[0.5, 0.005, 0.0001],
+                rgba=[0.75, 0.72, 0.65, 1.0],
             )
         frame = spec.worldbody.add_frame(pos=place, quat=turned(axis))
         spec.attach(child, frame=frame, prefix=PREFIX)

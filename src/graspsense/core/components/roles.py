@@ -70,6 +70,16 @@ class ObjectKind:
         return tuple(f"{self.name}:{state}" for state in self.states) or (self.name,)
 
 
+class Viewer(Protocol):
+    """Who wants to see a grasp: how many pictures a second of the gripper (0: none), and whether in a window too."""
+
+    frames_hz: float
+    window: bool
+
+    def picture(self, image: Any) -> None:
+        """Receive a picture, an array of rows x columns x 3 values from 0 to 255. It must not block."""
+
+
 class SensorBackend(ABC, Generic[ConfigT]):
     """A gripper with its sensors, real, simulated, emulated or recorded.
 
@@ -145,6 +155,16 @@ class SensorBackend(ABC, Generic[ConfigT]):
         A simulator verifies that these features are as accurate as it was asked to be; a real gripper ignores it.
         """
         del feature_set
+
+    def see(self, viewer: Viewer) -> None:
+        """Announce, before `open`, that the next grasp is to be seen, for a gripper that has a picture of itself.
+
+        Raises ConfigError if there is no picture, with what is missing for it.
+        """
+        del viewer
+        raise ConfigError(
+            f"{type(self).__name__} has no picture of its grasps. --plot draws the measured forces of any gripper"
+        )
 
     @abstractmethod
     def open(self, seed: int) -> DeviceInfo:

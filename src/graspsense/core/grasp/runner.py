@@ -17,7 +17,7 @@ from typing import Any, Final, Protocol, runtime_checkable
 from attrs import evolve, frozen
 
 from graspsense.core.components.delivered import Delivered
-from graspsense.core.components.roles import Controller, SensorBackend
+from graspsense.core.components.roles import Controller, SensorBackend, Viewer
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.control.binding import bind, maker
 from graspsense.core.control.contact import RestState, at_rest, update_rest
@@ -99,6 +99,11 @@ class EventSink(Protocol):
 
     def event(self, event: GraspEvent) -> None:
         """Receive one event."""
+
+
+@runtime_checkable
+class PictureSink(Viewer, Protocol):
+    """A sink that also receives pictures of the gripper, see `SensorBackend.see`."""
 
 
 @frozen(kw_only=True, eq=False)
@@ -210,6 +215,10 @@ def run_grasp(
     with Interrupts() as interrupts:
         try:
             backend.expect(controller, run)
+            sinks = tuple(sinks)
+            for sink in sinks:
+                if isinstance(sink, PictureSink):
+                    backend.see(sink)
             info = _opened(backend, run.seed)
             info = _described(info, backend, controller, run)
             if on_open is not None:
