@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from importlib.resources import files
+from math import inf
 from pathlib import Path
 from typing import Any, Final
 
@@ -106,7 +107,8 @@ class GripperFile:
     `open` and `closed` are the controls of each actuator with the fingers open and closed. `closing` is the direction
     in which the left finger moves (a vector of the world); empty: from the left finger to the right one. `angle` is the
     unit of angles in a model that leaves it to those that include it. With `only_fingers`, only the geoms of the fingers
-    touch: the hull of a mesh may fill the space between them.
+    touch: the hull of a mesh may fill the space between them. `impratio` is MuJoCo's option of that name, with elliptic
+    friction cones; 0: as the model says. At 1, MuJoCo's default, things creep out of fingers that are not parallel.
     """
 
     model: str
@@ -119,6 +121,7 @@ class GripperFile:
     closing: tuple[float, ...] = ()
     angle: str = ""
     only_fingers: bool = False
+    impratio: float = 0.0
     effort_limit_n: float = field(default=0.0)
     speed_limit_m_s: float = field(default=0.1)
     channels: Mapping[str, ModelSensor] = field(factory=dict)
@@ -131,6 +134,8 @@ class GripperFile:
                 raise ValueError(f"{name} has {len(values)} values for {len(self.actuators)} actuators")
         if self.closing and len(self.closing) != 3:
             raise ValueError(f"closing has {len(self.closing)} numbers: a direction has three")
+        if not 0.0 <= self.impratio < inf:
+            raise ValueError(f"impratio is {self.impratio:g}: it is above 0, or 0 for that of the model")
         if self.angle not in ("", "radian", "degree"):
             raise ValueError(f"angle is {self.angle!r}: give radian or degree, or leave it out")
         if self.effort_limit_n < 0.0 or self.speed_limit_m_s <= 0.0:

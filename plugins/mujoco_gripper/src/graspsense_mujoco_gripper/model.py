@@ -43,6 +43,8 @@ def gripper_spec(path: Path, gripper: GripperFile, timestep_s: float) -> mujoco.
     spec.option.timestep = timestep_s
     if gripper.angle:
         spec.compiler.degree = gripper.angle == "degree"
+    if gripper.impratio:
+        spec.option.impratio, spec.option.cone = gripper.impratio, mujoco.mjtCone.mjCONE_ELLIPTIC
     _exclude_neighbours(spec)
     fingers = (gripper.left, gripper.right)
     geoms = {name for finger in fingers for name in finger.geoms}
