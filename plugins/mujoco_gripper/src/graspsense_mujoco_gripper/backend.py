@@ -31,6 +31,7 @@ from graspsense.plugin_api import (
 )
 from graspsense_mujoco_gripper.catalogue import catalogue, thing_named
 from graspsense_mujoco_gripper.config import MujocoConfig
+from graspsense_mujoco_gripper.draft import Draft, drafted
 from graspsense_mujoco_gripper.drive import ActuatorDrive, Travel, instability, test_move
 from graspsense_mujoco_gripper.gripper_file import read_gripper
 from graspsense_mujoco_gripper.measurement import ForceGauge, GapGauge, cells_of, geoms_of, width_m
@@ -80,6 +81,11 @@ class MujocoGripper(SensorBackend[MujocoConfig]):
     def with_object(self, name: str) -> MujocoGripper:
         """Return this gripper with another thing between its fingers."""
         return MujocoGripper(evolve(self.config, object=name))
+
+    @staticmethod
+    def drafted(model: str, folder: Path) -> Draft:
+        """Return a first gripper file for a model, to be put into `folder`. Raises ConfigError."""
+        return drafted(model, folder)
 
     def open(self, seed: int) -> DeviceInfo:
         """Build the model with the thing between the open fingers. Raises ConfigError, UnknownName."""

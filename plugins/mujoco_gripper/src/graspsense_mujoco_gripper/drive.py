@@ -96,13 +96,14 @@ def test_move(model: mujoco.MjModel, gripper: GripperFile, width_m: float | None
     if end_m > start_m - LEAST_TRAVEL_M:
         raise ConfigError(
             f"gripper.file: with the controls `closed` the gap goes from {start_m * 1e3:.3g} to {end_m * 1e3:.3g} mm, "
-            "so the fingers do not close: look at actuators, open, closed and gap"
+            f"so the fingers do not close: look at actuators, open, closed and gap{_angle_hint(model)}"
         )
     touch_m = (start_m + end_m) / 2.0 if width_m is None else width_m + CLEARANCE_M
     data.qpos[:] = states[int(np.argmin(np.abs(np.array(gaps) - touch_m)))]
     mujoco.mj_kinematics(model, data)
     left, right = faces(model, data, gripper)
     axis = closing_axis(gripper, left, right)
+    _check_opposed(model, gripper, axis, (states[0], states[-1]))
     if gauge.along_axis:
         for k, state in enumerate(states):
             data.qpos[:] = state
@@ -115,6 +116,30 @@ def test_move(model: mujoco.MjModel, gripper: GripperFile, width_m: float | None
     )
     mass_kg = _mass(model, gripper, qpos_open, axis)
     return Travel(grid, table, mass_kg, axis, (left + right) / 2.0, qpos_open)
+
+
+def _angle_hint(model: mujoco.MjModel) -> str:
+    """Return what to do about hinges that hardly turn: their ranges are radians, read as degrees."""
+    hinges = (model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE) & (model.jnt_limited == 1)
+    widest = np.ptp(model.jnt_range[hinges], axis=1).max(initial=0.0)
+    return '. The ranges of its hinges look like radians: angle = "radian"' if 0.0 < widest < 0.1 else ""
+
+
+def _check_opposed(
+    model: mujoco.MjModel, gripper: GripperFile, axis: Floats, states: tuple[Floats, Floats]
+) -> None:
+    """Raise ConfigError where the faces of the fingers do not come nearer to each other."""
+    data, apart = mujoco.MjData(model), []
+    for state in states:
+        data.qpos[:] = state
+        mujoco.mj_kinematics(model, data)
+        left, right = faces(model, data, gripper)
+        apart.append(float((right - left) @ axis))
+    if apart[1] > apart[0] - LEAST_TRAVEL_M:
+        raise ConfigError(
+            f"gripper.file: the left and the right finger are {apart[0] * 1e3:.1f} mm apart while open, and "
+            f"{apart[1] * 1e3:.1f} mm while closed: they are not opposed. Look at left, right and gap"
+        )
 
 
 def _mass(model: mujoco.MjModel, gripper: GripperFile, qpos: Floats, axis: Floats) -> float:

@@ -165,9 +165,7 @@ def _face_sites(model: mujoco.MjModel, gap: Gap) -> tuple[list[int], ...]:
     return ()
 
 
-def faces(
-    model: mujoco.MjModel, data: mujoco.MjData, gripper: GripperFile
-) -> tuple[Floats, Floats]:
+def faces(model: mujoco.MjModel, data: mujoco.MjData, gripper: GripperFile) -> tuple[Floats, Floats]:
     """Return where the left and the right finger touch things: what the gap is measured between, or their geoms."""
     gap = gripper.gap
     if sites := _face_sites(model, gap):
