@@ -32,12 +32,20 @@ def write_picture(file: Path, target: Path, force_n: float) -> None:
     scene.sitegroup[:] = 0
     camera = mujoco.MjvCamera()
     camera.lookat[:] = gripper._travel.place
-    camera.distance, camera.elevation = 0.45, -15.0
-    axis = gripper._travel.axis
-    camera.azimuth = float(np.degrees(np.arctan2(axis[1], axis[0]))) + 90.0
+    # Across the fingers: they point from their body to the thing.
+    body = model.geom_bodyid[min(gripper._left.geoms)]
+    across = np.cross(gripper._travel.axis, gripper._travel.place - data.xpos[body])
+    across /= np.linalg.norm(across)
+    camera.distance = 0.4
+    camera.azimuth = float(np.degrees(np.arctan2(across[1], across[0])))
+    camera.elevation = float(np.degrees(np.arcsin(across[2])))
     with mujoco.Renderer(model, HEIGHT, WIDTH) as renderer:
         renderer.update_scene(data, camera, scene)
-        image = Image.fromarray(renderer.render())
+        pixels = renderer.render().copy()
+        renderer.enable_segmentation_rendering()
+        renderer.update_scene(data, camera, scene)
+        pixels[renderer.render()[..., 0] < 0] = 255
+    image = Image.fromarray(pixels)
     target.parent.mkdir(parents=True, exist_ok=True)
     image.quantize(48).save(target, optimize=True)
     gripper.close()

@@ -17,13 +17,13 @@ from attrs import frozen
 from numpy.typing import NDArray
 
 from graspsense.plugin_api import ConfigError
+from graspsense_mujoco_gripper.drive import LEAST_TURN_RAD
 from graspsense_mujoco_gripper.gripper_file import model_path
 from graspsense_mujoco_gripper.model import compiled, exclude_neighbours, read_spec
 
 Floats = NDArray[np.float64]
 MOVE_S = 1.0
 LEAST_CHANGE_M = 1e-3
-SMALLEST_RANGE_RAD = 0.1
 FARTHEST_M = 1.0
 FURTHER = (
     mujoco.mjtSensor.mjSENS_TOUCH,
@@ -114,7 +114,7 @@ def _model(path: Path) -> tuple[mujoco.MjModel, bool]:
         exclude_neighbours(spec)
         model = compiled(spec, str(path))
         hinges = model.jnt_range[(model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE) & (model.jnt_limited == 1)]
-        if not len(hinges) or float(np.ptp(hinges, axis=1).max()) > SMALLEST_RANGE_RAD:
+        if not len(hinges) or float(np.ptp(hinges, axis=1).max()) > LEAST_TURN_RAD:
             break
     return model, radian
 

@@ -23,6 +23,7 @@ TEST_S = 1.0
 """Time of each half of the test move: opening, and closing."""
 POINTS = 64
 LEAST_TRAVEL_M = 1e-3
+LEAST_TURN_RAD = 0.1
 CLEARANCE_M = 0.004
 """A thing is put where the fingers have this much more room than it needs, so that one that stands still is clear."""
 MASS_STEPS = 4
@@ -71,6 +72,7 @@ def test_move(model: mujoco.MjModel, gripper: GripperFile, width_m: float | None
     `width_m` is that of the thing to be grasped: fingers that turn are looked at where they touch it. Without a thing
     they are looked at half closed.
     """
+    _check_angles(model, gripper)
     data = mujoco.MjData(model)
     ids = actuator_ids(model, gripper)
     gauge = GapGauge(model, gripper.gap)
@@ -96,7 +98,7 @@ def test_move(model: mujoco.MjModel, gripper: GripperFile, width_m: float | None
     if end_m > start_m - LEAST_TRAVEL_M:
         raise ConfigError(
             f"gripper.file: with the controls `closed` the gap goes from {start_m * 1e3:.3g} to {end_m * 1e3:.3g} mm, "
-            f"so the fingers do not close: look at actuators, open, closed and gap{_angle_hint(model)}"
+            "so the fingers do not close: look at actuators, open, closed and gap"
         )
     touch_m = (start_m + end_m) / 2.0 if width_m is None else width_m + CLEARANCE_M
     data.qpos[:] = states[int(np.argmin(np.abs(np.array(gaps) - touch_m)))]
@@ -118,11 +120,15 @@ def test_move(model: mujoco.MjModel, gripper: GripperFile, width_m: float | None
     return Travel(grid, table, mass_kg, axis, (left + right) / 2.0, qpos_open)
 
 
-def _angle_hint(model: mujoco.MjModel) -> str:
-    """Return what to do about hinges that hardly turn: their ranges are radians, read as degrees."""
+def _check_angles(model: mujoco.MjModel, gripper: GripperFile) -> None:
+    """Raise ConfigError for hinges that hardly turn: their ranges are probably radians, read as degrees."""
     hinges = (model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE) & (model.jnt_limited == 1)
-    widest = np.ptp(model.jnt_range[hinges], axis=1).max(initial=0.0)
-    return '. The ranges of its hinges look like radians: angle = "radian"' if 0.0 < widest < 0.1 else ""
+    widest = float(np.ptp(model.jnt_range[hinges], axis=1).max(initial=0.0))
+    if not gripper.angle and 0.0 < widest < LEAST_TURN_RAD:
+        raise ConfigError(
+            f"gripper.file: the hinges of the model turn by {np.degrees(widest):.2g} degrees at most, as if radians were "
+            'read as degrees: give angle = "radian", or angle = "degree" where that is right'
+        )
 
 
 def _check_opposed(
