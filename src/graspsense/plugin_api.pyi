@@ -76,6 +76,7 @@ from graspsense.core.values.device import DeviceInfo as DeviceInfo
 from graspsense.core.values.mounting import Mounting as Mounting
 from graspsense.core.components.roles import ObjectKind as ObjectKind
 from graspsense.core.components.roles import SensorBackend as SensorBackend
+from graspsense.core.components.roles import Viewer as Viewer
 from graspsense.core.components.channels import no_signals as no_signals
 from graspsense.core.components.channels import signal_type as signal_type
 from graspsense.core.values.fingers import opposed_forces as opposed_forces
@@ -88,6 +89,7 @@ from graspsense.core.components.roles import BatchBackend as BatchBackend
 from graspsense.core.components.roles import BatchOptions as BatchOptions
 from graspsense.core.components.roles import Grasped as Grasped
 from graspsense.core.components.roles import SimulationVariant as SimulationVariant
+from graspsense.core.grasp.runner import run_uninterrupted as run_uninterrupted
 
 # Identifying an object from recorded squeezes
 from graspsense.core.components.identification import CandidateScore as CandidateScore

@@ -118,7 +118,9 @@ def run(
     _require_places(save, label, plot)
     if beside is not None:
         if picture or video or viewer:
-            raise click.UsageError("--picture, --video and --viewer show one gripper: leave them or --beside out")
+            raise click.UsageError(
+                "--picture, --video and --viewer show one gripper: leave them or --beside out"
+            )
         _run_beside(settings, beside, save, label, as_json)
         return
     film = None if picture is None and video is None and not viewer else _film(picture, video, viewer)
