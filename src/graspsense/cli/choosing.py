@@ -46,6 +46,17 @@ class Chosen:
         return {"classifier": best.classifier, "features": best.features, **values}
 
 
+def pipeline_beside(model: str) -> str:
+    """Return the file of the pipeline beside a model. Raises ConfigError if it is a TOML file of another kind."""
+    from graspsense.core.components.layers import read_toml
+    from graspsense.core.components.toml_kinds import refuse_other_kind
+
+    path = Path(model).with_suffix(".toml")
+    if path.is_file():
+        refuse_other_kind(read_toml(path, str(path), "pipeline").values, "pipeline", str(path))
+    return str(path)
+
+
 def refuse_with_choice(given: Mapping[str, Any]) -> None:
     """Raise UsageError if options are given that do not go together with --choose."""
     for name in ("checkpoints", "calibration_instances", "target_value"):
@@ -97,6 +108,8 @@ def _tables(
         return {str(features.get("type", "given")).rpartition("/")[2]: trials}
     known = [one for one in installed().components("feature-set") if one.qualified != UNION]
     available = [one for one in known if _available(one, notes)]
+    # Of equal rates the first candidate is chosen: that with the fewest features.
+    available.sort(key=lambda one: (len(one.declared().features), one.qualified))
     try:
         united = _with_union(source, progress, given, available)
     except GraspsenseError as error:

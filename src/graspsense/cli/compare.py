@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
 from graspsense.cli.output import echo_json, file_to_write_as
 from graspsense.cli.sources import (
+    DEFAULT_CLASSIFIER,
     SOURCES,
     command_line,
     folds_option,
@@ -26,6 +27,9 @@ if TYPE_CHECKING:
     from graspsense.core.components.entries import Role
     from graspsense.core.learn.labelled import Labelled
     from graspsense.evaluation.ranking import Candidate, Ranking
+
+DEFAULT: Final = (DEFAULT_CLASSIFIER, "chitta")
+"""The classifier and the features that are used where none are named."""
 
 
 @click.command(
@@ -135,6 +139,12 @@ def _print(found: Ranking) -> None:
     )
     for note in found.notes:
         echo_entry("note", note)
+    default = [one for one in found.candidates if (one.classifier, one.features) == DEFAULT]
+    if default and default[0].standing == "worse":
+        echo_entry(
+            "advice",
+            f"the default, {default[0].name}, is worse on these trials: train --choose finds what suits them",
+        )
 
 
 def _coverage(candidate: Candidate) -> str:

@@ -119,7 +119,8 @@ def classifier_option(command: CommandT) -> CommandT:
     return click.option(
         "--classifier",
         metavar="NAME",
-        help=f"c45, svm, mlp, forest, boosted, ebm, knn, tree, or another. [{DEFAULT_CLASSIFIER}] (classifier.type)",
+        help="c45, svm, mlp, forest, extra-trees, boosted, ebm, knn, tree, or another. "
+        f"[{DEFAULT_CLASSIFIER}] (classifier.type)",
     )(command)
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from graspsense.cli.choosing import chosen, pipeline_text, refuse_with_choice, say_chosen
+from graspsense.cli.choosing import chosen, pipeline_beside, pipeline_text, refuse_with_choice, say_chosen
 from graspsense.cli.output import check_outputs, echo_json, file_to_write, file_to_write_as
 from graspsense.cli.sources import (
     SOURCES,
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from graspsense.core.learn.model import Model
 
 
-_NOT_EVALUATED: Final = ("out", "keep", "overwrite", "as_json", "calibration_instances")
+_NOT_EVALUATED: Final = ("out", "keep", "overwrite", "as_json", "calibration_instances", "choose")
 """Options of `train` that `evaluate` does not have."""
 
 
@@ -91,45 +91,31 @@ def train(
     **given: Any,
 ) -> None:
     """Train a model, write it, and print what it was trained on."""
-    from functools import partial
-
     from graspsense.core.files.whole_file import write_whole
     from graspsense.core.learn.checkpoints import checkpoints_of
-    from graspsense.core.learn.model import train as trained
     from graspsense.core.learn.model import write_model
     from graspsense.evaluation.gathered_warnings import gathered_warnings
 
-    pipeline = str(Path(out).with_suffix(".toml")) if choose and not is_csv(source) else None
+    pipeline = pipeline_beside(out) if choose and not is_csv(source) else None
     check_outputs(out, keep, pipeline, overwrite=overwrite, sources=[source])
     times = checkpoints_of(checkpoints)
-    found = None
     if choose:
-        further = {"checkpoints": checkpoints, "calibration_instances": calibration_instances}
-        refuse_with_choice({**given, **further})
+        refuse_with_choice({**given, "checkpoints": times, "calibration_instances": calibration_instances})
     if given["target_value"]:
         from graspsense.cli.target_value import train_value
 
         train_value(source, classifier, out, keep, as_json, given)
         return
     _refuse_single_scene(source)
-    if choose:
-        found = chosen(source, classifier, given, target)
-        learner, labelled, held_out = found.learner, found.labelled, None
-        notes: list[str] = []
+    found, held_out = chosen(source, classifier, given, target) if choose else None, None
+    if found is not None:
+        learner, labelled = found.learner, found.labelled
     else:
         learner = learner_of(source, classifier, given)
         labelled, held_out = _trials(source, given, times, target, calibration_instances)
-        notes = list(labelled.notes)
+    notes = list(labelled.notes) if found is None else []  # those of a choice are printed with it
     with gathered_warnings(notes):
-        made = partial(
-            trained,
-            learner.component,
-            learner.config,
-            name=Path(out).stem,
-            seed=given["seed"],
-            target=target,
-            provenance={"command": command_line(("keep", "overwrite", "as_json"))},
-        )
+        made = _maker(learner, Path(out).stem, target, given["seed"])
         labelled, model = _made(made, learner, labelled, held_out, times, given["seed"])
     write_model(Path(out), model)
     if found is not None and pipeline is not None:
@@ -145,13 +131,34 @@ def train(
     if found is not None:
         say_chosen(found, pipeline)
     else:
-        # In one line, so that it can be copied.
-        echo_as_it_is(f"how good    {command_line(_NOT_EVALUATED, 'evaluate')}")
-        if classifier is None and not given["options"]:
-            echo_entry(
-                "choice",
-                "classifier and features are the defaults; --choose finds those that suit the trials",
-            )
+        _say_how_good(default=classifier is None and not given["options"])
+
+
+def _maker(learner: SelectedComponent, name: str, target: str, seed: int) -> Callable[[Labelled], Model]:
+    """Return a function that trains a model of this name, without calibration."""
+    from functools import partial
+
+    from graspsense.core.learn.model import train as trained
+
+    return partial(
+        trained,
+        learner.component,
+        learner.config,
+        name=name,
+        seed=seed,
+        target=target,
+        provenance={"command": command_line(("keep", "overwrite", "as_json"))},
+    )
+
+
+def _say_how_good(*, default: bool) -> None:
+    """Print the command that tells how good the model is, and what to do where nobody chose its features."""
+    # In one line, so that it can be copied.
+    echo_as_it_is(f"how good    {command_line(_NOT_EVALUATED, 'evaluate')}")
+    if default:
+        echo_entry(
+            "choice", "classifier and features are the defaults; --choose finds those that suit the trials"
+        )
 
 
 def _made(

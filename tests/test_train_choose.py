@@ -1,0 +1,137 @@
+"""`graspsense train --choose`, as a user types it, on a store of recordings of another program."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from graspsense.cli.main import main
+
+MANIFEST = """\
+folder = "grasps"
+files = "{class}_{instance:d}_{order:d}.csv"
+label = "{class}"
+instance = "{class}#{instance}"
+time = "t [s]"
+gap = "gap [mm]"
+left = "left [N]"
+right = "right [N]"
+"""
+
+
+@pytest.fixture
+def run(capsys):
+    def run(*arguments):
+        with pytest.raises(SystemExit) as ended:
+            main([str(one) for one in arguments])
+        out, err = capsys.readouterr()
+        return ended.value.code or 0, out, err
+
+    return run
+
+
+def squeeze(relaxes, rng):
+    """Return the lines of a squeeze to 10 N that is held for 1 s; the force of foam falls by a third meanwhile."""
+    t = np.arange(0.0, 2.0, 0.02)
+    x = np.interp(t, [0.3, 0.8, 2.0], [0.0, 4.0, 4.8])  # it creeps, so that no rest ends a replay
+    force = 2.5 * np.minimum(x, 4.0) * (
+        1.0 - relaxes * np.clip((t - 0.8) / 1.0, 0.0, 1.0)
+    ) + 0.02 * rng.normal(size=len(t))
+    gap = 40.0 - 10.0 * np.minimum(t, 0.3) - x + rng.normal() * 0.5
+    rows = zip(t.tolist(), gap.tolist(), force.tolist(), strict=True)
+    return "\n".join(["t,gap,left,right", *(f"{a:.3f},{b:.4f},{c:.4f},{c:.4f}" for a, b, c in rows)])
+
+
+@pytest.fixture
+def store(tmp_path, run):
+    """Twelve objects of two labels, each squeezed twice; only the course of the hold tells the labels apart."""
+    rng = np.random.default_rng(0)
+    (tmp_path / "grasps").mkdir()
+    for kind, relaxes in (("foam", 0.33), ("wood", 0.0)):
+        for instance in range(6):
+            for order in range(2):
+                file = tmp_path / "grasps" / f"{kind}_{instance}_{order}.csv"
+                file.write_text(squeeze(relaxes, rng) + "\n")
+    (tmp_path / "m.toml").write_text(MANIFEST)
+    code, _, err = run("import", tmp_path / "m.toml", "--save", tmp_path / "store")
+    assert code == 0, err
+    return tmp_path / "store"
+
+
+def runs(run, store, pipeline):
+    code, out, err = run(
+        "run", "--pipeline", pipeline, "--gripper", "replay", "-o", f"gripper.recording=store:{store}#1"
+    )
+    assert code == 0, err
+    assert "prediction  foam" in out
+    # Other settings than those of the training would be told.
+    assert "warning" not in out
+
+
+@pytest.mark.slow
+def test_among_all_candidates_one_that_knows_the_hold_is_chosen(run, store, tmp_path):
+    code, out, err = run("train", store, "--choose", "--out", tmp_path / "own.json", "--json")
+    assert code == 0, err
+    found = json.loads(out)["choice"]
+
+    assert found["rate"]["rate"] >= 0.9
+    assert found["rate"]["instances"] == 12
+    candidates = {(one["classifier"], one["features"]) for one in found["ranking"]["candidates"]}
+    assert ("extra-trees", "union") in candidates
+    assert len(candidates) >= 24
+    runs(run, store, tmp_path / "own.toml")
+
+
+@pytest.mark.parametrize(
+    "fixed",
+    [
+        ("--classifier", "knn"),
+        ("--classifier", "extra-trees", "-o", "classifier.trees=10", "-o", "features.type=union"),
+    ],
+)
+def test_what_is_written_runs_on_a_recording(run, store, tmp_path, fixed):
+    code, out, err = run("train", store, "--choose", *fixed, "--out", tmp_path / "own.json")
+
+    assert code == 0, err
+    assert f"--pipeline {tmp_path / 'own.toml'}" in out
+    assert "the whole procedure by instance_held_out" in " ".join(out.split())
+    runs(run, store, tmp_path / "own.toml")
+
+
+def test_a_component_that_is_given_stays_and_files_are_not_replaced(run, store, tmp_path):
+    given = ("train", store, "--choose", "-o", "features.type=chitta", "--classifier", "knn")
+    code, out, err = run(*given, "--out", tmp_path / "own.json", "--json")
+    assert code == 0, err
+    candidates = json.loads(out)["choice"]["ranking"]["candidates"]
+
+    assert [(one["classifier"], one["features"]) for one in candidates] == [("knn", "chitta")]
+    (tmp_path / "own.json").unlink()
+    code, _, err = run(*given, "--out", tmp_path / "own.json")
+    assert code == 2
+    assert "own.toml" in err
+
+
+def test_a_table_has_its_features_and_gets_no_pipeline(run, tmp_path):
+    rng = np.random.default_rng(0)
+    lines = ["what,thing,f [N]"]
+    lines += [f"l{k % 2},l{k % 2}#{k % 12},{k % 2 + 0.1 * rng.normal():.4f}" for k in range(48)]
+    (tmp_path / "t.csv").write_text("\n".join(lines) + "\n")
+    code, out, err = run(
+        "train", tmp_path / "t.csv", "--label", "what", "--instance", "thing", "--choose", "--classifier", "c45",
+        "--out", tmp_path / "own.json", "--json",
+    )  # fmt: skip
+    assert code == 0, err
+
+    assert json.loads(out)["choice"]["rate"]["correct"] >= 46
+    assert not (tmp_path / "own.toml").exists()
+
+
+@pytest.mark.parametrize("option", [("--checkpoints", "0.1"), ("--target-value", "fill")])
+def test_options_that_do_not_go_with_it(run, store, tmp_path, option):
+    code, _, err = run("train", store, "--choose", *option, "--out", tmp_path / "own.json")
+
+    assert code == 2
+    assert "--choose" in err
+    assert not (tmp_path / "own.json").exists()
