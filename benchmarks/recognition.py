@@ -8,7 +8,8 @@ forces over time, from the first sample to the last. For that, SOURCE is a store
 `simulated`. With `--aeon-python`, the Python of an environment with aeon, MultiRocket-Hydra is among them.
 
 Prints a table for each source as Markdown. For several sources, the mean over them follows, with the difference from
-the best of the others and its 95 % interval: Student's t over the sources.
+the best of the others and its 95 % interval: Student's t over the sources. `--mean FILE` prints that for the tables in
+a file.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -32,14 +34,12 @@ from graspsense.cli.compare import compare, compared_trials
 from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import learner_of
 from graspsense.core.components.config import resolve
-from graspsense.core.learn.copies import without_copies
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.values.trace import Trace
 from graspsense.evaluation.intervals import percentage, percentages
-from graspsense.evaluation.ranking import BEFORE_CONTACT, OutsideAnswers, Ranking, protocols_of, rank
+from graspsense.evaluation.ranking import OutsideAnswers, Ranking, protocols_of, rank
 from graspsense.recording.reader import read_recorded
 from graspsense.sources.trial_source import STORE, TrialSource, labelled_trials
-from graspsense.store.dataset import labelled_store
 from graspsense.store.store import COUNTS, Store
 
 CLASSIFIERS = "c45,svm,forest"
@@ -83,16 +83,20 @@ def whole_curves(source: str, asked: dict[str, Any], trials: Labelled) -> np.nda
 
     A channel that was not recorded, or that repeats another one, is left out.
     """
+    traces: list[Trace] = []
     if source.startswith(STORE):
-        folder = source.removeprefix(STORE)
-        with Store.read(folder) as store:
-            query = f"SELECT recording FROM trial WHERE {COUNTS} AND label IS NOT NULL ORDER BY id"
-            traces = [read_recorded(store.recording_path(path)).trace() for (path,) in store.query(query)]
-        every = labelled_store(folder, [f"features.type={asked['feature_sets'].split(',')[0]}"])
+        with Store.read(source.removeprefix(STORE)) as store:
+            query = f"SELECT recording, label FROM trial WHERE {COUNTS} AND label IS NOT NULL ORDER BY id"
+            rows = store.query(query)
+            labels = tuple(label for _, label in rows)
+            if labels != trials.labels:
+                raise SystemExit(
+                    f"{source}: some recordings are copies or cannot be read; set them aside first"
+                )
+            traces = [read_recorded(store.recording_path(path)).trace() for path, _ in rows]
     elif source == "simulated":
-        traces = []
         settings = resolve("default", options=("classifier.type=c45",))
-        every = labelled_trials(
+        labelled_trials(
             TrialSource(source=source, instances=asked["instances"], trials=asked["trials"]),
             settings=lambda: settings,
             features=settings.features.create,
@@ -103,13 +107,6 @@ def whole_curves(source: str, asked: dict[str, Any], trials: Labelled) -> np.nda
         raise SystemExit(
             f"{source}: the recordings are read from a store: graspsense import {source} --save DIR"
         )
-    if len(every) != len(traces):
-        raise SystemExit(f"{source}: {len(traces)} recordings for {len(every)} trials")
-    kept = without_copies(every)
-    if len(kept) != len(every):
-        raise SystemExit(f"{source}: {len(every) - len(kept)} trials are copies; set them aside first")
-    if every.labels != trials.labels:
-        raise SystemExit(f"{source}: the recordings are not those of the trials")
     return sampled([curve_of(trace) for trace in traces])
 
 
@@ -184,33 +181,25 @@ def markdown(ranking: Ranking) -> str:
     return "\n".join([*lines, "", *(f"- {note}" for note in ranking.notes)])
 
 
-def mean_over(rankings: Sequence[Ranking]) -> str:
-    """Return a table of the candidates by their mean over the sources, with the difference from the best of others."""
+def mean_over(text: str) -> str:
+    """Return a table of the means over the tables in a text, with the differences from the best of the others."""
+    sources = re.findall(r"^\d+ (?:\w+:)?(\S+), compared by", text, re.MULTILINE)
     rates: dict[str, list[float]] = {}
-    others = set()
-    for ranking in rankings:
-        for one in ranking.candidates:
-            if one.features != BEFORE_CONTACT:
-                rates.setdefault(one.name, []).append(100.0 * one.rates[ranking.protocol].rate)
-                if one.sets is None:
-                    others.add(one.name)
-    complete = {name: np.array(of) for name, of in rates.items() if len(of) == len(rankings)}
-    best = max(others & set(complete), key=lambda name: complete[name].mean())
-    sources = [
-        Path(ranking.source).name.partition(":")[2] or Path(ranking.source).name for ranking in rankings
-    ]
+    for name, features, rate in re.findall(r"^\| (\S[^|]*) \| ([^|]+) \| ([0-9.]+) %", text, re.MULTILINE):
+        rates.setdefault(f"{name} with {features}", []).append(float(rate))
+    complete = {name: np.array(of) for name, of in rates.items() if len(of) == len(sources)}
+    others = [name for name in complete if name.endswith(CURVES)]
+    best = max(others, key=lambda name: complete[name].mean())
     lines = [
-        f"Mean over {len(rankings)} sources, and the difference from {best} in points (95 %):",
-        "",
-        f"| candidate | {' | '.join(sources)} | mean | difference |",
+        f"| candidate | {' | '.join(Path(source).name for source in sources)} | mean | difference from {best} |",
         "|" + "---|" * (len(sources) + 3),
     ]
     for name, of in sorted(complete.items(), key=lambda one: -one[1].mean()):
-        difference = of - complete[best]
-        half = stats.t.ppf(0.975, len(of) - 1) * difference.std(ddof=1) / np.sqrt(len(of))
-        middle = difference.mean()
-        words = "" if name == best else f"{middle:+.1f} ({middle - half:+.1f} to {middle + half:+.1f})"
-        lines.append(f"| {name} | {' | '.join(f'{one:.1f}' for one in of)} | {of.mean():.1f} | {words} |")
+        apart = of - complete[best]
+        half = stats.t.ppf(0.975, len(of) - 1) * apart.std(ddof=1) / np.sqrt(len(of))
+        words = f"{apart.mean():+.1f} ({apart.mean() - half:+.1f} to {apart.mean() + half:+.1f})"
+        cells = [name, *(f"{rate:.1f}" for rate in of), f"{of.mean():.1f}", "" if name == best else words]
+        lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines)
 
 
@@ -222,14 +211,20 @@ def main() -> None:
     )
     parser.add_argument("--aeon-python", metavar="PATH", help="the Python of an environment with aeon")
     parser.add_argument("--short", action="store_true", help="least work, only to show that it runs")
+    parser.add_argument(
+        "--mean", metavar="FILE", help="print the mean over the tables in this file, nothing else"
+    )
     given, options = parser.parse_known_args(words[len(sources) :])
+    if given.mean:
+        print(mean_over(Path(given.mean).read_text(encoding="utf-8")))
+        return
     options += SHORT if given.short else ()
-    rankings = []
+    tables = []
     for source in sources or ["simulated"]:
-        rankings.append(measured(source, given, options))
-        print(markdown(rankings[-1]), end="\n\n", flush=True)
-    if len(rankings) > 1:
-        print(mean_over(rankings))
+        tables.append(markdown(measured(source, given, options)))
+        print(tables[-1], end="\n\n", flush=True)
+    if len(tables) > 1:
+        print(mean_over("\n".join(tables)))
 
 
 if __name__ == "__main__":
