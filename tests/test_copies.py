@@ -176,3 +176,11 @@ def test_a_damaged_recording_and_its_recovered_copy_are_one_trial(tmp_path, caps
     trials = load_trials(f"store:{folder}")
     assert len(trials) == 2
     assert copies_said(trials)
+
+
+def test_equal_features_of_recordings_that_were_compared_and_differ_are_no_copies():
+    """A feature that hardly varies, such as the gap at the contact of presses that begin alike, makes no copies."""
+    values = [[0.018499999999999999, np.nan]] * 4 + [[0.019000000000000003, np.nan]] * 4
+    found = without_copies(labelled(values, content=tuple("abcdefgh")))
+    assert len(found) == 8
+    assert len(without_copies(labelled(values, content=tuple("aaaaefgh")))) == 5

@@ -43,6 +43,8 @@ UNIT_WORDS: Final = {
 TO_S: Final = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 _LONGEST_STEP_S: Final = 0.25
 """The time between the samples of a grasp, where no unit is stated."""
+_EVEN, _MOSTLY = 0.2, 0.9
+"""Deviation of a step from the median, as a share of it, and the share of the steps that are within, for a time."""
 EFFORT_WORDS: Final = frozenset(("effort", "eff", "torque", "current"))
 _SIDES: Final = (("left", "right"), ("l", "r"))
 _FEWEST_CELLS: Final = 4
@@ -97,7 +99,19 @@ def time_column(table: ColumnTable) -> str | None:
     named = [name for name in rising if TIME_WORDS & set(words_of(name))]
     states = [name for name in rising if table.units.get(name, "").lower() in UNIT_WORDS["time"]]
     units = [name for name in rising if set(words_of(name)) & {"ms", "us", "ns", "sec"}]
-    return next(iter((*states, *named, *units)), None)
+    return next(iter((*states, *named, *units, *_evenly_rising(table, rising))), None)
+
+
+def _evenly_rising(table: ColumnTable, rising: Sequence[str]) -> list[str]:
+    """Return the columns without a name that rise by nearly equal steps, those with fractions first; no counters."""
+    found = []
+    for name in rising:
+        steps = np.diff(table.numbers[name])
+        step = float(np.median(steps))
+        even = bool(np.mean(np.abs(steps - step) <= _EVEN * step) > _MOSTLY) and step != 1.0
+        if even and re.fullmatch(r"c\d+", name):
+            found.append(name)
+    return sorted(found, key=lambda name: bool((table.numbers[name] == np.round(table.numbers[name])).all()))
 
 
 def force_columns(table: ColumnTable, time: str | None) -> tuple[str, ...]:

@@ -102,7 +102,11 @@ def _originals(table: FeatureTable, content: Sequence[str] | None) -> tuple[NDAr
         parents = [by_content.setdefault(text, i) if text else i for i, text in enumerate(content)]
     by_row: dict[bytes, int] = {}
     equal = [by_row.setdefault(row.tobytes(), i) if known[i].any() else i for i, row in enumerate(values)]
-    repeated = [i for i, k in enumerate(equal) if _root(parents, i) != _root(parents, k)]
+    repeated = [
+        i
+        for i, k in enumerate(equal)
+        if _root(parents, i) != _root(parents, k) and not _known_to_differ(content, i, k)
+    ]
     sure: list[int] = []
     if repeated:
         distinct = values[np.unique(equal)]
@@ -115,6 +119,11 @@ def _originals(table: FeatureTable, content: Sequence[str] | None) -> tuple[NDAr
         parents[_root(parents, i)] = _root(parents, equal[i])
     families = [_root(parents, i) for i in range(len(parents))]
     return _best_of(families, known.sum(axis=1).tolist()), len(repeated) - len(sure)
+
+
+def _known_to_differ(content: Sequence[str] | None, i: int, k: int) -> bool:
+    """Return whether two recordings were compared and are different, so that equal features are chance."""
+    return content is not None and content[i] != "" and content[k] != "" and content[i] != content[k]
 
 
 def _root(parents: list[int], i: int) -> int:

@@ -25,10 +25,12 @@ from graspsense.sources.column_guess import Guess, guesses
 from graspsense.sources.manifest.array_format import (
     ARRAY_SUFFIXES,
     COLUMN,
+    GRASP,
     ArrayRules,
     arrays_in,
     read_arrays,
 )
+from graspsense.sources.manifest.description import TIME
 from graspsense.sources.manifest.files import tree_below
 from graspsense.sources.manifest.raw_tables import BAG_SUFFIXES, PARQUET_SUFFIXES, TEXT_SUFFIXES, raw_tables
 from graspsense.sources.manifest.table import ColumnTable
@@ -59,6 +61,8 @@ _PARTS: Final = frozenset(
     ]
 )
 _MOST_LABELS: Final = 100
+_ALIKE: Final = 3
+"""Most arrays of a file with the same name but for its number that are not taken for grasps."""
 _FEW: Final = 6
 """Most values of a number that is a label."""
 
@@ -94,8 +98,13 @@ def suggested_manifest(folder: Path, place: Path) -> Suggestion:
     table, about = _table_of(example)
     lines += about
     divided = [guess.key for guess in about]
-    if not divided and _is_of_readings(table):  # the rows tell what was grasped
-        lines[-1] = evolve(lines[-1], value=lines[-1].value.replace("{label}", "{part}"))
+    if _LABELS & _fields_of(about) or (not divided and _is_of_readings(table)):
+        # Arrays or rows tell what was grasped.
+        lines = [
+            evolve(one, value=one.value.replace("{label}", "{part}")) if one.key == "files" else one
+            for one in lines
+        ]
+        fields -= {"label"}
     lines += _label(fields | _fields_of(about), table, divided)
     of_rows = any(guess.value == "rows" for guess in lines)
     lines += [guess for guess in guesses(table) if not (of_rows and guess.key == "rate_hz")]
@@ -135,6 +144,8 @@ def _pattern(names: Sequence[str]) -> tuple[str, set[str], str]:
         wanted = {"text": "part", "number": "order", "stamp": "recorded"}[what]
         if values is label:
             wanted = "label"
+        elif what == "number" and label is None and "object" not in taken and _repeats(values):
+            wanted = "object"  # folders that have several files each
         elif (
             what == "number"
             and label is not None
@@ -148,6 +159,11 @@ def _pattern(names: Sequence[str]) -> tuple[str, set[str], str]:
     if len(names) == 1:
         check = "the only file of its kind"
     return written, taken, check
+
+
+def _repeats(values: Sequence[str]) -> bool:
+    """Return whether each of several values stands in several paths."""
+    return len(set(values)) > 1 and min(Counter(values).values()) > 1
 
 
 def _label_values(pieces: Sequence[tuple[str, Sequence[str]]]) -> Sequence[str] | None:
@@ -196,12 +212,13 @@ def _table_of(path: Path) -> tuple[ColumnTable, list[Guess]]:
             )
             return read_text(path, start[0])[0], [Guess(key="start", value=start[0], check=check)]
     if path.suffix.lower() in ARRAY_SUFFIXES:
-        pattern = _array_pattern(path)
+        pattern, shape = _array_pattern(path)
         if pattern:
-            rules = ArrayRules(pattern=pattern)
-            return read_arrays(path, rules)[0], [
-                Guess(key="arrays", value=pattern, check="the names of the arrays")
-            ]
+            lines = [Guess(key="arrays", value=pattern, check="the names of the arrays")]
+            axes = _axes(shape)
+            if axes:
+                lines.append(Guess(key="axes", value=", ".join(axes), check=f"what the axes of {shape} are"))
+            return read_arrays(path, ArrayRules(pattern=pattern, axes=axes))[0], lines
     if path.is_dir() or path.suffix.lower() in BAG_SUFFIXES:
         from graspsense.sources.manifest.ros_format import read_bag
 
@@ -233,25 +250,42 @@ def _start(path: Path) -> tuple[str, int] | None:
     return ",".join(written), len(begins)
 
 
-def _array_pattern(path: Path) -> str:
-    """Return the pattern of the names of many arrays that are alike, empty if they are not."""
+def _array_pattern(path: Path) -> tuple[str, tuple[int, ...]]:
+    """Return the pattern of the names of many arrays that are alike, empty if they are not, and the shape of one."""
     with readable(path):
-        names = [name for name, array in arrays_in(path).items() if array.size > 1]
-    numbered = [name for name in names if re.search(r"\d+", name)]
+        arrays = {name: array for name, array in arrays_in(path).items() if array.size > 1}
     shapes: dict[str, list[str]] = {}
-    for name in numbered:
-        shapes.setdefault(re.sub(r"\d+", "#", name), []).append(name)
-    many = {shape: found for shape, found in shapes.items() if len(found) > 3 and shape.count("#") == 1}
+    for name in arrays:
+        if re.search(r"\d+", name):
+            shapes.setdefault(re.sub(r"\d+", "#", name), []).append(name)
+    many = {shape: found for shape, found in shapes.items() if len(found) > _ALIKE}
     if not many:
-        return ""
+        return "", ()
+    most = max(many, key=lambda shape: len(many[shape]))
+    shape = arrays[many[most][0]].shape
+    if most.count("#") > 1:
+        names = ("object", *(f"number{k}" for k in range(2, most.count("#") + 1)))
+        pieces = most.split("#")
+        return pieces[0] + "".join(f"{{{a}:d}}{b}" for a, b in zip(names, pieces[1:], strict=True)), shape
+    many = {shape: found for shape, found in many.items() if shape.count("#") == 1}
     ends = {shape.partition("#")[2] for shape in many}
     starts = {shape.partition("#")[0] for shape in many}
     signs = {one[-1:] for one in starts}
     start = f"{{label}}{signs.pop()}" if signs in ({"_"}, {"/"}, {"."}) else "{label}"
     if len(ends) == 1:
-        return f"{start}{{order:d}}{ends.pop()}"
+        return f"{start}{{order:d}}{ends.pop()}", shape
     signs = {one[:1] for one in ends}
-    return f"{start}{{order:d}}{signs.pop()}{{{COLUMN}}}" if signs in ({"_"}, {"/"}, {"."}) else ""
+    pattern = f"{start}{{order:d}}{signs.pop()}{{{COLUMN}}}" if signs in ({"_"}, {"/"}, {"."}) else ""
+    return pattern, shape
+
+
+def _axes(shape: Sequence[int]) -> tuple[str, ...]:
+    """Return what the axes of an array of three dimensions likely are: the longest is the time, the shortest grasps."""
+    if len(shape) != 3:
+        return ()
+    ordered = sorted(range(3), key=lambda k: shape[k])
+    names = dict(zip(ordered, (GRASP, COLUMN, TIME), strict=True))
+    return tuple(names[k] for k in range(3))
 
 
 def _fields_of(lines: Sequence[Guess]) -> set[str]:
