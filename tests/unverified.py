@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.accuracy.propose import grip_of, propose
 from graspsense_sim_gripper.run.build import build, instantiate, problem_of
@@ -13,3 +15,15 @@ def unverified_setup(config: SimConfig, scene: str | ObjectSpec, seed: int) -> G
     problem = build(config, scene) if isinstance(scene, str) else problem_of(config, scene)
     reduction = None if problem.spec is None else propose(problem, grip_of(problem))
     return instantiate(problem, reduction, seed)
+
+
+def sample(spec: ObjectSpec, seed: int | None, number: int | None = None) -> SimpleNamespace:
+    """Return the instance that a seed draws, or that with this number; `seed` None: the nominal one."""
+    setup = instantiate(problem_of(SimConfig(spread=seed is not None), spec, number), None, seed or 0)
+    return SimpleNamespace(
+        width_m=setup.plant.object.width_m,
+        offset_m=setup.state.contact.offset_m,
+        share=setup.sensor.share,
+        terms=setup.terms,
+        spec=spec,
+    )

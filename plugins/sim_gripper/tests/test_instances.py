@@ -1,9 +1,8 @@
 from __future__ import annotations
 
-import numpy as np
 import pytest
 from attrs import evolve
-from unverified import unverified_setup
+from unverified import sample, unverified_setup
 
 from graspsense.core.values.errors import UnknownName
 from graspsense.plugin_api import RunConfig, create
@@ -12,13 +11,12 @@ from graspsense_sim_gripper.plant.sensing import with_listed_cells
 from graspsense_sim_gripper.run.accuracy.select import select
 from graspsense_sim_gripper.run.build import build
 from graspsense_sim_gripper.run.problem import GraspController
-from graspsense_sim_gripper.scene.instance import sample
 from graspsense_sim_gripper.scene.library import find, split_number
 
 
 def drawn(name, seed):
     plain, number = split_number(name)
-    return sample(find(plain), np.random.default_rng(seed), number)
+    return sample(find(plain), seed, number)
 
 
 def test_a_numbered_thing_is_the_same_in_every_trial_and_state_but_placed_anew():

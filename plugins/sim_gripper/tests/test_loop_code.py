@@ -11,8 +11,8 @@ from graspsense_sim_gripper.plant.sensing import PadBuffers
 from graspsense_sim_gripper.run.compiled.loop_code import (
     FIRST_IMAGES,
     IMAGES_AT_ONCE,
+    NO_NOISE,
     CellNoise,
-    no_noise,
     stored_grasp,
 )
 from graspsense_sim_gripper.run.loop import Buffers
@@ -49,9 +49,9 @@ def run(wanted, *, first=0, is_drawn=1):
         "grasp": grasp,
         "tuples_of": lambda *given: ((), state_after(first, ended=0)),
         "store_numbers": lambda array, values: None,
-        "draw_normals": lambda words, tables, row: drawn.append(row),
+        "draw_image_noise": lambda key, image, row: drawn.append(row),
     }
-    noise = CellNoise(is_drawn, *no_noise()[1:])
+    noise = CellNoise(is_drawn, NO_NOISE.key)
     pads = PadBuffers(np.zeros(1), np.zeros(1), np.zeros((MOST, 2)), images)
     buffers = Buffers(pads, np.zeros(MOST), np.zeros((1, 1)), np.zeros(1))
     done = bind(stored_grasp, **parts)((), None, (), buffers, noise, None)

@@ -11,7 +11,7 @@ from textwrap import dedent
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from unverified import unverified_setup
+from unverified import sample, unverified_setup
 
 from graspsense.cli.main import cli
 from graspsense.core.components.run_config import RunConfig
@@ -21,7 +21,6 @@ from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.backend import SimBackend
 from graspsense_sim_gripper.run.batch import run_many
 from graspsense_sim_gripper.run.compiled.compose import plant_move
-from graspsense_sim_gripper.scene.instance import sample
 from graspsense_sim_gripper.scene.library import find, shipped_scenes, split_number
 from graspsense_sim_gripper.scene.terms.registry import laws_of
 
@@ -109,14 +108,14 @@ spread = { force_n = 0.3 }
 
 def test_a_parameter_with_a_spread_varies_between_instances_and_alone():
     spec, without = find(SPREAD), find(SPREAD.replace("spread = { force_n = 0.3 }", ""))
-    forces = [sample(spec, np.random.default_rng(seed)).terms[1].force_n for seed in range(2000)]
+    forces = [sample(spec, seed).terms[1].force_n for seed in range(2000)]
     assert np.std(np.log(forces)) == pytest.approx(0.3, rel=0.05)
     assert np.median(forces) == pytest.approx(6.0, rel=0.05)
     assert sample(spec, None).terms[1].force_n == 6.0
-    one, other = (sample(each, np.random.default_rng(7), 3) for each in (spec, without))
+    one, other = (sample(each, 7, 3) for each in (spec, without))
     assert (one.width_m, one.offset_m, one.terms[0]) == (other.width_m, other.offset_m, other.terms[0])
     # A numbered instance is the same in every trial.
-    assert sample(spec, np.random.default_rng(8), 3).terms == one.terms != sample(spec, None).terms
+    assert sample(spec, 8, 3).terms == one.terms != sample(spec, None).terms
 
 
 @pytest.mark.parametrize(

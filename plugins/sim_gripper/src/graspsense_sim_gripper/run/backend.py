@@ -151,10 +151,8 @@ class SimBackend(BatchBackend[SimConfig]):
         self._state, self._sensor = setup.state, setup.sensor_state
         self._ticks = 0
         zero = (CELL_OFFSET[0],) * CELLS
-        self._noise = setup.noise()
         self._buffers = PadBuffers(zero, zero, [], [])
         self._palm, self._palm_state = setup.palm, setup.palm_state
-        self._palm_noise = setup.palm_noise() if setup.has_palm else None
         self._palm_buffers = PalmBuffers([], ())
         self._pads = no_pads(CELLS)
         self._effort_n: float | None = None
@@ -223,8 +221,8 @@ class SimBackend(BatchBackend[SimConfig]):
     def _further_signals(self, frame: Frame) -> PalmSignals:
         """Return the samples of the palm in this tick."""
         noise = self._palm_buffers.noise
-        if self._palm_noise is not None and self._ticks >= len(noise):
-            noise.extend(self._palm_noise(NOISE_TICKS).tolist())
+        if self._ticks >= len(noise):
+            noise.extend(self._setup.palm_noise(len(noise), NOISE_TICKS).tolist())
         signals, self._palm_state = palm_signals(
             self._palm, self._palm_state, self._state, frame.t_s, frame.dt_s, self._ticks, self._palm_buffers
         )
@@ -290,7 +288,7 @@ class SimBackend(BatchBackend[SimConfig]):
     def _draw_noise(self) -> None:
         """Draw the noise of the next images, and extend the buffer of images by as many."""
         noise, images = self._buffers.noise, self._buffers.images
-        noise.extend(self._noise.standard_normal((IMAGES_PER_BLOCK, 2 * CELLS)).tolist())
+        noise.extend(self._setup.noise(len(noise), IMAGES_PER_BLOCK).tolist())
         images.extend(([0.0] * CELLS, [0.0] * CELLS) for _ in range(len(noise) - len(images)))
 
     def variants(self) -> tuple[SimulationVariant, ...]:

@@ -24,9 +24,9 @@ from graspsense.plugin_api import (
 )
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant.contact import ObjectModel, PadCompliance
-from graspsense_sim_gripper.plant.drive import Drive, Friction, FrictionSpread, drawn_friction
+from graspsense_sim_gripper.plant.drive import Drive, Friction
 from graspsense_sim_gripper.plant.drive_models import LINKAGES, STRAIGHT
-from graspsense_sim_gripper.plant.fingertip import CELL_OFFSET, CELLS, cell_offset
+from graspsense_sim_gripper.plant.fingertip import CELL_OFFSET, CELLS
 from graspsense_sim_gripper.plant.palm import AT_REST, palm_params
 from graspsense_sim_gripper.plant.sensing import (
     ImageClock,
@@ -39,12 +39,20 @@ from graspsense_sim_gripper.plant.state import Contact, ContactState, Motion, Pl
 from graspsense_sim_gripper.run.accuracy.levels import step_tolerance
 from graspsense_sim_gripper.run.accuracy.model import Reduction
 from graspsense_sim_gripper.run.compiled.compose import all_active, uncompressed
+from graspsense_sim_gripper.run.drawing import (
+    NO_NUMBER,
+    CellArrays,
+    Drawn,
+    draw_buffers,
+    draw_grasp,
+    scene_numbers,
+)
 from graspsense_sim_gripper.run.problem import GraspSetup, Problem
-from graspsense_sim_gripper.scene.instance import PAD_CELLS, Instance, cell_weights, present_cells, sample
+from graspsense_sim_gripper.scene.instance import PAD_CELLS, Instance, draws_of_number, instance_of
 from graspsense_sim_gripper.scene.library import find, split_number
-from graspsense_sim_gripper.scene.random_numbers import Generator, GeneratorOf, NumpyGenerator
+from graspsense_sim_gripper.scene.random_numbers import key_of
 from graspsense_sim_gripper.scene.scaled import ScaledParameter
-from graspsense_sim_gripper.scene.spec import PATCHES, ObjectSpec
+from graspsense_sim_gripper.scene.spec import ObjectSpec
 from graspsense_sim_gripper.solve.scheme import PlantParams, Steps
 
 EFFORT_LIMIT_N: Final = 100.0
@@ -105,7 +113,7 @@ def problem_of(config: SimConfig, spec: ObjectSpec | None, number: int | None = 
     model_config = _model_config(config, config.spread)
     nominal = None
     if spec is not None:
-        nominal = _setup(_model_config(config, False), sample(spec, None), 0, NumpyGenerator(0))
+        nominal = _setup(_model_config(config, False), spec, None, None)
         if number is not None:
             # A numbered instance differs from the nominal object, like the instances that a seed draws.
             model_config = _model_config(config, True)
@@ -132,58 +140,51 @@ def _examples(config: SimConfig, spec: ObjectSpec | None) -> tuple[GraspSetup, .
         return ()
     setups = []
     for seed in range(EXAMPLES):
-        rng = NumpyGenerator(seed)
-        instance = sample(spec, rng)
         with suppress(ConfigError):
-            check_fit(config, spec, instance.width_m, instance.offset_m)
-            setups.append(_setup(config, instance, seed, rng))
+            setups.append(_setup(config, spec, None, seed))
     return tuple(setups)
 
 
-def instantiate(
-    problem: Problem,
-    reduction: Reduction | None,
-    seed: int,
-    generator_of: GeneratorOf = NumpyGenerator,
-) -> GraspSetup:
+def instantiate(problem: Problem, reduction: Reduction | None, seed: int) -> GraspSetup:
     """Return the grasp with this seed, of an instance; `reduction` None: in steps that are not chosen for it.
 
-    `generator_of`: draws all that the seed gives.
-
-    Raises ConfigError for an object of a scene file that the open fingers would cut into.
+    Raises ConfigError for an object of a scene file that the open fingers would cut into, and ValueError for a seed
+    that is negative or has more than 64 bits.
     """
-    rng = generator_of(seed)
-    instance = _instance(problem, rng)
-    if instance is not None:
-        check_fit(problem.config, instance.spec, instance.width_m, instance.offset_m)
-    return _setup(problem.config, instance, seed, rng, reduction)
+    return _setup(problem.config, problem.spec, problem.number, seed, reduction)
 
 
 def example_of(problem: Problem, reduction: Reduction | None) -> GraspSetup:
-    """Return any grasp of a scene, for what all of them have in common; it may not fit between the fingers."""
-    rng = NumpyGenerator(0)
-    return _setup(problem.config, _instance(problem, rng), 0, rng, reduction)
+    """Return a grasp of the nominal object, for what all grasps of a scene have in common.
 
-
-def _instance(problem: Problem, rng: Generator) -> Instance | None:
-    """Return the instance that `rng` draws; None if there is no object."""
-    if problem.spec is None:
-        return None
-    return sample(problem.spec, rng if problem.config.spread else None, problem.number)
+    It may not fit between the fingers, and its cells measure nothing.
+    """
+    return _setup(problem.config, problem.spec, problem.number, None, reduction)
 
 
 def _setup(
     config: SimConfig,
-    instance: Instance | None,
-    seed: int,
-    rng: Generator,
+    spec: ObjectSpec | None,
+    number: int | None,
+    seed: int | None,
     reduction: Reduction | None = None,
 ) -> GraspSetup:
-    """Return the grasp of an instance; `reduction` None: in steps that are not chosen for it."""
-    plant, state = _plant(config, instance, rng)
+    """Return the grasp with a seed; `reduction` None: in steps that are not chosen for it.
+
+    `seed` None: that of the nominal object, without cells. Otherwise this raises as `check_fit` does.
+    """
+    scene = scene_numbers(config, spec)
+    if seed is None:
+        scene = scene._replace(varies=0, period_s=0.0)
+    buffers = draw_buffers(scene)
+    of_number = NO_NUMBER if number is None or spec is None else draws_of_number(spec, number)
+    drawn = draw_grasp(scene, key_of(seed or 0), of_number, buffers)
+    instance = None if spec is None else instance_of(spec, drawn.placement, buffers.params)
+    if instance is not None and seed is not None:
+        check_fit(config, instance.spec, instance.width_m, instance.offset_m)
+    plant, state = _plant(config, instance, drawn)
     if instance is not None and reduction is not None:
         plant = reduction.applied_to(plant)
-    sensor = _sensor(config, instance, rng)
     palm: dict[str, Any] = {}
     if config.acceleration:
         params = palm_params(_linkage(config), 1.0 / config.rate_hz, ideal=config.sensor == "ideal")
@@ -193,11 +194,10 @@ def _setup(
         terms=instance.terms if instance else (),
         plant=plant,
         state=state,
-        sensor=sensor,
+        sensor=_sensor(config, 1.0 if instance is None else instance.share, drawn, buffers.cells),
         sensor_state=_gripper(config).sensor_state,
         dt_s=1.0 / config.rate_hz,
-        seed=seed,
-        rng=rng,
+        seed=seed or 0,
         **palm,
     )
 
@@ -220,19 +220,11 @@ def check_fit(config: SimConfig, spec: ObjectSpec, width_m: float, offset_m: flo
         )
 
 
-def _plant(config: SimConfig, instance: Instance | None, rng: Generator) -> tuple[PlantParams, PlantState]:
-    """Return the parameters of the plant, and its state before the grasp: open, at rest, without contact.
-
-    With spread, the Coulomb friction of the trial is drawn here.
-    """
+def _plant(config: SimConfig, instance: Instance | None, drawn: Drawn) -> tuple[PlantParams, PlantState]:
+    """Return the parameters of the plant, and its state before the grasp: open, at rest, without contact."""
     gripper = _gripper(config)
-    drive = gripper.drive
-    if config.spread:
-        # `_replace` would take several times as long.
-        link, inertia, (_, _, *rest), closed_rev, open_rev, lag_s = drive
-        drawn = drawn_friction(friction_spread(config), float(rng.standard_normal(1)[0]))
-        friction = Friction(*drawn, *rest)
-        drive = Drive(link, inertia, friction, closed_rev, open_rev, lag_s)
+    friction = gripper.drive.friction._replace(coulomb_n=drawn.coulomb_n, breakaway_n=drawn.breakaway_n)
+    drive = gripper.drive._replace(friction=friction)
     if instance is None:
         # A negative width: the fingers close without touching anything.
         model = ObjectModel(-1.0, 0.0, gripper.pads, all_active(()))
@@ -249,11 +241,6 @@ def _plant(config: SimConfig, instance: Instance | None, rng: Generator) -> tupl
     right = (at_rest,) if model.held == 1 else ()
     state = PlantState(gripper.motion, Contact(0.0, 0.0, offset, 0, at_rest, right))
     return PlantParams(drive, model, gripper.steps), state
-
-
-def friction_spread(config: SimConfig) -> FrictionSpread:
-    """Return how friction differs between the trials of these settings."""
-    return FrictionSpread(float(config.coulomb_n), float(config.coulomb_spread_n), float(config.breakaway_n))
 
 
 @lru_cache(maxsize=256)
@@ -321,25 +308,18 @@ def _inertia(config: SimConfig) -> float:
     return 4.0 * math.pi * math.pi * config.rotor_kg_m2
 
 
-def _sensor(config: SimConfig, instance: Instance | None, rng: Generator) -> SensorParams:
-    """Return the sensors of a grasp. The offsets of the cells and the time of the first image are drawn here."""
+def _sensor(config: SimConfig, share: float, drawn: Drawn, cells: CellArrays) -> SensorParams:
+    """Return the sensors of a grasp; `share`: that of the force which lands on the gripping faces."""
     period = float(config.pad_period_s)
     if config.sensor == "ideal":
         clock = ImageClock(0.0, period, 0.0)
         return SensorParams(1, _linkage(config), clock, 1.0, 0.0, IDEAL_CELLS, IDEAL_CELLS)
-    offsets = cell_offset(rng.standard_normal((2, CELLS)))
-    weights = list(EVEN_WEIGHTS)
-    if instance is not None:
-        cell_weights(PATCHES.index(instance.spec.patch), instance.patch_row, weights)
-    shares = np.array(weights)
-    if config.pad_cells < PAD_CELLS:
-        shares *= present_cells(config.pad_cells)
     return SensorParams(
         ideal=0,
         link=_linkage(config),
-        clock=ImageClock(rng.random() * period, period, float(config.pad_delay_s)),
-        share=float(instance.share) if instance else 1.0,
+        clock=ImageClock(drawn.image_phase_s, period, float(config.pad_delay_s)),
+        share=float(share),
         noise_counts=float(config.noise_counts),
-        left=PadCells(shares, offsets[0]),
-        right=PadCells(shares, offsets[1]),
+        left=PadCells(cells.weights, cells.left),
+        right=PadCells(cells.weights, cells.right),
     )

@@ -15,15 +15,14 @@ from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant.palm import NUMBERS
 from graspsense_sim_gripper.plant.sensing import SensorParams, SensorState
 from graspsense_sim_gripper.plant.state import PlantState
-from graspsense_sim_gripper.scene.random_numbers import Generator
+from graspsense_sim_gripper.run.drawing import image_noise
+from graspsense_sim_gripper.scene.random_numbers import PALM, key_of, normal_rows
 from graspsense_sim_gripper.scene.spec import ObjectSpec, TermParams
 from graspsense_sim_gripper.solve.scheme import PlantParams
 
 IMAGES_PER_BLOCK: Final = 64
 """Number of cell images whose noise is drawn at once where it is not known how many a grasp needs."""
 
-PalmNoise = Callable[[int], NDArray[np.float64]]
-"""Draws the noise of the palm in the next ticks: standard normal numbers (ticks, NUMBERS)."""
 ControllerStep = Callable[..., Any]
 """The step of a controller, with parameters and state of its own types."""
 
@@ -55,7 +54,7 @@ class GraspController:
 
 @frozen(kw_only=True)
 class GraspSetup:
-    """One grasp before it begins: parameters and initial states of plant and sensors, and the random generator."""
+    """One grasp before it begins: parameters and initial states of plant and sensors, and the seed."""
 
     kinds: tuple[str, ...]
     """The kinds of the object's terms."""
@@ -67,8 +66,6 @@ class GraspSetup:
     sensor_state: SensorState
     dt_s: float
     seed: int
-    rng: Generator
-    """The generator of the seed, after all of the above was drawn from it. The noise of the cells follows."""
     palm: Any = ()
     """`PalmParams` of a gripper with an accelerometer, otherwise ()."""
     palm_state: Any = ()
@@ -79,20 +76,13 @@ class GraspSetup:
         """Whether the gripper has an accelerometer."""
         return bool(self.palm)
 
-    def noise(self) -> Generator:
-        """Return a generator of the noise of the cell images: standard normal numbers, 2 CELLS for each image.
+    def noise(self, first: int, count: int) -> NDArray[np.float64]:
+        """Return the noise of the cell images from image `first` on: normal numbers (count, 2 CELLS)."""
+        return image_noise(key_of(self.seed), first, count)
 
-        Those of all calls give the same numbers.
-        """
-        return self.rng.copy()
-
-    def palm_noise(self) -> PalmNoise:
-        """Return a function that draws the noise of the palm in the next ticks, as many as it is asked for.
-
-        Its numbers are another stream of the same seed, so that all others are the same without an accelerometer.
-        """
-        rng = np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(0,)))
-        return lambda ticks: rng.standard_normal((ticks, NUMBERS))
+    def palm_noise(self, first: int, count: int) -> NDArray[np.float64]:
+        """Return the noise of the palm in the ticks from tick `first` on: normal numbers (count, NUMBERS)."""
+        return normal_rows(key_of(self.seed), PALM, first, count, NUMBERS)
 
 
 @frozen(kw_only=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 from collections.abc import Sequence
 from functools import cache, lru_cache
@@ -11,7 +12,7 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from graspsense_sim_gripper.scene.random_numbers import Generator
+from graspsense_sim_gripper.scene.random_numbers import OBJECT, draw_normals, key_of
 from graspsense_sim_gripper.scene.spec import (
     PATCHES,
     InstanceSpread,
@@ -60,24 +61,10 @@ class Instance:
     kinds: tuple[str, ...]
     terms: tuple[TermParams, ...]
     """The parameters of its terms."""
-    patch_row: float
-    """Position of the contact on the pad, in rows from its middle."""
 
 
-def sample(spec: ObjectSpec, rng: Generator | None, number: int | None = None) -> Instance:
-    """Return an instance that `rng` draws from the spreads of the spec; without `rng`, one with the nominal values.
-
-    With a number it is one particular object. Its stiffness, its width and the parameters with a spread of their own
-    then depend on the class and the number only, and are the same in every trial; `rng` draws its placement.
-    """
-    values, spread = spec.nominal_params, spec.spread
-    n_draws = N_COMMON_DRAWS + spec.n_own_spreads
-    draws = rng.standard_normal(n_draws).tolist() if rng is not None else [0.0] * n_draws
-    if rng is not None and number is not None:
-        take_number(draws, draws_of_number(spec, number))
-    params = [0.0] * len(values.value)
-    draw_params(values, spread.stiffness, draws, params)
-    placement = placed(spread, draws)
+def instance_of(spec: ObjectSpec, placement: Placement, params: Sequence[float]) -> Instance:
+    """Return the instance of an object with this placement and these parameters of all its terms."""
     terms = tuple([tuple.__new__(kind, params[begin:end]) for kind, begin, end in spec.params_of_terms])
     return Instance(
         spec=spec,
@@ -87,12 +74,14 @@ def sample(spec: ObjectSpec, rng: Generator | None, number: int | None = None) -
         table_n=spec.friction * spec.mass_kg * GRAVITY_M_S2,
         kinds=spec.kinds,
         terms=terms,
-        patch_row=placement.patch_row,
     )
 
 
 def take_number(draws: Any, of_number: Any) -> None:
-    """Replace the draws that decide which individual object it is by those of a number."""
+    """Replace the draws that decide which individual object it is by those of a number.
+
+    These are its stiffness, its width and the parameters with a spread of their own, the same in every trial.
+    """
     draws[0], draws[1] = of_number[0], of_number[1]
     for i in range(2, len(of_number)):
         draws[N_COMMON_DRAWS - 2 + i] = of_number[i]
@@ -147,8 +136,10 @@ def draws_of_number(spec: ObjectSpec, number: int) -> tuple[float, ...]:
 @lru_cache(maxsize=1024)
 def _draws_of_number(name: str, number: int, count: int) -> tuple[float, ...]:
     """Return the draws of the object with this number, of the class with this name."""
-    rng = np.random.default_rng([number, *name.encode()])
-    return tuple(rng.standard_normal(count).tolist())
+    digest = hashlib.blake2b(f"{name}#{number}".encode(), digest_size=8).digest()
+    draws = [0.0] * count
+    draw_normals(key_of(int.from_bytes(digest)), OBJECT, 0, count, draws)
+    return tuple(draws)
 
 
 def cell_weights(patch: int, row: float, weights: Any) -> None:

@@ -8,7 +8,13 @@ from importlib.util import find_spec
 from attrs import field, frozen
 
 from graspsense.plugin_api import ended_by_itself
-from graspsense_sim_gripper.run.batch.drawn import DrawMemory, DrawnInstances, DrawnScene, can_be_drawn
+from graspsense_sim_gripper.run.batch.drawn import (
+    Drawing,
+    DrawMemory,
+    DrawnInstances,
+    DrawnScene,
+    compiled_drawing,
+)
 from graspsense_sim_gripper.run.batch.job import (
     EndedGrasp,
     FinishedGrasp,
@@ -22,10 +28,10 @@ from graspsense_sim_gripper.run.batch.job import (
 )
 from graspsense_sim_gripper.run.batch.scenes import Scenes
 from graspsense_sim_gripper.run.compiled.compose import Composition
-from graspsense_sim_gripper.run.compiled.drawing import Drawing, compiled_drawing
-from graspsense_sim_gripper.run.compiled.loop_code import CompiledLoop, CompiledLoops
+from graspsense_sim_gripper.run.compiled.loop_code import CellNoise, CompiledLoop, CompiledLoops
 from graspsense_sim_gripper.run.compiled.padding import composition_of
 from graspsense_sim_gripper.run.loop import Buffers, Ending
+from graspsense_sim_gripper.scene.random_numbers import key_of
 from graspsense_sim_gripper.scene.terms.term import LAW_ERRORS
 
 
@@ -45,7 +51,7 @@ class CompiledGrasps:
     """Whether the loop of a composition is compiled."""
     storage: Storage = field(factory=Storage, init=False)
     _drawing: Drawing | None = field(init=False)
-    """None if numpy draws other numbers, or if nothing can be compiled."""
+    """None if nothing can be compiled."""
     _memory: dict[DrawnScene, DrawMemory] = field(factory=dict, init=False)
 
     @_drawing.default
@@ -62,7 +68,7 @@ class CompiledGrasps:
 
         Raises NotCompilable if it cannot be compiled, and otherwise as `Scenes.setup` does.
         """
-        instances = self.scenes.drawn(scene) if can_be_drawn(seed) else None
+        instances = self.scenes.drawn(scene)
         if instances is not None and self._drawing is not None:
             composition = instances.scene.composition
             if not self.is_compiled(composition):
@@ -87,12 +93,13 @@ class CompiledGrasps:
         if scene not in self._memory:
             self._memory[scene] = scene.memory()
         memory, buffers = self._memory[scene], self.storage.buffers
-        start = scene.drawn(drawing, seed, number, memory)
+        key = key_of(seed)
+        start = scene.drawn(drawing, key, number, memory)
         begin_images(buffers)
         try:
-            end = loop.run_from(start, buffers, drawing.noise_of(scene.scene, memory.buffers))
+            end = loop.run_from(start, buffers, CellNoise(int(scene.has_cells), key))
             while scene.has_cells and _needs_images(end.ending, buffers):
-                buffers = with_more_images(buffers, drawing.noise(memory.buffers))
+                buffers = with_more_images(buffers, key)
                 start = start.after(end)
                 end = loop.run_from(start, buffers)
         except LAW_ERRORS:

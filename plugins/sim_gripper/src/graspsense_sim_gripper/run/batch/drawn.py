@@ -6,26 +6,22 @@ bit as by `build.instantiate` (`test_a_drawn_grasp_is_that_of_the_seed`).
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
+from graspsense.plugin_api import CompileOptions, compile_function, entry_point
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant.sensing import PadCells
 from graspsense_sim_gripper.run.accuracy.model import Reduction
-from graspsense_sim_gripper.run.build import check_fit, friction_spread
+from graspsense_sim_gripper.run.binding import bind_reachable
+from graspsense_sim_gripper.run.build import check_fit
 from graspsense_sim_gripper.run.compiled.compose import Composition
-from graspsense_sim_gripper.run.compiled.drawing import (
-    NO_NUMBER,
-    DrawBuffers,
-    Drawing,
-    Places,
-    SceneNumbers,
-    draw_buffers,
-)
-from graspsense_sim_gripper.run.compiled.generator import LARGEST_SEED
+from graspsense_sim_gripper.run.compiled.jit import generating
 from graspsense_sim_gripper.run.compiled.loop_code import (
     Arrays,
     LoopStart,
@@ -34,16 +30,81 @@ from graspsense_sim_gripper.run.compiled.loop_code import (
     loop_start,
 )
 from graspsense_sim_gripper.run.compiled.padding import PaddedLayout, composition_of, layout_of
+from graspsense_sim_gripper.run.drawing import (
+    NO_NUMBER,
+    DrawBuffers,
+    SceneNumbers,
+    draw_buffers,
+    draw_grasp,
+    scene_numbers,
+)
 from graspsense_sim_gripper.run.loop import GraspParams, SimulationState
 from graspsense_sim_gripper.run.nested import appender, with_places
 from graspsense_sim_gripper.run.problem import GraspSetup, Problem
-from graspsense_sim_gripper.scene.instance import (
-    N_COMMON_DRAWS,
-    deepest_dent,
-    draws_of_number,
-    present_cells,
-)
-from graspsense_sim_gripper.scene.spec import PATCHES, NominalParams, ObjectSpec
+from graspsense_sim_gripper.scene.instance import deepest_dent, draws_of_number
+from graspsense_sim_gripper.scene.random_numbers import IN_COMPILED_CODE, Word, key_of
+from graspsense_sim_gripper.scene.spec import NominalParams, ObjectSpec
+
+
+class Places(NamedTuple):
+    """Where the numbers that a seed decides are among those of a grasp."""
+
+    coulomb_n: int
+    breakaway_n: int
+    width_m: int
+    offset_m: int
+    share: int
+    image_phase_s: int
+    params: NDArray[np.int64]
+    """Those of the terms, in the order of `NominalParams`."""
+
+
+Drawing = Callable[[SceneNumbers, Places, Word, Any, DrawBuffers, Any], None]
+"""`draw_numbers`, compiled."""
+
+
+def draw_numbers(
+    scene: SceneNumbers, places: Places, key: Word, of_number: Any, buffers: DrawBuffers, numbers: Any
+) -> None:
+    """Draw a grasp of the scene as `draw_grasp` does, and write it to its places in `numbers`."""
+    drawn = draw_grasp(scene, key, of_number, buffers)
+    numbers[places.coulomb_n], numbers[places.breakaway_n] = drawn.coulomb_n, drawn.breakaway_n
+    numbers[places.width_m], numbers[places.offset_m] = drawn.placement.width_m, drawn.placement.offset_m
+    for i in range(len(places.params)):
+        numbers[places.params[i]] = buffers.params[i]
+    if scene.period_s > 0.0:
+        numbers[places.share], numbers[places.image_phase_s] = drawn.placement.share, drawn.image_phase_s
+
+
+@cache
+def compiled_drawing() -> Drawing:
+    """Return `draw_numbers` in compiled code. Raises NotCompilable."""
+    none, no_places = np.zeros(0), np.zeros(0, np.int64)
+    scene = _with_arrays(scene_numbers(SimConfig(), None))
+    # It takes less time than getting the lock of the interpreter back from another thread.
+    compiled = compile_function(
+        bind_reachable(draw_numbers, IN_COMPILED_CODE), CompileOptions(releases_lock=False)
+    )
+    with generating():
+        compiled(
+            scene, Places(0, 0, 0, 0, 0, 0, no_places), key_of(0), none, _array_buffers(scene), np.zeros(1)
+        )
+    return entry_point(compiled)
+
+
+def _with_arrays(scene: SceneNumbers) -> SceneNumbers:
+    """Return the numbers of a scene in arrays, as compiled code takes them."""
+    value, is_stiffness, spread = scene.nominal
+    return scene._replace(
+        nominal=NominalParams(
+            np.array(value, float), np.array(is_stiffness, np.int64), np.array(spread, float)
+        )
+    )
+
+
+def _array_buffers(scene: SceneNumbers) -> DrawBuffers:
+    draws, params, cells = draw_buffers(scene)
+    return DrawBuffers(np.array(draws), np.array(params, float), cells)
 
 
 class DrawMemory(NamedTuple):
@@ -101,26 +162,26 @@ class DrawnScene:
     @property
     def has_cells(self) -> bool:
         """Whether the sensors are pads."""
-        return self.scene.has_cells == 1
+        return self.scene.period_s > 0.0
 
     def memory(self) -> DrawMemory:
         """Return memory for drawing and simulating its grasps one after the other, in one thread."""
-        buffers = draw_buffers(N_COMMON_DRAWS + self.scene.n_own + 1, len(self.places.params))
+        buffers = _array_buffers(self.scene)
         arrays, (weights, left, right) = [*self.arrays], buffers.cells
         if self.has_cells:
             for place, array in zip(self.start.cells, (weights, left, weights, right), strict=True):
                 arrays[place] = array
         return DrawMemory(buffers, tuple(arrays))
 
-    def drawn(self, drawing: Drawing, seed: int, number: int | None, memory: DrawMemory) -> LoopStart:
-        """Return the grasp with this seed, from 0 to LARGEST_SEED; `number`: that of a particular instance.
+    def drawn(self, drawing: Drawing, key: Word, number: int | None, memory: DrawMemory) -> LoopStart:
+        """Return the grasp with the seed of this key; `number`: that of a particular instance.
 
         Its arrays are those of `memory`, until the next grasp is drawn to it. Raises ConfigError as `check_fit` does.
         """
         numbers, spec, places, (buffers, arrays) = self.numbers.copy(), self.spec, self.places, memory
         of_number = NO_NUMBER if number is None else np.array(draws_of_number(spec, number))
-        drawing(self.scene, places, seed, of_number, buffers, numbers)
-        if spec.dents and self.scene.varies == 1:
+        drawing(self.scene, places, key, of_number, buffers, numbers)
+        if spec.dents:
             numbers[places.width_m] -= deepest_dent(spec, buffers.params.tolist())
         if spec.file:
             check_fit(self.config, spec, float(numbers[places.width_m]), float(numbers[places.offset_m]))
@@ -135,11 +196,6 @@ class DrawnInstances(NamedTuple):
     """That of the instance."""
 
 
-def can_be_drawn(seed: int) -> bool:
-    """Return whether compiled code draws grasps with this seed."""
-    return 0 <= seed <= LARGEST_SEED
-
-
 def drawn_scene(
     problem: Problem,
     reduction: Reduction | None,
@@ -152,7 +208,7 @@ def drawn_scene(
     `example`: one of them; `begun`: its parameters and its first state, padded. `layouts`: those that are known, to
     which that of this scene is added.
     """
-    spec, sensor = problem.spec, example.sensor
+    spec = problem.spec
     if spec is None or reduction is None or example.has_palm:
         return None
     layout, config = layout_of(example), problem.config
@@ -161,21 +217,6 @@ def drawn_scene(
         layouts[composition] = StartLayout.of(*begun)
     known = layouts[composition]
     start, places = loop_start(*begun, known.types), _places(known.at, layout, spec)
-    if sensor.ideal == 0:
-        start.numbers[places.image_phase_s] = sensor.clock.period_s
-    nominal = spec.nominal_params
-    scene = SceneNumbers(
-        varies=1 if config.spread else 0,
-        has_cells=1 - sensor.ideal,
-        nominal=NominalParams(
-            np.array(nominal.value), np.array(nominal.is_stiffness, np.int64), np.array(nominal.spread)
-        ),
-        spread=spec.spread,
-        n_own=spec.n_own_spreads,
-        friction=friction_spread(config),
-        patch=PATCHES.index(spec.patch),
-        present=present_cells(config.pad_cells),
-    )
     return DrawnScene(
         config=config,
         spec=spec,
@@ -184,7 +225,7 @@ def drawn_scene(
         start=known,
         numbers=start.numbers,
         arrays=start.arrays,
-        scene=scene,
+        scene=_with_arrays(scene_numbers(config, spec)),
         places=places,
     )
 

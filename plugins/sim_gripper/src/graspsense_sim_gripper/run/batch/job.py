@@ -43,6 +43,7 @@ from graspsense_sim_gripper.run.compiled.padding import (
     padded,
     unpadded,
 )
+from graspsense_sim_gripper.run.drawing import image_noise
 from graspsense_sim_gripper.run.loop import (
     COLUMNS,
     NOT_STARTED,
@@ -67,11 +68,10 @@ from graspsense_sim_gripper.run.problem import (
     IMAGES_PER_BLOCK,
     GraspController,
     GraspSetup,
-    PalmNoise,
 )
 from graspsense_sim_gripper.run.recorded_trace import recorded_trace
 from graspsense_sim_gripper.run.term_failure import not_finite_in_tick, raised_in_term
-from graspsense_sim_gripper.scene.random_numbers import Generator
+from graspsense_sim_gripper.scene.random_numbers import Word, key_of
 from graspsense_sim_gripper.scene.scaled import ScaledParameter
 from graspsense_sim_gripper.scene.terms.term import LAW_ERRORS
 
@@ -340,14 +340,12 @@ def _run(job: Job, setup: GraspSetup, loop: GraspLoop, storage: Storage) -> tupl
     """Run the loop to the end of the grasp, with longer buffers where those of the storage do not suffice."""
     ideal, buffers, on_arrays = setup.sensor.ideal == 1, storage.buffers, isinstance(loop, CompiledLoop)
     run = loop.run if isinstance(loop, CompiledLoop) else partial(run_plain, loop)
-    noise = None if ideal else setup.noise()
-    if noise is not None:
-        noise.fill(buffers.pads.noise)
+    if not ideal:
+        buffers.pads.noise[:] = setup.noise(0, len(buffers.pads.noise))
     begin_images(buffers)
-    palm_noise = None
     if setup.has_palm:
-        palm_noise, ticks = setup.palm_noise(), len(buffers.phases)
-        buffers = buffers._replace(palm=PalmBuffers(palm_noise(ticks), np.zeros((NUMBERS, ticks))))
+        ticks = len(buffers.phases)
+        buffers = buffers._replace(palm=PalmBuffers(setup.palm_noise(0, ticks), np.zeros((NUMBERS, ticks))))
     if not on_arrays:
         # The interpreter indexes lists faster than arrays.
         buffers = _as_lists(buffers)
@@ -363,10 +361,10 @@ def _run(job: Job, setup: GraspSetup, loop: GraspLoop, storage: Storage) -> tupl
         if end.ending.ended == 1 or end.ending.ticks >= most_ticks:
             return end, buffers
         progress = end.state()
-        if noise is not None and end.ending.images == len(buffers.pads.images):
-            buffers = with_more_images(buffers, noise)
+        if not ideal and end.ending.images == len(buffers.pads.images):
+            buffers = with_more_images(buffers, key_of(setup.seed))
         else:
-            buffers = _with_more_ticks(buffers, palm_noise)
+            buffers = _with_more_ticks(buffers, setup)
         if not on_arrays:
             buffers = _as_lists(buffers)
 
@@ -399,9 +397,9 @@ def begin_images(buffers: Buffers) -> None:
     buffers.pads.left_zero[:] = buffers.pads.right_zero[:] = CELL_OFFSET[0]
 
 
-def with_more_images(buffers: Buffers, generator: Generator) -> Buffers:
-    """Return buffers for more images, of which `generator` draws the noise; they begin with the same values."""
-    noise = generator.standard_normal((IMAGES_PER_BLOCK, 2 * CELLS))
+def with_more_images(buffers: Buffers, key: Word) -> Buffers:
+    """Return buffers for more images of a grasp, `key`: that of its seed; they begin with the same values."""
+    noise = image_noise(key, len(buffers.pads.images), IMAGES_PER_BLOCK)
     left_zero, right_zero, drawn, images = (np.asarray(array) for array in buffers.pads)
     images = np.concatenate([images, np.zeros((len(noise), 2, CELLS))])
     images[-1] = math.nan
@@ -411,13 +409,13 @@ def with_more_images(buffers: Buffers, generator: Generator) -> Buffers:
     )
 
 
-def _with_more_ticks(buffers: Buffers, palm_noise: PalmNoise | None) -> Buffers:
+def _with_more_ticks(buffers: Buffers, setup: GraspSetup) -> Buffers:
     """Return buffers for twice as many ticks; they begin with the same values."""
     columns, phases, palm = np.asarray(buffers.columns), np.asarray(buffers.phases), buffers.palm
-    if palm_noise is not None:
+    if setup.has_palm:
         noise, samples = np.asarray(palm.noise), np.asarray(palm.samples)
         palm = PalmBuffers(
-            np.concatenate([noise, palm_noise(len(noise))]),
+            np.concatenate([noise, setup.palm_noise(len(noise), len(noise))]),
             np.concatenate([samples, np.zeros_like(samples)], axis=1),
         )
     return buffers._replace(

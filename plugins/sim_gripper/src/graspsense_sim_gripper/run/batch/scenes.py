@@ -18,7 +18,6 @@ from graspsense_sim_gripper.run.model_report import GraspModel
 from graspsense_sim_gripper.run.problem import GraspSetup, Problem
 from graspsense_sim_gripper.run.sampled_loop import instability
 from graspsense_sim_gripper.scene.library import split_number
-from graspsense_sim_gripper.scene.random_numbers import GeneratorOf, NumpyGenerator
 
 
 @define
@@ -28,8 +27,6 @@ class Scenes:
     job: Job
     selected: Mapping[tuple[str, bool], Reduction | None] = field(factory=dict)
     """Models that were selected elsewhere, by `scene_key`."""
-    generator_of: GeneratorOf = NumpyGenerator
-    """Draws what a seed gives."""
     _scenes: dict[tuple[str, bool], tuple[Problem, Reduction | None]] = field(factory=dict, init=False)
     """By `scene_key`."""
     _problems: dict[str, tuple[Problem, Reduction | None]] = field(factory=dict, init=False)
@@ -74,7 +71,7 @@ class Scenes:
             if key[1]:
                 problem = evolve(problem, number=split_number(scene)[1])
             known = self._problems[scene] = problem, reduction
-        return instantiate(*known, seed, self.generator_of)
+        return instantiate(*known, seed)
 
     def example(self, scene: str) -> GraspSetup:
         """Return any grasp of a scene, for what all of them have in common. Raises as `add` does."""
@@ -98,15 +95,15 @@ class Scenes:
             self._drawn[scene] = None if of_key is None else DrawnInstances(of_key, number)
         return self._drawn[scene]
 
-    def model_of(self, scene: str, seed: int) -> GraspModel:
-        """Return the model of a scene; `seed`: that of one of its grasps."""
+    def model_of(self, scene: str) -> GraspModel:
+        """Return the model of a scene that was added."""
         key = scene_key(scene)
         known = self._models.get(key)
         if known is None:
             problem, reduction = self._scenes[key]
             kinds, unstable = () if problem.spec is None else problem.spec.kinds, ""
             if reduction is not None:
-                unstable = instability(self.setup(scene, seed), self.job.grasp_controller, reduction)
+                unstable = instability(self.example(scene), self.job.grasp_controller, reduction)
             known = self._models[key] = GraspModel(kinds, reduction, unstable)
         return known
 

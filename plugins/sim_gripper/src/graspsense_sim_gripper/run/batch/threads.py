@@ -24,6 +24,7 @@ from attrs import define, field
 from graspsense.plugin_api import BatchOptions, Controller, FeatureSet, NotCompilable, RunConfig
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.batch.compiled_grasps import CompiledGrasps
+from graspsense_sim_gripper.run.batch.drawn import compiled_drawing
 from graspsense_sim_gripper.run.batch.job import (
     FinishedGrasp,
     Job,
@@ -33,9 +34,7 @@ from graspsense_sim_gripper.run.batch.job import (
 from graspsense_sim_gripper.run.batch.scenes import Scenes, scene_key
 from graspsense_sim_gripper.run.batch.worker import NotHandedOver, PlainProcess
 from graspsense_sim_gripper.run.compiled.compose import Composition
-from graspsense_sim_gripper.run.compiled.drawing import compiled_drawing
 from graspsense_sim_gripper.run.compiled.extraction import compiled_measure
-from graspsense_sim_gripper.run.compiled.generator import compiled_generator
 from graspsense_sim_gripper.run.compiled.loop_code import CompiledLoops
 from graspsense_sim_gripper.run.compiled.padding import compiled_kinds, composition_of
 from graspsense_sim_gripper.scene.library import kinds_in
@@ -213,7 +212,6 @@ class _Batch:
         try:
             # Here, so that the threads find the code of the drawing.
             compiled_drawing()
-            self.models.generator_of = compiled_generator()
         except NotCompilable:
             # The loop cannot be compiled either, and says why.
             return
@@ -225,8 +223,10 @@ class _Batch:
 
     def _with_models(self, done: list[FinishedGrasp], which: range) -> list[FinishedGrasp]:
         """Return the results of the grasps with these indices, each with its model."""
-        part = zip(done, self._part(which), strict=True)
-        return [grasp.in_model(self.models.model_of(*one)) for grasp, one in part]
+        scenes = self.scenes[which.start : which.stop]
+        return [
+            grasp.in_model(self.models.model_of(scene)) for grasp, scene in zip(done, scenes, strict=True)
+        ]
 
     def _part(self, which: range) -> list[tuple[str, int]]:
         """Return the scene and the seed of the grasps with these indices."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from array import array
 from collections.abc import Callable
-from functools import cache, lru_cache
+from functools import lru_cache
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from graspsense.plugin_api import NotCompilable, bind, entry_point
 from graspsense_sim_gripper.plant.sensing import PadBuffers
+from graspsense_sim_gripper.run.binding import bind_reachable
 from graspsense_sim_gripper.run.compiled.compose import Composition, grasp_loop
-from graspsense_sim_gripper.run.compiled.generator import WORD, Words, draw_normals, with_wide_product
 from graspsense_sim_gripper.run.compiled.jit import COMPILING, OPTIONS, compile_part, generating
-from graspsense_sim_gripper.run.compiled.ziggurat import Ziggurat
+from graspsense_sim_gripper.run.drawing import draw_image_noise
 from graspsense_sim_gripper.run.loop import Buffers, Ending, GraspParams, LoopEnd, SimulationState, ending
 from graspsense_sim_gripper.run.nested import (
     Append,
@@ -31,6 +31,7 @@ from graspsense_sim_gripper.run.nested import (
     structure,
 )
 from graspsense_sim_gripper.run.problem import ControllerStep
+from graspsense_sim_gripper.scene.random_numbers import IN_COMPILED_CODE, Word, key_of
 
 FIRST_IMAGES: Final = 80
 IMAGES_AT_ONCE: Final = 16
@@ -62,17 +63,11 @@ class CellNoise(NamedTuple):
 
     is_drawn: int
     """1: it is drawn to the buffers where the grasp comes to it; 0: it is in them, or there is none."""
-    words: Words
-    """The state of its generator, which changes."""
-    tables: Ziggurat
-    """The tables of its generator."""
+    key: Word
+    """The key of the seed."""
 
 
-@cache
-def no_noise() -> CellNoise:
-    """Return that nothing is drawn."""
-    tables = Ziggurat(np.zeros(512), np.zeros(256, WORD), np.zeros(256))
-    return CellNoise(0, np.zeros(4, WORD), tables)
+NO_NOISE: Final = CellNoise(0, key_of(0))
 
 
 def stored_grasp(
@@ -92,7 +87,7 @@ def stored_grasp(
         n = min(n, most)
         if noise.is_drawn == 1:
             for image in range(drawn, n):
-                draw_normals(noise.words, noise.tables, of_images[image])
+                draw_image_noise(noise.key, image, of_images[image])
         if state.sensor.images == 0:
             # The loop reads it as the image before the first one.
             images[n - 1] = math.nan
@@ -191,7 +186,7 @@ class CompiledLoop:
         Raises NotCompilable if numba refuses.
         """
         types, state = start.types, np.empty(start.types.state.count)
-        arguments = types.pattern, start.numbers, start.arrays, buffers, noise or no_noise(), state
+        arguments = types.pattern, start.numbers, start.arrays, buffers, noise or NO_NOISE, state
         if self._machine_code is not None:
             end = self._machine_code(*arguments)
         else:
@@ -239,6 +234,5 @@ def _compiled(composition: Composition, step: ControllerStep) -> Callable[..., E
         "grasp": grasp_loop(composition, step, interpreted=False),
         "tuples_of": tuples_of,
         "store_numbers": store_numbers,
-        "draw_normals": with_wide_product(draw_normals),
     }
-    return compile_part(bind(stored_grasp, **parts))
+    return compile_part(bind_reachable(bind(stored_grasp, **parts), IN_COMPILED_CODE))

@@ -102,7 +102,6 @@ def padded(setup: GraspSetup, kinds: tuple[str, ...] | None = None) -> GraspSetu
         sensor_state=setup.sensor_state,
         dt_s=setup.dt_s,
         seed=setup.seed,
-        rng=setup.rng,
         palm=setup.palm,
         palm_state=setup.palm_state,
     )
