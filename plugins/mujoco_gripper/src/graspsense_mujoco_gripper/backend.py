@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import ceil, inf, nan
+from pathlib import Path
 from typing import Any, Final, Unpack, final
 
 import mujoco
