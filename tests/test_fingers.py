@@ -11,6 +11,7 @@ import pytest
 from attrs import evolve, frozen
 from hypothesis import given
 from hypothesis import strategies as st
+from matplotlib.figure import Figure
 
 import graspsense_sim_gripper.plugin as simulator
 from graspsense import load_pipeline
@@ -18,7 +19,7 @@ from graspsense.core.components.channels import as_json, from_json
 from graspsense.core.components.registry import IsolatedPlugins
 from graspsense.core.control.contact import both_touch
 from graspsense.core.pipeline.pipeline import grasp_with
-from graspsense.core.values.errors import ConfigError
+from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.core.values.fingers import fingers_of
 from graspsense.plugin_api import (
     NAMES_INPUT,
@@ -40,9 +41,10 @@ from graspsense.recording.export_trace import WRITERS
 from graspsense.recording.labelled_recording import UnreadableRecording
 from graspsense.recording.reader import read_recorded
 from graspsense.report.further_channels import channel_figures
-from graspsense.report.trace_plot import plot
+from graspsense.report.trace_plot import draw_trace
 from graspsense.sources.dataset_recordings import readable_or_not
 from graspsense.sources.exported_grasp import read_exported
+from graspsense.sources.grasp_columns import GraspColumns, checked_recording
 from graspsense.store.record_grasp import record_grasp
 from graspsense.store.store import Store
 from graspsense.testing.conformance import Examined
@@ -266,12 +268,13 @@ def test_an_export_declares_the_fingers_and_has_their_forces(grasped, tmp_path, 
 def test_the_pages_and_the_picture_draw_the_force_of_each_finger(grasped):
     trial, _, _, _ = grasped
     figures = channel_figures(trial.trace, trial.device.channels)
-    axes, _ = plot(trial.trace)
+    force, gap = Figure().subplots(2)
+    draw_trace(trial.trace, force, gap, fingers_of(trial.device.channels))
 
     (fingers,) = [one for one in figures if "Forces of the fingers" in one]
     assert len(figures) == 1
     assert all(name in fingers for name in ("thumb", "index", "ring"))
-    assert {"thumb", "index", "ring"} <= {line.get_label() for line in axes.lines}
+    assert {"thumb", "index", "ring"} <= {line.get_label() for line in force.lines}
 
 
 def test_features_may_require_the_force_of_a_finger(grasped):
@@ -393,3 +396,19 @@ def test_an_imported_trial_of_five_fingers_says_of_which_fingers_its_features_ar
 def test_a_manifest_with_fingers_that_cannot_be_is_refused(tmp_path, lines, says):
     with pytest.raises(ConfigError, match=says):
         five_fingers(tmp_path, lines)
+
+
+def test_columns_of_a_reader_have_every_finger_that_they_declare():
+    n = 20
+    columns = GraspColumns(
+        source="a hand",
+        t_s=np.arange(n) / 100.0,
+        gap_m=np.full(n, 0.05),
+        left_n=np.ones(n),
+        right_n=np.ones(n),
+        scalars={"force_thumb": np.ones(n)},
+        fingers=five("sides", thumb="left")[:2],
+    )
+
+    with pytest.raises(DataDamaged, match="force_index"):
+        checked_recording(columns)

@@ -8,6 +8,7 @@ from textwrap import wrap
 from typing import TYPE_CHECKING, Any, Final
 
 from graspsense.core.values.errors import ConfigError, PluginUnavailable
+from graspsense.core.values.fingers import fingers_of
 from graspsense.core.values.units import display_unit
 from graspsense.report.trace_plot import MATPLOTLIB_HINT, draw_trace
 from graspsense.report.write import write_picture
@@ -65,7 +66,7 @@ def grasp_png(trial: Trial, path: Path) -> None:
     force: Any = figure.add_subplot(grid[0, 0])
     gap: Any = figure.add_subplot(grid[1, 0], sharex=force)
     words: Any = figure.add_subplot(grid[:, 1])
-    draw_trace(trial.trace, force, gap)
+    draw_trace(trial.trace, force, gap, fingers_of(trial.device.channels))
     words.set_axis_off()
     words.text(0.0, 1.0, "\n".join(lines), va="top", fontsize=8.5, linespacing=1.45)
     write_picture(path, figure)

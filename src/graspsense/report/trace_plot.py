@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from graspsense.core.values.errors import PluginUnavailable
-from graspsense.core.values.fingers import PREFIX
 from graspsense.core.values.signals import Phase
 from graspsense.core.values.trace import SampleTrace
 from graspsense.core.values.units import display_unit, without_underscores
@@ -23,6 +22,9 @@ from graspsense.report.moments import (
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from graspsense.core.values.fingers import FingerForce
     from graspsense.core.values.trace import Floats, ImageTrace, Integers, Trace
 
 MATPLOTLIB_HINT: Final = (
@@ -91,21 +93,20 @@ def _draw_array(trace: Trace, axes: Any, name: str, images: ImageTrace) -> Any:
     return picture
 
 
-def draw_trace(trace: Trace, force: Any, gap: Any) -> None:
-    """Draw the pad forces and the gap into two axes of matplotlib that share the axis of time."""
+def draw_trace(trace: Trace, force: Any, gap: Any, fingers: Sequence[FingerForce] = ()) -> None:
+    """Draw the pad forces and the gap into two axes of matplotlib that share the axis of time.
+
+    The forces of `fingers`, which the gripper declares, are drawn beside those of the pads.
+    """
     contact = contact_time(trace)
     zero = 0.0 if contact is None else contact
     start = shown_from(trace)
     t = trace.t_s[start:] - zero
     force.plot(t, trace.force_left_n[start:], color=LEFT, lw=1.6, label="left pad")
     force.plot(t, trace.force_right_n[start:], color=RIGHT, lw=1.6, ls="--", label="right pad")
-    fingers = {
-        name.removeprefix(PREFIX): signal
-        for name, signal in trace.signals.items()
-        if name.startswith(PREFIX) and isinstance(signal, np.ndarray)
-    }
-    for k, (name, signal) in enumerate(fingers.items()):
-        force.plot(t, signal[start:], color=f"C{k + 2}", lw=0.8, label=without_underscores(name))
+    for k, one in enumerate(fingers):
+        label = without_underscores(one.finger)
+        force.plot(t, trace.signals[one.name][start:], color=f"C{k + 2}", lw=0.8, label=label)
     force.set_ylabel(f"force, {trace.units['force_left']}")
     # Noise alone does not fill the axis.
     force.set_ylim(top=max(force.get_ylim()[1], 1.0))

@@ -212,6 +212,9 @@ def _check_lengths(columns: GraspColumns) -> None:
         if len(values) != rows:
             of = f"`times` has {rows} for it" if name in columns.times else f"t_s has {rows}"
             raise DataDamaged(f"{columns.source}: {name!r} has {len(values)} samples, and {of}")
+    for one in columns.fingers:
+        if one.name not in columns.scalars:
+            raise DataDamaged(f"{columns.source}: `fingers` names {one.name!r}, which is not in `scalars`")
     for name in sorted(columns.fast - columns.arrays.keys()):
         raise DataDamaged(f"{columns.source}: `fast` names {name!r}, which is not in `arrays`")
     for name, values in columns.arrays.items():
