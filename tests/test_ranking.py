@@ -134,3 +134,22 @@ def test_the_page_has_verdict_rates_losses_sets_and_the_command(tmp_path, capsys
         assert f"{heading}</h2>" in text
     assert "--classifiers tree,knn" in text
     assert "http" not in text.replace("http-equiv", "").replace("http://www.w3.org/2000/svg", "")
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_default_that_is_worse_is_told_with_what_to_do(sign, tmp_path, capsys):
+    """The label is that of the product of two features: a tree that looks at one of them at a time sees nothing."""
+    rng = np.random.default_rng(0)
+    x = rng.uniform(-1.0, 1.0, size=(120, 2))
+    product = x[:, 0] * x[:, 1] if sign > 0 else x[:, 0]
+    lines = ["what,a [N],b [N]"]
+    lines += [
+        f"{'high' if one > 0.0 else 'low'},{a:.4f},{b:.4f}"
+        for one, (a, b) in zip(product.tolist(), x.tolist(), strict=True)
+    ]
+    path = tmp_path / "t.csv"
+    path.write_text("\n".join(lines) + "\n")
+    with pytest.raises(SystemExit):
+        main(["compare", str(path), "--label", "what", "--classifiers", "c45,svm"])
+
+    assert ("--choose" in capsys.readouterr().out) == (sign > 0)

@@ -113,6 +113,14 @@ def test_a_component_that_is_given_stays_and_files_are_not_replaced(run, store, 
     assert "own.toml" in err
 
 
+def test_a_file_of_another_kind_beside_the_model_is_never_replaced(run, store, tmp_path):
+    code, _, err = run("train", store, "--choose", "--overwrite", "--out", tmp_path / "m.json")
+
+    assert code == 2
+    assert "manifest" in err
+    assert (tmp_path / "m.toml").read_text() == MANIFEST
+
+
 def test_a_table_has_its_features_and_gets_no_pipeline(run, tmp_path):
     rng = np.random.default_rng(0)
     lines = ["what,thing,f [N]"]

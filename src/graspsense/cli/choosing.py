@@ -220,7 +220,12 @@ def pipeline_text(chosen: Chosen, model: str) -> str:
 def say_chosen(chosen: Chosen, pipeline: str | None) -> None:
     """Print what was chosen, the rate of the procedure, what is as good, and how to use it."""
     choice = chosen.choice
-    echo_entry("chosen", f"{choice.best.name}, of {len(choice.ranking.candidates)} candidates")
+    folds = sum(choice.chosen_in.values())
+    echo_entry(
+        "chosen",
+        f"{choice.best.name}, of {len(choice.ranking.candidates)} candidates; also in "
+        f"{choice.chosen_in.get(choice.best.name, 0)} of {folds} folds",
+    )
     echo_entry(
         "rate",
         f"{choice.rate.words}, of the whole procedure by {choice.ranking.protocol}: no trial takes part in the choice "

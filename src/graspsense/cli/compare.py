@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from graspsense.core.learn.labelled import Labelled
     from graspsense.evaluation.ranking import Candidate, Ranking
 
-DEFAULT: Final = (DEFAULT_CLASSIFIER, "chitta")
-"""The classifier and the features that are used where none are named."""
+DEFAULT_FEATURES: Final = ("chitta", "columns")
+"""The features that are used where none are named: of recordings, and of a table."""
 
 
 @click.command(
@@ -139,11 +139,18 @@ def _print(found: Ranking) -> None:
     )
     for note in found.notes:
         echo_entry("note", note)
-    default = [one for one in found.candidates if (one.classifier, one.features) == DEFAULT]
-    if default and default[0].standing == "worse":
+    default = next(
+        (
+            one
+            for one in found.candidates
+            if one.classifier == DEFAULT_CLASSIFIER and one.features in DEFAULT_FEATURES
+        ),
+        None,
+    )
+    if default is not None and default.standing == "worse":
         echo_entry(
             "advice",
-            f"the default, {default[0].name}, is worse on these trials: train --choose finds what suits them",
+            f"the default, {default.name}, is worse on these trials: train --choose finds what suits them",
         )
 
 

@@ -18,12 +18,19 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from attrs import frozen
 
-from graspsense.core.values.errors import ConfigError, named
+from graspsense.core.values.errors import FAILURES, ConfigError, named
 from graspsense.evaluation.chosen import ChosenRate
 from graspsense.evaluation.crossval import ClassifierFactory, fit_and_predict
+from graspsense.evaluation.folds import INSTANCE_HELD_OUT
 from graspsense.evaluation.gathered_warnings import gathered_warnings
 from graspsense.evaluation.intervals import RecognitionRate, rate_of
-from graspsense.evaluation.ranking import Candidate, Measured, Ranking, protocols_of, ranking_of
+from graspsense.evaluation.ranking import (
+    Candidate,
+    Measured,
+    Ranking,
+    protocols_of,
+    ranking_of,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -85,6 +92,9 @@ def choose(
     known = next(iter(trials.values()))
     protocol, folds = _folds(known, seed)
     notes = [*dict.fromkeys(note for one in trials.values() for note in one.notes), *notes]
+    if protocol != INSTANCE_HELD_OUT:
+        why = known.no_instances or "a label has a single instance"
+        notes.append(f"{why}: whole objects cannot be held out, so the rate is that for these objects")
     pairs = [(learner, name) for name in trials for learner in learners]
     answers: dict[tuple[str, str], _Answers] = {}
     with gathered_warnings(notes):
@@ -93,7 +103,7 @@ def choose(
                 progress(f"{learner} with {name}", done, len(pairs))
             try:
                 answers[learner, name] = _answers(learners[learner], trials[name], folds, seed)
-            except Exception as error:  # the code of any plugin
+            except FAILURES as error:
                 notes.append(f"{learner} with {name} is left out: {named(error)}")
     right, chosen_in = _nested(answers, folds)
     rate = rate_of(right, known.instances, known.no_interval)

@@ -18,7 +18,7 @@ from graspsense.core.values.errors import ConfigError
 from graspsense.evaluation.confusion import confusion
 from graspsense.evaluation.crossval import ClassifierFactory, FitRefused, Groups, Pooled, cross_validate
 from graspsense.evaluation.doubt import reliability, set_coverage
-from graspsense.evaluation.folds import commonest, in_order, instance_held_out, stratified
+from graspsense.evaluation.folds import INSTANCE_HELD_OUT, commonest, in_order, instance_held_out, stratified
 from graspsense.evaluation.gathered_warnings import gathered_warnings
 from graspsense.evaluation.intervals import (
     MIN_INSTANCES,
@@ -37,7 +37,6 @@ if TYPE_CHECKING:
     from graspsense.evaluation.doubt import Reliability, SetCoverage
     from graspsense.evaluation.folds import Folds
 
-INSTANCE_HELD_OUT: Final = "instance_held_out"
 SHARES: Final = (0.1, 0.2, 0.4, 0.7, 1.0)
 """Shares of the training trials at which the learning curve is measured."""
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -15,6 +15,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Folds = NDArray[np.int64]
+
+
+INSTANCE_HELD_OUT: Final = "instance_held_out"
+"""The name of the protocol with folds of whole instances."""
 
 
 def stratified(labels: Sequence[str], k: int, seed: int) -> Folds:

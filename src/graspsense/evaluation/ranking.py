@@ -18,7 +18,7 @@ from graspsense.core.values.errors import ConfigError
 from graspsense.evaluation.chosen import ChosenRate, comparisons_of, rate_of_chosen
 from graspsense.evaluation.crossval import ClassifierFactory, FitRefused, cross_validate
 from graspsense.evaluation.doubt import SetCoverage, exchangeable_instances, set_coverage
-from graspsense.evaluation.folds import in_order, instance_held_out, stratified
+from graspsense.evaluation.folds import INSTANCE_HELD_OUT, in_order, instance_held_out, stratified
 from graspsense.evaluation.gathered_warnings import gathered_warnings
 from graspsense.evaluation.intervals import Difference, RecognitionRate, difference, rate_of
 
@@ -209,7 +209,7 @@ def protocols_of(trials: Labelled, k: int, seed: int) -> dict[str, Folds]:
     protocols: dict[str, Folds] = {}
     instances = exchangeable_instances(trials)
     if instances is not None:
-        protocols["instance_held_out"] = instance_held_out(trials.labels, instances, k, seed)
+        protocols[INSTANCE_HELD_OUT] = instance_held_out(trials.labels, instances, k, seed)
     protocols[f"stratified_{k}_fold"] = stratified(trials.labels, k, seed)
     if trials.order is not None:
         protocols["recording_order"] = in_order(trials.labels, trials.order, k)

@@ -18,8 +18,7 @@ from attrs.validators import ge, le
 
 from graspsense.core.components.config import settings_from
 from graspsense.core.components.strict import structured
-from graspsense.evaluation.evaluate import INSTANCE_HELD_OUT
-from graspsense.evaluation.folds import instance_held_out
+from graspsense.evaluation.folds import INSTANCE_HELD_OUT, instance_held_out
 from graspsense.experiments.task_results import ClassifierResult, RecognitionResult
 from graspsense.experiments.trade.costs import CostSettings
 from graspsense.experiments.trade.squeezes import MOST_SQUEEZES

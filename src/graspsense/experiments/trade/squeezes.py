@@ -13,8 +13,7 @@ from graspsense.core.components.config import SelectedComponent
 from graspsense.core.components.strict import structured
 from graspsense.core.learn.labelled import Labelled, Target
 from graspsense.core.values.errors import ConfigError
-from graspsense.evaluation.evaluate import INSTANCE_HELD_OUT
-from graspsense.evaluation.folds import instance_held_out
+from graspsense.evaluation.folds import INSTANCE_HELD_OUT, instance_held_out
 from graspsense.experiments.task_results import ClassifierResult, RecognitionResult, TrialValues
 from graspsense.experiments.trade.costs import CostSettings, mean_seconds
 from graspsense.experiments.trade.trade_task import (
