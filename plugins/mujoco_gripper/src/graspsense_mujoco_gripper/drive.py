@@ -126,8 +126,8 @@ def _check_angles(model: mujoco.MjModel, gripper: GripperFile) -> None:
     widest = float(np.ptp(model.jnt_range[hinges], axis=1).max(initial=0.0))
     if not gripper.angle and 0.0 < widest < LEAST_TURN_RAD:
         raise ConfigError(
-            f"gripper.file: the hinges of the model turn by {np.degrees(widest):.2g} degrees at most, as if radians were "
-            'read as degrees: give angle = "radian", or angle = "degree" where that is right'
+            f"gripper.file: the hinges of the model turn by {np.degrees(widest):.2g} degrees at most, as if radians "
+            'were read as degrees: give angle = "radian", or angle = "degree" where that is right'
         )
 
 
