@@ -74,6 +74,7 @@ from graspsense.core.values.faults import StatusBit as StatusBit
 from graspsense.core.values.device import DeviceInfo as DeviceInfo
 from graspsense.core.components.roles import ObjectKind as ObjectKind
 from graspsense.core.components.roles import SensorBackend as SensorBackend
+from graspsense.core.components.roles import Viewer as Viewer
 from graspsense.core.components.channels import no_signals as no_signals
 from graspsense.core.components.channels import signal_type as signal_type
 
@@ -82,6 +83,7 @@ from graspsense.core.components.roles import BatchBackend as BatchBackend
 from graspsense.core.components.roles import BatchOptions as BatchOptions
 from graspsense.core.components.roles import Grasped as Grasped
 from graspsense.core.components.roles import SimulationVariant as SimulationVariant
+from graspsense.core.grasp.runner import run_uninterrupted as run_uninterrupted
 
 # Identifying an object from recorded squeezes
 from graspsense.core.components.identification import CandidateScore as CandidateScore
