@@ -1,0 +1,64 @@
+"""Pictures and videos of a grasp: which files can be written, and which picture is kept."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from graspsense import load_pipeline
+from graspsense.core.control.tick import RELEASE
+from graspsense.core.values.errors import ConfigError, PluginUnavailable
+from graspsense.core.values.signals import HOLD
+from graspsense.report import film as module
+from graspsense.report.film import Film
+
+
+def plain(grey):
+    return np.full((48, 64, 3), grey, np.uint8)
+
+
+def filmed(film):
+    """Show three pictures: the last one is of the release."""
+    for grey, phase in ((10, HOLD), (120, HOLD), (250, RELEASE)):
+        film.take(None, phase, None)
+        film.picture(plain(grey))
+
+
+def test_the_picture_is_the_last_one_before_the_release(tmp_path):
+    film = Film(str(tmp_path / "p.png"), None)
+    filmed(film)
+    assert film.write() == [tmp_path / "p.png"]
+    with Image.open(tmp_path / "p.png") as image:
+        assert image.getpixel((0, 0)) == (120, 120, 120)
+
+
+@pytest.mark.parametrize("kind", ["gif", "webp"])
+def test_a_video_has_all_pictures(tmp_path, kind):
+    film = Film(None, str(tmp_path / f"v.{kind}"))
+    filmed(film)
+    film.write()
+    with Image.open(tmp_path / f"v.{kind}") as image:
+        assert image.n_frames == 3
+
+
+@pytest.mark.parametrize(
+    ("picture", "video", "said"),
+    [("p.bmp", None, ".png"), (None, "v.avi", ".mp4"), ("missing/p.png", None, "no folder")],
+)
+def test_what_cannot_be_written_is_refused_before_the_grasp(tmp_path, monkeypatch, picture, video, said):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ConfigError, match=said):
+        Film(picture, video)
+
+
+def test_an_mp4_without_its_package_says_what_to_install(tmp_path, monkeypatch):
+    monkeypatch.setattr(module, "find_spec", lambda name: None)
+    with pytest.raises(PluginUnavailable, match=r"graspsense\[video\]"):
+        Film(None, str(tmp_path / "v.mp4"))
+
+
+def test_a_gripper_without_a_picture_says_so_before_it_opens(tmp_path):
+    film = Film(str(tmp_path / "p.png"), None)
+    with pytest.raises(ConfigError, match="no picture"):
+        load_pipeline("default", options=["classifier.type=none"]).grasp(sinks=[film])
