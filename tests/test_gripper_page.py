@@ -5,6 +5,8 @@ from __future__ import annotations
 import inspect
 import re
 import sys
+import threading
+import time
 from math import nan
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
@@ -17,6 +19,8 @@ from graspsense.core.components.registry import IsolatedPlugins
 from graspsense.plugin_api import Reading, SensorBackendEntry, hookimpl
 from graspsense.testing import examine
 
+LATE_S = 0.15
+"""Longer than the page's driver waits for an answer before it asks again; this is waited for in earnest."""
 PAGE = (Path(__file__).parents[1] / "docs" / "tcp_gripper.md").read_text(encoding="utf-8")
 
 
@@ -42,11 +46,14 @@ def hand(monkeypatch):
     exec(compile(code, "tcp_gripper.md", "exec", dont_inherit=True), vars(module))
     (camera,) = re.findall(r"<!-- example: camera -->\n```python\n(.*?)```", PAGE, re.DOTALL)
     exec(compile(camera, "tcp_gripper.md", "exec", dont_inherit=True), vars(module))
-    now_s = 0.0
+    now_s, looked = 0.0, threading.Lock()
 
     def sleep(seconds):
         nonlocal now_s
-        now_s += seconds
+        with looked:
+            now_s += seconds
+        if seconds == LATE_S:
+            time.sleep(LATE_S)
 
     def monotonic():
         sleep(1e-5)
@@ -63,15 +70,15 @@ def plugins(hand):
         yield plugins
 
 
-def grasp(plugins):
-    options = ["gripper.type=lab-hand/lab-hand", "gripper.reply_timeout_s=60", "classifier.type=none"]
-    return load_pipeline(options=options, plugins=plugins).grasp()
+def grasp(plugins, *options):
+    fixed = ["gripper.type=lab-hand/lab-hand", "gripper.patience_s=60", "classifier.type=none"]
+    return load_pipeline(options=[*fixed, *options], plugins=plugins).grasp()
 
 
 def test_it_conforms(plugins):
     examined = examine(
         "lab-hand/lab-hand",
-        keys={"reply_timeout_s": 60.0},
+        keys={"patience_s": 60.0},
         unplugged={"vanishes_s": 0.5},
         absent={"address": "127.0.0.1:9"},
         plugins=plugins,
@@ -110,6 +117,16 @@ def test_its_camera_conforms_and_sees_the_force(hand, plugins):
     forces = np.interp(eye.t_s, trace.t_s, trace.force_left_n)
     assert eye.cells[:, 100, 150, 0] == pytest.approx(40 + np.minimum(10 * forces, 200), abs=1)
     assert (eye.cells[:, 0, 0] == 40).all()
+
+
+def test_answers_that_are_late_are_asked_for_again_and_counted(plugins):
+    trial = grasp(plugins, f"gripper.late_s={LATE_S}")
+
+    assert trial.outcome.words == "steady"
+    assert trial.features.as_dict()["f_steady"] == pytest.approx(20.0, abs=1.5)
+    assert trial.report["repeated"] > 0
+    assert trial.counts["lost_frames"] > 0
+    assert f"{trial.counts['lost_frames']} frames" in trial.reason
 
 
 @pytest.mark.parametrize("second", [nan, 0.0])

@@ -15,9 +15,11 @@ from graspsense.plugin_api import (
     SensorBackend,
     SensorBackendEntry,
     calibrations_of,
+    cells_force,
     hookimpl,
     load_of,
     setting,
+    stored_gain,
     stored_tables,
     stored_zero,
 )
@@ -83,6 +85,53 @@ def test_zero_and_force_are_stored_and_found_by_serial_number(calibrate, tmp_pat
     assert (len(left), set(left), set(right)) == (22, {3000.0}, {3000.0})
     left_table, _ = stored_tables(found["load-cell"])
     assert load_of(left_table, 1.5) == (pytest.approx(1.65), True)
+
+
+def gains_text(scale=1.0, cells=22, whole=""):
+    lines = ["side,cell,counts,load_n"]
+    for side, factor in (("left", 1.0), ("right", 2.0)):
+        for cell in range(cells):
+            lines += [
+                f"{side},{cell}{whole},{scale * factor * (100 + cell) * load_n},{load_n}"
+                for load_n in (0.5, 2.0)
+            ]
+    return "\n".join(lines)
+
+
+def test_the_gain_of_each_cell_is_fitted_stored_and_used(calibrate, tmp_path):
+    readings = tmp_path / "readings.csv"
+    readings.write_text(gains_text())
+    folder = ("-o", f"gripper.calibration={tmp_path}")
+    assert calibrate("counting", "gain", str(readings), *folder) == (0, "")
+
+    left, right = stored_gain(calibrations_of(tmp_path, "H7", NUMBERS)["gain"])
+    assert left == pytest.approx([100 + cell for cell in range(22)])
+    assert right == pytest.approx([200 + 2 * cell for cell in range(22)])
+    # Two cells of the face, each with 3 N on it, whatever their gains are.
+    zero = (3000.0,) * 22
+    pressed = tuple(3000.0 + 3.0 * left[i] if i in (8, 20) else 3000.0 for i in range(22))
+    assert cells_force(pressed, zero, left, 7) == pytest.approx(6.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (gains_text(cells=21), "21"),
+        (gains_text(cells=23), "no cell 22"),
+        (gains_text(scale=-1.0), "do not rise"),
+        (gains_text(whole=".5"), "whole number"),
+        (gains_text().replace("cell", "taxel"), "lacks the columns cell"),
+        (gains_text() + "\nleft,3,nan,1\n", "numbers"),
+        (gains_text() + "\nmiddle,3,100,1\n", "left or right"),
+    ],
+)
+def test_readings_that_give_no_gain_are_refused(calibrate, tmp_path, text, said):
+    readings = tmp_path / "readings.csv"
+    readings.write_text(text)
+    code, told = calibrate("counting", "gain", str(readings), "-o", f"gripper.calibration={tmp_path}")
+    assert code in (2, 5)
+    assert said in told
+    assert not (tmp_path / "H7").exists()
 
 
 def test_a_gripper_without_the_setting_is_told_what_it_takes(calibrate):

@@ -93,7 +93,7 @@ def held_n(trace):
     return trace.force_left_n[trace.phase == Phase.HOLD][-1]
 
 
-HYBRIDS = [{"sends": "position"}, {"sends": "velocity"}, {"sends": "position", "loop": "closed"}]
+HYBRIDS = [{"sends": "position"}, {"sends": "position", "loop": "closed"}]
 
 
 @pytest.mark.parametrize("keys", HYBRIDS)

@@ -110,6 +110,7 @@ _TABLE: Final[Table] = {
     "Calibration: from cell counts to newtons": {
         "core.grasp.calibration": (
             "LoadTable",
+            "cells_force",
             "edge_force",
             "load_of",
             "masked",
@@ -120,6 +121,7 @@ _TABLE: Final[Table] = {
         "core.grasp.calibration_files": (
             "calibrations_of",
             "stored_friction",
+            "stored_gain",
             "stored_tables",
             "stored_zero",
         ),

@@ -106,6 +106,7 @@ from graspsense.core.components.emulated import EmulatedDevice as EmulatedDevice
 
 # Calibration: from cell counts to newtons
 from graspsense.core.grasp.calibration import LoadTable as LoadTable
+from graspsense.core.grasp.calibration import cells_force as cells_force
 from graspsense.core.grasp.calibration import edge_force as edge_force
 from graspsense.core.grasp.calibration import load_of as load_of
 from graspsense.core.grasp.calibration import masked as masked
@@ -114,6 +115,7 @@ from graspsense.core.grasp.calibration import tare as tare
 from graspsense.core.grasp.calibration import zero_of as zero_of
 from graspsense.core.grasp.calibration_files import calibrations_of as calibrations_of
 from graspsense.core.grasp.calibration_files import stored_friction as stored_friction
+from graspsense.core.grasp.calibration_files import stored_gain as stored_gain
 from graspsense.core.grasp.calibration_files import stored_tables as stored_tables
 from graspsense.core.grasp.calibration_files import stored_zero as stored_zero
 

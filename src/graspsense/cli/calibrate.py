@@ -1,4 +1,4 @@
-"""`graspsense calibrate`: files by device serial that hold a gripper's zero, its load table and its friction."""
+"""`graspsense calibrate`: files by device serial with the zero, gains, load table and friction of a gripper."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from graspsense.cli.terminal import echo, echo_table, talk
 if TYPE_CHECKING:
     from graspsense.core.grasp.calibrating import Rig
     from graspsense.core.grasp.calibration_files import Calibration
+    from graspsense.core.values.channel import TactileArray
     from graspsense.core.values.device import DeviceInfo
 
 
@@ -67,6 +68,26 @@ def tare(images: int, replace: bool, as_json: bool, **asked: Any) -> None:
             setup.backend.tare(taken)
         data = {"left": list(left), "right": list(right), "images": len(taken)}
         _store(setup, "tare", data, as_json)
+
+
+@calibrate.command()
+@click.argument("readings", type=click.Path(exists=True, dir_okay=False))
+@_options
+def gain(readings: str, replace: bool, as_json: bool, **asked: Any) -> None:
+    """Store the counts under one newton of each cell, computed from READINGS.
+
+    READINGS is a CSV file with the columns side (left or right), cell (from 0 on), counts (over the zero of this cell)
+    and load_n (force on this cell alone). Several loads a cell are fitted by a line through zero.
+    """
+    from graspsense.core.grasp.calibration import counts_per_newton
+
+    with _set_up(asked, replace) as setup:
+        cells = _fingertips(setup).cells
+        rows = _sided(readings, "cell", "counts", "load_n")
+        gains = {}
+        for side, numbers in rows.items():
+            gains[side] = counts_per_newton([(_cell(row[0]), row[1], row[2]) for row in numbers], cells)
+        _store(setup, "gain", {side: list(values) for side, values in gains.items()}, as_json)
 
 
 @calibrate.command("load-cell")
@@ -170,14 +191,29 @@ def _store(setup: _Setup, kind: str, data: Mapping[str, Any], as_json: bool) -> 
         talk(f"note: {note}")
 
 
+def _cell(number: float) -> int:
+    """Return the number of a cell. Raises ConfigError."""
+    from graspsense.core.values.errors import ConfigError
+
+    if not number.is_integer():
+        raise ConfigError(f"cell {number} is not a whole number: cells are numbered from 0 on")
+    return int(number)
+
+
 def _first_facing(setup: _Setup) -> int:
     """Return the number of the first cell on the gripping face, which its declaration states. Raises ConfigError."""
+    facing = _fingertips(setup).facing
+    return facing.index(True) if True in facing else 0
+
+
+def _fingertips(setup: _Setup) -> TactileArray:
+    """Return the declared array of the fingertips. Raises ConfigError."""
     from graspsense.core.values.channel import TactileArray
     from graspsense.core.values.errors import ConfigError
 
     for channel in setup.backend.channels:
         if channel.name == "pads" and isinstance(channel, TactileArray):
-            return channel.facing.index(True) if True in channel.facing else 0
+            return channel
     raise ConfigError(f"{setup.info.name} does not declare the cells of its fingertips")
 
 
@@ -195,30 +231,33 @@ def _counts_per_n(setup: _Setup) -> float:
 
 
 def _tables(path: str, counts_per_n: float) -> dict[str, Any]:
-    from math import isnan
+    from graspsense.core.grasp.calibration import load_table
+
+    tables = {}
+    for side, rows in _sided(path, "pad_counts", "load_n").items():
+        table = load_table((pad_counts / counts_per_n, load_n) for pad_counts, load_n in rows)
+        tables[side] = {"pad_n": list(table.pad_n), "load_n": list(table.load_n)}
+    return tables
+
+
+def _sided(path: str, *names: str) -> dict[str, list[tuple[float, ...]]]:
+    """Return the numbers in these columns of a CSV file, by the side of the gripper. Raises DataDamaged."""
+    from math import isfinite
     from pathlib import Path
 
-    from graspsense.core.grasp.calibration import load_table
     from graspsense.core.values.errors import DataDamaged
     from graspsense.sources.csv_columns import CsvColumns
 
     columns = CsvColumns(Path(path))
-    missing = {"side", "pad_counts", "load_n"} - set(columns.names)
+    missing = {"side", *names} - set(columns.names)
     if missing:
         raise DataDamaged(f"{path} lacks the columns {', '.join(sorted(missing))}")
-    readings: dict[str, list[tuple[float, float]]] = {"left": [], "right": []}
-    rows = zip(
-        columns.lines,
-        columns.cells["side"],
-        columns.numbers("pad_counts"),
-        columns.numbers("load_n"),
-        strict=True,
-    )
-    for line, side, pad_counts, load_n in rows:
-        if side not in readings:
+    found: dict[str, list[tuple[float, ...]]] = {"left": [], "right": []}
+    rows = zip(*map(columns.numbers, names), strict=True)
+    for line, side, numbers in zip(columns.lines, columns.cells["side"], rows, strict=True):
+        if side not in found:
             raise DataDamaged(f"{path}:{line}: side is {side[:40]!r}, expected left or right")
-        if isnan(pad_counts) or isnan(load_n):
-            raise DataDamaged(f"{path}:{line}: expected two numbers, pad_counts and load_n")
-        readings[side].append((pad_counts / counts_per_n, load_n))
-    tables = {side: load_table(pairs) for side, pairs in readings.items()}
-    return {side: {"pad_n": list(one.pad_n), "load_n": list(one.load_n)} for side, one in tables.items()}
+        if not all(map(isfinite, numbers)):
+            raise DataDamaged(f"{path}:{line}: expected numbers in the columns {', '.join(names)}")
+        found[side].append(tuple(map(float, numbers)))
+    return found

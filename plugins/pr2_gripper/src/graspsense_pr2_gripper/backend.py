@@ -22,6 +22,7 @@ from graspsense.plugin_api import (
     SensorBackend,
     calibrations_of,
     stored_friction,
+    stored_gain,
     stored_tables,
     stored_zero,
 )
@@ -202,6 +203,7 @@ class Pr2Backend(SensorBackend[Pr2Config]):
             config,
             stored_zero(found["tare"]) if "tare" in found else None,
             stored_tables(found["load-cell"]) if "load-cell" in found else None,
+            stored_gain(found["gain"]) if "gain" in found else None,
         )
         self._effort_limit_n = min(identity.effort_limit_un / 1e6, EFFORT_CEILING_N)
         self._speed_limit_m_s = min(identity.speed_limit_um_s / 1e6, SPEED_CEILING_M_S)

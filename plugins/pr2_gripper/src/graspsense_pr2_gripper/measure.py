@@ -12,6 +12,7 @@ from graspsense.plugin_api import (
     Pads,
     Reading,
     TareRefused,
+    cells_force,
     edge_force,
     gap_and_rate,
     load_of,
@@ -74,7 +75,8 @@ _NO_FORCES: Final = _PadForces(math.nan, math.nan, math.nan, math.nan, 0)
 class Measure:
     """Converts the reports of one device, in order, to readings.
 
-    `stored` is the zero of a stored tare, `tables` are the load tables of left and right; None if there are none.
+    `stored` is the zero of a stored tare, `tables` are the load tables of left and right, `gains` the counts under one
+    newton of each of their cells; None if there are none.
     """
 
     def __init__(
@@ -83,6 +85,7 @@ class Measure:
         config: Pr2Config,
         stored: Tips | None,
         tables: tuple[LoadTable, LoadTable] | None,
+        gains: Tips | None = None,
     ) -> None:
         self._link = LINKAGES[identity.transmission]
         self._period_us = round(1e6 / identity.report_rate_hz)
@@ -96,6 +99,8 @@ class Measure:
         self._edge_per_n = edge_scale(side, edge)
         self._swap, self._mirror = config.swap_fingers, (config.mirror_left, config.mirror_right)
         self._stored, self._tables = stored, tables
+        # The sum of the cells has the counts of the board; a gain of each cell takes its place.
+        self._gains = gains
         self._zero: Tips | None = stored
         self._accelerometer = Accelerometer(identity.accelerometer_g) if config.accelerometer else None
         self._pads = no_pads(CELLS)
@@ -202,8 +207,12 @@ class Measure:
             # Without a tare there is no force: the offsets alone are some thousand counts for each cell.
             self._forces = _PadForces(0.0, 0.0, 0.0, 0.0, status)
             return
-        left_n = pad_force(left, zero[0], self._pad_per_n, FIRST_PAD_CELL)
-        right_n = pad_force(right, zero[1], self._pad_per_n, FIRST_PAD_CELL)
+        if self._gains is None:
+            left_n = pad_force(left, zero[0], self._pad_per_n, FIRST_PAD_CELL)
+            right_n = pad_force(right, zero[1], self._pad_per_n, FIRST_PAD_CELL)
+        else:
+            left_n = cells_force(left, zero[0], self._gains[0], FIRST_PAD_CELL)
+            right_n = cells_force(right, zero[1], self._gains[1], FIRST_PAD_CELL)
         if self._tables is not None:
             left_n, left_inside = load_of(self._tables[0], left_n)
             right_n, right_inside = load_of(self._tables[1], right_n)

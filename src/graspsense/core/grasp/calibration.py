@@ -134,6 +134,46 @@ def _zero_of_answering(images: Sequence[Cells]) -> Cells:
     return tuple(zero)
 
 
+def counts_per_newton(readings: Iterable[tuple[int, float, float]], cells: int) -> Cells:
+    """Return the counts under one newton of each cell of a fingertip from readings (cell, counts, load in N).
+
+    The counts are those over the zero of the cell, and the load is on this cell alone: the line through zero that fits
+    best. Raises ConfigError for a cell that there is not or that has no reading, a load that is not above 0 N, and a
+    cell whose counts do not rise with the load.
+    """
+    products, squares = [0.0] * cells, [0.0] * cells
+    for cell, counts, load_n in readings:
+        if not 0 <= cell < cells:
+            raise ConfigError(f"there is no cell {cell}: the fingertip has {cells}, from 0 on")
+        if not (0.0 < load_n < float("inf") and abs(counts) < float("inf")):
+            raise ConfigError(
+                f"reading ({counts}, {load_n}) of cell {cell}: give counts, and a load above 0 N"
+            )
+        products[cell] += counts * load_n
+        squares[cell] += load_n * load_n
+    missing = [str(cell) for cell in range(cells) if not squares[cell]]
+    if missing:
+        raise ConfigError(f"the cells {', '.join(missing)} have no reading: press on each cell")
+    gains = tuple(product / square for product, square in zip(products, squares, strict=True))
+    for cell, gain in enumerate(gains):
+        if not gain > 0.0:
+            raise ConfigError(
+                f"the counts of cell {cell} do not rise with its load: is it the cell that was pressed?"
+            )
+    return gains
+
+
+def cells_force(cells: Cells, zero: Cells, counts_per_n: Cells, first: int) -> float:
+    """Return the force (N) on the cells of the gripping face, which are all from number `first` on.
+
+    `counts_per_n` has the counts under one newton of each cell, as `stored_gain` returns them.
+    """
+    total = 0.0
+    for i in range(first, len(cells)):
+        total += (cells[i] - zero[i]) / counts_per_n[i]
+    return total
+
+
 class LoadTable(NamedTuple):
     """The force that a load cell measured (N) at each force of a pad (N); both rise, from (0, 0) on."""
 

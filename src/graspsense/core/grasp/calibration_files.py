@@ -1,6 +1,6 @@
 """Calibration files: a folder for each serial number, and in it a file for each kind, with its version and hash.
 
-    FOLDER/SERIAL/tare.json, load-cell.json, friction.json
+    FOLDER/SERIAL/tare.json, gain.json, load-cell.json, friction.json
 
 A file names the device that it was made on; its use with another device is an error.
 """
@@ -26,7 +26,7 @@ from graspsense.core.values.errors import ConfigError, DataDamaged
 
 FORMAT: Final = "graspsense-calibration"
 VERSION: Final = 1
-KINDS: Final = ("tare", "load-cell", "friction")
+KINDS: Final = ("tare", "gain", "load-cell", "friction")
 UNCALIBRATED: Final = "none"
 """The value of the setting for the use without calibration."""
 
@@ -197,6 +197,14 @@ def stored_zero(calibration: Calibration) -> tuple[Cells, Cells]:
     return left, right
 
 
+def stored_gain(calibration: Calibration) -> tuple[Cells, Cells]:
+    """Return the counts under one newton of each cell of the left and of the right fingertip."""
+    left, right = _numbers(calibration.data["left"]), _numbers(calibration.data["right"])
+    if not left or not right or min(*left, *right) <= 0.0:
+        raise ValueError("the gain of each cell must be a number above 0")
+    return left, right
+
+
 def stored_tables(calibration: Calibration) -> tuple[LoadTable, LoadTable]:
     """Return the stored load tables of the left and of the right pad."""
     tables = []
@@ -218,7 +226,12 @@ def stored_friction(calibration: Calibration) -> tuple[Cells, Cells, Cells]:
     return columns[0], columns[1], columns[2]
 
 
-_READERS: Final = {"tare": stored_zero, "load-cell": stored_tables, "friction": stored_friction}
+_READERS: Final = {
+    "tare": stored_zero,
+    "gain": stored_gain,
+    "load-cell": stored_tables,
+    "friction": stored_friction,
+}
 
 
 def _numbers(values: Any) -> Cells:

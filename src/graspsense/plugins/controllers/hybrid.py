@@ -17,6 +17,7 @@ from graspsense.plugin_api import (
     EFFORT,
     NOT_FREE,
     POSITION,
+    VELOCITY,
     Command,
     Controller,
     Frame,
@@ -112,7 +113,7 @@ def step(params: HybridParams, state: HybridState, reading: Reading) -> tuple[Co
     frame = reading.frame
     before = state.progress
     sent = state.sent
-    if params.kind != EFFORT and rises(sent, params.force.probing_force_n):
+    if params.kind == POSITION and rises(sent, params.force.probing_force_n):
         before = not_resting(before, frame)
     progress = supervise(params.supervision, before, frame)
     _, _, _, integral, force_effort, approach_effort, contact_t, _, _ = state
@@ -124,7 +125,7 @@ def step(params: HybridParams, state: HybridState, reading: Reading) -> tuple[Co
         sent = Raised(sent.force_n, frame.t_s, frame.gap_m)
     else:
         # A gripper that closes by itself is corrected when its own loop has come to rest.
-        if params.kind == EFFORT or (
+        if params.kind != POSITION or (
             not rises(sent, params.force.probing_force_n)
             and at_rest(progress.still, frame.t_s, params.supervision.rest_window_s)
         ):
@@ -135,7 +136,10 @@ def step(params: HybridParams, state: HybridState, reading: Reading) -> tuple[Co
             effort = approach_effort + (effort - approach_effort) * (elapsed / params.ramp_s)
         sent = raised(params.own, sent, frame.t_s, params.force.probing_force_n)
     command = Command(EFFORT, effort, inf, inf)
-    if params.kind != EFFORT:
+    if params.kind == VELOCITY:
+        limit = inf if progress.phase == APPROACH else effort
+        command = Command(VELOCITY, -params.velocity.closing_speed_m_s, limit, inf)
+    elif params.kind == POSITION:
         command = own_command(params, progress.phase, sent, effort)
     return command, HybridState(
         progress.phase,
@@ -152,13 +156,10 @@ def step(params: HybridParams, state: HybridState, reading: Reading) -> tuple[Co
 
 def own_command(params: HybridParams, phase: int, sent: Raised, effort_n: float) -> Command:
     """Return what a gripper is sent that closes by itself; its force follows the loop once it has been raised."""
-    speed = params.velocity.closing_speed_m_s
     force, stops = sent.force_n, phase != APPROACH and sent.stop_gap_m == sent.stop_gap_m
     if phase != APPROACH and not stops and force >= params.force.probing_force_n:
         force = effort_n
-    if params.kind == POSITION:
-        return Command(POSITION, sent.stop_gap_m if stops else 0.0, force, speed)
-    return Command(params.kind, 0.0 if stops else -speed, force, inf)
+    return Command(POSITION, sent.stop_gap_m if stops else 0.0, force, params.velocity.closing_speed_m_s)
 
 
 def free_begin(params: HybridParams, state: HybridState, frame: Frame) -> tuple[float, FreeLimits]:
@@ -190,7 +191,7 @@ class HybridController(Controller[HybridConfig]):
     alternatives = ("velocity", "position")
     becomes: ClassVar[Mapping[str, str]] = {
         "position": f"the closed position at the closing speed with {STEPS}",
-        "velocity": f"the closing speed with {STEPS}",
+        "velocity": "the closing speed, from the contact on with the probing force",
     }
     step = staticmethod(step)
     events = EVENTS
@@ -211,7 +212,7 @@ class HybridController(Controller[HybridConfig]):
 
     @property
     def _own_loop(self) -> bool:
-        return bool(self.config.sends != "effort")
+        return bool(self.config.sends == "position")
 
     def asked_speed_m_s(self) -> float:
         """Return the closing speed (m/s)."""
