@@ -136,6 +136,19 @@ def test_a_table_has_its_features_and_gets_no_pipeline(run, tmp_path):
     assert not (tmp_path / "own.toml").exists()
 
 
+def test_trials_from_which_nothing_can_be_chosen(run, store, tmp_path):
+    out = ("--out", tmp_path / "own.json")
+    code, _, err = run("train", store, "--choose", "--only", "foam", *out)
+    assert (code, "'foam'" in err) == (2, True)
+    # No pad reaches this force: no feature set finds a contact.
+    code, _, err = run("train", store, "--choose", "-o", "features.contact_force_n=15", *out)
+    assert (code, "0 of 24 trials" in err) == (2, True)
+    given = ("-o", "features.type=curve", "-o", "features.contact_force_n=15", "--classifier", "knn")
+    code, _, err = run("train", store, "--choose", *given, *out)
+    assert (code, "no feature" in err) == (2, True)
+    assert not list(tmp_path.glob("own*"))
+
+
 @pytest.mark.parametrize("option", [("--checkpoints", "0.1"), ("--target-value", "fill")])
 def test_options_that_do_not_go_with_it(run, store, tmp_path, option):
     code, _, err = run("train", store, "--choose", *option, "--out", tmp_path / "own.json")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -64,8 +64,16 @@ def refuse_with_choice(given: Mapping[str, Any]) -> None:
             raise click.UsageError(f"--choose does not go with --{name.replace('_', '-')}")
 
 
-def chosen(source: str, classifier: str | None, given: Mapping[str, Any], target: str) -> Chosen:
-    """Choose among the classifiers with the feature sets that suit the trials. Raises ConfigError."""
+def chosen(
+    source: str,
+    classifier: str | None,
+    given: Mapping[str, Any],
+    aimed: Callable[[Labelled], Labelled],
+) -> Chosen:
+    """Choose among the classifiers with the feature sets that suit the trials; `aimed` gives these their labels.
+
+    Raises ConfigError.
+    """
     from graspsense.cli.progress import ProgressLine
     from graspsense.evaluation.choosing import choose
 
@@ -74,7 +82,7 @@ def chosen(source: str, classifier: str | None, given: Mapping[str, Any], target
     learners = {one.component.name: one for one in learners.values()}
     notes: list[str] = []
     with ProgressLine() as progress:
-        trials = {name: one.aimed(target) for name, one in _tables(source, progress, given, notes).items()}
+        trials = {name: aimed(one) for name, one in _tables(source, progress, given, notes).items()}
         choice = choose(learners, trials, seed=given["seed"], notes=notes, progress=progress)
     return Chosen(
         choice=choice,
@@ -128,7 +136,9 @@ def _tables(
         part = _part(united, component, columns)
         having = int((~np.isnan(part.table.values)).any(axis=1).sum())
         if having >= SUITED * len(part):
-            tables[component.name], suited[component.qualified] = part, columns
+            # Sets of two distributions can have the same name.
+            name = component.name if component.distribution == "graspsense" else component.qualified
+            tables[name], suited[component.qualified] = part, columns
         else:
             notes.append(
                 f"features {component.name} are left out: {having} of {len(part)} trials have one of them"

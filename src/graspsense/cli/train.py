@@ -91,6 +91,8 @@ def train(
     **given: Any,
 ) -> None:
     """Train a model, write it, and print what it was trained on."""
+    from functools import partial
+
     from graspsense.core.files.whole_file import write_whole
     from graspsense.core.learn.checkpoints import checkpoints_of
     from graspsense.core.learn.model import write_model
@@ -107,7 +109,10 @@ def train(
         train_value(source, classifier, out, keep, as_json, given)
         return
     _refuse_single_scene(source)
-    found, held_out = chosen(source, classifier, given, target) if choose else None, None
+    found, held_out = (
+        chosen(source, classifier, given, partial(_with_target, target=target)) if choose else None,
+        None,
+    )
     if found is not None:
         learner, labelled = found.learner, found.labelled
     else:

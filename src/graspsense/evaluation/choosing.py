@@ -20,7 +20,7 @@ from attrs import frozen
 
 from graspsense.core.values.errors import FAILURES, ConfigError, named
 from graspsense.evaluation.chosen import ChosenRate
-from graspsense.evaluation.crossval import ClassifierFactory, fit_and_predict
+from graspsense.evaluation.crossval import ClassifierFactory, fit_and_predict, refuse_without_features
 from graspsense.evaluation.folds import INSTANCE_HELD_OUT
 from graspsense.evaluation.gathered_warnings import gathered_warnings
 from graspsense.evaluation.intervals import RecognitionRate, rate_of
@@ -149,6 +149,7 @@ def _nested(answers: Mapping[tuple[str, str], _Answers], folds: Folds) -> tuple[
 
 def _answers(learner: ClassifierFactory, trials: Labelled, folds: Folds, seed: int) -> _Answers:
     """Return the answers of a candidate. Raises what its classifier raises."""
+    refuse_without_features(trials.table)
     count = int(folds.max()) + 1
     inner = np.zeros((count, len(folds)), dtype=np.bool_)
     outer = np.zeros(len(folds), dtype=np.bool_)

@@ -64,6 +64,14 @@ class Pooled:
         return [answer == label for answer, label in zip(self.predicted, labels, strict=True)]
 
 
+def refuse_without_features(table: FeatureTable) -> None:
+    """Raise FitRefused if no trial has a feature."""
+    if np.isnan(table.values).all():
+        raise FitRefused(
+            f"no feature is defined in any of the {len(table)} trials: there is nothing to learn from"
+        )
+
+
 def columns_of(labels: Sequence[str], classes: Sequence[str]) -> NDArray[np.int64]:
     """Return the column of each of these labels."""
     column = {name: k for k, name in enumerate(classes)}
@@ -88,10 +96,7 @@ def cross_validate(
     With `share`, training uses about that share of the training trials of each label, at least one. Raises FitRefused
     if the classifier cannot learn from the training trials of a fold.
     """
-    if np.isnan(table.values).all():
-        raise FitRefused(
-            f"no feature is defined in any of the {len(table)} trials: there is nothing to learn from"
-        )
+    refuse_without_features(table)
     predicted = [""] * len(labels)
     all_classes = tuple(sorted(set(labels)))
     probabilities = np.full((len(labels), len(all_classes)), np.nan)
