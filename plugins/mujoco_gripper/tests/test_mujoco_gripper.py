@@ -170,6 +170,15 @@ def test_a_touch_sensor_measures_the_force_of_the_contacts(tmp_path):
         ({"open": "[1.0, 2.0]"}, ("open has 2 values",)),
         ({"gap": "{ }"}, ("one of sites, geoms and joint",)),
         ({"actuator": '["close"]'}, ("actuator", "actuators")),
+        ({"channels": '{ palm = { sensor = "nosuch", unit = "m/s2" } }'}, ("sensor", "nosuch")),
+        (
+            {
+                "gap": '{ left = [{ body = "nosuch", at = [0, 0, 0] }], right = [{ body = "left", at = [0, 0, 0] }] }'
+            },
+            ("body", "nosuch", "palm"),
+        ),
+        ({"angle": '"turns"'}, ("radian", "degree")),
+        ({"impratio": "-1.0"}, ("impratio",)),
         ({"model": "nosuch.xml"}, ("nosuch.xml",)),
         ({"model": "package:nosuchpackage:a.xml"}, ("pip install nosuchpackage",)),
     ],
@@ -263,6 +272,20 @@ def test_angles_in_radians_are_asked_for_where_hinges_hardly_turn(tmp_path):
     with pytest.raises(ConfigError, match='angle = "radian"'):
         create("sensor-backend", "mujoco", file=str(hinged_file(tmp_path))).open(0)
     create("sensor-backend", "mujoco", file=str(hinged_file(tmp_path, angle='"radian"'))).open(0)
+
+
+def test_what_is_no_finger_can_be_left_out_of_the_contacts(tmp_path):
+    """A box of the palm between the fingers stands for the hull of a mesh that is hollow there."""
+    text = PARALLEL.read_text()
+    filled = text.replace('<body name="left"', '<geom type="box" size="0.02 0.02 0.02"/><body name="left"', 1)
+    assert filled != text
+    (tmp_path / "filled.xml").write_text(filled)
+    file = gripper_file(tmp_path, tmp_path / "filled.xml")
+    with pytest.raises(ConfigError, match="penetrates"):
+        create("sensor-backend", "mujoco", file=str(file)).open(0)
+    file = gripper_file(tmp_path, tmp_path / "filled.xml", only_fingers="true")
+    trial = grasped(f"gripper.file={file}", thing="block")
+    assert trial.features["p_steady"] == pytest.approx(0.040, abs=2e-4)
 
 
 def test_fingers_that_are_not_opposed_are_refused(tmp_path):
