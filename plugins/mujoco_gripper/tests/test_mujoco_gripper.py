@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from graspsense import ConfigError, load_pipeline
+from graspsense.cli.main import main
 from graspsense.plugin_api import EFFORT, Command, DeviceLost, UnknownName, create, parametrize_checks
 from graspsense_mujoco_gripper.catalogue import FOLDER
 
@@ -18,11 +19,52 @@ def test_the_distribution_conforms(check):
     check.run()
 
 
+HINGED = """<mujoco>
+  <compiler angle="radian"/>
+  <option impratio="20" cone="elliptic"/>
+  <worldbody><body name="palm"><geom type="box" size="0.02 0.04 0.01" mass="1"/>
+    <body name="a" pos="0 -0.035 0"><joint name="ja" type="hinge" axis="1 0 0" range="-0.7 0.5" damping="0.02"/>
+      <geom name="pa" type="box" size="0.01 0.003 0.02" pos="0 -0.012 0.09" euler="0.2 0 0" mass="0.05"/></body>
+    <body name="b" pos="0 0.035 0"><joint name="jb" type="hinge" axis="1 0 0" range="-0.5 0.7" damping="0.02"/>
+      <geom name="pb" type="box" size="0.01 0.003 0.02" pos="0 0.012 0.09" euler="-0.2 0 0" mass="0.05"/></body>
+  </body></worldbody>
+  <actuator>
+    <position name="ma" joint="ja" kp="5" ctrlrange="-0.6 0.5"/>
+    <position name="mb" joint="jb" kp="5" ctrlrange="-0.5 0.6"/>
+  </actuator>
+</mujoco>"""
+"""Two fingers that turn, each with an actuator of its own."""
+
+
+def hinged_file(folder: Path, **changed: str) -> Path:
+    """Write the file of the gripper with two fingers that turn."""
+    return gripper_file(
+        folder,
+        folder / "hinged.xml",
+        **{
+            "actuators": '["ma", "mb"]',
+            "open": "[0.3, -0.3]",
+            "closed": "[-0.4, 0.4]",
+            "gap": '{ geoms = ["pa", "pb"] }',
+            "left": '{ geoms = ["pa"] }',
+            "right": '{ geoms = ["pb"] }',
+            **changed,
+        },
+    )
+
+
 def grasped(*options, thing="can", seed=0):
     pipeline = load_pipeline(
         "default", options=["gripper.type=mujoco", "classifier.type=none", "gripper.spread=false", *options]
     )
     return pipeline.grasp(object=thing, seed=seed)
+
+
+def run_cli(capsys, *arguments: str) -> tuple[int, str]:
+    """Run graspsense; return its exit code and all that it said."""
+    with pytest.raises(SystemExit) as ended:
+        main(arguments)
+    return int(ended.value.code or 0), "".join(capsys.readouterr())
 
 
 def gripper_file(folder: Path, model: Path = PARALLEL, **changed: str) -> Path:
@@ -193,3 +235,109 @@ def test_an_unstable_simulation_ends_with_its_reason_and_writes_nothing(tmp_path
     with pytest.raises(DeviceLost, match="unstable"):
         simulate()
     assert [path.name for path in tmp_path.iterdir()] == ["wild.xml"]
+
+
+def test_several_actuators_keep_together_and_a_thing_is_put_where_turning_fingers_meet_it(tmp_path):
+    """Two hinged fingers with an actuator each; they press at another place than where the gap is measured."""
+    (tmp_path / "hinged.xml").write_text(HINGED)
+    trial = grasped(
+        f"gripper.file={hinged_file(tmp_path)}",
+        "controller.sends=velocity",
+        "controller.probing_force_n=5",
+        thing="egg",
+    )
+    assert trial.outcome.words == "steady"
+    assert trial.features["f_steady"] == pytest.approx(5.0, rel=0.3)
+
+
+def test_angles_in_radians_are_asked_for_where_hinges_hardly_turn(tmp_path):
+    text = (
+        HINGED.replace('angle="radian"', "").replace("-0.7 0.5", "-0.3 0.05").replace("-0.5 0.7", "-0.05 0.3")
+    )
+    (tmp_path / "hinged.xml").write_text(text)
+    with pytest.raises(ConfigError, match='angle = "radian"'):
+        create("sensor-backend", "mujoco", file=str(hinged_file(tmp_path))).open(0)
+    create("sensor-backend", "mujoco", file=str(hinged_file(tmp_path, angle='"radian"'))).open(0)
+
+
+def test_fingers_that_are_not_opposed_are_refused(tmp_path):
+    both = gripper_file(tmp_path, right='{ geoms = ["left_pad"] }')
+    with pytest.raises(ConfigError, match="part of both fingers"):
+        create("sensor-backend", "mujoco", file=str(both)).open(0)
+    away = gripper_file(
+        tmp_path,
+        gap='{ joint = "left", scale = -2.0, offset_m = 0.09 }',
+        left='{ geoms = ["right_pad"] }',
+        right='{ geoms = ["left_pad"] }',
+        closing="[0.0, 1.0, 0.0]",
+    )
+    with pytest.raises(ConfigError, match="not opposed"):
+        create("sensor-backend", "mujoco", file=str(away)).open(0)
+
+
+@pytest.mark.parametrize("include", ["&#46;&#46;/secret.xml", "/etc/hostname"])
+def test_an_include_that_is_disguised_or_absolute_is_outside_as_well(tmp_path, include):
+    inside = tmp_path / "model"
+    inside.mkdir()
+    (tmp_path / "secret.xml").write_text("<mujocoinclude/>")
+    (inside / "m.xml").write_text(f"<mujoco><include\n file='{include}'/></mujoco>")
+    with pytest.raises(ConfigError, match="outside of its folder"):
+        create("sensor-backend", "mujoco", file=str(gripper_file(inside, inside / "m.xml"))).open(0)
+
+
+@pytest.mark.parametrize(
+    ("old", "new"), [('damping="600"', 'damping="nan"'), ('pos="0.045 0 0"', 'pos="nan 0 0"')]
+)
+def test_a_model_with_numbers_that_are_not_finite_is_refused(tmp_path, old, new):
+    text = PARALLEL.read_text()
+    assert old in text
+    (tmp_path / "nan.xml").write_text(text.replace(old, new))
+    with pytest.raises(ConfigError, match=r"not finite|refuses|nan"):
+        create("sensor-backend", "mujoco", file=str(gripper_file(tmp_path, tmp_path / "nan.xml"))).open(0)
+
+
+def test_a_library_that_a_model_names_is_not_loaded(tmp_path):
+    """Plugins come from the folder of MuJoCo only; the name of another is refused, and its file is not opened."""
+    (tmp_path / "evil.so").write_bytes(b"")
+    extension = f'<extension><plugin plugin="{tmp_path}/evil.so"/></extension>'
+    (tmp_path / "m.xml").write_text(PARALLEL.read_text().replace("<worldbody>", extension + "<worldbody>", 1))
+    with pytest.raises(ConfigError, match=r"refuses.*evil"):
+        create("sensor-backend", "mujoco", file=str(gripper_file(tmp_path, tmp_path / "m.xml"))).open(0)
+
+
+def test_a_robot_of_the_menagerie_that_cannot_be_had_says_what_to_do(tmp_path):
+    """The package is not among those of the tests; .ci/mujoco tries it where it is installed."""
+    text = gripper_file(tmp_path).read_text().replace(f"'{PARALLEL}'", '"menagerie:robotiq_2f85"')
+    (tmp_path / "gripper.toml").write_text(text)
+    with pytest.raises(ConfigError, match=r"menagerie:robotiq_2f85"):
+        create("sensor-backend", "mujoco", file=str(tmp_path / "gripper.toml")).open(0)
+
+
+def test_a_gripper_file_is_written_from_a_model_and_grasps_as_it_is(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    made = run_cli(
+        capsys, "plugins", "new", "lab-hand", "--role", "sensor-backend", "--mujoco", str(PARALLEL)
+    )
+    assert made[0] == 0, made
+    assert "close" in made[1]
+    assert "Left to fill in" in made[1]
+    trial = grasped("gripper.file=lab-hand.toml", thing="block")
+    assert (trial.outcome.words, trial.features["f_steady"]) == ("steady", pytest.approx(20.0, abs=0.2))
+    again = run_cli(
+        capsys, "plugins", "new", "lab-hand", "--role", "sensor-backend", "--mujoco", str(PARALLEL)
+    )
+    assert again[0] == 2
+    assert "there already" in again[1]
+
+
+def test_a_model_without_opposed_fingers_gets_no_gripper_file(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "arm.xml").write_text(
+        '<mujoco><worldbody><body name="arm"><joint name="j" type="slide" axis="1 0 0" range="0 1"/>'
+        '<geom size="0.1"/></body></worldbody><actuator>'
+        '<position joint="j" ctrlrange="0 1" kp="10"/></actuator></mujoco>'
+    )
+    made = run_cli(capsys, "plugins", "new", "lab-hand", "--role", "sensor-backend", "--mujoco", "arm.xml")
+    assert made[0] == 2
+    assert "opposed" in made[1]
+    assert not (tmp_path / "lab-hand.toml").exists()

@@ -162,12 +162,50 @@ def check(
     help="Role of a component; give it several times for several. An unknown role lists all of them.",
 )
 @click.option("--folder", type=click.Path(path_type=Path), help="Folder of the package.  [default: ./NAME]")
-def new(name: str, roles: tuple[str, ...], folder: Path | None) -> None:
+@click.option(
+    "--mujoco",
+    "model",
+    metavar="MODEL.xml",
+    help="Write only a gripper file, NAME.toml, for a MuJoCo model (--role sensor-backend).",
+)
+def new(name: str, roles: tuple[str, ...], folder: Path | None, model: str | None) -> None:
     """Create the package of a new plugin, with tests, for one role or for several that fit together."""
     from graspsense.scaffold.make import make
 
+    if model is not None:
+        _write_gripper_file(name, roles, folder or Path(), model)
+        return
     for line in make(name, roles, folder if folder is not None else Path(name)):
         echo(line, indent=2)
+
+
+def _write_gripper_file(name: str, roles: tuple[str, ...], folder: Path, model: str) -> None:
+    """Write a gripper file for a MuJoCo model; say what was found, and what is left to fill in."""
+    from graspsense.core.components.registry import installed
+    from graspsense.core.files.whole_file import write_whole
+    from graspsense.core.values.errors import ConfigError
+    from graspsense.scaffold.make import NAME
+
+    if roles != ("sensor-backend",):
+        raise ConfigError("a MuJoCo model is a gripper: --mujoco is given with --role sensor-backend alone")
+    if not NAME.fullmatch(name):
+        raise ConfigError(
+            f"the name {name!r} is not valid: small letters, digits and single hyphens, as in lab-hand"
+        )
+    path = folder / f"{name}.toml"
+    if path.exists():
+        raise ConfigError(f"{path} is there already: give another name, or --folder")
+    backend: Any = installed().find("sensor-backend", "mujoco").component_class()
+    draft = backend.drafted(model, folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    write_whole(path, draft.text.encode(), replace=False)
+    echo(f"{path} has a gripper file. Found:", indent=2)
+    for line in draft.found:
+        echo(f"  {line}", indent=4)
+    echo("Left to fill in or to look at:")
+    for line in draft.left:
+        echo(f"  {line}", indent=4)
+    echo(f"  graspsense run --gripper mujoco -o gripper.file={path} -o classifier.type=none", indent=2)
 
 
 @plugins.command()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import ceil, inf, nan
+from pathlib import Path
 from typing import Any, Final, Unpack, final
 
 import mujoco
@@ -37,6 +38,7 @@ from graspsense_mujoco_gripper.batch import Job, grasps
 from graspsense_mujoco_gripper.camera import Camera, Window, offscreen, require_screen
 from graspsense_mujoco_gripper.catalogue import catalogue
 from graspsense_mujoco_gripper.config import MujocoConfig
+from graspsense_mujoco_gripper.draft import Draft, drafted
 from graspsense_mujoco_gripper.drive import ActuatorDrive, Travel, instability, test_move
 from graspsense_mujoco_gripper.gripper_file import read_gripper
 from graspsense_mujoco_gripper.measurement import ForceGauge, GapGauge, cells_of, geoms_of, width_m
@@ -117,6 +119,11 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
         if viewer.window:
             require_screen()
         self._viewer = viewer
+
+    @staticmethod
+    def drafted(model: str, folder: Path) -> Draft:
+        """Return a first gripper file for a model, to be put into `folder`. Raises ConfigError."""
+        return drafted(model, folder)
 
     def open(self, seed: int) -> DeviceInfo:
         """Build the model with the thing between the open fingers. Raises ConfigError, UnknownName."""

@@ -6,7 +6,7 @@ actuator of gain g and bias b0 + b1 length + b2 velocity exerts the force g cont
 
 from __future__ import annotations
 
-from math import inf, isfinite
+from math import inf, isfinite, sqrt
 
 import mujoco
 import numpy as np
@@ -23,14 +23,17 @@ TEST_S = 1.0
 """Time of each half of the test move: opening, and closing."""
 POINTS = 64
 LEAST_TRAVEL_M = 1e-3
+LEAST_TURN_RAD = 0.1
 CLEARANCE_M = 0.004
 """A thing is put where the fingers have this much more room than it needs, so that one that stands still is clear."""
 MASS_STEPS = 4
 LEAST_MASS_KG = 1e-3
 UNKNOWN_MASS_KG = 0.5
 """Assumed where the fingers stand still in the first steps of the test move."""
-SERVO_RAD_S = 60.0
-"""Natural frequency of the servo on the gap, critically damped."""
+SERVO_RAD_S, FASTEST_RAD_S = 60.0, 300.0
+"""Natural frequency of the servo on the gap, critically damped; and that of the lightest grippers."""
+SERVO_N_M = 1000.0
+"""Least stiffness of the servo: at a lower one the force of light fingers on a thing grows too slowly."""
 
 
 @frozen(eq=False)
@@ -69,6 +72,7 @@ def test_move(model: mujoco.MjModel, gripper: GripperFile, width_m: float | None
     `width_m` is that of the thing to be grasped: fingers that turn are looked at where they touch it. Without a thing
     they are looked at half closed.
     """
+    _check_angles(model, gripper)
     data = mujoco.MjData(model)
     ids = actuator_ids(model, gripper)
     gauge = GapGauge(model, gripper.gap)
@@ -85,12 +89,12 @@ def test_move(model: mujoco.MjModel, gripper: GripperFile, width_m: float | None
     for _ in range(steps):
         mujoco.mj_step(model, data)
         gap_m = gauge.gap_m(data, axis)
-        if gap_m < gaps[-1] - 1e-6:
+        if 0.0 <= gap_m < gaps[-1] - 1e-6:
             gaps.append(gap_m)
             lengths.append(data.actuator_length[ids].copy())
             states.append(data.qpos.copy())
     _check(model, data)
-    end_m = gauge.gap_m(data, axis)
+    end_m = max(gauge.gap_m(data, axis), 0.0)
     if end_m > start_m - LEAST_TRAVEL_M:
         raise ConfigError(
             f"gripper.file: with the controls `closed` the gap goes from {start_m * 1e3:.3g} to {end_m * 1e3:.3g} mm, "
@@ -101,6 +105,7 @@ def test_move(model: mujoco.MjModel, gripper: GripperFile, width_m: float | None
     mujoco.mj_kinematics(model, data)
     left, right = faces(model, data, gripper)
     axis = closing_axis(gripper, left, right)
+    _check_opposed(model, gripper, axis, (states[0], states[-1]))
     if gauge.along_axis:
         for k, state in enumerate(states):
             data.qpos[:] = state
@@ -113,6 +118,34 @@ def test_move(model: mujoco.MjModel, gripper: GripperFile, width_m: float | None
     )
     mass_kg = _mass(model, gripper, qpos_open, axis)
     return Travel(grid, table, mass_kg, axis, (left + right) / 2.0, qpos_open)
+
+
+def _check_angles(model: mujoco.MjModel, gripper: GripperFile) -> None:
+    """Raise ConfigError for hinges that hardly turn: their ranges are probably radians, read as degrees."""
+    hinges = (model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE) & (model.jnt_limited == 1)
+    widest = float(np.ptp(model.jnt_range[hinges], axis=1).max(initial=0.0))
+    if not gripper.angle and 0.0 < widest < LEAST_TURN_RAD:
+        raise ConfigError(
+            f"gripper.file: the hinges of the model turn by {np.degrees(widest):.2g} degrees at most, as if radians "
+            'were read as degrees: give angle = "radian", or angle = "degree" where that is right'
+        )
+
+
+def _check_opposed(
+    model: mujoco.MjModel, gripper: GripperFile, axis: Floats, states: tuple[Floats, Floats]
+) -> None:
+    """Raise ConfigError where the faces of the fingers do not come nearer to each other."""
+    data, apart = mujoco.MjData(model), []
+    for state in states:
+        data.qpos[:] = state
+        mujoco.mj_kinematics(model, data)
+        left, right = faces(model, data, gripper)
+        apart.append(float((right - left) @ axis))
+    if apart[1] > apart[0] - LEAST_TRAVEL_M:
+        raise ConfigError(
+            f"gripper.file: the left and the right finger are {apart[0] * 1e3:.1f} mm apart while open, and "
+            f"{apart[1] * 1e3:.1f} mm while closed: they are not opposed. Look at left, right and gap"
+        )
 
 
 def _mass(model: mujoco.MjModel, gripper: GripperFile, qpos: Floats, axis: Floats) -> float:
@@ -190,6 +223,7 @@ class ActuatorDrive:
         self.effort_n = 0.0
         """The effort that the actuators exert in this step (N), positive where it closes."""
         self._target_m = travel.open_m
+        self._servo_rad_s = min(max(sqrt(SERVO_N_M / travel.mass_kg), SERVO_RAD_S), FASTEST_RAD_S)
         self.effort_limit_n = gripper.effort_limit_n or self._greatest()
 
     def _greatest(self) -> float:
@@ -230,9 +264,9 @@ class ActuatorDrive:
         """Return forces that keep several actuators at the positions of the test move for this gap, without effort."""
         if len(slopes) == 1:
             return np.zeros(1)
-        inertia = self._travel.mass_kg / float(slopes @ slopes)
+        inertia, frequency = self._travel.mass_kg / float(slopes @ slopes), self._servo_rad_s
         behind = self._travel.lengths(gap_m) - length
-        forces = inertia * SERVO_RAD_S * (SERVO_RAD_S * behind + 2.0 * (slopes * rate_m_s - velocity))
+        forces = inertia * frequency * (frequency * behind + 2.0 * (slopes * rate_m_s - velocity))
         forces -= slopes * float(slopes @ forces) / float(slopes @ slopes)
         return np.asarray(forces)
 
@@ -254,9 +288,9 @@ class ActuatorDrive:
         else:
             raise ValueError(f"{kind} is no kind of command")
         self._target_m += speed * dt_s
-        stiffness = self._travel.mass_kg * SERVO_RAD_S**2
+        stiffness = self._travel.mass_kg * self._servo_rad_s**2
         # A target that the fingers cannot follow runs away only as far as the limit of the effort can use.
         farthest_m = min(command.effort_limit_n, self.effort_limit_n) / stiffness
         self._target_m = min(max(self._target_m, gap_m - farthest_m), gap_m + farthest_m)
-        damping = 2.0 * self._travel.mass_kg * SERVO_RAD_S
+        damping = 2.0 * self._travel.mass_kg * self._servo_rad_s
         return stiffness * (gap_m - self._target_m) + damping * (rate_m_s - speed)

@@ -18,7 +18,9 @@ geoms = ["finger2_pad_collision", "finger2_collision"]
 from __future__ import annotations
 
 from collections.abc import Mapping
+from importlib import import_module
 from importlib.resources import files
+from math import inf
 from pathlib import Path
 from typing import Any, Final
 
@@ -105,8 +107,9 @@ class GripperFile:
 
     `open` and `closed` are the controls of each actuator with the fingers open and closed. `closing` is the direction
     in which the left finger moves (a vector of the world); empty: from the left finger to the right one. `angle` is the
-    unit of angles in a model that leaves it to those that include it. With `only_fingers`, only the geoms of the fingers
-    touch: the hull of a mesh may fill the space between them.
+    unit of angles in a model that leaves it to those that include it. With `only_fingers`, only their geoms
+    touch: the hull of a mesh may fill the space between them. `impratio` is MuJoCo's option of that name, with elliptic
+    friction cones; 0: as the model says. At 1, MuJoCo's default, things creep out of fingers that are not parallel.
     """
 
     model: str
@@ -119,6 +122,7 @@ class GripperFile:
     closing: tuple[float, ...] = ()
     angle: str = ""
     only_fingers: bool = False
+    impratio: float = 0.0
     effort_limit_n: float = field(default=0.0)
     speed_limit_m_s: float = field(default=0.1)
     channels: Mapping[str, ModelSensor] = field(factory=dict)
@@ -131,10 +135,17 @@ class GripperFile:
                 raise ValueError(f"{name} has {len(values)} values for {len(self.actuators)} actuators")
         if self.closing and len(self.closing) != 3:
             raise ValueError(f"closing has {len(self.closing)} numbers: a direction has three")
+        if not 0.0 <= self.impratio < inf:
+            raise ValueError(f"impratio is {self.impratio:g}: it is above 0, or 0 for that of the model")
         if self.angle not in ("", "radian", "degree"):
             raise ValueError(f"angle is {self.angle!r}: give radian or degree, or leave it out")
         if self.effort_limit_n < 0.0 or self.speed_limit_m_s <= 0.0:
             raise ValueError("effort_limit_n is at least 0 (0: from the model), speed_limit_m_s above 0")
+        shared = {*self.left.geoms, *self.left.bodies} & {*self.right.geoms, *self.right.bodies}
+        if shared:
+            raise ValueError(
+                f"{', '.join(sorted(shared))} is part of both fingers: a gripper has two opposed ones"
+            )
         if self.left.rows * self.left.columns != self.right.rows * self.right.columns:
             raise ValueError("the arrays of both fingers have the same number of cells")
 
@@ -157,7 +168,7 @@ def read_gripper(name: str) -> tuple[GripperFile, Path]:
         raise ConfigError(f"gripper.file: {path} cannot be read: {error}") from error
     except TomlError as error:
         raise ConfigError(f"gripper.file: {path}, line {error.line}: {error}") from error
-    return _gripper_of(values, path), _model_path(str(values["model"]), path)
+    return _gripper_of(values, path), model_path(str(values["model"]), path)
 
 
 def _gripper_of(values: Mapping[str, Any], path: Path) -> GripperFile:
@@ -168,8 +179,10 @@ def _gripper_of(values: Mapping[str, Any], path: Path) -> GripperFile:
         raise ConfigError(f"gripper.file: {path}\n  " + "\n  ".join(said)) from None
 
 
-def _model_path(name: str, beside: Path) -> Path:
-    """Return the path of a model: relative to the gripper file, or `package:DISTRIBUTION:PATH` in a package."""
+def model_path(name: str, beside: Path) -> Path:
+    """Return the path of a model: beside the gripper file, `package:PACKAGE:PATH`, or `menagerie:ROBOT[/ENTRY]`."""
+    if name.startswith("menagerie:"):
+        return _menagerie_path(*name.removeprefix("menagerie:").partition("/")[::2])
     if not name.startswith("package:"):
         path = beside.parent / Path(name).expanduser()
         if not path.is_file():
@@ -186,6 +199,27 @@ def _model_path(name: str, beside: Path) -> Path:
     if ".." in Path(resource).parts or not path.is_file():
         raise ConfigError(f"gripper.file: the package {package} has no file {resource}")
     return path
+
+
+def _menagerie_path(robot: str, entry: str) -> Path:
+    """Return the path of a model of MuJoCo Menagerie, whose package downloads it at first use. Raises ConfigError."""
+    try:
+        menagerie: Any = import_module("mujoco_menagerie")
+    except ImportError as error:
+        raise ConfigError(
+            f"gripper.file: the model menagerie:{robot} needs the package mujoco-menagerie ({error}): "
+            "pip install mujoco-menagerie"
+        ) from error
+    try:
+        found = menagerie.get(robot)
+        return Path(found.xml(entry or found.default_model))
+    except LookupError as error:
+        raise ConfigError(f"gripper.file: MuJoCo Menagerie has no menagerie:{robot}: {error}") from error
+    except (menagerie.MenagerieError, OSError, ValueError) as error:
+        raise ConfigError(
+            f"gripper.file: the model menagerie:{robot} cannot be downloaded: {error}. Connect to the network, or copy "
+            "the model here and set MENAGERIE_ROOT to a checkout of MuJoCo Menagerie"
+        ) from error
 
 
 def _package_folder(package: str) -> Path | None:

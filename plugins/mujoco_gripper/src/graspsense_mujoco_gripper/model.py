@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
+from html import unescape
 from pathlib import Path
 from typing import Any, Final
 
 import mujoco
+import numpy as np
 
 from graspsense.plugin_api import ConfigError
 from graspsense_mujoco_gripper.gripper_file import GripperFile
@@ -16,9 +18,30 @@ OBJ: Final = mujoco.mjtObj
 # MuJoCo would print each warning and write it to MUJOCO_LOG.TXT in the current folder; `instability` tells them.
 mujoco.set_mju_user_warning(lambda text: None)
 
+NUMBERS: Final = (
+    "qpos0",
+    "body_pos",
+    "body_quat",
+    "body_mass",
+    "body_inertia",
+    "geom_pos",
+    "geom_size",
+    "geom_friction",
+    "geom_solref",
+    "jnt_axis",
+    "jnt_stiffness",
+    "jnt_range",
+    "dof_damping",
+    "dof_armature",
+    "actuator_gainprm",
+    "actuator_biasprm",
+    "actuator_ctrlrange",
+    "actuator_forcerange",
+)
+"""Parts of a model that MuJoCo accepts with values that are not finite."""
 LARGEST_BYTES: Final = 8 * 1024 * 1024
 """Limit on the size of the text of a model."""
-_INCLUDE: Final = re.compile(r"<include\b[^>]*\bfile\s*=\s*[\"']([^\"']*)[\"']")
+_INCLUDE: Final = re.compile(r"""<(?:include|model)\b[^>]*?\bfile\s*=\s*(?:"([^"]*)"|'([^']*)')""")
 
 
 def read_spec(path: Path) -> mujoco.MjSpec:
@@ -43,7 +66,9 @@ def gripper_spec(path: Path, gripper: GripperFile, timestep_s: float) -> mujoco.
     spec.option.timestep = timestep_s
     if gripper.angle:
         spec.compiler.degree = gripper.angle == "degree"
-    _exclude_neighbours(spec)
+    if gripper.impratio:
+        spec.option.impratio, spec.option.cone = gripper.impratio, mujoco.mjtCone.mjCONE_ELLIPTIC
+    exclude_neighbours(spec)
     fingers = (gripper.left, gripper.right)
     geoms = {name for finger in fingers for name in finger.geoms}
     bodies = {name for finger in fingers for name in finger.bodies}
@@ -64,7 +89,7 @@ def gripper_spec(path: Path, gripper: GripperFile, timestep_s: float) -> mujoco.
     return spec
 
 
-def _exclude_neighbours(spec: mujoco.MjSpec) -> None:
+def exclude_neighbours(spec: mujoco.MjSpec) -> None:
     """Exclude contacts of bodies that are hinged to one another, or to a palm of several bodies.
 
     MuJoCo leaves such contacts out in a gripper on a moving arm, but not where the palm is fixed to the world.
@@ -96,9 +121,13 @@ def named(parts: Iterable[Any]) -> str:
 def compiled(spec: mujoco.MjSpec, called: str) -> mujoco.MjModel:
     """Return the compiled model. Raises ConfigError with MuJoCo's message."""
     try:
-        return spec.compile()
+        model = spec.compile()
     except (ValueError, OSError) as error:
         raise ConfigError(f"MuJoCo {mujoco.mj_versionString()} refuses {called}: {error}") from error
+    bad = [name for name in NUMBERS if not np.isfinite(getattr(model, name)).all()]
+    if bad:
+        raise ConfigError(f"{called} has numbers that are not finite, in {', '.join(bad)}: correct the model")
+    return model
 
 
 def identifier(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str, what: str) -> int:
@@ -135,7 +164,7 @@ def _check_includes(path: Path, folder: Path, seen: set[Path]) -> None:
         text = path.read_text(encoding="utf-8", errors="replace")
     except OSError as error:
         raise ConfigError(f"the model {path} cannot be read: {error}") from error
-    for name in _INCLUDE.findall(text):
+    for name in (unescape("".join(quoted)) for quoted in _INCLUDE.findall(text)):
         included = (folder / name).resolve()
         if not included.is_relative_to(folder):
             raise ConfigError(

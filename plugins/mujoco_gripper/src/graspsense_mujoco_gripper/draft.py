@@ -1,0 +1,267 @@
+"""A first gripper file for a model: what can be found without doubt, and what is left to fill in.
+
+The fingers are the last bodies that an actuator moves; a single one is opposed by the body that it is hinged to. The
+actuators that close them are those that change their distance.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from itertools import product
+from pathlib import Path
+
+import mujoco
+import numpy as np
+from attrs import frozen
+from numpy.typing import NDArray
+
+from graspsense.plugin_api import ConfigError
+from graspsense_mujoco_gripper.drive import LEAST_TURN_RAD
+from graspsense_mujoco_gripper.gripper_file import model_path
+from graspsense_mujoco_gripper.model import compiled, exclude_neighbours, read_spec
+
+Floats = NDArray[np.float64]
+MOVE_S = 1.0
+LEAST_CHANGE_M = 1e-3
+FARTHEST_M = 1.0
+FURTHER = (
+    mujoco.mjtSensor.mjSENS_TOUCH,
+    mujoco.mjtSensor.mjSENS_FORCE,
+    mujoco.mjtSensor.mjSENS_ACCELEROMETER,
+    mujoco.mjtSensor.mjSENS_GYRO,
+    mujoco.mjtSensor.mjSENS_TORQUE,
+)
+"""Sensors that a gripper file can name."""
+
+
+@frozen
+class Draft:
+    """The text of a gripper file, what was found, and what is left to fill in."""
+
+    text: str
+    found: tuple[str, ...]
+    left: tuple[str, ...]
+
+
+@frozen
+class _Closing:
+    """The actuators that close, their controls, the bodies of both fingers, their nearest points while closed."""
+
+    actuators: tuple[str, ...]
+    open: tuple[float, ...]
+    closed: tuple[float, ...]
+    fingers: tuple[tuple[int, ...], tuple[int, ...]]
+    points: tuple[Floats, ...]
+    overlap_m: float
+
+
+def drafted(name: str, folder: Path) -> Draft:
+    """Return a gripper file for a model, to be put into `folder`. Raises ConfigError where it has no fingers."""
+    path = model_path(name, Path.cwd() / "gripper.toml")
+    model, radian = _model(path)
+    closing = _closing(model)
+    written = name if ":" in name else Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()
+    lines = [f'model = "{written}"']
+    if radian:
+        lines.append('angle = "radian"')
+    lines += [
+        f"actuators = {_texts(closing.actuators)}",
+        f"open = {[round(value, 6) for value in closing.open]}",
+        f"closed = {[round(value, 6) for value in closing.closed]}",
+        "",
+        "# The nearest points of the fingers: correct them if things are held elsewhere.",
+        "[gap]",
+    ]
+    points = iter(closing.points)
+    for side, bodies in zip(("left", "right"), closing.fingers, strict=True):
+        places = [
+            f'{{ body = "{model.body(k).name}", at = {next(points).round(5).tolist()} }}' for k in bodies
+        ]
+        lines.append(f"{side} = [{', '.join(places)}]")
+    for side, bodies in zip(("left", "right"), closing.fingers, strict=True):
+        lines += ["", f"[{side}]", f"bodies = {_texts(model.body(k).name for k in bodies)}"]
+    sensors = [model.sensor(k).name for k in range(model.nsensor) if model.sensor_type[k] in FURTHER]
+    lines += [f"# A sensor of the model: {sensor}" for sensor in sensors]
+    left = ["speed_limit_m_s, where it is not 0.1 m/s"]
+    if not all(
+        model.actuator(one).forcelimited or model.actuator(one).ctrllimited for one in closing.actuators
+    ):
+        left.append("effort_limit_n: the actuators have no limits")
+    if sensors:
+        left.append("sensor of a finger, or channels: the forces are those of the contacts until then")
+    if closing.overlap_m > LEAST_CHANGE_M:
+        left.append(
+            f"the points of the gap: closed, the geoms of the fingers overlap by {closing.overlap_m * 1e3:.0f} mm. "
+            "Where they are hulls of meshes, name the geoms that touch, with only_fingers = true"
+        )
+    fingers = [", ".join(model.body(k).name for k in bodies) for bodies in closing.fingers]
+    found = (
+        *(["angles in radians: the ranges of the joints are too small for degrees"] if radian else []),
+        f"actuators that close: {', '.join(closing.actuators)}",
+        f"left finger: {fingers[0]}; right finger: {fingers[1]}",
+        f"sensors: {', '.join(sensors) or 'none'}",
+    )
+    return Draft("\n".join(lines) + "\n", found, tuple(left))
+
+
+def _model(path: Path) -> tuple[mujoco.MjModel, bool]:
+    """Return the model, and whether its angles are radians although it does not say so."""
+    for radian in (False, True):
+        spec = read_spec(path)
+        if radian:
+            spec.compiler.degree = False
+        exclude_neighbours(spec)
+        model = compiled(spec, str(path))
+        hinges = model.jnt_range[(model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE) & (model.jnt_limited == 1)]
+        if not len(hinges) or float(np.ptp(hinges, axis=1).max()) > LEAST_TURN_RAD:
+            break
+    return model, radian
+
+
+def _closing(model: mujoco.MjModel) -> _Closing:
+    """Return how the fingers close. Raises ConfigError where there are no two opposed fingers."""
+    if model.nu == 0:
+        raise ConfigError("the model has no actuator that could close fingers: add one to its <actuator>")
+    ends = [_ends(model, k) for k in range(model.nu)]
+    rest = [float(np.clip(0.0, low, high)) for low, high in ends]
+    low, high = (_moved(model, [pair[k] for pair in ends]) for k in (0, 1))
+    tips = _tips(model, low, high)
+    if not tips:
+        raise ConfigError("no actuator moves a body with geoms that touch: the model has no fingers")
+    fingers = _opposed(model, tips, low, high)
+    closers: dict[int, tuple[float, float]] = {}
+    for k, pair in enumerate(ends):
+        gaps = []
+        for control in pair:
+            controls = [pair_of[0] if j in closers else rest[j] for j, pair_of in enumerate(ends)]
+            controls[k] = control
+            gaps.append(_nearest(model, _moved(model, controls), fingers)[0])
+        if abs(gaps[0] - gaps[1]) > LEAST_CHANGE_M:
+            closers[k] = pair if gaps[0] > gaps[1] else (pair[1], pair[0])
+    if not closers:
+        raise ConfigError(
+            "no actuator changes the distance of two fingers: the model has no two opposed fingers. Name them in a "
+            "gripper file by hand"
+        )
+    closed = [closers[k][1] if k in closers else rest[k] for k in range(model.nu)]
+    total_m, points = _nearest(model, _moved(model, closed), fingers)
+    return _Closing(
+        tuple(model.actuator(k).name for k in closers),
+        tuple(pair[0] for pair in closers.values()),
+        tuple(pair[1] for pair in closers.values()),
+        fingers,
+        points,
+        max(-total_m / len(points), 0.0),
+    )
+
+
+def _ends(model: mujoco.MjModel, actuator: int) -> tuple[float, float]:
+    if model.actuator_ctrllimited[actuator]:
+        low, high = model.actuator_ctrlrange[actuator]
+        return float(low), float(high)
+    return -1.0, 1.0
+
+
+def _moved(model: mujoco.MjModel, controls: list[float]) -> mujoco.MjData:
+    """Return the state after a second under these controls."""
+    data = mujoco.MjData(model)
+    data.ctrl[:] = controls
+    for _ in range(int(MOVE_S / model.opt.timestep)):
+        mujoco.mj_step(model, data)
+    mujoco.mj_forward(model, data)
+    return data
+
+
+def _geoms(model: mujoco.MjModel, body: int) -> list[int]:
+    """Return the geoms of a body that touch."""
+    start = int(model.body_geomadr[body])
+    numbers = range(start, start + int(model.body_geomnum[body])) if start >= 0 else range(0)
+    return [k for k in numbers if model.geom_contype[k] or model.geom_conaffinity[k]]
+
+
+def _tips(model: mujoco.MjModel, low: mujoco.MjData, high: mujoco.MjData) -> list[int]:
+    """Return the last bodies of each chain that move, and have geoms that touch."""
+    moving = [
+        k
+        for k in range(1, model.nbody)
+        if _geoms(model, k)
+        and float(np.abs(low.xpos[k] - high.xpos[k]).max() + np.abs(low.xmat[k] - high.xmat[k]).max())
+        > LEAST_CHANGE_M
+    ]
+    above = {j for k in moving for j in _above(model, k)}
+    ends = [k for k in moving if k not in above]
+    deepest = max((len(_above(model, k)) for k in ends), default=0)
+    return [k for k in ends if len(_above(model, k)) == deepest]
+
+
+def _above(model: mujoco.MjModel, body: int) -> list[int]:
+    chain = []
+    while body:
+        body = int(model.body_parentid[body])
+        chain.append(body)
+    return chain
+
+
+def _opposed(
+    model: mujoco.MjModel, tips: list[int], low: mujoco.MjData, high: mujoco.MjData
+) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Return the bodies of both fingers: those that move against the first one are opposed to it."""
+    if len(tips) == 1:
+        opposed = next((k for k in _above(model, tips[0]) if k and _geoms(model, k)), 0)
+        if not opposed:
+            raise ConfigError(
+                f"only {model.body(tips[0]).name!r} moves, and nothing is opposed to it: a gripper has two fingers"
+            )
+        return (tips[0],), (opposed,)
+    if len(tips) == 2:
+        return (tips[0],), (tips[1],)
+    places = [
+        np.mean([data.geom_xpos[g] for g in _geoms(model, k)], axis=0) for data in (low, high) for k in tips
+    ]
+    moves = np.array(places[: len(tips)]) - np.array(places[len(tips) :])
+    same = [float(move @ moves[0]) > 0.0 for move in moves]
+    left = tuple(k for k, together in zip(tips, same, strict=True) if together)
+    right = tuple(k for k, together in zip(tips, same, strict=True) if not together)
+    if not right:
+        raise ConfigError(
+            f"the bodies {', '.join(model.body(k).name for k in left)} all move in one direction: the model has no two "
+            "opposed fingers"
+        )
+    return left, right
+
+
+def _nearest(
+    model: mujoco.MjModel, data: mujoco.MjData, fingers: tuple[tuple[int, ...], tuple[int, ...]]
+) -> tuple[float, tuple[Floats, ...]]:
+    """Return the sum of the distances of each body to the opposed finger, and its nearest point in its own frame."""
+    total, points = 0.0, []
+    for bodies, opposed in (fingers, fingers[::-1]):
+        others = [geom for body in opposed for geom in _geoms(model, body)]
+        for body in bodies:
+            best, nearest = FARTHEST_M, np.zeros(3)
+            for one, other in product(_geoms(model, body), others):
+                ends = np.zeros(6)
+                distance = float(mujoco.mj_geomDistance(model, data, one, other, FARTHEST_M, ends))
+                if distance < best:
+                    best, nearest = distance, _level_with(data, one, other, ends[:3])
+            total += best
+            points.append(data.xmat[body].reshape(3, 3).T @ (nearest - data.xpos[body]))
+    return total, tuple(points)
+
+
+def _level_with(data: mujoco.MjData, geom: int, opposed: int, point: Floats) -> Floats:
+    """Return the point in the middle of a geom that faces the opposed one as near as this one does.
+
+    Of faces that are parallel, any points are the nearest.
+    """
+    centre = data.geom_xpos[geom]
+    axis = data.geom_xpos[opposed] - centre
+    length = float(np.linalg.norm(axis))
+    if length < LEAST_CHANGE_M:
+        return point
+    return np.asarray(centre + axis * float((point - centre) @ axis) / length**2)
+
+
+def _texts(names: Iterable[str]) -> str:
+    return "[" + ", ".join(f'"{name}"' for name in names) + "]"
