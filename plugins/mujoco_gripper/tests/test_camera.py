@@ -65,8 +65,8 @@ def test_a_picture_shows_the_gripper_or_the_command_says_what_is_missing(tmp_pat
     path = tmp_path / "grasp.png"
     command = [
         sys.executable,
-        "-m",
-        "graspsense.cli.entry",
+        "-c",
+        "from graspsense.cli.entry import main; main()",
         "run",
         "--gripper",
         "mujoco",

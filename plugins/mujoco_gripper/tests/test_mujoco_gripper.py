@@ -246,11 +246,6 @@ def test_an_unstable_simulation_ends_with_its_reason_and_writes_nothing(tmp_path
     assert [path.name for path in tmp_path.iterdir()] == ["wild.xml"]
 
 
-def test_every_thing_of_the_catalogue_has_its_file():
-    assert len(catalogue()) >= 10
-    assert {path.stem for path in FOLDER.glob("*.xml")} == set(catalogue())
-
-
 def test_several_actuators_keep_together_and_a_thing_is_put_where_turning_fingers_meet_it(tmp_path):
     """Two hinged fingers with an actuator each; they press at another place than where the gap is measured."""
     (tmp_path / "hinged.xml").write_text(HINGED)

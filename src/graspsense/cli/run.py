@@ -115,16 +115,14 @@ def run(
     if dry_run:
         _say_what_would_be_done(settings, as_json)
         return
-    _require_places(save, label, plot)
+    _check_outputs(label, save, plot)
     if beside is not None:
         if picture or video or viewer:
-            raise click.UsageError(
-                "--picture, --video and --viewer show one gripper: leave them or --beside out"
-            )
+            raise click.UsageError("--picture, --video and --viewer show one gripper: leave them or --beside out")
         _run_beside(settings, beside, save, label, as_json)
         return
-    film = None if picture is None and video is None and not viewer else _film(picture, video, viewer)
-    sinks = (*(() if as_json else (LiveRows(),)), *(() if film is None else (film,)))
+    film = _film(picture, video, viewer)
+    sinks = film if as_json else (LiveRows(), *film)
     kept: dict[str, Any] | None = None
     if save is None:
         trial, interrupted = _grasped(settings, sinks)
@@ -143,19 +141,8 @@ def run(
         _print_further(settings, trial, condition)
     if plot is not None:
         draw_grasp(trial, Path(plot))
-    if film is not None:
-        _write_film(film, save, None if kept is None else kept["trial"])
+    _write_film(film, save, kept)
     _exit(trial, interrupted, "" if kept is None else kept["problem"])
-
-
-def _require_places(save: str | None, label: str | None, plot: str | None) -> None:
-    """Check before a grasp that what is asked for can be written. Raises as `require_picture`, and UsageError."""
-    if label is not None and save is None:
-        raise click.UsageError("--label goes with a trial that is kept: add --save DIR")
-    if plot is not None:
-        from graspsense.report.grasp_picture import require_picture
-
-        require_picture(Path(plot))
 
 
 def _run_beside(
@@ -292,21 +279,35 @@ def draw_grasp(trial: Trial, path: Path) -> None:
     talk(f"picture written to {path}")
 
 
-def _film(picture: str | None, video: str | None, viewer: bool) -> Film:
+def _check_outputs(label: str | None, save: str | None, plot: str | None) -> None:
+    """Check before the grasp what is to be made of it."""
+    if label is not None and save is None:
+        raise click.UsageError("--label goes with a trial that is kept: add --save DIR")
+    if plot is not None:
+        from graspsense.report.grasp_picture import require_picture
+
+        require_picture(Path(plot))
+
+
+def _film(picture: str | None, video: str | None, viewer: bool) -> tuple[Film, ...]:
+    """Return the sink that receives pictures; nothing if none are asked for."""
+    if picture is None and video is None and not viewer:
+        return ()
     from graspsense.report.film import Film
 
-    return Film(picture, video, window=viewer)
+    return (Film(picture, video, window=viewer),)
 
 
-def _write_film(film: Film, save: str | None, number: int | None) -> None:
-    """Write the pictures; that of a kept trial also beside the store, for its page."""
+def _write_film(films: Sequence[Film], save: str | None, kept: dict[str, Any] | None) -> None:
+    """Write the pictures; that of a kept trial also into the folder of the store, for its page."""
     from graspsense.report.film import picture_of_trial
 
-    for path in film.write():
-        talk(f"written: {path}")
-    png = film.png()
-    if save is not None and number is not None and png is not None:
-        picture_of_trial(save, number).write_bytes(png)
+    for film in films:
+        for path in film.write():
+            talk(f"written: {path}")
+        png = film.png()
+        if save is not None and kept is not None and kept["trial"] is not None and png is not None:
+            picture_of_trial(save, kept["trial"]).write_bytes(png)
 
 
 def _kept(

@@ -214,11 +214,8 @@ def run_grasp(
     began = time.perf_counter()
     with Interrupts() as interrupts:
         try:
-            backend.expect(controller, run)
             sinks = tuple(sinks)
-            for sink in sinks:
-                if isinstance(sink, PictureSink):
-                    backend.see(sink)
+            _announce(backend, controller, run, sinks)
             info = _opened(backend, run.seed)
             info = _described(info, backend, controller, run)
             if on_open is not None:
@@ -283,6 +280,16 @@ def run_uninterrupted(
     if grasp.interrupted:
         raise KeyboardInterrupt
     return grasp
+
+
+def _announce(
+    backend: SensorBackend[Any], controller: Controller[Any], run: RunConfig, sinks: Iterable[Sink]
+) -> None:
+    """Tell a gripper, before it is opened, of the next grasp and of who wants to see it."""
+    backend.expect(controller, run)
+    for sink in sinks:
+        if isinstance(sink, PictureSink):
+            backend.see(sink)
 
 
 def _opened(backend: SensorBackend[Any], seed: int) -> DeviceInfo:
