@@ -14,6 +14,7 @@ import numpy as np
 from attrs import evolve, frozen
 from parts import (
     ACCELERATION,
+    CAMERA,
     CHANNELS_OF_HAND,
     ENTRIES,
     Hand,
@@ -46,10 +47,8 @@ from graspsense.plugin_api import (
     ObjectKind,
     Reading,
     StatusBit,
-    TactileArray,
     UnknownName,
     setting,
-    signal_type,
 )
 from graspsense.testing.gentle import GentleState, step
 
@@ -617,7 +616,7 @@ def _(reading):
 mutant(
     "sensor-backend",
     "signals-are-those-declared",
-    "declared are acceleration, motor_temperature, and read delivers acceleration",
+    "declared are acceleration, camera, motor_temperature, and read delivers acceleration, camera",
     channels=(*ENTRIES["sensor-backend"].channels, Channel("motor_temperature", "K", 1.0)),
 )(Hand)
 
@@ -648,28 +647,29 @@ mutant(
 
 @giving("signals-are-those-declared", "give Samples of the declared shape (3, 3)")
 def _(reading):
-    return reading._replace(signals=type(reading.signals)(reading.signals.acceleration.values))
+    return reading._replace(
+        signals=reading.signals._replace(acceleration=reading.signals.acceleration.values)
+    )
 
 
 @giving("signals-are-those-declared", "no number of the declared channel 'acceleration' came")
 def _(reading):
     block = reading.signals.acceleration
-    return reading._replace(signals=type(reading.signals)(block._replace(new=0)))
+    return reading._replace(signals=reading.signals._replace(acceleration=block._replace(new=0)))
 
 
 @giving("signals-have-no-gaps-or-repeats", "count every sample that the sensor has taken")
 def _(reading):
     block = reading.signals.acceleration
-    return reading._replace(signals=type(reading.signals)(block._replace(counter=block.counter // 3)))
+    return reading._replace(
+        signals=reading.signals._replace(acceleration=block._replace(counter=block.counter // 3))
+    )
 
 
 @giving("signals-have-no-gaps-or-repeats", "they repeat old ones")
 def _(reading):
     block = reading.signals.acceleration
-    return reading._replace(signals=type(reading.signals)(block._replace(new=2)))
-
-
-CAMERA = TactileArray("camera", "counts", rows=2, columns=2, dtype="uint8")
+    return reading._replace(signals=reading.signals._replace(acceleration=block._replace(new=2)))
 
 
 def seeing(says):
@@ -683,11 +683,9 @@ def seeing(says):
                 frame, pads, signals = super().read(timeout_s)
                 self.pixels[:] = frame.t_s * 100.0 % 256.0
                 seen = Image(frame.t_s, 1 + round(frame.t_s * 1000.0), image(self.pixels))
-                channels = ENTRIES["sensor-backend"].channels
-                return Reading(frame, pads, signal_type((*channels, CAMERA))(*signals, seen))
+                return Reading(frame, pads, signals._replace(camera=seen))
 
-        channels = (*ENTRIES["sensor-backend"].channels, CAMERA)
-        mutant("sensor-backend", "images-stay-as-they-were-delivered", says, channels=channels)(Seeing)
+        mutant("sensor-backend", "images-stay-as-they-were-delivered", says)(Seeing)
 
     return keep
 
@@ -752,7 +750,7 @@ mutant(
     "sensor-backend",
     "rate-is-as-declared",
     "is declared at 5000 Hz",
-    channels=(*channels(*CHANNELS_OF_HAND, rate_hz=5000.0), ACCELERATION),
+    channels=(*channels(*CHANNELS_OF_HAND, rate_hz=5000.0), ACCELERATION, CAMERA),
 )(Hand)
 
 

@@ -139,7 +139,7 @@ class Hand(SensorBackend[HandConfig]):
         if not self.config.here:
             raise NoDevice("no hand at port 7: plug it in, then `graspsense devices`")
         self._bench, self._zero = (
-            ModelGripper(frozenset((*CHANNELS_OF_HAND, ACCELERATION)), 0.05, 1500.0),
+            ModelGripper(frozenset((*CHANNELS_OF_HAND, ACCELERATION, CAMERA)), 0.05, 1500.0),
             None,
         )
         self._info = self._bench.open(seed)
@@ -190,6 +190,7 @@ class Hand(SensorBackend[HandConfig]):
 
 
 ACCELERATION = FastChannel("acceleration", "m/s2", 3000.0, samples=3, axes=("x", "y", "z"))
+CAMERA = TactileArray("camera", "counts", rows=2, columns=2, dtype="uint8")
 CHANNELS_OF_HAND = (
     *("gap", "velocity", "effort", "force_left", "force_right", "edge_left", "edge_right", "pads"),
 )
@@ -282,7 +283,7 @@ ENTRIES = {
         target="parts:Hand",
         config="parts:HandConfig",
         summary="a hand that is a mass and a spring",
-        channels=(*channels(*CHANNELS_OF_HAND), ACCELERATION),
+        channels=(*channels(*CHANNELS_OF_HAND), ACCELERATION, CAMERA),
         accepts=("effort",),
     ),
     "classifier": ClassifierEntry(

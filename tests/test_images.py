@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 from attrs import evolve, frozen
+from kept import begun
 from mcap.reader import make_reader
 
 from graspsense import load_pipeline
@@ -49,7 +50,9 @@ from graspsense.plugin_api import (
     signal_type,
 )
 from graspsense.recording.export_trace import write_csv, write_npz, write_parquet
+from graspsense.recording.layout import START, Topic, shown_array
 from graspsense.recording.reader import read_recorded
+from graspsense.recording.recorder import Recorder
 from graspsense.recording.replayable import content_sha256
 from graspsense.sources.replay import read_named
 from graspsense.store.record_grasp import record_grasp
@@ -263,6 +266,32 @@ def test_a_gripper_with_cameras_conforms(seen):
     assert "images-stay-as-they-were-delivered" in {
         one.check for one in report.results if one.state == "passed"
     }
+
+
+@pytest.mark.parametrize("array", IMAGES, ids=lambda one: one.name)
+def test_a_recording_shows_the_shape_of_its_images_without_the_declaration(array, tmp_path):
+    recorder = Recorder(tmp_path / "g.mcap")
+    recorder.metadata(START, begun().section(START))
+    frame = Frame(0.0, 0.1, 0.05, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0)
+    image = Image(0.0, 1, cells_of(array, numbers_of(array, 1)))
+    recorder.take(Reading(frame, NO_PADS, signal_type((array,))(image)), 3, Command(EFFORT, 0.0, inf, inf))
+    recorder.finish()
+    grasp = read_recorded(tmp_path / "g.mcap")
+    (shown,) = grasp.channels
+    assert (shown.shape, shown.dtype) == (array.shape, array.dtype)
+    assert np.array_equal(grasp.trace().signals[array.name].cells[0], image.cells)
+
+
+@pytest.mark.parametrize(
+    "definition",
+    ["uint8[4] t_s", "float64 t_s\nuint8 x", "float64 t_s\nuint8[3] x\nint64 y", "float64 t_s\nint8[3] x"],
+)
+def test_a_topic_of_other_fields_is_refused(definition):
+    with pytest.raises(ValueError, match="/grasp/signals/eye has"):
+        Topic("/grasp/signals/eye", "graspsense_msgs/msg/Array3", definition + "\n")
+    definition = "float64 t_s\nint64 counter\nuint8[18] cells\n"
+    with pytest.raises(ValueError, match="components"):
+        shown_array(Topic("/grasp/signals/eye", "graspsense_msgs/msg/Uint8Array1x2x9", definition))
 
 
 def grasped(image, monkeypatch, array=EYE):

@@ -20,7 +20,7 @@ from typing import Any, Final
 from attrs import field, frozen
 
 from graspsense.core.components.channels import dtype_of, shape_of
-from graspsense.core.values.channel import FLOATS
+from graspsense.core.values.channel import FLOATS, TactileArray
 from graspsense.core.values.limits import CHANNEL_NUMBERS
 from graspsense.core.values.signals import Frame, Image, Pads, Reading, Samples
 
@@ -151,11 +151,35 @@ def signal_topics(signals: Any) -> list[tuple[Topic, Callable[[Reading], tuple[A
 
 
 def image_topic(name: str, image: Image) -> Topic:
-    """Return the topic of a tactile array, given an image of it."""
-    numbers, dtype = math.prod(shape_of(image)), dtype_of(image)
-    definition = f"float64 t_s\nint64 counter\n{dtype}[{numbers}] cells\n"
+    """Return the topic of a tactile array, given an image of it. The name of its type has the shape."""
+    shape, dtype = shape_of(image), dtype_of(image)
+    definition = f"float64 t_s\nint64 counter\n{dtype}[{math.prod(shape)}] cells\n"
     kind = "" if dtype == FLOATS else dtype.capitalize()
-    return Topic(SIGNAL_TOPIC + name, f"graspsense_msgs/msg/{kind}Array{numbers}", definition)
+    type_name = f"graspsense_msgs/msg/{kind}Array{'x'.join(map(str, shape))}"
+    return Topic(SIGNAL_TOPIC + name, type_name, definition)
+
+
+def shown_array(topic: Topic) -> TactileArray:
+    """Return the tactile array of a topic as its messages show it: the type and the shape of its images.
+
+    Raises ValueError for a shape that no array has.
+    """
+    name, (_, kind, numbers) = topic.name[len(SIGNAL_TOPIC) :], topic.fields[-1]
+    dtype: Any = KINDS[kind]
+    match = _SHAPE.search(topic.type_name)
+    shape = tuple(map(int, match[1].split("x"))) if match else ()
+    if math.prod(shape) != numbers:
+        shape = (numbers,)
+    if dtype == FLOATS:
+        components = math.prod(shape[1:])
+        return TactileArray(name, "unknown", rows=1, columns=shape[0], components=components)
+    if len(shape) == 1:
+        return TactileArray(name, "unknown", positions_m=((math.nan, math.nan),) * numbers, dtype=dtype)
+    rows, columns, components = shape if len(shape) > 2 else (*shape, 1)
+    return TactileArray(name, "unknown", rows=rows, columns=columns, components=components, dtype=dtype)
+
+
+_SHAPE: Final = re.compile(r"Array([1-9][0-9]{0,9}(?:x[1-9][0-9]{0,9}){0,2})$")
 
 
 def samples_topic(name: str, samples: int, axes: int) -> Topic:

@@ -16,7 +16,14 @@ from attrs import evolve, field, frozen
 from mcap.exceptions import McapError
 from mcap.records import Channel, Chunk, DataEnd, Footer, Header, McapRecord, Message, Metadata, Schema
 
-from graspsense.core.components.channels import cells_of, declared_shape, further, no_signals, signal_type
+from graspsense.core.components.channels import (
+    cells_of,
+    declared_dtype,
+    declared_shape,
+    further,
+    no_signals,
+    signal_type,
+)
 from graspsense.core.values.channel import Channel as DeclaredChannel
 from graspsense.core.values.channel import FastChannel, TactileArray
 from graspsense.core.values.errors import ConfigError, DataDamaged, TooLarge, named
@@ -42,6 +49,7 @@ from graspsense.recording.layout import (
     Topic,
     pads_topic,
     pads_topic_by_cell,
+    shown_array,
 )
 from graspsense.recording.mcap_records import records_in, records_of
 from graspsense.recording.readable import readable, refuse_devices
@@ -133,12 +141,10 @@ class RecordedGrasp:
         shown: list[DeclaredChannel] = []
         for name, found in self.topics.items():
             numbers = {field: max(number, 1) for field, _, number in found.topic.fields}
-            dtype: Any = KINDS[found.topic.fields[-1][1]]
             if name == SCALARS_TOPIC:
                 shown += [DeclaredChannel(field, "unknown") for field in numbers if field != "t_s"]
             elif name.startswith(SIGNAL_TOPIC) and "cells" in numbers:
-                array = name[len(SIGNAL_TOPIC) :]
-                shown.append(TactileArray(array, "unknown", rows=1, columns=numbers["cells"], dtype=dtype))
+                shown.append(shown_array(found.topic))
             elif name.startswith(SIGNAL_TOPIC):
                 axes = int(found.rows["axes"][0]) if len(found.rows) else numbers["values"]
                 shown.append(
@@ -152,7 +158,11 @@ class RecordedGrasp:
         kept = []
         for channel in shown:
             said = declared.get(channel.name)
-            kept.append(said if said is not None and _have_same_numbers(said, channel) else channel)
+            same = said is not None and (declared_shape(said), declared_dtype(said)) == (
+                declared_shape(channel),
+                declared_dtype(channel),
+            )
+            kept.append(said if same and said is not None else channel)
         return (*(channel for channel in self.device.channels if channel.name == "pads"), *kept)
 
     def events(self) -> tuple[GraspEvent, ...]:
@@ -497,15 +507,9 @@ def _is_ours(topic: Topic) -> bool:
     if topic.name == SCALARS_TOPIC:
         return len(names) > 1 and all(kind == "d" and not number for _, kind, number in topic.fields)
     if names == ["t_s", "counter", "cells"]:
+        shown_array(topic)
         return True
     return names == ["t_s", "counter", "new", "axes", "values"] and topic.fields[-1][1] == "d"
-
-
-def _have_same_numbers(said: DeclaredChannel, shown: DeclaredChannel) -> bool:
-    """Return whether what the gripper declared fits what the messages show; these do not show rows and components."""
-    if isinstance(said, TactileArray) and isinstance(shown, TactileArray):
-        return (said.numbers, said.dtype) == (shown.numbers, shown.dtype)
-    return declared_shape(said) == declared_shape(shown)
 
 
 _KINDS: Final = {kind: np.dtype(name).newbyteorder("<") for kind, name in KINDS.items()}
