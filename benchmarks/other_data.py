@@ -2,7 +2,8 @@
 
     python benchmarks/other_data.py FOLDER [--classifier c45] [--sets jaco,fruit] [--short]
 
-FOLDER has a folder for each data set, with the names of docs/other_data.md. A set whose folder is missing is left out. The manifests are those of docs/manifests. `--short` imports the recordings only.
+FOLDER has a folder for each data set, with the names of docs/other_data.md. A set whose folder is missing is left out.
+The manifests are those of docs/manifests. `--short` imports the recordings only.
 """
 
 from __future__ import annotations

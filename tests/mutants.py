@@ -49,6 +49,7 @@ from graspsense.plugin_api import (
     StatusBit,
     UnknownName,
     setting,
+    signal_type,
 )
 from graspsense.testing.gentle import GentleState, step
 
@@ -633,7 +634,7 @@ FINGERS = (FingerForce("force_thumb", "N", side="left"), FingerForce("force_inde
 class OwnFrame(Hand):
     def read(self, timeout_s):
         reading = super().read(timeout_s)
-        signals = signal_type((ACCELERATION, *FINGERS))
+        signals = signal_type((*CHANNELS_OF_HAND, *FINGERS))
         return reading._replace(signals=signals(*reading.signals, 1.0, 2.0))
 
 

@@ -103,14 +103,14 @@ def test_it_grasps_with_the_default_pipeline(plugins):
 
 
 def test_its_camera_conforms_and_sees_the_force(hand, plugins):
-    keys = {"reply_timeout_s": 60.0}
+    keys = {"patience_s": 60.0}
     examined = examine("lab-hand/seeing", keys=keys, unplugged={"vanishes_s": 0.5}, plugins=plugins)
     report = examined.report()
     assert report.failures == []
     passed = {one.check for one in report.results if one.state == "passed"}
     assert {"images-stay-as-they-were-delivered", "what-it-delivers-is-kept"} <= passed
 
-    options = ["gripper.type=lab-hand/seeing", "gripper.reply_timeout_s=60", "classifier.type=none"]
+    options = ["gripper.type=lab-hand/seeing", "gripper.patience_s=60", "classifier.type=none"]
     trace = load_pipeline(options=options, plugins=plugins).grasp().trace
     eye = trace.signals["eye"]
     assert eye.cells.shape == (len(eye.t_s), *hand.EYE.shape)

@@ -118,11 +118,13 @@ def run(
     _check_outputs(label, save, plot)
     if beside is not None:
         if picture or video or viewer:
-            raise click.UsageError("--picture, --video and --viewer show one gripper: leave them or --beside out")
+            raise click.UsageError(
+                "--picture, --video and --viewer show one gripper: leave them or --beside out"
+            )
         _run_beside(settings, beside, save, label, as_json)
         return
     film = _film(picture, video, viewer)
-    sinks = film if as_json else (LiveRows(), *film)
+    sinks: tuple[Sink, ...] = film if as_json else (LiveRows(), *film)
     kept: dict[str, Any] | None = None
     if save is None:
         trial, interrupted = _grasped(settings, sinks)
