@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import runpy
 import sys
 from math import inf
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,13 +18,22 @@ from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.runner import run_grasp
 from graspsense.core.values.errors import ConfigError
 from graspsense.core.values.signals import EFFORT, FORCE, POSITION, VELOCITY, Command, Outcome, Phase, Reading
-from graspsense.plugin_api import CHANNELS, Channel, ObjectKind, SensorBackend, SensorBackendEntry, hookimpl
+from graspsense.plugin_api import (
+    CHANNELS,
+    Channel,
+    ObjectKind,
+    SensorBackend,
+    SensorBackendEntry,
+    create,
+    hookimpl,
+)
 from graspsense.plugins.controllers.force import ForceConfig, ForceController
 from graspsense.plugins.controllers.hybrid import HybridConfig, HybridController
 from graspsense.plugins.controllers.send_and_watch import SendAndWatchConfig, SendAndWatchController
 from graspsense.testing.model_gripper import OBJECTS, ModelGripper
 
 HERE = sys.modules[__name__]
+BENCHMARK = Path(__file__).parents[1] / "benchmarks" / "own_loop.py"
 WITH_PADS = ("gap", "velocity", "effort", "force_left", "force_right")
 PADLESS = ("gap", "velocity", "effort")
 
@@ -110,6 +121,19 @@ def test_hybrid_approaches_gently_and_raises_the_force_in_steps(thing, keys):
     # Until the first step, the fingers stop where both pads touched.
     contact_s = trace.t_s[trace.phase == Phase.SQUEEZE][0]
     assert trace.force_left_n[(trace.t_s >= contact_s) & (trace.t_s < contact_s + 0.1)].max() < 8.0
+
+
+@pytest.mark.parametrize("rate_hz", [100.0, 1000.0])
+def test_hybrid_with_the_simulated_body_behind_such_an_interface(rate_hz):
+    body = runpy.run_path(str(BENCHMARK))["OwnLoop"](create("sensor-backend", "sim", object="block"), rate_hz)
+    grasp = run_grasp(body, HybridController(HybridConfig(sends="position")), RunConfig(seed=1))
+    assert grasp.outcome is Outcome.STEADY, grasp.reason
+    trace = grasp.trace
+    assert -trace.velocity_m_s[trace.phase == Phase.APPROACH].min() < 0.0125
+    contact_s = trace.t_s[trace.phase == Phase.SQUEEZE][0]
+    # The drive of this body takes 7 N, and what is left of the force is on the pads.
+    assert trace.force_left_n[(trace.t_s >= contact_s) & (trace.t_s < contact_s + 0.1)].max() < 10.0
+    assert 10.0 < held_n(trace) < 21.0
 
 
 @pytest.mark.parametrize("law", [HybridController, SendAndWatchController])
