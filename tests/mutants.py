@@ -634,7 +634,7 @@ FINGERS = (FingerForce("force_thumb", "N", side="left"), FingerForce("force_inde
 class OwnFrame(Hand):
     def read(self, timeout_s):
         reading = super().read(timeout_s)
-        signals = signal_type((*CHANNELS_OF_HAND, *FINGERS))
+        signals = signal_type((ACCELERATION, CAMERA, *FINGERS))
         return reading._replace(signals=signals(*reading.signals, 1.0, 2.0))
 
 
@@ -757,7 +757,7 @@ mutant(
 
 @giving("images-count-up", "count up by one")
 def _(reading):
-    return Reading(reading.frame, reading.pads._replace(counter=2 * reading.pads.counter), reading.signals)
+    return Reading(reading.frame, reading.pads._replace(counter=-reading.pads.counter), reading.signals)
 
 
 @giving("images-count-up", "while its counter stays")
