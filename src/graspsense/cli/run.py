@@ -109,7 +109,7 @@ def run(
         return
     _check_outputs(label, save, plot)
     film = _film(picture, video, viewer)
-    sinks = film if as_json else (LiveRows(), *film)
+    sinks: tuple[Sink, ...] = film if as_json else (LiveRows(), *film)
     kept: dict[str, Any] | None = None
     if save is None:
         trial, interrupted = _grasped(settings, sinks)
