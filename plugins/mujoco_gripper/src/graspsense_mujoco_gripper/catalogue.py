@@ -74,6 +74,7 @@ class Walls:
                 mass=self.mass_kg * WALL_SHARE,
                 friction=[self.friction, 0.005, 0.0001],
                 condim=4,
+                priority=1,
                 solref=[0.001, 1.0],
                 solimp=[0.99, 0.999, 0.0001, 0.5, 2.0],
             )

@@ -88,6 +88,11 @@ class Scene:
         if self.friction is not None and not 0.0 <= self.friction < float("inf"):
             raise ValueError(f"friction is {self.friction}: it is at least 0")
 
+    @property
+    def needs_friction(self) -> bool:
+        """Whether the friction of the thing decides what happens."""
+        return self.table or bool(self.arm) or self.cord is not None or self.friction is not None
+
 
 @frozen(eq=False)
 class Model:
@@ -189,9 +194,10 @@ def add_thing(spec: mujoco.MjSpec, model: Model, place: Floats, axis: Floats) ->
         body.gravcomp = float(not scene.table)
     spec.visual.headlight.ambient = [0.4, 0.4, 0.4]
     spec.visual.headlight.diffuse = [0.6, 0.6, 0.6]
-    # MuJoCo would else take the larger friction of thing and finger, and the mean of their stiffness.
-    for part in (*child.geoms, *child.flexes):
-        part.priority = max(part.priority, 1)
+    if scene.needs_friction:
+        # MuJoCo would else take the larger friction of thing and finger, and the mean of their stiffness.
+        for part in (*child.geoms, *child.flexes):
+            part.priority = max(part.priority, 1)
     if scene.friction is not None:
         _scale_friction(child, scene.friction, absolute=True)
     try:
