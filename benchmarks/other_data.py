@@ -2,7 +2,8 @@
 
     python benchmarks/other_data.py FOLDER [--classifier c45] [--sets jaco,fruit] [--short]
 
-FOLDER has a folder for each data set, with the names of docs/other_data.md. A set whose folder is missing is left out. The manifests are those of docs/manifests. `--short` imports the recordings only.
+FOLDER has a folder for each data set, with the names of docs/other_data.md. A set whose folder is missing is left out.
+The manifests are those of docs/manifests. `--short` imports the recordings only.
 """
 
 from __future__ import annotations
@@ -17,7 +18,17 @@ from collections.abc import Sequence
 from pathlib import Path
 
 MANIFESTS = Path(__file__).parents[1] / "docs" / "manifests"
-SETS = ("fruit", "jaco", "pr2_biotac", "palpation", "dataglove", "biotac_slide", "biotac_sp", "barrett_taps", "icub")
+SETS = (
+    "fruit",
+    "jaco",
+    "pr2_biotac",
+    "palpation",
+    "dataglove",
+    "biotac_slide",
+    "biotac_sp",
+    "barrett_taps",
+    "icub",
+)
 FEATURES = ("chitta", "curve")
 ROWS = ("before_contact", "first_line", "width_only", "recording_order", "majority_class")
 
