@@ -22,8 +22,6 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from peer_drake import INSTALLED as DRAKE_INSTALLED
-from peer_drake import calls_ms, drake_engines
 from peer_engines import (
     REFERENCE_STEPS,
     Engine,
@@ -53,10 +51,6 @@ SHOWS = (
     "- MuJoCo is called from C with its profiling clock removed. Its rows show the cost of its steps. In linear "
     "contact, object and contact are its own springs; elsewhere the loop computes the forces, since MuJoCo has no "
     "such laws. They do not show what MuJoCo is for: many bodies, and contacts that it finds itself.",
-    "- Drake is called from Python once a tick, because its package has nothing to compile a loop in C++ against; "
-    "steps and contact are its own machine code. In linear contact, ball, half-space and springs are its own, with "
-    "CENIC and two of its other integrators, and with its discrete solver; elsewhere the loop computes the force once "
-    "a tick, since Drake has no such laws. As for MuJoCo, this does not show what Drake is for.",
 )
 WRONG = 0.05
 """Relative error of a trace from which an engine is said to miss the scene."""
@@ -75,7 +69,6 @@ def main() -> None:
     wanted = ["snap", "linear"] if given.short else [name for name in given.scenes.split(",") if name]
     scenes = [s for s in SCENES if not wanted or any(name in s.name for name in wanted)]
     result: dict[str, Any] = {"made": made(), "repeats": 1 if given.short else given.repeats, "scenes": []}
-    result["drake_calls_ms"] = calls_ms() if DRAKE_INSTALLED else None
     for scene in scenes:
         measured = compared(scene, result["repeats"], adaptive=not given.short)
         result["scenes"].append(measured)
@@ -95,7 +88,6 @@ def compared(scene: PeerScene, repeats: int, *, adaptive: bool) -> dict[str, Any
         *ours(scene),
         *loops(scene),
         *mujoco_engines(scene),
-        *drake_engines(scene),
         *(solvers(scene) if adaptive else ()),
     ):
         engines.append(prepared(prepare))
@@ -178,8 +170,6 @@ def page(result: dict[str, Any]) -> Iterator[str]:
     yield "What the comparison shows, and what it does not:"
     yield ""
     yield from SHOWS
-    if result["drake_calls_ms"] is not None:
-        yield f"  The calls from Python are {result['drake_calls_ms']:.0f} ms of each of its times in linear contact."
     yield ""
     yield from across_scenes([scene["ratios"] for scene in result["scenes"]])
     for scene in result["scenes"]:

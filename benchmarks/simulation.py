@@ -86,7 +86,7 @@ def made() -> dict[str, Any]:
         "graspsense": __version__,
         "load_at_the_start": round(os.getloadavg()[0], 1),
     }
-    for name in ("numpy", "numba", "scipy", "mujoco", "scikit-sundae", "drake"):
+    for name in ("numpy", "numba", "scipy", "mujoco", "scikit-sundae"):
         try:
             found[name] = version(name)
         except PackageNotFoundError:

@@ -258,20 +258,14 @@ class _Batch:
             return None
         try:
             if not hasattr(self.local, "grasps"):
-                self.local.grasps = CompiledGrasps(self.models, self.loops, self.measure, self._is_compiled)
+                self.local.grasps = CompiledGrasps(
+                    self.models, self.loops, self.measure, self.is_compiled.__getitem__
+                )
             grasps: CompiledGrasps = self.local.grasps
             return grasps.grasp(scene, seed)
         except NotCompilable as error:
             self._note_not_compilable(composition_of(self.models.setup(scene, seed)), error)
             return None
-
-    def _is_compiled(self, composition: Composition) -> bool:
-        if composition not in self.is_compiled:
-            # The friction that is drawn may make one trial of a scene piecewise linear, and the next not.
-            self.is_compiled[composition] = any(
-                compiled for other, compiled in self.is_compiled.items() if other.kinds == composition.kinds
-            )
-        return self.is_compiled[composition]
 
     def _note_not_compilable(self, composition: Composition, error: NotCompilable) -> None:
         self.is_compiled[composition] = False
