@@ -39,7 +39,7 @@ SERVO_RAD_S, FASTEST_RAD_S = 60.0, 300.0
 """Natural frequency of the servo on the gap, critically damped; and that of the lightest grippers."""
 SERVO_SHARE, LONGEST_S = 0.1, 1e-3
 """Controls are kept no longer than this share of the servo's time constant, and than this time."""
-SERVO_N_M = 1000.0
+SERVO_N_M = 10_000.0
 """Least stiffness of the servo: at a lower one the force of light fingers on a thing grows too slowly."""
 
 
@@ -138,7 +138,8 @@ def _moved(model: mujoco.MjModel, gripper: GripperFile, width_m: float | None) -
     table = np.array(
         [np.interp(grid, np.array(gaps)[order], column) for column in np.array(lengths)[order].T]
     )
-    mass_kg = _mass(model, gripper, half, axis)
+    slopes = np.gradient(table, grid, axis=1)[:, POINTS // 2]
+    mass_kg = _mass(model, gripper, half, axis, slopes)
     return Travel(grid, table, mass_kg, axis, (left + right) / 2.0, qpos_open)
 
 
@@ -170,7 +171,7 @@ def _check_opposed(
         )
 
 
-def _mass(model: mujoco.MjModel, gripper: GripperFile, qpos: Floats, axis: Floats) -> float:
+def _mass(model: mujoco.MjModel, gripper: GripperFile, qpos: Floats, axis: Floats, slopes: Floats) -> float:
     """Return the mass (kg) that moves with the gap: how much more it accelerates under the controls `closed`.
 
     At rest, and away from the ends of the joints, no friction and no stop takes a part of the force.
@@ -184,13 +185,14 @@ def _mass(model: mujoco.MjModel, gripper: GripperFile, qpos: Floats, axis: Float
         accelerations.append(data.qacc.copy())
         forces.append(data.actuator_force[ids].copy())
     measured_m = GapGauge(model, gripper.gap).reader(data, axis)
-    gap_m, length = measured_m(), data.actuator_length[ids].copy()
+    gap_m = measured_m()
     mujoco.mj_integratePos(model, data.qpos, accelerations[1] - accelerations[0], MASS_S2)
-    mujoco.mj_forward(model, data)
+    mujoco.mj_kinematics(model, data)
     moved_m = gap_m - measured_m()
     if moved_m <= 0.0:
         return UNKNOWN_MASS_KG
-    effort_n = float((forces[1] - forces[0]) @ (data.actuator_length[ids] - length)) / moved_m
+    # The coupling of two fingers gives way a little, so the slope is that of the test move.
+    effort_n = float((forces[0] - forces[1]) @ slopes)
     mass = effort_n * MASS_S2 / moved_m
     return mass if isfinite(mass) and mass > LEAST_MASS_KG else UNKNOWN_MASS_KG
 
