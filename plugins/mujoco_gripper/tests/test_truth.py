@@ -69,3 +69,15 @@ def test_a_grasp_at_the_ends_of_every_range_is_finite_or_says_why_it_ended(
     assert np.isfinite(grasp.trace.force_left_n).all()
     assert np.isfinite(grasp.trace.gap_m).all()
     assert math.isfinite(float(grasp.report["greatest_force_n"]))
+
+
+def test_the_test_move_finds_the_mass_of_the_gap(truth, tmp_path, monkeypatch):
+    """The stop at the open end takes half of the force that opens: a mass from there would be twice the true one."""
+    settings = {}
+    monkeypatch.setattr(truth, "_features", lambda gripper, **given: settings.update(given))
+    truth.by_mujoco(tmp_path, 5e-4)
+    gripper = create("sensor-backend", "mujoco", **settings)
+    found = gripper.open(0).numbers["moving_mass_kg"]
+    gripper.close()
+    # Both fingers of 60 g move with half of the speed of the gap.
+    assert found == pytest.approx(truth.MASS_KG + 2 * 0.06 / 4, rel=1e-3)

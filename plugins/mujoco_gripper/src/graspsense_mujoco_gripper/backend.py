@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from math import ceil, inf, nan
 from pathlib import Path
 from typing import Any, Final, Unpack, final
@@ -10,7 +10,6 @@ from typing import Any, Final, Unpack, final
 import mujoco
 import numpy as np
 from attrs import evolve
-from numpy.typing import NDArray
 
 from graspsense.plugin_api import (
     EFFORT,
@@ -41,7 +40,7 @@ from graspsense_mujoco_gripper.config import MujocoConfig
 from graspsense_mujoco_gripper.draft import Draft, drafted
 from graspsense_mujoco_gripper.drive import ActuatorDrive, Travel, instability, test_move
 from graspsense_mujoco_gripper.gripper_file import read_gripper
-from graspsense_mujoco_gripper.measurement import ForceGauge, GapGauge, cells_of, geoms_of, width_m
+from graspsense_mujoco_gripper.measurement import ForceGauge, GapGauge, cells_of, plain, width_m
 from graspsense_mujoco_gripper.model import OBJ, compiled, gripper_spec, identifier
 from graspsense_mujoco_gripper.scene import PREFIX, Motion, add_thing, is_thing, put_on_arm, read_scene, vary
 
@@ -53,6 +52,8 @@ SOFT: Final = -1
 """The number of the geom of a contact with a soft body."""
 DEEPEST_M: Final = 1e-3
 """A thing that begins deeper in a finger is refused."""
+MANY: Final = 256
+"""Errors of the forces that are drawn at once."""
 SWING, MOST_SWINGS = 0.1, 20
 """The loop counts as unstable if the effort changes its sign above this share of its limit more often than this."""
 
@@ -161,13 +162,12 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
         data.qpos[: len(travel.qpos_open)] = travel.qpos_open
         mujoco.mj_forward(model, data)
         self._model, self._travel, self._generator = model, travel, generator
-        self._gauge = GapGauge(model, self._gripper.gap)
+        self._measured_gap_m = GapGauge(model, self._gripper.gap).reader(data, travel.axis)
         things = {k for k in range(model.ngeom) if self._of_thing(k)}
         if model.nflex:
             things.add(SOFT)
-        left, right = self._gripper.left, self._gripper.right
-        self._left = ForceGauge(model, left, things | geoms_of(model, right), -1.0)
-        self._right = ForceGauge(model, right, things | geoms_of(model, left), 1.0)
+        fingers = self._gripper.left, self._gripper.right
+        self._forces = ForceGauge(model, data, fingers, things, travel.axis)
         self._cells = cells_of(model, self._gripper)
         self._sensors = [
             int(model.sensor_adr[identifier(model, OBJ.mjOBJ_SENSOR, one.sensor, "sensor")])
@@ -177,11 +177,15 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
         self._shell = [
             identifier(model, OBJ.mjOBJ_EQUALITY, PREFIX + name, "equality") for name in self._thing.shell
         ]
-        self._drive = ActuatorDrive(model, self._gripper, travel)
+        self._drive = ActuatorDrive(model, data, self._gripper, travel)
         self._motion = Motion(model, self._scene)
         self._data = data
         self._check_start(data)
-        self._gap_m = self._gauge.gap_m(data, travel.axis)
+        self._kept = kept_steps(self._steps, self._drive.longest_s / model.opt.timestep)
+        self._noises: Iterator[float] = iter(())
+        self._tick_s, self._timestep_s = 1.0 / self.config.rate_hz, model.opt.timestep
+        self._warnings, self._values = plain(data.warning.number), plain(data.sensordata)
+        self._gap_m, self._rate_m_s = self._measured_gap_m(), 0.0
         self._drive.reset(self._gap_m)
         self._command = Command(EFFORT, 0.0, inf, inf)
         self._ticks, self._swings, self._broken, self._greatest_n = 0, 0, False, 0.0
@@ -221,18 +225,16 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
     def read(self, timeout_s: float) -> Reading | None:
         """Step the model by one tick and measure. Raises DeviceLost where MuJoCo warns that the state is bad."""
         del timeout_s
-        data = self._opened()
-        axis, dt_s = self._travel.axis, self._model.opt.timestep
-        before_m = self._gap_m
-        for _ in range(self._steps):
-            now_m = self._gauge.gap_m(data, axis)
-            self._drive.set_controls(
-                data, self._command, now_m, (now_m - before_m) / dt_s if self._ticks else 0.0, dt_s
-            )
-            before_m = now_m
-            mujoco.mj_step(self._model, data)
-            self._break_shell(data, axis)
-        if problem := instability(data):
+        data, model, drive, timestep_s = self._opened(), self._model, self._drive, self._timestep_s
+        for steps in self._kept:
+            kept_s = steps * timestep_s
+            drive.set_controls(self._command, self._gap_m, self._rate_m_s, kept_s)
+            mujoco.mj_step(model, data, nstep=steps)
+            before_m, self._gap_m = self._gap_m, self._measured_gap_m()
+            self._rate_m_s = (self._gap_m - before_m) / kept_s
+            if self._shell and not self._broken:
+                self._break_shell(data)
+        if any(self._warnings) and (problem := instability(data)):
             raise DeviceLost(f"the simulation became unstable: {problem}. Use a smaller gripper.timestep_s")
         self._ticks += 1
         if self._viewer is not None:
@@ -247,36 +249,35 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
             self._window.follow(t_s)
 
     def _reading(self, data: mujoco.MjData) -> Reading:
-        axis, tick_s = self._travel.axis, 1.0 / self.config.rate_hz
-        self._gap_m = self._gauge.gap_m(data, axis)
+        tick_s = self._tick_s
         measured_m = self._rounded(self._gap_m)
         velocity = (measured_m - self._measured_m) / tick_s
         self._measured_m = measured_m
-        forces = [gauge.force_n(data, axis) for gauge in (self._left, self._right)]
-        self._greatest_n = max(self._greatest_n, *forces)
-        self._motion.set(data, self._ticks * tick_s, touched=min(forces) > 0.0)
-        left, right = (force + self._noise() for force in forces)
+        left, right = self._forces.forces_n()
+        self._greatest_n = max(self._greatest_n, left, right)
         t_s = self._ticks * tick_s
+        if self._motion.moves:
+            self._motion.set(data, t_s, touched=min(left, right) > 0.0)
+        if self.config.force_noise_n:
+            left, right = left + self._noise(), right + self._noise()
         frame = Frame(t_s, tick_s, measured_m, velocity, self._drive.effort_n, left, right, nan, nan, 0)
         pads = NO_PADS
         if self._cells is not None:
             pads = Pads(t_s, self._ticks, *self._cells.images(data))
-        signals = self._signals(*(float(data.sensordata[k]) for k in self._sensors)) if self._sensors else ()
+        signals = self._signals(*(self._values[k] for k in self._sensors)) if self._sensors else ()
         return Reading(frame, pads, signals)
 
-    def _break_shell(self, data: mujoco.MjData, axis: NDArray[np.float64]) -> None:
-        if self._broken or not self._shell:
-            return
-        if max(gauge.force_n(data, axis) for gauge in (self._left, self._right)) > self._thing.breaks_at_n:
+    def _break_shell(self, data: mujoco.MjData) -> None:
+        if max(self._forces.forces_n()) > self._thing.breaks_at_n:
             self._broken = True
             data.eq_active[self._shell] = 0
 
     def _noise(self) -> float:
-        return (
-            float(self._generator.normal(0.0, self.config.force_noise_n))
-            if self.config.force_noise_n
-            else 0.0
-        )
+        """Return the next error of a force (N); many are drawn at once."""
+        for error_n in self._noises:
+            return error_n
+        self._noises = iter(self._generator.normal(0.0, self.config.force_noise_n, MANY).tolist())
+        return next(self._noises)
 
     def _rounded(self, gap_m: float) -> float:
         step = self.config.gap_step_m
@@ -323,6 +324,12 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
                 "-o controller.sends=velocity"
             )
         return report
+
+
+def kept_steps(steps: int, most: float) -> list[int]:
+    """Return the steps of a tick, in parts under the same controls: as many as `most` in each, and at least one."""
+    each = max(int(most + 1e-9), 1)
+    return [min(each, steps - begun) for begun in range(0, steps, each)]
 
 
 def _step_variant(integrator: str, timestep_s: float) -> SimulationVariant:

@@ -6,6 +6,8 @@ actuator of gain g and bias b0 + b1 length + b2 velocity exerts the force g cont
 
 from __future__ import annotations
 
+from bisect import bisect_left
+from hashlib import sha256
 from math import inf, isfinite, sqrt
 
 import mujoco
@@ -15,24 +17,29 @@ from numpy.typing import NDArray
 
 from graspsense.plugin_api import EFFORT, FORCE, POSITION, VELOCITY, Command, ConfigError
 from graspsense_mujoco_gripper.gripper_file import GripperFile
-from graspsense_mujoco_gripper.measurement import GapGauge, closing_axis, faces
+from graspsense_mujoco_gripper.measurement import GapGauge, closing_axis, faces, plain
 from graspsense_mujoco_gripper.model import identifier
 
 Floats = NDArray[np.float64]
 TEST_S = 1.0
 """Time of each half of the test move: opening, and closing."""
 POINTS = 64
+MOST_TRAVELS = 64
+_TRAVELS: dict[tuple[bytes, str, float | None], Travel] = {}
 LEAST_TRAVEL_M = 1e-3
 LEAST_TURN_RAD = 0.1
 CLEARANCE_M = 0.004
 """A thing is put where the fingers have this much more room than it needs, so that one that stands still is clear."""
-MASS_STEPS = 4
+MASS_S2 = 1e-6
+"""The gap is moved by this much of its acceleration, to see how it accelerates."""
 LEAST_MASS_KG = 1e-3
 UNKNOWN_MASS_KG = 0.5
-"""Assumed where the fingers stand still in the first steps of the test move."""
+"""Assumed where the fingers do not accelerate."""
 SERVO_RAD_S, FASTEST_RAD_S = 60.0, 300.0
 """Natural frequency of the servo on the gap, critically damped; and that of the lightest grippers."""
-SERVO_N_M = 1000.0
+SERVO_SHARE, LONGEST_S = 0.1, 1e-3
+"""Controls are kept no longer than this share of the servo's time constant, and than this time."""
+SERVO_N_M = 10_000.0
 """Least stiffness of the servo: at a lower one the force of light fingers on a thing grows too slowly."""
 
 
@@ -70,8 +77,19 @@ def test_move(model: mujoco.MjModel, gripper: GripperFile, width_m: float | None
     """Open and close the empty gripper. Raises ConfigError where the fingers do not move, or move the wrong way.
 
     `width_m` is that of the thing to be grasped: fingers that turn are looked at where they touch it. Without a thing
-    they are looked at half closed.
+    they are looked at half closed. The move is kept: it follows from the arguments, and takes as long as a short grasp.
     """
+    whole = np.empty(mujoco.mj_sizeModel(model), np.uint8)
+    mujoco.mj_saveModel(model, None, whole)
+    key = (sha256(whole.tobytes()).digest(), repr(gripper), width_m)
+    if (travel := _TRAVELS.get(key)) is None:
+        if len(_TRAVELS) >= MOST_TRAVELS:
+            _TRAVELS.clear()
+        travel = _TRAVELS[key] = _moved(model, gripper, width_m)
+    return travel
+
+
+def _moved(model: mujoco.MjModel, gripper: GripperFile, width_m: float | None) -> Travel:
     _check_angles(model, gripper)
     data = mujoco.MjData(model)
     ids = actuator_ids(model, gripper)
@@ -83,18 +101,19 @@ def test_move(model: mujoco.MjModel, gripper: GripperFile, width_m: float | None
     _check(model, data)
     axis = closing_axis(gripper, *faces(model, data, gripper))
     qpos_open = data.qpos.copy()
-    start_m = gauge.gap_m(data, axis)
+    measured_m = gauge.reader(data, axis)
+    start_m = measured_m()
     data.ctrl[ids] = gripper.closed
     gaps, lengths, states = [start_m], [data.actuator_length[ids].copy()], [qpos_open]
     for _ in range(steps):
         mujoco.mj_step(model, data)
-        gap_m = gauge.gap_m(data, axis)
+        gap_m = measured_m()
         if 0.0 <= gap_m < gaps[-1] - 1e-6:
             gaps.append(gap_m)
             lengths.append(data.actuator_length[ids].copy())
             states.append(data.qpos.copy())
     _check(model, data)
-    end_m = max(gauge.gap_m(data, axis), 0.0)
+    end_m = max(measured_m(), 0.0)
     if end_m > start_m - LEAST_TRAVEL_M:
         raise ConfigError(
             f"gripper.file: with the controls `closed` the gap goes from {start_m * 1e3:.3g} to {end_m * 1e3:.3g} mm, "
@@ -107,16 +126,20 @@ def test_move(model: mujoco.MjModel, gripper: GripperFile, width_m: float | None
     axis = closing_axis(gripper, left, right)
     _check_opposed(model, gripper, axis, (states[0], states[-1]))
     if gauge.along_axis:
+        measured_m = gauge.reader(data, axis)
         for k, state in enumerate(states):
             data.qpos[:] = state
             mujoco.mj_kinematics(model, data)
-            gaps[k] = gauge.gap_m(data, axis)
+            gaps[k] = measured_m()
+    half_m = (gaps[0] + min(gaps)) / 2.0
+    half = states[int(np.argmin(np.abs(np.array(gaps) - half_m)))]
     grid = np.linspace(min(gaps), gaps[0], POINTS)
     order = np.argsort(gaps)
     table = np.array(
         [np.interp(grid, np.array(gaps)[order], column) for column in np.array(lengths)[order].T]
     )
-    mass_kg = _mass(model, gripper, qpos_open, axis)
+    slopes = np.gradient(table, grid, axis=1)[:, POINTS // 2]
+    mass_kg = _mass(model, gripper, half, axis, slopes)
     return Travel(grid, table, mass_kg, axis, (left + right) / 2.0, qpos_open)
 
 
@@ -148,26 +171,29 @@ def _check_opposed(
         )
 
 
-def _mass(model: mujoco.MjModel, gripper: GripperFile, qpos: Floats, axis: Floats) -> float:
-    """Return the mass (kg) that moves with the gap: from the accelerations under the controls `open` and `closed`."""
-    gauge, ids = GapGauge(model, gripper.gap), actuator_ids(model, gripper)
-    gaps, forces, lengths = [], [], []
+def _mass(model: mujoco.MjModel, gripper: GripperFile, qpos: Floats, axis: Floats, slopes: Floats) -> float:
+    """Return the mass (kg) that moves with the gap: how much more it accelerates under the controls `closed`.
+
+    At rest, and away from the ends of the joints, no friction and no stop takes a part of the force.
+    """
+    ids, data = actuator_ids(model, gripper), mujoco.MjData(model)
+    accelerations, forces = [], []
     for controls in (gripper.open, gripper.closed):
-        data = mujoco.MjData(model)
         data.qpos[:] = qpos
         data.ctrl[ids] = controls
         mujoco.mj_forward(model, data)
+        accelerations.append(data.qacc.copy())
         forces.append(data.actuator_force[ids].copy())
-        for _ in range(MASS_STEPS):
-            mujoco.mj_step(model, data)
-        gaps.append(gauge.gap_m(data, axis))
-        lengths.append(data.actuator_length[ids].copy())
-    moved_m = gaps[0] - gaps[1]
+    measured_m = GapGauge(model, gripper.gap).reader(data, axis)
+    gap_m = measured_m()
+    mujoco.mj_integratePos(model, data.qpos, accelerations[1] - accelerations[0], MASS_S2)
+    mujoco.mj_kinematics(model, data)
+    moved_m = gap_m - measured_m()
     if moved_m <= 0.0:
         return UNKNOWN_MASS_KG
-    effort_n = float((forces[0] - forces[1]) @ (lengths[0] - lengths[1])) / moved_m
-    acceleration = 2.0 * moved_m / (MASS_STEPS * model.opt.timestep) ** 2
-    mass = effort_n / acceleration
+    # The coupling of two fingers gives way a little, so the slope is that of the test move.
+    effort_n = float((forces[0] - forces[1]) @ slopes)
+    mass = effort_n * MASS_S2 / moved_m
     return mass if isfinite(mass) and mass > LEAST_MASS_KG else UNKNOWN_MASS_KG
 
 
@@ -210,70 +236,94 @@ def instability(data: mujoco.MjData) -> str:
 
 
 class ActuatorDrive:
-    """Sets the controls for a command, once for each step of the integrator."""
+    """Sets the controls for a command.
 
-    def __init__(self, model: mujoco.MjModel, gripper: GripperFile, travel: Travel) -> None:
-        self._travel = travel
-        self._ids = actuator_ids(model, gripper)
-        self._gain = model.actuator_gainprm[self._ids, 0].copy()
-        affine = model.actuator_biastype[self._ids] == mujoco.mjtBias.mjBIAS_AFFINE
-        self._bias = np.where(affine[:, None], model.actuator_biasprm[self._ids, :3], 0.0)
-        limited = model.actuator_ctrllimited[self._ids].astype(bool)
-        self._controls = np.where(limited[:, None], model.actuator_ctrlrange[self._ids], [-inf, inf])
-        forced = model.actuator_forcelimited[self._ids].astype(bool)
-        self._forces = np.where(forced[:, None], model.actuator_forcerange[self._ids], [-inf, inf])
+    The sums over the actuators are written out: with the few that a gripper has, the interpreter is faster than numpy.
+    """
+
+    def __init__(
+        self, model: mujoco.MjModel, data: mujoco.MjData, gripper: GripperFile, travel: Travel
+    ) -> None:
+        ids = actuator_ids(model, gripper)
+        self._ids = ids
+        gain = model.actuator_gainprm[ids, 0]
+        affine = model.actuator_biastype[ids] == mujoco.mjtBias.mjBIAS_AFFINE
+        bias = np.where(affine[:, None], model.actuator_biasprm[ids, :3], 0.0)
+        limited = model.actuator_ctrllimited[ids].astype(bool)
+        controls = np.where(limited[:, None], model.actuator_ctrlrange[ids], [-inf, inf])
+        forced = model.actuator_forcelimited[ids].astype(bool)
+        forces = np.where(forced[:, None], model.actuator_forcerange[ids], [-inf, inf])
+        self._actuators = np.column_stack([gain, bias, controls, forces]).tolist()
+        self._control = plain(data.ctrl)
+        self._length, self._velocity = plain(data.actuator_length), plain(data.actuator_velocity)
+        self._gaps_m, self._lengths = travel.gap_m.tolist(), travel.length.T.tolist()
+        self._slopes = [travel.slopes(gap_m).tolist() for gap_m in self._gaps_m]
         self.effort_n = 0.0
-        """The effort that the actuators exert in this step (N), positive where it closes."""
+        """The effort that the actuators exert (N), positive where it closes."""
         self._target_m = travel.open_m
+        self._mass_kg = travel.mass_kg
         self._servo_rad_s = min(max(sqrt(SERVO_N_M / travel.mass_kg), SERVO_RAD_S), FASTEST_RAD_S)
-        self.effort_limit_n = gripper.effort_limit_n or self._greatest()
+        self.longest_s = min(SERVO_SHARE / self._servo_rad_s, LONGEST_S)
+        """Controls are kept no longer than this."""
+        self.effort_limit_n = gripper.effort_limit_n or self._greatest(travel)
 
-    def _greatest(self) -> float:
+    def _greatest(self, travel: Travel) -> float:
         """Return the largest effort that the ranges of the actuators allow with the fingers half closed."""
-        gap_m = float(np.mean(self._travel.gap_m))
-        slopes, length = self._travel.slopes(gap_m), self._travel.lengths(gap_m)
-        ends = self._gain[:, None] * self._controls + (self._bias[:, 0] + self._bias[:, 1] * length)[:, None]
-        ends = np.clip(np.sort(ends, axis=1), self._forces[:, :1], self._forces[:, 1:])
-        closing = np.where(slopes > 0.0, -ends[:, 0], ends[:, 1])
-        effort = float(closing @ np.abs(slopes))
-        return effort if isfinite(effort) and effort > 0.0 else 100.0
+        gap_m = float(np.mean(travel.gap_m))
+        effort_n = 0.0
+        for slope, length, (gain, b0, b1, _, least, most, least_n, most_n) in zip(
+            travel.slopes(gap_m), travel.lengths(gap_m), self._actuators, strict=True
+        ):
+            ends = sorted(gain * control + b0 + b1 * length for control in (least, most))
+            low, high = (min(max(end, least_n), most_n) for end in ends)
+            effort_n += abs(slope) * (-low if slope > 0.0 else high)
+        return float(effort_n) if isfinite(effort_n) and effort_n > 0.0 else 100.0
 
     def reset(self, gap_m: float) -> None:
         """Begin at this gap."""
         self._target_m = gap_m
 
-    def set_controls(
-        self, data: mujoco.MjData, command: Command, gap_m: float, rate_m_s: float, dt_s: float
-    ) -> None:
-        """Set the controls for one step under a command."""
+    def set_controls(self, command: Command, gap_m: float, rate_m_s: float, dt_s: float) -> None:
+        """Set the controls for the next `dt_s` under a command."""
         effort = self._effort(command, gap_m, rate_m_s, dt_s)
         limit = min(command.effort_limit_n, self.effort_limit_n)
         effort = min(max(effort, -limit), limit)
-        slopes = self._travel.slopes(gap_m)
-        share = np.abs(slopes).sum()
-        length, velocity = data.actuator_length[self._ids], data.actuator_velocity[self._ids]
-        wanted = -np.sign(slopes) * effort / share
-        wanted += self._kept_together(slopes, length, velocity, gap_m, rate_m_s)
-        bias = self._bias[:, 0] + self._bias[:, 1] * length + self._bias[:, 2] * velocity
-        # np.clip takes longer than a step of MuJoCo.
-        controls = np.minimum(
-            np.maximum((wanted - bias) / self._gain, self._controls[:, 0]), self._controls[:, 1]
-        )
-        data.ctrl[self._ids] = controls
-        force = np.minimum(np.maximum(self._gain * controls + bias, self._forces[:, 0]), self._forces[:, 1])
-        self.effort_n = float(-force @ slopes)
+        row = min(max(bisect_left(self._gaps_m, gap_m), 1), len(self._gaps_m) - 1)
+        slopes = self._slopes[row]
+        per_slope = effort / sum(map(abs, slopes))
+        lengths = [self._length[k] for k in self._ids]
+        velocities = [self._velocity[k] for k in self._ids]
+        wanted = [(-per_slope if slope > 0.0 else per_slope) if slope else 0.0 for slope in slopes]
+        if len(slopes) > 1:
+            together = self._kept_together(row, lengths, velocities, gap_m, rate_m_s)
+            wanted = [one + other for one, other in zip(wanted, together, strict=True)]
+        self.effort_n = 0.0
+        for k, number in enumerate(self._ids):
+            gain, b0, b1, b2, least, most, least_n, most_n = self._actuators[k]
+            bias = b0 + b1 * lengths[k] + b2 * velocities[k]
+            control = min(max((wanted[k] - bias) / gain, least), most)
+            self._control[number] = control
+            self.effort_n -= min(max(gain * control + bias, least_n), most_n) * slopes[k]
 
     def _kept_together(
-        self, slopes: Floats, length: Floats, velocity: Floats, gap_m: float, rate_m_s: float
-    ) -> Floats:
+        self, row: int, lengths: list[float], velocities: list[float], gap_m: float, rate_m_s: float
+    ) -> list[float]:
         """Return forces that keep several actuators at the positions of the test move for this gap, without effort."""
-        if len(slopes) == 1:
-            return np.zeros(1)
-        inertia, frequency = self._travel.mass_kg / float(slopes @ slopes), self._servo_rad_s
-        behind = self._travel.lengths(gap_m) - length
-        forces = inertia * frequency * (frequency * behind + 2.0 * (slopes * rate_m_s - velocity))
-        forces -= slopes * float(slopes @ forces) / float(slopes @ slopes)
-        return np.asarray(forces)
+        slopes, before, after = self._slopes[row], self._lengths[row - 1], self._lengths[row]
+        start_m, end_m = self._gaps_m[row - 1], self._gaps_m[row]
+        share = min(max((gap_m - start_m) / (end_m - start_m), 0.0), 1.0)
+        square = sum(slope * slope for slope in slopes)
+        inertia, frequency = self._mass_kg / square, self._servo_rad_s
+        forces = [
+            inertia
+            * frequency
+            * (frequency * (begin + share * (end - begin) - length) + 2.0 * (slope * rate_m_s - velocity))
+            for begin, end, length, velocity, slope in zip(
+                before, after, lengths, velocities, slopes, strict=True
+            )
+        ]
+        closing = sum(slope * force for slope, force in zip(slopes, forces, strict=True)) / square
+        return [force - slope * closing for force, slope in zip(forces, slopes, strict=True)]
 
     def _effort(self, command: Command, gap_m: float, rate_m_s: float, dt_s: float) -> float:
         """Return the effort for a command; a servo on the gap keeps the speed, or reaches the position."""
@@ -293,9 +343,9 @@ class ActuatorDrive:
         else:
             raise ValueError(f"{kind} is no kind of command")
         self._target_m += speed * dt_s
-        stiffness = self._travel.mass_kg * self._servo_rad_s**2
+        stiffness = self._mass_kg * self._servo_rad_s**2
         # A target that the fingers cannot follow runs away only as far as the limit of the effort can use.
         farthest_m = min(command.effort_limit_n, self.effort_limit_n) / stiffness
         self._target_m = min(max(self._target_m, gap_m - farthest_m), gap_m + farthest_m)
-        damping = 2.0 * self._travel.mass_kg * self._servo_rad_s
+        damping = 2.0 * self._mass_kg * self._servo_rad_s
         return stiffness * (gap_m - self._target_m) + damping * (rate_m_s - speed)

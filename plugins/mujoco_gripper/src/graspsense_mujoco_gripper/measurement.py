@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Set
+from collections.abc import Callable, Set
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -16,6 +17,13 @@ from graspsense_mujoco_gripper.model import OBJ, POINT, identifier
 Floats = NDArray[np.float64]
 FARTHEST_M = 10.0
 """Beyond this distance two geoms are not measured."""
+SIDES, NOTHING = (-1.0, 1.0), (0.0, 0.0)
+"""The closing direction points from the left finger to the right one."""
+
+
+def plain(values: NDArray[Any]) -> Any:
+    """Return a view of an array, row by row, whose numbers are read and set in a fraction of the time of numpy."""
+    return memoryview(values.reshape(-1))  # type: ignore[arg-type]
 
 
 class GapGauge:
@@ -38,63 +46,109 @@ class GapGauge:
         """Whether the gap depends on the closing direction."""
         return bool(self._faces)
 
-    def gap_m(self, data: mujoco.MjData, axis: Floats) -> float:
-        """Return the gap."""
+    def reader(self, data: mujoco.MjData, axis: Floats) -> Callable[[], float]:
+        """Return a function that returns the gap in the present state of `data`."""
+        if self._gap.geoms and not self._faces:
+            model, (left, right) = self._model, self._ids
+            return lambda: float(mujoco.mj_geomDistance(model, data, left, right, FARTHEST_M, None))
+        # Sums of a few numbers take less time in the interpreter than in numpy.
         if self._faces:
-            left, right = (data.site_xpos[sites].mean(axis=0) for sites in self._faces)
-            return float((right - left) @ axis)
-        if self._gap.geoms:
-            return float(mujoco.mj_geomDistance(self._model, data, *self._ids, FARTHEST_M, None))
-        return float(self._gap.offset_m + self._gap.scale * data.qpos[self._ids[0]])
+            values, offset_m = plain(data.site_xpos), 0.0
+            terms = [
+                (3 * site + k, sign * float(axis[k]) / len(sites))
+                for sign, sites in zip((-1.0, 1.0), self._faces, strict=True)
+                for site in sites
+                for k in range(3)
+                if axis[k] != 0.0
+            ]
+        else:
+            values, offset_m = plain(data.qpos), self._gap.offset_m
+            terms = [(self._ids[0], self._gap.scale)]
+
+        def gap_m() -> float:
+            total: float = offset_m
+            for k, weight in terms:
+                total += weight * values[k]
+            return total
+
+        return gap_m
 
 
 class ForceGauge:
-    """Measures the force (N) that closes one finger on a thing; positive where it presses.
+    """Measures the forces (N) that close both fingers on a thing; positive where they press.
 
-    `touched` are the geoms that it can press on: those of things and of the other finger. Contacts with other parts of
-    the gripper do not count.
+    A finger can press on `things` and on the other finger. Contacts with other parts of the gripper do not count.
     """
 
-    def __init__(self, model: mujoco.MjModel, finger: Finger, touched: Set[int], side: float) -> None:
-        self._touched = touched
-        self.geoms = geoms_of(model, finger)
-        self._model, self._side = model, side
-        self._sensor = -1
-        if finger.sensor:
-            self._sensor = identifier(model, OBJ.mjOBJ_SENSOR, finger.sensor, "sensor")
-            kind = int(model.sensor_type[self._sensor])
-            if kind not in (mujoco.mjtSensor.mjSENS_TOUCH, mujoco.mjtSensor.mjSENS_FORCE):
-                raise ConfigError(
-                    f"gripper.file: the sensor {finger.sensor!r} is neither a touch nor a force sensor"
-                )
-            self._is_touch = kind == mujoco.mjtSensor.mjSENS_TOUCH
-            self._address = int(model.sensor_adr[self._sensor])
-            self._site = int(model.sensor_objid[self._sensor])
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        fingers: tuple[Finger, Finger],
+        things: Set[int],
+        axis: Floats,
+    ) -> None:
+        self._model, self._data, self._axis = model, data, axis
+        self._fingers = tuple(geoms_of(model, finger) for finger in fingers)
+        self._things = things
+        self._sensors = [self._sensor(finger, side) for finger, side in zip(fingers, SIDES, strict=True)]
+        self._by_contacts = None in self._sensors
+        self._factors: dict[tuple[int, int], tuple[float, float]] = {}
+        self._wrench = np.zeros(6)
+        self._force = plain(self._wrench)
 
-    def force_n(self, data: mujoco.MjData, axis: Floats) -> float:
-        """Return the force on the finger along the closing direction."""
-        if self._sensor < 0:
-            return self._of_contacts(data, axis)
-        if self._is_touch:
-            return float(data.sensordata[self._address])
-        local = data.sensordata[self._address : self._address + 3]
-        world = data.site_xmat[self._site].reshape(3, 3) @ local
-        return float(self._side * (world @ axis))
+    def _sensor(self, finger: Finger, side: float) -> Callable[[], float] | None:
+        """Return a function that reads the sensor of a finger; None for one that is measured by its contacts."""
+        if not finger.sensor:
+            return None
+        model, data = self._model, self._data
+        sensor = identifier(model, OBJ.mjOBJ_SENSOR, finger.sensor, "sensor")
+        kind, address = int(model.sensor_type[sensor]), int(model.sensor_adr[sensor])
+        if kind == mujoco.mjtSensor.mjSENS_TOUCH:
+            return lambda: float(data.sensordata[address])
+        if kind != mujoco.mjtSensor.mjSENS_FORCE:
+            raise ConfigError(
+                f"gripper.file: the sensor {finger.sensor!r} is neither a touch nor a force sensor"
+            )
+        local = data.sensordata[address : address + 3]
+        turn = data.site_xmat[int(model.sensor_objid[sensor])].reshape(3, 3)
+        return lambda: float(side * ((turn @ local) @ self._axis))
 
-    def _of_contacts(self, data: mujoco.MjData, axis: Floats) -> float:
-        total, wrench = 0.0, np.zeros(6)
-        for k in range(data.ncon):
-            contact = data.contact[k]
-            one, other = int(contact.geom[0]), int(contact.geom[1])
-            second = other in self.geoms and one in self._touched
-            if not second and not (one in self.geoms and other in self._touched):
+    def forces_n(self) -> tuple[float, float]:
+        """Return the force on the left and on the right finger along the closing direction."""
+        left, right = self._sums() if self._by_contacts and self._data.ncon else (0.0, 0.0)
+        by_left, by_right = self._sensors
+        return left if by_left is None else by_left(), right if by_right is None else by_right()
+
+    def _sums(self) -> tuple[float, float]:
+        """Return the sums of the forces at the contacts of each finger."""
+        model, data, factors, force = self._model, self._data, self._factors, self._force
+        contacts, rows = data.contact, None
+        left = right = 0.0
+        for k, (one, other) in enumerate(contacts.geom.tolist()):
+            pair = factors.get((one, other))
+            if pair is None:
+                pair = factors[one, other] = self._factors_of(one, other)
+            if pair == NOTHING:
                 continue
-            mujoco.mj_contactForce(self._model, data, k, wrench)
-            # The frame's first row is the normal, from the first geom to the second; the force acts on the second.
-            world = contact.frame.reshape(3, 3).T @ wrench[:3]
-            on_finger = world if second else -world
-            total += self._side * float(on_finger @ axis)
-        return total
+            if rows is None:
+                rows = (contacts.frame.reshape(-1, 3) @ self._axis).tolist()
+            mujoco.mj_contactForce(model, data, k, self._wrench)
+            # The first row of a frame is the normal, from the first geom to the second; the force acts on the second.
+            along = rows[3 * k] * force[0] + rows[3 * k + 1] * force[1] + rows[3 * k + 2] * force[2]
+            left += pair[0] * along
+            right += pair[1] * along
+        return left, right
+
+    def _factors_of(self, one: int, other: int) -> tuple[float, float]:
+        """Return the sign of the force of a contact of two geoms on the left and the right finger; 0: none."""
+        factors = []
+        for k, side in enumerate(SIDES):
+            own, touched = self._fingers[k], self._things | self._fingers[1 - k]
+            second = other in own and one in touched
+            counts = second or (one in own and other in touched)
+            factors.append(side * (1.0 if second else -1.0) if counts else 0.0)
+        return factors[0], factors[1]
 
 
 @frozen
