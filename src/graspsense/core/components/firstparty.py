@@ -33,6 +33,7 @@ class Shipped:
 _PR2 = Shipped("graspsense-pr2-gripper", "pr2_gripper", "pr2")
 _SIM = Shipped("graspsense-sim-gripper", "sim_gripper", "sim")
 _MUJOCO = Shipped("graspsense-mujoco-gripper", "mujoco_gripper", "mujoco")
+_ROBOTIQ = Shipped("graspsense-robotiq-2f", "robotiq_2f", "robotiq")
 _C45 = Shipped("graspsense-c45", "c45", "c45")
 _PAPER = Shipped("graspsense-paper", "paper", "paper")
 _IDENTIFY = Shipped("graspsense-identify", "identify", "identify")
@@ -41,6 +42,8 @@ SHIPPED: Final[dict[tuple[Role, str], Shipped]] = {
     ("sensor-backend", "pr2"): _PR2,
     ("sensor-backend", "sim"): _SIM,
     ("sensor-backend", "mujoco"): _MUJOCO,
+    ("sensor-backend", "robotiq"): _ROBOTIQ,
+    ("feature-set", "chitta-without-pads"): _ROBOTIQ,
     ("classifier", "c45"): _C45,
 }
 """Components in other distributions of this project, for the hint if one is not installed."""
@@ -59,12 +62,11 @@ class Example:
         return f"in a clone: pip install -e ./examples/{self.folder}"
 
 
-_ROBOTIQ = Example("graspsense-robotiq-2f85", "robotiq_2f85")
+_OWN_ROBOTIQ = Example("graspsense-robotiq-2f85", "robotiq_2f85")
 _CURVE = Example("graspsense-grasp-curve", "grasp_curve")
 
 EXAMPLES: Final[dict[tuple[Role, str], Example]] = {
-    ("sensor-backend", "robotiq-2f85"): _ROBOTIQ,
-    ("feature-set", "chitta-without-pads"): _ROBOTIQ,
+    ("sensor-backend", "robotiq-2f85"): _OWN_ROBOTIQ,
     ("feature-set", "grasp-curve"): _CURVE,
     ("feature-set", "chitta-and-curve"): _CURVE,
 }

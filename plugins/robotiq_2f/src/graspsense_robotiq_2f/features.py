@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
+import numpy as np
 from attrs import evolve, frozen
 
 from graspsense.plugin_api import Channel, Feature, Features, FeatureSet, create, setting
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from graspsense.plugin_api import Trace
+
+START_M: Final = 1e-3
+"""Travel before which the fingers are only set in motion."""
 
 
 @frozen(kw_only=True)
@@ -41,7 +47,7 @@ class WithoutPadsConfig:
 
 
 class WithoutPads(FeatureSet[WithoutPadsConfig]):
-    """Four of the six features of Table I; f_steady and df_dt need a force, which the 2F-85 does not measure."""
+    """Four of the six features of Table I; f_steady and df_dt need a force, which the gripper does not measure."""
 
     requires = (Channel("gap", "m"), Channel("effort", "N"))
     features = (
@@ -54,15 +60,33 @@ class WithoutPads(FeatureSet[WithoutPadsConfig]):
     def extract(self, trace: Trace) -> Features:
         """Return the four features; in the reasons, the force of a pad stands for the effort."""
         config = self.config
+        effort_n = _without_start(trace.gap_m, trace.effort_n, config.contact_effort_n)
         six = create(
             "feature-set",
             "graspsense/chitta",
             contact_force_n=config.contact_effort_n,
             rest_speed_m_s=config.rest_speed_m_s,
             rest_window_s=config.rest_window_s,
-        ).extract(evolve(trace, force_left_n=trace.effort_n, force_right_n=trace.effort_n))
+        ).extract(evolve(trace, force_left_n=effort_n, force_right_n=effort_n))
         names = [feature.name for feature in self.features]
         return self.result(
             {name: six[name] for name in names},
             {name: six.reasons[name] for name in names if name in six.reasons},
         )
+
+
+def _without_start(
+    gap_m: NDArray[np.float64], effort_n: NDArray[np.float64], contact_n: float
+) -> NDArray[np.float64]:
+    """Return the effort without that which sets the fingers in motion, which can be as large as at contact.
+
+    It is above the threshold before the fingers have moved, and falls below it while they move on.
+    """
+    above = np.flatnonzero(effort_n >= contact_n)
+    if len(above) == 0 or gap_m[above[0]] < gap_m[0] - START_M:
+        return effort_n
+    below = np.flatnonzero(effort_n[above[0] :] < contact_n)
+    if len(below) == 0:
+        return effort_n
+    end = above[0] + below[0]
+    return np.concatenate([np.minimum(effort_n[:end], 0.0), effort_n[end:]])

@@ -1,8 +1,8 @@
-"""The registers of a 2F-85 (Robotiq, 2F-85 & 2F-140 instruction manual, "Control") and the meaning of their bytes.
+"""The registers of the grippers (Robotiq instruction manuals, "Control") and the meaning of their bytes.
 
 Three output registers from 0x03E8: action, position request, speed and force. Three input registers from 0x07D0:
-status, fault and echo, position and current. Speeds go from 20 to 150 mm/s and forces from 20 to 235 N over a byte;
-the current is in steps of 10 mA. The position byte is 3 open and about 230 closed, over 85 mm.
+status, fault and echo, position and current. Speed and force go from least to greatest over a byte;
+the current is in steps of 10 mA.
 """
 
 from __future__ import annotations
@@ -14,16 +14,42 @@ OUTPUT: Final = 0x03E8
 INPUT: Final = 0x07D0
 COUNT: Final = 3
 
-OPEN_M: Final = 0.085
-OPEN_BYTE: Final = 3
-CLOSED_BYTE: Final = 230
-SPEEDS_M_S: Final = (0.020, 0.150)
-FORCES_N: Final = (20.0, 235.0)
 AMPERES_A_STEP: Final = 0.010
 
 ACTIVE: Final = 3
 MOVING, STOPPED_OPENING, STOPPED_CLOSING, THERE = range(4)
 """The meaning of the object bits."""
+
+
+class Model(NamedTuple):
+    """A model of gripper: its stroke, the position bytes at both ends, and its least and greatest speed and force."""
+
+    name: str
+    stroke_m: float
+    open_byte: int
+    closed_byte: int
+    speeds_m_s: tuple[float, float]
+    forces_n: tuple[float, float]
+
+    @property
+    def step_m(self) -> float:
+        """The change of the gap for one step of the position byte."""
+        return self.stroke_m / (self.closed_byte - self.open_byte)
+
+    def gap_m(self, position: int) -> float:
+        """Return the gap at this position byte."""
+        return self.step_m * (self.closed_byte - min(max(position, self.open_byte), self.closed_byte))
+
+    def position(self, gap_m: float) -> int:
+        """Return the position byte nearest to this gap."""
+        return round(self.closed_byte - min(max(gap_m, 0.0), self.stroke_m) / self.step_m)
+
+
+MODELS: Final = {
+    "2f-85": Model("Robotiq 2F-85", 0.085, 3, 230, (0.020, 0.150), (20.0, 235.0)),
+    "2f-140": Model("Robotiq 2F-140", 0.140, 3, 230, (0.030, 0.250), (10.0, 125.0)),
+    "hand-e": Model("Robotiq Hand-E", 0.050, 0, 255, (0.020, 0.150), (20.0, 185.0)),
+}
 
 
 class Request(NamedTuple):
@@ -44,6 +70,7 @@ class Status(NamedTuple):
     """The status of the gripper, in bytes and bits."""
 
     active: bool
+    go: bool
     state: int
     objects: int
     fault: int
@@ -62,19 +89,14 @@ def status_of(registers: Sequence[int]) -> Status:
     first, second, third = registers
     status = first >> 8
     return Status(
-        bool(status & 1), status >> 4 & 3, status >> 6 & 3, second >> 8 & 15, third >> 8, third & 0xFF
+        bool(status & 1),
+        bool(status >> 3 & 1),
+        status >> 4 & 3,
+        status >> 6 & 3,
+        second >> 8 & 15,
+        third >> 8,
+        third & 0xFF,
     )
-
-
-def gap_of(position: int) -> float:
-    """Return the gap (m) at this position byte."""
-    return OPEN_M * (CLOSED_BYTE - min(max(position, OPEN_BYTE), CLOSED_BYTE)) / (CLOSED_BYTE - OPEN_BYTE)
-
-
-def position_of(gap_m: float) -> int:
-    """Return the position byte nearest to this gap."""
-    share = 1.0 - min(max(gap_m / OPEN_M, 0.0), 1.0)
-    return round(OPEN_BYTE + share * (CLOSED_BYTE - OPEN_BYTE))
 
 
 def byte_of(value: float, within: tuple[float, float]) -> int:

@@ -1,4 +1,4 @@
-"""The fault codes of a 2F-85 as status bits (Robotiq, 2F-85 & 2F-140 instruction manual, register gFLT)."""
+"""The fault codes of the grippers as status bits (Robotiq instruction manuals, register gFLT)."""
 
 from __future__ import annotations
 

@@ -1,0 +1,274 @@
+"""A Robotiq gripper as a sensor backend."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from math import inf, nan
+from types import MappingProxyType
+from typing import Final, final
+
+from attrs import evolve
+
+from graspsense.plugin_api import (
+    FORCE,
+    NO_PADS,
+    POSITION,
+    VELOCITY,
+    Channel,
+    Command,
+    DeviceInfo,
+    DeviceLost,
+    Frame,
+    NoDevice,
+    ObjectKind,
+    Pads,
+    Reading,
+    SensorBackend,
+    create,
+)
+from graspsense_robotiq_2f.config import RobotiqConfig
+from graspsense_robotiq_2f.emulator.device import EmulatedGripper
+from graspsense_robotiq_2f.faults import STATUS_BITS, bit_of
+from graspsense_robotiq_2f.link import Link, NoReply
+from graspsense_robotiq_2f.registers import (
+    ACTIVE,
+    AMPERES_A_STEP,
+    MODELS,
+    Request,
+    Status,
+    byte_of,
+    status_of,
+)
+
+RATE_HZ: Final = 100.0
+ACTIVATION_S: Final = 5.0
+ATTEMPTS: Final = 3
+SLOPE_FRAMES: Final = 6
+COMMAND_DELAY_S: Final = 0.02
+"""A command waits for the next exchange (10 ms), which takes 5 ms on the line, and the gripper's next period (5 ms)."""
+AHEAD_M: Final = 0.004
+"""How far a target that moves can be ahead of the fingers."""
+
+
+@final
+class RobotiqBackend(SensorBackend[RobotiqConfig]):
+    """Turns commands into a target position with a speed and a force; each read is one exchange."""
+
+    channels = (
+        Channel("gap", "m", RATE_HZ),
+        Channel("velocity", "m/s", RATE_HZ),
+        Channel("effort", "N", RATE_HZ),
+    )
+    accepts = ("velocity", "position", "force")
+    closes_itself: Mapping[str, str] = MappingProxyType(
+        {
+            "velocity": "the open or closed position, with this speed; below the least speed a target that moves at it",
+            "position": "the target, with the limits of the command as speed and force",
+            "force": "the closed position, with this force and at most the least speed",
+        }
+    )
+    command_delay_s = COMMAND_DELAY_S
+
+    def __init__(self, config: RobotiqConfig) -> None:
+        super().__init__(config)
+        self._model = MODELS[config.model]
+        self.least_force_n = self._model.forces_n[0]
+        self.least_step_m = self._model.step_m
+        self._link: Link | None = None
+        self._emulated: EmulatedGripper | None = None
+        self._asked = Request(active=True, go=False, position=0, speed=0, force=0)
+        self._frames = self._retries = 0
+        self._body_report: Mapping[str, float | int | str | bool] = {}
+
+    def objects(self) -> Sequence[ObjectKind]:
+        """Return what the body of the emulated gripper can hold."""
+        config = self.config
+        if config.port != "emulated":
+            return ()
+        return tuple(create("sensor-backend", config.body, **config.body_config).objects())
+
+    def with_object(self, name: str) -> SensorBackend[RobotiqConfig]:
+        """Return the emulated gripper with this object. Raises ConfigError for a real one."""
+        if self.config.port != "emulated":
+            return super().with_object(name)
+        return RobotiqBackend(evolve(self.config, object=name))
+
+    def open(self, seed: int) -> DeviceInfo:
+        """Open the gripper, and activate it if it is not: it then opens and closes once. Raises NoDevice."""
+        self.close()
+        config, model = self.config, self._model
+        port = config.port
+        if port == "emulated":
+            self._emulated = EmulatedGripper(config, "socket", seed)
+            self._emulated.tell("plug")
+            port = self._emulated.where
+        self._asked = Request(active=True, go=False, position=0, speed=0, force=0)
+        self._frames = self._retries = 0
+        try:
+            self._link = Link(port, config.address, config.reply_timeout_s)
+            status = self._activated()
+        except (OSError, ValueError, NoReply) as error:
+            self.close()
+            raise NoDevice(
+                f"no {model.name} at {config.port}, unit {config.address}: {error}. Look at its power and cable, at "
+                "gripper.port and gripper.address; on Linux be in the group dialout"
+            ) from error
+        self._began_s = self._last_s = self._due_s = time.monotonic()
+        self._target_m = model.gap_m(status.position)
+        self._recent: deque[tuple[float, float]] = deque(maxlen=SLOPE_FRAMES)
+        return self._described()
+
+    def read(self, timeout_s: float) -> Reading | None:
+        """Wait for the next multiple of 10 ms, then exchange data with the gripper. Raises DeviceLost."""
+        wait_s = self._due_s - time.monotonic()
+        if wait_s > timeout_s:
+            time.sleep(timeout_s)
+            return None
+        if wait_s > 0.0:
+            time.sleep(wait_s)
+        # On a grid of times, so that the duration of an exchange does not lower the rate; lost time is not made up.
+        self._due_s = max(self._due_s, time.monotonic()) + 1.0 / RATE_HZ
+        status = self._status()
+        now_s = time.monotonic()
+        t_s, dt_s, self._last_s = now_s - self._began_s, now_s - self._last_s, now_s
+        gap_m = self._model.gap_m(status.position)
+        self._recent.append((t_s, gap_m))
+        (start_s, start_m), span = self._recent[0], len(self._recent)
+        velocity = (gap_m - start_m) / (t_s - start_s) if span > 1 else 0.0
+        effort = status.current * AMPERES_A_STEP * self.config.newtons_per_ampere
+        self._frames += 1
+        return Reading(
+            Frame(t_s, dt_s, gap_m, velocity, effort, nan, nan, nan, nan, bit_of(status.fault)),
+            NO_PADS,
+        )
+
+    def apply(self, command: Command) -> None:
+        """Store a command for the next exchange."""
+        kind, value, effort_limit, speed_limit = command
+        slowest = self._model.speeds_m_s[0]
+        gap_m = self._recent[-1][1] if self._recent else self._target_m
+        force = effort_limit
+        if kind == VELOCITY:
+            speed, goal = min(abs(value), speed_limit), self._model.stroke_m if value > 0.0 else 0.0
+        elif kind == POSITION:
+            speed, goal = speed_limit, value
+        elif kind == FORCE:
+            speed, goal, force = min(slowest, speed_limit), 0.0, min(value, effort_limit)
+        else:
+            speed, goal = 0.0, gap_m
+        if speed <= slowest:
+            self._move_target(goal, speed, gap_m)
+        else:
+            self._target_m = goal
+        self._asked = Request(
+            active=True,
+            go=True,
+            position=self._model.position(self._target_m),
+            speed=byte_of(speed, self._model.speeds_m_s),
+            force=byte_of(force, self._model.forces_n),
+        )
+
+    def tare(self, images: Sequence[Pads]) -> None:
+        """Do nothing: there are no pads."""
+
+    def close(self) -> None:
+        """Stop the fingers if the gripper still responds, and close the connection."""
+        link, self._link = self._link, None
+        if link is not None:
+            for _ in range(ATTEMPTS):
+                with suppress(NoReply, OSError):
+                    link.exchange(self._asked._replace(go=False).registers())
+                    break
+            with suppress(OSError):
+                link.close()
+        emulated, self._emulated = self._emulated, None
+        if emulated is not None:
+            self._body_report = emulated.body_report
+            emulated.close()
+
+    def report(self) -> dict[str, float | int | str | bool]:
+        """Return the number of frames, and of repeated exchanges, with what the emulated body knows."""
+        body = self._body_report if self._emulated is None else self._emulated.body_report
+        return {**body, "frames": self._frames, "repeated": self._retries}
+
+    def dry_run_backend(self) -> RobotiqBackend:
+        """Return the emulated gripper."""
+        config = self.config
+        if config.port != "emulated":
+            config = RobotiqConfig(
+                port="emulated",
+                model=config.model,
+                address=config.address,
+                newtons_per_ampere=config.newtons_per_ampere,
+            )
+        return RobotiqBackend(config)
+
+    def _described(self) -> DeviceInfo:
+        model, emulated = self._model, self._emulated is not None
+        return DeviceInfo(
+            name=f"emulated {model.name}" if emulated else model.name,
+            clock="device",
+            simulated=emulated,
+            rate_hz=RATE_HZ,
+            effort_limit_n=model.forces_n[1],
+            speed_limit_m_s=model.speeds_m_s[1],
+            opening=Command(POSITION, model.stroke_m, inf, 0.05),
+            relaxed=Command(VELOCITY, 0.0, inf, inf),
+            status_bits=STATUS_BITS,
+            numbers={"newtons_per_ampere": self.config.newtons_per_ampere},
+            notes=(
+                "effort is the motor's current times gripper.newtons_per_ampere, an assumption unless you measured it",
+                *(("emulated: no gripper was touched",) if emulated else ()),
+            ),
+        )
+
+    def _activated(self) -> Status:
+        """Return the status of the gripper once it is active. One that is already active does not move."""
+        assert self._link is not None
+        status = status_of(self._link.status())
+        if status.state == ACTIVE and not status.fault:
+            return self._exchange(self._asked)
+        self._exchange(self._asked._replace(active=False))
+        until = time.monotonic() + ACTIVATION_S
+        while (status := self._exchange(self._asked)).state != ACTIVE:
+            if time.monotonic() > until:
+                raise NoReply(f"not activated after {ACTIVATION_S:g} s, fault {status.fault}")
+            time.sleep(1.0 / RATE_HZ)
+        return status
+
+    def _move_target(self, goal_m: float, speed_m_s: float, gap_m: float) -> None:
+        """Move the target on by the way of one frame: the gripper itself cannot move that slowly."""
+        if speed_m_s == 0.0:
+            self._target_m = gap_m
+        step = speed_m_s / RATE_HZ
+        self._target_m += min(max(goal_m - self._target_m, -step), step)
+        if goal_m < gap_m:
+            self._target_m = max(self._target_m, gap_m - AHEAD_M)
+
+    def _exchange(self, request: Request) -> Status:
+        assert self._link is not None
+        return status_of(self._link.exchange(request.registers()))
+
+    def _status(self) -> Status:
+        if self._link is None:
+            raise DeviceLost(f"the {self._model.name} is not open")
+        said = ""
+        for attempt in range(ATTEMPTS):
+            try:
+                status = self._exchange(self._asked)
+            except NoReply as error:
+                said = str(error)
+                self._retries += attempt < ATTEMPTS - 1
+                continue
+            except OSError as error:
+                said = str(error)
+                break
+            if not status.active:
+                raise DeviceLost(f"the {self._model.name} was switched off and on again: open it anew")
+            return status
+        raise DeviceLost(
+            f"the {self._model.name} at {self.config.port} does not answer ({said}): look at its cable and power"
+        )

@@ -1,0 +1,85 @@
+"""Settings of a Robotiq gripper: its model, its connection, and the emulation."""
+
+from __future__ import annotations
+
+from math import inf
+from typing import Any, Literal
+
+from attrs import frozen
+
+from graspsense.plugin_api import NAMES_INPUT, setting
+
+
+@frozen(kw_only=True)
+class FaultConfig:
+    """Faults of the emulated gripper, by default none. Times are counted from its activation."""
+
+    unplug_at_s: float = setting(
+        default=inf, unit="s", minimum=0.0, meaning="Time at which the cable is pulled; inf: never."
+    )
+    mood: Literal["well", "silent", "damaged", "late", "repeated"] = setting(
+        default="well",
+        meaning="silent: no reply. damaged: a bit of each reply is flipped. late: each reply comes after late_s. "
+        "repeated: each reply comes twice.",
+    )
+    mood_at_s: float = setting(default=0.0, unit="s", minimum=0.0, meaning="Time from which on mood acts.")
+    late_s: float = setting(
+        default=0.3,
+        unit="s",
+        above=0.0,
+        plausible=(1e-4, 10.0),
+        meaning="Time by which a late reply is late.",
+    )
+
+
+@frozen(kw_only=True)
+class RobotiqConfig:
+    """A Robotiq gripper and its connection. The keys from `body` on are for `port = "emulated"` only."""
+
+    model: Literal["2f-85", "2f-140", "hand-e"] = setting(
+        default="2f-85", meaning="The model of the gripper."
+    )
+    port: str = setting(
+        default="/dev/ttyUSB0",
+        meaning="A serial port; socket:HOST:PORT for RTU through a socket; or emulated, a gripper in software.",
+    )
+    address: int = setting(default=9, minimum=1, maximum=247, meaning="Modbus address of the gripper.")
+    reply_timeout_s: float = setting(
+        default=0.1,
+        unit="s",
+        above=0.0,
+        plausible=(1e-3, 120.0),
+        meaning="Longest wait for a reply.",
+    )
+    newtons_per_ampere: float = setting(
+        default=150.0,
+        unit="N/A",
+        above=0.0,
+        plausible=(1.0, 2000.0),
+        meaning="Grip force per motor current. The manual does not give it, so this is an assumption: measure yours.",
+    )
+    body: str = setting(
+        default="sim",
+        meaning="Emulated only: a backend with a virtual clock that takes an effort, behind the emulated registers.",
+    )
+    body_config: dict[str, Any] = setting(
+        factory=dict,
+        meaning="Emulated only: settings of that backend, as in its table [gripper].",
+    )
+    object: str | None = setting(
+        default=None,
+        effect=NAMES_INPUT,
+        meaning="Emulated only: the object between the fingers; not set: the default of body.",
+    )
+    faults: FaultConfig = setting(factory=FaultConfig, meaning="Emulated only: faults of the gripper.")
+
+    def __attrs_post_init__(self) -> None:
+        if self.port == "emulated":
+            return
+        defaults = RobotiqConfig(port="emulated")
+        for key in ("object", "body", "body_config", "faults"):
+            if getattr(self, key) != getattr(defaults, key):
+                raise ValueError(
+                    f"{key} is for the emulated gripper, but port is {self.port!r}: leave it out, or set gripper.port "
+                    "to emulated"
+                )

@@ -1,0 +1,115 @@
+"""Where an emulated device can be reached: a pseudo-terminal, or a socket of this machine. One thread serves it."""
+
+from __future__ import annotations
+
+import os
+import select
+import socket
+import threading
+import tty
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Final, final
+
+LARGEST: Final = 4096
+
+
+@final
+class SerialPort:
+    """A port on a `pty` or a `socket`; `heard(data)` is called with what arrives, and returns what is sent back.
+
+    `idle` is called at most every `period_s`, where that is given, and returns what is sent unasked.
+    """
+
+    def __init__(
+        self,
+        wire: str,
+        heard: Callable[[bytes], bytes],
+        idle: Callable[[], bytes] | None = None,
+        period_s: float | None = None,
+    ) -> None:
+        self._heard, self._idle, self._period_s = heard, idle, period_s
+        self._door: socket.socket | None = None
+        self._call: socket.socket | None = None
+        self._terminal: tuple[int, int] | None = None
+        if wire == "pty":
+            self._terminal = os.openpty()
+            for end in self._terminal:
+                tty.setraw(end)
+            self.where = os.ttyname(self._terminal[1])
+        else:
+            self._door = socket.create_server(("127.0.0.1", 0))
+            self.where = f"socket:127.0.0.1:{self._door.getsockname()[1]}"
+        self._wake = os.pipe()
+        self._closed = False
+        self._thread = threading.Thread(target=self._serve, name="emulated port", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Pull the plug; can be called twice, and by what `heard` does."""
+        if self._closed:
+            return
+        self._closed = True
+        os.write(self._wake[1], b"x")
+        if threading.current_thread() is not self._thread:
+            self._thread.join()
+
+    def _serve(self) -> None:
+        try:
+            while not self._closed:
+                sources = [self._wake[0], *self._sources()]
+                ready, _, _ = select.select(sources, [], [], self._period_s)
+                if self._door is not None and self._door.fileno() in ready:
+                    self._accept()
+                elif set(ready) & set(self._sources()):
+                    self._hear()
+                if self._idle is not None and (unasked := self._idle()):
+                    self._send(unasked)
+        finally:
+            self._release()
+
+    def _sources(self) -> list[int]:
+        if self._terminal is not None:
+            return [self._terminal[0]]
+        assert self._door is not None
+        return [self._door.fileno(), *([] if self._call is None else [self._call.fileno()])]
+
+    def _accept(self) -> None:
+        assert self._door is not None
+        # A newer host replaces an older one, as on a converter that has one connection.
+        if self._call is not None:
+            self._call.close()
+        self._call = self._door.accept()[0]
+        self._call.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+
+    def _hear(self) -> None:
+        data = b""
+        with suppress(OSError):
+            data = self._call.recv(LARGEST) if self._call is not None else os.read(self._handle(), LARGEST)
+        if data:
+            reply = self._heard(data)
+            if reply and not self._closed:
+                self._send(reply)
+        elif self._call is not None:
+            self._call.close()
+            self._call = None
+
+    def _handle(self) -> int:
+        assert self._terminal is not None
+        return self._terminal[0]
+
+    def _send(self, data: bytes) -> None:
+        with suppress(OSError):
+            if self._terminal is not None:
+                # Where nobody reads, a terminal fills up: what has no room is lost, as on a serial line.
+                if select.select([], [self._handle()], [], 0.0)[1]:
+                    os.write(self._handle(), data)
+            elif self._call is not None:
+                self._call.sendall(data)
+
+    def _release(self) -> None:
+        for end in (*(self._terminal or ()), *self._wake):
+            os.close(end)
+        for connection in (self._door, self._call):
+            if connection is not None:
+                connection.close()

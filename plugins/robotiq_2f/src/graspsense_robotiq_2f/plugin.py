@@ -1,0 +1,77 @@
+"""The components of this distribution. No driver is imported here."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from graspsense.plugin_api import (
+    EmulatorEntry,
+    FeatureSetEntry,
+    Finding,
+    FoundDevice,
+    PipelineEntry,
+    SensorBackendEntry,
+    hookimpl,
+)
+
+GRASPSENSE_API = (2, 0)
+
+
+@hookimpl
+def graspsense_sensor_backends() -> Iterable[SensorBackendEntry]:
+    """Return the gripper. Its effort is an estimate from the motor's current."""
+    yield SensorBackendEntry(
+        name="robotiq",
+        target="graspsense_robotiq_2f.backend:RobotiqBackend",
+        summary="Robotiq 2F-85, 2F-140 or Hand-E over Modbus RTU (serial port or socket); position and motor current",
+        needs='pip install "graspsense[robotiq]"; on Linux your user in the group dialout',
+    )
+
+
+@hookimpl
+def graspsense_feature_sets() -> Iterable[FeatureSetEntry]:
+    """Return the features that need no pads."""
+    yield FeatureSetEntry(
+        name="chitta-without-pads",
+        target="graspsense_robotiq_2f.features:WithoutPads",
+        summary="the four features of Table I that need no force, with contact from the effort",
+    )
+
+
+@hookimpl
+def graspsense_pipelines() -> Iterable[PipelineEntry]:
+    """Return the pipeline of gripper, controller and features."""
+    yield PipelineEntry(
+        name="robotiq",
+        resource="graspsense_robotiq_2f:pipelines/robotiq.toml",
+        summary="a Robotiq gripper, closed by send-and-watch, and the features that need no pads",
+    )
+
+
+@hookimpl
+def graspsense_emulators() -> Iterable[EmulatorEntry]:
+    """Return the emulated gripper as a device of this machine."""
+    yield EmulatorEntry(
+        name="robotiq",
+        target="graspsense_robotiq_2f.emulator.device:emulate",
+        summary="a Robotiq gripper's registers, over a simulated gripper",
+        wires=("pty", "socket"),
+        options=("gripper.port=emulated",),
+        needs='pip install "graspsense[robotiq]"',
+    )
+
+
+@hookimpl
+def graspsense_probe_devices(timeout_s: float) -> Iterable[FoundDevice]:
+    """Return the USB converters that Robotiq ships; nothing is sent to them."""
+    from graspsense_robotiq_2f.discovery import found_devices
+
+    return found_devices()
+
+
+@hookimpl
+def graspsense_diagnose(config: object, timeout_s: float) -> Iterable[Finding]:
+    """Examine the gripper of these settings, or the USB converters of this computer."""
+    from graspsense_robotiq_2f.discovery import diagnose
+
+    return diagnose(config, timeout_s)

@@ -1,0 +1,250 @@
+"""The driver against the emulated gripper, over every connection."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from graspsense import WiringError, load_pipeline
+from graspsense.plugin_api import (
+    POSITION,
+    VELOCITY,
+    Command,
+    DeviceLost,
+    NoDevice,
+    create,
+    parametrize_checks,
+)
+from graspsense_robotiq_2f import backend
+from graspsense_robotiq_2f.config import RobotiqConfig
+from graspsense_robotiq_2f.discovery import diagnose
+from graspsense_robotiq_2f.emulator import device
+from graspsense_robotiq_2f.emulator.device import EmulatedGripper
+from graspsense_robotiq_2f.emulator.modbus import checksum
+from graspsense_robotiq_2f.features import _without_start
+from graspsense_robotiq_2f.link import Link, NoReply
+from graspsense_robotiq_2f.registers import MODELS, byte_of
+
+PATIENT_S = 60.0
+"""For a reply that comes: when it does is this machine's business."""
+EMULATED = ["gripper.port=emulated", f"gripper.reply_timeout_s={PATIENT_S}"]
+
+
+@pytest.fixture
+def own_time(monkeypatch):
+    """Driver and emulator have a time of their own, which passes while the driver sleeps or looks at it."""
+    now_s = 0.0
+
+    def sleep(seconds):
+        nonlocal now_s
+        now_s += seconds
+
+    def look():
+        sleep(0.001)
+        return now_s
+
+    monkeypatch.setattr(backend, "time", SimpleNamespace(monotonic=look, sleep=sleep))
+    monkeypatch.setattr(device, "time", SimpleNamespace(monotonic=lambda: now_s))
+
+
+@pytest.fixture
+def emulated():
+    """Makes emulated grippers that are plugged in, and unplugs them."""
+    made = []
+
+    def make(wire="pty", **keys):
+        gripper = EmulatedGripper(RobotiqConfig(port="emulated", **keys), wire, 1)
+        made.append(gripper)
+        gripper.tell("plug")
+        return gripper
+
+    yield make
+    for gripper in made:
+        gripper.close()
+
+
+@pytest.mark.usefixtures("own_time")
+@parametrize_checks(
+    "graspsense-robotiq-2f",
+    keys={"port": "emulated", "reply_timeout_s": PATIENT_S},
+    unplugged={"faults": {"unplug_at_s": 0.5}, "reply_timeout_s": 1.0},
+    absent={"port": "/dev/nowhere"},
+)
+def test_conformance(check):
+    check.run()
+
+
+@pytest.mark.usefixtures("own_time")
+@pytest.mark.parametrize("wire", ["pty", "socket"])
+def test_a_grasp_over_every_wire(emulated, wire):
+    gripper = emulated(wire)
+    options = [f"gripper.port={gripper.where}", f"gripper.reply_timeout_s={PATIENT_S}"]
+    trial = load_pipeline("robotiq", options=options).grasp()
+
+    assert trial.outcome.words == "steady", trial.reason
+    assert not trial.features.reasons
+    # The fingers are 85 mm apart, and the block of the simulator is narrower.
+    assert 0.05 < trial.features["p_steady"] <= trial.features["p_first"] < 0.08
+    assert not gripper.state()["going"]
+
+
+@pytest.mark.usefixtures("own_time")
+@pytest.mark.parametrize("model", MODELS)
+def test_every_model_closes_with_its_own_limits(model):
+    gripper = create("sensor-backend", "robotiq", model=model, port="emulated", reply_timeout_s=PATIENT_S)
+    info = gripper.open(1)
+    frames = []
+    for _ in range(400):
+        frames.append(gripper.read(0.1).frame)
+        gripper.apply(Command(POSITION, 0.0, 20.0, 0.03))
+    gripper.close()
+
+    assert (info.speed_limit_m_s, info.effort_limit_n) == (
+        MODELS[model].speeds_m_s[1],
+        MODELS[model].forces_n[1],
+    )
+    assert gripper.least_force_n == MODELS[model].forces_n[0]
+    assert frames[0].gap_m - frames[-1].gap_m > 0.01
+    assert frames[-1].gap_m > 0.005, "it holds the thing"
+    # A step of the current is 10 mA, 1.5 N.
+    assert max(frame.effort_n for frame in frames) <= 20.0 + 1.5
+    assert gripper.report()["true_peak_force_n"] < 40.0
+
+
+@pytest.mark.usefixtures("own_time")
+@pytest.mark.parametrize("at_s", [0.02, 0.5, 2.0])
+@pytest.mark.parametrize("fault", ["unplug", "silent"])
+def test_a_gripper_lost_in_a_grasp_ends_it_and_is_told(fault, at_s):
+    faults = (
+        [f"gripper.faults.unplug_at_s={0.2 + at_s}"]
+        if fault == "unplug"
+        else ["gripper.faults.mood=silent", f"gripper.faults.mood_at_s={0.2 + at_s}"]
+    )
+    pipeline = load_pipeline(
+        "robotiq", options=["gripper.port=emulated", "gripper.reply_timeout_s=0.05", *faults]
+    )
+    trial = pipeline.grasp()
+    assert trial.outcome.words == "device lost"
+    assert "cable and power" in trial.reason
+
+
+@pytest.mark.usefixtures("own_time")
+@pytest.mark.parametrize("wire", ["pty", "socket"])
+@pytest.mark.parametrize("mood", ["damaged", "silent", "late", "repeated"])
+def test_whatever_becomes_of_replies_the_fingers_are_told_to_stop(emulated, wire, mood):
+    """The gripper still hears: what it is told last is to stop."""
+    gripper = emulated(wire)
+    driver = create("sensor-backend", "robotiq", port=gripper.where, reply_timeout_s=0.5)
+    driver.open(1)
+    for _ in range(20):
+        driver.read(0.1)
+        driver.apply(Command(VELOCITY, -0.03, 25.0, 0.15))
+    assert gripper.state()["going"]
+    gripper.tell(mood)
+    try:
+        for _ in range(4):
+            driver.read(0.1)
+    except DeviceLost:
+        assert mood in ("damaged", "silent")
+    else:
+        assert mood in ("late", "repeated")
+    driver.close()
+    assert not gripper.state()["going"]
+
+
+def test_a_late_reply_is_not_taken_for_that_of_the_next_request(emulated):
+    gripper = emulated("socket")
+    link = Link(gripper.where, 9, PATIENT_S)
+    link.exchange([0x0100, 7, 0])
+    gripper.tell("repeated")
+    link.exchange([0x0100, 8, 0])
+    gripper.tell("well")
+    assert link.exchange([0x0100, 9, 0])[1] == 9
+    link.close()
+
+
+@pytest.mark.usefixtures("own_time")
+def test_an_active_gripper_is_not_activated_again(emulated):
+    """Activation runs the fingers over the whole stroke, and would drop what they hold."""
+    gripper = emulated()
+    for _ in range(2):
+        driver = create("sensor-backend", "robotiq", port=gripper.where, reply_timeout_s=PATIENT_S)
+        driver.open(1)
+        driver.close()
+        activated = gripper._hand.active_since_s
+    driver.open(1)
+    assert gripper._hand.active_since_s == activated
+    driver.close()
+
+
+@pytest.mark.usefixtures("own_time")
+def test_a_slow_velocity_is_a_target_that_moves():
+    gripper = create("sensor-backend", "robotiq", port="emulated", reply_timeout_s=PATIENT_S)
+    gripper.open(0)
+    frames = []
+    for _ in range(200):
+        frames.append(gripper.read(0.1).frame)
+        gripper.apply(Command(VELOCITY, -0.01, 25.0, 0.15))
+    gripper.close()
+
+    moved, seconds = frames[60].gap_m - frames[-1].gap_m, frames[-1].t_s - frames[60].t_s
+    assert 0.006 < moved / seconds <= 0.0115
+
+
+@pytest.mark.parametrize("port", ["/dev/nowhere", "socket:127.0.0.1:1", "socket:nonsense"])
+def test_no_gripper_is_said_with_what_to_look_at(port):
+    with pytest.raises(NoDevice, match=r"no Robotiq 2F-85 at .*gripper\.port"):
+        create("sensor-backend", "robotiq", port=port).open(0)
+
+
+def test_the_six_features_need_pads_and_the_user_is_told():
+    with pytest.raises(WiringError, match="force_left"):
+        load_pipeline("robotiq", options=["features.type=chitta"])
+
+
+@pytest.mark.parametrize("setting", ["controller.approach_force_n=5", "run.first_effort_n=12"])
+def test_less_than_the_least_force_is_refused_before_anything_moves(setting):
+    with pytest.raises(WiringError, match="20 N"):
+        load_pipeline("robotiq", options=["gripper.port=/dev/nowhere", setting])
+
+
+def test_doctor_tells_a_gripper_from_a_silent_port_and_from_none(emulated):
+    gripper = emulated()
+    states = {}
+    for port, address in ((gripper.where, 9), (gripper.where, 8), ("/dev/nowhere", 9)):
+        config = RobotiqConfig(port=port, address=address)
+        states[port, address] = next(iter(diagnose(config, 1.0))).state
+    assert list(states.values()) == ["ok", "problem", "problem"]
+    assert not gripper.state()["going"]
+
+
+def test_the_checksum_is_that_of_the_manual():
+    # "Activation request" of the manual: 09 10 03 E8 00 03 06 01 00 00 00 00 00, checksum 72 E1.
+    assert checksum(bytes.fromhex("09 10 03 e8 00 03 06 01 00 00 00 00 00")) == bytes.fromhex("72 e1")
+
+
+def test_another_unit_is_silent(emulated):
+    link = Link(emulated("socket").where, 8, 0.1)
+    with pytest.raises(NoReply):
+        link.exchange([0, 0, 0])
+    link.close()
+
+
+def test_bytes_never_ask_for_more_than_was_said():
+    forces_n = MODELS["2f-85"].forces_n
+    assert byte_of(5.0, forces_n) == 0
+    assert byte_of(235.0, forces_n) == 255
+    assert forces_n[0] + byte_of(100.0, forces_n) * 215.0 / 255.0 <= 100.0
+    for model in MODELS.values():
+        for position in (model.open_byte, 100, model.closed_byte):
+            assert model.position(model.gap_m(position)) == position
+
+
+def test_the_effort_that_starts_the_fingers_is_not_a_contact():
+    gap_m = np.array([0.085, 0.085, 0.084, 0.080, 0.070, 0.0695])
+    effort_n = np.array([0.0, 20.0, 7.0, 7.0, 15.0, 20.0])
+    assert _without_start(gap_m, effort_n, 10.5).tolist() == [0.0, 0.0, 7.0, 7.0, 15.0, 20.0]
+    touching = np.array([0.0, 20.0, 20.0, 20.0, 20.0, 20.0])
+    assert _without_start(gap_m, touching, 10.5).tolist() == touching.tolist()
