@@ -191,6 +191,9 @@ _TABLE: Final[Table] = {
         "recording.readable": ("each_readable",),
         "recording.replayable": ("Recording",),
         "sources.grasp_columns": ("GraspColumns", "checked_recording"),
+        "sources.manifest.parquet_format": ("read_parquet",),
+        "sources.manifest.steps": ("squeezes",),
+        "sources.manifest.table": ("ColumnTable",),
     },
     "Tests of a plugin": {
         "testing.conformance": ("parametrize_checks",),
@@ -249,6 +252,7 @@ _TABLE: Final[Table] = {
             "PluginUnavailable",
             "RecordingEnded",
             "TareRefused",
+            "TooLarge",
             "UnknownName",
             "suggestion",
         ),

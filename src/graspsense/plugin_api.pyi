@@ -196,6 +196,9 @@ from graspsense.recording.readable import each_readable as each_readable
 from graspsense.recording.replayable import Recording as Recording
 from graspsense.sources.grasp_columns import GraspColumns as GraspColumns
 from graspsense.sources.grasp_columns import checked_recording as checked_recording
+from graspsense.sources.manifest.parquet_format import read_parquet as read_parquet
+from graspsense.sources.manifest.steps import squeezes as squeezes
+from graspsense.sources.manifest.table import ColumnTable as ColumnTable
 
 # Tests of a plugin
 from graspsense.testing.conformance import parametrize_checks as parametrize_checks
@@ -266,5 +269,6 @@ from graspsense.core.values.errors import NoDevice as NoDevice
 from graspsense.core.values.errors import PluginUnavailable as PluginUnavailable
 from graspsense.core.values.errors import RecordingEnded as RecordingEnded
 from graspsense.core.values.errors import TareRefused as TareRefused
+from graspsense.core.values.errors import TooLarge as TooLarge
 from graspsense.core.values.errors import UnknownName as UnknownName
 from graspsense.core.values.errors import suggestion as suggestion

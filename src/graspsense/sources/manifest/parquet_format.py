@@ -5,6 +5,7 @@ Repeated values take almost no place in a Parquet file. So its numbers of rows a
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any, Final
 
@@ -24,8 +25,8 @@ _BYTES_OF_A_TEXT: Final = 64
 _ROWS_AT_ONCE: Final = 65536
 
 
-def read_parquet(path: Path) -> list[ColumnTable]:
-    """Return the table in a Parquet file.
+def read_parquet(path: Path, wanted: Collection[str] | None = None) -> list[ColumnTable]:
+    """Return the table in a Parquet file, or those of its columns that are wanted.
 
     Raises PluginUnavailable without pyarrow, ConfigError, TooLarge, DataDamaged.
     """
@@ -35,7 +36,7 @@ def read_parquet(path: Path) -> list[ColumnTable]:
         raise PluginUnavailable(PARQUET_HINT) from error
     with readable(path):
         refuse_devices(path)
-        table = _table(path)
+        table = _table(path, wanted)
         numbers: dict[str, Numbers] = {}
         shapes: dict[str, tuple[int, int]] = {}
         texts: dict[str, list[str]] = {}
@@ -59,7 +60,7 @@ def _expect_columns(path: Path, columns: int) -> None:
     Unpacked(path).expect(_BYTES_OF_A_NUMBER * max(size.values, size.rows * columns))
 
 
-def _table(path: Path) -> Any:
+def _table(path: Path, wanted: Collection[str] | None) -> Any:
     """Return the columns, read in parts that are counted. Texts stay numbers of a dictionary."""
     import pyarrow.parquet
     from pyarrow import types
@@ -68,10 +69,11 @@ def _table(path: Path) -> Any:
         _expect_columns(path, len(file.schema_arrow))
         is_text = (types.is_string, types.is_large_string, types.is_binary)
         texts = [field.name for field in file.schema_arrow if any(test(field.type) for test in is_text)]
+        names = None if wanted is None else [name for name in file.schema_arrow.names if name in wanted]
     unpacked = Unpacked(path)
     parts = []
     with pyarrow.parquet.ParquetFile(path, read_dictionary=texts, pre_buffer=False) as file:
-        for part in file.iter_batches(batch_size=_ROWS_AT_ONCE, use_threads=False):
+        for part in file.iter_batches(batch_size=_ROWS_AT_ONCE, columns=names, use_threads=False):
             unpacked.add(part.nbytes)
             parts.append(part)
         return pyarrow.Table.from_batches(parts, parts[0].schema if parts else file.schema_arrow)

@@ -1,0 +1,1 @@
+"""LeRobot data sets: read as trials, and written from trials."""

@@ -1,0 +1,315 @@
+"""The folder of a LeRobot data set, v2.1 or v3.0: its description, its tasks, and the table of each episode.
+
+What a file of the folder says is compared with the other files before it is used. A path in `meta/info.json` is a
+pattern of which only the known fields are filled in, and it may not leave the folder.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cached_property
+from pathlib import Path, PurePosixPath
+from typing import Any, Final
+
+import numpy as np
+from attrs import frozen
+
+from graspsense.plugin_api import ColumnTable, ConfigError, DataDamaged, TooLarge, read_parquet
+
+INFO: Final = "meta/info.json"
+DESCRIPTION_BYTES: Final = 64 * 2**20
+"""Largest size of a JSON file of a data set."""
+DATA_PATHS: Final = {
+    2: "data/chunk-{episode_chunk:03d}/episode_{episode_index:06d}.parquet",
+    3: "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet",
+}
+VIDEO_PATHS: Final = {
+    2: "videos/chunk-{episode_chunk:03d}/{video_key}/episode_{episode_index:06d}.mp4",
+    3: "videos/{video_key}/chunk-{chunk_index:03d}/file-{file_index:03d}.mp4",
+}
+_FIELD: Final = re.compile(r"\{(?P<name>[a-z_]+)(?::0?(?P<width>[0-9])d)?\}")
+
+
+@frozen(kw_only=True, eq=False)
+class Feature:
+    """A feature as `meta/info.json` declares it; `names` has a name for each number if it has one dimension."""
+
+    key: str
+    dtype: str
+    shape: tuple[int, ...]
+    names: tuple[str, ...]
+
+
+@frozen(kw_only=True, eq=False)
+class Episode:
+    """The frames of an episode, its task, and the videos that show it.
+
+    `videos` has the path of each video within the folder, and the time (s) of its first frame of the episode.
+    """
+
+    index: int
+    table: ColumnTable
+    task: str
+    videos: Mapping[str, tuple[str, float]]
+
+
+@frozen(kw_only=True, eq=False)
+class Folder:
+    """A data set: its folder, its version (2 or 3), its frames per second, and its features by key."""
+
+    place: Path
+    version: int
+    fps: float
+    features: Mapping[str, Feature]
+    info: Mapping[str, Any]
+
+    @cached_property
+    def tasks(self) -> Mapping[int, str]:
+        """The text of each task. Raises DataDamaged."""
+        if self.version == 2:
+            rows = json_lines(self.place, "meta/tasks.jsonl")
+            return {_whole(row, "task_index", "meta/tasks.jsonl"): str(row.get("task", "")) for row in rows}
+        table = self.parquet("meta/tasks.parquet")
+        texts = table.texts.get("task") or next(iter(table.texts.values()), None)
+        if texts is None or "task_index" not in table.numbers:
+            raise DataDamaged(f"{self.place}/meta/tasks.parquet needs the columns task and task_index")
+        return dict(zip(map(int, table.numbers["task_index"]), texts, strict=True))
+
+    def episodes(self) -> Iterator[Episode]:
+        """Yield every episode, in order. Raises DataDamaged."""
+        rows = sorted(self._episode_rows(), key=lambda row: _whole(row, "episode_index", "meta/episodes"))
+        claimed = self.info.get("total_episodes")
+        if not rows:
+            raise DataDamaged(f"{self.place}: no episode is described in meta/episodes")
+        if isinstance(claimed, int) and claimed != len(rows):
+            raise DataDamaged(
+                f"{self.place}: {INFO} says {claimed} episodes, and meta/episodes describes {len(rows)}"
+            )
+        held: tuple[str, ColumnTable] | None = None
+        for row in rows:
+            path = self._data_path(row)
+            if held is None or held[0] != path:
+                held = path, self.parquet(path, self._wanted)
+            yield self._episode(row, path, held[1])
+
+    def parquet(self, path: str, wanted: Sequence[str] | None = None) -> ColumnTable:
+        """Return these columns of a Parquet file of the folder, or all. Raises DataDamaged, TooLarge."""
+        file = self.place / path
+        if not file.is_file():
+            raise DataDamaged(f"{self.place}: {path} is missing")
+        return read_parquet(file, wanted)[0]
+
+    @cached_property
+    def _wanted(self) -> tuple[str, ...]:
+        """The columns of a data file that are numbers."""
+        numbers = [
+            one.key
+            for one in self.features.values()
+            if one.dtype not in ("video", "image", "string", "language")
+        ]
+        return tuple(dict.fromkeys((*numbers, "timestamp", "frame_index", "episode_index", "task_index")))
+
+    def _episode_rows(self) -> Iterator[Mapping[str, Any]]:
+        """Yield what `meta/episodes` says of each episode."""
+        if self.version == 2:
+            yield from json_lines(self.place, "meta/episodes.jsonl")
+            return
+        files = sorted((self.place / "meta" / "episodes").glob("*/*.parquet"))
+        if not files:
+            raise DataDamaged(f"{self.place}: meta/episodes has no Parquet file")
+        videos = [
+            f"videos/{one.key}/{what}"
+            for one in self.features.values()
+            if one.dtype == "video"
+            for what in ("chunk_index", "file_index", "from_timestamp")
+        ]
+        for file in files:
+            table = read_parquet(
+                file, ("episode_index", "length", "data/chunk_index", "data/file_index", *videos)
+            )[0]
+            for k in range(len(table)):
+                yield {name: float(values[k]) for name, values in table.numbers.items() if values.ndim == 1}
+
+    def _data_path(self, row: Mapping[str, Any]) -> str:
+        index = _whole(row, "episode_index", "meta/episodes")
+        if self.version == 2:
+            chunk = index // self._chunk_size
+            return self._filled("data_path", {"episode_chunk": chunk, "episode_index": index})
+        numbers = {
+            name: _whole(row, f"data/{name}", "meta/episodes") for name in ("chunk_index", "file_index")
+        }
+        return self._filled("data_path", {**numbers, "episode_index": index})
+
+    @property
+    def _chunk_size(self) -> int:
+        size = self.info.get("chunks_size", 1000)
+        if not isinstance(size, int) or size < 1:
+            raise DataDamaged(f"{self.place}: chunks_size in {INFO} is {size!r}, not a whole number above 0")
+        return size
+
+    def _filled(self, key: str, fields: Mapping[str, int | str]) -> str:
+        """Return a path of `meta/info.json` with its fields. Raises DataDamaged if it leaves the folder."""
+        default = (DATA_PATHS if key == "data_path" else VIDEO_PATHS)[self.version]
+        pattern = self.info.get(key) or default
+
+        def value(match: re.Match[str]) -> str:
+            found = fields.get(match["name"])
+            if found is None:
+                raise DataDamaged(
+                    f"{self.place}: {key} in {INFO} has the unknown field {match['name']!r}; known are "
+                    f"{', '.join(fields)}"
+                )
+            return str(found).rjust(int(match["width"] or 0), "0")
+
+        path = _FIELD.sub(value, str(pattern))
+        parts = PurePosixPath(path)
+        if parts.is_absolute() or ".." in parts.parts or "{" in path or "\\" in path or "\0" in path:
+            raise DataDamaged(
+                f"{self.place}: {key} in {INFO} is {str(pattern)[:80]!r}, which is no path in the folder"
+            )
+        return path
+
+    def _episode(self, row: Mapping[str, Any], path: str, table: ColumnTable) -> Episode:
+        index = _whole(row, "episode_index", "meta/episodes")
+        missing = [
+            name for name in ("timestamp", "frame_index", "episode_index") if name not in table.numbers
+        ]
+        if missing:
+            raise DataDamaged(f"{self.place}/{path} has no column of numbers {', '.join(missing)}")
+        kept = table.numbers["episode_index"] == index
+        length = _whole(row, "length", "meta/episodes")
+        if int(kept.sum()) != length or not length:
+            raise DataDamaged(
+                f"{self.place}/{path} has {int(kept.sum())} frames of episode {index}, and meta/episodes says {length}"
+            )
+        frames = table.rows(np.flatnonzero(kept))
+        return Episode(
+            index=index, table=frames, task=self._task(frames, index), videos=self._videos(row, index)
+        )
+
+    def _task(self, frames: ColumnTable, index: int) -> str:
+        numbers = frames.numbers.get("task_index")
+        if numbers is None or not np.isfinite(numbers).all():
+            return ""
+        number = int(numbers[0])
+        if number not in self.tasks:
+            raise DataDamaged(
+                f"{self.place}: episode {index} has task_index {number}, and meta/tasks has {len(self.tasks)} tasks"
+            )
+        return self.tasks[number]
+
+    def _videos(self, row: Mapping[str, Any], index: int) -> dict[str, tuple[str, float]]:
+        found = {}
+        for one in self.features.values():
+            if one.dtype != "video":
+                continue
+            if self.version == 2:
+                chunk = index // self._chunk_size
+                fields: dict[str, int | str] = {
+                    "episode_chunk": chunk,
+                    "episode_index": index,
+                    "video_key": one.key,
+                }
+                found[one.key] = self._filled("video_path", fields), 0.0
+                continue
+            names = {name: f"videos/{one.key}/{name}" for name in ("chunk_index", "file_index")}
+            if all(name in row for name in names.values()):
+                numbers = {name: _whole(row, column, "meta/episodes") for name, column in names.items()}
+                start_s = float(row.get(f"videos/{one.key}/from_timestamp", 0.0))
+                found[one.key] = self._filled("video_path", {**numbers, "video_key": one.key}), start_s
+        return found
+
+
+def read_folder(place: Path) -> Folder:
+    """Return the data set in this folder. Raises ConfigError if it is none, DataDamaged."""
+    if not place.is_dir():
+        raise ConfigError(
+            f"there is no folder {place}: name the folder of a LeRobot data set, which has {INFO}"
+        )
+    if not (place / INFO).is_file():
+        raise ConfigError(f"{place} is not a LeRobot data set: it has no {INFO}")
+    info = _json(place, INFO)
+    if not isinstance(info, dict):
+        raise DataDamaged(f"{place}/{INFO} is not a table of keys")
+    named = str(info.get("codebase_version", ""))
+    match = re.fullmatch(r"v?(?:2\.1|3\.0)", named)
+    if match is None:
+        raise DataDamaged(
+            f"{place}/{INFO} has the codebase_version {named[:40]!r}; v2.1 and v3.0 are read. LeRobot converts others"
+        )
+    fps = info.get("fps")
+    if not isinstance(fps, int | float) or isinstance(fps, bool) or not 0 < fps < 1e6:
+        raise DataDamaged(f"{place}/{INFO} has fps = {str(fps)[:40]}, not a number of frames per second")
+    features = info.get("features")
+    if not isinstance(features, dict) or not features:
+        raise DataDamaged(f"{place}/{INFO} declares no features")
+    return Folder(
+        place=place,
+        version=2 if "2." in named else 3,
+        fps=float(fps),
+        features={key: _feature(place, key, value) for key, value in features.items()},
+        info=info,
+    )
+
+
+def _feature(place: Path, key: str, value: Any) -> Feature:
+    shape = value.get("shape") if isinstance(value, dict) else None
+    if not isinstance(shape, list) or not all(isinstance(one, int) and 0 < one < 10**7 for one in shape):
+        raise DataDamaged(f"{place}/{INFO}: the feature {key[:80]!r} has no shape of whole numbers")
+    names = value.get("names")
+    while isinstance(names, dict) and names:  # {"motors": [...]}, of earlier versions
+        names = next(iter(names.values())) if len(names) == 1 else list(names)
+    given = tuple(map(str, names)) if isinstance(names, list) else ()
+    return Feature(key=key, dtype=str(value.get("dtype", "")), shape=tuple(shape), names=given)
+
+
+def _json(place: Path, name: str) -> Any:
+    try:
+        return json.loads(_text(place, name))
+    except (ValueError, RecursionError) as error:
+        raise DataDamaged(f"{place}/{name} is not JSON: {error}") from error
+
+
+def json_lines(place: Path, name: str) -> list[dict[str, Any]]:
+    """Return the tables of a file with a JSON table in each line. Raises DataDamaged."""
+    rows = []
+    for number, line in enumerate(_text(place, name).splitlines(), 1):
+        if not line.strip():
+            continue
+        try:
+            row = json.loads(line)
+        except (ValueError, RecursionError) as error:
+            raise DataDamaged(f"{place}/{name}, line {number}, is not JSON: {error}") from error
+        if not isinstance(row, dict):
+            raise DataDamaged(f"{place}/{name}, line {number}, is not a table of keys")
+        rows.append(row)
+    return rows
+
+
+def _text(place: Path, name: str) -> str:
+    path = place / name
+    if not path.is_file():
+        raise DataDamaged(f"{place}: {name} is missing")
+    size = path.stat().st_size
+    if size > DESCRIPTION_BYTES:
+        raise TooLarge(f"{path} has {size} bytes; at most {DESCRIPTION_BYTES} are read")
+    try:
+        return path.read_text("utf-8")
+    except UnicodeDecodeError as error:
+        raise DataDamaged(f"{path} is not UTF-8: {error}") from error
+
+
+def _whole(row: Mapping[str, Any], key: str, where: str) -> int:
+    value = row.get(key)
+    if (
+        not isinstance(value, int | float)
+        or isinstance(value, bool)
+        or value != value
+        or not 0 <= value < 2**53
+    ):
+        raise DataDamaged(f"{where}: {key} is {str(value)[:40]}, not a whole number from 0 on")
+    if value != int(value):
+        raise DataDamaged(f"{where}: {key} is {value}, not a whole number from 0 on")
+    return int(value)

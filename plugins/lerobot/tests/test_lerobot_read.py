@@ -1,0 +1,286 @@
+"""LeRobot data sets of both versions become labelled trials, and what is wrong with them is told."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from click.testing import CliRunner
+from lerobot_sets import CELLS, FPS, NAMES, episode, write_lines, write_set
+
+from graspsense.cli.main import cli
+from graspsense.core.values.errors import ConfigError, DataDamaged, GraspsenseError, TooLarge
+from graspsense.recording.labelled_recording import LabelledRecording, UnreadableRecording
+from graspsense.store.store import Store
+from graspsense_lerobot.names import meaning_of
+from graspsense_lerobot.reader import recordings
+
+
+def read(place: object) -> list[LabelledRecording]:
+    found = list(recordings(str(place)))
+    assert all(isinstance(one, LabelledRecording) for one in found)
+    return found  # type: ignore[return-value]
+
+
+def column(one: LabelledRecording, name: str) -> np.ndarray:
+    return np.array([getattr(reading.frame, name) for reading in one.recording.readings])
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_each_squeeze_of_an_episode_is_a_trial_with_its_task_as_label(tmp_path, version):
+    found = read(write_set(tmp_path / "set", version))
+    assert [one.label for one in found] == [
+        "pick_the_red_cup", "squeeze-_sponge", "squeeze-_sponge", "pick_the_red_cup",
+    ]  # fmt: skip
+    assert [int(one.order) for one in found] == [0, 1, 1, 2]
+    # Four cells of 1, 2, 2 and 1 parts of the peak press along z; shear is not part of the force.
+    assert [float(column(one, "force_left_n").max()) for one in found] == pytest.approx(
+        [24.0, 18.0, 19.5, 30.0], rel=1e-5
+    )
+    arrays = {one.name: one for one in found[0].recording.channels if hasattr(one, "components")}
+    assert {name: (one.cells, one.components) for name, one in arrays.items()} == {"f0": (4, 3), "f1": (4, 3)}
+    cells = np.array([reading.signals.f0.cells for reading in found[0].recording.readings])
+    assert cells[:, 1, 2].max() == pytest.approx(8.0, rel=1e-5)
+    assert cells[:, 1, 0].max() == pytest.approx(0.8, rel=1e-5)
+
+
+def test_both_versions_of_the_same_episodes_are_the_same_trials(tmp_path):
+    old, new = read(write_set(tmp_path / "old", 2)), read(write_set(tmp_path / "new", 3))
+    for a, b in zip(old, new, strict=True):
+        assert column(a, "gap_m").tolist() == column(b, "gap_m").tolist()
+        assert a.label == b.label
+
+
+def test_videos_stay_and_are_linked_by_the_time_of_the_trial(tmp_path):
+    found = read(write_set(tmp_path / "set", 3))
+    lines = [line for line in found[3].recording.notes if "video" in line]
+    assert ["videos/observation.images.wrist/chunk-000/file-000.mp4" in line for line in lines] == [True]
+    assert f"from {270 / FPS:.3f} s" in lines[0]
+
+
+def test_the_moments_of_closing_and_contact_are_told(tmp_path):
+    one = read(write_set(tmp_path / "set", 3, [episode()]))[0]
+    line = next(line for line in one.recording.notes if "contact" in line)
+    numbers = [float(word) for word in line.replace(",", " ").split() if word.replace(".", "").isdigit()]
+    # The gripper closes in a third of the episode of 3 s, and touches at 60 % of that.
+    assert numbers[0] <= 0.1
+    assert numbers[1] == pytest.approx(0.7, abs=0.1)
+
+
+def test_the_import_keeps_trials_in_a_store(tmp_path):
+    folder = write_set(tmp_path / "set", 3)
+    done = CliRunner().invoke(
+        cli, ["import", f"lerobot:{folder}?gap_m_per_unit=0.001", "--save", str(tmp_path / "s")]
+    )
+    assert done.exit_code == 0, done.output
+    with Store.read(tmp_path / "s") as store:
+        trials = store.page(limit=10)
+        assert len(trials) == 4
+        assert {one.label for one in trials} == {"pick_the_red_cup", "squeeze-_sponge"}
+
+
+def test_check_says_what_was_understood(tmp_path):
+    folder = write_set(tmp_path / "set", 2)
+    done = CliRunner().invoke(
+        cli, ["import", f"lerobot:{folder}", "--check", "--plot", str(tmp_path / "p.png")]
+    )
+    assert done.exit_code == 0, done.output
+    for word in ("gripper.pos", "gap_m_per_unit", "f0 [counts]", "episode_000000.mp4", "contact at"):
+        assert word in done.output
+
+
+def test_a_gripper_in_percent_is_told_and_mended(tmp_path):
+    folder = write_set(tmp_path / "set", 3)
+    plain, mended = read(folder)[0], read(f"{folder}?gap_m_per_unit=0.0008&gap_zero=10")[0]
+    assert plain.recording.units["gap"] == "%"
+    assert any("gap_m_per_unit" in notice for notice in plain.notices)
+    assert "gap" not in mended.recording.units
+    assert not any("gap_m_per_unit" in notice for notice in mended.notices)
+    assert column(mended, "gap_m") == pytest.approx(0.0008 * (column(plain, "gap_m") - 10.0))
+
+
+def test_a_gripper_in_radians_is_told(tmp_path):
+    state = episode()
+    state[:, 1] *= 0.015
+    assert read(write_set(tmp_path / "set", 3, [state]))[0].recording.units["gap"] == "rad"
+
+
+def test_a_gripper_whose_number_grows_while_it_closes_is_told(tmp_path):
+    state = episode()
+    state[:, 1] = 100.0 - state[:, 1]
+    one = read(write_set(tmp_path / "set", 3, [state]))[0]
+    assert any("gap_m_per_unit=-" in notice for notice in one.notices)
+
+
+def test_another_frame_rate_is_told_and_mended(tmp_path):
+    folder = write_set(tmp_path / "set", 3, fps=60)
+    assert any("fps" in notice for notice in read(folder)[0].notices)
+    mended = read(f"{folder}?fps=60")[0]
+    assert not any("fps" in notice for notice in mended.notices)
+    assert np.diff(column(mended, "t_s")) == pytest.approx(1 / 60)
+
+
+def test_repeated_frames_are_told_and_left_out(tmp_path):
+    folder = write_set(tmp_path / "set", 3, [np.repeat(episode(), 2, axis=0)])
+    assert any("repeated=drop" in notice for notice in read(folder)[0].notices)
+    mended = read(f"{folder}?repeated=drop")[0]
+    assert len(mended.recording.readings) == 90
+
+
+def test_missing_frames_are_told_and_divide_the_episode(tmp_path):
+    folder = write_set(tmp_path / "set", 3, [episode(2)])
+    data = folder / "data/chunk-000/file-000.parquet"
+    table = pq.read_table(data)
+    kept = [k for k in range(len(table)) if not 88 <= k < 96]
+    pq.write_table(table.take(kept), data)
+    episodes = folder / "meta/episodes/chunk-000/file-000.parquet"
+    rows = pq.read_table(episodes).to_pydict()
+    pq.write_table(pa.table({**rows, "length": [len(kept)]}), episodes)
+    assert any("gaps=cut" in notice for notice in read(folder)[0].notices)
+    assert [len(one.recording.readings) for one in read(f"{folder}?gaps=cut")] == [88, 84]
+
+
+def test_frames_without_a_number_are_told_and_left_out(tmp_path):
+    state = episode()
+    state[10, 1] = np.nan
+    one = read(write_set(tmp_path / "set", 3, [state]))[0]
+    assert len(one.recording.readings) == 89
+    assert any("without a number" in notice for notice in one.notices)
+
+
+def test_the_load_of_the_motor_is_the_force_where_nothing_feels(tmp_path):
+    state = episode()[:, :3]
+    one = read(write_set(tmp_path / "set", 3, [state], NAMES[:3]))[0]
+    assert one.recording.units["force_left"] == "%"
+    assert column(one, "force_left_n").max() == pytest.approx(50.0)
+
+
+def test_nothing_that_feels_is_an_error_that_names_the_option(tmp_path):
+    folder = write_set(tmp_path / "set", 3, [episode()[:, :2]], NAMES[:2])
+    with pytest.raises(ConfigError, match=r"force=NAME.*shoulder\.pos"):
+        list(recordings(str(folder)))
+
+
+def test_names_of_arrays_with_rows_and_columns():
+    meaning = meaning_of(
+        [f"thumb.r{row}c{column}" for row in range(3) for column in range(5)] + ["gripper_width"]
+    )
+    (array,) = meaning.arrays
+    assert (array.name, array.rows, array.columns, array.axes) == ("thumb", 3, 5, "z")
+    assert meaning.gap == ("gripper_width",)
+
+
+def test_cells_that_are_not_all_there_are_no_array():
+    assert meaning_of(CELLS[:-1]).arrays[0].name == "f0"
+    assert len(meaning_of(CELLS[:-1]).arrays) == 1
+
+
+def damage_info(folder: Path, **changed: object) -> None:
+    path = folder / "meta/info.json"
+    path.write_text(json.dumps({**json.loads(path.read_text()), **changed}))
+
+
+def _remove(name):
+    return lambda folder: (folder / name).unlink()
+
+
+def _cut(name):
+    return lambda folder: (folder / name).write_bytes((folder / name).read_bytes()[:200])
+
+
+def _other_schema(folder):
+    pq.write_table(pa.table({"a": [1, 2]}), folder / "data/chunk-000/file-000.parquet")
+
+
+def _episodes(**changed):
+    def damage(folder):
+        path = folder / "meta/episodes/chunk-000/file-000.parquet"
+        pq.write_table(pa.table({**pq.read_table(path).to_pydict(), **changed}), path)
+
+    return damage
+
+
+def _info(**changed):
+    return lambda folder: damage_info(folder, **changed)
+
+
+DATA, META = "data/chunk-000/file-000.parquet", "meta/info.json"
+
+
+@pytest.mark.parametrize(
+    ("damage", "kind", "word"),
+    [
+        (_remove(META), ConfigError, "info.json"),
+        (_remove("meta/tasks.parquet"), DataDamaged, "tasks.parquet"),
+        (_remove("meta/episodes/chunk-000/file-000.parquet"), DataDamaged, "meta/episodes"),
+        (_remove(DATA), DataDamaged, "file-000.parquet is missing"),
+        (_cut(META), DataDamaged, "JSON"),
+        (_cut(DATA), DataDamaged, "file-000.parquet"),
+        (_other_schema, DataDamaged, "timestamp"),
+        (_episodes(length=[1, 2, 3]), DataDamaged, "90 frames"),
+        (_episodes(**{"data/file_index": [7, 7, 7]}), DataDamaged, "file-007.parquet is missing"),
+        (_episodes(**{"data/file_index": [-1, 0, 0]}), DataDamaged, "file_index"),
+        (_episodes(episode_index=[0, 1, 9]), DataDamaged, "episode 9"),
+        (_info(total_episodes=4), DataDamaged, "4 episodes"),
+        (_info(codebase_version="v1.6"), DataDamaged, "v1.6"),
+        (_info(fps=0), DataDamaged, "fps"),
+        (_info(fps="30"), DataDamaged, "fps"),
+        (_info(features={}), DataDamaged, "features"),
+        (_info(features={"observation.state": {"dtype": "float32"}}), DataDamaged, "shape"),
+        (_info(data_path="../../{chunk_index}/x.parquet"), DataDamaged, "data_path"),
+        (_info(data_path="/etc/passwd"), DataDamaged, "data_path"),
+        (_info(data_path="data/{chunk_index.__class__}"), DataDamaged, "data_path"),
+        (_info(data_path="data/{chunk_index:0999999999d}"), DataDamaged, "data_path"),
+        (_info(data_path="data/{name}.parquet"), DataDamaged, "name"),
+    ],
+)  # fmt: skip
+def test_a_damaged_data_set_is_an_error_that_says_what_is_wrong(tmp_path, damage, kind, word):
+    folder = write_set(tmp_path / "set", 3)
+    damage(folder)
+    with pytest.raises(kind) as caught:
+        _refusal(folder)
+    assert word in str(caught.value)
+    done = CliRunner().invoke(cli, ["import", f"lerobot:{folder}", "--check"])
+    assert isinstance(done.exception, kind | SystemExit)
+    assert done.exit_code
+
+
+def _refusal(folder: Path) -> None:
+    """Raise the error of a data set, or of its first episode that cannot be read."""
+    raise next(one.error for one in recordings(str(folder)) if isinstance(one, UnreadableRecording))
+
+
+def test_a_task_that_is_not_described_is_an_error(tmp_path):
+    folder = write_set(tmp_path / "set", 2)
+    write_lines(folder / "meta/tasks.jsonl", [{"task_index": 5, "task": "x"}])
+    with pytest.raises(DataDamaged, match="task_index 0"):
+        list(recordings(str(folder)))
+
+
+def test_more_numbers_than_the_memory_should_hold_are_not_read(tmp_path):
+    folder = write_set(tmp_path / "set", 3)
+    n = 20_000_000
+    values = pa.DictionaryArray.from_arrays(pa.array(np.zeros(n, np.int8)), pa.array([1.0]))
+    table = pa.table(dict.fromkeys(("timestamp", "frame_index", "episode_index", "index"), values))
+    pq.write_table(table, folder / "data/chunk-000/file-000.parquet")
+    with pytest.raises(TooLarge):
+        list(recordings(str(folder)))
+
+
+@pytest.mark.parametrize(
+    "query", ["fps=0", "fps=x", "speed=3", "repeated=often", "gap=none", "gap_m_per_unit=nan"]
+)
+def test_a_wrong_option_is_wrong_use(tmp_path, query):
+    folder = write_set(tmp_path / "set", 3)
+    with pytest.raises(GraspsenseError) as caught:
+        list(recordings(f"{folder}?{query}"))
+    assert caught.value.exit_code == 2
+
+
+def test_a_folder_that_is_none(tmp_path):
+    with pytest.raises(ConfigError, match="no folder"):
+        list(recordings(str(tmp_path / "nothing")))
