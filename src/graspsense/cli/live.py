@@ -58,7 +58,7 @@ class Live:
             if error:
                 warn(error)
             if sink.dropped:
-                warn(f"{sink.module} could not follow: {sink.dropped} messages are missing there")
+                warn(f"{sink.name} could not follow: {sink.dropped} messages are missing there")
 
 
 @contextmanager
@@ -95,14 +95,22 @@ def _wait_for_interrupt() -> None:
 def _started(host: str, port: int) -> Live:
     from importlib.util import find_spec
 
-    from graspsense.core.values.errors import PluginUnavailable
+    from graspsense.core.components.registry import installed
+    from graspsense.core.values.errors import ConfigError, PluginUnavailable
     from graspsense.live.feeds import LiveFeed
 
     if find_spec("websockets") is None:
         raise PluginUnavailable(HINT)
     page = LiveFeed("graspsense.live.page_process", [host, str(port)])
     talk(f"live: {page.answer['address']}")
-    return Live([page])
+    feeds = [page]
+    for observer in installed().live_observers():
+        try:
+            feeds.append(LiveFeed("graspsense.live.observer_process", [observer.entry.target]))
+        except ConfigError as error:
+            needs = f": {observer.entry.needs}" if observer.entry.needs else ""
+            warn(f"live observer {observer.qualified}: {error}{needs}")
+    return Live(feeds)
 
 
 def _host_and_port(address: str | None) -> tuple[str, int]:

@@ -36,7 +36,8 @@ class LiveFeed(Feed):
     """
 
     def __init__(self, module: str, arguments: Sequence[str]) -> None:
-        self.module = module
+        self.name = " ".join((module, *arguments))
+        """The process, for messages."""
         try:
             super().__init__(module, arguments, QUEUE_BYTES)
         except SaveFailed as error:
@@ -60,7 +61,7 @@ class LiveFeed(Feed):
             left = max(0.0, until - time.monotonic())
             data = os.read(out, 4096) if select.select([out], [], [], left)[0] else b""
             if not data:
-                return {"error": f"the process {self.module} does not start"}
+                return {"error": f"the process {self.name} does not start"}
             said += data
         answer: Mapping[str, Any] = json.loads(said)
         return answer
@@ -94,7 +95,7 @@ class LiveFeed(Feed):
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.communicate()
-            return f"{self.module} did not end, and was stopped"
+            return f"{self.name} did not end, and was stopped"
         last = out.splitlines()[-1:] or [b"{}"]
         try:
             return str(json.loads(last[0]).get("error", ""))

@@ -33,8 +33,8 @@ from graspsense.recording.layout import TICK_FIELDS
 MOST_VIEWERS: Final = 16
 MOST_CONNECTIONS: Final = 64
 """Connections at a time, with those that have not asked for anything yet; further ones are closed."""
-MOST_WAITING: Final = 200
-"""Batches that wait for a viewer before it is dropped, 7 s of them."""
+WAITING_BYTES: Final = 8 << 20
+"""Text that may wait for a viewer before it is dropped."""
 HISTORY_BYTES: Final = 16 << 20
 """Text of the running grasp that is kept for viewers who come later; of a longer grasp they see the end."""
 LARGEST_MESSAGE: Final = 1024
@@ -104,13 +104,32 @@ class History:
         return f"[{','.join([*head, *self._texts, *others])}]"
 
 
+class _Waiting:
+    """The texts that a viewer has not taken yet, and their size."""
+
+    def __init__(self) -> None:
+        self.size = 0
+        self._queue: asyncio.Queue[str | None] = asyncio.Queue()
+
+    def add(self, text: str | None) -> None:
+        """Add a text; None is the end."""
+        self.size += len(text or "")
+        self._queue.put_nowait(text)
+
+    async def next(self) -> str | None:
+        """Return the oldest text."""
+        text = await self._queue.get()
+        self.size -= len(text or "")
+        return text
+
+
 class Page:
     """The page under its token, and the viewers that are connected to it."""
 
     def __init__(self, host: str) -> None:
         self.host, self.port, self.token = host, 0, secrets.token_urlsafe(24)
         self.history = History()
-        self.viewers: dict[ServerConnection, asyncio.Queue[str | None]] = {}
+        self.viewers: dict[ServerConnection, _Waiting] = {}
         folder = files("graspsense.live")
         self._files = {name: (folder / (name or "page.html")).read_bytes() for name in FILES}
 
@@ -154,39 +173,36 @@ class Page:
 
     async def show(self, viewer: ServerConnection) -> None:
         """Send everything to a viewer until it leaves, sends something, or the grasping program ends."""
-        queue: asyncio.Queue[str | None] = asyncio.Queue(MOST_WAITING)
-        queue.put_nowait(self.history.text())
-        self.viewers[viewer] = queue
-        listening = asyncio.create_task(self._drop_speaker(viewer))
+        waiting = self.viewers[viewer] = _Waiting()
+        waiting.add(None if len(self.viewers) > MOST_VIEWERS else self.history.text())
+        listening = asyncio.create_task(self._drop_speaker(viewer, waiting))
         try:
             with suppress(ConnectionClosed):
-                while (text := await queue.get()) is not None:
+                while (text := await waiting.next()) is not None:
                     await viewer.send(text)
         finally:
             self.viewers.pop(viewer, None)
             listening.cancel()
 
-    async def _drop_speaker(self, viewer: ServerConnection) -> None:
+    async def _drop_speaker(self, viewer: ServerConnection, waiting: _Waiting) -> None:
         with suppress(ConnectionClosed):
             await viewer.recv()
             viewer.transport.abort()
+        waiting.add(None)
 
     def pass_on(self, messages: list[Message]) -> None:
         """Hand messages to every viewer; one that has not taken those before is dropped."""
         text = self.history.add(messages)
-        for viewer, queue in list(self.viewers.items()):
-            try:
-                queue.put_nowait(text)
-            except asyncio.QueueFull:
-                self.viewers.pop(viewer, None)
+        for viewer, waiting in list(self.viewers.items()):
+            waiting.add(text)
+            if waiting.size > WAITING_BYTES:
+                del self.viewers[viewer]
                 viewer.transport.abort()
 
     async def end(self) -> None:
         """Let the viewers take what is left, for a short time."""
-        left = list(self.viewers.values())
-        for queue in left:
-            with suppress(asyncio.QueueFull):
-                queue.put_nowait(None)
+        for waiting in self.viewers.values():
+            waiting.add(None)
         async with asyncio.timeout(FLUSH_S):
             while self.viewers:
                 await asyncio.sleep(0.01)
