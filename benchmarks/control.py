@@ -6,7 +6,7 @@ The tick is what the runner does from the moment a report's bytes are in the pro
 handed to the wire: decode, count, convert, the hybrid controller's step, the guard, encode. The reports are those of
 an emulated grasp, recorded first and played back, so that neither the emulated board nor the simulator is in the
 figure. The reports are played back twice more by the clock, without and with the predictions of the default model at
-its checkpoints, in turn: *paced* is the time from when a report is due to its command, in the squeeze, and *predicting*
+its checkpoints, in turn, and likewise without and with a live page that has a viewer (*unseen*, *live*): *paced* is the time from when a report is due to its command, in the squeeze, and *predicting*
 the same in the ticks during which the thread beside the loop computes. The wake-up is measured apart, against a board
 that runs by the clock in a thread of the same process: how long after the report with the shortest delay, in device
 time, a report was in the driver's hands.
@@ -30,9 +30,10 @@ from attrs import evolve
 from graspsense.core.components.config import resolve
 from graspsense.core.components.registry import installed
 from graspsense.core.components.run_config import RunConfig
-from graspsense.core.grasp.runner import run_grasp
+from graspsense.core.grasp.runner import Sink, run_grasp
 from graspsense.core.learn.model import model_for
 from graspsense.core.pipeline.anytime import Anytime, anytime_of
+from graspsense.live.feeds import LiveFeed
 from graspsense.plugin_api import SQUEEZE, DeviceInfo, create
 from graspsense_pr2_gripper import backend as driver
 from graspsense_pr2_gripper import emulation, opening
@@ -142,12 +143,15 @@ def recorded() -> tuple[Sequence[bytes], bytes]:
     return recordings[0].sent, recordings[0].firmware.feature()
 
 
-def played(wire: Playback, feature: bytes, watcher: Watched | None = None) -> None:
+def played(
+    wire: Playback, feature: bytes, watcher: Watched | None = None, sinks: Sequence[Sink] = ()
+) -> None:
     """Run a grasp on recorded reports."""
     identity = decode_identity(feature)
     link = LockStepLink(wire, 1.0 / identity.report_rate_hz)
     driver.open_board = lambda *_: opening.Opened(link, identity, None)  # type: ignore[assignment]
-    grasp = run_grasp(RealTime(EMULATED), create("controller", "hybrid"), RunConfig(), watcher=watcher)
+    law = create("controller", "hybrid")
+    grasp = run_grasp(RealTime(EMULATED), law, RunConfig(), watcher=watcher, sinks=sinks)
     driver.open_board = opening.open_board
     assert grasp.outcome.words == "steady", grasp.reason
 
@@ -180,6 +184,27 @@ def paced_us(grasps: int, sent: Sequence[bytes], feature: bytes) -> dict[str, li
             us = [ns / 1e3 for ns in wire.ticks_ns]
             found["paced_with_predictions" if predicts else "paced"] += [us[k] for k in watched.squeeze]
             found["predicting"] += [us[k] for k in watched.predicting]
+    return found
+
+
+def live_us(grasps: int, sent: Sequence[bytes], feature: bytes) -> dict[str, list[float]]:
+    """Return the times of the ticks of a squeeze, in turn alone and with a page that one viewer receives."""
+    from websockets.sync.client import connect
+
+    period_s = 1.0 / decode_identity(feature).report_rate_hz
+    found: dict[str, list[float]] = {"unseen": [], "live": []}
+    feed = LiveFeed("graspsense.live.page_process", ["127.0.0.1", "0"])
+    with connect(feed.answer["address"].replace("http", "ws", 1) + "frames", max_size=None) as viewer:
+        for _ in range(grasps):
+            for name, sinks in (("unseen", ()), ("live", (feed,))):
+                wire = Playback(sent, feature, period_s)
+                watched = Watched(None, wire)
+                played(wire, feature, watched, sinks)
+                found[name] += [wire.ticks_ns[k] / 1e3 for k in watched.squeeze]
+        feed.told("outcome", {"outcome": "over", "reason": ""})
+        while '"over"' not in viewer.recv():
+            pass
+    feed.close()
     return found
 
 
@@ -233,6 +258,7 @@ def main() -> None:
         asked.grasps, asked.seconds = 1, 0.5
     sent, feature = recorded()
     paced = paced_us(asked.grasps, sent, feature)
+    live = live_us(asked.grasps, sent, feature)
     result = {
         "date": date.today().isoformat(),
         "machine": f"{platform.machine()}, {os.cpu_count()} cores, {platform.system()} {platform.release()}",
@@ -242,6 +268,7 @@ def main() -> None:
         "graspsense-pr2-gripper": version("graspsense-pr2-gripper"),
         **distribution("tick", ticks_us(asked.grasps, sent, feature)),
         **{key: value for name, us in paced.items() if us for key, value in distribution(name, us).items()},
+        **{key: value for name, us in live.items() for key, value in distribution(name, us).items()},
         **distribution("wake_up", wake_ups_us(asked.seconds)),
     }
     if asked.json:

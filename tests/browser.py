@@ -98,7 +98,7 @@ class Browser:
         return json.loads(text)
 
     def show(self, path, width, *, dark=False, media="screen", height=900):
-        """Load a page at this width, in light or dark."""
+        """Load a page, a file or an address, at this width, in light or dark."""
         features = [{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}]
         self.call("Emulation.setEmulatedMedia", media=media, features=features)
         self.call(
@@ -109,7 +109,9 @@ class Browser:
             mobile=False,
         )
         self.events.clear()
-        self.call("Page.navigate", url=Path(path).resolve().as_uri())
+        self.call(
+            "Page.navigate", url=path if str(path).startswith("http") else Path(path).resolve().as_uri()
+        )
         while not any(event.get("method") == "Page.loadEventFired" for event in self.events):
             self.events.append(self.message())
 

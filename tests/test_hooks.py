@@ -179,6 +179,11 @@ def test_hook_graspsense_emulators():
     assert (entry.target, entry.wires, entry.options) == ("lab_hand.emulator:emulate", ("pty",), ())
 
 
+def test_hook_graspsense_live_observers():
+    plugins = IsolatedPlugins(example("graspsense_live_observers"))
+    assert [one.entry.target for one in plugins.live_observers()] == ["lab_hand.wall:observe"]
+
+
 def test_hook_graspsense_identifiers():
     plugins = IsolatedPlugins(example("graspsense_identifiers"))
 

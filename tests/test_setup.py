@@ -54,7 +54,7 @@ def test_an_installation_for_use_has_every_distribution_with_the_same_versions()
     ]
     tools = PROJECT["dependency-groups"]["dev"]
     assert [line for line in lines if not line.startswith((".", "-"))] == [
-        line for line in tools if line.startswith(("matplotlib", "numba"))
+        line for line in tools if line.startswith(("matplotlib", "numba", "websockets"))
     ]
 
 

@@ -30,6 +30,7 @@ _TABLE: Final[Table] = {
             "Finding",
             "FoundDevice",
             "IdentifierEntry",
+            "LiveObserverEntry",
             "ModelEntry",
             "PipelineEntry",
             "SensorBackendEntry",

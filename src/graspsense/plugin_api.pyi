@@ -19,6 +19,7 @@ from graspsense.core.components.entries import FeatureSetEntry as FeatureSetEntr
 from graspsense.core.components.entries import Finding as Finding
 from graspsense.core.components.entries import FoundDevice as FoundDevice
 from graspsense.core.components.entries import IdentifierEntry as IdentifierEntry
+from graspsense.core.components.entries import LiveObserverEntry as LiveObserverEntry
 from graspsense.core.components.entries import ModelEntry as ModelEntry
 from graspsense.core.components.entries import PipelineEntry as PipelineEntry
 from graspsense.core.components.entries import SensorBackendEntry as SensorBackendEntry

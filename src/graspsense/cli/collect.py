@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import sys
 from contextlib import suppress
+from functools import partial
 from typing import TYPE_CHECKING
 
 import click
 
+from graspsense.cli.live import Live, live_options, shown_live
 from graspsense.cli.options import (
     GRIPPER_ALONE,
     contradiction,
@@ -48,6 +50,7 @@ _LABEL = 14
 )
 @click.option("--changed", is_flag=True, help="Continue with another gripper or other settings.")
 @pipeline_options
+@live_options
 @click.option("--json", "as_json", is_flag=True, help="Print a summary as JSON at the end.")
 def collect(
     labels: str,
@@ -62,6 +65,8 @@ def collect(
     options: tuple[str, ...],
     seed: int | None,
     force: bool,
+    live: bool,
+    live_address: str | None,
     as_json: bool,
 ) -> None:
     """Prompt for the next object, grasp it and store the trial.
@@ -87,16 +92,14 @@ def collect(
     )
     first = settings_of(pipeline, gripper, object_name, options, seed, force)
     check(first)
-    if not _has_model(first):
-        options = (*options, *GRIPPER_ALONE)
+    options = options if _has_model(first) else (*options, *GRIPPER_ALONE)
     selects = _label_selects_object(first, wanted.words, names_object(object_name, options))
 
     def settings_for(word: str, number: int) -> Settings:
         return settings_of(pipeline, gripper, word if selects else object_name, options, number, force)
 
-    with Store.open(save) as store:
-        _recover(store)
-        _refuse_other_units(store, values)
+    with Store.open(save) as store, shown_live(live, live_address, save) as shown:
+        _prepare(store, values)
         collection = Collection(
             store=store,
             wanted=wanted,
@@ -104,8 +107,9 @@ def collect(
             settings_for=settings_for,
             ask=_ask,
             say=talk,
-            show=_show,
+            show=partial(_show, shown, save),
             changed=changed,
+            sinks=shown.sinks,
         )
         _run(collection, save, as_json)
 
@@ -123,10 +127,11 @@ def _run(collection: Collection, save: str, as_json: bool) -> None:
     _print_counts(save, collection, as_json)
 
 
-def _show(word: str, trial: Trial) -> None:
-    """Print the faults that were seen in a trial, what was felt, and what the model takes the object for."""
+def _show(shown: Live, save: str, word: str, trial: Trial) -> None:
+    """Show how a trial ended; print the faults that were seen, what was felt, and what the object is taken for."""
     from graspsense.core.values.units import in_words
 
+    shown.finished(trial, save)
     for warning in trial.warnings:
         if warning != trial.reason:
             echo_entry("  warning", warning, Style.CAUTION, err=True, width=_LABEL)
@@ -211,20 +216,16 @@ def _has_model(settings: Settings) -> bool:
     return True
 
 
-def _refuse_other_units(store: Store, values: tuple[str, ...]) -> None:
+def _prepare(store: Store, values: tuple[str, ...]) -> None:
+    """Complete the trials of an interrupted run, and print what became of each. Raises ConfigError for other units."""
     from graspsense.core.learn.target_value import value_label
     from graspsense.store.changes import refuse_other_units
-
-    refuse_other_units(store, [value_label(text)[0] for text in values])
-
-
-def _recover(store: Store) -> None:
-    """Complete the trials of an interrupted run, and print what became of each."""
     from graspsense.store.recover import recover_store
 
     for one in recover_store(store):
         number = f" as trial {one.trial}" if one.trial is not None else ""
         talk(f"{one.file.name}: {one.what}{number}{f' ({one.why})' if one.why else ''}")
+    refuse_other_units(store, [value_label(text)[0] for text in values])
 
 
 def _ask(question: str) -> str | None:

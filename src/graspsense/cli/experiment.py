@@ -10,14 +10,16 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from graspsense.cli.live import Live, live_options, shown_live
 from graspsense.cli.options import force_option
 from graspsense.cli.output import echo_json
 from graspsense.cli.terminal import Style, echo, echo_entry, echo_table, talk
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Iterable
 
     from graspsense.experiments.duration import Effort
+    from graspsense.experiments.executors.base import Executor
     from graspsense.experiments.experiment import Planned
     from graspsense.experiments.findings import Findings
     from graspsense.experiments.results import Results
@@ -61,6 +63,7 @@ class ExperimentCommand(click.Command):
     help="Set a key of the file: -o seeds=3, -o data.trials=2. Can be repeated.",
 )
 @force_option
+@live_options
 @click.option("--dry-run", is_flag=True, help="Print what would be done, and do nothing.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def experiment(
@@ -71,6 +74,8 @@ def experiment(
     workers: int | None,
     options: tuple[str, ...],
     force: bool,
+    live: bool,
+    live_address: str | None,
     dry_run: bool,
     as_json: bool,
 ) -> None:
@@ -86,11 +91,11 @@ def experiment(
     if experiment is None:
         _list(shipped(), as_json)
         return
-    from graspsense.cli.progress import ProgressLine
+    from graspsense.experiments.answer import answer
     from graspsense.experiments.executors.choose import chosen
     from graspsense.experiments.page import findings_of
     from graspsense.experiments.results import Results
-    from graspsense.experiments.run import refuse_store, run_experiment
+    from graspsense.experiments.run import refuse_store
     from graspsense.experiments.summary import summarise
 
     planned = read_experiment(experiment, options, force=force)
@@ -100,19 +105,12 @@ def experiment(
     if dry_run:
         _plan(planned, results, workers or os.cpu_count() or 1, as_json)
         return
-    with ProgressLine() as progress:
-        account = run_experiment(
-            planned,
-            results,
-            make,
-            resume=resume,
-            command=shlex.join(["graspsense", *sys.argv[1:]]),
-            progress=progress,
-            said=talk,
-        )
-    found = summarise(planned, results)
-    page, problem = _written_page(found, results)
-    more = findings_of(found)
+    with shown_live(live, live_address) as shown:
+        account = _run(planned, results, make, resume, shown)
+        found = summarise(planned, results)
+        page, problem = _written_page(found, results)
+        more = findings_of(found)
+        shown.told("progress", {"text": answer(found) if more is None else more.answer})
     if as_json:
         _print_json(found, more, page, _counts(account, problem))
     else:
@@ -121,6 +119,30 @@ def experiment(
         raise click.exceptions.Exit(EXIT_INTERRUPTED)
     if problem or not account.complete:
         raise click.exceptions.Exit(EXIT_INCOMPLETE)
+
+
+def _run(
+    planned: Planned, results: Results, make: Callable[[], Executor], resume: bool, shown: Live
+) -> Account:
+    """Run the tasks, and show how many are done."""
+    from graspsense.cli.progress import ProgressLine
+    from graspsense.experiments.run import run_experiment
+
+    with ProgressLine() as line:
+
+        def progress(what: str, done: int, total: int) -> None:
+            line(what, done, total)
+            shown.told("progress", {"text": f"{what}: {done} of {total}"})
+
+        return run_experiment(
+            planned,
+            results,
+            make,
+            resume=resume,
+            command=shlex.join(["graspsense", *sys.argv[1:]]),
+            progress=progress,
+            said=talk,
+        )
 
 
 def _written_page(found: Summary, results: Results) -> tuple[Path | None, str]:

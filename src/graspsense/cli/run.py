@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from graspsense.cli.live import live_options, shown_live
 from graspsense.cli.live_rows import LiveRows
 from graspsense.cli.model_table import print_model, print_not_verified, print_selection, print_without
 from graspsense.cli.options import contradiction, names_object, pipeline_options, settings_of
@@ -74,6 +75,7 @@ MANY_GUARDED: Final = 0.1
 )
 @click.option("--video", metavar="FILE", help="Film a gripper that can be seen: .mp4, .webp or .gif.")
 @click.option("--viewer", is_flag=True, help="Show a gripper that can be seen, in a window.")
+@live_options
 @click.option("--dry-run", is_flag=True, help="Print what would be done, and open nothing.")
 @click.option("--json", "as_json", is_flag=True, help="Print the trial as JSON.")
 def run(
@@ -92,6 +94,8 @@ def run(
     picture: str | None,
     video: str | None,
     viewer: bool,
+    live: bool,
+    live_address: str | None,
     dry_run: bool,
     as_json: bool,
 ) -> None:
@@ -102,8 +106,10 @@ def run(
     """
     from graspsense.core.pipeline.wiring import check
 
-    if beside and (plot or explain_model or dry_run):
-        raise click.UsageError("--beside goes without --plot, --explain-model and --dry-run")
+    if beside and any((plot, explain_model, dry_run, picture, video, viewer, live, live_address)):
+        raise click.UsageError(
+            "--beside goes without --plot, --explain-model, --dry-run, --picture, --video, --viewer and --live"
+        )
     if explain_model:
         options = (*options, "gripper.explain=true")
     settings = _labelled_settings(label, pipeline, gripper, object_name, options, seed, force)
@@ -117,22 +123,40 @@ def run(
         return
     _check_outputs(label, save, plot)
     if beside is not None:
-        if picture or video or viewer:
-            raise click.UsageError(
-                "--picture, --video and --viewer show one gripper: leave them or --beside out"
-            )
         _run_beside(settings, beside, save, label, as_json)
         return
     film = _film(picture, video, viewer)
     sinks: tuple[Sink, ...] = film if as_json else (LiveRows(), *film)
-    kept: dict[str, Any] | None = None
-    if save is None:
-        trial, interrupted = _grasped(settings, sinks)
-    else:
-        trial, interrupted, kept = _kept(save, label, settings, sinks, changed)
+    with shown_live(live, live_address, save) as shown:
+        trial, interrupted, kept = _performed(settings, (*sinks, *shown.sinks), save, label, changed)
         if drawn:
             talk(f"seed {seed}, drawn for this trial; --seed {seed} repeats the grasp")
+        shown.finished(trial, save)
+        _say_all(settings, trial, interrupted, kept, explain_model, as_json)
+        if plot is not None:
+            draw_grasp(trial, Path(plot))
+        _write_film(film, save, kept)
+    _exit(trial, interrupted, "" if kept is None else kept["problem"])
 
+
+def _performed(
+    settings: Settings, sinks: Sequence[Sink], save: str | None, label: str | None, changed: bool
+) -> tuple[Trial, bool, dict[str, Any] | None]:
+    """Grasp, and return the trial, whether it was interrupted, and its place in a store if it is saved."""
+    if save is None:
+        return (*_grasped(settings, sinks), None)
+    return _kept(save, label, settings, sinks, changed)
+
+
+def _say_all(
+    settings: Settings,
+    trial: Trial,
+    interrupted: bool,
+    kept: Mapping[str, Any] | None,
+    explain_model: bool,
+    as_json: bool,
+) -> None:
+    """Print the trial, as text or as JSON."""
     asked = explain_model and "model" in trial.report and not interrupted
     condition = _condition(settings) if asked else None
     if as_json:
@@ -141,10 +165,6 @@ def run(
     else:
         print_trial(trial)
         _print_further(settings, trial, condition)
-    if plot is not None:
-        draw_grasp(trial, Path(plot))
-    _write_film(film, save, kept)
-    _exit(trial, interrupted, "" if kept is None else kept["problem"])
 
 
 def _run_beside(

@@ -11,27 +11,19 @@ from __future__ import annotations
 import json
 import os
 import signal
+import struct
 import sys
 import time
 from pathlib import Path
 from typing import Final
 
-from graspsense.recording.layout import (
-    IS_END,
-    IS_METADATA,
-    IS_SIGNAL,
-    IS_TICK,
-    IS_TOPIC,
-    LENGTH_WIRE,
-    READY,
-    SIGNAL_WIRE,
-    TICK_WIRE,
-    Topic,
-)
+from graspsense.recording.layout import IS_END, IS_SIGNAL, IS_TICK, IS_TOPIC, READY, Topic
+from graspsense.recording.wire_messages import complete_messages
 from graspsense.recording.writer import RecordingWriter
 
 READ_EVERY_S: Final = 0.01
 READ_BYTES: Final = 1 << 20
+_T_S: Final = struct.Struct("<d")
 BEHIND: Final = 1 << 16
 """A read of this many bytes or more is followed by the next read without a pause."""
 
@@ -82,43 +74,17 @@ def _write(path: Path) -> dict[str, object]:
 
 def _write_messages(file: RecordingWriter, buffer: bytearray) -> bool:
     """Write every complete message and remove it from the buffer. Return whether the trial is over."""
-    at, end = 0, len(buffer)
-    try:
-        while at < end:
-            kind = bytes(buffer[at : at + 1])
-            if kind == IS_END:
-                return True
-            if kind == IS_TICK:
-                if at + TICK_WIRE.size > end:
-                    break
-                t_s = TICK_WIRE.unpack_from(buffer, at)[1]
-                file.tick(t_s, bytes(buffer[at + 1 : at + TICK_WIRE.size]))
-                at += TICK_WIRE.size
-            elif kind == IS_SIGNAL:
-                if at + SIGNAL_WIRE.size > end:
-                    break
-                _, length, number = SIGNAL_WIRE.unpack_from(buffer, at)
-                start = at + SIGNAL_WIRE.size
-                if start + length > end:
-                    break
-                file.signal(number, bytes(buffer[start : start + length]))
-                at = start + length
-            else:
-                if at + LENGTH_WIRE.size > end:
-                    break
-                assert kind in (IS_METADATA, IS_TOPIC)
-                length = LENGTH_WIRE.unpack_from(buffer, at)[1]
-                start = at + LENGTH_WIRE.size
-                if start + length > end:
-                    break
-                if kind == IS_TOPIC:
-                    file.topic(Topic(*json.loads(buffer[start : start + length])))
-                else:
-                    name, values = json.loads(buffer[start : start + length])
-                    file.metadata(name, values)
-                at = start + length
-    finally:
-        del buffer[:at]
+    for kind, number, body in complete_messages(buffer):
+        if kind == IS_END:
+            return True
+        if kind == IS_TICK:
+            file.tick(_T_S.unpack_from(body)[0], body)
+        elif kind == IS_SIGNAL:
+            file.signal(number, body)
+        elif kind == IS_TOPIC:
+            file.topic(Topic(*json.loads(body)))
+        else:
+            file.metadata(*json.loads(body))
     return False
 
 

@@ -279,6 +279,24 @@ class EmulatorEntry:
 
 
 @frozen
+class LiveObserverEntry:
+    """A function that receives grasps while they go on, in a process of its own: `--live`.
+
+    `target` is a function `observe(batches)`. `batches` yields a list of messages about 30 times a second, until the
+    command ends; docs/live.md lists them. What the function does, and how long it takes, cannot disturb a grasp.
+    """
+
+    name: str = field(validator=IS_NAME)
+    """The name of the observer."""
+    target: str = field(validator=_IS_TARGET)
+    """The import string of the function `observe(batches)`."""
+    summary: str = field(validator=instance_of(str))
+    """What it does with a grasp, in one line."""
+    needs: str = ""
+    """What to install or do if the target cannot be imported."""
+
+
+@frozen
 class IdentifierEntry:
     """A function that identifies an object from recorded squeezes, as a scene of a simulator: `graspsense identify`.
 

@@ -24,6 +24,7 @@ from graspsense.core.components.entries import (
     Finding,
     FoundDevice,
     IdentifierEntry,
+    LiveObserverEntry,
     ModelEntry,
     PipelineEntry,
     SensorBackendEntry,
@@ -90,6 +91,11 @@ def graspsense_emulators() -> Iterable[EmulatorEntry]:  # type: ignore[empty-bod
 @hookspec
 def graspsense_identifiers() -> Iterable[IdentifierEntry]:  # type: ignore[empty-body]
     """Return functions that identify objects from recorded squeezes."""
+
+
+@hookspec
+def graspsense_live_observers() -> Iterable[LiveObserverEntry]:  # type: ignore[empty-body]
+    """Return functions that receive grasps while they go on, each in a process of its own."""
 
 
 @hookspec

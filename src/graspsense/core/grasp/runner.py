@@ -52,6 +52,7 @@ from graspsense.core.values.errors import (
 )
 from graspsense.core.values.events import EventSource, GraspEvent, event_name
 from graspsense.core.values.faults import Fault
+from graspsense.core.values.features import Prediction
 from graspsense.core.values.fingers import fingers_in_words, fingers_of
 from graspsense.core.values.signals import (
     APPROACH,
@@ -69,8 +70,8 @@ from graspsense.core.values.signals import (
 )
 from graspsense.core.values.trace import SI_UNITS, Trace, TraceRecorder
 
-Tell = Callable[[float, int, str], None]
-"""Called with the time, the phase and a sentence for each prediction."""
+Tell = Callable[[float, int, str, Prediction | None], None]
+"""Called with the time, the phase, a sentence and the prediction; None where there is none, for the reason told."""
 
 
 class Watcher(Protocol):
@@ -99,6 +100,14 @@ class EventSink(Protocol):
 
     def event(self, event: GraspEvent) -> None:
         """Receive one event."""
+
+
+@runtime_checkable
+class DeviceSink(Protocol):
+    """A sink that is told of the gripper before the fingers move."""
+
+    def opened(self, device: DeviceInfo) -> None:
+        """Receive the description of the opened gripper."""
 
 
 @runtime_checkable
@@ -402,9 +411,19 @@ class _Grasp:
         self.watcher = watcher
         watcher.begin(self.recorder, self.info, self._predicted)
 
+    def _show_device(self) -> None:
+        """Tell the sinks of the gripper."""
+        for sink in self.sinks:
+            if isinstance(sink, DeviceSink):
+                try:
+                    sink.opened(self.info)
+                except FAILURES as error:
+                    self._drop(sink, error, 0.0, Phase.OPENING)
+
     def drive(self) -> tuple[Outcome, str]:
         """Run the loop and return the outcome. The gripper was then commanded to open or relax."""
         lost = False
+        self._show_device()
         try:
             self._loop()
             ending: tuple[Outcome, str] | None = None
@@ -621,8 +640,15 @@ class _Grasp:
                 event = self._event(frame.t_s, Phase(phase), event_name(self.event_names, i), "controller")
                 self.recorder.events.append(event)
 
-    def _event(self, t_s: float, phase: Phase, what: str, source: EventSource = "runner") -> GraspEvent:
-        event = GraspEvent(t_s, phase, what, source)
+    def _event(
+        self,
+        t_s: float,
+        phase: Phase,
+        what: str,
+        source: EventSource = "runner",
+        prediction: Prediction | None = None,
+    ) -> GraspEvent:
+        event = GraspEvent(t_s, phase, what, source, prediction)
         self.events.append(event)
         if self.on_event is not None:
             self.on_event(event)
@@ -641,9 +667,9 @@ class _Grasp:
             self.state = state = stopped(self.params.schedule, state, frame)
         return state
 
-    def _predicted(self, t_s: float, phase: int, what: str) -> None:
+    def _predicted(self, t_s: float, phase: int, what: str, prediction: Prediction | None) -> None:
         """Log a prediction that was made while the grasp goes on."""
-        self._event(t_s, Phase(phase), what, "model")
+        self._event(t_s, Phase(phase), what, "model", prediction)
 
     def _let_go(self, opens: bool) -> None:
         """Open the fingers, then relax. A failure of one step must not prevent the next.

@@ -99,9 +99,8 @@ class Anytime:
         after_s, model = self._left.pop(0)
         self._set_due()
         if self._running is not None:
-            self._tell(
-                t_s, phase, f"{after_s:g} s after the contact: no prediction, the one before still runs"
-            )
+            skipped = f"{after_s:g} s after the contact: no prediction, the one before still runs"
+            self._tell(t_s, phase, skipped, None)
             return ""
         compute = self._prediction_of(after_s, model)
         if self._pool is None:
@@ -131,11 +130,12 @@ class Anytime:
         try:
             features, prediction = result()
         except FAILURES as error:
-            self._tell(t_s, phase, f"{after_s:g} s after the contact: the prediction failed: {named(error)}")
+            failed = f"{after_s:g} s after the contact: the prediction failed: {named(error)}"
+            self._tell(t_s, phase, failed, None)
             return ""
         made = CheckpointPrediction(after_s=after_s, t_s=t_s, features=features, prediction=prediction)
         self.predictions.append(made)
-        self._tell(t_s, phase, made.words)
+        self._tell(t_s, phase, made.words, prediction)
         return made.words if self._stops and made.sure else ""
 
 

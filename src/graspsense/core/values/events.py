@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from attrs import frozen
 
 from graspsense.core.values.signals import Phase
+
+if TYPE_CHECKING:
+    from graspsense.core.values.features import Prediction
 
 EventSource = Literal["runner", "controller", "model"]
 """What an event of a grasp comes from."""
@@ -19,13 +22,14 @@ class GraspEvent:
 
     `source` is `runner` for a change of phase, an action of the guard or a sink that failed, and `controller` for an
     event that the controller told; `what` is then the name of the event, one of `Controller.events`. It is `model` for
-    a prediction while the grasp goes on.
+    a prediction while the grasp goes on, which `prediction` then has.
     """
 
     t_s: float
     phase: Phase
     what: str
     source: EventSource = "runner"
+    prediction: Prediction | None = None
 
 
 def event_name(names: Sequence[str], number: int) -> str:

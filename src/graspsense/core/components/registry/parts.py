@@ -28,6 +28,7 @@ from graspsense.core.components.entries import (
     Finding,
     FoundDevice,
     IdentifierEntry,
+    LiveObserverEntry,
     ModelEntry,
     PipelineEntry,
     Role,
@@ -55,6 +56,7 @@ EntryT = TypeVar(
     ExperimentEntry,
     ExperimentKindEntry,
     IdentifierEntry,
+    LiveObserverEntry,
     ConformanceCheckEntry,
 )
 
@@ -293,6 +295,7 @@ _KIND_OF_ENTRY: Final[dict[type, str]] = {
     ExperimentEntry: "experiment",
     ExperimentKindEntry: "kind of experiment",
     IdentifierEntry: "identifier of objects",
+    LiveObserverEntry: "live observer",
     ConformanceCheckEntry: "conformance check",
 }
 

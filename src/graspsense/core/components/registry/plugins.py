@@ -30,6 +30,7 @@ from graspsense.core.components.entries import (
     Finding,
     FoundDevice,
     IdentifierEntry,
+    LiveObserverEntry,
     ModelEntry,
     PipelineEntry,
     Role,
@@ -90,6 +91,7 @@ RESOURCE_HOOKS: Final[dict[str, type]] = {
     "graspsense_commands": CommandEntry,
     "graspsense_emulators": EmulatorEntry,
     "graspsense_identifiers": IdentifierEntry,
+    "graspsense_live_observers": LiveObserverEntry,
     "graspsense_experiment_kinds": ExperimentKindEntry,
     "graspsense_experiments": ExperimentEntry,
     "graspsense_conformance_checks": ConformanceCheckEntry,
@@ -185,6 +187,10 @@ class Plugins:
     def identifiers(self) -> tuple[Resource[IdentifierEntry], ...]:
         """Return the functions that identify objects."""
         return self._resources_of(IdentifierEntry)
+
+    def live_observers(self) -> tuple[Resource[LiveObserverEntry], ...]:
+        """Return what receives grasps while they go on."""
+        return self._resources_of(LiveObserverEntry)
 
     def experiment_kinds(self) -> tuple[Resource[ExperimentKindEntry], ...]:
         """Return the kinds of experiments that plugins add."""

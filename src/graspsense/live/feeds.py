@@ -1,0 +1,127 @@
+"""The sink that shows grasps live: it hands ticks to the process of an observer, and never waits for it."""
+
+from __future__ import annotations
+
+import json
+import os
+import select
+import subprocess
+import time
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+from attrs import asdict
+
+from graspsense.core.values.channel import FastChannel, TactileArray
+from graspsense.core.values.device import DeviceInfo
+from graspsense.core.values.errors import ConfigError
+from graspsense.core.values.events import GraspEvent, event_as_json
+from graspsense.core.values.features import Prediction
+from graspsense.core.values.json_values import json_ready
+from graspsense.core.values.trial import Trial
+from graspsense.recording.atomic_file import SaveFailed
+from graspsense.recording.feed import Feed
+
+QUEUE_BYTES: Final = 8 << 20
+"""Limit on what waits for an observer; what is beyond it is dropped."""
+START_TIMEOUT_S: Final = 30.0
+END_TIMEOUT_S: Final = 3.0
+
+
+class LiveFeed(Feed):
+    """A sink that passes grasps to the process of one observer, `python -m MODULE ARGUMENTS`.
+
+    The process prints a line of JSON once it is ready, with what it found as values, or `error`. Raises ConfigError
+    with that error, and if the process does not start.
+    """
+
+    def __init__(self, module: str, arguments: Sequence[str]) -> None:
+        self.name = " ".join((module, *arguments))
+        """The process, for messages."""
+        try:
+            super().__init__(module, arguments, QUEUE_BYTES)
+        except SaveFailed as error:
+            raise ConfigError(str(error)) from error
+        self.answer = self._first_line()
+        """What the process found."""
+        if "error" in self.answer:
+            self.close()
+            raise ConfigError(str(self.answer["error"]))
+
+    @property
+    def dropped(self) -> int:
+        """Messages that the process did not take."""
+        return self._dropped
+
+    def _first_line(self) -> Mapping[str, Any]:
+        assert self._process.stdout is not None
+        out, said = self._process.stdout.fileno(), b""
+        until = time.monotonic() + START_TIMEOUT_S
+        while not said.endswith(b"\n"):
+            left = max(0.0, until - time.monotonic())
+            data = os.read(out, 4096) if select.select([out], [], [], left)[0] else b""
+            if not data:
+                return {"error": f"the process {self.name} does not start"}
+            said += data
+        answer: Mapping[str, Any] = json.loads(said)
+        return answer
+
+    def opened(self, device: DeviceInfo) -> None:
+        """Begin a grasp with this gripper."""
+        self._counter = 0
+        self._told("grasp", grasp_values(device))
+
+    def event(self, event: GraspEvent) -> None:
+        """Pass on an event, and the prediction if it is one."""
+        self._told("event", event_as_json(event))
+        if event.prediction is not None:
+            self._told("prediction", prediction_values(event.prediction))
+
+    def finished(self, trial: Trial) -> None:
+        """Pass on how a grasp ended. Do not call this during control."""
+        if trial.prediction is not None:
+            self._told("prediction", prediction_values(trial.prediction))
+        self._told("outcome", {"outcome": trial.outcome.words, "reason": trial.reason})
+
+    def told(self, name: str, values: Any) -> None:
+        """Pass on JSON values. Do not call this during control."""
+        self._told(name, values)
+
+    def close(self) -> str:
+        """End the process and return the error that it reports; empty if there is none."""
+        self._drain(b"", END_TIMEOUT_S)
+        try:
+            out, _ = self._process.communicate(timeout=END_TIMEOUT_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.communicate()
+            return f"{self.name} did not end, and was stopped"
+        last = out.splitlines()[-1:] or [b"{}"]
+        try:
+            return str(json.loads(last[0]).get("error", ""))
+        except (ValueError, AttributeError):
+            return ""
+
+
+def grasp_values(device: DeviceInfo) -> dict[str, Any]:
+    """Return what is known of a grasp before it begins, as JSON values."""
+    channels = []
+    for channel in device.channels:
+        kind = {TactileArray: "array", FastChannel: "fast"}.get(type(channel), "number")
+        values = {
+            key: value for key, value in asdict(channel).items() if key not in ("positions_m", "facing")
+        }
+        channels.append({**values, "kind": kind})
+    values = {"device": device.name, "rate_hz": device.rate_hz, "clock": device.clock, "channels": channels}
+    ready: dict[str, Any] = json_ready({**values, "units": dict(device.units)})
+    return ready
+
+
+def prediction_values(prediction: Prediction) -> dict[str, Any]:
+    """Return a prediction in words, as JSON values."""
+    return {
+        "label": prediction.label,
+        "certainty": prediction.certainty_in_words,
+        "set": prediction.set_in_words,
+        "because": [reason.words for reason in prediction.because],
+    }

@@ -1,0 +1,281 @@
+"""The process that serves the page of live grasps: HTTP and a WebSocket on one port, under a random token.
+
+It reads the messages of a `Feed` on its standard input. Nothing that a viewer sends is used: a viewer that sends
+anything, or that does not take what it is sent, is dropped.
+
+    python -m graspsense.live.page_process HOST PORT
+"""
+
+from __future__ import annotations
+
+import asyncio
+import errno
+import json
+import os
+import secrets
+import signal
+import sys
+from collections import deque
+from contextlib import suppress
+from http import HTTPStatus
+from importlib.resources import files
+from typing import Any, Final
+
+from websockets.asyncio.server import ServerConnection, serve
+from websockets.datastructures import Headers
+from websockets.exceptions import ConnectionClosed
+from websockets.http11 import Request, Response
+
+from graspsense.core.values.json_values import json_ready
+from graspsense.live.stream import Message, batches
+from graspsense.recording.layout import TICK_FIELDS
+
+MOST_VIEWERS: Final = 16
+MOST_CONNECTIONS: Final = 64
+"""Connections at a time, with those that have not asked for anything yet; further ones are closed."""
+WAITING_BYTES: Final = 8 << 20
+"""Text that may wait for a viewer before it is dropped."""
+HISTORY_BYTES: Final = 16 << 20
+"""Text of the running grasp that is kept for viewers who come later; of a longer grasp they see the end."""
+LARGEST_MESSAGE: Final = 1024
+SHAKE_TIMEOUT_S: Final = 5.0
+FLUSH_S: Final = 2.0
+FILES: Final = {"": "text/html", "page.js": "text/javascript", "curves.js": "text/javascript"}
+POLICY: Final = (
+    "default-src 'none'; script-src 'self'; style-src 'unsafe-inline'; connect-src 'self'; "
+    "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+LOOPBACK: Final = ("127.0.0.1", "localhost", "[::1]")
+STICKY: Final = ("grasp", "stored", "progress", "prediction", "outcome")
+"""Messages of which a viewer who comes later needs the newest."""
+_SHOWN: Final = (
+    "t_s",
+    "gap_m",
+    "effort_n",
+    "force_left_n",
+    "force_right_n",
+    "command",
+    "command_kind",
+    "phase",
+)
+_LEFT_OUT: Final = tuple(name for name in TICK_FIELDS if name not in _SHOWN)
+
+
+class History:
+    """What a viewer needs who comes during a grasp: the newest of some messages, and the running grasp."""
+
+    def __init__(self) -> None:
+        self._newest: dict[str, str] = {}
+        self._texts: deque[str] = deque()
+        self._size = 0
+
+    def add(self, messages: list[Message]) -> str:
+        """Keep the messages and return them as the text for a viewer."""
+        for message in messages:
+            if message["kind"] == "ticks":
+                for name in _LEFT_OUT:
+                    message.pop(name, None)
+        ready = [json_ready(message) for message in messages]
+        began = [k for k, message in enumerate(ready) if message["kind"] == "grasp"]
+        if began:
+            self._texts.clear()
+            self._size = 0
+            for kind in ("prediction", "outcome"):
+                self._newest.pop(kind, None)
+        for message in ready[began[-1] if began else 0 :]:
+            if message["kind"] in STICKY:
+                self._newest[message["kind"]] = json.dumps(message)
+            elif message["kind"] == "image":
+                self._newest[f"image {message['name']}"] = json.dumps(message)
+            else:
+                self._keep(json.dumps(message))
+        return json.dumps(ready)
+
+    def _keep(self, text: str) -> None:
+        self._texts.append(text)
+        self._size += len(text)
+        while self._size > HISTORY_BYTES:
+            self._size -= len(self._texts.popleft())
+
+    def text(self) -> str:
+        """Return all of it as the text for a viewer."""
+        head = [self._newest["grasp"]] if "grasp" in self._newest else []
+        others = [text for kind, text in self._newest.items() if kind != "grasp"]
+        return f"[{','.join([*head, *self._texts, *others])}]"
+
+
+class _Waiting:
+    """The texts that a viewer has not taken yet, and their size."""
+
+    def __init__(self) -> None:
+        self.size = 0
+        self._queue: asyncio.Queue[str | None] = asyncio.Queue()
+
+    def add(self, text: str | None) -> None:
+        """Add a text; None is the end."""
+        self.size += len(text or "")
+        self._queue.put_nowait(text)
+
+    async def next(self) -> str | None:
+        """Return the oldest text."""
+        text = await self._queue.get()
+        self.size -= len(text or "")
+        return text
+
+
+class Page:
+    """The page under its token, and the viewers that are connected to it."""
+
+    def __init__(self, host: str) -> None:
+        self.host, self.port, self.token = host, 0, secrets.token_urlsafe(24)
+        self.history = History()
+        self.viewers: dict[ServerConnection, _Waiting] = {}
+        folder = files("graspsense.live")
+        self._files = {name: (folder / (name or "page.html")).read_bytes() for name in FILES}
+
+    @property
+    def address(self) -> str:
+        """The address to open."""
+        host = f"[{self.host}]" if ":" in self.host else self.host
+        return f"http://{host}:{self.port}/{self.token}/"
+
+    def answer(self, connection: ServerConnection, request: Request) -> Response | None:
+        """Return the answer to an HTTP request; None lets a WebSocket open."""
+        folder, _, name = request.path.removeprefix("/").partition("/")
+        host, origin = request.headers.get("Host", ""), request.headers.get("Origin")
+        if not secrets.compare_digest(folder.encode(), self.token.encode()):
+            return connection.respond(
+                HTTPStatus.NOT_FOUND, "wrong address: open the one that graspsense printed\n"
+            )
+        if self.host in LOOPBACK and host not in {f"{one}:{self.port}" for one in LOOPBACK}:
+            return connection.respond(HTTPStatus.FORBIDDEN, "wrong host\n")
+        if name == "frames":
+            if origin is not None and origin != f"http://{host}":
+                return connection.respond(HTTPStatus.FORBIDDEN, "wrong origin\n")
+            if len(self.viewers) >= MOST_VIEWERS:
+                return connection.respond(HTTPStatus.SERVICE_UNAVAILABLE, f"{MOST_VIEWERS} viewers already\n")
+            return None
+        if name not in FILES:
+            return connection.respond(HTTPStatus.NOT_FOUND, "no such page\n")
+        body = self._files[name]
+        headers = Headers(
+            {
+                "Content-Type": f"{FILES[name]}; charset=utf-8",
+                "Content-Length": str(len(body)),
+                "Content-Security-Policy": POLICY,
+                "Referrer-Policy": "no-referrer",
+                "X-Content-Type-Options": "nosniff",
+                "Cache-Control": "no-store",
+                "Connection": "close",
+            }
+        )
+        return Response(HTTPStatus.OK, "OK", headers, body)
+
+    async def show(self, viewer: ServerConnection) -> None:
+        """Send everything to a viewer until it leaves, sends something, or the grasping program ends."""
+        waiting = self.viewers[viewer] = _Waiting()
+        waiting.add(None if len(self.viewers) > MOST_VIEWERS else self.history.text())
+        listening = asyncio.create_task(self._drop_speaker(viewer, waiting))
+        try:
+            with suppress(ConnectionClosed):
+                while (text := await waiting.next()) is not None:
+                    await viewer.send(text)
+        finally:
+            self.viewers.pop(viewer, None)
+            listening.cancel()
+
+    async def _drop_speaker(self, viewer: ServerConnection, waiting: _Waiting) -> None:
+        with suppress(ConnectionClosed):
+            await viewer.recv()
+            viewer.transport.abort()
+        waiting.add(None)
+
+    def pass_on(self, messages: list[Message]) -> None:
+        """Hand messages to every viewer; one that has not taken those before is dropped."""
+        text = self.history.add(messages)
+        for viewer, waiting in list(self.viewers.items()):
+            waiting.add(text)
+            if waiting.size > WAITING_BYTES:
+                del self.viewers[viewer]
+                viewer.transport.abort()
+
+    async def end(self) -> None:
+        """Let the viewers take what is left, for a short time."""
+        for waiting in self.viewers.values():
+            waiting.add(None)
+        async with asyncio.timeout(FLUSH_S):
+            while self.viewers:
+                await asyncio.sleep(0.01)
+
+
+class _Limited(ServerConnection):  # type: ignore[misc, unused-ignore]
+    """A connection that is closed at once if there are too many."""
+
+    connected = 0
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        _Limited.connected += 1
+        super().connection_made(transport)
+        if _Limited.connected > MOST_CONNECTIONS:
+            self.transport.abort()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        _Limited.connected -= 1
+        super().connection_lost(exc)
+
+
+async def serve_page(host: str, port: int) -> None:
+    """Serve until standard input ends. Prints one line of JSON: the address, or why there is none."""
+    page, loop = Page(host), asyncio.get_running_loop()
+    try:
+        server = await serve(
+            page.show,
+            host,
+            port,
+            process_request=page.answer,
+            create_connection=_Limited,
+            compression=None,
+            server_header=None,
+            max_size=LARGEST_MESSAGE,
+            max_queue=1,
+            open_timeout=SHAKE_TIMEOUT_S,
+            close_timeout=FLUSH_S,
+            ping_interval=10,
+            ping_timeout=10,
+        )
+    except OSError as error:
+        _say({"error": _why_not(host, port, error)})
+        return
+    async with server:
+        page.port = next(iter(server.sockets)).getsockname()[1]
+        _say({"address": page.address})
+        incoming = batches(0)
+        while (messages := await loop.run_in_executor(None, next, incoming, None)) is not None:
+            page.pass_on(messages)
+        with suppress(TimeoutError):
+            await page.end()
+
+
+def _why_not(host: str, port: int, error: OSError) -> str:
+    if error.errno == errno.EADDRINUSE:
+        return f"--live-address: port {port} of {host} is taken: name another one, or leave it out for a free one"
+    return f"--live-address: cannot listen on {host}, port {port}: {error.strerror or error}"
+
+
+def _say(answer: dict[str, Any]) -> None:
+    sys.stdout.write(json.dumps(answer) + "\n")
+    sys.stdout.flush()
+
+
+def main(host: str, port: str) -> int:
+    """Serve the page. Ctrl-C is meant for the grasping program; this process ends when its input ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # On Linux, a batch process does not preempt the control loop when it wakes up.
+    if hasattr(os, "SCHED_BATCH"):
+        os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
+    asyncio.run(serve_page(host, int(port)))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(*sys.argv[1:]))

@@ -1,0 +1,45 @@
+"""The messages of a `Feed` on the other side of the pipe."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from graspsense.recording.layout import (
+    IS_END,
+    IS_METADATA,
+    IS_SIGNAL,
+    IS_TICK,
+    IS_TOPIC,
+    LENGTH_WIRE,
+    SIGNAL_WIRE,
+    TICK_WIRE,
+)
+
+
+def complete_messages(buffer: bytearray) -> Iterator[tuple[bytes, int, bytes]]:
+    """Remove every complete message from the buffer, and yield its kind, the number of its topic (or 0), its body."""
+    at, end = 0, len(buffer)
+    try:
+        while at < end:
+            kind, number = bytes(buffer[at : at + 1]), 0
+            if kind == IS_END:
+                start, length = at + 1, 0
+            elif kind == IS_TICK:
+                start, length = at + 1, TICK_WIRE.size - 1
+            elif kind == IS_SIGNAL:
+                start = at + SIGNAL_WIRE.size
+                if start > end:
+                    break
+                _, length, number = SIGNAL_WIRE.unpack_from(buffer, at)
+            else:
+                assert kind in (IS_METADATA, IS_TOPIC)
+                start = at + LENGTH_WIRE.size
+                if start > end:
+                    break
+                length = LENGTH_WIRE.unpack_from(buffer, at)[1]
+            if start + length > end:
+                break
+            at = start + length
+            yield kind, number, bytes(buffer[start:at])
+    finally:
+        del buffer[:at]

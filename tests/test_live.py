@@ -1,0 +1,363 @@
+"""A grasp that is shown live: what viewers and observers receive, and what bad viewers cannot do."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from contextlib import ExitStack
+from urllib.error import HTTPError
+from urllib.request import Request, urlopen
+
+import click
+import pytest
+
+from graspsense.cli.live import _host_and_port
+from graspsense.core.pipeline.pipeline import load_pipeline
+from graspsense.core.values.channel import Channel, FastChannel, TactileArray
+from graspsense.core.values.device import DeviceInfo
+from graspsense.core.values.signals import EFFORT, NO_PADS, SQUEEZE, Command, Frame, Image, Reading, Samples
+from graspsense.core.values.errors import ConfigError
+from graspsense.live.feeds import LiveFeed
+from graspsense.plugin_api import signal_type
+
+pytest.importorskip("websockets")
+
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import connect
+
+PATIENCE_S = 60.0
+COMMAND = Command(EFFORT, 5.0, math.inf, math.inf)
+CHANNELS = (
+    Channel("gap", "m", 1000.0),
+    Channel("temperature", "K", 1000.0),
+    TactileArray("skin", "counts", 100.0, rows=2, columns=3),
+    FastChannel("sound", "V", 4000.0, samples=4, axes=("x", "y")),
+)
+
+
+Signals = signal_type(CHANNELS)
+
+
+def device():
+    return DeviceInfo(
+        name="hand",
+        simulated=True,
+        clock="device",
+        rate_hz=1000.0,
+        effort_limit_n=100.0,
+        speed_limit_m_s=0.1,
+        opening=COMMAND,
+        relaxed=COMMAND,
+        channels=CHANNELS,
+    )
+
+
+def reading(k):
+    t_s, nan = k / 1000, math.nan
+    frame = Frame(t_s, 0.001, 0.05 - k * 1e-5, 0.0, 1.0 + k, nan, nan, nan, nan, 0)
+    skin = Image(t_s, k + 1, tuple(float(k + i) for i in range(6)))
+    sound = Samples(t_s, 4 * k + 3, 3, (*((k + i / 4, -1.0) for i in range(3)), (nan, nan)))
+    return Reading(frame, NO_PADS, Signals(300.0 + k, skin, sound))
+
+
+@pytest.fixture
+def feed():
+    running = LiveFeed("graspsense.live.page_process", ["127.0.0.1", "0"])
+    yield running
+    assert running.close() == ""
+
+
+def frames_of(feed):
+    return feed.answer["address"].replace("http", "ws", 1) + "frames"
+
+
+def port_of(feed):
+    return int(feed.answer["address"].split(":")[2].partition("/")[0])
+
+
+def received(viewer, until):
+    """Return the messages up to the first of this kind."""
+    found = []
+    while not any(message["kind"] == until for message in found):
+        found += json.loads(viewer.recv(timeout=PATIENCE_S))
+    return found
+
+
+def refused(address, headers=None):
+    """Return the status with which a WebSocket is refused."""
+    with pytest.raises(InvalidStatus) as answer, connect(address, additional_headers=headers):
+        pass
+    return answer.value.response.status_code
+
+
+def shown(feed, n=20):
+    feed.opened(device())
+    for k in range(n):
+        feed.take(reading(k), SQUEEZE, COMMAND)
+    feed.told("outcome", {"outcome": "steady", "reason": ""})
+
+
+def column(messages, kind, name):
+    return [value for one in messages if one["kind"] == kind for value in one[name]]
+
+
+def check_received(messages, n=20):
+    sent = [reading(k) for k in range(n)]
+    assert column(messages, "ticks", "t_s") == [one.frame.t_s for one in sent]
+    assert column(messages, "ticks", "gap_m") == [one.frame.gap_m for one in sent]
+    assert column(messages, "ticks", "force_left_n") == [None] * n
+    assert column(messages, "scalars", "temperature") == [300.0 + k for k in range(n)]
+    assert column(messages, "samples", "values") == [[[k + i / 4, -1.0] for i in range(3)] for k in range(n)]
+    images = [one for one in messages if one["kind"] == "image"]
+    assert images[-1]["cells"] == [n - 1.0 + i for i in range(6)]
+
+
+def test_viewers_receive_every_tick_sample_and_image_before_and_after_they_come(feed):
+    with connect(frames_of(feed)) as early:
+        shown(feed)
+        check_received(received(early, "outcome"))
+        with connect(frames_of(feed)) as late:
+            check_received(received(late, "outcome"))
+        shown(feed, 5)
+        messages = received(early, "outcome")
+        assert messages[0]["kind"] == "grasp"
+        check_received(messages, 5)
+
+
+def test_a_new_grasp_replaces_the_one_before_for_viewers_who_come_later(feed):
+    shown(feed)
+    shown(feed, 5)
+    with connect(frames_of(feed)) as viewer:
+        messages = []
+        while not messages or messages[-1]["kind"] != "outcome":
+            messages += received(viewer, "outcome")
+    began = max(k for k, message in enumerate(messages) if message["kind"] == "grasp")
+    check_received(messages[began:], 5)
+
+
+@pytest.mark.parametrize("path", ["/", "/wrong/", "/wrong/frames"])
+def test_without_the_token_nothing_is_answered(feed, path):
+    assert refused(f"ws://127.0.0.1:{port_of(feed)}{path}") == 404
+
+
+@pytest.mark.parametrize(
+    "headers", [{"Origin": "http://elsewhere.example"}, {"Origin": "null"}], ids=["elsewhere", "null"]
+)
+def test_another_page_cannot_listen(feed, headers):
+    assert refused(frames_of(feed), headers) == 403
+
+
+@pytest.mark.parametrize("sent", ["x", b"\x00" * 100, "x" * 100_000], ids=["text", "bytes", "oversized"])
+def test_a_viewer_that_sends_something_is_dropped_and_the_others_stay(feed, sent):
+    with connect(frames_of(feed)) as good, connect(frames_of(feed)) as bad:
+        bad.recv(timeout=PATIENCE_S)
+        bad.send(sent)
+        with pytest.raises(ConnectionClosed):
+            bad.recv(timeout=PATIENCE_S)
+        shown(feed)
+        check_received(received(good, "outcome"))
+
+
+@pytest.mark.slow
+def test_rubbish_and_a_thousand_connections_disturb_nobody(feed):
+    with connect(frames_of(feed)) as good:
+        crowd = []
+        for k in range(1000):
+            one = socket.create_connection(("127.0.0.1", port_of(feed)))
+            crowd.append(one)
+            if k % 100 == 0:
+                one.sendall(os.urandom(2000))
+        shown(feed)
+        check_received(received(good, "outcome"))
+        for one in crowd:
+            one.close()
+
+
+def test_viewers_beyond_the_limit_are_refused(feed):
+    with ExitStack() as viewers:
+        for _ in range(16):
+            viewers.enter_context(connect(frames_of(feed)))
+        assert refused(frames_of(feed)) == 503
+    shown(feed)
+    until = time.monotonic() + PATIENCE_S
+    while True:
+        try:
+            with connect(frames_of(feed)) as viewer:
+                check_received(received(viewer, "outcome"))
+                return
+        except InvalidStatus:
+            assert time.monotonic() < until, "the places of those who left are not free"
+
+
+@pytest.mark.slow
+def test_a_viewer_that_stalls_is_dropped_and_no_tick_waits(feed):
+    request = (
+        f"GET {frames_of(feed)[5 + len('127.0.0.1:') + len(str(port_of(feed))) :]} HTTP/1.1\r\n"
+        f"Host: 127.0.0.1:{port_of(feed)}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+        "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n"
+    )
+    stalled = socket.socket()
+    stalled.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+    stalled.connect(("127.0.0.1", port_of(feed)))
+    stalled.sendall(request.encode())
+    assert stalled.recv(12) == b"HTTP/1.1 101"
+    with stalled, connect(frames_of(feed), max_size=None) as good:
+        feed.opened(device())
+        sent = 0
+        for k in range(0, 150_000, 1000):
+            for i in range(k, k + 1000):
+                feed.take(reading(i), SQUEEZE, COMMAND)
+            times = []
+            while not times or times[-1] < reading(k + 999).frame.t_s:
+                text = good.recv(timeout=PATIENCE_S)
+                sent += len(text)
+                times += column(json.loads(text), "ticks", "t_s")
+        assert times[-1] == reading(149_999).frame.t_s
+        assert feed.dropped == 0
+        assert _rest(stalled) < sent
+
+
+def _rest(connection):
+    """Return the number of bytes until the other side ends the connection."""
+    connection.settimeout(PATIENCE_S)
+    n = 0
+    try:
+        while data := connection.recv(1 << 20):
+            n += len(data)
+    except ConnectionResetError:
+        pass
+    return n
+
+
+def test_the_page_asks_for_nothing_from_outside(feed):
+    with urlopen(feed.answer["address"], timeout=PATIENCE_S) as answer:
+        text, policy = answer.read().decode(), answer.headers["Content-Security-Policy"]
+    assert policy.startswith("default-src 'none'")
+    assert "://" not in text
+
+
+def test_a_name_that_leads_to_this_machine_is_refused(feed):
+    """As a page elsewhere has it that makes its own name lead to 127.0.0.1."""
+    asked = Request(feed.answer["address"], headers={"Host": f"elsewhere.example:{port_of(feed)}"})
+    with pytest.raises(HTTPError) as refusal:
+        urlopen(asked, timeout=PATIENCE_S)
+    refusal.value.close()
+    assert refusal.value.code == 403
+
+
+def graspsense(*arguments):
+    command = [sys.executable, "-m", "graspsense", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+
+
+def test_a_port_that_is_taken_is_an_error_before_the_grasp(tmp_path):
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        done = graspsense("run", "--live-address", f"127.0.0.1:{port}", "--save", str(tmp_path / "store"))
+    assert done.returncode == 2
+    assert str(port) in done.stderr
+    assert "Traceback" not in done.stderr
+    assert not (tmp_path / "store").exists()
+
+
+@pytest.mark.parametrize("address", ["", ":80", "127.0.0.1:x", "127.0.0.1:70000", "[::1]:-1"])
+def test_an_address_that_is_none_is_wrong_use(address):
+    with pytest.raises(click.UsageError):
+        _host_and_port(address)
+
+
+def test_a_page_that_is_killed_loses_no_grasp(feed):
+    class Killer:
+        def __init__(self):
+            self.ticks = 0
+
+        def take(self, reading, phase, command):
+            self.ticks += 1
+            if self.ticks == 100:
+                os.kill(feed._process.pid, signal.SIGKILL)
+                feed._process.wait()
+
+    trial = load_pipeline("default").grasp(sinks=[Killer(), feed])
+    assert trial.outcome.words == "steady"
+    assert trial.reason == ""
+
+
+def test_a_trial_is_stored_as_without_a_page(tmp_path):
+    said = []
+    for name, live in (("with", ["--live"]), ("without", [])):
+        asked = ["run", "--save", str(tmp_path / name), "--seed", "3", "--json", *live]
+        done = graspsense(*asked)
+        assert done.returncode == 0, done.stderr
+        said.append(json.loads(done.stdout))
+    for one in said:
+        del one["seconds_wall"], one["kept"]["store"]
+    assert said[0] == said[1]
+
+
+OBSERVER = """
+import json, os, sys, time
+HERE = os.path.dirname(__file__)
+
+def observe(batches):
+    print("not an answer")
+    with open(os.path.join(HERE, "seen"), "w") as seen:
+        for messages in batches:
+            seen.writelines(json.dumps(message) + "\\n" for message in messages)
+
+def fail(batches):
+    next(batches)
+    raise ValueError("a mistake")
+
+def hang(batches):
+    time.sleep(1000)
+"""
+
+
+@pytest.fixture
+def observer(tmp_path, monkeypatch):
+    """Start an observer by the name of its function."""
+    (tmp_path / "lab_wall.py").write_text(OBSERVER)
+    monkeypatch.setenv("PYTHONPATH", f"{tmp_path}{os.pathsep}{os.environ.get('PYTHONPATH', '')}")
+    return lambda name: LiveFeed("graspsense.live.observer_process", [f"lab_wall:{name}"])
+
+
+def test_an_observer_of_a_plugin_receives_the_whole_grasp(tmp_path, observer):
+    feed = observer("observe")
+    shown(feed)
+    assert feed.close() == ""
+    messages = [json.loads(line) for line in (tmp_path / "seen").read_text().splitlines()]
+    assert column(messages, "ticks", "effort_n") == [1.0 + k for k in range(20)]
+    assert column(messages, "scalars", "temperature") == [300.0 + k for k in range(20)]
+    assert messages[0]["kind"] == "grasp"
+    assert messages[-1]["outcome"] == "steady"
+
+
+def test_an_observer_that_fails_is_named_and_the_grasp_goes_on(observer):
+    feed = observer("fail")
+    trial = load_pipeline("default").grasp(sinks=[feed])
+    assert (trial.outcome.words, trial.reason) == ("steady", "")
+    assert "lab_wall:fail" in (problem := feed.close())
+    assert "a mistake" in problem
+
+
+def test_an_observer_that_cannot_be_imported_is_an_error_at_its_start(observer):
+    with pytest.raises(ConfigError, match="missing"):
+        observer("missing")
+
+
+@pytest.mark.slow
+def test_an_observer_that_takes_nothing_is_stopped_at_the_end(observer):
+    feed = observer("hang")
+    feed.opened(device())
+    for k in range(100_000):
+        feed.take(reading(k), SQUEEZE, COMMAND)
+    assert feed.dropped > 0
+    assert "stopped" in feed.close()
