@@ -12,7 +12,8 @@ from graspsense_robotiq_2f85.modbus import Client, NoReply, SocketLine, crc, ope
 from graspsense_robotiq_2f85.registers import FORCES_N, SPEEDS_M_S, byte_of, gap_of, position_of
 
 from graspsense import WiringError, load_pipeline
-from graspsense.plugin_api import VELOCITY, Command, NoDevice, create, parametrize_checks
+from graspsense.plugin_api import VELOCITY, Command, NoDevice, create
+from graspsense.testing_api import parametrize_checks
 
 
 @pytest.fixture
