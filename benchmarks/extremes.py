@@ -32,7 +32,8 @@ from attrs import evolve, frozen
 from numpy.typing import NDArray
 from selection import controller_is_stable, error_of
 
-from graspsense.plugin_api import ConfigError, NotCompilable, RunConfig, bind, create
+from graspsense.plugin_api import ConfigError, create
+from graspsense.simulator_api import NotCompilable, RunConfig, bind
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant.state import PlantState
 from graspsense_sim_gripper.run.accuracy.model import Reduction

@@ -32,6 +32,7 @@ from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.runner import run_grasp
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import RecordingEnded
+from graspsense.gripper_api import no_signals
 from graspsense.plugin_api import (
     EFFORT,
     NO_PADS,
@@ -42,7 +43,6 @@ from graspsense.plugin_api import (
     Reading,
     TactileArray,
     create,
-    no_signals,
     signal_type,
 )
 from graspsense.recording.layout import DEVICE, START

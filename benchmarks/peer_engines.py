@@ -21,7 +21,7 @@ from peer_scenes import MODES, SCENES, PeerScene, law
 from scipy.integrate import solve_ivp
 from simulation_scene import KC, LIGHT, TICK, TICKS, X0, B, C, K, Law, M, Run
 
-from graspsense.plugin_api import RunConfig
+from graspsense.simulator_api import RunConfig
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.batch.job import Job, Storage, grasp_compiled
 from graspsense_sim_gripper.run.batch.scenes import Scenes

@@ -21,7 +21,7 @@ from attrs import evolve, frozen
 from numba import njit
 from simulation_scene import CONFIG, KC, LIGHT, OPEN_M, X0, B, C, K, M, closed_law
 
-from graspsense.plugin_api import gap_and_rate, revolutions_at
+from graspsense.gripper_api import gap_and_rate, revolutions_at
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant.drive_models import LINKAGES
 

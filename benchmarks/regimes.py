@@ -33,7 +33,8 @@ from selection import KINDS, Bench, Scene, controller_is_stable, record_of
 
 from graspsense.evaluation.intervals import wilson
 from graspsense.experiments.versions import where_measured
-from graspsense.plugin_api import ConfigError, RunConfig, create
+from graspsense.plugin_api import ConfigError, create
+from graspsense.simulator_api import RunConfig
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.accuracy.error import deviation
 from graspsense_sim_gripper.run.accuracy.model import Reduction

@@ -40,7 +40,9 @@ from scipy.stats import binomtest
 from selection import KINDS, Bench, Scene, controller_is_stable
 
 from graspsense.experiments.versions import where_measured
-from graspsense.plugin_api import ConfigError, Features, Outcome, RunConfig, create
+from graspsense.gripper_api import Outcome
+from graspsense.plugin_api import ConfigError, Features, create
+from graspsense.simulator_api import RunConfig
 from graspsense_sim_gripper.run.accuracy.error import UNIT_SCALES
 from graspsense_sim_gripper.run.accuracy.select import select
 from graspsense_sim_gripper.run.batch.job import Job, grasp_once, grasp_plain

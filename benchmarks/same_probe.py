@@ -23,7 +23,8 @@ import attrs
 import numpy as np
 
 from graspsense import load_pipeline
-from graspsense.plugin_api import RunConfig, create
+from graspsense.plugin_api import create
+from graspsense.simulator_api import RunConfig
 
 CONTROLLERS: Final = ("hybrid", "velocity", "force")
 SENSORS: Final = ("ideal", "pads")

@@ -24,7 +24,8 @@ from typing import Any, Final
 import numpy as np
 from attrs import evolve, frozen
 
-from graspsense.plugin_api import HOLD, ConfigError, RunConfig, create
+from graspsense.plugin_api import HOLD, ConfigError, create
+from graspsense.simulator_api import RunConfig
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.accuracy.error import GraspRecord, deviation
 from graspsense_sim_gripper.run.accuracy.model import Reduction

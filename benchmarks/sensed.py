@@ -20,7 +20,7 @@ from attrs import asdict
 from graspsense.core.components.config import resolve
 from graspsense.experiments.sensed import SensedTrade, sensed_trade
 from graspsense.experiments.versions import where_measured
-from graspsense.plugin_api import SimulationVariant
+from graspsense.simulator_api import SimulationVariant
 from graspsense_sim_gripper.run.variants import variants
 
 

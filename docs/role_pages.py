@@ -8,10 +8,12 @@ A test compares the pages with the output of this script.
 from __future__ import annotations
 
 import ast
+import enum
 import inspect
 import re
 import sys
 from collections.abc import Sequence
+from importlib import import_module
 from importlib.resources import files
 from itertools import pairwise
 from pathlib import Path
@@ -20,9 +22,17 @@ from typing import Any
 
 import attrs
 
-from graspsense import plugin_api
+from graspsense import (
+    classifier_api,
+    experiment_api,
+    gripper_api,
+    plugin_api,
+    simulator_api,
+    testing_api,
+)
 from graspsense.core.components import compiled_features, entries, hookspecs, roles, strict
 from graspsense.core.components.entries import DECLARED, TABLE_OF_ROLE
+from graspsense.core.components.moved_names import REPLACED, moved
 from graspsense.core.control import contact, free_motion, tick
 from graspsense.core.values import signals
 from graspsense.core.values.channel import Channel, FastChannel, TactileArray
@@ -40,6 +50,10 @@ from graspsense.scaffold.make import KINDS, plugin_module, words_of
 from graspsense.sources.grasp_columns import GraspColumns, checked_recording
 from graspsense.testing import CHECKS, MINIMUM_CHECKS
 
+DOORS = (plugin_api, gripper_api, classifier_api, experiment_api, testing_api, simulator_api)
+"""The public modules for authors of plugins."""
+MOVES = Path(__file__).parent / "from-1-to-2.md"
+DOOR_OF = {name: door for door in DOORS for name in door.__all__}
 FOLDER = Path(__file__).parent / "roles"
 TITLES = {
     "sensor-backend": "A gripper",
@@ -299,13 +313,14 @@ def helpers_page() -> str:
     lines = [
         HEAD + "# Helpers",
         "",
-        "These functions and constants of `graspsense.plugin_api` are for use in components and their tests. The "
-        "features and controllers of graspsense use the same functions, so that all of them agree on contact and rest.",
+        "These functions and constants are for use in components and their tests. The "
+        "features and controllers of graspsense use the same functions, so that all of them agree on contact and rest. "
+        "They are in `graspsense.plugin_api` unless another module is named.",
         "",
     ]
     for title, names in HELPERS.items():
         lines += [f"## {title}", ""]
-        constants = [name for name in names if not callable(getattr(plugin_api, name))]
+        constants = [name for name in names if not callable(public(name))]
         if constants:
             lines += ["| constant | value | meaning |", "|---|---|---|"]
             lines += [_constant(name) for name in constants]
@@ -318,16 +333,114 @@ def helpers_page() -> str:
 
 def _helper(name: str) -> list[str]:
     """Return the section on one function or named tuple: signature, meaning and example."""
-    helper = getattr(plugin_api, name)
-    # The quotes of annotations go, those of default values stay.
-    signature = re.sub(r"(: |-> )'([^']+)'", r"\1\2", str(inspect.signature(helper)))
-    signature = re.sub(r"ForwardRef\('?(\w+)'?\)", r"\1", signature)
-    return [f"### {name}", "", f"    {name}{signature}", "", *_meaning(helper), *_docstring_example(helper)]
+    helper = public(name)
+    door = DOOR_OF[name]
+    home = [] if door is plugin_api else [f"It is in `{door.__name__}`.", ""]
+    return [
+        *(f"### {name}", "", f"    {name}{_signature(helper)}", "", *home),
+        *(*_meaning(helper), *_docstring_example(helper)),
+    ]
+
+
+def public(name: str) -> Any:
+    """Return what a public name stands for."""
+    return getattr(DOOR_OF[name], name)
+
+
+def _signature(called: Any) -> str:
+    """Return the signature of a function or class; the quotes of annotations go, those of default values stay."""
+    signature = re.sub(r"(: |-> )'([^']+)'", r"\1\2", str(inspect.signature(called)))
+    return re.sub(r"ForwardRef\('?(\w+)'?\)", r"\1", signature)
+
+
+def names_page() -> str:
+    """Return the page of every public name, in the groups of its module."""
+    lines = [
+        HEAD + "# Public names",
+        "",
+        "Everything that a plugin may import. The roles, [signals](signals.md) and [helpers](helpers.md) have pages "
+        "with examples.",
+        "",
+    ]
+    for door in DOORS:
+        lines += [
+            f"## graspsense.{door.__name__.rpartition('.')[2]}",
+            "",
+            _text(door).partition("\n\n")[0],
+            "",
+        ]
+        for title, homes in door.PUBLIC.table.items():
+            lines += [f"### {title}", "", "| name | meaning |", "|---|---|"]
+            lines += [_public_row(home, name) for home, names in homes.items() for name in names]
+            lines.append("")
+    return "\n".join(lines)
+
+
+def moved_section() -> str:
+    """Return the section on the names that `graspsense.plugin_api` no longer has, for the page from 1 to 2."""
+    by_module: dict[str, list[str]] = {}
+    for name, replacement in moved():
+        by_module.setdefault(replacement.split()[1], []).append(f"`{name}`")
+    lines = [
+        MOVED_TITLE,
+        "",
+        "`graspsense.plugin_api` has what every plugin needs; other names are in modules for few plugins ([public "
+        "names](roles/names.md)). `graspsense plugins check DISTRIBUTION` prints each line that imports a moved name, "
+        "with the new form beside it.",
+        "",
+        "| module | names |",
+        "|---|---|",
+        *(f"| `{module}` | {', '.join(names)} |" for module, names in sorted(by_module.items())),
+        "",
+        "| no longer public | in its place |",
+        "|---|---|",
+        *(f"| `{name}` | {replacement} |" for name, replacement in REPLACED.items()),
+    ]
+    return "\n".join([*lines, ""])
+
+
+MOVED_TITLE = "## Names that moved"
+
+
+def _public_row(home: str, name: str) -> str:
+    """Return the row of a name: with its signature if it is called, and the first sentence of its meaning."""
+    value = getattr(import_module(f"graspsense.{home}"), name)
+    if not callable(value):
+        return f"| `{name}` | {_cell(_sentence(_text_below(home, name)) or f'the value {value!r}')} |"
+    if inspect.isclass(value):
+        shown = name if issubclass(value, BaseException | enum.Enum) else _fields_of(value)
+    else:
+        shown = f"{name}{_signature(value)}"
+    return f"| `{_cell(shown)}` | {_cell(_sentence(inspect.getdoc(value) or ''))} |"
+
+
+def _fields_of(cls: Any) -> str:
+    """Return a class with its fields, without them if it has none."""
+    fields = getattr(cls, "_fields", None) or tuple(
+        one.alias for one in getattr(cls, "__attrs_attrs__", ()) if one.init
+    )
+    return f"{cls.__name__}({', '.join(fields)})" if fields else cls.__name__
+
+
+def _sentence(text: str) -> str:
+    """Return the first sentence of a docstring."""
+    return re.split(r"(?<=[.:]) (?=[A-Z])", " ".join(text.partition("\n\n")[0].split()))[0]
+
+
+def _text_below(home: str, name: str) -> str:
+    """Return the docstring that follows the definition of a constant in its module, empty if there is none."""
+    body = ast.parse(inspect.getsource(import_module(f"graspsense.{home}"))).body
+    for one, text in pairwise(body):
+        if isinstance(one, ast.Assign | ast.AnnAssign) and isinstance(text, ast.Expr):
+            target = one.targets[0] if isinstance(one, ast.Assign) else one.target
+            if ast.unparse(target) == name:
+                return str(ast.literal_eval(text.value))
+    return ""
 
 
 def _constant(name: str) -> str:
     """Return the row of a constant, with the docstring that follows it in its module."""
-    value = getattr(plugin_api, name)
+    value = public(name)
     for module in (signals, contact, tick):
         body = ast.parse(inspect.getsource(module)).body
         for one, text in pairwise(body):
@@ -387,8 +500,8 @@ def _many() -> list[str]:
     return [
         "## Many grasps at once",
         "",
-        f"`graspsense.plugin_api.BatchBackend`: {_text(roles.BatchBackend)} Experiments and simulated trials use this "
-        "class. A sensor backend does not have to be a batch backend.",
+        f"`graspsense.simulator_api.BatchBackend`: {_text(roles.BatchBackend)} Experiments and simulated trials use "
+        "this class. A sensor backend does not have to be a batch backend.",
         "",
         *_methods(roles.BatchBackend),
         f"`BatchOptions`: {_text(roles.BatchOptions)}",
@@ -482,6 +595,9 @@ def main() -> None:
         (FOLDER / f"{role}.md").write_text(page(role), encoding="utf-8")
     (FOLDER / "hooks.md").write_text(hooks_page(), encoding="utf-8")
     (FOLDER / "helpers.md").write_text(helpers_page(), encoding="utf-8")
+    (FOLDER / "names.md").write_text(names_page(), encoding="utf-8")
+    kept = MOVES.read_text(encoding="utf-8").partition(MOVED_TITLE)[0].rstrip()
+    MOVES.write_text(f"{kept}\n\n{moved_section()}", encoding="utf-8")
     (FOLDER / "signals.md").write_text(signals_page(), encoding="utf-8")
 
 

@@ -27,6 +27,7 @@ from parts import (
     channels,
 )
 
+from graspsense.gripper_api import FingerForce, StatusBit
 from graspsense.plugin_api import (
     APPROACH,
     EFFORT,
@@ -38,19 +39,15 @@ from graspsense.plugin_api import (
     Channel,
     ClassifierConfig,
     Command,
-    CompiledFeatures,
     Features,
-    FingerForce,
-    FreeLimits,
-    FreeMotion,
     Image,
     ObjectKind,
     Reading,
-    StatusBit,
     UnknownName,
     setting,
     signal_type,
 )
+from graspsense.simulator_api import CompiledFeatures, FreeLimits, FreeMotion
 from graspsense.testing.gentle import GentleState, step
 
 

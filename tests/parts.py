@@ -9,6 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from attrs import evolve, frozen
 
+from graspsense.classifier_api import in_words
+from graspsense.gripper_api import TareRefused
 from graspsense.plugin_api import (
     EFFORT,
     NAMES_INPUT,
@@ -18,7 +20,6 @@ from graspsense.plugin_api import (
     ClassifierConfig,
     ClassifierEntry,
     Command,
-    CompiledFeatures,
     Controller,
     ControllerEntry,
     DeviceInfo,
@@ -36,10 +37,9 @@ from graspsense.plugin_api import (
     SensorBackend,
     SensorBackendEntry,
     TactileArray,
-    TareRefused,
-    in_words,
     setting,
 )
+from graspsense.simulator_api import CompiledFeatures
 from graspsense.testing.gentle import GentleController as Gentle
 from graspsense.testing.gentle import GentleParams, GentleState, step
 from graspsense.testing.model_gripper import ModelGripper
@@ -230,7 +230,7 @@ class Nearest(Classifier[ClassifierConfig]):
         return weight / weight.sum(axis=1, keepdims=True)
 
     def explain(self, features):
-        from graspsense.plugin_api import table_of
+        from graspsense.classifier_api import table_of
 
         shares = self.probabilities(table_of([features]))[0].tolist()
         name, value, unit = features.names[0], features.values[0], features.units[0]
@@ -251,7 +251,7 @@ class Nearest(Classifier[ClassifierConfig]):
 
 
 def channels(*names, rate_hz=1000.0):
-    from graspsense.plugin_api import CHANNELS
+    from graspsense.simulator_api import CHANNELS
 
     return tuple(
         TactileArray(name, "counts", rate_hz, rows=2, columns=11)

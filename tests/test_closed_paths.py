@@ -167,7 +167,7 @@ def test_a_calibration_that_another_user_could_have_changed_is_refused(
 PROGRAM = """
     import os
     os.umask(int(os.environ["MASK"], 8))
-    from graspsense.plugin_api import compile_function, is_on_disk
+    from graspsense.simulator_api import compile_function, is_on_disk
 
     def law(x):
         return 2.0 * x

@@ -15,7 +15,7 @@ import pytest
 from graspsense.core.compiling import compiled_code_folder as folder_module
 from graspsense.core.compiling import compiling
 from graspsense.core.compiling.compiled_code_folder import compiled_code_folder, delete_older_half
-from graspsense.plugin_api import (
+from graspsense.simulator_api import (
     CompileOptions,
     NotCompilable,
     bind,
@@ -236,7 +236,7 @@ def test_without_numba_the_message_names_what_to_install(monkeypatch):
 
 COMPOSE = """
     import sys
-    from graspsense.plugin_api import CompileOptions, bind, compile_function
+    from graspsense.simulator_api import CompileOptions, bind, compile_function
 
     part = None
 
@@ -293,7 +293,7 @@ def test_compositions_compiled_in_three_processes_stay_themselves_in_a_fourth(tm
 MAIN = """
     import numbers_of_law
     from laws import helper
-    from graspsense.plugin_api import compile_function
+    from graspsense.simulator_api import compile_function
 
     def law(x):
         return helper(x) * numbers_of_law.SCALE
@@ -328,7 +328,7 @@ def test_code_of_a_version_with_other_types_is_made_anew(tmp_path):
     run = """
 import shapes
 from law import law
-from graspsense.plugin_api import compile_function
+from graspsense.simulator_api import compile_function
 compiled = compile_function(law)
 print(compiled(shapes.{name}(3.0)), sum(compiled.stats.cache_hits.values()))
 """
@@ -372,7 +372,7 @@ def test_what_an_earlier_process_compiled_is_known_to_be_on_disk(tmp_path):
     program, asks = tmp_path / "compose.py", tmp_path / "asks.py"
     program.write_text(textwrap.dedent(COMPOSE))
     asks.write_text(
-        "import sys\nsys.argv[1:] = []\nfrom compose import laws\nfrom graspsense.plugin_api import is_on_disk\n"
+        "import sys\nsys.argv[1:] = []\nfrom compose import laws\nfrom graspsense.simulator_api import is_on_disk\n"
         "print([is_on_disk(*law) for law in laws.values()], 'numba' in sys.modules)\n"
     )
     cache = {"XDG_CACHE_HOME": str(tmp_path / "cache"), "NUMBA_CACHE_DIR": ""}

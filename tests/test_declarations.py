@@ -245,7 +245,7 @@ def test_a_law_with_the_numbers_of_its_config_is_compiled_once_and_then_loaded(t
     (tmp_path / "lab_slow.py").write_text(
         "from attrs import frozen\n"
         "from graspsense.core.components.step_params import params_of\n"
-        "from graspsense.plugin_api import compile_function, first_call\n"
+        "from graspsense.simulator_api import compile_function, first_call\n"
         "@frozen\n"
         "class SlowConfig:\n"
         "    speed_m_s: float = 0.5\n"

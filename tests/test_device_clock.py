@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from graspsense.plugin_api import DeviceClock
+from graspsense.gripper_api import DeviceClock
 
 
 def fed(clock, seconds, drift, offset_s, seed, rate_hz=200.0, least_s=0.0):

@@ -15,9 +15,9 @@ from pathlib import Path
 import click
 import numpy
 import pytest
-from test_imports import MAY_KNOW, ROOMS
+from test_imports import DOORS, MAY_KNOW, ROOMS
 
-from graspsense import plugin_api
+from graspsense import plugin_api, simulator_api
 from graspsense.cli.main import cli
 from graspsense.experiments.experiment import read_experiment
 
@@ -72,12 +72,34 @@ def test_the_page_of_helpers_is_that_of_their_docstrings():
     assert written == PAGES.helpers_page(), "run: python docs/role_pages.py"
 
 
-HELPERS = [name for names in PAGES.HELPERS.values() for name in names if callable(getattr(plugin_api, name))]
+def test_the_page_of_public_names_is_that_of_their_tables():
+    written = (ROOT / "docs" / "roles" / "names.md").read_text(encoding="utf-8")
+    assert written == PAGES.names_page(), "run: python docs/role_pages.py"
+    undocumented = [
+        line for line in written.splitlines() if line.startswith("| `") and line.endswith("` |  |")
+    ]
+    assert not undocumented
+
+
+def test_every_name_that_all_plugins_share_is_on_a_page_with_its_meaning():
+    pages = "\n".join(page.read_text(encoding="utf-8") for page in PAGES.FOLDER.glob("*.md"))
+    for name in plugin_api.__all__:
+        row = re.search(rf"^\| `{name}(?:\(.*)?` \| (.+) \|$", pages, re.MULTILINE)
+        assert row, name
+        assert "the value " not in row[1][:10], f"{name} has no docstring"
+
+
+def test_the_page_of_moved_names_has_each_of_them():
+    page = (ROOT / "docs" / "from-1-to-2.md").read_text(encoding="utf-8")
+    assert page.endswith(PAGES.moved_section()), "run: python docs/role_pages.py"
+
+
+HELPERS = [name for names in PAGES.HELPERS.values() for name in names if callable(PAGES.public(name))]
 
 
 @pytest.mark.parametrize("name", HELPERS)
 def test_a_helper_has_an_example_that_holds(name):
-    helper = getattr(plugin_api, name)
+    helper = PAGES.public(name)
     finder = doctest.DocTestFinder(recurse=False)
     (example,) = finder.find(helper, name, globs={**vars(sys.modules[helper.__module__]), "np": numpy})
     if name != "RestState":
@@ -87,7 +109,7 @@ def test_a_helper_has_an_example_that_holds(name):
 
 
 def test_the_example_of_a_compiled_form_of_features_holds():
-    (example,) = doctest.DocTestFinder(recurse=False).find(plugin_api.CompiledFeatures, globs={})
+    (example,) = doctest.DocTestFinder(recurse=False).find(simulator_api.CompiledFeatures, globs={})
     assert example.examples
     assert doctest.DocTestRunner().run(example).failed == 0
 
@@ -95,7 +117,7 @@ def test_the_example_of_a_compiled_form_of_features_holds():
 def test_the_table_of_packages_is_the_rule_that_is_enforced():
     packages = {name: used for name, used in MAY_KNOW.items() if not name.startswith("__")}
     table = {row[0].strip("`"): set(re.findall(r"`(\w+)`", row[2])) for row in architecture_rows("Packages")}
-    unused = {"plugins", "plugin_api", "experiment_api"}
+    unused = {"plugins", *DOORS}
     assert table.pop("cli") == unused, "the cli may use all packages but these"
     packages["cli"] |= unused
     assert packages.pop("cli") == packages.keys() | {"cli"}

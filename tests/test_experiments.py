@@ -17,6 +17,7 @@ from graspsense.cli.main import main
 from graspsense.core.components.registry import IsolatedPlugins
 from graspsense.core.values.errors import ConfigError, UnknownName
 from graspsense.evaluation.over_seeds import OverSeeds, mean_difference
+from graspsense.experiment_api import ExperimentEntry
 from graspsense.experiments.executors.serial import Serial
 from graspsense.experiments.experiment import read_experiment, shipped
 from graspsense.experiments.results import Results
@@ -24,7 +25,7 @@ from graspsense.experiments.run import run_experiment
 from graspsense.experiments.summary import summarise
 from graspsense.experiments.task import Task, TaskResult
 from graspsense.experiments.timing import TimeLeft
-from graspsense.plugin_api import ExperimentEntry, hookimpl
+from graspsense.plugin_api import hookimpl
 from graspsense.store.store import Store
 
 EXPERIMENT = """

@@ -21,19 +21,18 @@ from graspsense.core.control.contact import both_touch
 from graspsense.core.pipeline.pipeline import grasp_with
 from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.core.values.fingers import fingers_of
+from graspsense.gripper_api import FingerForce, opposed_forces
 from graspsense.plugin_api import (
     NAMES_INPUT,
     Channel,
     Feature,
     FeatureSet,
     FeatureSetEntry,
-    FingerForce,
     Reading,
     SensorBackend,
     SensorBackendEntry,
     create,
     hookimpl,
-    opposed_forces,
     setting,
     signal_type,
 )

@@ -19,14 +19,9 @@ from graspsense.core.values.features import Features
 from graspsense.core.values.signals import Outcome, Phase
 from graspsense.core.values.trace import trace_of
 from graspsense.core.values.trial import RunInfo, Trial
-from graspsense.plugin_api import (
-    CommandEntry,
-    ExperimentKindEntry,
-    PluginUnavailable,
-    UnknownName,
-    collect,
-    hookimpl,
-)
+from graspsense.experiment_api import ExperimentKindEntry
+from graspsense.plugin_api import CommandEntry, PluginUnavailable, UnknownName, hookimpl
+from graspsense.simulator_api import collect
 
 HOOKS = {name: spec for name, spec in vars(hookspecs).items() if name.startswith("graspsense_")}
 DOCS = (Path(__file__).parents[1] / "docs" / "hooks.md").read_text()

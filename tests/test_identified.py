@@ -14,7 +14,8 @@ from graspsense.core.components.identification import RecordedSqueeze
 from graspsense.core.components.registry import IsolatedPlugins
 from graspsense.core.values.errors import ConfigError, UnknownName
 from graspsense.core.values.trace import trace_of
-from graspsense.plugin_api import IdentifierEntry, hookimpl
+from graspsense.plugin_api import hookimpl
+from graspsense.simulator_api import IdentifierEntry
 from graspsense.sources import squeezes as module
 from graspsense.sources.identified import gripper_flags, identified_scenes
 from graspsense.sources.squeezes import recorded_squeezes

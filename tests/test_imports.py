@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import importlib
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -13,14 +14,18 @@ from sources import parsed, statements
 
 import graspsense
 from graspsense import plugin_api
+from graspsense.core.components.moved_names import REPLACED, SPECIAL, new_form
 
 ROOT = Path(__file__).parents[1]
 SOURCE = ROOT / "src" / "graspsense"
 
+DOORS = ("plugin_api", *SPECIAL)
+"""The modules that plugins may import from."""
+
 MAY_KNOW = {
     "__main__": {"cli"},
     "core": {"core"},
-    "plugins": {"plugin_api", "plugins"},
+    "plugins": {*DOORS, "plugins"},
     "recording": {"core", "recording"},
     "store": {"core", "recording", "store"},
     "sources": {"core", "recording", "store", "sources"},
@@ -43,10 +48,9 @@ MAY_KNOW = {
         "testing",
         "cli",
     },
-    "testing": {"core", "plugin_api", "recording", "sources", "testing"},
+    "testing": {"core", "plugin_api", "testing_api", "recording", "sources", "testing"},
     "scaffold": {"core", "scaffold"},
-    "plugin_api": {"core"},
-    "experiment_api": {"core", "sources", "evaluation", "report", "experiments"},
+    **{door: {"core"} for door in DOORS},
     "__init__": {"core"},
 }
 """Subpackage to the subpackages it may import from; every subpackage may import the package itself, for its version."""
@@ -198,8 +202,7 @@ def test_core_names_the_other_subpackages_in_one_place_only():
 
 def _is_target(text: str) -> bool:
     return any(
-        text.startswith(f"graspsense.{subpackage}.")
-        for subpackage in MAY_KNOW.keys() - {"core", "plugin_api", "experiment_api"}
+        text.startswith(f"graspsense.{subpackage}.") for subpackage in MAY_KNOW.keys() - {"core", *DOORS}
     )
 
 
@@ -209,7 +212,7 @@ def test_a_distribution_knows_the_door_for_authors_only(folder):
     for path in files(package):
         names = set(imported(parsed(path), package.name))
         known = {name for name in names if name.split(".")[0] == "graspsense"}
-        allowed = {"graspsense.plugin_api", "graspsense.experiment_api"}
+        allowed = {f"graspsense.{door}" for door in DOORS}
         # The trees need nothing of graspsense; the compiled engine does, and is optional.
         if folder.name == "c45" and path.name not in {"plugin.py", "compiled.py"}:
             allowed = set()
@@ -262,7 +265,7 @@ def test_nothing_loads_what_could_run_code():
 
 
 def test_importing_the_doors_is_light_and_loads_no_plugin():
-    loaded = loaded_after("import graspsense, graspsense.plugin_api")
+    loaded = loaded_after(f"import graspsense, {', '.join(f'graspsense.{door}' for door in DOORS)}")
 
     assert not loaded & (HEAVY | {"pluggy", "attr", "click"})
 
@@ -295,24 +298,51 @@ def test_listing_plugins_loads_no_driver_and_nothing_heavy(arguments):
     assert not loaded_after(COMMAND, *arguments) & HEAVY
 
 
-def test_type_checkers_see_the_names_of_the_tables():
-    for public, stub in ((graspsense.PUBLIC, "__init__.pyi"), (plugin_api.PUBLIC, "plugin_api.pyi")):
-        assert (SOURCE / stub).read_text() == public.stub() + "\n"
+PUBLIC_MODULES = [graspsense, *(importlib.import_module(f"graspsense.{door}") for door in DOORS)]
 
 
-def test_each_public_module_lists_a_name_once():
-    for public in (graspsense.PUBLIC, plugin_api.PUBLIC):
-        names = [name for homes in public.table.values() for part in homes.values() for name in part]
-        assert sorted(names) == public.names == sorted(set(names))
+@pytest.mark.parametrize("door", PUBLIC_MODULES, ids=lambda door: door.__name__)
+def test_type_checkers_see_the_names_of_the_tables(door):
+    stub = "__init__" if door is graspsense else door.__name__.removeprefix("graspsense.")
+    assert (SOURCE / f"{stub}.pyi").read_text() == door.PUBLIC.stub() + "\n"
 
 
-@pytest.mark.parametrize("door", [graspsense, plugin_api], ids=["graspsense", "plugin_api"])
+@pytest.mark.parametrize("door", PUBLIC_MODULES, ids=lambda door: door.__name__)
+def test_each_public_module_lists_a_name_once(door):
+    names = [name for homes in door.PUBLIC.table.values() for part in homes.values() for name in part]
+    assert sorted(names) == door.PUBLIC.names == sorted(set(names))
+
+
+@pytest.mark.parametrize("door", PUBLIC_MODULES, ids=lambda door: door.__name__)
 def test_every_name_of_a_door_can_be_imported(door):
     for name in door.__all__:
         assert getattr(door, name) is not None
         assert name in dir(door)
     with pytest.raises(AttributeError, match="has no attribute 'nosuch'"):
         door.nosuch  # noqa: B018
+
+
+def test_what_every_plugin_may_import_are_at_most_seventy_names_that_no_special_module_repeats():
+    assert len(plugin_api.__all__) <= 70
+    special = [name for door in PUBLIC_MODULES[2:] for name in door.__all__ if name != "structured"]
+    assert len(special) == len(set(special))
+    assert not set(special) & set(plugin_api.__all__)
+    assert not set(REPLACED) & {*special, *plugin_api.__all__}
+
+
+def test_a_name_that_moved_says_where_it_is_now():
+    with pytest.raises(ImportError, match=r"from graspsense\.gripper_api import tare"):
+        from graspsense.gripper_api import tare  # noqa: F401
+    with pytest.raises(ImportError, match="import RestState"):
+        from graspsense.plugin_api import Stillness  # noqa: F401
+    assert new_form("Channel") == ""
+
+
+def test_examples_need_nothing_of_the_simulators_module():
+    paths = [path for path in (ROOT / "examples").rglob("*.py") if "mujoco" not in path.parts]
+    assert paths
+    for path in paths:
+        assert "graspsense.simulator_api" not in set(imported(parsed(path), "")), path.relative_to(ROOT)
 
 
 def test_settings_are_read_without_the_simulator():

@@ -6,7 +6,8 @@ import pytest
 
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.runner import run_grasp
-from graspsense.plugin_api import CHANNELS, Channel, FastChannel, TactileArray, create
+from graspsense.plugin_api import Channel, FastChannel, TactileArray, create
+from graspsense.simulator_api import CHANNELS
 from graspsense.testing.model_gripper import OBJECTS, TICKS_OF_AN_IMAGE, ModelGripper
 
 PADS = TactileArray("pads", "counts", 24.0, rows=2, columns=3)

@@ -13,7 +13,8 @@ from graspsense.core.components.registry import installed
 from graspsense.core.grasp.runner import run_grasp
 from graspsense.core.pipeline.pipeline import grasp_with
 from graspsense.core.values.errors import ConfigError
-from graspsense.plugin_api import Mounting, create
+from graspsense.gripper_api import Mounting
+from graspsense.plugin_api import create
 from graspsense.recording.export_trace import WRITERS
 from graspsense.recording.reader import read_recorded
 from graspsense.recording.trial_record import DeviceRecord

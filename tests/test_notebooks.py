@@ -16,7 +16,7 @@ from graspsense.core.values.errors import PluginUnavailable
 from graspsense.evaluation.confusion import Confusion
 from graspsense.evaluation.intervals import RecognitionRate
 from graspsense.evaluation.results import Measurement
-from graspsense.plugin_api import a_trial, squeeze, with_channels
+from graspsense.testing_api import a_trial, squeeze, with_channels
 
 ROOT = Path(__file__).parents[1]
 PAGES = [*ROOT.glob("docs/**/*.md"), ROOT / "README.md", *ROOT.glob("examples/*/README.md")]

@@ -10,19 +10,15 @@ from parts import CHANNELS_OF_HAND, Hand, HandConfig, channels
 
 from graspsense.cli.main import main
 from graspsense.core.components.registry import IsolatedPlugins
-from graspsense.plugin_api import (
-    NAMES_INPUT,
-    SensorBackend,
-    SensorBackendEntry,
+from graspsense.gripper_api import (
     calibrations_of,
     cells_force,
-    hookimpl,
     load_of,
-    setting,
     stored_gain,
     stored_tables,
     stored_zero,
 )
+from graspsense.plugin_api import NAMES_INPUT, SensorBackend, SensorBackendEntry, hookimpl, setting
 
 HERE = sys.modules[__name__]
 NUMBERS = {"pad_counts_per_n": 2200.0}

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
+import subprocess
+import sys
 
 import parts
 import pytest
@@ -11,6 +14,7 @@ from mutants import MUTANTS
 from graspsense.cli.main import main
 from graspsense.core.components.registry import IsolatedPlugins
 from graspsense.plugin_api import hookimpl
+from graspsense.scaffold.make import make
 from graspsense.testing import CHECKS
 
 
@@ -91,6 +95,44 @@ def test_a_name_that_nobody_has(graspsense):
 
     assert code == 2
     assert "Did you mean 'chitta'?" in err
+
+
+OLD = """import graspsense.plugin_api as api
+from graspsense.gripper_api import tare
+from graspsense.plugin_api import Channel, Stillness
+bound = api.bind
+"""
+
+
+@pytest.mark.parametrize("module", ["older", "plugin"])
+def test_imports_that_moved_are_printed_with_the_new_form_beside(tmp_path, module):
+    make("lab-old", ["observer"], tmp_path / "old")
+    source = tmp_path / "old" / "src"
+    path = source / "lab_old" / f"{module}.py"
+    path.write_text(OLD + (path.read_text() if path.exists() else ""))
+    (source / "lab_old-1.dist-info").mkdir()
+    (source / "lab_old-1.dist-info" / "METADATA").write_text(
+        "Metadata-Version: 2.1\nName: lab-old\nVersion: 1\n"
+    )
+    (source / "lab_old-1.dist-info" / "entry_points.txt").write_text(
+        "[graspsense.plugins]\nlab-old = lab_old.plugin\n"
+    )
+
+    ran = subprocess.run(
+        [sys.executable, "-m", "graspsense", "plugins", "check", "lab-old"],
+        env={**os.environ, "PYTHONPATH": str(source)},
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+
+    assert ran.returncode == 1, ran.stderr
+    said = ran.stdout + ran.stderr
+    old = "from graspsense.plugin_api import"
+    assert f"{module}.py:4: {old} Stillness -> from graspsense.plugin_api import RestState" in said
+    assert f"{module}.py:5: {old} tare -> from graspsense.gripper_api import tare" in said
+    assert f"{module}.py:7: api.bind -> from graspsense.simulator_api import bind" in said
+    assert "Channel ->" not in said
 
 
 def test_a_new_package_says_what_to_do_next(graspsense, tmp_path):

@@ -7,7 +7,8 @@ import threading
 
 import pytest
 
-from graspsense.plugin_api import DeviceLost, ReadingThread
+from graspsense.gripper_api import ReadingThread
+from graspsense.plugin_api import DeviceLost
 
 
 class Wire:

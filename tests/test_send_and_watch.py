@@ -19,7 +19,6 @@ from graspsense.core.grasp.runner import run_grasp
 from graspsense.core.values.errors import ConfigError
 from graspsense.core.values.signals import EFFORT, FORCE, POSITION, VELOCITY, Command, Outcome, Phase, Reading
 from graspsense.plugin_api import (
-    CHANNELS,
     Channel,
     ObjectKind,
     SensorBackend,
@@ -30,6 +29,7 @@ from graspsense.plugin_api import (
 from graspsense.plugins.controllers.force import ForceConfig, ForceController
 from graspsense.plugins.controllers.hybrid import HybridConfig, HybridController
 from graspsense.plugins.controllers.send_and_watch import SendAndWatchConfig, SendAndWatchController
+from graspsense.simulator_api import CHANNELS
 from graspsense.testing.model_gripper import OBJECTS, ModelGripper
 
 HERE = sys.modules[__name__]

@@ -13,7 +13,6 @@ from graspsense.core.components.config import resolve
 from graspsense.core.components.registry import IsolatedPlugins
 from graspsense.core.values.errors import ConfigError
 from graspsense.plugin_api import (
-    CHANNELS,
     Channel,
     ObjectKind,
     SensorBackend,
@@ -21,6 +20,7 @@ from graspsense.plugin_api import (
     hookimpl,
     setting,
 )
+from graspsense.simulator_api import CHANNELS
 from graspsense.sources.simulated import Group, plan_trials, simulated
 from graspsense.store.dataset import labelled_store
 from graspsense.store.labels import labels_of

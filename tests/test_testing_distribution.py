@@ -142,7 +142,8 @@ def test_a_pipeline_that_does_not_resolve_is_caught(site):
 
 
 OWNER = """
-    from graspsense.plugin_api import ConformanceCheckEntry, hookimpl
+    from graspsense.plugin_api import hookimpl
+    from graspsense.simulator_api import ConformanceCheckEntry
     GRASPSENSE_API = (2, 0)
 
     @hookimpl

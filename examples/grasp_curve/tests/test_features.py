@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from graspsense.plugin_api import HOLD, create, parametrize_checks, squeeze, with_channels
+from graspsense.plugin_api import HOLD, create
+from graspsense.testing_api import parametrize_checks, squeeze, with_channels
 
 
 @parametrize_checks("graspsense-grasp-curve")

@@ -58,9 +58,11 @@ import numpy as np
 from attrs import asdict, evolve, frozen
 
 from graspsense import load_pipeline
+from graspsense.classifier_api import table_of
 from graspsense.core.components.identification import Identification, RecordedSqueeze
 from graspsense.evaluation.intervals import wilson
-from graspsense.plugin_api import RunConfig, create, table_of
+from graspsense.plugin_api import create
+from graspsense.simulator_api import RunConfig
 from graspsense_identify.gas import combinations
 from graspsense_identify.interval import LEVEL, interval_of_mean, normal
 from graspsense_identify.laws import SLOTS

@@ -8,7 +8,8 @@ import pytest
 from identify import delayed
 
 from graspsense.core.components.identification import RecordedSqueeze
-from graspsense.plugin_api import ConfigError, RunConfig, create
+from graspsense.plugin_api import ConfigError, create
+from graspsense.simulator_api import RunConfig
 from graspsense_identify.block import lag_of_block, with_fingertips_of_block
 from graspsense_identify.run import _settings, _shares, identify
 from graspsense_sim_gripper.config import SimConfig

@@ -12,7 +12,8 @@ from identify import delayed
 from squeezes import recorded
 
 from graspsense.core.components.identification import RecordedSqueeze
-from graspsense.plugin_api import RunConfig, create
+from graspsense.plugin_api import create
+from graspsense.simulator_api import RunConfig
 from graspsense_identify.delay import Delay, Lag
 from graspsense_identify.forward import RIGID_PADS, ForwardModel
 from graspsense_identify.prepare import prepared

@@ -10,7 +10,8 @@ from attrs import evolve
 from squeezes import WIDTH_M, recorded
 
 from graspsense.core.components.identification import RecordedSqueeze
-from graspsense.plugin_api import RunConfig, create
+from graspsense.plugin_api import create
+from graspsense.simulator_api import RunConfig
 from graspsense_identify.choose import choose
 from graspsense_identify.fit import fit
 from graspsense_identify.forward import RIGID_PADS, ForwardModel

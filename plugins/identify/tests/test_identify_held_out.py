@@ -8,7 +8,7 @@ from attrs import evolve
 from squeezes import recorded
 from test_identify import scale_of, shell
 
-from graspsense.plugin_api import SqueezeFit, Undetermined
+from graspsense.simulator_api import SqueezeFit, Undetermined
 from graspsense_identify.choose import choose
 from graspsense_identify.fit import fit
 from graspsense_identify.forward import RIGID_PADS, ForwardModel

@@ -11,7 +11,8 @@ from attrs import evolve
 from squeezes import WIDTH_M, recorded
 
 from graspsense.core.components.identification import RecordedSqueeze
-from graspsense.plugin_api import RunConfig, create
+from graspsense.plugin_api import create
+from graspsense.simulator_api import RunConfig
 from graspsense_identify.fit import Fitted
 from graspsense_identify.forward import ForwardModel
 from graspsense_identify.individual import alone

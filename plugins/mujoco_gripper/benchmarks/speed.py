@@ -22,7 +22,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from graspsense.plugin_api import RunConfig, create, run_uninterrupted
+from graspsense.plugin_api import create
+from graspsense.simulator_api import RunConfig, run_uninterrupted
 from graspsense_mujoco_gripper.backend import MujocoGripper
 from graspsense_mujoco_gripper.config import MujocoConfig
 from graspsense_mujoco_gripper.measurement import geoms_of

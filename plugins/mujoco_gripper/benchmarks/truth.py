@@ -15,7 +15,8 @@ import time
 from collections.abc import Mapping
 from pathlib import Path
 
-from graspsense.plugin_api import RunConfig, create, run_uninterrupted
+from graspsense.plugin_api import create
+from graspsense.simulator_api import RunConfig, run_uninterrupted
 from graspsense_mujoco_gripper.backend import INTEGRATORS
 from graspsense_mujoco_gripper.gripper_file import read_gripper
 

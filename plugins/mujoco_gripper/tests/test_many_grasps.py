@@ -9,7 +9,8 @@ from attrs import evolve
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from graspsense.plugin_api import RunConfig, UnknownName, create, run_uninterrupted
+from graspsense.plugin_api import UnknownName, create
+from graspsense.simulator_api import RunConfig, run_uninterrupted
 
 HYBRID = create("controller", "hybrid", sends="velocity", closing_speed_m_s=0.15)
 FEATURES = create("feature-set", "chitta")

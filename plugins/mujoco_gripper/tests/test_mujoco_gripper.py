@@ -8,7 +8,8 @@ import pytest
 
 from graspsense import ConfigError, load_pipeline
 from graspsense.cli.main import main
-from graspsense.plugin_api import EFFORT, Command, DeviceLost, UnknownName, create, parametrize_checks
+from graspsense.plugin_api import EFFORT, Command, DeviceLost, UnknownName, create
+from graspsense.testing_api import parametrize_checks
 from graspsense_mujoco_gripper.catalogue import FOLDER
 
 PARALLEL = FOLDER.parent / "parallel.xml"

@@ -8,7 +8,8 @@ import mujoco
 import pytest
 
 from graspsense import ConfigError, load_pipeline
-from graspsense.plugin_api import create, toml_values
+from graspsense.plugin_api import create
+from graspsense.simulator_api import toml_values
 from graspsense_mujoco_gripper.catalogue import FOLDER, catalogue
 from graspsense_mujoco_gripper.scene import read_scene
 

@@ -11,7 +11,9 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from graspsense.plugin_api import Outcome, RunConfig, create, run_uninterrupted
+from graspsense.gripper_api import Outcome
+from graspsense.plugin_api import create
+from graspsense.simulator_api import RunConfig, run_uninterrupted
 
 SCRIPT = Path(__file__).parents[1] / "benchmarks/truth.py"
 

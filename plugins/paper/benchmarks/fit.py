@@ -41,10 +41,11 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from attrs import evolve, field, frozen
 
+from graspsense.classifier_api import table_of
 from graspsense.core.values.trace import Trace
 from graspsense.evaluation.crossval import cross_validate
 from graspsense.evaluation.folds import stratified
-from graspsense.plugin_api import Classifier, Features, create, table_of
+from graspsense.plugin_api import Classifier, Features, create
 from graspsense.sources.simulated import OBJECTS_PER_SEED, TRIALS_PER_SEED, Group
 from graspsense_paper.published import published
 from graspsense_sim_gripper.config import SimConfig

@@ -15,9 +15,10 @@ import pytest
 
 from graspsense import load_pipeline
 from graspsense.core.grasp.runner import run_grasp
-from graspsense.plugin_api import RunConfig, Samples, create
+from graspsense.plugin_api import Samples, create
 from graspsense.recording.export_trace import write_npz
 from graspsense.recording.reader import read_recorded
+from graspsense.simulator_api import RunConfig
 from graspsense_pr2_gripper import emulation
 from graspsense_pr2_gripper.accelerometer import CHANNEL, Accelerometer, word_of
 from graspsense_pr2_gripper.backend import Pr2Backend

@@ -11,7 +11,9 @@ from typing import Any
 import pytest
 
 from graspsense.core.grasp.runner import run_grasp
-from graspsense.plugin_api import Outcome, Phase, RunConfig, create
+from graspsense.gripper_api import Outcome, Phase
+from graspsense.plugin_api import create
+from graspsense.simulator_api import RunConfig
 from graspsense_pr2_gripper.backend import Pr2Backend
 from graspsense_pr2_gripper.config import FaultConfig, Pr2Config
 from graspsense_pr2_gripper.faults import Wire

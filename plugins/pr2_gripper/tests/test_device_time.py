@@ -14,7 +14,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from graspsense.core.grasp.runner import run_grasp
-from graspsense.plugin_api import EFFORT, Command, DeviceLost, Outcome, RunConfig, create
+from graspsense.gripper_api import Outcome
+from graspsense.plugin_api import EFFORT, Command, DeviceLost, create
+from graspsense.simulator_api import RunConfig
 from graspsense_pr2_gripper import link as links
 from graspsense_pr2_gripper.backend import Pr2Backend
 from graspsense_pr2_gripper.config import FaultConfig, Pr2Config

@@ -14,7 +14,9 @@ from attrs import evolve
 from graspsense import load_pipeline
 from graspsense.core.grasp.dry_run import dry_run
 from graspsense.core.grasp.runner import Grasp, run_grasp
-from graspsense.plugin_api import ConfigError, GraspEvent, Outcome, Phase, RunConfig, create
+from graspsense.gripper_api import Outcome, Phase
+from graspsense.plugin_api import ConfigError, GraspEvent, create
+from graspsense.simulator_api import RunConfig
 from graspsense_pr2_gripper.backend import Pr2Backend
 from graspsense_pr2_gripper.config import FaultConfig, Pr2Config
 from graspsense_pr2_gripper.faults import Wire

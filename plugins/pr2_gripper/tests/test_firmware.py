@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from graspsense.plugin_api import gap_and_rate
+from graspsense.gripper_api import gap_and_rate
 from graspsense_pr2_gripper.linkage import LINKAGES
 from graspsense_pr2_gripper.protocol import (
     ACCEPTED,

@@ -9,7 +9,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from graspsense.plugin_api import DeviceClock, DeviceLost
+from graspsense.gripper_api import DeviceClock
+from graspsense.plugin_api import DeviceLost
 from graspsense_pr2_gripper import link as links
 from graspsense_pr2_gripper.link import ThreadedLink
 from graspsense_pr2_gripper.protocol import InputReport, encode_input

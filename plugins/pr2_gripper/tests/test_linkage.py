@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from graspsense.plugin_api import gap_and_rate, revolutions_at
+from graspsense.gripper_api import gap_and_rate, revolutions_at
 from graspsense_pr2_gripper.linkage import ENCODER_TICKS, LINKAGES
 
 # Gap (mm), motor revolutions, mm/revolution, um/encoder tick for the delivered gripper: computed from the published

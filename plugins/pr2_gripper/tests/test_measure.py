@@ -7,7 +7,8 @@ from typing import Any
 
 import pytest
 
-from graspsense.plugin_api import LoadTable, Pads, TareRefused, gap_and_rate, revolutions_at
+from graspsense.gripper_api import LoadTable, TareRefused, gap_and_rate, revolutions_at
+from graspsense.plugin_api import Pads
 from graspsense_pr2_gripper.config import Pr2Config
 from graspsense_pr2_gripper.linkage import LINKAGES
 from graspsense_pr2_gripper.measure import Measure

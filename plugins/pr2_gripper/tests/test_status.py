@@ -11,7 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from graspsense.plugin_api import Pads, revolutions_at
+from graspsense.gripper_api import revolutions_at
+from graspsense.plugin_api import Pads
 from graspsense_pr2_gripper.backend import Pr2Backend
 from graspsense_pr2_gripper.config import FaultConfig, Pr2Config
 from graspsense_pr2_gripper.linkage import LINKAGES

@@ -8,15 +8,8 @@ import numpy as np
 import pytest
 
 from graspsense import WiringError, load_pipeline
-from graspsense.plugin_api import (
-    POSITION,
-    VELOCITY,
-    Command,
-    DeviceLost,
-    NoDevice,
-    create,
-    parametrize_checks,
-)
+from graspsense.plugin_api import POSITION, VELOCITY, Command, DeviceLost, NoDevice, create
+from graspsense.testing_api import parametrize_checks
 from graspsense_robotiq_2f import backend
 from graspsense_robotiq_2f.config import RobotiqConfig
 from graspsense_robotiq_2f.discovery import diagnose

@@ -17,7 +17,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from unverified import unverified_setup
 
-from graspsense.plugin_api import gap_and_rate, revolutions_at
+from graspsense.gripper_api import gap_and_rate, revolutions_at
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant.state import Motion
 from graspsense_sim_gripper.run.compiled.compose import composed_move, composition

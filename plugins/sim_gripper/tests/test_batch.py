@@ -19,20 +19,20 @@ from graspsense.core.components.registry import IsolatedPlugins
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.runner import run_grasp
 from graspsense.core.values.errors import UnknownName
+from graspsense.gripper_api import Outcome
 from graspsense.plugin_api import (
     APPROACH,
     EFFORT,
     RUNNING,
     STEADY,
     Command,
-    CompiledExtraction,
     Controller,
     ControllerEntry,
-    Outcome,
     Trace,
     create,
     hookimpl,
 )
+from graspsense.simulator_api import CompiledExtraction
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.backend import SimBackend
 from graspsense_sim_gripper.run.batch import compiled_grasps, threads, worker

@@ -5,7 +5,8 @@ import pytest
 
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.runner import run_grasp
-from graspsense.plugin_api import Outcome, Phase, create
+from graspsense.gripper_api import Outcome, Phase
+from graspsense.plugin_api import create
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.backend import SimBackend
 from graspsense_sim_gripper.run.batch import run_many

@@ -5,7 +5,8 @@ from attrs import evolve
 from unverified import sample, unverified_setup
 
 from graspsense.core.values.errors import UnknownName
-from graspsense.plugin_api import RunConfig, create
+from graspsense.plugin_api import create
+from graspsense.simulator_api import RunConfig
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant.sensing import with_listed_cells
 from graspsense_sim_gripper.run.accuracy.select import select

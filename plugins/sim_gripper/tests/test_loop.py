@@ -6,7 +6,8 @@ from attrs import evolve, fields
 
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.runner import run_grasp
-from graspsense.plugin_api import EFFORT, Command, Trace, bind, create, fingerprint
+from graspsense.plugin_api import EFFORT, Command, Trace, create
+from graspsense.simulator_api import bind, fingerprint
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.backend import SimBackend
 from graspsense_sim_gripper.run.batch import run_many

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from graspsense.plugin_api import bind
+from graspsense.simulator_api import bind
 from graspsense_sim_gripper.plant.sensing import PadBuffers
 from graspsense_sim_gripper.run.compiled.loop_code import (
     FIRST_IMAGES,

@@ -8,7 +8,8 @@ import pytest
 from unverified import unverified_setup
 
 from graspsense.core.components.run_config import RunConfig
-from graspsense.plugin_api import EFFORT, RELEASE, Command, create, gap_and_rate, revolutions_at
+from graspsense.gripper_api import gap_and_rate, revolutions_at
+from graspsense.plugin_api import EFFORT, RELEASE, Command, create
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant.state import Contact, Motion, PlantState
 from graspsense_sim_gripper.run.batch import job, run_many

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from graspsense.plugin_api import gap_and_rate, revolutions_at, straight_linkage
+from graspsense.gripper_api import gap_and_rate, revolutions_at
+from graspsense.simulator_api import straight_linkage
 from graspsense_sim_gripper.plant.contact import ObjectModel, PadCompliance, solve_contact
 from graspsense_sim_gripper.plant.drive import Drive, Friction, sliding_friction, stribeck_excess
 from graspsense_sim_gripper.plant.drive_models import LINKAGES, STRAIGHT

@@ -100,7 +100,7 @@ def test_the_noise_of_an_image_is_compiled_too(compiled_draws):
 def compiled_draws():
     """Return `draw_units` and `draw_normals` as compiled code calls them."""
     pytest.importorskip("numba", reason="compiled numbers need the extra `fast`")
-    from graspsense.plugin_api import compile_function
+    from graspsense.simulator_api import compile_function
     from graspsense_sim_gripper.run.binding import bind_reachable
 
     units, normal = IN_COMPILED_CODE["draw_units"], bind_reachable(draw_normals, IN_COMPILED_CODE)

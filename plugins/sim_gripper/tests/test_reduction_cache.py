@@ -7,7 +7,8 @@ import pwd
 import pytest
 from attrs import evolve
 
-from graspsense.plugin_api import RunConfig, create
+from graspsense.plugin_api import create
+from graspsense.simulator_api import RunConfig
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.accuracy import cache
 from graspsense_sim_gripper.run.accuracy import select as selection

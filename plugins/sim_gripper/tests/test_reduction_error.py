@@ -7,7 +7,8 @@ import pytest
 from attrs import evolve
 
 from graspsense.core.grasp.runner import run_grasp
-from graspsense.plugin_api import APPROACH, HOLD, SQUEEZE, STEADY, RunConfig, Trace, create
+from graspsense.plugin_api import APPROACH, HOLD, SQUEEZE, STEADY, Trace, create
+from graspsense.simulator_api import RunConfig
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.accuracy.error import GraspRecord, deviation
 from graspsense_sim_gripper.run.backend import SimBackend

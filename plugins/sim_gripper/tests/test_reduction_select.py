@@ -10,6 +10,7 @@ from selection import error_of, record_of
 
 from graspsense.core.grasp.runner import run_grasp
 from graspsense.core.learn.checkpoints import with_checkpoints
+from graspsense.gripper_api import Outcome
 from graspsense.plugin_api import (
     HOLD,
     Channel,
@@ -17,10 +18,9 @@ from graspsense.plugin_api import (
     Controller,
     Feature,
     FeatureSet,
-    Outcome,
-    RunConfig,
     create,
 )
+from graspsense.simulator_api import RunConfig
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.accuracy import select as selection
 from graspsense_sim_gripper.run.accuracy import verify

@@ -5,7 +5,7 @@ import pytest
 from simulation_scene import CONFIG, OPEN_M, TICK, Law, exact, exact_closed
 from unverified import unverified_setup
 
-from graspsense.plugin_api import RunConfig
+from graspsense.simulator_api import RunConfig
 from graspsense_sim_gripper.run.batch import run_many
 from graspsense_sim_gripper.run.compiled.compose import plant_move
 from graspsense_sim_gripper.scene.terms.registry import laws_of

@@ -5,12 +5,8 @@ import pytest
 
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.runner import run_grasp
-from graspsense.plugin_api import (
-    Outcome,
-    Phase,
-    create,
-    revolutions_at,
-)
+from graspsense.gripper_api import Outcome, Phase, revolutions_at
+from graspsense.plugin_api import create
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant.drive_models import ENCODER_TICKS, LINKAGES
 from graspsense_sim_gripper.plant.sensing import PAD_COUNTS_PER_N

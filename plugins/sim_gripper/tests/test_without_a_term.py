@@ -6,7 +6,8 @@ import pytest
 
 from graspsense.cli.model_table import print_without
 from graspsense.core.grasp.runner import run_grasp
-from graspsense.plugin_api import RunConfig, create
+from graspsense.plugin_api import create
+from graspsense.simulator_api import RunConfig
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.backend import SimBackend
 

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from graspsense.experiment_api import ExperimentEntry, ExperimentKindEntry
 from graspsense.plugin_api import (
     ClassifierEntry,
     ControllerEntry,
     DatasetEntry,
-    ExperimentEntry,
-    ExperimentKindEntry,
     FeatureSetEntry,
     PipelineEntry,
     SensorBackendEntry,

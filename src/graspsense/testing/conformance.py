@@ -181,7 +181,7 @@ def parametrize_checks(name: str, **options: Any) -> Any:
     The test is `def test_conformance(check): check.run()`. The options are those of `examine`, which
     docs/tcp_gripper.md explains.
 
-    >>> from graspsense.plugin_api import parametrize_checks
+    >>> from graspsense.testing_api import parametrize_checks
     >>> @parametrize_checks("graspsense/knn")
     ... def test_conformance(check):
     ...     check.run()

@@ -8,26 +8,28 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from attrs import frozen
 
-from graspsense.plugin_api import (
-    Classifier,
-    ClassifierConfig,
-    ClassifierEntry,
+from graspsense.classifier_api import (
     CodedColumn,
-    Features,
-    FeatureTable,
-    Prediction,
     Reason,
     SplitTest,
     TreeNode,
     codes_of,
-    hookimpl,
     in_words,
     leaf_reason,
     missing_feature,
     path_reasons,
-    setting,
     table_of,
     with_codes,
+)
+from graspsense.plugin_api import (
+    Classifier,
+    ClassifierConfig,
+    ClassifierEntry,
+    Features,
+    FeatureTable,
+    Prediction,
+    hookimpl,
+    setting,
 )
 
 if TYPE_CHECKING:

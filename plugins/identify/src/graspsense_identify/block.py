@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 from attrs import evolve, frozen
 
-from graspsense.plugin_api import RecordedSqueeze
+from graspsense.simulator_api import RecordedSqueeze
 from graspsense_identify.choose import LEAST_GAIN
 from graspsense_identify.delay import EVIDENCE
 from graspsense_identify.fit import LAG_UNIT_S, LEAST_ERROR

@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from graspsense.plugin_api import PredictiveCheck
+from graspsense.simulator_api import PredictiveCheck
 from graspsense_identify.fit import Fitted
 from graspsense_identify.forward import ForwardModel
 from graspsense_identify.prepare import Squeeze

@@ -14,7 +14,8 @@ import numpy as np
 from attrs import evolve, frozen
 from numpy.typing import NDArray
 
-from graspsense.plugin_api import CandidateScore, ConfigError
+from graspsense.plugin_api import ConfigError
+from graspsense.simulator_api import CandidateScore
 from graspsense_identify.corners import with_corners
 from graspsense_identify.fit import LEAST_ERROR, Fitted, Mask, fit, held_out_rms
 from graspsense_identify.forward import ForwardModel

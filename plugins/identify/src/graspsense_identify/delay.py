@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 from attrs import evolve, frozen
 
-from graspsense.plugin_api import IdentifiedParameter, Undetermined
+from graspsense.simulator_api import IdentifiedParameter, Undetermined
 from graspsense_identify.choose import LEAST_GAIN, information, least_error
 from graspsense_identify.fit import Fitted, fit
 from graspsense_identify.forward import ForwardModel

@@ -16,7 +16,7 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from graspsense.plugin_api import NotCompilable, entry_point, first_call
+from graspsense.simulator_api import NotCompilable, entry_point, first_call
 from graspsense_identify.laws import N_NUMBERS, SLOTS, CandidateLaw, terms_of
 from graspsense_identify.prepare import Squeeze
 from graspsense_sim_gripper.run.identification import (

@@ -18,7 +18,7 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from graspsense.plugin_api import IdentifiedParameter, Undetermined
+from graspsense.simulator_api import IdentifiedParameter, Undetermined
 from graspsense_identify.fit import Fitted
 from graspsense_identify.forward import ForwardModel, Runs
 from graspsense_identify.interval import student

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from graspsense.plugin_api import IdentifierEntry, hookimpl
+from graspsense.plugin_api import hookimpl
+from graspsense.simulator_api import IdentifierEntry
 
 GRASPSENSE_API = (2, 0)
 

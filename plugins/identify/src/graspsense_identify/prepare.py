@@ -14,7 +14,8 @@ import numpy as np
 from attrs import evolve, frozen
 from numpy.typing import NDArray
 
-from graspsense.plugin_api import ConfigError, RecordedSqueeze, Trace
+from graspsense.plugin_api import ConfigError, Trace
+from graspsense.simulator_api import RecordedSqueeze
 
 Floats = NDArray[np.float64]
 

@@ -19,7 +19,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from graspsense.plugin_api import IdentifiedParameter
+from graspsense.simulator_api import IdentifiedParameter
 from graspsense_identify.fit import Fitted, linear_covariance
 from graspsense_identify.forward import ForwardModel
 from graspsense_identify.individual import reference_stiffness, stiffnesses

@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from graspsense.plugin_api import SqueezeFit, Undetermined, repeatability
+from graspsense.simulator_api import SqueezeFit, Undetermined, repeatability
 from graspsense_identify.fit import Fitted
 from graspsense_identify.held_out import CONFIRMS
 from graspsense_identify.laws import ELASTIC, GAS, SNAP

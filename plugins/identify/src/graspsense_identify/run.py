@@ -10,8 +10,8 @@ from typing import Any, Final
 import numpy as np
 from attrs import evolve, fields_dict
 
-from graspsense.plugin_api import (
-    ConfigError,
+from graspsense.plugin_api import ConfigError
+from graspsense.simulator_api import (
     Identification,
     IdentifiedParameter,
     RecordedSqueeze,

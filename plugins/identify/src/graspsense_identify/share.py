@@ -14,7 +14,8 @@ from typing import Final
 
 import numpy as np
 
-from graspsense.plugin_api import Trace, gap_and_rate, revolutions_at
+from graspsense.gripper_api import gap_and_rate, revolutions_at
+from graspsense.plugin_api import Trace
 from graspsense_identify.prepare import Squeeze
 from graspsense_sim_gripper.run.identification import Drive, stribeck_excess
 

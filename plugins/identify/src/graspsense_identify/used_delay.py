@@ -11,7 +11,7 @@ from typing import Final, NamedTuple
 
 from attrs import evolve
 
-from graspsense.plugin_api import RecordedSqueeze
+from graspsense.simulator_api import RecordedSqueeze
 from graspsense_identify.delay import PATH_ERROR_S, Delay, Lag
 from graspsense_identify.forward import ForwardModel
 from graspsense_identify.individual import Individual

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 
 from attrs import frozen
 
-from graspsense.plugin_api import CandidateScore, IdentifiedParameter, Undetermined
+from graspsense.simulator_api import CandidateScore, IdentifiedParameter, Undetermined
 from graspsense_identify.delay import Delay
 from graspsense_identify.fit import Fitted
 from graspsense_identify.fracture import FractureFit

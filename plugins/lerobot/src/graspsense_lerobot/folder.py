@@ -16,7 +16,8 @@ from typing import Any, Final
 import numpy as np
 from attrs import frozen
 
-from graspsense.plugin_api import ColumnTable, ConfigError, DataDamaged, TooLarge, read_parquet
+from graspsense.gripper_api import ColumnTable, TooLarge, read_parquet
+from graspsense.plugin_api import ConfigError, DataDamaged
 
 INFO: Final = "meta/info.json"
 DESCRIPTION_BYTES: Final = 64 * 2**20

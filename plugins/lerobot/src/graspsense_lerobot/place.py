@@ -12,7 +12,8 @@ from urllib.parse import parse_qsl
 
 from attrs import fields_dict, frozen
 
-from graspsense.plugin_api import ConfigError, suggestion
+from graspsense.plugin_api import ConfigError
+from graspsense.simulator_api import suggestion
 
 _WORDS: Final = {"repeated": ("keep", "drop"), "gaps": ("keep", "cut"), "split": ("force", "none")}
 _NAMES: Final = ("gap", "force")

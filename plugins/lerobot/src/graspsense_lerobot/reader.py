@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from attrs import evolve, frozen
 
+from graspsense.gripper_api import squeezes
 from graspsense.plugin_api import (
     ConfigError,
     DataDamaged,
@@ -23,7 +24,6 @@ from graspsense.plugin_api import (
     UnreadableRecording,
     checked_recording,
     each_readable,
-    squeezes,
 )
 from graspsense_lerobot.folder import Episode, Feature, Folder, read_folder
 from graspsense_lerobot.names import CellArray, Meaning, channel_name, meaning_of

@@ -15,8 +15,6 @@ from graspsense.plugin_api import (
     EFFORT,
     NO_PADS,
     POSITION,
-    BatchBackend,
-    BatchOptions,
     Channel,
     Command,
     ConfigError,
@@ -24,15 +22,13 @@ from graspsense.plugin_api import (
     DeviceInfo,
     DeviceLost,
     Frame,
-    Grasped,
     ObjectKind,
     Pads,
     Reading,
-    SimulationVariant,
     TactileArray,
-    Viewer,
     signal_type,
 )
+from graspsense.simulator_api import BatchBackend, BatchOptions, Grasped, SimulationVariant, Viewer
 from graspsense_mujoco_gripper.batch import Job, grasps
 from graspsense_mujoco_gripper.camera import Camera, Window, offscreen, require_screen
 from graspsense_mujoco_gripper.catalogue import catalogue

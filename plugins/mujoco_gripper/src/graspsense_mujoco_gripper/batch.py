@@ -22,21 +22,9 @@ from typing import IO, Any, Final
 import numpy as np
 from attrs import asdict, evolve, fields, frozen
 
-from graspsense.plugin_api import (
-    BatchOptions,
-    ConfigError,
-    Controller,
-    Grasped,
-    GraspEvent,
-    Outcome,
-    Phase,
-    RunConfig,
-    Trace,
-    UnknownName,
-    create,
-    recipe_of,
-    run_uninterrupted,
-)
+from graspsense.gripper_api import Outcome, Phase
+from graspsense.plugin_api import ConfigError, Controller, GraspEvent, Trace, UnknownName, create
+from graspsense.simulator_api import BatchOptions, Grasped, RunConfig, recipe_of, run_uninterrupted
 from graspsense_mujoco_gripper.config import MujocoConfig
 
 WORTH_A_PROCESS: Final = 4

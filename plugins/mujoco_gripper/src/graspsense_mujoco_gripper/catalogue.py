@@ -11,7 +11,8 @@ from typing import Final
 import mujoco
 from attrs import field, frozen
 
-from graspsense.plugin_api import UnknownName, structured, suggestion, toml_values
+from graspsense.plugin_api import UnknownName
+from graspsense.simulator_api import structured, suggestion, toml_values
 from graspsense_mujoco_gripper.model import read_spec
 
 FOLDER: Final = Path(str(files("graspsense_mujoco_gripper") / "things"))

@@ -26,7 +26,8 @@ from typing import Any, Final
 
 from attrs import field, frozen
 
-from graspsense.plugin_api import ConfigError, TomlError, ValidationFailed, structured, toml_values
+from graspsense.plugin_api import ConfigError
+from graspsense.simulator_api import TomlError, ValidationFailed, structured, toml_values
 
 LARGEST_BYTES: Final = 512 * 1024
 """Limit on the size of a gripper file."""

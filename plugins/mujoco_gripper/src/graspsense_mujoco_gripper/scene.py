@@ -22,7 +22,8 @@ import numpy as np
 from attrs import field, frozen
 from numpy.typing import NDArray
 
-from graspsense.plugin_api import ConfigError, TomlError, ValidationFailed, structured, toml_values
+from graspsense.plugin_api import ConfigError
+from graspsense.simulator_api import TomlError, ValidationFailed, structured, toml_values
 from graspsense_mujoco_gripper.catalogue import Thing, Walls, thing_named
 from graspsense_mujoco_gripper.model import compiled
 

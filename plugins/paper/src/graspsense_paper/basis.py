@@ -13,7 +13,8 @@ from graspsense.experiment_api import (
     groups_of,
     simulated_objects,
 )
-from graspsense.plugin_api import ObjectKind, given_claims
+from graspsense.plugin_api import ObjectKind
+from graspsense.simulator_api import given_claims
 from graspsense_paper.cases import is_of
 
 Basis = Literal["predicted", "fitted", "built in"]

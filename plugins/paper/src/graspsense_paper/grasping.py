@@ -21,7 +21,9 @@ from graspsense.experiment_api import (
     settings_from,
     structured,
 )
-from graspsense.plugin_api import CONTACT_FORCE_N, BatchBackend, ConfigError, Phase
+from graspsense.gripper_api import Phase
+from graspsense.plugin_api import CONTACT_FORCE_N, ConfigError
+from graspsense.simulator_api import BatchBackend
 from graspsense_paper.grasp_result import GraspResult, GraspRow
 
 if TYPE_CHECKING:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from graspsense.plugin_api import ExperimentEntry, ExperimentKindEntry, hookimpl
+from graspsense.experiment_api import ExperimentEntry, ExperimentKindEntry
+from graspsense.plugin_api import hookimpl
 
 GRASPSENSE_API = (2, 0)
 

@@ -10,6 +10,13 @@ from typing import Final, final
 
 from attrs import asdict, evolve
 
+from graspsense.gripper_api import (
+    calibrations_of,
+    stored_friction,
+    stored_gain,
+    stored_tables,
+    stored_zero,
+)
 from graspsense.plugin_api import (
     EFFORT,
     Channel,
@@ -20,11 +27,6 @@ from graspsense.plugin_api import (
     Pads,
     Reading,
     SensorBackend,
-    calibrations_of,
-    stored_friction,
-    stored_gain,
-    stored_tables,
-    stored_zero,
 )
 from graspsense_pr2_gripper.accelerometer import CHANNEL as ACCELERATION
 from graspsense_pr2_gripper.ceilings import EFFORT_CEILING_N, SPEED_CEILING_M_S

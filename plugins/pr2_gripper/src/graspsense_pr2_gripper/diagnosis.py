@@ -10,7 +10,8 @@ from typing import Final, Literal, NamedTuple
 
 from attrs import evolve
 
-from graspsense.plugin_api import DeviceLost, Finding, GraspsenseError, calibrations_of
+from graspsense.gripper_api import Finding, GraspsenseError, calibrations_of
+from graspsense.plugin_api import DeviceLost
 from graspsense_pr2_gripper.backend import TEST_NUMBER, UNCALIBRATED, device_numbers
 from graspsense_pr2_gripper.config import Pr2Config
 from graspsense_pr2_gripper.discovery import Search, on_the_bus, search

@@ -11,7 +11,8 @@ from pathlib import Path
 
 from attrs import frozen
 
-from graspsense.plugin_api import FoundDevice, PluginUnavailable
+from graspsense.gripper_api import FoundDevice
+from graspsense.plugin_api import PluginUnavailable
 from graspsense_pr2_gripper.config import Pr2Config
 
 BACKEND = "pr2"

@@ -10,16 +10,8 @@ import math
 from collections.abc import Sequence
 from typing import Any, Final
 
-from graspsense.plugin_api import (
-    EFFORT,
-    Command,
-    Frame,
-    Pads,
-    Samples,
-    SensorBackend,
-    gap_and_rate,
-    revolutions_at,
-)
+from graspsense.gripper_api import gap_and_rate, revolutions_at
+from graspsense.plugin_api import EFFORT, Command, Frame, Pads, Samples, SensorBackend
 from graspsense_pr2_gripper.accelerometer import has_accelerometer, word_of
 from graspsense_pr2_gripper.fingertip import CELLS
 from graspsense_pr2_gripper.linkage import LINKAGES

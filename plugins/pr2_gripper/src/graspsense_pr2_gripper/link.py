@@ -13,7 +13,8 @@ import time
 from abc import ABC, abstractmethod
 from typing import Final, NamedTuple, final
 
-from graspsense.plugin_api import DeviceClock, DeviceLost, ReadingThread
+from graspsense.gripper_api import DeviceClock, ReadingThread
+from graspsense.plugin_api import DeviceLost
 from graspsense_pr2_gripper.device_time import ClockFault, CountedTime, HostTime, PassingTime
 from graspsense_pr2_gripper.protocol import MAX_SAMPLES, InputReport
 from graspsense_pr2_gripper.stream import RawImage, Restarted, Stream

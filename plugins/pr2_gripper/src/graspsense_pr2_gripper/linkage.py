@@ -2,7 +2,7 @@
 
 The simulator (graspsense-sim-gripper, `drive_models.py` and `sensing.py`) has the same numbers as data of its model;
 `tests/test_pr2_numbers.py` holds the two equal. The map from motor revolutions to the gap is
-`pr2_mechanism_model/src/pr2_gripper_transmission.cpp`, here `graspsense.plugin_api.gap_and_rate`.
+`pr2_mechanism_model/src/pr2_gripper_transmission.cpp`, here `graspsense.gripper_api.gap_and_rate`.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
-from graspsense.plugin_api import ScrewLinkage, screw_linkage
+from graspsense.gripper_api import ScrewLinkage, screw_linkage
 
 _ALPHA2 = {
     "theta0_deg": 2.97571,

@@ -6,11 +6,8 @@ import math
 from collections.abc import Sequence
 from typing import Final, NamedTuple
 
-from graspsense.plugin_api import (
-    Frame,
+from graspsense.gripper_api import (
     LoadTable,
-    Pads,
-    Reading,
     TareRefused,
     cells_force,
     edge_force,
@@ -22,6 +19,7 @@ from graspsense.plugin_api import (
     revolutions_at,
     tare,
 )
+from graspsense.plugin_api import Frame, Pads, Reading
 from graspsense_pr2_gripper.accelerometer import Accelerometer
 from graspsense_pr2_gripper.ceilings import GAPS_M, SENSOR_SPEED_M_S
 from graspsense_pr2_gripper.config import Pr2Config

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from graspsense.plugin_api import EmulatorEntry, Finding, FoundDevice, SensorBackendEntry, hookimpl
+from graspsense.gripper_api import EmulatorEntry, Finding, FoundDevice
+from graspsense.plugin_api import SensorBackendEntry, hookimpl
 
 GRASPSENSE_API = (2, 0)
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from graspsense.plugin_api import StatusBit
+from graspsense.gripper_api import StatusBit
 from graspsense_pr2_gripper.protocol import (
     CLAMPED,
     ENCODER_FAULT,

@@ -6,7 +6,7 @@ import os
 from collections.abc import Iterator, Sequence
 from typing import Final
 
-from graspsense.plugin_api import Finding, FoundDevice
+from graspsense.gripper_api import Finding, FoundDevice
 from graspsense_robotiq_2f.config import RobotiqConfig
 from graspsense_robotiq_2f.faults import STATUS_BITS, bit_of
 from graspsense_robotiq_2f.link import Link, NoReply

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import inf
 from typing import Final
 
-from graspsense.plugin_api import StatusBit
+from graspsense.gripper_api import StatusBit
 
 _CODES: Final = {
     0x05: ("not activated", "it has to be activated again before it moves", 0.1),

@@ -4,15 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from graspsense.plugin_api import (
-    EmulatorEntry,
-    FeatureSetEntry,
-    Finding,
-    FoundDevice,
-    PipelineEntry,
-    SensorBackendEntry,
-    hookimpl,
-)
+from graspsense.gripper_api import EmulatorEntry, Finding, FoundDevice
+from graspsense.plugin_api import FeatureSetEntry, PipelineEntry, SensorBackendEntry, hookimpl
 
 GRASPSENSE_API = (2, 0)
 

@@ -7,7 +7,8 @@ from typing import Literal
 
 from attrs import frozen
 
-from graspsense.plugin_api import CHANGES_NO_RESULT, NAMES_INPUT, setting
+from graspsense.plugin_api import NAMES_INPUT, setting
+from graspsense.simulator_api import CHANGES_NO_RESULT
 
 
 @frozen(kw_only=True, cache_hash=True)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from graspsense.plugin_api import ConformanceCheckEntry, ModelEntry, SensorBackendEntry, hookimpl
+from graspsense.plugin_api import SensorBackendEntry, hookimpl
+from graspsense.simulator_api import ConformanceCheckEntry, ModelEntry
 
 GRASPSENSE_API = (2, 0)
 

@@ -44,7 +44,9 @@ class CompiledFeatures:
 
     The conformance checks compare both on whole and on unusual grasps.
 
-    >>> from graspsense.plugin_api import Channel, CompiledFeatures, Feature, FeatureSet, squeeze
+    >>> from graspsense.plugin_api import Channel, Feature, FeatureSet
+    >>> from graspsense.simulator_api import CompiledFeatures
+    >>> from graspsense.testing_api import squeeze
     >>> def measure(params, ticks):
     ...     peak = -1.0
     ...     for force in ticks.force_left_n:

@@ -4,7 +4,8 @@ Listing plugins and printing help therefore load neither numpy nor a driver. Typ
 module, which is generated from the same table:
 
     python -c "import graspsense as m; print(m.PUBLIC.stub())" > src/graspsense/__init__.pyi
-    python -c "import graspsense.plugin_api as m; print(m.PUBLIC.stub())" > src/graspsense/plugin_api.pyi
+    for door in plugin gripper classifier testing experiment simulator; do
+        python -c "import graspsense.${door}_api as m; print(m.PUBLIC.stub())" > src/graspsense/${door}_api.pyi; done
 
 A test compares the stubs with the tables.
 """

@@ -33,6 +33,7 @@ OPENING = int(Phase.OPENING)
 TARING = int(Phase.TARING)
 APPROACH = int(Phase.APPROACH)
 RELEASE = int(Phase.RELEASE)
+"""The fingers open again, after the grasp has ended."""
 
 OPEN_SPEED_M_S = 1e-3
 OPEN_WINDOW_S = 0.1

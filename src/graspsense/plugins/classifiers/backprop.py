@@ -8,16 +8,10 @@ from typing import TYPE_CHECKING, Any, Final, Self
 
 from attrs import frozen
 
-from graspsense.plugin_api import (
-    ClassifierConfig,
-    FeatureValue,
-    NotCompilable,
-    Reason,
-    compile_function,
-    first_call,
-    setting,
-)
+from graspsense.classifier_api import FeatureValue, Reason
+from graspsense.plugin_api import ClassifierConfig, setting
 from graspsense.plugins.classifiers.scikit import FittedEstimator, ScikitClassifier, most_likely
+from graspsense.simulator_api import NotCompilable, compile_function, first_call
 
 if TYPE_CHECKING:
     import numpy as np

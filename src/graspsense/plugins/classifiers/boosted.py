@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from attrs import frozen
 
-from graspsense.plugin_api import ClassifierConfig, FeatureValue, Reason, contribution_reasons, setting
+from graspsense.classifier_api import FeatureValue, Reason, contribution_reasons
+from graspsense.plugin_api import ClassifierConfig, setting
 from graspsense.plugins.classifiers.scikit import FittedEstimator, ScikitClassifier, most_likely
 from graspsense.plugins.classifiers.tree_contributions import means_from_leaves, path_contributions
 

@@ -14,17 +14,15 @@ from typing import TYPE_CHECKING, Any, Final
 
 from attrs import frozen
 
+from graspsense.classifier_api import FeatureValue, contribution_reasons, missing_feature
 from graspsense.plugin_api import (
     Classifier,
     ClassifierConfig,
     Features,
     FeatureTable,
-    FeatureValue,
     PluginUnavailable,
     Prediction,
     StoredValues,
-    contribution_reasons,
-    missing_feature,
     setting,
 )
 

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from attrs import frozen
 
-from graspsense.plugin_api import FeatureValue, Reason, contribution_reasons, setting
+from graspsense.classifier_api import FeatureValue, Reason, contribution_reasons
+from graspsense.plugin_api import setting
 from graspsense.plugins.classifiers.scikit import FittedEstimator, KeptConfig, ScikitClassifier, most_likely
 from graspsense.plugins.classifiers.tree_contributions import path_contributions
 

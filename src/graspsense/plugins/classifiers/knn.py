@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from attrs import frozen
 
-from graspsense.plugin_api import ClassifierConfig, FeatureValue, Reason, setting
+from graspsense.classifier_api import FeatureValue, Reason
+from graspsense.plugin_api import ClassifierConfig, setting
 from graspsense.plugins.classifiers.scikit import FittedEstimator, ScikitClassifier
 
 if TYPE_CHECKING:

@@ -16,19 +16,21 @@ from typing import TYPE_CHECKING, Any, Final, Literal, TypeVar
 
 from attrs import frozen
 
-from graspsense.plugin_api import (
+from graspsense.classifier_api import (
     LARGEST_SEED,
+    FeatureValue,
+    Reason,
+    contribution_reasons,
+    in_words,
+    missing_feature,
+)
+from graspsense.plugin_api import (
     Classifier,
     ClassifierConfig,
     Features,
     FeatureTable,
-    FeatureValue,
     Prediction,
-    Reason,
     StoredValues,
-    contribution_reasons,
-    in_words,
-    missing_feature,
     setting,
 )
 

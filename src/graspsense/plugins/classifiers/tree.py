@@ -7,15 +7,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from attrs import frozen
 
-from graspsense.plugin_api import (
-    FeatureTable,
-    FeatureValue,
-    Reason,
-    SplitTest,
-    leaf_reason,
-    path_reasons,
-    setting,
-)
+from graspsense.classifier_api import FeatureValue, Reason, SplitTest, leaf_reason, path_reasons
+from graspsense.plugin_api import FeatureTable, setting
 from graspsense.plugins.classifiers.scikit import FittedEstimator, KeptConfig, ScikitClassifier
 
 if TYPE_CHECKING:

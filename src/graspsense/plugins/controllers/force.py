@@ -15,13 +15,10 @@ from graspsense.plugin_api import (
     APPROACH,
     EFFORT,
     FORCE,
-    NOT_FREE,
     POSITION,
     Command,
     Controller,
     Frame,
-    FreeLimits,
-    FreeMotion,
     Reading,
     setting,
 )
@@ -37,6 +34,7 @@ from graspsense.plugins.controllers.supervision import (
     supervise,
     supervision,
 )
+from graspsense.simulator_api import NOT_FREE, FreeLimits, FreeMotion
 
 
 @frozen(kw_only=True, slots=False)

@@ -15,14 +15,11 @@ from attrs import frozen
 from graspsense.plugin_api import (
     APPROACH,
     EFFORT,
-    NOT_FREE,
     POSITION,
     VELOCITY,
     Command,
     Controller,
     Frame,
-    FreeLimits,
-    FreeMotion,
     Reading,
     at_rest,
     setting,
@@ -64,6 +61,7 @@ from graspsense.plugins.controllers.velocity import (
     kind_sent,
     velocity_loop,
 )
+from graspsense.simulator_api import NOT_FREE, FreeLimits, FreeMotion
 
 
 @frozen(kw_only=True, slots=False)

@@ -12,32 +12,28 @@ from typing import Final, NamedTuple
 
 from attrs import frozen
 
+from graspsense.gripper_api import CRUSHED, SIDE_IMPACT, SLIPPED, TOO_WIDE
 from graspsense.plugin_api import (
     APPROACH,
     CONTACT_FORCE_N,
-    CRUSHED,
     HOLD,
     NEVER_STEADY,
-    NOT_FREE,
     NOTHING_THERE,
     ONE_FINGER,
     REST_SPEED_M_S,
     REST_WINDOW_S,
     RUNNING,
-    SIDE_IMPACT,
-    SLIPPED,
     SQUEEZE,
     STEADY,
-    TOO_WIDE,
     Channel,
     Frame,
-    FreeLimits,
     RestState,
     at_rest,
     both_touch,
     setting,
     update_rest,
 )
+from graspsense.simulator_api import NOT_FREE, FreeLimits
 
 LAW_CHANNELS: Final = (
     Channel("gap", "m"),

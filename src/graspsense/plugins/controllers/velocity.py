@@ -14,14 +14,11 @@ from attrs import frozen
 
 from graspsense.plugin_api import (
     EFFORT,
-    NOT_FREE,
     POSITION,
     VELOCITY,
     Command,
     Controller,
     Frame,
-    FreeLimits,
-    FreeMotion,
     Reading,
     setting,
 )
@@ -37,6 +34,7 @@ from graspsense.plugins.controllers.supervision import (
     supervise,
     supervision,
 )
+from graspsense.simulator_api import NOT_FREE, FreeLimits, FreeMotion
 
 
 @frozen(kw_only=True, slots=False)

@@ -18,30 +18,31 @@ from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 
 from attrs import frozen
 
+from graspsense.gripper_api import (
+    NO_GAP,
+    first_rest,
+    gap_resolution,
+    gap_resolution_by_sample,
+    window_of_rest,
+)
 from graspsense.plugin_api import (
     APPROACH,
     CONTACT_FORCE_N,
     HOLD,
-    NO_GAP,
     REST_SPEED_M_S,
     REST_WINDOW_S,
     Channel,
-    CompiledFeatures,
     Feature,
     Features,
     FeatureSet,
     RestState,
-    TickColumns,
     at_rest,
     both_touch,
-    first_rest,
-    gap_resolution,
-    gap_resolution_by_sample,
     missing,
     setting,
     update_rest,
-    window_of_rest,
 )
+from graspsense.simulator_api import CompiledFeatures, TickColumns
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from attrs import evolve, frozen
 
-from graspsense.plugin_api import APPROACH, HOLD, NO_GAP, RELEASE, Features, missing
+from graspsense.gripper_api import NO_GAP
+from graspsense.plugin_api import APPROACH, HOLD, RELEASE, Features, missing
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from graspsense.plugin_api import CompileOptions, Inlining, compile_function, is_on_disk
+from graspsense.simulator_api import CompileOptions, Inlining, compile_function, is_on_disk
 from graspsense_c45 import arithmetic, criteria
 from graspsense_c45.arrays import Indices, Mask, Reals
 from graspsense_c45.depthfirst import growing, pruning, routing, scanning

@@ -8,7 +8,8 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Final, Literal, final
 
-from graspsense.plugin_api import EmulatedDevice, NoDevice
+from graspsense.gripper_api import EmulatedDevice
+from graspsense.plugin_api import NoDevice
 from graspsense_pr2_gripper.config import Pr2Config
 from graspsense_pr2_gripper.emulation import emulated_board
 from graspsense_pr2_gripper.emulator.port import Plug, Port

@@ -7,7 +7,7 @@ import time
 from collections.abc import Mapping
 from typing import Final, final
 
-from graspsense.plugin_api import EmulatedDevice
+from graspsense.gripper_api import EmulatedDevice
 from graspsense_robotiq_2f.config import RobotiqConfig
 from graspsense_robotiq_2f.emulator.hand import Hand
 from graspsense_robotiq_2f.emulator.modbus import answered

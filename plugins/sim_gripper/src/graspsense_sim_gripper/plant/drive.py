@@ -18,7 +18,7 @@ from __future__ import annotations
 import math
 from typing import Final, NamedTuple
 
-from graspsense.plugin_api import ScrewLinkage
+from graspsense.gripper_api import ScrewLinkage
 from graspsense_sim_gripper.plant.state import Contact, Motion, right_of
 
 STRIBECK_SPEEDS: Final = 4.5

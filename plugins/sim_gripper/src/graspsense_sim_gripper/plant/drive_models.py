@@ -2,7 +2,7 @@
 
 The numbers of the PR2 are published. The driver of the real gripper (graspsense-pr2-gripper, `linkage.py`) has the
 same ones; `tests/test_pr2_numbers.py` holds the two equal. The map from motor revolutions to the gap is
-`pr2_mechanism_model/src/pr2_gripper_transmission.cpp`, here `graspsense.plugin_api.gap_and_rate`.
+`pr2_mechanism_model/src/pr2_gripper_transmission.cpp`, here `graspsense.gripper_api.gap_and_rate`.
 """
 
 from __future__ import annotations
@@ -10,7 +10,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
-from graspsense.plugin_api import ScrewLinkage, screw_linkage, straight_linkage
+from graspsense.gripper_api import ScrewLinkage, screw_linkage
+from graspsense.simulator_api import straight_linkage
 
 _ALPHA2 = {
     "theta0_deg": 2.97571,

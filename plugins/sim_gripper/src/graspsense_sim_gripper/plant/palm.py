@@ -27,7 +27,9 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from graspsense.plugin_api import FastChannel, Samples, SampleTrace, ScrewLinkage
+from graspsense.gripper_api import ScrewLinkage
+from graspsense.plugin_api import FastChannel, Samples
+from graspsense.testing_api import SampleTrace
 from graspsense_sim_gripper.plant.state import PlantState
 
 SAMPLES: Final = 3

@@ -16,13 +16,8 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from graspsense.plugin_api import (
-    Frame,
-    ScrewLinkage,
-    edge_force,
-    gap_and_rate,
-    pad_force,
-)
+from graspsense.gripper_api import ScrewLinkage, edge_force, gap_and_rate, pad_force
+from graspsense.plugin_api import Frame
 from graspsense_sim_gripper.plant.drive_models import ENCODER_TICKS
 from graspsense_sim_gripper.plant.fingertip import CELLS, FIRST_PAD_CELL
 from graspsense_sim_gripper.plant.state import Motion, PlantReadings

@@ -11,7 +11,9 @@ from __future__ import annotations
 import math
 from typing import Any, Final, NamedTuple
 
-from graspsense.plugin_api import CLOSES, Frame, FreeLimits, after_free, free_from, free_tick, gap_and_rate
+from graspsense.gripper_api import gap_and_rate
+from graspsense.plugin_api import Frame
+from graspsense.simulator_api import CLOSES, FreeLimits, after_free, free_from, free_tick
 from graspsense_sim_gripper.plant.contact import offset_of_pushed
 from graspsense_sim_gripper.plant.drive import STRIBECK_SPEEDS, stribeck_excess
 from graspsense_sim_gripper.plant.sensing import moved_sensor, next_image_s, sense_motion

@@ -8,28 +8,29 @@ from typing import Any, Final, Unpack
 
 from attrs import evolve
 
+from graspsense.gripper_api import no_pads, tare
 from graspsense.plugin_api import (
-    BatchBackend,
-    BatchOptions,
     Channel,
     Command,
     Controller,
     DeviceInfo,
     FeatureSet,
     Frame,
-    FreeRun,
-    Grasped,
     ObjectKind,
     Pads,
     Reading,
+    create,
+)
+from graspsense.simulator_api import (
+    BatchBackend,
+    BatchOptions,
+    FreeRun,
+    Grasped,
     RunConfig,
     SimulationVariant,
     TickParams,
     TickState,
-    create,
     maker,
-    no_pads,
-    tare,
 )
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant.fingertip import CELL_OFFSET, CELLS, FIRST_PAD_CELL, fingertips

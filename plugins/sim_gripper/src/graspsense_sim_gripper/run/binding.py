@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from types import FunctionType
 from typing import Any, TypeVar
 
-from graspsense.plugin_api import bind
+from graspsense.simulator_api import bind
 
 Part = Any
 """A function, constant or class that a generic function reads as a global."""

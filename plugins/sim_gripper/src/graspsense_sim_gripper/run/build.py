@@ -13,15 +13,8 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from attrs import evolve, fields
 
-from graspsense.plugin_api import (
-    EFFORT,
-    Command,
-    ConfigError,
-    DeviceInfo,
-    ScrewLinkage,
-    gap_and_rate,
-    revolutions_at,
-)
+from graspsense.gripper_api import ScrewLinkage, gap_and_rate, revolutions_at
+from graspsense.plugin_api import EFFORT, Command, ConfigError, DeviceInfo
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant.contact import ObjectModel, PadCompliance
 from graspsense_sim_gripper.plant.drive import Drive, Friction

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from graspsense.plugin_api import CALLED, TARING, Frame, after_free, free_from, free_tick
+from graspsense.plugin_api import Frame
+from graspsense.simulator_api import CALLED, TARING, after_free, free_from, free_tick
 from graspsense_sim_gripper.plant.sensing import moved_sensor, next_image_s, sense_motion
 from graspsense_sim_gripper.plant.state import Contact, Motion, PlantState
 from graspsense_sim_gripper.run.approach import approach_ticks

@@ -9,18 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Final, NamedTuple
 
-from graspsense.plugin_api import (
-    APPROACH,
-    HOLD,
-    SQUEEZE,
-    TARING,
-    Command,
-    Frame,
-    Pads,
-    Reading,
-    TickParams,
-    TickState,
-)
+from graspsense.plugin_api import APPROACH, HOLD, SQUEEZE, Command, Frame, Pads, Reading
+from graspsense.simulator_api import TARING, TickParams, TickState
 from graspsense_sim_gripper.plant.sensing import (
     PadBuffers,
     SensorParams,

@@ -10,7 +10,8 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from graspsense.plugin_api import Controller, DeviceInfo, FeatureSet, RunConfig
+from graspsense.plugin_api import Controller, DeviceInfo, FeatureSet
+from graspsense.simulator_api import RunConfig
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant.palm import NUMBERS
 from graspsense_sim_gripper.plant.sensing import SensorParams, SensorState

@@ -7,7 +7,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from graspsense.plugin_api import GraspEvent, Phase, SampleTrace, Trace, event_name
+from graspsense.gripper_api import Phase
+from graspsense.plugin_api import GraspEvent, Trace
+from graspsense.simulator_api import event_name
+from graspsense.testing_api import SampleTrace
 from graspsense_sim_gripper.plant.fingertip import CELLS
 from graspsense_sim_gripper.run.loop import COLUMNS, EVENT_SHIFT
 

@@ -15,7 +15,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from graspsense.plugin_api import NOT_FREE, Frame, FreeMotion, Reading, no_pads
+from graspsense.gripper_api import no_pads
+from graspsense.plugin_api import Frame, Reading
+from graspsense.simulator_api import NOT_FREE, FreeMotion
 from graspsense_sim_gripper.plant.fingertip import CELLS
 from graspsense_sim_gripper.run.accuracy.model import Reduction
 from graspsense_sim_gripper.run.problem import GraspController, GraspSetup

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from traceback import walk_tb
 from types import CodeType
 
-from graspsense.plugin_api import GraspsenseError
+from graspsense.gripper_api import GraspsenseError
 from graspsense_sim_gripper.plant.state import PlantState
 from graspsense_sim_gripper.run.compiled.compose import hardens, plant_move
 from graspsense_sim_gripper.scene.terms.registry import active_laws, phases_of

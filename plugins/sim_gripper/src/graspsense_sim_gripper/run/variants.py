@@ -7,7 +7,7 @@ from typing import Final
 
 from attrs import evolve
 
-from graspsense.plugin_api import SimulationVariant
+from graspsense.simulator_api import SimulationVariant
 
 ACCURACIES: Final = (0.5, 0.3, 0.1, 0.03, 0.01, 0.001, 1e-4)
 STEPS_S: Final = (1e-3, 5e-4, 2e-4, 1e-4)

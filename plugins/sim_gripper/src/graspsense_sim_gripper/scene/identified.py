@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
-from graspsense.plugin_api import suggestion
+from graspsense.simulator_api import suggestion
 
 
 def _is_number(value: Any) -> bool:

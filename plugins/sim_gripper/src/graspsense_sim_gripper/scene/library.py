@@ -17,14 +17,8 @@ from typing import Final
 
 from attrs import fields_dict
 
-from graspsense.plugin_api import (
-    ConfigError,
-    ObjectKind,
-    UnknownName,
-    fitted_results,
-    given_claims,
-    suggestion,
-)
+from graspsense.plugin_api import ConfigError, ObjectKind, UnknownName
+from graspsense.simulator_api import fitted_results, given_claims, suggestion
 from graspsense_sim_gripper.scene.spec import (
     ObjectSpec,
     TomlTable,

@@ -13,15 +13,8 @@ from typing import Any, Final, NamedTuple
 from attrs import field, fields_dict, frozen
 from attrs.validators import ge, gt, in_, le
 
-from graspsense.plugin_api import (
-    ConfigError,
-    TomlError,
-    UnknownName,
-    gives,
-    refuse_other_kind,
-    suggestion,
-    toml_values,
-)
+from graspsense.plugin_api import ConfigError, UnknownName
+from graspsense.simulator_api import TomlError, gives, refuse_other_kind, suggestion, toml_values
 from graspsense_sim_gripper.scene.identified import check_identified
 from graspsense_sim_gripper.scene.terms.registry import find_term, in_order
 from graspsense_sim_gripper.scene.terms.term import not_dented

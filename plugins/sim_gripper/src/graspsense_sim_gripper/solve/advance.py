@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from graspsense.plugin_api import gap_and_rate
+from graspsense.gripper_api import gap_and_rate
 from graspsense_sim_gripper.plant.contact import has_event, is_pressed, is_touched, restarted
 from graspsense_sim_gripper.plant.drive import Drive, is_held
 from graspsense_sim_gripper.plant.state import Contact, Motion, PlantState, StepState

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from graspsense.plugin_api import gap_and_rate
+from graspsense.gripper_api import gap_and_rate
 from graspsense_sim_gripper.plant.contact import ObjectModel, offset_of_pushed
 from graspsense_sim_gripper.plant.drive import ARREST_M_S, is_held, stribeck_excess
 from graspsense_sim_gripper.plant.state import Contact, Motion, PlantState, StepState, right_of

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from graspsense.plugin_api import gap_and_rate
+from graspsense.gripper_api import gap_and_rate
 from graspsense_sim_gripper.plant.contact import CONTACT_TOL_M
 from graspsense_sim_gripper.plant.drive import ARREST_M_S
 from graspsense_sim_gripper.plant.state import ContactState, Motion, right_of

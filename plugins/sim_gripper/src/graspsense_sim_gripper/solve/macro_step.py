@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from typing import Final, NamedTuple
 
-from graspsense.plugin_api import gap_and_rate
+from graspsense.gripper_api import gap_and_rate
 from graspsense_sim_gripper.plant.contact import ObjectModel, has_event, pad_forces
 from graspsense_sim_gripper.plant.drive import Drive, acceleration, is_held, sliding_friction
 from graspsense_sim_gripper.plant.state import (

@@ -20,8 +20,8 @@ from typing import Any, Final, NamedTuple
 from attrs import asdict
 
 import graspsense.plugin_api as plugin_api
-from graspsense.plugin_api import (
-    FeatureSet,
+from graspsense.plugin_api import FeatureSet
+from graspsense.simulator_api import (
     NotCompilable,
     cache_folder,
     fingerprint,

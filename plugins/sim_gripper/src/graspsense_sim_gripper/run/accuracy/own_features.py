@@ -16,7 +16,8 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from graspsense.plugin_api import CHANNELS, Features, FeatureSet, NotCompilable, compiled_extraction
+from graspsense.plugin_api import Features, FeatureSet
+from graspsense.simulator_api import CHANNELS, NotCompilable, compiled_extraction
 from graspsense_sim_gripper.run.accuracy.error import UNIT_SCALES
 from graspsense_sim_gripper.run.compiled.extraction import compiled_measure
 from graspsense_sim_gripper.run.loop import COLUMNS, EVENT_SHIFT

@@ -12,7 +12,7 @@ from typing import Final
 
 from attrs import evolve
 
-from graspsense.plugin_api import gap_and_rate, revolutions_at
+from graspsense.gripper_api import gap_and_rate, revolutions_at
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant.contact import ObjectModel
 from graspsense_sim_gripper.plant.drive import Drive

@@ -16,15 +16,12 @@ import numpy as np
 from attrs import define, evolve, field
 from numpy.typing import NDArray
 
-from graspsense.plugin_api import (
-    CONTACT_FORCE_N,
-    HOLD,
-    FeatureSet,
+from graspsense.gripper_api import gap_and_rate, revolutions_at
+from graspsense.plugin_api import CONTACT_FORCE_N, HOLD, FeatureSet
+from graspsense.simulator_api import (
     NotCompilable,
     TickParams,
     first_state,
-    gap_and_rate,
-    revolutions_at,
     seconds_at_most,
     tick_params,
 )

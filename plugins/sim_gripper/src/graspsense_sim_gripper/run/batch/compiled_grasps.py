@@ -7,7 +7,7 @@ from importlib.util import find_spec
 
 from attrs import field, frozen
 
-from graspsense.plugin_api import ended_by_itself
+from graspsense.simulator_api import ended_by_itself
 from graspsense_sim_gripper.run.batch.drawn import (
     Drawing,
     DrawMemory,

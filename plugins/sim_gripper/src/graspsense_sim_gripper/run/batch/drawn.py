@@ -14,7 +14,7 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from graspsense.plugin_api import CompileOptions, compile_function, entry_point
+from graspsense.simulator_api import CompileOptions, compile_function, entry_point
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant.sensing import PadCells
 from graspsense_sim_gripper.run.accuracy.model import Reduction

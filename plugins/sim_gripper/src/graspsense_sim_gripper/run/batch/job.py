@@ -11,16 +11,13 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from attrs import define, field, frozen
 
-from graspsense.plugin_api import (
+from graspsense.gripper_api import Outcome
+from graspsense.plugin_api import Controller, FeatureSet, Trace
+from graspsense.simulator_api import (
     CompiledExtraction,
-    Controller,
-    FeatureSet,
-    Outcome,
     RunConfig,
-    SampleTrace,
     TickParams,
     TickState,
-    Trace,
     compiled_extraction,
     ended_by_itself,
     first_state,
@@ -28,6 +25,7 @@ from graspsense.plugin_api import (
     seconds_at_most,
     tick_params,
 )
+from graspsense.testing_api import SampleTrace
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant.fingertip import CELL_OFFSET, CELLS
 from graspsense_sim_gripper.plant.palm import NUMBERS, PalmBuffers, sample_trace

@@ -21,7 +21,8 @@ from typing import Any, Final, Unpack
 
 from attrs import define, field
 
-from graspsense.plugin_api import BatchOptions, Controller, FeatureSet, NotCompilable, RunConfig
+from graspsense.plugin_api import Controller, FeatureSet
+from graspsense.simulator_api import BatchOptions, NotCompilable, RunConfig
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.batch.compiled_grasps import CompiledGrasps
 from graspsense_sim_gripper.run.batch.drawn import compiled_drawing

@@ -22,7 +22,9 @@ from typing import IO, Any, Final
 import numpy as np
 from attrs import asdict, evolve, fields
 
-from graspsense.plugin_api import Controller, GraspEvent, Outcome, Phase, RunConfig, Trace, create, recipe_of
+from graspsense.gripper_api import Outcome, Phase
+from graspsense.plugin_api import Controller, GraspEvent, Trace, create
+from graspsense.simulator_api import RunConfig, recipe_of
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.accuracy.cache import restored, stored
 from graspsense_sim_gripper.run.batch.job import FinishedGrasp, Job, grasp_plain

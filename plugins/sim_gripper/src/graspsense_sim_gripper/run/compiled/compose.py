@@ -12,7 +12,8 @@ from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import Any, Final, NamedTuple
 
-from graspsense.plugin_api import Frame, bind, events_of, free_parts, maker, tick
+from graspsense.plugin_api import Frame
+from graspsense.simulator_api import bind, events_of, free_parts, maker, tick
 from graspsense_sim_gripper.plant.contact import (
     BalanceSearch,
     ObjectModel,

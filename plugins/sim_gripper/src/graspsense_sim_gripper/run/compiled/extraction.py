@@ -8,7 +8,13 @@ from typing import Any, Final
 
 import numpy as np
 
-from graspsense.plugin_api import CompiledExtraction, TickColumns, bind, compile_function, entry_point
+from graspsense.simulator_api import (
+    CompiledExtraction,
+    TickColumns,
+    bind,
+    compile_function,
+    entry_point,
+)
 from graspsense_sim_gripper.run.compiled.jit import generating
 from graspsense_sim_gripper.run.loop import COLUMNS, EVENT_SHIFT, Table
 

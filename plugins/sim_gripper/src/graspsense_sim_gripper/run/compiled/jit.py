@@ -1,4 +1,4 @@
-"""Compiling the loop of a grasp with numba: the options for it, on top of `graspsense.plugin_api.compile_function`."""
+"""Compiling the loop of a grasp with numba: the options for it, on top of `graspsense.simulator_api.compile_function`."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, Final
 
-from graspsense.plugin_api import CompileOptions, Inlining, compile_function, first_call
+from graspsense.simulator_api import CompileOptions, Inlining, compile_function, first_call
 from graspsense_sim_gripper.plant.contact import _pressed, solve_contact
 from graspsense_sim_gripper.solve.advance import advance, move, take_step, take_steps
 from graspsense_sim_gripper.solve.converge import refine_until_converged

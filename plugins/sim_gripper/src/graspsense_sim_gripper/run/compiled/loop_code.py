@@ -14,7 +14,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from graspsense.plugin_api import NotCompilable, bind, entry_point
+from graspsense.simulator_api import NotCompilable, bind, entry_point
 from graspsense_sim_gripper.plant.sensing import PadBuffers
 from graspsense_sim_gripper.run.binding import bind_reachable
 from graspsense_sim_gripper.run.compiled.compose import Composition, grasp_loop

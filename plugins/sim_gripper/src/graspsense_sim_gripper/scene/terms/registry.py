@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from functools import cache
 from typing import Final
 
-from graspsense.plugin_api import UnknownName, bind, collect, suggestion
+from graspsense.plugin_api import UnknownName
+from graspsense.simulator_api import bind, collect, suggestion
 from graspsense_sim_gripper.scene.terms import (
     elastic,
     foam,

@@ -1,0 +1,90 @@
+"""What some grippers need besides `graspsense.plugin_api`: calibration, clocks, more fingers, emulated devices."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+from graspsense.core.components.lazy_names import LazyNames, Table
+
+_TABLE: Final[Table] = {
+    "Finding devices and their faults": {
+        "core.components.entries": ("FoundDevice", "Finding"),
+        "core.values.faults": ("StatusBit",),
+        "core.values.errors": ("TareRefused", "GraspsenseError"),
+    },
+    "Emulated devices": {
+        "core.components.emulated": ("EmulatedDevice",),
+        "core.components.entries": ("EmulatorEntry",),
+    },
+    "Reading threads and clocks of devices": {
+        "core.grasp.reading_thread": ("ReadingThread",),
+        "core.grasp.device_clock": ("DeviceClock",),
+    },
+    "Fingers, and where the gripper is mounted": {
+        "core.values.fingers": ("FingerForce", "opposed_forces"),
+        "core.values.mounting": ("Mounting",),
+    },
+    "Signals of grippers that lack some": {
+        "core.values.signals": ("NO_GAP", "no_pads"),
+        "core.components.channels": ("no_signals",),
+    },
+    "Calibration: from cell counts to newtons": {
+        "core.grasp.calibration": (
+            "LoadTable",
+            "cells_force",
+            "edge_force",
+            "load_of",
+            "masked",
+            "pad_force",
+            "tare",
+            "zero_of",
+        ),
+        "core.grasp.calibration_files": (
+            "calibrations_of",
+            "stored_friction",
+            "stored_gain",
+            "stored_tables",
+            "stored_zero",
+        ),
+    },
+    "Transmission: from motor revolutions to the gap": {
+        "core.grasp.transmission": ("ScrewLinkage", "gap_and_rate", "revolutions_at", "screw_linkage"),
+    },
+    "Rest where the gap is coarse": {
+        "core.grasp.gap_resolution": (
+            "GapResolution",
+            "gap_resolution",
+            "gap_resolution_by_sample",
+            "window_of_rest",
+        ),
+        "core.control.contact": ("first_rest",),
+    },
+    "Observers of a grasp while it goes on": {
+        "core.components.entries": ("LiveObserverEntry",),
+    },
+    "Readers of tables with several squeezes": {
+        "sources.manifest.parquet_format": ("read_parquet",),
+        "sources.manifest.steps": ("squeezes",),
+        "sources.manifest.table": ("ColumnTable",),
+        "core.values.errors": ("TooLarge",),
+    },
+    "Recordings as they are replayed": {
+        "recording.replayable": ("Recording",),
+        "core.values.errors": ("RecordingEnded",),
+    },
+    "Commands, phases and outcomes as enumerations, and the outcomes that few laws report": {
+        "core.values.signals": ("Phase", "Outcome", "TOO_WIDE", "SIDE_IMPACT", "CRUSHED", "SLIPPED"),
+    },
+}
+
+PUBLIC: Final = LazyNames("graspsense.gripper_api", _TABLE)
+
+__all__ = PUBLIC.names
+
+
+def __getattr__(name: str) -> Any:
+    return PUBLIC.load(name)
+
+
+def __dir__() -> list[str]:
+    return __all__

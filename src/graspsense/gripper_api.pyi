@@ -1,0 +1,75 @@
+"""Generated from the table of graspsense.gripper_api by `core/components/lazy_names.py`: change the table."""
+
+# Finding devices and their faults
+from graspsense.core.components.entries import FoundDevice as FoundDevice
+from graspsense.core.components.entries import Finding as Finding
+from graspsense.core.values.faults import StatusBit as StatusBit
+from graspsense.core.values.errors import TareRefused as TareRefused
+from graspsense.core.values.errors import GraspsenseError as GraspsenseError
+
+# Emulated devices
+from graspsense.core.components.emulated import EmulatedDevice as EmulatedDevice
+from graspsense.core.components.entries import EmulatorEntry as EmulatorEntry
+
+# Reading threads and clocks of devices
+from graspsense.core.grasp.reading_thread import ReadingThread as ReadingThread
+from graspsense.core.grasp.device_clock import DeviceClock as DeviceClock
+
+# Fingers, and where the gripper is mounted
+from graspsense.core.values.fingers import FingerForce as FingerForce
+from graspsense.core.values.fingers import opposed_forces as opposed_forces
+from graspsense.core.values.mounting import Mounting as Mounting
+
+# Signals of grippers that lack some
+from graspsense.core.values.signals import NO_GAP as NO_GAP
+from graspsense.core.values.signals import no_pads as no_pads
+from graspsense.core.components.channels import no_signals as no_signals
+
+# Calibration: from cell counts to newtons
+from graspsense.core.grasp.calibration import LoadTable as LoadTable
+from graspsense.core.grasp.calibration import cells_force as cells_force
+from graspsense.core.grasp.calibration import edge_force as edge_force
+from graspsense.core.grasp.calibration import load_of as load_of
+from graspsense.core.grasp.calibration import masked as masked
+from graspsense.core.grasp.calibration import pad_force as pad_force
+from graspsense.core.grasp.calibration import tare as tare
+from graspsense.core.grasp.calibration import zero_of as zero_of
+from graspsense.core.grasp.calibration_files import calibrations_of as calibrations_of
+from graspsense.core.grasp.calibration_files import stored_friction as stored_friction
+from graspsense.core.grasp.calibration_files import stored_gain as stored_gain
+from graspsense.core.grasp.calibration_files import stored_tables as stored_tables
+from graspsense.core.grasp.calibration_files import stored_zero as stored_zero
+
+# Transmission: from motor revolutions to the gap
+from graspsense.core.grasp.transmission import ScrewLinkage as ScrewLinkage
+from graspsense.core.grasp.transmission import gap_and_rate as gap_and_rate
+from graspsense.core.grasp.transmission import revolutions_at as revolutions_at
+from graspsense.core.grasp.transmission import screw_linkage as screw_linkage
+
+# Rest where the gap is coarse
+from graspsense.core.grasp.gap_resolution import GapResolution as GapResolution
+from graspsense.core.grasp.gap_resolution import gap_resolution as gap_resolution
+from graspsense.core.grasp.gap_resolution import gap_resolution_by_sample as gap_resolution_by_sample
+from graspsense.core.grasp.gap_resolution import window_of_rest as window_of_rest
+from graspsense.core.control.contact import first_rest as first_rest
+
+# Observers of a grasp while it goes on
+from graspsense.core.components.entries import LiveObserverEntry as LiveObserverEntry
+
+# Readers of tables with several squeezes
+from graspsense.sources.manifest.parquet_format import read_parquet as read_parquet
+from graspsense.sources.manifest.steps import squeezes as squeezes
+from graspsense.sources.manifest.table import ColumnTable as ColumnTable
+from graspsense.core.values.errors import TooLarge as TooLarge
+
+# Recordings as they are replayed
+from graspsense.recording.replayable import Recording as Recording
+from graspsense.core.values.errors import RecordingEnded as RecordingEnded
+
+# Commands, phases and outcomes as enumerations, and the outcomes that few laws report
+from graspsense.core.values.signals import Phase as Phase
+from graspsense.core.values.signals import Outcome as Outcome
+from graspsense.core.values.signals import TOO_WIDE as TOO_WIDE
+from graspsense.core.values.signals import SIDE_IMPACT as SIDE_IMPACT
+from graspsense.core.values.signals import CRUSHED as CRUSHED
+from graspsense.core.values.signals import SLIPPED as SLIPPED
