@@ -6,8 +6,9 @@ The tick is what the runner does from the moment a report's bytes are in the pro
 handed to the wire: decode, count, convert, the hybrid controller's step, the guard, encode. The reports are those of
 an emulated grasp, recorded first and played back, so that neither the emulated board nor the simulator is in the
 figure. The reports are played back twice more by the clock, without and with the predictions of the default model at
-its checkpoints, in turn, and likewise without and with a live page that has a viewer (*unseen*, *live*): *paced* is the time from when a report is due to its command, in the squeeze, and *predicting*
-the same in the ticks during which the thread beside the loop computes. The wake-up is measured apart, against a board
+its checkpoints, in turn, and likewise without and with a live page that has a viewer (*unseen*, *live*): *paced* is the
+time from when a report is due to its command, in the squeeze, and *predicting* the same in the ticks during which the
+thread beside the loop computes. The wake-up is measured apart, against a board
 that runs by the clock in a thread of the same process: how long after the report with the shortest delay, in device
 time, a report was in the driver's hands.
 """

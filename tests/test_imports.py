@@ -332,7 +332,7 @@ def test_what_every_plugin_may_import_are_at_most_seventy_names_that_no_special_
 
 def test_a_name_that_moved_says_where_it_is_now():
     with pytest.raises(ImportError, match=r"from graspsense\.gripper_api import tare"):
-        from graspsense.gripper_api import tare  # noqa: F401
+        from graspsense.plugin_api import tare  # noqa: F401
     with pytest.raises(ImportError, match="import RestState"):
         from graspsense.plugin_api import Stillness  # noqa: F401
     assert new_form("Channel") == ""

@@ -98,8 +98,11 @@ def test_a_name_that_nobody_has(graspsense):
 
 
 OLD = """import graspsense.plugin_api as api
-from graspsense.gripper_api import tare
-from graspsense.plugin_api import Channel, Stillness
+from graspsense.plugin_api import (
+    Channel,
+    Stillness,
+    tare,
+)
 bound = api.bind
 """
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from graspsense.core.components.config import SelectedComponent
     from graspsense.core.components.registry import Component
     from graspsense.core.learn.labelled import Labelled
-    from graspsense.evaluation.choosing import Choice
+    from graspsense.evaluation.choosing import ChosenPipeline
 
 CLASSIFIERS: Final = ("c45", "knn", "svm", "forest", "extra-trees", "mlp")
 """The classifiers to choose from, unless one is given."""
@@ -33,7 +33,7 @@ SUITED: Final = 0.5
 class Chosen:
     """What was chosen, and the trials with the features of it."""
 
-    choice: Choice
+    choice: ChosenPipeline
     learner: SelectedComponent
     labelled: Labelled
 

@@ -26,7 +26,7 @@ from graspsense.evaluation.gathered_warnings import gathered_warnings
 from graspsense.evaluation.intervals import RecognitionRate, rate_of
 from graspsense.evaluation.ranking import (
     Candidate,
-    Measured,
+    CandidateResult,
     Ranking,
     protocols_of,
     ranking_of,
@@ -45,7 +45,7 @@ LEAST_FOLDS: Final = 3
 
 
 @frozen(kw_only=True)
-class Choice:
+class ChosenPipeline:
     """The candidate that was chosen, and what its choice is worth.
 
     `rate` is that of the whole procedure: choice and training on trials that are not predicted. `chosen_in` counts in
@@ -82,7 +82,7 @@ def choose(
     seed: int = 0,
     notes: Sequence[str] = (),
     progress: Callable[[str, int, int], None] | None = None,
-) -> Choice:
+) -> ChosenPipeline:
     """Choose one of the classifiers with one of the feature sets.
 
     `trials` are the same trials with different features. Of candidates with equal rates the first is chosen, in the
@@ -109,7 +109,7 @@ def choose(
     rate = rate_of(right, known.instances, known.no_interval)
     ranking = ranking_of(
         {
-            key: Measured(right={protocol: one.outer.tolist()}, training_s=one.training_s)
+            key: CandidateResult(right={protocol: one.outer.tolist()}, training_s=one.training_s)
             for key, one in answers.items()
         },
         protocol,
@@ -117,7 +117,7 @@ def choose(
         tuple(dict.fromkeys(notes)),
         ChosenRate(rate=rate.rate, interval=rate.interval, of=len(answers)),
     )
-    return Choice(rate=rate, chosen_in=chosen_in, ranking=ranking)
+    return ChosenPipeline(rate=rate, chosen_in=chosen_in, ranking=ranking)
 
 
 def _folds(trials: Labelled, seed: int) -> tuple[str, Folds]:

@@ -118,7 +118,7 @@ class OutsideAnswers:
 
 
 @frozen(kw_only=True)
-class Measured:
+class CandidateResult:
     """What is known of a classifier with a feature set: which trials are right under each protocol, and the sets."""
 
     right: Mapping[str, list[bool]]
@@ -153,7 +153,7 @@ def rank(
     tables = {name: one.table for name, one in trials.items()}
     if first.before_contact is not None:
         tables[BEFORE_CONTACT] = first.before_contact.table
-    measured: dict[tuple[str, str], Measured] = {}
+    measured: dict[tuple[str, str], CandidateResult] = {}
     notes: list[str] = []
     pairs = [(learner, name) for name in tables for learner in learners]
     for done, (learner, name) in enumerate(pairs):
@@ -170,12 +170,12 @@ def rank(
             protocol: [a == b for a, b in zip(predicted, first.labels, strict=True)]
             for protocol, predicted in answers.predicted.items()
         }
-        measured[key] = Measured(right=right, training_s=answers.training_s)
+        measured[key] = CandidateResult(right=right, training_s=answers.training_s)
     return ranking_of(measured, headline, first, (*first.notes, *dict.fromkeys(notes)))
 
 
 def ranking_of(
-    measured: Mapping[tuple[str, str], Measured],
+    measured: Mapping[tuple[str, str], CandidateResult],
     headline: str,
     trials: Labelled,
     notes: Sequence[str],
@@ -222,7 +222,7 @@ def _measured(
     trials: Labelled,
     protocols: Mapping[str, Folds],
     seed: int,
-) -> Measured:
+) -> CandidateResult:
     """Return the answers of a classifier under each protocol. Raises FitRefused."""
     labels, groups = trials.labels, [np.arange(len(trials))]
     right, seconds, sets = {}, [], None
@@ -235,7 +235,7 @@ def _measured(
             sets = set_coverage(
                 pooled, labels, exchangeable_instances(trials), groups, [of], _rate_among(trials)
             )
-    return Measured(right=right, training_s=seconds[0], sets=sets)
+    return CandidateResult(right=right, training_s=seconds[0], sets=sets)
 
 
 def _rate_among(trials: Labelled) -> Callable[[Sequence[bool], Sequence[int] | None], RecognitionRate]:
@@ -250,7 +250,7 @@ def _rate_among(trials: Labelled) -> Callable[[Sequence[bool], Sequence[int] | N
 
 
 def _ranked(
-    measured: Mapping[tuple[str, str], Measured],
+    measured: Mapping[tuple[str, str], CandidateResult],
     headline: str,
     trials: Labelled,
     chosen: ChosenRate | None,

@@ -29,7 +29,7 @@ from graspsense.plugin_api import (
     signal_type,
 )
 from graspsense.simulator_api import BatchBackend, BatchOptions, Grasped, SimulationVariant, Viewer
-from graspsense_mujoco_gripper.batch import Job, grasps
+from graspsense_mujoco_gripper.batch import GraspingJob, grasps
 from graspsense_mujoco_gripper.camera import Camera, Window, offscreen, require_screen
 from graspsense_mujoco_gripper.catalogue import catalogue
 from graspsense_mujoco_gripper.config import MujocoConfig
@@ -38,7 +38,15 @@ from graspsense_mujoco_gripper.drive import ActuatorDrive, Travel, instability, 
 from graspsense_mujoco_gripper.gripper_file import read_gripper
 from graspsense_mujoco_gripper.measurement import ForceGauge, GapGauge, cells_of, plain, width_m
 from graspsense_mujoco_gripper.model import OBJ, compiled, gripper_spec, identifier
-from graspsense_mujoco_gripper.scene import PREFIX, Motion, add_thing, is_thing, put_on_arm, read_scene, vary
+from graspsense_mujoco_gripper.scene import (
+    PREFIX,
+    ArmMotion,
+    add_thing,
+    is_thing,
+    put_on_arm,
+    read_scene,
+    vary,
+)
 
 INTEGRATORS: Final = ("Euler", "implicitfast", "implicit", "RK4", "discrete")
 STEPS_S: Final = (1e-3, 5e-4, 2e-4, 1e-4)
@@ -107,7 +115,7 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
         for name in dict.fromkeys(scenes):
             read_scene(name)
         gripper, _ = read_gripper(self.config.file)
-        return grasps(Job(self.config, controller, options, bool(gripper.channels)), scenes, seeds)
+        return grasps(GraspingJob(self.config, controller, options, bool(gripper.channels)), scenes, seeds)
 
     def see(self, viewer: Viewer) -> None:
         """Make pictures of the next grasp without a screen, or show it in MuJoCo's own viewer."""
@@ -174,7 +182,7 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
             identifier(model, OBJ.mjOBJ_EQUALITY, PREFIX + name, "equality") for name in self._thing.shell
         ]
         self._drive = ActuatorDrive(model, data, self._gripper, travel)
-        self._motion = Motion(model, self._scene)
+        self._motion = ArmMotion(model, self._scene)
         self._data = data
         self._check_start(data)
         self._kept = kept_steps(self._steps, self._drive.longest_s / model.opt.timestep)

@@ -32,12 +32,12 @@ WORTH_A_PROCESS: Final = 4
 _COLUMNS: Final = tuple(one.name for one in fields(Trace) if one.name not in ("units", "signals", "events"))
 
 
-class NotHandedOver(Exception):
+class JobStaysHere(Exception):
     """A grasp cannot run in another process, or failed there; the caller runs it, which shows the reason."""
 
 
 @frozen(eq=False)
-class Job:
+class GraspingJob:
     """What all grasps of a batch have in common."""
 
     config: MujocoConfig
@@ -65,15 +65,15 @@ class Job:
         )
 
     def greeting(self) -> bytes:
-        """Return what a process has to know before its first grasp. Raises NotHandedOver."""
+        """Return what a process has to know before its first grasp. Raises JobStaysHere."""
         if self.makes_signals:
-            raise NotHandedOver
+            raise JobStaysHere
         try:
             name, values = recipe_of("controller", self.controller)
             twin = create("controller", name, **values)
             # Compared as text, because NaN is not equal to itself.
             if repr((twin.params(), twin.init())) != repr((self.controller.params(), self.controller.init())):
-                raise NotHandedOver
+                raise JobStaysHere
             return _line(
                 {
                     "path": [folder or os.getcwd() for folder in sys.path],
@@ -83,10 +83,10 @@ class Job:
                 }
             )
         except (ConfigError, UnknownName, TypeError, ValueError) as error:
-            raise NotHandedOver from error
+            raise JobStaysHere from error
 
     def grasp_in(self, process: subprocess.Popen[bytes], thing: str, seed: int) -> Grasped:
-        """Run one grasp in a process. Raises NotHandedOver."""
+        """Run one grasp in a process. Raises JobStaysHere."""
         to, answers = process.stdin, process.stdout
         assert to is not None
         assert answers is not None
@@ -95,18 +95,18 @@ class Job:
             to.flush()
             line = answers.readline()
             if not line.endswith(b"\n"):
-                raise NotHandedOver
+                raise JobStaysHere
             answer = json.loads(line)
             columns = io.BytesIO(answers.read(answer["bytes"]))
             if "failed" in answer:
-                raise NotHandedOver
+                raise JobStaysHere
             trace = _trace(columns, answer["events"])
         except (OSError, ValueError) as error:
-            raise NotHandedOver from error
+            raise JobStaysHere from error
         return self._grasped(Outcome(answer["outcome"]), answer["reason"], trace, answer["report"])
 
 
-def grasps(job: Job, things: Sequence[str], seeds: Sequence[int]) -> list[Grasped]:
+def grasps(job: GraspingJob, things: Sequence[str], seeds: Sequence[int]) -> list[Grasped]:
     """Return the grasp of each thing with its seed, in order. Raises ValueError if their numbers differ."""
     if len(things) != len(seeds):
         raise ValueError(f"{len(things)} scenes and {len(seeds)} seeds: give one seed a scene")
@@ -120,7 +120,7 @@ def grasps(job: Job, things: Sequence[str], seeds: Sequence[int]) -> list[Graspe
             try:
                 if process is not None:
                     return job.grasp_in(process, things[k], seeds[k])
-            except NotHandedOver:
+            except JobStaysHere:
                 if process is not None:
                     process.kill()
                 process = None
@@ -148,14 +148,14 @@ def grasps(job: Job, things: Sequence[str], seeds: Sequence[int]) -> list[Graspe
 
 
 @contextmanager
-def _processes(job: Job, workers: int) -> Iterator[SimpleQueue[subprocess.Popen[bytes] | None]]:
+def _processes(job: GraspingJob, workers: int) -> Iterator[SimpleQueue[subprocess.Popen[bytes] | None]]:
     """Yield the processes that are free, and end them; None stands for this process."""
     free: SimpleQueue[subprocess.Popen[bytes] | None] = SimpleQueue()
     started: list[subprocess.Popen[bytes]] = []
     try:
         try:
             greeting = job.greeting() if workers > 1 else b""
-        except NotHandedOver:
+        except JobStaysHere:
             greeting = b""
         for _ in range(workers):
             if not greeting:
@@ -189,7 +189,7 @@ def main() -> None:
         return
     sys.path[:] = greeting["path"]
     name, values = greeting["controller"]
-    job = Job(
+    job = GraspingJob(
         MujocoConfig(**greeting["config"]),
         create("controller", name, **values),
         {"run": RunConfig(**greeting["run"]), "traces": True},

@@ -96,7 +96,7 @@ class Scene:
 
 
 @frozen(eq=False)
-class Model:
+class SceneModel:
     """A scene that is read: its thing and the thing's model, not compiled; no model where there is no thing."""
 
     scene: Scene
@@ -105,7 +105,7 @@ class Model:
     instance: str
 
 
-def read_scene(name: str) -> Model:
+def read_scene(name: str) -> SceneModel:
     """Return the scene of this name: a thing of the catalogue, an MJCF file, or a scene file (TOML).
 
     What follows `#` names an instance. Raises UnknownName, ConfigError.
@@ -120,9 +120,9 @@ def read_scene(name: str) -> Model:
     else:
         thing, found = thing_named(scene.thing, beside)
         if found is None:
-            return Model(scene, thing, None, "")
+            return SceneModel(scene, thing, None, "")
         spec = found
-    return Model(scene, thing, spec, f"{name}#{instance}" if number else "")
+    return SceneModel(scene, thing, spec, f"{name}#{instance}" if number else "")
 
 
 def _scene_of(path: Path) -> Scene:
@@ -184,7 +184,7 @@ def put_on_arm(spec: mujoco.MjSpec) -> None:
         body.gravcomp = 1.0
 
 
-def add_thing(spec: mujoco.MjSpec, model: Model, place: Floats, axis: Floats) -> None:
+def add_thing(spec: mujoco.MjSpec, model: SceneModel, place: Floats, axis: Floats) -> None:
     """Add the thing at a place, its x axis along the closing direction, and the table under it.
 
     Raises ConfigError with MuJoCo's message.
@@ -250,7 +250,7 @@ def _lowest(model: mujoco.MjModel) -> float:
     return min(lowest, default=0.0)
 
 
-def vary(model: Model, generator: np.random.Generator) -> float:
+def vary(model: SceneModel, generator: np.random.Generator) -> float:
     """Draw mass, friction, stiffness and size of the thing, and return its place along the gap (m).
 
     An instance has the same mass, stiffness and size in every trial.
@@ -301,7 +301,7 @@ def _scale_size(child: mujoco.MjSpec, factor: float) -> None:
         geom.fromto = np.array(geom.fromto) * factor
 
 
-class Motion:
+class ArmMotion:
     """Moves the arm and pulls the cord, by the time since both fingers touched."""
 
     def __init__(self, model: mujoco.MjModel, scene: Scene) -> None:
