@@ -7,6 +7,9 @@ the same functions. The classifiers of others (benchmarks/recognition_peers.py) 
 forces over time, from the first sample to the last. For that, SOURCE is a store (`graspsense import ... --save DIR`) or
 `simulated`. With `--aeon-python`, the Python of an environment with aeon, MultiRocket-Hydra is among them.
 
+With `--folds 5` there is a row of `graspsense train SOURCE --choose`: the rate of the whole procedure, whose choice for
+each fold is made without this fold. Its time is that of all candidates.
+
 Prints a table for each source as Markdown. For several sources, the mean over them follows, with the difference from
 the best of the others and its 95 % interval: Student's t over the sources. `--mean FILE` prints that for the tables in
 a file.
@@ -30,12 +33,15 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
+from graspsense.cli.choosing import chosen
 from graspsense.cli.compare import compare, compared_trials
 from graspsense.cli.progress import ProgressLine
 from graspsense.cli.sources import learner_of
+from graspsense.cli.train import train
 from graspsense.core.components.config import resolve
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.values.trace import Trace
+from graspsense.evaluation.choosing import FOLDS
 from graspsense.evaluation.intervals import percentage, percentages
 from graspsense.evaluation.ranking import OutsideAnswers, Ranking, protocols_of, rank
 from graspsense.recording.reader import read_recorded
@@ -62,9 +68,9 @@ def measured(source: str, given: argparse.Namespace, options: Sequence[str]) -> 
         learners = {name: learner_of(source, name, asked) for name in asked["classifiers"].split(",")}
     first = next(iter(trials.values()))
     headline, folds = next(iter(protocols_of(first, asked["folds"], asked["seed"]).items()))
-    # A procedure as a whole, such as a choice among candidates inside of the training folds, can be added here: its
-    # answers for all trials under these folds.
     outside = answers_of_others(first, whole_curves(source, asked, first), folds, given, asked["seed"])
+    if asked["folds"] == FOLDS and not given.short:
+        outside |= answers_of_choice(source, first, asked["seed"])
     return rank(
         learners,
         trials,
@@ -76,6 +82,22 @@ def measured(source: str, given: argparse.Namespace, options: Sequence[str]) -> 
         },
         progress=told,
     )
+
+
+def answers_of_choice(source: str, trials: Labelled, seed: int) -> dict[tuple[str, str], dict[str, Any]]:
+    """Return the answers of `graspsense train --choose` as a whole, which has the same outer folds.
+
+    A trial that it does not recognise has an empty answer.
+    """
+    began = time.perf_counter()
+    with tempfile.TemporaryDirectory() as folder:
+        words = [source, "--choose", "--seed", str(seed), "--out", str(Path(folder, "own.json"))]
+        with train.make_context("graspsense train", words) as context:
+            given = context.params
+            choice = chosen(given["source"], None, given, lambda labelled: labelled).choice
+    seconds = (time.perf_counter() - began) / (FOLDS + 1)
+    predicted = [label if right else "" for label, right in zip(trials.labels, choice.right, strict=True)]
+    return {("train --choose", "its choice"): {"predicted": predicted, "training_s": seconds}}
 
 
 def whole_curves(source: str, asked: dict[str, Any], trials: Labelled) -> np.ndarray:

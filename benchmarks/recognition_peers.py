@@ -5,8 +5,8 @@
 
 With the environment of graspsense:
 
-- *QUANT* on the curves (A. Dempster, D. F. Schmidt and G. I. Webb, arXiv:2308.00928), written here from the paper:
-  quantiles over dyadic intervals of the curves, their differences and their spectrum, and extremely randomised trees.
+- *QUANT* on the curves (A. Dempster, D. F. Schmidt and G. I. Webb, arXiv:2308.00928): the quantiles of the feature set
+  `quant` of graspsense, written from the paper, and extremely randomised trees with the settings of the paper.
 - *ExtraTrees* on the curves: all their points.
 - *catch22* on the curves (pycatch22): the 22 characteristics, mean and standard deviation of each channel, and
   extremely randomised trees.
@@ -23,7 +23,6 @@ from __future__ import annotations
 
 import argparse
 import importlib.util
-import itertools
 import json
 import sys
 import time
@@ -33,38 +32,7 @@ import numpy as np
 
 GROUPS, KERNELS, LENGTH = 64, 8, 9
 TREES = 300
-QUANT_DEPTH, QUANT_SHARE, QUANT_TREES, SMOOTHED = 6, 4, 200, 5
-"""Depth of the intervals, points for each quantile, number of trees, and points of the mean of the differences."""
-
-
-def intervals_of(points: int) -> list[slice]:
-    """Return the intervals of QUANT: halves of halves, and the same shifted by half of their length."""
-    found = []
-    for depth in range(min(QUANT_DEPTH, int(np.log2(points)) + 1)):
-        ends = np.linspace(0, points, 2**depth + 1).astype(int)
-        found += [slice(a, b) for a, b in itertools.pairwise(ends) if b > a]
-        shifted = ends[:-1] + np.diff(ends) // 2
-        if depth and np.diff(ends).min() > 1:
-            found += [slice(a, b) for a, b in itertools.pairwise(shifted)]
-    return found
-
-
-def quant_features(series: np.ndarray) -> np.ndarray:
-    """Return the quantiles of one channel of all trials, shape (trials, features)."""
-    kernel = np.full(SMOOTHED, 1.0 / SMOOTHED)
-    steps = np.diff(series, axis=1)
-    smooth = np.array([np.convolve(one, kernel, mode="same") for one in steps])
-    spectrum = np.abs(np.fft.rfft(series, axis=1))
-    parts = []
-    for values in (series, smooth, np.diff(series, n=2, axis=1), spectrum):
-        for interval in intervals_of(values.shape[1]):
-            part = values[:, interval]
-            count = 1 + (part.shape[1] - 1) // QUANT_SHARE
-            shares = np.linspace(0.0, 1.0, count) if count > 1 else np.array([0.5])
-            quantiles = np.quantile(part, shares, axis=1).T
-            quantiles[:, 1::2] -= part.mean(axis=1, keepdims=True)
-            parts.append(quantiles)
-    return np.concatenate(parts, axis=1)
+QUANT_TREES = 200
 
 
 def trees(
@@ -81,7 +49,9 @@ def channels_of(data: dict, transform: object) -> np.ndarray:
 
 
 def quant(data: dict, training: np.ndarray, test: np.ndarray, seed: int) -> np.ndarray:
-    features = channels_of(data, quant_features)
+    from graspsense.plugins.features.quant import interval_quantiles
+
+    features = channels_of(data, interval_quantiles)
     given = {"n_estimators": QUANT_TREES, "max_features": 0.1, "criterion": "entropy"}
     return trees(features, data, training, test, seed, **given)
 
@@ -202,9 +172,8 @@ def synthetic() -> dict:
     rng = np.random.default_rng(0)
     labels = np.array(["soft", "stiff"] * 12)
     steep = np.where(labels == "stiff", 2.0, 1.0)
-    curves = steep[:, np.newaxis, np.newaxis] * np.linspace(0.0, 1.0, 64) + 0.05 * rng.normal(
-        size=(24, 2, 64)
-    )
+    curves = steep[:, np.newaxis, np.newaxis] * np.linspace(0.0, 1.0, 128)
+    curves += 0.05 * rng.normal(size=(24, 2, 128))
     return {
         "labels": labels, "instances": np.arange(24) // 2, "features": curves.mean(axis=2), "curves": curves,
         "folds": np.arange(24) // 2 % 2,

@@ -1,7 +1,9 @@
 """`import --check` on files without a manifest, and `--suggest`, which writes one from the files of a folder."""
 
 import json
+import shutil
 import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +13,7 @@ from graspsense.cli.main import main
 from graspsense.sources.channel_facts import channel_facts
 from graspsense.sources.manifest.reader import read_recordings
 
+SAMPLES = Path(__file__).parents[1] / "samples"
 N = 300
 T_S = np.arange(N) * 0.01
 GAP_MM = np.where(T_S < 1.0, 60.0 - 10.0 * T_S, 50.0)
@@ -308,3 +311,13 @@ def test_a_manifest_is_not_written_over_another_one(tmp_path, capsys):
     (tmp_path / "empty").mkdir()
     assert run(capsys, "import", tmp_path / "empty", "--suggest", tmp_path / "n.toml")[0] == 2
     assert not (tmp_path / "n.toml").exists()
+
+
+def test_check_draws_a_grasp_whose_object_is_not_known(tmp_path, capsys):
+    pytest.importorskip("matplotlib", reason="needs the extra plot")
+    shutil.copytree(SAMPLES / "trials", tmp_path / "trials")
+    code, _, err = run(capsys, "export", f"{tmp_path / 'trials'}#1", "--to", tmp_path / "x.npz")
+    assert code == 0, err
+    code, _, err = run(capsys, "import", f"npz:{tmp_path / 'x.npz'}", "--check", "--plot", tmp_path / "x.png")
+    assert code == 0, err
+    assert (tmp_path / "x.png").stat().st_size > 5000

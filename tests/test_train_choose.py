@@ -140,9 +140,7 @@ def test_trials_from_which_nothing_can_be_chosen(run, store, tmp_path):
     out = ("--out", tmp_path / "own.json")
     code, _, err = run("train", store, "--choose", "--only", "foam", *out)
     assert (code, "'foam'" in err) == (2, True)
-    # No pad reaches this force: no feature set finds a contact.
-    code, _, err = run("train", store, "--choose", "-o", "features.contact_force_n=15", *out)
-    assert (code, "0 of 24 trials" in err) == (2, True)
+    # No pad reaches this force.
     given = ("-o", "features.type=curve", "-o", "features.contact_force_n=15", "--classifier", "knn")
     code, _, err = run("train", store, "--choose", *given, *out)
     assert (code, "no feature" in err) == (2, True)
@@ -156,3 +154,26 @@ def test_options_that_do_not_go_with_it(run, store, tmp_path, option):
     assert code == 2
     assert "--choose" in err
     assert not (tmp_path / "own.json").exists()
+
+
+def test_recordings_without_contact_are_told_apart_by_the_features_that_need_none(run, store, tmp_path):
+    given = ("-o", "features.contact_force_n=15", "--classifier", "extra-trees", "-o", "classifier.trees=20")
+    code, told, err = run("train", store, "--choose", *given, "--out", tmp_path / "own.json", "--json")
+    assert code == 0, err
+    choice = json.loads(told)["choice"]
+
+    assert {one["features"] for one in choice["ranking"]["candidates"]} == {"quant"}
+    assert choice["rate"]["rate"] >= 0.9
+    assert sum(choice["right"]) == choice["rate"]["correct"]
+    assert any("curve" in note and "0 of 24" in note for note in choice["ranking"]["notes"])
+
+
+def test_sets_of_many_features_are_left_to_classifiers_that_take_them_quickly(run, store, tmp_path):
+    code, told, err = run(
+        "train", store, "--choose", "--classifier", "knn", "--out", tmp_path / "own.json", "--json"
+    )
+    assert code == 0, err
+    ranking = json.loads(told)["choice"]["ranking"]
+
+    assert not {"quant", "union of all"} & {one["features"] for one in ranking["candidates"]}
+    assert any("quant" in note and "knn" in note for note in ranking["notes"])

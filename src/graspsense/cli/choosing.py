@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 CLASSIFIERS: Final = ("c45", "knn", "svm", "forest", "extra-trees", "mlp")
 """The classifiers to choose from, unless one is given."""
 UNION: Final = "graspsense/union"
+MANY: Final = 500
+"""Number of features from which on only `QUICK` classifiers are tried: others take minutes on some hundred trials."""
+QUICK: Final = ("svm", "extra-trees")
 SUITED: Final = 0.5
 """Least share of the trials in which a feature set finds a feature; else the recordings lack what it needs."""
 
@@ -83,12 +86,38 @@ def chosen(
     notes: list[str] = []
     with ProgressLine() as progress:
         trials = {name: aimed(one) for name, one in _tables(source, progress, given, notes).items()}
-        choice = choose(learners, trials, seed=given["seed"], notes=notes, progress=progress)
+        pairs = _pairs(learners, trials, notes)
+        choice = choose(learners, trials, pairs, seed=given["seed"], notes=notes, progress=progress)
     return Chosen(
         choice=choice,
         learner=learners[choice.best.classifier],
         labelled=trials[choice.best.features],
     )
+
+
+def _pairs(
+    learners: Collection[str], trials: Mapping[str, Labelled], notes: list[str]
+) -> list[tuple[str, str]]:
+    """Return the pairs of classifier and features to try; `notes` gets what would take too long.
+
+    Where nothing else is left, because classifier or features are given, they are tried however long they take.
+    """
+    every = [(learner, name) for name in trials for learner in learners]
+    quick = [
+        (learner, name)
+        for learner, name in every
+        if learner in QUICK or len(trials[name].table.names) <= MANY
+    ]
+    if not quick:
+        return every
+    for name in trials:
+        slow = [learner for learner in learners if (learner, name) not in quick]
+        if slow:
+            count = len(trials[name].table.names)
+            notes.append(
+                f"features {name} are {count}: not tried with {', '.join(slow)}, which would take long"
+            )
+    return quick
 
 
 def _sets(given: Mapping[str, Any], key: str) -> bool:
@@ -99,9 +128,10 @@ def _sets(given: Mapping[str, Any], key: str) -> bool:
 def _tables(
     source: str, progress: ProgressLine, given: Mapping[str, Any], notes: list[str]
 ) -> dict[str, Labelled]:
-    """Return the trials with each feature set that suits them, and with the union of these; `notes` has the others.
+    """Return the trials with each feature set that suits them, and with the unions of these; `notes` has the others.
 
-    The recordings are read once, for all sets together.
+    There is a union of the sets without many features, in which these are not outnumbered, and one of all. The
+    recordings are read once, for all sets together.
     """
     import numpy as np
 
@@ -145,9 +175,11 @@ def _tables(
             )
     if not suited:
         raise ConfigError(f"no feature set suits the trials of {source}:\n" + "\n".join(notes))
-    if len(suited) > 1:
-        union = installed().find("feature-set", UNION)
-        tables["union"] = _part(united, union, np.concatenate(list(suited.values())), sets=tuple(suited))
+    union = installed().find("feature-set", UNION)
+    small = {name: columns for name, columns in suited.items() if len(columns) <= MANY}
+    for name, sets in (("union", small), ("union of all", suited)):
+        if len(sets) > 1 and (name == "union" or len(sets) > len(small)):
+            tables[name] = _part(united, union, np.concatenate(list(sets.values())), sets=tuple(sets))
     return tables
 
 

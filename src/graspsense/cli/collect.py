@@ -136,11 +136,9 @@ def _show(shown: Live, save: str, word: str, trial: Trial) -> None:
         if warning != trial.reason:
             echo_entry("  warning", warning, Style.CAUTION, err=True, width=_LABEL)
     features = trial.features
-    felt = ", ".join(
-        f"{name} {in_words(value, unit)}"
-        for name, value, unit in zip(features.names, features.values, features.units, strict=True)
-        if value == value
-    )
+    rows, more = features.shown()
+    known = [f"{name} {in_words(value, unit)}" for name, value, unit in rows if value == value]
+    felt = ", ".join([*known, more] if more else known)
     undefined = sum(value != value for value in features.values)
     felt += f"{', ' if felt else ''}{undefined} not defined" if undefined else ""
     echo_entry("  felt", felt, err=True, width=_LABEL)

@@ -381,9 +381,12 @@ def print_trial(trial: Trial) -> None:
     for warning in trial.warnings:
         echo_entry("warning", warning, Style.CAUTION)
     features = trial.features
-    wide = max([LABEL_WIDTH, *(len(name) + 1 for name in features.names)])
-    for name, value, unit in zip(features.names, features.values, features.units, strict=True):
+    rows, more = features.shown()
+    wide = max([LABEL_WIDTH, *(len(name) + 1 for name, _, _ in rows)])
+    for name, value, unit in rows:
         echo_entry(name, _shown(value, unit, features.reasons.get(name, "")), width=wide)
+    if more:
+        echo_entry("features", more, width=wide)
     for event in trial.trace.events:
         unit = trial.trace.units["t"]
         echo_entry("event", f"{event.what} at {event.t_s:.3f} {unit} ({event.phase.name.lower()})")

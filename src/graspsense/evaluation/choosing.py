@@ -48,11 +48,13 @@ LEAST_FOLDS: Final = 3
 class ChosenPipeline:
     """The candidate that was chosen, and what its choice is worth.
 
-    `rate` is that of the whole procedure: choice and training on trials that are not predicted. `chosen_in` counts in
-    how many outer folds each candidate was chosen. `ranking` compares all candidates; the first is the chosen one.
+    `rate` is that of the whole procedure: choice and training on trials that are not predicted. `right` says which
+    trials it recognises. `chosen_in` counts in how many outer folds each candidate was chosen. `ranking` compares all
+    candidates; the first is the chosen one.
     """
 
     rate: RecognitionRate
+    right: tuple[bool, ...]
     chosen_in: Mapping[str, int]
     ranking: Ranking
 
@@ -78,6 +80,7 @@ class _Answers:
 def choose(
     learners: Mapping[str, ClassifierFactory],
     trials: Mapping[str, Labelled],
+    pairs: Sequence[tuple[str, str]] | None = None,
     *,
     seed: int = 0,
     notes: Sequence[str] = (),
@@ -85,9 +88,9 @@ def choose(
 ) -> ChosenPipeline:
     """Choose one of the classifiers with one of the feature sets.
 
-    `trials` are the same trials with different features. Of candidates with equal rates the first is chosen, in the
-    order of features and of `learners`. A candidate that fails is left out, with a note after `notes`. Raises
-    ConfigError if nothing can be chosen from these trials.
+    `trials` are the same trials with different features. `pairs` are the candidates by the names of classifier and
+    features; by default, these are all. Of candidates with equal rates the first is chosen, in this order. A candidate
+    that fails is left out, with a note after `notes`. Raises ConfigError if nothing can be chosen from these trials.
     """
     known = next(iter(trials.values()))
     protocol, folds = _folds(known, seed)
@@ -95,7 +98,7 @@ def choose(
     if protocol != INSTANCE_HELD_OUT:
         why = known.no_instances or "a label has a single instance"
         notes.append(f"{why}: whole objects cannot be held out, so the rate is that for these objects")
-    pairs = [(learner, name) for name in trials for learner in learners]
+    pairs = pairs or [(learner, name) for name in trials for learner in learners]
     answers: dict[tuple[str, str], _Answers] = {}
     with gathered_warnings(notes):
         for done, (learner, name) in enumerate(pairs):
@@ -117,7 +120,7 @@ def choose(
         tuple(dict.fromkeys(notes)),
         ChosenRate(rate=rate.rate, interval=rate.interval, of=len(answers)),
     )
-    return ChosenPipeline(rate=rate, chosen_in=chosen_in, ranking=ranking)
+    return ChosenPipeline(rate=rate, right=tuple(right), chosen_in=chosen_in, ranking=ranking)
 
 
 def _folds(trials: Labelled, seed: int) -> tuple[str, Folds]:

@@ -57,6 +57,11 @@ def graspsense_feature_sets() -> Iterable[FeatureSetEntry]:
         summary="quantiles of gap, forces and their rates over the contact and its halves",
     )
     yield FeatureSetEntry(
+        name="quant",
+        target="graspsense.plugins.features.quant:QuantFeatures",
+        summary="quantiles of gap, forces, their rates and spectrum on many intervals of the whole recording",
+    )
+    yield FeatureSetEntry(
         name="catch22",
         target="graspsense.plugins.features.catch22:Catch22Features",
         summary="22 characteristics of the force over time (pycatch22)",

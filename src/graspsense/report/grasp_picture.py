@@ -76,16 +76,18 @@ def _words(trial: Trial) -> list[str]:
     """Return what was grasped, outcome, warnings, features and prediction with its set, line by line."""
     features, prediction = trial.features, trial.prediction
     reason = f": {trial.reason}" if trial.reason else ""
-    held = trial.run.settings.get("gripper", {}).get("object") or trial.run.labels.get("label", "not known")
+    labels, gripper = trial.run.labels, trial.run.settings.get("gripper", {})
+    held = str(gripper.get("object") or labels.get("label") or "").strip() or "not known"
     lines = [f"Outcome: {trial.outcome.words}{reason}"]
-    lines += [f"Object: {held.strip().splitlines()[0]}, seed {trial.run.seed}"]
+    lines += [f"Object: {held.splitlines()[0]}, seed {trial.run.seed}"]
     lines += [f"Warning: {warning}" for warning in trial.warnings if warning != trial.reason]
     lines += ["", "Features"]
-    for name, value, unit in zip(features.names, features.values, features.units, strict=True):
+    rows, more = features.shown()
+    for name, value, unit in rows:
         shown, factor = display_unit(unit)
         number = "missing" if value != value else f"{factor * value:.4g} {'' if shown == '1' else shown}"
         lines.append(f"   {name} = {number.rstrip()}")
-    lines.append("")
+    lines += [f"   {more}", ""] if more else [""]
     if prediction is None:
         return [*lines, "Prediction: none, the pipeline has no classifier"]
     certainty = f" ({prediction.certainty_in_words})" if prediction.certainty_in_words else ""

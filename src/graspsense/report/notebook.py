@@ -50,10 +50,9 @@ def html(value: object) -> str:
 
 def features_html(features: Features) -> str:
     """Return the features as a table, each missing one with its reason."""
-    rows = [
-        (name, quantity(value, unit), features.reasons.get(name, ""))
-        for name, value, unit in zip(features.names, features.values, features.units, strict=True)
-    ]
+    shown, more = features.shown()
+    rows = [(name, quantity(value, unit), features.reasons.get(name, "")) for name, value, unit in shown]
+    rows += [(more, "", "")] if more else []
     if not features.reasons:
         return table(("feature", "value"), [row[:2] for row in rows])
     return table(("feature", "value", "why it is missing"), rows)

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+SHOWN: Final = 200
+"""Most features of a grasp that are printed or drawn."""
 LARGEST_VALUE: Final = 1e100
 """The largest magnitude of a number to learn from: the squares of its differences, and their sums, are still finite."""
 
@@ -52,9 +54,16 @@ class Features:
             if math.isnan(value) and not self.reasons.get(name):
                 raise ValueError(f"feature {name!r} is NaN without a reason: add one to `reasons`")
 
+    def shown(self) -> tuple[list[tuple[str, float, str]], str]:
+        """Return name, value and unit of the features that people are shown, and in words how many more there are."""
+        rows = list(zip(self.names, self.values, self.units, strict=True))[:SHOWN]
+        left = len(self.names) - len(rows)
+        return rows, f"{left} more features" if left else ""
+
     def __repr__(self) -> str:
-        each = zip(self.names, self.values, self.units, strict=True)
-        words = ", ".join(f"{name} {quantity(value, unit)}" for name, value, unit in each)
+        rows, more = self.shown()
+        each = [f"{name} {quantity(value, unit)}" for name, value, unit in rows]
+        words = ", ".join([*each, more] if more else each)
         return in_one_line(f"<Features: {words or 'none'}>")
 
     def _repr_html_(self) -> str:

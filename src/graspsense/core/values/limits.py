@@ -63,7 +63,7 @@ MODEL_BYTES: Final = SizeLimit("GRASPSENSE_MAX_MODEL_BYTES", 256 * 2**20, "bytes
 CASES: Final = SizeLimit("GRASPSENSE_MAX_CASES", 1000, "cases of an experiment")
 RECORDINGS: Final = SizeLimit("GRASPSENSE_MAX_RECORDINGS", 20_000, "recordings of a data set")
 CLASSES: Final = SizeLimit("GRASPSENSE_MAX_CLASSES", 100, "different labels")
-FEATURES: Final = SizeLimit("GRASPSENSE_MAX_FEATURES", 1000, "features of a trial")
+FEATURES: Final = SizeLimit("GRASPSENSE_MAX_FEATURES", 5000, "features of a trial")
 CHECKPOINTS: Final = SizeLimit("GRASPSENSE_MAX_CHECKPOINTS", 100, "checkpoints of a grasp")
 
 LIMITS: Final = (

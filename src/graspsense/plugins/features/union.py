@@ -6,6 +6,7 @@ feature keeps its name, unless a set before has one of this name: then its set i
 
 from __future__ import annotations
 
+from collections.abc import Container
 from functools import cached_property
 from typing import Any, Final
 
@@ -72,25 +73,27 @@ class UnionFeatures(FeatureSet[UnionConfig]):
     @property
     def features(self) -> tuple[Feature, ...]:  # type: ignore[override]
         """The features of all sets; the first width among them is the width."""
-        found: list[Feature] = []
-        for name, part in self._parts.items():
+        found: dict[str, Feature] = {}
+        has_width = False
+        for set_name, part in self._parts.items():
             for feature in part.features:
-                width = feature.width and not any(one.width for one in found)
-                found.append(
-                    evolve(feature, name=_distinct(feature.name, name, [f.name for f in found]), width=width)
-                )
-        return tuple(found)
+                name = _distinct(feature.name, set_name, found)
+                width = feature.width and not has_width
+                has_width |= width
+                same = (name, width) == (feature.name, feature.width)
+                found[name] = feature if same else evolve(feature, name=name, width=width)
+        return tuple(found.values())
 
     def extract(self, trace: Trace) -> Features:
         """Return the features of all sets."""
-        names: list[str] = []
+        names: dict[str, None] = {}
         values: list[float] = []
         units: list[str] = []
         reasons: dict[str, str] = {}
         for set_name, part in self._parts.items():
             found = part.extract(trace)
             own = {name: _distinct(name, set_name, names) for name in found.names}
-            names += own.values()
+            names |= dict.fromkeys(own.values())
             values += found.values
             units += found.units
             reasons |= {own[name]: why for name, why in found.reasons.items()}
@@ -117,7 +120,7 @@ class UnionFeatures(FeatureSet[UnionConfig]):
         return type(part)(evolve(part.config, **own)) if own else part
 
 
-def _distinct(name: str, set_name: str, taken: list[str]) -> str:
+def _distinct(name: str, set_name: str, taken: Container[str]) -> str:
     """Return the name of a feature, with that of its set in front if the name is taken."""
     if name not in taken:
         return name
