@@ -192,6 +192,7 @@ _TABLE: Final[Table] = {
         "sources.manifest.parquet_format": ("read_parquet",),
         "sources.manifest.steps": ("squeezes",),
         "sources.manifest.table": ("ColumnTable",),
+        "store.stored_grasps": ("StoredGrasp",),
     },
     "Tests of a plugin": {
         "testing.conformance": ("parametrize_checks",),
@@ -254,6 +255,7 @@ _TABLE: Final[Table] = {
             "UnknownName",
             "suggestion",
         ),
+        "recording.atomic_file": ("SaveFailed",),
     },
 }
 

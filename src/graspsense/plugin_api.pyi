@@ -197,6 +197,7 @@ from graspsense.sources.grasp_columns import checked_recording as checked_record
 from graspsense.sources.manifest.parquet_format import read_parquet as read_parquet
 from graspsense.sources.manifest.steps import squeezes as squeezes
 from graspsense.sources.manifest.table import ColumnTable as ColumnTable
+from graspsense.store.stored_grasps import StoredGrasp as StoredGrasp
 
 # Tests of a plugin
 from graspsense.testing.conformance import parametrize_checks as parametrize_checks
@@ -270,3 +271,4 @@ from graspsense.core.values.errors import TareRefused as TareRefused
 from graspsense.core.values.errors import TooLarge as TooLarge
 from graspsense.core.values.errors import UnknownName as UnknownName
 from graspsense.core.values.errors import suggestion as suggestion
+from graspsense.recording.atomic_file import SaveFailed as SaveFailed

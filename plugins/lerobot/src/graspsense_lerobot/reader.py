@@ -26,7 +26,7 @@ from graspsense.plugin_api import (
     squeezes,
 )
 from graspsense_lerobot.folder import Episode, Feature, Folder, read_folder
-from graspsense_lerobot.names import CellArray, Meaning, channel_name, meaning_of
+from graspsense_lerobot.names import CELL, CellArray, Meaning, channel_name, meaning_of
 from graspsense_lerobot.place import Options, folder_and_options
 
 if TYPE_CHECKING:
@@ -87,7 +87,7 @@ def understand(folder: Folder, options: Options) -> Understood:
         )
     given = tuple(_chosen(name, names, "force") for name in options.force.split(",") if name)
     touch = bool(meaning.arrays or images)
-    forces = given or (() if touch else meaning.forces or meaning.effort[:1])
+    forces = given or meaning.forces or (() if touch else meaning.effort[:1])
     if not forces and not touch:
         raise ConfigError(
             f"{folder.place}: nothing tells whether an object was felt: there is no tactile array, and no force, load "
@@ -113,11 +113,13 @@ def frames_of(understood: Understood, episode: Episode) -> list[GraspColumns]:
 
 
 def label_of_task(task: str) -> str:
-    """Return the text of a task as a label, which has no spaces and none of the characters : # ,
+    """Return the text of a task as a label, which has no spaces and none of : # , beside that of CLASS:STATE.
 
-    >>> label_of_task("Pick up: the red cup")
-    'Pick_up-_the_red_cup'
+    >>> label_of_task("Pick up: the red cup"), label_of_task("can:full_open")
+    ('Pick_up-_the_red_cup', 'can:full_open')
     """
+    if re.fullmatch(r"[^\s:#,]+:[^\s:#,]+", task):
+        return task
     return re.sub(r"[:#,]", "-", re.sub(r"\s+", "_", task.strip()))
 
 
@@ -243,11 +245,22 @@ def _names(feature: Feature) -> list[str]:
     given = feature.names if len(feature.names) == feature.shape[0] else ()
     if feature.key == "observation.state":
         return list(given) or [f"state.{k}" for k in range(feature.shape[0])]
+    if given and all(CELL.fullmatch(name) for name in given):
+        return list(given)
     if feature.shape[0] == 1:
         return [word]
     if word in _OF_STATE:
         return [f"{name}.{word}" for name in given or map(str, range(feature.shape[0]))]
     return [f"{word}.{name}" for name in given or map(str, range(feature.shape[0]))]
+
+
+def _units(folder: Folder) -> dict[str, str]:
+    """Return the unit of each number that has one in the metadata."""
+    return {
+        name: unit
+        for feature in _vectors(folder)
+        for name, unit in zip(_names(feature), feature.units, strict=False)
+    }
 
 
 def _chosen(name: str, names: Sequence[str], what: str) -> str:
@@ -296,6 +309,8 @@ def _times(understood: Understood, episode: Episode) -> Numbers:
 def _unit_of_force(understood: Understood) -> str:
     if not understood.forces:
         return "counts"
+    if _units(understood.folder).get(understood.forces[0]) == "N":
+        return ""
     name = understood.forces[0].lower()
     return "%" if name.endswith("load") else "mA" if name.endswith("current") else "counts"
 
@@ -304,6 +319,8 @@ def _unit_of_gap(folder: Folder, gap: str, options: Options) -> tuple[str, list[
     """Return the unit of the opening, empty for metres, and what has to be said of it."""
     if options.gap_m_per_unit is not None:
         return "", [f"gap = {options.gap_m_per_unit:g} * ({gap} - {options.gap_zero:g}) m"]
+    if _units(folder).get(gap) == "m":
+        return "", []
     values = np.concatenate([_numbers(folder, episode)[gap] for episode in folder.episodes()])
     known = values[np.isfinite(values)]
     if not len(known):
