@@ -192,3 +192,68 @@ def test_an_episode_of_an_array_feature_is_read(tmp_path):
     assert max(reading.frame.force_left_n for reading in one.recording.readings) == pytest.approx(
         24.0, rel=1e-5
     )
+
+
+@pytest.fixture(params=[2, 3])
+def annotated(request, tmp_path):
+    """Return a data set of this version, its store, and its annotated copy."""
+    original = write_set(tmp_path / "set", request.param)
+    run("import", f"lerobot:{original}?gap_m_per_unit=0.001", "--save", tmp_path / "s")
+    before = contents(original)
+    run("export", tmp_path / "s", "--to", f"lerobot:{tmp_path / 'copy'}?annotate={original}")
+    assert contents(original) == before
+    return request.param, original, tmp_path / "copy"
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def all_frames(folder: Path) -> pd.DataFrame:
+    return pd.concat([pd.read_parquet(path) for path in sorted((folder / "data").rglob("*.parquet"))])
+
+
+def test_a_copy_has_what_it_had_and_phase_event_and_prediction(annotated):
+    _, original, copy = annotated
+    old, new = all_frames(original), all_frames(copy)
+    added = ["graspsense.phase", "graspsense.event", "graspsense.prediction"]
+    assert [*new.columns] == [*old.columns, *added]
+    for key in old:
+        assert np.array_equal(np.stack(old[key]), np.stack(new[key]))
+    assert set(info(copy)["features"]) == set(new.columns) | {"observation.images.wrist"}
+    means = json.loads((copy / "meta/graspsense.json").read_text())
+    own = new[new["episode_index"] == 1]  # with two squeezes, and so two contacts
+    contacts = [means["graspsense.event"][str(number)] for number in own["graspsense.event"] if number]
+    assert contacts.count("contact") == 2
+    at = np.flatnonzero(own["graspsense.event"])
+    state = np.stack(own["observation.state"])
+    assert (state[at[0], 5::3] > 0.0).all()  # the cells press where contact is told
+    assert (state[at[0] - 3, 5::3] == 0.0).all()
+
+
+def test_a_copy_says_what_each_trial_of_an_episode_was(annotated):
+    version, _, copy = annotated
+    if version == 2:
+        rows = [json.loads(line) for line in (copy / "meta/episodes.jsonl").read_text().splitlines()]
+        trials = [
+            [(one["graspsense/label"], one["graspsense/felt"]) for one in row["graspsense"]] for row in rows
+        ]
+    else:
+        table = pd.read_parquet(copy / "meta/episodes/chunk-000/file-000.parquet")
+        both = zip(table["graspsense/label"], table["graspsense/felt"], strict=True)
+        trials = [list(zip(labels.tolist(), felt.tolist(), strict=True)) for labels, felt in both]
+    cup, sponge = ("pick_the_red_cup", True), ("squeeze-_sponge", True)
+    assert trials == [[cup], [sponge, sponge], [cup]]
+
+
+def test_an_annotated_copy_reads_as_the_original(annotated):
+    _, original, copy = annotated
+    for a, b in zip(recordings(str(original)), recordings(str(copy)), strict=True):
+        assert [one.frame for one in a.recording.readings] == [one.frame for one in b.recording.readings]
+
+
+def test_trials_of_another_origin_annotate_nothing(tmp_path):
+    original = write_set(tmp_path / "set", 3)
+    with pytest.raises(ConfigError, match="imported"):
+        run("export", SAMPLES, "--to", f"lerobot:{tmp_path / 'copy'}?annotate={original}")
+    assert not (tmp_path / "copy").exists()

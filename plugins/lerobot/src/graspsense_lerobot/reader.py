@@ -10,6 +10,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from itertools import pairwise
+from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -103,6 +104,21 @@ def understand(folder: Folder, options: Options) -> Understood:
     )  # fmt: skip
 
 
+def numbered_parts(place: str, folder: Path) -> Iterator[tuple[int, float, float] | None]:
+    """Yield the episode and the times (s) of each recording of a place, read from this folder; None for a damaged one.
+
+    The place gives the options. Raises ConfigError, DataDamaged.
+    """
+    understood = understand(read_folder(folder), folder_and_options(place)[1])
+    for episode in understood.folder.episodes():
+        for part in each_readable(f"episode {episode.index}", partial(frames_of, understood, episode)):
+            if isinstance(part, UnreadableRecording):
+                yield None
+            else:
+                yield episode.index, float(part.t_s[0]), float(part.t_s[-1])
+
+
+@np.errstate(all="ignore")  # what is infinite is refused by `checked_recording`
 def frames_of(understood: Understood, episode: Episode) -> list[GraspColumns]:
     """Return the squeezes of an episode, with the times of the episode. Raises DataDamaged."""
     columns = _columns(understood, episode)
@@ -126,13 +142,15 @@ def label_of_task(task: str) -> str:
 def _of_episode(
     understood: Understood, episode: Episode
 ) -> Iterator[LabelledRecording | UnreadableRecording]:
-    notices = tuple(_notices(understood, episode))
+    with np.errstate(all="ignore"):
+        notices = tuple(_notices(understood, episode))
     for k, squeeze in enumerate(frames_of(understood, episode)):
         yield from each_readable(
             squeeze.source, partial(_grasp, understood, episode, evolve(squeeze, warnings=notices), k)
         )
 
 
+@np.errstate(all="ignore")
 def _grasp(
     understood: Understood, episode: Episode, columns: GraspColumns, number: int
 ) -> tuple[LabelledRecording]:
@@ -394,6 +412,10 @@ def _notices(understood: Understood, episode: Episode) -> Iterator[str]:
 
 def _moments(columns: GraspColumns) -> str:
     """Return when the gripper begins to close and when it touches, in words."""
+    known = np.isfinite(columns.force_n) & np.isfinite(columns.gap_m)
+    if not known.any():
+        return "no contact is found in the force"
+    columns = columns.rows(known)
     force, gap = columns.force_n, columns.gap_m
     low = float(np.nanmin(force))
     touched = force > low + TOUCHED * (float(np.nanmax(force)) - low)

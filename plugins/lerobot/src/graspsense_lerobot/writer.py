@@ -70,11 +70,16 @@ class Plan:
 
 
 def export(grasps: Sequence[StoredGrasp], place: str) -> dict[str, int]:
-    """Write trials to a new folder and return how many trials and frames it has.
+    """Write trials to a new folder, or to a copy of their data set, and return how many trials and frames it has.
 
     Raises ConfigError if it exists or a trial cannot be an episode, SaveFailed if it cannot be written.
     """
     folder, options = folder_and_options(place)
+    if options.annotate:
+        from graspsense_lerobot.annotate import annotate
+
+        with new_folder(folder) as part:
+            return annotate(grasps, Path(options.annotate).expanduser(), part)
     fps = options.fps or FPS
     if fps != int(fps):
         raise ConfigError(f"fps={fps:g}: LeRobot has whole numbers of frames per second")
@@ -124,8 +129,8 @@ def planned(grasps: Sequence[StoredGrasp], fps: int) -> Plan:
         units=tuple(state.values()),
         arrays=arrays,
         tasks=tuple(dict.fromkeys(map(task_of, grasps))),
-        classes=tuple(dict.fromkeys(label for one in grasps for _, label in predictions(one))),
-        events=tuple(dict.fromkeys(str(event["what"]) for one in grasps for event in _told(one))),
+        classes=predicted_classes(grasps),
+        events=told_events(grasps),
         commanded=commanded,
     )
 
@@ -144,6 +149,16 @@ def predictions(grasp: StoredGrasp) -> list[tuple[float, str]]:
     ]
     final = grasp.prediction
     return running + ([(np.inf, str(final["label"]))] if final else [])
+
+
+def predicted_classes(grasps: Sequence[StoredGrasp]) -> tuple[str, ...]:
+    """Return every label that was predicted."""
+    return tuple(dict.fromkeys(label for one in grasps for _, label in predictions(one)))
+
+
+def told_events(grasps: Sequence[StoredGrasp]) -> tuple[str, ...]:
+    """Return the name of every event that was told."""
+    return tuple(dict.fromkeys(str(event["what"]) for one in grasps for event in _told(one)))
 
 
 def _told(grasp: StoredGrasp) -> list[Mapping[str, Any]]:
@@ -199,7 +214,7 @@ def _write(folder: Path, grasps: Sequence[StoredGrasp], plan: Plan) -> int:
     assert writer is not None
     writer.close()
     _write_meta(folder, grasps, plan, rows, columns)
-    _json(
+    write_json(
         folder / "meta" / "stats.json", {key: statistics(np.concatenate(one)) for key, one in every.items()}
     )
     return start
@@ -223,8 +238,8 @@ def _columns(grasp: StoredGrasp, trace: Trace, plan: Plan, episode: int, start: 
             "action", action.astype(np.float32), ("gripper.command" if plan.commanded else "gripper.pos",)
         ),
         Column("graspsense.phase", trace.phase[tick].astype(np.int64)),
-        Column("graspsense.event", _event_numbers(grasp, plan, times)),
-        Column("graspsense.prediction", _prediction_numbers(grasp, plan, times)),
+        Column("graspsense.event", event_numbers(grasp, plan.events, times)),
+        Column("graspsense.prediction", prediction_numbers(grasp, plan.classes, times)),
         Column("timestamp", (frame / plan.fps).astype(np.float32)),
         Column("frame_index", frame),
         Column("episode_index", np.full(n, episode)),
@@ -258,19 +273,21 @@ def cell_names(array: TactileArray) -> tuple[str, ...]:
     return tuple(f"{array.name}.r{row:02d}c{column:02d}{axis}" for row, column in places for axis in axes)
 
 
-def _event_numbers(grasp: StoredGrasp, plan: Plan, times: Any) -> Any:
+def event_numbers(grasp: StoredGrasp, events: Sequence[str], times: Any) -> Any:
+    """Return the number of the event that was told in each frame, 0 for none."""
     numbers = np.zeros(len(times), dtype=np.int64)
     for event in _told(grasp):
         frame = min(int(np.searchsorted(times, float(event["t_s"]) - 1e-9)), len(times) - 1)
-        numbers[frame] = plan.events.index(str(event["what"])) + 1
+        numbers[frame] = events.index(str(event["what"])) + 1
     return numbers
 
 
-def _prediction_numbers(grasp: StoredGrasp, plan: Plan, times: Any) -> Any:
+def prediction_numbers(grasp: StoredGrasp, classes: Sequence[str], times: Any) -> Any:
+    """Return the number of the prediction that holds in each frame, 0 for none."""
     numbers = np.zeros(len(times), dtype=np.int64)
     for t_s, label in predictions(grasp):
         frame = min(int(np.searchsorted(times, t_s - 1e-9)), len(times) - 1)
-        numbers[frame:] = plan.classes.index(label) + 1
+        numbers[frame:] = classes.index(label) + 1
     return numbers
 
 
@@ -324,7 +341,7 @@ def _write_meta(
     table = pyarrow.table({name: [row.get(name) for row in rows] for name in names})
     parquet.write_table(table, folder / EPISODES)
     parquet.write_table(_tasks(plan.tasks), folder / "meta/tasks.parquet")
-    _json(
+    write_json(
         folder / "meta/info.json",
         {
             "codebase_version": "v3.0",
@@ -342,19 +359,26 @@ def _write_meta(
             "features": {one.key: one.declared() for one in columns},
         },
     )
-    _json(folder / "meta/graspsense.json", _meanings(grasps, plan))
-    _json(folder / "meta/episodes.json", {"episodes": [_listed(row, plan) for row in rows]})
+    write_json(folder / "meta/graspsense.json", _meanings(grasps, plan))
+    write_json(folder / "meta/episodes.json", {"episodes": [_listed(row, plan) for row in rows]})
     (folder / "README.md").write_text(_card(grasps, plan), "utf-8")
 
 
 def _meanings(grasps: Sequence[StoredGrasp], plan: Plan) -> dict[str, Any]:
     return {
-        "graspsense.phase": {str(int(phase)): phase.name.lower() for phase in Phase},
-        "graspsense.event": {"0": "", **{str(k): name for k, name in enumerate(plan.events, 1)}},
-        "graspsense.prediction": {"0": "", **{str(k): name for k, name in enumerate(plan.classes, 1)}},
+        **meanings_of_numbers(plan.events, plan.classes),
         "action": "the value that was commanded" if plan.commanded else "the position one frame later",
         "units of features": {name: unit for one in grasps for name, unit in one.units.items()},
         "raw": "graspsense/raw: the channels of each episode at their own rates",
+    }
+
+
+def meanings_of_numbers(events: Sequence[str], classes: Sequence[str]) -> dict[str, dict[str, str]]:
+    """Return what the numbers of phase, event and prediction stand for."""
+    return {
+        "graspsense.phase": {str(int(phase)): phase.name.lower() for phase in Phase},
+        "graspsense.event": {"0": "", **{str(k): name for k, name in enumerate(events, 1)}},
+        "graspsense.prediction": {"0": "", **{str(k): name for k, name in enumerate(classes, 1)}},
     }
 
 
@@ -433,6 +457,7 @@ def _write_raw(folder: Path, trace: Trace, episode: int) -> None:
             parquet.write_table(table, folder / f"episode_{episode:06d}-{name}.parquet")
 
 
-def _json(path: Path, value: Any) -> None:
+def write_json(path: Path, value: Any) -> None:
+    """Write a JSON file, and the folder that it is in."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(json.dumps(value, indent=4, ensure_ascii=False), "utf-8")
