@@ -257,3 +257,11 @@ def test_trials_of_another_origin_annotate_nothing(tmp_path):
     with pytest.raises(ConfigError, match="imported"):
         run("export", SAMPLES, "--to", f"lerobot:{tmp_path / 'copy'}?annotate={original}")
     assert not (tmp_path / "copy").exists()
+
+
+def test_an_annotation_takes_the_place_of_an_earlier_one(annotated, tmp_path):
+    _, _, copy = annotated
+    run("import", f"lerobot:{copy}?gap_m_per_unit=0.001", "--save", tmp_path / "s2")
+    run("export", tmp_path / "s2", "--to", f"lerobot:{tmp_path / 'second'}?annotate={copy}")
+    assert all_frames(tmp_path / "second").equals(all_frames(copy))
+    assert info(tmp_path / "second") == info(copy)

@@ -110,10 +110,8 @@ def _annotate_file(
             table = file.read_row_group(k)
             if not {"episode_index", "timestamp"} <= set(table.column_names):
                 raise DataDamaged(f"{path.name} has no columns episode_index and timestamp")
-            if set(COLUMNS) & set(table.column_names):
-                raise ConfigError("the data set is annotated already: annotate the original")
             for name, values in _numbers(table, placed, meanings).items():
-                table = table.append_column(name, pyarrow.array(values))
+                table = _with_column(table, name, values)
                 every[name].append(values)
             # What another library says of the columns does not name the new ones.
             table = table.replace_schema_metadata(None)
@@ -165,7 +163,11 @@ def _annotate_episodes(copy: Path, version: int, placed: Mapping[int, Sequence[P
             for index in table["episode_index"].to_pylist()
         ]
         for name in names:
-            table = table.append_column(
-                name, pyarrow.array([[one.get(name) for one in some] for some in known])
-            )
+            table = _with_column(table, name, [[one.get(name) for one in some] for some in known])
         parquet.write_table(table.replace_schema_metadata(None), path)
+
+
+def _with_column(table: Any, name: str, values: Any) -> Any:
+    """Return the table with this column, in place of one of the same name."""
+    kept = table.drop_columns([name]) if name in table.column_names else table
+    return kept.append_column(name, pyarrow.array(values))
