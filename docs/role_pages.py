@@ -48,6 +48,7 @@ from graspsense.recording.labelled_recording import LabelledRecording
 from graspsense.recording.replayable import Recording
 from graspsense.scaffold.make import KINDS, plugin_module, words_of
 from graspsense.sources.grasp_columns import GraspColumns, checked_recording
+from graspsense.store.stored_grasps import StoredGrasp
 from graspsense.testing import CHECKS, MINIMUM_CHECKS
 
 DOORS = (plugin_api, gripper_api, classifier_api, experiment_api, testing_api, simulator_api)
@@ -187,6 +188,12 @@ def dataset_page() -> str:
             _text(GraspColumns),
             "",
             f"`checked_recording(columns)`: {_text(checked_recording)}",
+            "",
+            "## StoredGrasp",
+            "",
+            f"    {_fields_signature(StoredGrasp)}",
+            "",
+            _text(StoredGrasp),
             "",
             "## Fields of the entry",
             "",

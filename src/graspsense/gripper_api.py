@@ -62,7 +62,9 @@ _TABLE: Final[Table] = {
     "Observers of a grasp while it goes on": {
         "core.components.entries": ("LiveObserverEntry",),
     },
-    "Readers of tables with several squeezes": {
+    "Readers of tables with several squeezes, and writers of data sets": {
+        "store.stored_grasps": ("StoredGrasp",),
+        "recording.atomic_file": ("SaveFailed",),
         "sources.manifest.parquet_format": ("read_parquet",),
         "sources.manifest.steps": ("squeezes",),
         "sources.manifest.table": ("ColumnTable",),

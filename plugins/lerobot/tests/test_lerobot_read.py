@@ -284,3 +284,31 @@ def test_a_wrong_option_is_wrong_use(tmp_path, query):
 def test_a_folder_that_is_none(tmp_path):
     with pytest.raises(ConfigError, match="no folder"):
         list(recordings(str(tmp_path / "nothing")))
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1e30])
+@pytest.mark.parametrize("name", NAMES[1:4])
+def test_a_column_of_impossible_numbers_is_told_without_a_warning_of_numpy(tmp_path, value, name):
+    state = episode()
+    state[:, NAMES.index(name)] = value
+    folder = write_set(tmp_path / "set", 3, [state, episode()])
+    try:
+        found = list(recordings(f"{folder}?gap_m_per_unit=0.001&force_n_per_unit=1"))
+    except GraspsenseError:
+        return
+    assert isinstance(found[-1], LabelledRecording)
+    assert all(isinstance(one, LabelledRecording | UnreadableRecording) for one in found)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_damaged_bytes_are_an_error_of_ours(tmp_path, seed):
+    folder = write_set(tmp_path / "set", 3, [episode()])
+    random = np.random.default_rng(seed)
+    files = sorted(path for path in folder.rglob("*") if path.is_file())
+    path = files[seed % len(files)]
+    data = bytearray(path.read_bytes())
+    for place in random.integers(0, len(data), 5):
+        data[place] = random.integers(256)
+    path.write_bytes(bytes(data))
+    done = CliRunner().invoke(cli, ["import", f"lerobot:{folder}", "--save", str(tmp_path / "s")])
+    assert done.exception is None or isinstance(done.exception, GraspsenseError | SystemExit)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -18,7 +20,8 @@ from graspsense.cli.terminal import echo
     "target",
     required=True,
     metavar="FILE",
-    help="File to write. Its suffix is the format: .csv .npz .arff .parquet .mcap .toml",
+    help="File to write. Its suffix is the format: .csv .npz .arff .parquet .mcap .toml. Or NAME:FOLDER, a data set of "
+    "a plugin.",
 )
 @click.option(
     "--pictures", is_flag=True, help="Add the tactile images as pictures for Foxglove (.mcap of one grasp)."
@@ -28,16 +31,26 @@ def export(source: str, target: str, pictures: bool, as_json: bool) -> None:
     """Write the trials of the store DIR as a table (.csv .npz .arff .parquet), or one recorded grasp, tick by tick.
 
     One grasp is a trial of a store, DIR#NUMBER, or a FILE.mcap. Its formats are .csv, .npz, .parquet,
-    .mcap (a copy of the recording) and .toml (its settings). Existing files are never overwritten.
+    .mcap (a copy of the recording) and .toml (its settings). NAME:FOLDER is a data set that a plugin writes, as
+    lerobot:FOLDER. Existing files are never overwritten.
     """
     from graspsense.core.values.errors import ConfigError
     from graspsense.recording import export_trace
     from graspsense.recording.reader import read_recorded
+    from graspsense.sources.dataset_recordings import datasets_to_write, write_dataset
     from graspsense.store import export_table
     from graspsense.store.trial_ref import stored_grasp
 
     path = Path(target)
     table = Path(source).is_dir()
+    kind, _, place = target.partition(":")
+    if place and kind in datasets_to_write():
+        if not table or pictures:
+            raise ConfigError(
+                f"{target!r}: a data set is written from the folder of a store, without --pictures"
+            )
+        echo_written(target, write_dataset(kind, place, source), as_json)
+        return
     writers = export_table.WRITERS if table else export_trace.WRITERS
     if path.suffix not in writers:
         what = "the table of a store" if table else "one grasp"
@@ -61,10 +74,15 @@ def export(source: str, target: str, pictures: bool, as_json: bool) -> None:
         else:
             export_trace.WRITERS[path.suffix](path, grasp)
         written = {"ticks": len(grasp), "images": grasp.images}
+    echo_written(target, written, as_json)
+
+
+def echo_written(target: str, written: Mapping[str, Any], as_json: bool) -> None:
+    """Print what was written."""
     if as_json:
         echo_json({"file": target, **written})
-    else:
-        counts = ("trials", "ticks", "images")
-        echo(f"{target}: {', '.join(f'{written[key]} {key}' for key in counts if key in written)}")
-        if written.get("set_aside"):
-            echo(f"note: trials that are set aside and left out: {written['set_aside']}")
+        return
+    counts = ("trials", "ticks", "images", "frames")
+    echo(f"{target}: {', '.join(f'{written[key]} {key}' for key in counts if key in written)}")
+    if written.get("set_aside"):
+        echo(f"note: trials that are set aside and left out: {written['set_aside']}")

@@ -21,6 +21,7 @@ from graspsense.recording.labelled_recording import LabelledRecording, Unreadabl
 from graspsense.recording.readable import is_mistake, readable
 from graspsense.recording.replayable import Recording, check_recording
 from graspsense.sources.recording_notices import with_notices
+from graspsense.store.stored_grasps import stored_grasps
 
 _NUMBERED: Final = re.compile(r"(?P<place>.+)#(?P<number>[1-9]\d{0,8})", re.DOTALL)
 
@@ -30,6 +31,18 @@ _handed: dict[str, Recording] = {}
 def datasets_with_recordings() -> tuple[str, ...]:
     """Return the names of the installed data sets that have recordings."""
     return tuple(one.name for one in installed().datasets() if one.entry.recordings)
+
+
+def datasets_to_write() -> tuple[str, ...]:
+    """Return the names of the installed data sets that trials can be written as."""
+    return tuple(one.name for one in installed().datasets() if one.entry.export)
+
+
+def write_dataset(kind: str, place: str, store: str) -> dict[str, int]:
+    """Write the trials of a store as a data set, and return what was counted. Raises ConfigError, DataDamaged."""
+    dataset = installed().dataset(kind)
+    with _failing_as(dataset.qualified):
+        return dict(dataset.load("export")(stored_grasps(store), place))
 
 
 def is_recording_number(kind: str, name: str) -> bool:
@@ -92,7 +105,7 @@ def _failing_as(dataset: str) -> Iterator[None]:
     except Exception as error:
         if is_mistake(error):
             raise
-        raise ComponentFailed(f"the reader of data set {dataset} failed: {named(error)}") from error
+        raise ComponentFailed(f"data set {dataset} failed: {named(error)}") from error
 
 
 def numbered_recording(kind: str, name: str) -> LabelledRecording:

@@ -41,6 +41,8 @@ class Feature:
     dtype: str
     shape: tuple[int, ...]
     names: tuple[str, ...]
+    units: tuple[str, ...] = ()
+    """The unit of each number, where the metadata of the feature has them."""
 
 
 @frozen(kw_only=True, eq=False)
@@ -263,7 +265,15 @@ def _feature(place: Path, key: str, value: Any) -> Feature:
     while isinstance(names, dict) and names:  # {"motors": [...]}, of earlier versions
         names = next(iter(names.values())) if len(names) == 1 else list(names)
     given = tuple(map(str, names)) if isinstance(names, list) else ()
-    return Feature(key=key, dtype=str(value.get("dtype", "")), shape=tuple(shape), names=given)
+    about = value.get("info")
+    units = about.get("units") if isinstance(about, dict) else None
+    return Feature(
+        key=key,
+        dtype=str(value.get("dtype", "")),
+        shape=tuple(shape),
+        names=given,
+        units=tuple(map(str, units)) if isinstance(units, list) and len(units) == len(given) else (),
+    )
 
 
 def _json(place: Path, name: str) -> Any:

@@ -16,7 +16,7 @@ from graspsense.plugin_api import ConfigError
 from graspsense.simulator_api import suggestion
 
 _WORDS: Final = {"repeated": ("keep", "drop"), "gaps": ("keep", "cut"), "split": ("force", "none")}
-_NAMES: Final = ("gap", "force")
+_NAMES: Final = ("gap", "force", "annotate")
 
 
 @frozen(kw_only=True)
@@ -39,6 +39,8 @@ class Options:
     """`drop` leaves out frames that are equal to the one before."""
     gaps: str = "keep"
     """`cut` divides an episode where frames are missing."""
+    annotate: str = ""
+    """Writing: the data set of which the trials were imported, and of which a copy is annotated."""
     split: str = "force"
     """`none` makes one trial of an episode; else each squeeze of it becomes one."""
 

@@ -10,6 +10,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from itertools import pairwise
+from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -26,7 +27,7 @@ from graspsense.plugin_api import (
     each_readable,
 )
 from graspsense_lerobot.folder import Episode, Feature, Folder, read_folder
-from graspsense_lerobot.names import CellArray, Meaning, channel_name, meaning_of
+from graspsense_lerobot.names import CELL, CellArray, Meaning, channel_name, meaning_of
 from graspsense_lerobot.place import Options, folder_and_options
 
 if TYPE_CHECKING:
@@ -87,7 +88,7 @@ def understand(folder: Folder, options: Options) -> Understood:
         )
     given = tuple(_chosen(name, names, "force") for name in options.force.split(",") if name)
     touch = bool(meaning.arrays or images)
-    forces = given or (() if touch else meaning.forces or meaning.effort[:1])
+    forces = given or meaning.forces or (() if touch else meaning.effort[:1])
     if not forces and not touch:
         raise ConfigError(
             f"{folder.place}: nothing tells whether an object was felt: there is no tactile array, and no force, load "
@@ -103,6 +104,21 @@ def understand(folder: Folder, options: Options) -> Understood:
     )  # fmt: skip
 
 
+def numbered_parts(place: str, folder: Path) -> Iterator[tuple[int, float, float] | None]:
+    """Yield the episode and the times (s) of each recording of a place, read from this folder; None for a damaged one.
+
+    The place gives the options. Raises ConfigError, DataDamaged.
+    """
+    understood = understand(read_folder(folder), folder_and_options(place)[1])
+    for episode in understood.folder.episodes():
+        for part in each_readable(f"episode {episode.index}", partial(frames_of, understood, episode)):
+            if isinstance(part, UnreadableRecording):
+                yield None
+            else:
+                yield episode.index, float(part.t_s[0]), float(part.t_s[-1])
+
+
+@np.errstate(all="ignore")  # what is infinite is refused by `checked_recording`
 def frames_of(understood: Understood, episode: Episode) -> list[GraspColumns]:
     """Return the squeezes of an episode, with the times of the episode. Raises DataDamaged."""
     columns = _columns(understood, episode)
@@ -113,24 +129,28 @@ def frames_of(understood: Understood, episode: Episode) -> list[GraspColumns]:
 
 
 def label_of_task(task: str) -> str:
-    """Return the text of a task as a label, which has no spaces and none of the characters : # ,
+    """Return the text of a task as a label, which has no spaces and none of : # , beside that of CLASS:STATE.
 
-    >>> label_of_task("Pick up: the red cup")
-    'Pick_up-_the_red_cup'
+    >>> label_of_task("Pick up: the red cup"), label_of_task("can:full_open")
+    ('Pick_up-_the_red_cup', 'can:full_open')
     """
+    if re.fullmatch(r"[^\s:#,]+:[^\s:#,]+", task):
+        return task
     return re.sub(r"[:#,]", "-", re.sub(r"\s+", "_", task.strip()))
 
 
 def _of_episode(
     understood: Understood, episode: Episode
 ) -> Iterator[LabelledRecording | UnreadableRecording]:
-    notices = tuple(_notices(understood, episode))
+    with np.errstate(all="ignore"):
+        notices = tuple(_notices(understood, episode))
     for k, squeeze in enumerate(frames_of(understood, episode)):
         yield from each_readable(
             squeeze.source, partial(_grasp, understood, episode, evolve(squeeze, warnings=notices), k)
         )
 
 
+@np.errstate(all="ignore")
 def _grasp(
     understood: Understood, episode: Episode, columns: GraspColumns, number: int
 ) -> tuple[LabelledRecording]:
@@ -243,11 +263,22 @@ def _names(feature: Feature) -> list[str]:
     given = feature.names if len(feature.names) == feature.shape[0] else ()
     if feature.key == "observation.state":
         return list(given) or [f"state.{k}" for k in range(feature.shape[0])]
+    if given and all(CELL.fullmatch(name) for name in given):
+        return list(given)
     if feature.shape[0] == 1:
         return [word]
     if word in _OF_STATE:
         return [f"{name}.{word}" for name in given or map(str, range(feature.shape[0]))]
     return [f"{word}.{name}" for name in given or map(str, range(feature.shape[0]))]
+
+
+def _units(folder: Folder) -> dict[str, str]:
+    """Return the unit of each number that has one in the metadata."""
+    return {
+        name: unit
+        for feature in _vectors(folder)
+        for name, unit in zip(_names(feature), feature.units, strict=False)
+    }
 
 
 def _chosen(name: str, names: Sequence[str], what: str) -> str:
@@ -296,6 +327,8 @@ def _times(understood: Understood, episode: Episode) -> Numbers:
 def _unit_of_force(understood: Understood) -> str:
     if not understood.forces:
         return "counts"
+    if _units(understood.folder).get(understood.forces[0]) == "N":
+        return ""
     name = understood.forces[0].lower()
     return "%" if name.endswith("load") else "mA" if name.endswith("current") else "counts"
 
@@ -304,6 +337,8 @@ def _unit_of_gap(folder: Folder, gap: str, options: Options) -> tuple[str, list[
     """Return the unit of the opening, empty for metres, and what has to be said of it."""
     if options.gap_m_per_unit is not None:
         return "", [f"gap = {options.gap_m_per_unit:g} * ({gap} - {options.gap_zero:g}) m"]
+    if _units(folder).get(gap) == "m":
+        return "", []
     values = np.concatenate([_numbers(folder, episode)[gap] for episode in folder.episodes()])
     known = values[np.isfinite(values)]
     if not len(known):
@@ -377,6 +412,10 @@ def _notices(understood: Understood, episode: Episode) -> Iterator[str]:
 
 def _moments(columns: GraspColumns) -> str:
     """Return when the gripper begins to close and when it touches, in words."""
+    known = np.isfinite(columns.force_n) & np.isfinite(columns.gap_m)
+    if not known.any():
+        return "no contact is found in the force"
+    columns = columns.rows(known)
     force, gap = columns.force_n, columns.gap_m
     low = float(np.nanmin(force))
     touched = force > low + TOUCHED * (float(np.nanmax(force)) - low)

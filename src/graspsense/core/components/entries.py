@@ -232,6 +232,10 @@ class DatasetEntry:
     """The import string of the function `recordings(folder)`, as in `"lab_data.reader:recordings"`."""
     target: str = field(default="", validator=_IS_TARGET_OR_EMPTY)
     """The import string of a function `read(folder, features, *, unreliable)` that returns `Labelled`."""
+    export: str = field(default="", validator=_IS_TARGET_OR_EMPTY)
+    """The import string of a function `export(grasps, folder)` for `graspsense export DIR --to NAME:FOLDER`.
+
+    It writes a sequence of `StoredGrasp` to a new folder, and returns what it has counted as a dict of numbers."""
     needs: str = ""
     """What to install or do if the functions cannot be imported."""
 

@@ -285,7 +285,7 @@ class Resource(Declared[EntryT]):
         return file
 
 
-_TARGETS: Final = ("target", "recordings", "run", "keys", "result", "findings")
+_TARGETS: Final = ("target", "recordings", "export", "run", "keys", "result", "findings")
 _KIND_OF_ENTRY: Final[dict[type, str]] = {
     PipelineEntry: "pipeline",
     ModelEntry: "model",

@@ -1,0 +1,173 @@
+"""A copy of a LeRobot data set with what graspsense found in it: phase, event and prediction of each frame.
+
+The trials were imported from the data set, so that each is a part of an episode. The table of episodes gets what was
+grasped and felt, a list with an item for each trial. The original is only read.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import pyarrow
+from attrs import frozen
+from pyarrow import parquet
+
+from graspsense.plugin_api import ConfigError, DataDamaged, StoredGrasp
+from graspsense_lerobot.columns import statistics
+from graspsense_lerobot.folder import INFO, json_lines, read_folder
+from graspsense_lerobot.reader import numbered_parts
+from graspsense_lerobot.writer import (
+    about,
+    event_numbers,
+    meanings_of_numbers,
+    predicted_classes,
+    prediction_numbers,
+    told_events,
+    write_json,
+)
+
+NO_GRASP: Final = -1
+"""The phase of a frame that is in no trial."""
+COLUMNS: Final = ("graspsense.phase", "graspsense.event", "graspsense.prediction")
+_KIND: Final = "lerobot:"
+
+
+@frozen(eq=False)
+class Placed:
+    """A trial and the times (s) of its episode that it lasts."""
+
+    grasp: StoredGrasp
+    start_s: float
+    end_s: float
+
+
+def annotate(grasps: Sequence[StoredGrasp], original: Path, copy: Path) -> dict[str, int]:
+    """Write an annotated copy of the data set into an empty folder, and return how many trials and frames it has.
+
+    Raises ConfigError if the trials are not of this data set, DataDamaged.
+    """
+    folder = read_folder(original)
+    placed = _placed(grasps, original)
+    events, classes = told_events(grasps), predicted_classes(grasps)
+    shutil.copytree(original, copy, dirs_exist_ok=True)
+    every: dict[str, list[Any]] = {name: [] for name in COLUMNS}
+    for path in sorted((copy / "data").rglob("*.parquet")):
+        _annotate_file(path, placed, (events, classes), every)
+    found = {name: np.concatenate(values) for name, values in every.items() if values}
+    if not found:
+        raise DataDamaged(f"{original} has no Parquet file in its folder data")
+    _annotate_episodes(copy, folder.version, placed)
+    declared = {name: {"dtype": "int64", "shape": [1], "names": None} for name in COLUMNS}
+    write_json(copy / INFO, {**folder.info, "features": {**folder.info["features"], **declared}})
+    meanings: dict[str, dict[str, str]] = meanings_of_numbers(events, classes)
+    meanings["graspsense.phase"][str(NO_GRASP)] = "no grasp"
+    write_json(copy / "meta" / "graspsense.json", meanings)
+    stats = copy / "meta" / "stats.json"
+    if stats.is_file():
+        known = json.loads(stats.read_text("utf-8"))
+        write_json(stats, {**known, **{name: statistics(values) for name, values in found.items()}})
+    return {"trials": len(grasps), "frames": len(found[COLUMNS[0]])}
+
+
+def _placed(grasps: Sequence[StoredGrasp], original: Path) -> dict[int, list[Placed]]:
+    """Return the trials of each episode. Raises ConfigError for one that was not imported from this data set."""
+    places = {grasp.source.rpartition("#")[0] for grasp in grasps}
+    if len(places) != 1 or not all(place.startswith(_KIND) for place in places):
+        raise ConfigError(
+            f"annotate={original}: not all trials were imported from one LeRobot data set. Import it into a store of "
+            f"its own: graspsense import lerobot:{original} --save DIR"
+        )
+    parts = list(numbered_parts(places.pop().removeprefix(_KIND), original))
+    found: dict[int, list[Placed]] = {}
+    for grasp in grasps:
+        number = int(grasp.source.rpartition("#")[2]) - 1
+        part = parts[number] if number < len(parts) else None
+        if part is None:
+            raise ConfigError(
+                f"trial {grasp.number} is recording {number + 1} of another data set: {original} has {len(parts)}"
+            )
+        episode, start_s, end_s = part
+        found.setdefault(episode, []).append(Placed(grasp, start_s, end_s))
+    return found
+
+
+def _annotate_file(
+    path: Path,
+    placed: Mapping[int, Sequence[Placed]],
+    meanings: tuple[Sequence[str], Sequence[str]],
+    every: dict[str, list[Any]],
+) -> None:
+    """Add the columns to a data file, one group of rows after the other. Raises DataDamaged."""
+    part = path.with_suffix(".part")
+    writer = None
+    with parquet.ParquetFile(path) as file:
+        for k in range(file.num_row_groups):
+            table = file.read_row_group(k)
+            if not {"episode_index", "timestamp"} <= set(table.column_names):
+                raise DataDamaged(f"{path.name} has no columns episode_index and timestamp")
+            for name, values in _numbers(table, placed, meanings).items():
+                table = _with_column(table, name, values)
+                every[name].append(values)
+            # What another library says of the columns does not name the new ones.
+            table = table.replace_schema_metadata(None)
+            writer = writer or parquet.ParquetWriter(part, table.schema)
+            writer.write_table(table)
+    if writer is not None:
+        writer.close()
+        part.replace(path)
+
+
+def _numbers(
+    table: Any, placed: Mapping[int, Sequence[Placed]], meanings: tuple[Sequence[str], Sequence[str]]
+) -> dict[str, Any]:
+    episodes = table["episode_index"].to_numpy()
+    times = table["timestamp"].to_numpy().astype(np.float64)
+    phase = np.full(len(table), NO_GRASP, dtype=np.int64)
+    event, prediction = np.zeros(len(table), dtype=np.int64), np.zeros(len(table), dtype=np.int64)
+    for episode in np.unique(episodes).tolist():
+        for one in placed.get(int(episode), ()):
+            within = (episodes == episode) & (times >= one.start_s - 1e-6) & (times <= one.end_s + 1e-6)
+            own_s = times[within] - one.start_s
+            if not len(own_s):
+                continue
+            trace = one.grasp.trace()
+            tick = np.clip(np.searchsorted(trace.t_s, own_s + 1e-6, side="right") - 1, 0, len(trace) - 1)
+            phase[within] = trace.phase[tick]
+            event[within] = event_numbers(one.grasp, meanings[0], own_s)
+            prediction[within] = prediction_numbers(one.grasp, meanings[1], own_s)
+    return dict(zip(COLUMNS, (phase, event, prediction), strict=True))
+
+
+def _annotate_episodes(copy: Path, version: int, placed: Mapping[int, Sequence[Placed]]) -> None:
+    """Add what is known of the trials of each episode to its description."""
+    if version == 2:
+        rows = json_lines(copy, "meta/episodes.jsonl")
+        lines = [
+            json.dumps(
+                {**row, "graspsense": [about(one.grasp) for one in placed.get(row["episode_index"], ())]}
+            )
+            for row in rows
+        ]
+        (copy / "meta" / "episodes.jsonl").write_text("\n".join(lines) + "\n", "utf-8")
+        return
+    names = dict.fromkeys(name for some in placed.values() for one in some for name in about(one.grasp))
+    for path in sorted((copy / "meta" / "episodes").glob("*/*.parquet")):
+        table = parquet.read_table(path)
+        known = [
+            [about(one.grasp) for one in placed.get(index, ())]
+            for index in table["episode_index"].to_pylist()
+        ]
+        for name in names:
+            table = _with_column(table, name, [[one.get(name) for one in some] for some in known])
+        parquet.write_table(table.replace_schema_metadata(None), path)
+
+
+def _with_column(table: Any, name: str, values: Any) -> Any:
+    """Return the table with this column, in place of one of the same name."""
+    kept = table.drop_columns([name]) if name in table.column_names else table
+    return kept.append_column(name, pyarrow.array(values))

@@ -1,0 +1,267 @@
+"""A store written as a LeRobot data set v3.0: what others read of it, and that it is the same trials when read back."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pyarrow.parquet as pq
+import pytest
+from click.testing import CliRunner
+from lerobot_sets import episode, write_set
+
+from graspsense.cli.main import cli
+from graspsense.core.values.errors import ConfigError, DataDamaged
+from graspsense.store.store import Store
+from graspsense_lerobot.reader import recordings
+
+SAMPLES = Path(__file__).parents[3] / "samples" / "trials"
+
+
+def run(*words: object) -> str:
+    done = CliRunner().invoke(cli, list(map(str, words)), catch_exceptions=False)
+    assert done.exit_code == 0, done.output
+    return done.output
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    """Return the data set of a store of imported trials, and the store."""
+    folder = tmp_path_factory.mktemp("lerobot")
+    write_set(folder / "set", 3)
+    run(
+        "import",
+        f"lerobot:{folder / 'set'}?gap_m_per_unit=0.001&force_n_per_unit=0.5",
+        "--save",
+        folder / "s",
+    )
+    run("export", folder / "s", "--to", f"lerobot:{folder / 'out'}?fps=15")
+    return folder / "out", folder / "s"
+
+
+def frames(folder: Path) -> pd.DataFrame:
+    return pd.read_parquet(folder / "data/chunk-000/file-000.parquet")
+
+
+def info(folder: Path) -> dict:
+    return json.loads((folder / "meta/info.json").read_text())
+
+
+def test_the_description_agrees_with_the_frames(written):
+    said, rows = info(written[0]), frames(written[0])
+    assert said["codebase_version"] == "v3.0"
+    assert (said["fps"], said["total_episodes"], said["total_frames"]) == (15, 4, len(rows))
+    assert set(said["features"]) == set(rows.columns)
+    for key, feature in said["features"].items():
+        value = np.atleast_1d(rows[key].iloc[0])
+        assert [*value.shape] == feature["shape"]
+        if feature["names"]:
+            assert len(feature["names"]) == len(value)
+    assert not any("/" in key for key in said["features"])
+
+
+def test_the_indices_are_those_that_lerobot_needs(written):
+    rows = frames(written[0])
+    assert rows["index"].tolist() == list(range(len(rows)))
+    assert rows["timestamp"].dtype == np.float32
+    episodes = pd.read_parquet(written[0] / "meta/episodes/chunk-000/file-000.parquet")
+    for row in episodes.itertuples():
+        own = rows[rows["episode_index"] == row.episode_index]
+        assert (row.dataset_from_index, row.dataset_to_index) == (own["index"].min(), own["index"].max() + 1)
+        assert row.length == len(own)
+        assert own["frame_index"].tolist() == list(range(len(own)))
+        assert own["timestamp"].to_numpy() == pytest.approx(np.arange(len(own)) / 15)
+
+
+def test_the_tasks_are_the_index_of_their_table(written):
+    tasks = pd.read_parquet(written[0] / "meta/tasks.parquet")
+    assert tasks.loc["pick_the_red_cup"].task_index == 0
+    assert [*tasks.columns] == ["task_index"]
+
+
+def test_statistics_are_those_of_the_frames(written):
+    stats = json.loads((written[0] / "meta/stats.json").read_text())
+    state = np.stack(frames(written[0])["observation.state"])
+    assert stats["observation.state"]["max"] == pytest.approx(state.max(axis=0).tolist())
+    assert stats["observation.state"]["std"] == pytest.approx(state.std(axis=0).tolist(), rel=1e-4, abs=1e-6)
+    assert stats["observation.state"]["count"] == [len(state)]
+
+
+def test_phase_event_and_prediction_have_a_meaning(written):
+    means, rows = json.loads((written[0] / "meta/graspsense.json").read_text()), frames(written[0])
+    own = rows[rows["episode_index"] == 0]
+    contact = next(number for number, name in means["graspsense.event"].items() if name == "contact")
+    (at,) = np.flatnonzero(own["graspsense.event"] == int(contact))
+    phases = [means["graspsense.phase"][str(number)] for number in own["graspsense.phase"]]
+    assert phases[at - 2] == "approach"
+    assert phases[at + 1] == "squeeze"
+    assert means["graspsense.prediction"][str(own["graspsense.prediction"].iloc[-1])]
+
+
+def test_what_was_felt_and_the_features_are_columns_of_the_episodes(written):
+    episodes = pd.read_parquet(written[0] / "meta/episodes/chunk-000/file-000.parquet")
+    assert episodes["graspsense/felt"].all()
+    assert not episodes["graspsense/crushed"].any()
+    with Store.read(written[1]) as store:
+        features = store.trial(1).result.features
+    for (name, _), value in zip(features.features, features.values, strict=True):
+        kept = episodes[f"graspsense/feature/{name}"].iloc[0]
+        assert np.isnan(kept) if value is None else kept == value
+
+
+def test_the_raw_rate_is_kept_beside(written):
+    raw = pd.read_parquet(written[0] / "graspsense/raw/episode_000000.parquet")
+    assert np.diff(raw["t_s"]) == pytest.approx(1 / 30, abs=1e-6)
+    cells = pd.read_parquet(written[0] / "graspsense/raw/episode_000000-f0.parquet")
+    assert len(cells["f0"].iloc[0]) == 12
+
+
+def test_what_was_written_reads_back_as_the_same_trials(written):
+    found = list(recordings(str(written[0])))
+    assert [one.label for one in found] == [
+        "pick_the_red_cup",
+        "squeeze-_sponge",
+        "squeeze-_sponge",
+        "pick_the_red_cup",
+    ]
+    with Store.read(written[1]) as store:
+        assert len(found) == len(store.page(limit=10))
+    for one, peak in zip(found, [12.0, 9.0, 9.75, 15.0], strict=True):
+        assert not one.recording.units  # metres and newtons, as the metadata says
+        assert max(reading.frame.force_left_n for reading in one.recording.readings) == pytest.approx(
+            peak, rel=1e-5
+        )
+        assert {channel.name for channel in one.recording.channels} >= {"f0", "f1"}
+
+
+def test_simulated_trials_are_written(tmp_path):
+    run("export", SAMPLES, "--to", f"lerobot:{tmp_path / 'out'}")
+    rows, said = frames(tmp_path / "out"), info(tmp_path / "out")
+    names = said["features"]["observation.state"]["names"]
+    assert {"gripper.pos", "left.force", "right.force"} <= set(names)
+    assert np.isfinite(np.stack(rows["observation.state"])).all()
+    assert "synthetic" in (tmp_path / "out/README.md").read_text()
+    assert ":" in pd.read_parquet(tmp_path / "out/meta/tasks.parquet").index[0]
+
+
+def test_an_existing_folder_is_not_written_to(written):
+    with pytest.raises(ConfigError, match="already exists"):
+        run("export", written[1], "--to", f"lerobot:{written[0]}")
+
+
+def test_nothing_is_left_of_an_export_that_fails(written, tmp_path):
+    store = tmp_path / "s"
+    import shutil
+
+    shutil.copytree(written[1], store)
+    next((store / "recordings").glob("*.mcap")).write_bytes(b"damaged")
+    with pytest.raises((DataDamaged, ConfigError)):
+        run("export", store, "--to", f"lerobot:{tmp_path / 'out'}")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["s"]
+
+
+@pytest.mark.parametrize("source", ["#1", "#2"])
+def test_a_single_trial_is_no_data_set(written, tmp_path, source):
+    with pytest.raises(ConfigError, match="folder of a store"):
+        run("export", f"{written[1]}{source}", "--to", f"lerobot:{tmp_path / 'out'}")
+
+
+def test_an_episode_of_an_array_feature_is_read(tmp_path):
+    """`observation.tactile.left` as a whole: cells with three axes, or a grid."""
+    folder = write_set(tmp_path / "set", 3, [episode()])
+    path = folder / "data/chunk-000/file-000.parquet"
+    table = pq.read_table(path)
+    state = np.stack(table["observation.state"].to_pylist())
+    cells = state[:, 3:15].reshape(-1, 4, 3).astype(np.float32)
+    said = info(folder)
+    said["features"]["observation.tactile.left"] = {"dtype": "float32", "shape": [4, 3], "names": None}
+    said["features"]["observation.state"] |= {
+        "shape": [3],
+        "names": said["features"]["observation.state"]["names"][:3],
+    }
+    (folder / "meta/info.json").write_text(json.dumps(said))
+    import pyarrow as pa
+
+    table = table.set_column(0, "observation.state", pa.array(state[:, :3].tolist()))
+    pq.write_table(table.append_column("observation.tactile.left", pa.array(cells.tolist())), path)
+    (one,) = recordings(str(folder))
+    (array,) = [channel for channel in one.recording.channels if channel.name == "tactile_left"]
+    assert (array.cells, array.components) == (4, 3)
+    assert max(reading.frame.force_left_n for reading in one.recording.readings) == pytest.approx(
+        24.0, rel=1e-5
+    )
+
+
+@pytest.fixture(params=[2, 3])
+def annotated(request, tmp_path):
+    """Return a data set of this version, its store, and its annotated copy."""
+    original = write_set(tmp_path / "set", request.param)
+    run("import", f"lerobot:{original}?gap_m_per_unit=0.001", "--save", tmp_path / "s")
+    before = contents(original)
+    run("export", tmp_path / "s", "--to", f"lerobot:{tmp_path / 'copy'}?annotate={original}")
+    assert contents(original) == before
+    return request.param, original, tmp_path / "copy"
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def all_frames(folder: Path) -> pd.DataFrame:
+    return pd.concat([pd.read_parquet(path) for path in sorted((folder / "data").rglob("*.parquet"))])
+
+
+def test_a_copy_has_what_it_had_and_phase_event_and_prediction(annotated):
+    _, original, copy = annotated
+    old, new = all_frames(original), all_frames(copy)
+    added = ["graspsense.phase", "graspsense.event", "graspsense.prediction"]
+    assert [*new.columns] == [*old.columns, *added]
+    for key in old:
+        assert np.array_equal(np.stack(old[key]), np.stack(new[key]))
+    assert set(info(copy)["features"]) == set(new.columns) | {"observation.images.wrist"}
+    means = json.loads((copy / "meta/graspsense.json").read_text())
+    own = new[new["episode_index"] == 1]  # with two squeezes, and so two contacts
+    contacts = [means["graspsense.event"][str(number)] for number in own["graspsense.event"] if number]
+    assert contacts.count("contact") == 2
+    at = np.flatnonzero(own["graspsense.event"])
+    state = np.stack(own["observation.state"])
+    assert (state[at[0], 5::3] > 0.0).all()  # the cells press where contact is told
+    assert (state[at[0] - 3, 5::3] == 0.0).all()
+
+
+def test_a_copy_says_what_each_trial_of_an_episode_was(annotated):
+    version, _, copy = annotated
+    if version == 2:
+        rows = [json.loads(line) for line in (copy / "meta/episodes.jsonl").read_text().splitlines()]
+        trials = [
+            [(one["graspsense/label"], one["graspsense/felt"]) for one in row["graspsense"]] for row in rows
+        ]
+    else:
+        table = pd.read_parquet(copy / "meta/episodes/chunk-000/file-000.parquet")
+        both = zip(table["graspsense/label"], table["graspsense/felt"], strict=True)
+        trials = [list(zip(labels.tolist(), felt.tolist(), strict=True)) for labels, felt in both]
+    cup, sponge = ("pick_the_red_cup", True), ("squeeze-_sponge", True)
+    assert trials == [[cup], [sponge, sponge], [cup]]
+
+
+def test_an_annotated_copy_reads_as_the_original(annotated):
+    _, original, copy = annotated
+    for a, b in zip(recordings(str(original)), recordings(str(copy)), strict=True):
+        assert [one.frame for one in a.recording.readings] == [one.frame for one in b.recording.readings]
+
+
+def test_trials_of_another_origin_annotate_nothing(tmp_path):
+    original = write_set(tmp_path / "set", 3)
+    with pytest.raises(ConfigError, match="imported"):
+        run("export", SAMPLES, "--to", f"lerobot:{tmp_path / 'copy'}?annotate={original}")
+    assert not (tmp_path / "copy").exists()
+
+
+def test_an_annotation_takes_the_place_of_an_earlier_one(annotated, tmp_path):
+    _, _, copy = annotated
+    run("import", f"lerobot:{copy}?gap_m_per_unit=0.001", "--save", tmp_path / "s2")
+    run("export", tmp_path / "s2", "--to", f"lerobot:{tmp_path / 'second'}?annotate={copy}")
+    assert all_frames(tmp_path / "second").equals(all_frames(copy))
+    assert info(tmp_path / "second") == info(copy)
