@@ -21,8 +21,8 @@ from graspsense.cli.live import _host_and_port
 from graspsense.core.pipeline.pipeline import load_pipeline
 from graspsense.core.values.channel import Channel, FastChannel, TactileArray
 from graspsense.core.values.device import DeviceInfo
-from graspsense.core.values.signals import EFFORT, NO_PADS, SQUEEZE, Command, Frame, Image, Reading, Samples
 from graspsense.core.values.errors import ConfigError
+from graspsense.core.values.signals import EFFORT, NO_PADS, SQUEEZE, Command, Frame, Image, Reading, Samples
 from graspsense.live.feeds import LiveFeed
 from graspsense.plugin_api import signal_type
 
