@@ -6,9 +6,10 @@ The tick is what the runner does from the moment a report's bytes are in the pro
 handed to the wire: decode, count, convert, the hybrid controller's step, the guard, encode. The reports are those of
 an emulated grasp, recorded first and played back, so that neither the emulated board nor the simulator is in the
 figure. The reports are played back twice more by the clock, without and with the predictions of the default model at
-its checkpoints, in turn, and likewise without and with a live page that has a viewer (*unseen*, *live*): *paced* is the
-time from when a report is due to its command, in the squeeze, and *predicting* the same in the ticks during which the
-thread beside the loop computes. The wake-up is measured apart, against a board
+its checkpoints, in turn: *paced* is the time from when a report is due to its command, in the squeeze, and *predicting*
+the same in the ticks during which the thread beside the loop computes. Two further times they are played back without
+and with a live page that a viewer receives: *unseen* and *live* are as *paced*, and *handed_over* is what the runner
+spends on the page after the command of a tick. The wake-up is measured apart, against a board
 that runs by the clock in a thread of the same process: how long after the report with the shortest delay, in device
 time, a report was in the driver's hands.
 """
@@ -20,6 +21,8 @@ import json
 import math
 import os
 import platform
+import subprocess
+import sys
 import time
 from collections.abc import Sequence
 from datetime import date
@@ -112,6 +115,29 @@ class RealTime(Pr2Backend):
         return evolve(super().open(seed), clock="device")
 
 
+class Timed:
+    """A sink that passes on ticks, and notes how long that takes."""
+
+    def __init__(self, inner: Sink) -> None:
+        self._inner = inner
+        self.us: list[float] = []
+
+    def take(self, *tick: Any) -> None:
+        began = time.perf_counter_ns()
+        self._inner.take(*tick)
+        self.us.append((time.perf_counter_ns() - began) / 1e3)
+
+
+VIEWER = """
+import sys
+from websockets.sync.client import connect
+with connect(sys.argv[1], max_size=None) as viewer:
+    print("connected", flush=True)
+    for text in viewer:
+        pass
+"""
+
+
 class Watched:
     """Passes every tick on to the predictions, and notes in which ticks of a squeeze one is computed."""
 
@@ -190,23 +216,24 @@ def paced_us(grasps: int, sent: Sequence[bytes], feature: bytes) -> dict[str, li
 
 def live_us(grasps: int, sent: Sequence[bytes], feature: bytes) -> dict[str, list[float]]:
     """Return the times of the ticks of a squeeze, in turn alone and with a page that one viewer receives."""
-    from websockets.sync.client import connect
-
     period_s = 1.0 / decode_identity(feature).report_rate_hz
     found: dict[str, list[float]] = {"unseen": [], "live": []}
     feed = LiveFeed("graspsense.live.page_process", ["127.0.0.1", "0"])
-    with connect(feed.answer["address"].replace("http", "ws", 1) + "frames", max_size=None) as viewer:
+    timed = Timed(feed)
+    frames = feed.answer["address"].replace("http", "ws", 1) + "frames"
+    with subprocess.Popen([sys.executable, "-c", VIEWER, frames], stdout=subprocess.PIPE) as viewer:
+        assert viewer.stdout is not None
+        viewer.stdout.readline()  # it is connected
         for _ in range(grasps):
-            for name, sinks in (("unseen", ()), ("live", (feed,))):
+            for name, sinks in (("unseen", ()), ("live", (timed,))):
                 wire = Playback(sent, feature, period_s)
                 watched = Watched(None, wire)
                 played(wire, feature, watched, sinks)
                 found[name] += [wire.ticks_ns[k] / 1e3 for k in watched.squeeze]
-        feed.told("outcome", {"outcome": "over", "reason": ""})
-        while '"over"' not in viewer.recv():
-            pass
-    feed.close()
-    return found
+        feed.close()
+    assert not feed.dropped
+    assert not viewer.returncode
+    return {**found, "handed_over": timed.us}
 
 
 def wake_ups_us(seconds: float) -> list[float]:

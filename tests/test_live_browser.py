@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import json
+import math
 
 import browser as browsers
 import pytest
 
 from graspsense.core.pipeline.pipeline import load_pipeline
+from graspsense.core.values.channel import Channel, FastChannel, TactileArray
+from graspsense.core.values.device import DeviceInfo
+from graspsense.core.values.signals import EFFORT, NO_PADS, SQUEEZE, Command, Frame, Image, Reading, Samples
 from graspsense.live.feeds import LiveFeed
+from graspsense.plugin_api import signal_type
 
 pytest.importorskip("websockets")
 pytestmark = pytest.mark.browser
@@ -97,3 +102,52 @@ def test_the_page_shows_what_was_sent(browser, feed, tmp_path, dark, width):
     assert [
         one for one in browser.events if one.get("method") in ("Log.entryAdded", "Runtime.exceptionThrown")
     ] == []
+
+
+CHANNELS = (
+    Channel("gap", "m", 1000.0),
+    TactileArray("skin", "counts", 100.0, rows=2, columns=3),
+    FastChannel("sound", "V", 4000.0, samples=4),
+)
+
+
+def test_arrays_are_heat_maps_and_fast_channels_have_a_spectrogram_and_nothing_grows(browser, feed):
+    """A tone of an eighth of the rate stands at a quarter of the spectrogram; a curve keeps its last points."""
+    command, nan = Command(EFFORT, 5.0, math.inf, math.inf), math.nan
+    signals, ticks = signal_type(CHANNELS), 31_000
+    browser.show(feed.answer["address"], 1280)
+    feed.opened(
+        DeviceInfo(
+            name="hand",
+            clock="device",
+            simulated=True,
+            rate_hz=1000.0,
+            effort_limit_n=100.0,
+            speed_limit_m_s=0.1,
+            opening=command,
+            relaxed=command,
+            channels=CHANNELS,
+        )
+    )
+    for k in range(ticks):
+        frame = Frame(k / 1000, 0.001, 0.05, 0.0, nan, nan, nan, nan, nan, 0)
+        cells = tuple(float(k * i) for i in range(6))
+        tone = tuple((math.sin(2 * math.pi * (4 * k + i) / 8),) for i in range(4))
+        new = Samples(k / 1000, 4 * k + 4, 4, tone)
+        feed.take(Reading(frame, NO_PADS, signals(Image(k / 1000, k + 1, cells), new)), SQUEEZE, command)
+        if k % 4000 == 0:
+            feed.told("progress", {"text": f"tick {k}"})
+            shown(browser, "$('done').textContent", f"tick {k}")
+    feed.told("outcome", {"outcome": "steady", "reason": ""})
+    shown(browser, "$('outcome').textContent", "outcome: steady")
+    assert browser.run("[series.get('gap_m').n, series.get('sound value').n]") == [30_000, 30_000]
+    assert browser.run("series.get('gap_m').last()") == 0.05
+    assert browser.run("arrays.get('skin').text.textContent") == "skin: 0 to 155000 counts"
+    picture = "arrays.get('skin').canvas.getContext('2d').getImageData(0, 0, 3, 2).data"
+    assert browser.run(f"[{picture}[0], {picture}[20], {picture}.length]") == [0, 255, 24]
+    column = "spectra.get('sound').canvas.getContext('2d').getImageData(0, 0, 1, 128).data"
+    strongest = browser.run(
+        f"(() => {{ const d = {column}; return [...Array(128).keys()].sort((a, b) => "
+        "d[4 * b] + d[4 * b + 1] - d[4 * a] - d[4 * a + 1])[0]; })()"
+    )
+    assert abs(127 - strongest - 32) <= 1

@@ -81,11 +81,13 @@ class LiveFeed(Feed):
         """Pass on how a grasp ended. Do not call this during control."""
         if trial.prediction is not None:
             self._told("prediction", prediction_values(trial.prediction))
-        self._told("outcome", {"outcome": trial.outcome.words, "reason": trial.reason})
+        self.told("outcome", {"outcome": trial.outcome.words, "reason": trial.reason})
 
     def told(self, name: str, values: Any) -> None:
         """Pass on JSON values. Do not call this during control."""
         self._told(name, values)
+        # What waits for the pipe would otherwise stay there until the next message.
+        self._drain(b"", END_TIMEOUT_S)
 
     def close(self) -> str:
         """End the process and return the error that it reports; empty if there is none."""
