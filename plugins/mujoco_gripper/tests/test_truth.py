@@ -39,7 +39,8 @@ def extreme(folder, mass_kg, friction, speed_m_s, step_s):
     )
     scene = folder / "scene.toml"
     scene.write_text(
-        f'thing = "wide.xml"\ntable = true\nmass_kg = {mass_kg}\nfriction = {friction}\narm = [[0.0, 0.0], [0.3, 0.03]]\n'
+        f'thing = "wide.xml"\ntable = true\nmass_kg = {mass_kg}\nfriction = {friction}\n'
+        "arm = [[0.0, 0.0], [0.3, 0.03]]\n"
     )
     gripper = create(
         "sensor-backend",
