@@ -7,6 +7,7 @@ each gripper that holds the egg (needs PyOpenGL, and EGL or OSMesa).
 from __future__ import annotations
 
 import argparse
+import subprocess
 import sys
 from math import isfinite
 from pathlib import Path
@@ -14,11 +15,13 @@ from pathlib import Path
 from graspsense import load_pipeline
 
 FORCE_N = 8.0
+SIZE = (200, 150)
+"""Of a picture (pixels)."""
 
 
-def grasped(file: Path, thing: str) -> str:
-    """Grasp a thing; return what came of it. Raises SystemExit where it was not held whole."""
-    options = [
+def options(file: Path) -> list[str]:
+    """Return the settings of a grasp with a gripper file."""
+    return [
         "gripper.type=mujoco",
         f"gripper.file={file}",
         "classifier.type=none",
@@ -26,7 +29,24 @@ def grasped(file: Path, thing: str) -> str:
         "controller.sends=velocity",
         f"controller.probing_force_n={FORCE_N}",
     ]
-    trial = load_pipeline("default", options=options).grasp(object=thing, seed=0)
+
+
+def write_picture(file: Path, target: Path) -> None:
+    """Write a small picture of a gripper that holds the egg, as `graspsense run --picture` takes it."""
+    from PIL import Image
+
+    target.parent.mkdir(parents=True, exist_ok=True)
+    settings = [word for option in options(file) for word in ("-o", option)]
+    command = [sys.executable, "-m", "graspsense", "run", "--object", "egg", "--seed", "0", *settings]
+    subprocess.run([*command, "--picture", str(target)], check=True, capture_output=True)
+    with Image.open(target) as picture:
+        small = picture.convert("RGB").resize(SIZE, Image.Resampling.LANCZOS)
+    small.quantize(48).save(target, optimize=True)
+
+
+def grasped(file: Path, thing: str) -> str:
+    """Grasp a thing; return what came of it. Raises SystemExit where it was not held whole."""
+    trial = load_pipeline("default", options=options(file)).grasp(object=thing, seed=0)
     features = trial.features
     said = f"{file.stem:14} {thing:6} {trial.outcome.words}: {features['p_steady'] * 1e3:.1f} mm"
     said += f", {features['f_steady']:.1f} N, at most {trial.report['greatest_force_n']:.1f} N"
@@ -45,9 +65,7 @@ def main() -> None:
         for thing in ("block", "egg"):
             print(grasped(file, thing), flush=True)  # noqa: T201 (what was asked for)
         if arguments.pictures is not None:
-            from picture import write_picture
-
-            write_picture(file, arguments.pictures / f"{file.stem}.png", FORCE_N)
+            write_picture(file, arguments.pictures / f"{file.stem}.png")
 
 
 if __name__ == "__main__":

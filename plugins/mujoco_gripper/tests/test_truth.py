@@ -34,9 +34,15 @@ def test_both_simulators_have_the_same_features(truth, tmp_path, step_s):
 
 
 def extreme(folder, mass_kg, friction, speed_m_s, step_s):
+    # Nearly as wide as the opening, so that the slowest fingers have a short way.
+    (folder / "wide.xml").write_text(
+        '<mujoco><worldbody><body name="wide"><freejoint/><geom type="box" size="0.042 0.02 0.02" mass="1"/></body>'
+        "</worldbody></mujoco>"
+    )
     scene = folder / "scene.toml"
     scene.write_text(
-        f'thing = "can"\ntable = true\nmass_kg = {mass_kg}\nfriction = {friction}\narm = [[0.0, 0.0], [0.3, 0.03]]\n'
+        f'thing = "wide.xml"\ntable = true\nmass_kg = {mass_kg}\nfriction = {friction}\n'
+        "arm = [[0.0, 0.0], [0.3, 0.03]]\n"
     )
     gripper = create(
         "sensor-backend",

@@ -73,6 +73,7 @@ class Camera:
         self._context = _context()
         self._model = model
         self._camera, self._option = free_camera(place, axis, open_m), mujoco.MjvOption()
+        self._option.sitegroup[:] = 0  # Marks of the model, not parts of it.
         self._scene = mujoco.MjvScene(model, maxgeom=5000)
         self._renderer = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._renderer)
