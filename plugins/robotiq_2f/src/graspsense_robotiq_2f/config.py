@@ -43,6 +43,10 @@ class RobotiqConfig:
         default="/dev/ttyUSB0",
         meaning="A serial port; socket:HOST:PORT for RTU through a socket; or emulated, a gripper in software.",
     )
+    tactile_port: Literal["", "emulated"] = setting(
+        default="",
+        meaning="emulated: `graspsense emulate robotiq` has TSF-85 fingertips too, on a port of their own.",
+    )
     address: int = setting(default=9, minimum=1, maximum=247, meaning="Modbus address of the gripper.")
     reply_timeout_s: float = setting(
         default=0.1,
@@ -77,7 +81,7 @@ class RobotiqConfig:
         if self.port == "emulated":
             return
         defaults = RobotiqConfig(port="emulated")
-        for key in ("object", "body", "body_config", "faults"):
+        for key in ("tactile_port", "object", "body", "body_config", "faults"):
             if getattr(self, key) != getattr(defaults, key):
                 raise ValueError(
                     f"{key} is for the emulated gripper, but port is {self.port!r}: leave it out, or set gripper.port "

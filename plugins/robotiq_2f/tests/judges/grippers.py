@@ -63,4 +63,4 @@ def by_robotiq2f(port: str) -> None:
 
 by_pyrobotiqgripper(sys.argv[1])
 by_robotiq2f(sys.argv[1])
-print("judges: pyRobotiqGripper and robotiq2f drive the emulated gripper")
+print("judges: pyRobotiqGripper and robotiq2f drive the emulated gripper")  # noqa: T201

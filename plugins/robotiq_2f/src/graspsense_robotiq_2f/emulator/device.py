@@ -9,11 +9,13 @@ from typing import Final, final
 
 from graspsense.plugin_api import EmulatedDevice
 from graspsense_robotiq_2f.config import RobotiqConfig
+from graspsense_robotiq_2f.emulator.fingertips import Felt, Fingertips
 from graspsense_robotiq_2f.emulator.hand import Hand
 from graspsense_robotiq_2f.emulator.modbus import answered
 from graspsense_robotiq_2f.emulator.port import SerialPort
 
 RATE_HZ: Final = 100.0
+TACTILE_TICK_S: Final = 0.001
 MOODS: Final = {
     "well": "behave again",
     "silent": "take requests, but send no replies",
@@ -43,7 +45,8 @@ class EmulatedGripper(EmulatedDevice):
         self._began_s = time.monotonic()
         self._data = b""
         self._port: SerialPort | None = None
-        self._mood = "well" if config.faults.mood_at_s else config.faults.mood
+        self._fingertips = Fingertips(self._felt) if config.tactile_port else None
+        self._tactile_port: SerialPort | None = None
         self._told = self._failed = ""
         self._requests = 0
 
@@ -72,10 +75,14 @@ class EmulatedGripper(EmulatedDevice):
             if self._port is None:
                 self._data = b""
                 self._port = SerialPort(self.wire, self._heard)
+                if (tips := self._fingertips) is not None:
+                    self._tactile_port = SerialPort(self.wire, tips.heard, tips.unasked, TACTILE_TICK_S)
         elif word == "unplug":
-            port, self._port = self._port, None
-            if port is not None:
-                port.close()
+            ports = self._port, self._tactile_port
+            self._port = self._tactile_port = None
+            for port in ports:
+                if port is not None:
+                    port.close()
         else:
             self._told = {word: word for word in MOODS}[word]
 
@@ -86,6 +93,7 @@ class EmulatedGripper(EmulatedDevice):
                 self._hand.look(self._now_s())
             return {
                 "port": self.where,
+                "tactile_port": "" if self._tactile_port is None else self._tactile_port.where,
                 "plugged": self._port is not None,
                 "mood": self._mood_now(),
                 "requests": self._requests,
@@ -111,6 +119,10 @@ class EmulatedGripper(EmulatedDevice):
 
     def _active_s(self) -> float:
         return self._now_s() - self._hand.active_since_s
+
+    def _felt(self) -> Felt:
+        # Not by waiting: who unplugs may hold the lock, and waits for the thread that calls this.
+        return self._hand.felt
 
     def _heard(self, data: bytes) -> bytes:
         with self._lock:

@@ -36,6 +36,7 @@ class SerialPort:
             self._terminal = os.openpty()
             for end in self._terminal:
                 tty.setraw(end)
+            os.set_blocking(self._terminal[0], False)
             self.where = os.ttyname(self._terminal[1])
         else:
             self._door = socket.create_server(("127.0.0.1", 0))
