@@ -9,8 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from graspsense import load_pipeline
+from graspsense.plugin_api import create, parametrize_checks
 from graspsense_robotiq_2f.emulator import fingertips
-from graspsense_robotiq_2f.emulator.fingertips import COUNTS_PER_N, Felt, Fingertips
+from graspsense_robotiq_2f.emulator.fingertips import COUNTS_PER_N, REST_COUNTS, Felt, Fingertips
+from graspsense_robotiq_2f.emulator.port import SerialPort
+from graspsense_robotiq_2f.tactile import Fingertips as Driver
 from graspsense_robotiq_2f.tactile_protocol import (
     CELLS,
     DYNAMIC,
@@ -24,6 +28,7 @@ from graspsense_robotiq_2f.tactile_protocol import (
     packet,
 )
 
+PATIENT_S = 60.0
 CELL = st.integers(0, 0xFFFF)
 
 
@@ -83,7 +88,7 @@ def test_every_period_has_one_packet_and_images_come_at_60_hz(clock):
     assert 58 <= len(images) / 2 <= 61
     for image in images:
         force_n = (2.0, 4.0)[image.finger]
-        assert sum(image.values) == pytest.approx(force_n * COUNTS_PER_N, abs=CELLS / 2)
+        assert sum(image.values) - CELLS * REST_COUNTS == pytest.approx(force_n * COUNTS_PER_N, abs=CELLS / 2)
 
 
 def test_they_are_silent_until_asked_and_after_a_period_of_zero(clock):
@@ -95,3 +100,58 @@ def test_they_are_silent_until_asked_and_after_a_period_of_zero(clock):
     tips.heard(packet(0x58, bytes((5,))) + packet(0x58, bytes((0,))))
     clock.now_s = 2.0
     assert tips.unasked() == b""
+
+
+@pytest.fixture
+def port():
+    tips = Fingertips(lambda: Felt(2.0, 4.0))
+    port = SerialPort("pty", tips.heard, tips.unasked, 0.001)
+    yield port
+    port.close()
+
+
+def test_the_driver_reads_images_in_a_thread_with_their_age(port):
+    driver = Driver(port.where)
+    images = [driver.newest(PATIENT_S) for _ in range(5)]
+    driver.close()
+    counters = [image.counter for image in images]
+    assert counters == sorted(set(counters))
+    for image in images:
+        assert sum(image.left) - CELLS * REST_COUNTS == pytest.approx(2000, abs=CELLS / 2)
+        assert sum(image.right) - CELLS * REST_COUNTS == pytest.approx(4000, abs=CELLS / 2)
+    assert driver.clock.latency_s() >= 0.0
+    assert driver.damaged == 0
+
+
+def test_fingertips_that_are_unplugged_are_told(port):
+    driver = Driver(port.where)
+    assert driver.newest(PATIENT_S) is not None
+    port.close()
+    with pytest.raises(OSError, match="Input/output|device reports readiness|disconnected"):
+        [driver.newest(PATIENT_S) for _ in range(3)]
+    driver.close()
+
+
+def test_emulated_fingertips_need_an_emulated_gripper():
+    with pytest.raises(Exception, match="tactile_port"):
+        create("sensor-backend", "robotiq", port="/dev/ttyUSB0", tactile_port="emulated")
+
+
+@pytest.mark.slow
+def test_a_grasp_with_fingertips_has_the_six_features():
+    options = ["gripper.port=emulated", "gripper.tactile_port=emulated", "features.type=chitta"]
+    trial = load_pipeline("robotiq", options=options).grasp()
+    assert trial.outcome.words == "steady", trial.reason
+    assert not trial.features.reasons
+    assert 0.0 < trial.features["f_steady"] < 30.0
+
+
+@pytest.mark.slow
+@parametrize_checks(
+    "graspsense-robotiq-2f",
+    keys={"port": "emulated", "tactile_port": "emulated"},
+    unplugged={"faults": {"unplug_at_s": 0.5}, "reply_timeout_s": 1.0},
+    absent={"tactile_port": "/dev/nowhere"},
+)
+def test_conformance_with_fingertips(check):
+    check.run()

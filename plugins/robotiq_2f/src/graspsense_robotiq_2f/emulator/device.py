@@ -45,7 +45,7 @@ class EmulatedGripper(EmulatedDevice):
         self._began_s = time.monotonic()
         self._data = b""
         self._port: SerialPort | None = None
-        self._fingertips = Fingertips(self._felt) if config.tactile_port else None
+        self._fingertips = Fingertips(self._felt) if config.tactile_port == "emulated" else None
         self._tactile_port: SerialPort | None = None
         self._told = self._failed = ""
         self._requests = 0
@@ -54,6 +54,11 @@ class EmulatedGripper(EmulatedDevice):
     def where(self) -> str:
         """What `gripper.port` has to be, empty while it is unplugged."""
         return "" if self._port is None else self._port.where
+
+    @property
+    def tactile_where(self) -> str:
+        """What `gripper.tactile_port` has to be, empty without fingertips or while it is unplugged."""
+        return "" if self._tactile_port is None else self._tactile_port.where
 
     @property
     def body_report(self) -> Mapping[str, float | int | str | bool]:
@@ -76,7 +81,7 @@ class EmulatedGripper(EmulatedDevice):
                 self._data = b""
                 self._port = SerialPort(self.wire, self._heard)
                 if (tips := self._fingertips) is not None:
-                    self._tactile_port = SerialPort(self.wire, tips.heard, tips.unasked, TACTILE_TICK_S)
+                    self._tactile_port = SerialPort("pty", tips.heard, tips.unasked, TACTILE_TICK_S)
         elif word == "unplug":
             ports = self._port, self._tactile_port
             self._port = self._tactile_port = None
@@ -93,7 +98,7 @@ class EmulatedGripper(EmulatedDevice):
                 self._hand.look(self._now_s())
             return {
                 "port": self.where,
-                "tactile_port": "" if self._tactile_port is None else self._tactile_port.where,
+                "tactile_port": self.tactile_where,
                 "plugged": self._port is not None,
                 "mood": self._mood_now(),
                 "requests": self._requests,

@@ -28,6 +28,8 @@ from graspsense_robotiq_2f.tactile_protocol import (
 PRESSURE_S: Final = 1.0 / 60.0
 COUNTS_PER_N: Final = 1000.0
 """Counts of all cells under one newton: an assumption, as is the shape of the pressure."""
+REST_COUNTS: Final = 200
+"""Counts of a cell that nothing touches."""
 G_COUNTS: Final = 16384
 MOST_AT_ONCE: Final = 50
 """Packets that are made up for at once, if the machine was busy."""
@@ -105,4 +107,4 @@ class Fingertips:
 
 def _cells(force_n: float) -> tuple[int, ...]:
     counts = max(force_n, 0.0) * COUNTS_PER_N / _TOTAL
-    return tuple(min(round(counts * share), 0xFFFF) for share in _SHAPE[:CELLS])
+    return tuple(min(REST_COUNTS + round(counts * share), 0xFFFF) for share in _SHAPE[:CELLS])
