@@ -127,7 +127,7 @@ def test_fingertips_that_are_unplugged_are_told(port):
     driver = Driver(port.where)
     assert driver.newest(PATIENT_S) is not None
     port.close()
-    with pytest.raises(OSError, match="Input/output|device reports readiness|disconnected"):
+    with pytest.raises(OSError, match=r"Input/output|device reports readiness|disconnected"):
         [driver.newest(PATIENT_S) for _ in range(3)]
     driver.close()
 
