@@ -19,6 +19,7 @@ DEADLINE_S = 30.0
 
 def by_pyrobotiqgripper(port: str) -> None:
     gripper = pyrobotiqgripper.RobotiqGripper(com_port=port, connection_type="RTU")
+    gripper.timeOut = DEADLINE_S
     gripper.activate()
     gripper.start()
     gripper.open()
@@ -42,6 +43,8 @@ def by_robotiq2f(port: str) -> None:
     robotiq2f.LinuxFindTTYWithSerialNumber.find = lambda self, serial_number: port
     robotiq2f.robotiq2f.LinuxFindTTYWithSerialNumber.find = lambda self, serial_number: port
     with robotiq2f.Robotiq2F85(serial_number="any", async_control=False) as gripper:
+        # It waits 50 ms for a reply, which a busy machine can exceed.
+        gripper.client.serial.timeout = DEADLINE_S
         gripper.reset()
         assert gripper.is_activated
         for opening_mm, found_mm, holds in ((85.0, 85.0, False), (75.0, 75.0, False), (0.0, None, True)):

@@ -16,6 +16,8 @@ from graspsense_robotiq_2f.emulator.port import SerialPort
 
 RATE_HZ: Final = 100.0
 TACTILE_TICK_S: Final = 0.001
+KEEP_UP_S: Final = 0.02
+"""How often the fingers move on without a request, so that the next one need not wait until they have."""
 MOODS: Final = {
     "well": "behave again",
     "silent": "take requests, but send no replies",
@@ -79,7 +81,7 @@ class EmulatedGripper(EmulatedDevice):
         if word == "plug":
             if self._port is None:
                 self._data = b""
-                self._port = SerialPort(self.wire, self._heard)
+                self._port = SerialPort(self.wire, self._heard, self._moved_on, KEEP_UP_S)
                 if (tips := self._fingertips) is not None:
                     self._tactile_port = SerialPort("pty", tips.heard, tips.unasked, TACTILE_TICK_S)
         elif word == "unplug":
@@ -128,6 +130,20 @@ class EmulatedGripper(EmulatedDevice):
     def _felt(self) -> Felt:
         # Not by waiting: who unplugs may hold the lock, and waits for the thread that calls this.
         return self._hand.felt
+
+    def _moved_on(self) -> bytes:
+        with self._lock:
+            try:
+                self._hand.look(self._now_s())
+            except Exception as error:
+                return self._fail(error)
+        return b""
+
+    def _fail(self, error: Exception) -> bytes:
+        """End as a lost device does: the simulated fingers can be a user's code and fail."""
+        self._failed = f"{type(error).__name__}: {error}"
+        self.tell("unplug")
+        return b""
 
     def _heard(self, data: bytes) -> bytes:
         with self._lock:
