@@ -200,7 +200,7 @@ class RobotiqBackend(SensorBackend[RobotiqConfig]):
     def tare(self, images: Sequence[Pads]) -> None:
         """Set the zero of the fingertips; without them do nothing. Raises TareRefused."""
         if self._fingertips is not None:
-            self._zero = tare(images, self.config.pad_counts_per_n, 0)
+            self._zero = tare(images, self.config.pad_counts_per_newton, 0)
 
     def close(self) -> None:
         """Stop the fingers if the gripper still responds, and close the connection."""
@@ -235,7 +235,7 @@ class RobotiqBackend(SensorBackend[RobotiqConfig]):
                 address=config.address,
                 newtons_per_ampere=config.newtons_per_ampere,
                 tactile_port="emulated" if config.tactile_port else "",
-                pad_counts_per_n=config.pad_counts_per_n,
+                pad_counts_per_newton=config.pad_counts_per_newton,
             )
         return RobotiqBackend(config)
 
@@ -275,7 +275,7 @@ class RobotiqBackend(SensorBackend[RobotiqConfig]):
             raise DeviceLost(
                 f"the fingertips at {self.config.tactile_port} send nothing any more: look at their cable"
             )
-        gain = self.config.pad_counts_per_n
+        gain = self.config.pad_counts_per_newton
         left, right = (
             pad_force(cells, zero, gain, 0) if self._pads.counter else 0.0
             for cells, zero in zip(self._pads[2:], self._zero, strict=True)
@@ -297,12 +297,16 @@ class RobotiqBackend(SensorBackend[RobotiqConfig]):
             status_bits=STATUS_BITS,
             numbers={
                 "newtons_per_ampere": self.config.newtons_per_ampere,
-                **({"pad_counts_per_n": self.config.pad_counts_per_n} if self.config.tactile_port else {}),
+                **(
+                    {"pad_counts_per_n": self.config.pad_counts_per_newton}
+                    if self.config.tactile_port
+                    else {}
+                ),
             },
             notes=(
                 "effort is the motor's current times gripper.newtons_per_ampere, an assumption unless you measured it",
                 *(
-                    ("the forces are counts over gripper.pad_counts_per_n, likewise",)
+                    ("the forces are counts over gripper.pad_counts_per_newton, likewise",)
                     if self.config.tactile_port
                     else ()
                 ),

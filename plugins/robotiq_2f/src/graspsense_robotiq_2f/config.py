@@ -47,7 +47,7 @@ class RobotiqConfig:
         default="",
         meaning="Serial port of TSF-85 fingertips; empty: none; emulated: those of the emulated gripper.",
     )
-    pad_counts_per_n: float = setting(
+    pad_counts_per_newton: float = setting(
         default=1000.0,
         unit="counts/N",
         above=0.0,
