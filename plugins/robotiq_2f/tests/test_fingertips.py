@@ -9,8 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from graspsense import load_pipeline
-from graspsense.plugin_api import create, parametrize_checks
+from graspsense.plugin_api import POSITION, Command, create, parametrize_checks
 from graspsense_robotiq_2f.emulator import fingertips
 from graspsense_robotiq_2f.emulator.fingertips import COUNTS_PER_N, REST_COUNTS, Felt, Fingertips
 from graspsense_robotiq_2f.emulator.port import SerialPort
@@ -138,12 +137,27 @@ def test_emulated_fingertips_need_an_emulated_gripper():
 
 
 @pytest.mark.slow
-def test_a_grasp_with_fingertips_has_the_six_features():
-    options = ["gripper.port=emulated", "gripper.tactile_port=emulated", "features.type=chitta"]
-    trial = load_pipeline("robotiq", options=options).grasp()
-    assert trial.outcome.words == "steady", trial.reason
-    assert not trial.features.reasons
-    assert 0.0 < trial.features["f_steady"] < 30.0
+def test_the_forces_are_zero_after_a_tare_and_rise_on_contact():
+    gripper = create(
+        "sensor-backend", "robotiq", port="emulated", tactile_port="emulated", reply_timeout_s=PATIENT_S
+    )
+    info = gripper.open(1)
+    images = {}
+    while len(images) < info.tare_images:
+        pads = gripper.read(1.0).pads
+        if pads.counter:
+            images[pads.counter] = pads
+    gripper.tare(list(images.values()))
+    frame = gripper.read(1.0).frame
+    assert abs(frame.force_left_n) < 0.5
+    assert abs(frame.force_right_n) < 0.5
+    for _ in range(2000):
+        gripper.apply(Command(POSITION, 0.0, 25.0, 0.03))
+        frame = gripper.read(1.0).frame
+        if min(frame.force_left_n, frame.force_right_n) > 3.0:
+            break
+    gripper.close()
+    assert min(frame.force_left_n, frame.force_right_n) > 3.0
 
 
 @pytest.mark.slow
