@@ -127,7 +127,7 @@ class Robotiq2F85(SensorBackend[Robotiq2F85Config]):
         velocity = (self._gap_m - before_m) / dt_s if before_m == before_m else 0.0
         effort = status[5] * NEWTONS_A_STEP
         return Reading(
-            Frame(now_s - self._began_s, dt_s, self._gap_m, velocity, effort, *[nan] * 4, 0), NO_PADS
+            Frame(now_s - self._began_s, dt_s, self._gap_m, velocity, effort, nan, nan, nan, nan, 0), NO_PADS
         )
 
     def apply(self, command: Command) -> None:

@@ -27,7 +27,11 @@ from graspsense.plugin_api import (
     Pads,
     Reading,
     SensorBackend,
+    TactileArray,
     create,
+    no_pads,
+    pad_force,
+    tare,
 )
 from graspsense_robotiq_2f.config import RobotiqConfig
 from graspsense_robotiq_2f.emulator.device import EmulatedGripper
@@ -42,6 +46,8 @@ from graspsense_robotiq_2f.registers import (
     byte_of,
     status_of,
 )
+from graspsense_robotiq_2f.tactile import Fingertips
+from graspsense_robotiq_2f.tactile_protocol import CELLS, COLUMNS, ROWS
 
 RATE_HZ: Final = 100.0
 ACTIVATION_S: Final = 5.0
@@ -53,15 +59,25 @@ AHEAD_M: Final = 0.004
 """How far a target that moves can be ahead of the fingers."""
 
 
+BARE: Final = (
+    Channel("gap", "m", RATE_HZ),
+    Channel("velocity", "m/s", RATE_HZ),
+    Channel("effort", "N", RATE_HZ),
+)
+PADS: Final = (
+    Channel("force_left", "N", RATE_HZ),
+    Channel("force_right", "N", RATE_HZ),
+    TactileArray("pads", "counts", 60.0, rows=ROWS, columns=COLUMNS),
+)
+TARE_IMAGES: Final = 10
+PADS_SILENT_S: Final = 0.5
+"""Time without an image after which the fingertips are lost."""
+
+
 @final
 class RobotiqBackend(SensorBackend[RobotiqConfig]):
     """Turns commands into a target position with a speed and a force; each read is one exchange."""
 
-    channels = (
-        Channel("gap", "m", RATE_HZ),
-        Channel("velocity", "m/s", RATE_HZ),
-        Channel("effort", "N", RATE_HZ),
-    )
     accepts = ("velocity", "position", "force")
     closes_itself: Mapping[str, str] = MappingProxyType(
         {
@@ -79,9 +95,18 @@ class RobotiqBackend(SensorBackend[RobotiqConfig]):
         self.least_step_m = self._model.step_m
         self._link: Link | None = None
         self._emulated: EmulatedGripper | None = None
+        self._fingertips: Fingertips | None = None
+        self._pads = NO_PADS
+        self._zero = ((0.0,) * CELLS, (0.0,) * CELLS)
         self._asked = Request(active=True, go=False, position=0, speed=0, force=0)
         self._frames = self._retries = 0
+        self._clock_report: Mapping[str, float | int | str | bool] = {}
         self._body_report: Mapping[str, float | int | str | bool] = {}
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """Those of the bare gripper, and with fingertips their forces and cells."""
+        return BARE + PADS if self.config.tactile_port else BARE
 
     def objects(self) -> Sequence[ObjectKind]:
         """Return what the body of the emulated gripper can hold."""
@@ -110,6 +135,7 @@ class RobotiqBackend(SensorBackend[RobotiqConfig]):
         try:
             self._link = Link(port, config.address, config.reply_timeout_s)
             status = self._activated()
+            self._open_fingertips()
         except (OSError, ValueError, NoReply) as error:
             self.close()
             raise NoDevice(
@@ -141,8 +167,8 @@ class RobotiqBackend(SensorBackend[RobotiqConfig]):
         effort = status.current * AMPERES_A_STEP * self.config.newtons_per_ampere
         self._frames += 1
         return Reading(
-            Frame(t_s, dt_s, gap_m, velocity, effort, nan, nan, nan, nan, bit_of(status.fault)),
-            NO_PADS,
+            Frame(t_s, dt_s, gap_m, velocity, effort, *self._forces(), nan, nan, bit_of(status.fault)),
+            self._pads,
         )
 
     def apply(self, command: Command) -> None:
@@ -172,7 +198,9 @@ class RobotiqBackend(SensorBackend[RobotiqConfig]):
         )
 
     def tare(self, images: Sequence[Pads]) -> None:
-        """Do nothing: there are no pads."""
+        """Set the zero of the fingertips; without them do nothing. Raises TareRefused."""
+        if self._fingertips is not None:
+            self._zero = tare(images, self.config.pad_counts_per_newton, 0)
 
     def close(self) -> None:
         """Stop the fingers if the gripper still responds, and close the connection."""
@@ -184,6 +212,9 @@ class RobotiqBackend(SensorBackend[RobotiqConfig]):
                     break
             with suppress(OSError):
                 link.close()
+        fingertips, self._fingertips = self._fingertips, None
+        if fingertips is not None:
+            fingertips.close()
         emulated, self._emulated = self._emulated, None
         if emulated is not None:
             self._body_report = emulated.body_report
@@ -192,7 +223,7 @@ class RobotiqBackend(SensorBackend[RobotiqConfig]):
     def report(self) -> dict[str, float | int | str | bool]:
         """Return the number of frames, and of repeated exchanges, with what the emulated body knows."""
         body = self._body_report if self._emulated is None else self._emulated.body_report
-        return {**body, "frames": self._frames, "repeated": self._retries}
+        return {**body, "frames": self._frames, "repeated": self._retries, **self._clock_report}
 
     def dry_run_backend(self) -> RobotiqBackend:
         """Return the emulated gripper."""
@@ -203,8 +234,53 @@ class RobotiqBackend(SensorBackend[RobotiqConfig]):
                 model=config.model,
                 address=config.address,
                 newtons_per_ampere=config.newtons_per_ampere,
+                tactile_port="emulated" if config.tactile_port else "",
+                pad_counts_per_newton=config.pad_counts_per_newton,
             )
         return RobotiqBackend(config)
+
+    def _open_fingertips(self) -> None:
+        where = self.config.tactile_port
+        if not where:
+            return
+        if where == "emulated":
+            assert self._emulated is not None
+            where = self._emulated.tactile_where
+        self._pads = no_pads(CELLS)
+        self._zero = ((0.0,) * CELLS, (0.0,) * CELLS)
+        self._fingertips = Fingertips(where)
+        image = self._fingertips.newest(ACTIVATION_S)
+        if image is None:
+            raise NoReply(f"the fingertips at {self.config.tactile_port} send nothing")
+
+    def _forces(self) -> tuple[float, float]:
+        """Take the newest image, and return the forces on the pads. Raises DeviceLost."""
+        if self._fingertips is None:
+            return nan, nan
+        try:
+            image = self._fingertips.newest(0.0)
+        except OSError as error:
+            raise DeviceLost(f"the fingertips at {self.config.tactile_port} are gone: {error}") from error
+        if image is not None:
+            # An image that was measured before the gripper was opened has its time.
+            self._pads = Pads(max(image.host_s - self._began_s, 0.0), image.counter, image.left, image.right)
+            line = self._fingertips.clock.line()
+            self._clock_report = {
+                "tactile_drift": line.drift,
+                "tactile_uncertainty_s": line.uncertainty_s,
+                "tactile_latency_s": self._fingertips.clock.latency_s(),
+                "tactile_damaged": self._fingertips.damaged,
+            }
+        if self._fingertips.age_s() > PADS_SILENT_S:
+            raise DeviceLost(
+                f"the fingertips at {self.config.tactile_port} send nothing any more: look at their cable"
+            )
+        gain = self.config.pad_counts_per_newton
+        left, right = (
+            pad_force(cells, zero, gain, 0) if self._pads.counter else 0.0
+            for cells, zero in zip(self._pads[2:], self._zero, strict=True)
+        )
+        return left, right
 
     def _described(self) -> DeviceInfo:
         model, emulated = self._model, self._emulated is not None
@@ -217,10 +293,23 @@ class RobotiqBackend(SensorBackend[RobotiqConfig]):
             speed_limit_m_s=model.speeds_m_s[1],
             opening=Command(POSITION, model.stroke_m, inf, 0.05),
             relaxed=Command(VELOCITY, 0.0, inf, inf),
+            tare_images=TARE_IMAGES if self._fingertips is not None else 0,
             status_bits=STATUS_BITS,
-            numbers={"newtons_per_ampere": self.config.newtons_per_ampere},
+            numbers={
+                "newtons_per_ampere": self.config.newtons_per_ampere,
+                **(
+                    {"pad_counts_per_n": self.config.pad_counts_per_newton}
+                    if self.config.tactile_port
+                    else {}
+                ),
+            },
             notes=(
                 "effort is the motor's current times gripper.newtons_per_ampere, an assumption unless you measured it",
+                *(
+                    ("the forces are counts over gripper.pad_counts_per_newton, likewise",)
+                    if self.config.tactile_port
+                    else ()
+                ),
                 *(("emulated: no gripper was touched",) if emulated else ()),
             ),
         )

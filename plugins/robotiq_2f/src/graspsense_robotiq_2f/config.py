@@ -43,6 +43,17 @@ class RobotiqConfig:
         default="/dev/ttyUSB0",
         meaning="A serial port; socket:HOST:PORT for RTU through a socket; or emulated, a gripper in software.",
     )
+    tactile_port: str = setting(
+        default="",
+        meaning="Serial port of TSF-85 fingertips; empty: none; emulated: those of the emulated gripper.",
+    )
+    pad_counts_per_newton: float = setting(
+        default=1000.0,
+        unit="counts/N",
+        above=0.0,
+        plausible=(1.0, 1e6),
+        meaning="Counts of all cells of a TSF-85 under one newton. No document gives it: an assumption, measure yours.",
+    )
     address: int = setting(default=9, minimum=1, maximum=247, meaning="Modbus address of the gripper.")
     reply_timeout_s: float = setting(
         default=0.1,
@@ -76,6 +87,11 @@ class RobotiqConfig:
     def __attrs_post_init__(self) -> None:
         if self.port == "emulated":
             return
+        if self.tactile_port == "emulated":
+            raise ValueError(
+                f"tactile_port is emulated, but port is {self.port!r}: give the port of the fingertips, or set "
+                "gripper.port to emulated"
+            )
         defaults = RobotiqConfig(port="emulated")
         for key in ("object", "body", "body_config", "faults"):
             if getattr(self, key) != getattr(defaults, key):

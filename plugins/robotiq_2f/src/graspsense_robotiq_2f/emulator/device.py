@@ -9,11 +9,15 @@ from typing import Final, final
 
 from graspsense.gripper_api import EmulatedDevice
 from graspsense_robotiq_2f.config import RobotiqConfig
+from graspsense_robotiq_2f.emulator.fingertips import Felt, Fingertips
 from graspsense_robotiq_2f.emulator.hand import Hand
 from graspsense_robotiq_2f.emulator.modbus import answered
 from graspsense_robotiq_2f.emulator.port import SerialPort
 
 RATE_HZ: Final = 100.0
+TACTILE_TICK_S: Final = 0.001
+KEEP_UP_S: Final = 0.02
+"""How often the fingers move on without a request, so that the next one need not wait until they have."""
 MOODS: Final = {
     "well": "behave again",
     "silent": "take requests, but send no replies",
@@ -43,7 +47,8 @@ class EmulatedGripper(EmulatedDevice):
         self._began_s = time.monotonic()
         self._data = b""
         self._port: SerialPort | None = None
-        self._mood = "well" if config.faults.mood_at_s else config.faults.mood
+        self._fingertips = Fingertips(self._felt) if config.tactile_port == "emulated" else None
+        self._tactile_port: SerialPort | None = None
         self._told = self._failed = ""
         self._requests = 0
 
@@ -51,6 +56,11 @@ class EmulatedGripper(EmulatedDevice):
     def where(self) -> str:
         """What `gripper.port` has to be, empty while it is unplugged."""
         return "" if self._port is None else self._port.where
+
+    @property
+    def tactile_where(self) -> str:
+        """What `gripper.tactile_port` has to be, empty without fingertips or while it is unplugged."""
+        return "" if self._tactile_port is None else self._tactile_port.where
 
     @property
     def body_report(self) -> Mapping[str, float | int | str | bool]:
@@ -71,11 +81,15 @@ class EmulatedGripper(EmulatedDevice):
         if word == "plug":
             if self._port is None:
                 self._data = b""
-                self._port = SerialPort(self.wire, self._heard)
+                self._port = SerialPort(self.wire, self._heard, self._moved_on, KEEP_UP_S)
+                if (tips := self._fingertips) is not None:
+                    self._tactile_port = SerialPort("pty", tips.heard, tips.unasked, TACTILE_TICK_S)
         elif word == "unplug":
-            port, self._port = self._port, None
-            if port is not None:
-                port.close()
+            ports = self._port, self._tactile_port
+            self._port = self._tactile_port = None
+            for port in ports:
+                if port is not None:
+                    port.close()
         else:
             self._told = {word: word for word in MOODS}[word]
 
@@ -86,6 +100,7 @@ class EmulatedGripper(EmulatedDevice):
                 self._hand.look(self._now_s())
             return {
                 "port": self.where,
+                "tactile_port": self.tactile_where,
                 "plugged": self._port is not None,
                 "mood": self._mood_now(),
                 "requests": self._requests,
@@ -111,6 +126,24 @@ class EmulatedGripper(EmulatedDevice):
 
     def _active_s(self) -> float:
         return self._now_s() - self._hand.active_since_s
+
+    def _felt(self) -> Felt:
+        # Not by waiting: who unplugs may hold the lock, and waits for the thread that calls this.
+        return self._hand.felt
+
+    def _moved_on(self) -> bytes:
+        with self._lock:
+            try:
+                self._hand.look(self._now_s())
+            except Exception as error:
+                return self._fail(error)
+        return b""
+
+    def _fail(self, error: Exception) -> bytes:
+        """End as a lost device does: the simulated fingers can be a user's code and fail."""
+        self._failed = f"{type(error).__name__}: {error}"
+        self.tell("unplug")
+        return b""
 
     def _heard(self, data: bytes) -> bytes:
         with self._lock:

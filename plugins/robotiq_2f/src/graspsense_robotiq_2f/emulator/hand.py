@@ -7,6 +7,7 @@ from typing import Any, Final
 
 from graspsense.plugin_api import EFFORT, Command, ConfigError, SensorBackend, create
 from graspsense_robotiq_2f.config import RobotiqConfig
+from graspsense_robotiq_2f.emulator.fingertips import Felt
 from graspsense_robotiq_2f.registers import (
     ACTIVE,
     AMPERES_A_STEP,
@@ -65,6 +66,11 @@ class Hand:
     def gap_m(self) -> float:
         """The gap between the fingers."""
         return float(self._frame.gap_m - self._offset_m)
+
+    @property
+    def felt(self) -> Felt:
+        """The forces on the pads of the body."""
+        return Felt(float(self._frame.force_left_n), float(self._frame.force_right_n))
 
     @property
     def going(self) -> bool:

@@ -36,11 +36,13 @@ class SerialPort:
             self._terminal = os.openpty()
             for end in self._terminal:
                 tty.setraw(end)
+            os.set_blocking(self._terminal[0], False)
             self.where = os.ttyname(self._terminal[1])
         else:
             self._door = socket.create_server(("127.0.0.1", 0))
             self.where = f"socket:127.0.0.1:{self._door.getsockname()[1]}"
-        self._wake = os.pipe()
+        # Sockets: unlike the number of a pipe, a closed one cannot be another file by now.
+        self._wake = socket.socketpair()
         self._closed = False
         self._thread = threading.Thread(target=self._serve, name="emulated port", daemon=True)
         self._thread.start()
@@ -50,14 +52,15 @@ class SerialPort:
         if self._closed:
             return
         self._closed = True
-        os.write(self._wake[1], b"x")
+        with suppress(OSError):
+            self._wake[1].send(b"x")
         if threading.current_thread() is not self._thread:
             self._thread.join()
 
     def _serve(self) -> None:
         try:
             while not self._closed:
-                sources = [self._wake[0], *self._sources()]
+                sources = [self._wake[0].fileno(), *self._sources()]
                 ready, _, _ = select.select(sources, [], [], self._period_s)
                 if self._door is not None and self._door.fileno() in ready:
                     self._accept()
@@ -108,8 +111,8 @@ class SerialPort:
                 self._call.sendall(data)
 
     def _release(self) -> None:
-        for end in (*(self._terminal or ()), *self._wake):
+        for end in self._terminal or ():
             os.close(end)
-        for connection in (self._door, self._call):
+        for connection in (self._door, self._call, *self._wake):
             if connection is not None:
                 connection.close()

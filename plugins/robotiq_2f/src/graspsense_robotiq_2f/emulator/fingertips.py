@@ -1,0 +1,110 @@
+"""TSF-85 fingertips in software: they send what the pads of a hand feel, by themselves or when they are asked."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Final, NamedTuple
+
+from graspsense_robotiq_2f.tactile_protocol import (
+    ACCELERATION,
+    AUTOSEND,
+    CELLS,
+    COLUMNS,
+    DYNAMIC,
+    FINGERS,
+    GYROSCOPE,
+    PRESSURE,
+    READ,
+    ROWS,
+    TIMESTAMP,
+    VERSION,
+    Field,
+    Packets,
+    encoded,
+    packet,
+)
+
+PRESSURE_S: Final = 1.0 / 60.0
+COUNTS_PER_N: Final = 1000.0
+"""Counts of all cells under one newton: an assumption, as is the shape of the pressure."""
+REST_COUNTS: Final = 200
+"""Counts of a cell that nothing touches."""
+G_COUNTS: Final = 16384
+MOST_AT_ONCE: Final = 50
+"""Packets that are made up for at once, if the machine was busy."""
+_SHAPE: Final = [
+    (1.0 - abs(row - 3) / 4.0) * (1.0 - abs(column - 1.5) / 2.0)
+    for row in range(ROWS)
+    for column in range(COLUMNS)
+]
+_TOTAL: Final = sum(_SHAPE)
+
+
+class Felt(NamedTuple):
+    """What the pads feel: the forces (N) on the left and the right one."""
+
+    left_n: float
+    right_n: float
+
+
+class Fingertips:
+    """Two fingertips whose forces `felt` returns. `heard` and `unasked` are the two sides of a port."""
+
+    def __init__(self, felt: Callable[[], Felt]) -> None:
+        self._felt = felt
+        self._packets = Packets()
+        self._began_s = time.monotonic()
+        self._period_s = self._due_s = self._pressed_s = 0.0
+        self._last = Felt(0.0, 0.0)
+        self.sent = 0
+        """The number of packets with measurements."""
+
+    def heard(self, data: bytes) -> bytes:
+        """Return the replies to what a host sent."""
+        return b"".join(self._reply(command, given) for command, given in self._packets.fed(data))
+
+    def unasked(self) -> bytes:
+        """Return the packets that are due, with one of each period, none twice."""
+        if not self._period_s:
+            return b""
+        now_s = time.monotonic() - self._began_s
+        packets: list[bytes] = []
+        while self._due_s <= now_s and len(packets) < MOST_AT_ONCE:
+            packets.append(self._measured(self._due_s))
+            self._due_s += self._period_s
+        return b"".join(packets)
+
+    def _reply(self, command: int, given: bytes) -> bytes:
+        now_s = time.monotonic() - self._began_s
+        if command in AUTOSEND and given:
+            self._period_s, self._due_s = given[0] / 1000.0, now_s
+        elif command == READ:
+            return self._measured(now_s)
+        elif command == VERSION:
+            return packet(VERSION, b"graspsense emulated")
+        return b""
+
+    def _measured(self, now_s: float) -> bytes:
+        pressed = now_s >= self._pressed_s
+        before = self._last
+        if pressed:
+            self._pressed_s = now_s + PRESSURE_S
+            self._last = self._felt()
+        fields = []
+        for finger in range(FINGERS):
+            force_n, before_n = self._last[finger], before[finger]
+            fields.append(Field(TIMESTAMP, finger, (round(now_s * 1e6),)))
+            if pressed:
+                fields.append(Field(PRESSURE, finger, _cells(force_n)))
+            change = round(min(max((force_n - before_n) * COUNTS_PER_N, -32768.0), 32767.0))
+            fields.append(Field(DYNAMIC, finger, (change,)))
+            fields.append(Field(ACCELERATION, finger, (0, 0, G_COUNTS)))
+            fields.append(Field(GYROSCOPE, finger, (0, 0, 0)))
+        self.sent += 1
+        return encoded(fields)
+
+
+def _cells(force_n: float) -> tuple[int, ...]:
+    counts = max(force_n, 0.0) * COUNTS_PER_N / _TOTAL
+    return tuple(min(REST_COUNTS + round(counts * share), 0xFFFF) for share in _SHAPE[:CELLS])

@@ -1,0 +1,171 @@
+"""The protocol of the TSF-85 fingertips, and their emulator."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from types import SimpleNamespace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from graspsense.plugin_api import POSITION, Command, create, parametrize_checks
+from graspsense_robotiq_2f.emulator import fingertips
+from graspsense_robotiq_2f.emulator.fingertips import COUNTS_PER_N, REST_COUNTS, Felt, Fingertips
+from graspsense_robotiq_2f.emulator.port import SerialPort
+from graspsense_robotiq_2f.tactile import Fingertips as Driver
+from graspsense_robotiq_2f.tactile_protocol import (
+    CELLS,
+    DYNAMIC,
+    PRESSURE,
+    READ,
+    TIMESTAMP,
+    Field,
+    Packets,
+    decoded,
+    encoded,
+    packet,
+)
+
+PATIENT_S = 60.0
+CELL = st.integers(0, 0xFFFF)
+
+
+@given(
+    st.lists(CELL, min_size=CELLS, max_size=CELLS),
+    st.integers(-32768, 32767),
+    st.integers(0, 2**64 - 1),
+    st.integers(0, 1),
+)
+def test_what_is_encoded_is_decoded(cells, change, stamp, finger):
+    fields = [
+        Field(TIMESTAMP, finger, (stamp,)),
+        Field(PRESSURE, finger, tuple(cells)),
+        Field(DYNAMIC, finger, (change,)),
+    ]
+    [(command, data)] = Packets().fed(encoded(fields))
+    assert command == READ
+    assert decoded(data) == fields
+
+
+@given(st.binary(max_size=300), st.integers(1, 40))
+def test_any_bytes_in_any_pieces_are_taken(data, size):
+    whole, pieces = Packets(), Packets()
+    expected = whole.fed(data)
+    assert [
+        one for start in range(0, len(data), size) for one in pieces.fed(data[start : start + size])
+    ] == expected
+    for _, fields in expected:
+        decoded(fields)
+
+
+def test_a_field_that_is_cut_or_unknown_makes_a_packet_damaged():
+    assert decoded(bytes((PRESSURE,)) + bytes(2 * CELLS - 1)) is None
+    assert decoded(b"\x00\x00") is None
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    clock = SimpleNamespace(now_s=0.0)
+    monkeypatch.setattr(fingertips, "time", SimpleNamespace(monotonic=lambda: clock.now_s))
+    return clock
+
+
+def test_every_period_has_one_packet_and_images_come_at_60_hz(clock):
+    tips = Fingertips(lambda: Felt(2.0, 4.0))
+    tips.heard(packet(0x58, bytes((1,))))
+    packets = Packets()
+    found = []
+    for tick in range(1, 401):
+        clock.now_s = tick * 0.0025
+        found += [decoded(data) for _, data in packets.fed(tips.unasked())]
+    stamps = [fields[0].values[0] for fields in found]
+    assert {later - earlier for earlier, later in pairwise(stamps)} == {1000}
+    assert 1000 <= len(stamps) <= 1001
+    images = [field for fields in found for field in fields if field.kind == PRESSURE]
+    # A packet each millisecond: the image of 16.7 ms is in that of 17 ms.
+    assert 58 <= len(images) / 2 <= 61
+    for image in images:
+        force_n = (2.0, 4.0)[image.finger]
+        assert sum(image.values) - CELLS * REST_COUNTS == pytest.approx(force_n * COUNTS_PER_N, abs=CELLS / 2)
+
+
+def test_they_are_silent_until_asked_and_after_a_period_of_zero(clock):
+    tips = Fingertips(lambda: Felt(0.0, 0.0))
+    clock.now_s = 1.0
+    assert tips.unasked() == b""
+    [(command, _)] = Packets().fed(tips.heard(packet(READ)))
+    assert command == READ
+    tips.heard(packet(0x58, bytes((5,))) + packet(0x58, bytes((0,))))
+    clock.now_s = 2.0
+    assert tips.unasked() == b""
+
+
+@pytest.fixture
+def port():
+    tips = Fingertips(lambda: Felt(2.0, 4.0))
+    port = SerialPort("pty", tips.heard, tips.unasked, 0.001)
+    yield port
+    port.close()
+
+
+def test_the_driver_reads_images_in_a_thread_with_their_age(port):
+    driver = Driver(port.where)
+    images = [driver.newest(PATIENT_S) for _ in range(5)]
+    driver.close()
+    counters = [image.counter for image in images]
+    assert counters == sorted(set(counters))
+    for image in images:
+        assert sum(image.left) - CELLS * REST_COUNTS == pytest.approx(2000, abs=CELLS / 2)
+        assert sum(image.right) - CELLS * REST_COUNTS == pytest.approx(4000, abs=CELLS / 2)
+    assert driver.clock.latency_s() >= 0.0
+    assert driver.damaged == 0
+
+
+def test_fingertips_that_are_unplugged_are_told(port):
+    driver = Driver(port.where)
+    assert driver.newest(PATIENT_S) is not None
+    port.close()
+    with pytest.raises(OSError, match=r"Input/output|device reports readiness|disconnected"):
+        [driver.newest(PATIENT_S) for _ in range(3)]
+    driver.close()
+
+
+def test_emulated_fingertips_need_an_emulated_gripper():
+    with pytest.raises(Exception, match="tactile_port"):
+        create("sensor-backend", "robotiq", port="/dev/ttyUSB0", tactile_port="emulated")
+
+
+@pytest.mark.slow
+def test_the_forces_are_zero_after_a_tare_and_rise_on_contact():
+    gripper = create(
+        "sensor-backend", "robotiq", port="emulated", tactile_port="emulated", reply_timeout_s=PATIENT_S
+    )
+    info = gripper.open(1)
+    images = {}
+    while len(images) < info.tare_images:
+        pads = gripper.read(1.0).pads
+        if pads.counter:
+            images[pads.counter] = pads
+    gripper.tare(list(images.values()))
+    frame = gripper.read(1.0).frame
+    assert abs(frame.force_left_n) < 0.5
+    assert abs(frame.force_right_n) < 0.5
+    for _ in range(2000):
+        gripper.apply(Command(POSITION, 0.0, 25.0, 0.03))
+        frame = gripper.read(1.0).frame
+        if min(frame.force_left_n, frame.force_right_n) > 3.0:
+            break
+    gripper.close()
+    assert min(frame.force_left_n, frame.force_right_n) > 3.0
+
+
+@pytest.mark.slow
+@parametrize_checks(
+    "graspsense-robotiq-2f",
+    keys={"port": "emulated", "tactile_port": "emulated"},
+    unplugged={"faults": {"unplug_at_s": 0.5}, "reply_timeout_s": 1.0},
+    absent={"tactile_port": "/dev/nowhere"},
+)
+def test_conformance_with_fingertips(check):
+    check.run()
