@@ -1,4 +1,4 @@
-"""Compiling the loop of a grasp with numba: the options for it, on top of `graspsense.simulator_api.compile_function`."""
+"""Compiling the loop of a grasp with numba: the options for `graspsense.simulator_api.compile_function`."""
 
 from __future__ import annotations
 
