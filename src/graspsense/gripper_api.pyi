@@ -56,7 +56,9 @@ from graspsense.core.control.contact import first_rest as first_rest
 # Observers of a grasp while it goes on
 from graspsense.core.components.entries import LiveObserverEntry as LiveObserverEntry
 
-# Readers of tables with several squeezes
+# Readers of tables with several squeezes, and writers of data sets
+from graspsense.store.stored_grasps import StoredGrasp as StoredGrasp
+from graspsense.recording.atomic_file import SaveFailed as SaveFailed
 from graspsense.sources.manifest.parquet_format import read_parquet as read_parquet
 from graspsense.sources.manifest.steps import squeezes as squeezes
 from graspsense.sources.manifest.table import ColumnTable as ColumnTable

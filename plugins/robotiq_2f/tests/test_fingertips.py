@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from graspsense.plugin_api import POSITION, Command, create, parametrize_checks
+from graspsense.plugin_api import POSITION, Command, create
+from graspsense.testing_api import parametrize_checks
 from graspsense_robotiq_2f.emulator import fingertips
 from graspsense_robotiq_2f.emulator.fingertips import COUNTS_PER_N, REST_COUNTS, Felt, Fingertips
 from graspsense_robotiq_2f.emulator.port import SerialPort

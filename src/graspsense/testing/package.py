@@ -84,8 +84,7 @@ def plugin_modules_are_light(package: Package) -> None:
     demand(
         not found["heavy"],
         f"listing it imports {', '.join(found['heavy'])}: in the module of the entry point import "
-        "graspsense.plugin_api "
-        "only; name classes by import strings, and import what is heavy inside them",
+        "graspsense.plugin_api and its like only; name classes by import strings, and import what is heavy inside them",
     )
     demand(
         found["took"] <= 5.0 * SLOW_IMPORT_S,

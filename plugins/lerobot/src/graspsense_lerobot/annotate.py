@@ -17,7 +17,8 @@ import pyarrow
 from attrs import frozen
 from pyarrow import parquet
 
-from graspsense.plugin_api import ConfigError, DataDamaged, StoredGrasp
+from graspsense.gripper_api import StoredGrasp
+from graspsense.plugin_api import ConfigError, DataDamaged
 from graspsense_lerobot.columns import statistics
 from graspsense_lerobot.folder import INFO, json_lines, read_folder
 from graspsense_lerobot.reader import numbered_parts

@@ -20,15 +20,9 @@ import pyarrow
 from attrs import frozen
 from pyarrow import parquet
 
-from graspsense.plugin_api import (
-    ConfigError,
-    ImageTrace,
-    Phase,
-    SampleTrace,
-    SaveFailed,
-    StoredGrasp,
-    TactileArray,
-)
+from graspsense.gripper_api import Phase, SaveFailed, StoredGrasp
+from graspsense.plugin_api import ConfigError, TactileArray
+from graspsense.testing_api import ImageTrace, SampleTrace
 from graspsense_lerobot.columns import Column, parquet_columns, statistics
 from graspsense_lerobot.folder import DATA_PATHS
 from graspsense_lerobot.place import folder_and_options

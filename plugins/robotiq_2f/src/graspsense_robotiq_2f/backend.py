@@ -12,6 +12,7 @@ from typing import Final, final
 
 from attrs import evolve
 
+from graspsense.gripper_api import no_pads, pad_force, tare
 from graspsense.plugin_api import (
     FORCE,
     NO_PADS,
@@ -29,9 +30,6 @@ from graspsense.plugin_api import (
     SensorBackend,
     TactileArray,
     create,
-    no_pads,
-    pad_force,
-    tare,
 )
 from graspsense_robotiq_2f.config import RobotiqConfig
 from graspsense_robotiq_2f.emulator.device import EmulatedGripper

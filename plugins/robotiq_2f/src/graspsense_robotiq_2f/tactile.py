@@ -6,7 +6,7 @@ import time
 from contextlib import suppress
 from typing import Any, Final, NamedTuple, final
 
-from graspsense.plugin_api import DeviceClock, ReadingThread
+from graspsense.gripper_api import DeviceClock, ReadingThread
 from graspsense_robotiq_2f.tactile_protocol import AUTOSEND, PRESSURE, TIMESTAMP, Packets, decoded, packet
 
 BAUD: Final = 115200

@@ -20,7 +20,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from attrs import frozen
 
-from graspsense.plugin_api import APPROACH, NO_GAP, Channel, Feature, Features, FeatureSet
+from graspsense.gripper_api import NO_GAP
+from graspsense.plugin_api import APPROACH, Channel, Feature, Features, FeatureSet
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
