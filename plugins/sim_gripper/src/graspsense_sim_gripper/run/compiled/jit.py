@@ -1,8 +1,4 @@
-<<<<<<< HEAD
-"""Compiling the loop of a grasp with numba: its options, beside `graspsense.simulator_api.compile_function`."""
-=======
 """Compiling the loop of a grasp with numba: the options for `graspsense.simulator_api.compile_function`."""
->>>>>>> api
 
 from __future__ import annotations
 
