@@ -17,7 +17,7 @@ from graspsense_robotiq_2f.emulator import device
 from graspsense_robotiq_2f.emulator.device import EmulatedGripper
 from graspsense_robotiq_2f.emulator.modbus import checksum
 from graspsense_robotiq_2f.features import _without_start
-from graspsense_robotiq_2f.link import Link, NoReply
+from graspsense_robotiq_2f.link import ModbusLink, NoReply
 from graspsense_robotiq_2f.registers import MODELS, byte_of
 
 PATIENT_S = 60.0
@@ -149,7 +149,7 @@ def test_whatever_becomes_of_replies_the_fingers_are_told_to_stop(emulated, wire
 
 def test_a_late_reply_is_not_taken_for_that_of_the_next_request(emulated):
     gripper = emulated("socket")
-    link = Link(gripper.where, 9, PATIENT_S)
+    link = ModbusLink(gripper.where, 9, PATIENT_S)
     link.exchange([0x0100, 7, 0])
     gripper.tell("repeated")
     link.exchange([0x0100, 8, 0])
@@ -219,7 +219,7 @@ def test_the_checksum_is_that_of_the_manual():
 
 
 def test_another_unit_is_silent(emulated):
-    link = Link(emulated("socket").where, 8, 0.1)
+    link = ModbusLink(emulated("socket").where, 8, 0.1)
     with pytest.raises(NoReply):
         link.exchange([0, 0, 0])
     link.close()

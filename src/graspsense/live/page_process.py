@@ -123,7 +123,7 @@ class _Waiting:
         return text
 
 
-class Page:
+class LivePage:
     """The page under its token, and the viewers that are connected to it."""
 
     def __init__(self, host: str) -> None:
@@ -226,7 +226,7 @@ class _Limited(ServerConnection):  # type: ignore[misc, unused-ignore]
 
 async def serve_page(host: str, port: int) -> None:
     """Serve until standard input ends. Prints one line of JSON: the address, or why there is none."""
-    page, loop = Page(host), asyncio.get_running_loop()
+    page, loop = LivePage(host), asyncio.get_running_loop()
     try:
         server = await serve(
             page.show,

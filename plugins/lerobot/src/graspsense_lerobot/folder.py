@@ -34,7 +34,7 @@ _FIELD: Final = re.compile(r"\{(?P<name>[a-z_]+)(?::0?(?P<width>[0-9])d)?\}")
 
 
 @frozen(kw_only=True, eq=False)
-class Feature:
+class DataColumn:
     """A feature as `meta/info.json` declares it; `names` has a name for each number if it has one dimension."""
 
     key: str
@@ -65,7 +65,7 @@ class Folder:
     place: Path
     version: int
     fps: float
-    features: Mapping[str, Feature]
+    features: Mapping[str, DataColumn]
     info: Mapping[str, Any]
 
     @cached_property
@@ -257,7 +257,7 @@ def read_folder(place: Path) -> Folder:
     )
 
 
-def _feature(place: Path, key: str, value: Any) -> Feature:
+def _feature(place: Path, key: str, value: Any) -> DataColumn:
     shape = value.get("shape") if isinstance(value, dict) else None
     if not isinstance(shape, list) or not all(isinstance(one, int) and 0 < one < 10**7 for one in shape):
         raise DataDamaged(f"{place}/{INFO}: the feature {key[:80]!r} has no shape of whole numbers")
@@ -267,7 +267,7 @@ def _feature(place: Path, key: str, value: Any) -> Feature:
     given = tuple(map(str, names)) if isinstance(names, list) else ()
     about = value.get("info")
     units = about.get("units") if isinstance(about, dict) else None
-    return Feature(
+    return DataColumn(
         key=key,
         dtype=str(value.get("dtype", "")),
         shape=tuple(shape),

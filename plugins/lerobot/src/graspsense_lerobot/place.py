@@ -20,7 +20,7 @@ _NAMES: Final = ("gap", "force", "annotate")
 
 
 @frozen(kw_only=True)
-class Options:
+class PlaceOptions:
     """How a data set is read; a name or a number that is not given follows from the data set."""
 
     gap: str = ""
@@ -45,21 +45,21 @@ class Options:
     """`none` makes one trial of an episode; else each squeeze of it becomes one."""
 
 
-def folder_and_options(place: str) -> tuple[Path, Options]:
+def folder_and_options(place: str) -> tuple[Path, PlaceOptions]:
     """Return the folder and the options that a place names. Raises ConfigError."""
     whole = Path(place).expanduser()
     folder, mark, query = place.partition("?")
     if not mark or whole.is_dir():
-        return whole, Options()
+        return whole, PlaceOptions()
     given: dict[str, Any] = {}
-    known = tuple(fields_dict(Options))
+    known = tuple(fields_dict(PlaceOptions))
     for key, text in parse_qsl(query, keep_blank_values=True):
         if key not in known:
             raise ConfigError(
                 f"{key!r} is not an option of lerobot:FOLDER. Known: {', '.join(known)}.{suggestion(key, known)}"
             )
         given[key] = _value(key, text)
-    return Path(folder).expanduser(), Options(**given)
+    return Path(folder).expanduser(), PlaceOptions(**given)
 
 
 def _value(key: str, text: str) -> str | float:

@@ -26,9 +26,9 @@ from graspsense.plugin_api import (
     checked_recording,
     each_readable,
 )
-from graspsense_lerobot.folder import Episode, Feature, Folder, read_folder
+from graspsense_lerobot.folder import DataColumn, Episode, Folder, read_folder
 from graspsense_lerobot.names import CELL, CellArray, Meaning, channel_name, meaning_of
-from graspsense_lerobot.place import Options, folder_and_options
+from graspsense_lerobot.place import PlaceOptions, folder_and_options
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -51,14 +51,14 @@ class Understood:
     """A data set with what its names mean: the same for all episodes."""
 
     folder: Folder
-    options: Options
+    options: PlaceOptions
     meaning: Meaning
     gap: str
     gap_unit: str
     """Empty for metres."""
     forces: tuple[str, ...]
     """The names of the force of each side where no array gives it."""
-    images: tuple[Feature, ...]
+    images: tuple[DataColumn, ...]
     """The features that are arrays as a whole."""
     notes: tuple[str, ...]
 
@@ -71,7 +71,7 @@ def recordings(place: str) -> Iterator[LabelledRecording | UnreadableRecording]:
         yield from each_readable(f"episode {episode.index}", partial(_of_episode, understood, episode))
 
 
-def understand(folder: Folder, options: Options) -> Understood:
+def understand(folder: Folder, options: PlaceOptions) -> Understood:
     """Return what the names of a data set mean. Raises ConfigError if the opening or a force is not found."""
     names = [name for feature in _vectors(folder) for name in _names(feature)]
     images = tuple(
@@ -228,7 +228,7 @@ def _numbers(folder: Folder, episode: Episode) -> dict[str, Numbers]:
     return found
 
 
-def _checked_width(folder: Folder, feature: Feature, episode: Episode) -> Numbers:
+def _checked_width(folder: Folder, feature: DataColumn, episode: Episode) -> Numbers:
     values = episode.table.numbers.get(feature.key)
     width = int(np.prod(feature.shape))
     if values is None:
@@ -245,7 +245,7 @@ def _checked_width(folder: Folder, feature: Feature, episode: Episode) -> Number
     return rows
 
 
-def _vectors(folder: Folder) -> list[Feature]:
+def _vectors(folder: Folder) -> list[DataColumn]:
     return [
         one
         for one in folder.features.values()
@@ -253,11 +253,11 @@ def _vectors(folder: Folder) -> list[Feature]:
     ]
 
 
-def _is_number(feature: Feature) -> bool:
+def _is_number(feature: DataColumn) -> bool:
     return re.fullmatch(r"float(16|32|64)|u?int(8|16|32|64)|bool", feature.dtype) is not None
 
 
-def _names(feature: Feature) -> list[str]:
+def _names(feature: DataColumn) -> list[str]:
     """Return a name for each number of a vector, unlike those of other features."""
     word = feature.key.removeprefix("observation.").removeprefix("state.")
     given = feature.names if len(feature.names) == feature.shape[0] else ()
@@ -298,7 +298,7 @@ def _cells(cells: CellArray, numbers: Mapping[str, Numbers]) -> tuple[Numbers, t
     return values, (*grid, len(cells.axes)) if len(cells.axes) > 1 else grid
 
 
-def _grid(feature: Feature) -> tuple[int, ...]:
+def _grid(feature: DataColumn) -> tuple[int, ...]:
     """Return the rows, columns and components of an array: (cells, 3) are cells with three axes."""
     if len(feature.shape) == 2:
         return (1, feature.shape[0], 3) if feature.shape[1] == 3 else feature.shape
@@ -333,7 +333,7 @@ def _unit_of_force(understood: Understood) -> str:
     return "%" if name.endswith("load") else "mA" if name.endswith("current") else "counts"
 
 
-def _unit_of_gap(folder: Folder, gap: str, options: Options) -> tuple[str, list[str]]:
+def _unit_of_gap(folder: Folder, gap: str, options: PlaceOptions) -> tuple[str, list[str]]:
     """Return the unit of the opening, empty for metres, and what has to be said of it."""
     if options.gap_m_per_unit is not None:
         return "", [f"gap = {options.gap_m_per_unit:g} * ({gap} - {options.gap_zero:g}) m"]

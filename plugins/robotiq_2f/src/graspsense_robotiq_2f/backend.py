@@ -34,7 +34,7 @@ from graspsense.plugin_api import (
 from graspsense_robotiq_2f.config import RobotiqConfig
 from graspsense_robotiq_2f.emulator.device import EmulatedGripper
 from graspsense_robotiq_2f.faults import STATUS_BITS, bit_of
-from graspsense_robotiq_2f.link import Link, NoReply
+from graspsense_robotiq_2f.link import ModbusLink, NoReply
 from graspsense_robotiq_2f.registers import (
     ACTIVE,
     AMPERES_A_STEP,
@@ -44,7 +44,7 @@ from graspsense_robotiq_2f.registers import (
     byte_of,
     status_of,
 )
-from graspsense_robotiq_2f.tactile import Fingertips
+from graspsense_robotiq_2f.tactile import TactileFingertips
 from graspsense_robotiq_2f.tactile_protocol import CELLS, COLUMNS, ROWS
 
 RATE_HZ: Final = 100.0
@@ -91,9 +91,9 @@ class RobotiqBackend(SensorBackend[RobotiqConfig]):
         self._model = MODELS[config.model]
         self.least_force_n = self._model.forces_n[0]
         self.least_step_m = self._model.step_m
-        self._link: Link | None = None
+        self._link: ModbusLink | None = None
         self._emulated: EmulatedGripper | None = None
-        self._fingertips: Fingertips | None = None
+        self._fingertips: TactileFingertips | None = None
         self._pads = NO_PADS
         self._zero = ((0.0,) * CELLS, (0.0,) * CELLS)
         self._asked = Request(active=True, go=False, position=0, speed=0, force=0)
@@ -131,7 +131,7 @@ class RobotiqBackend(SensorBackend[RobotiqConfig]):
         self._asked = Request(active=True, go=False, position=0, speed=0, force=0)
         self._frames = self._retries = 0
         try:
-            self._link = Link(port, config.address, config.reply_timeout_s)
+            self._link = ModbusLink(port, config.address, config.reply_timeout_s)
             status = self._activated()
             self._open_fingertips()
         except (OSError, ValueError, NoReply) as error:
@@ -246,7 +246,7 @@ class RobotiqBackend(SensorBackend[RobotiqConfig]):
             where = self._emulated.tactile_where
         self._pads = no_pads(CELLS)
         self._zero = ((0.0,) * CELLS, (0.0,) * CELLS)
-        self._fingertips = Fingertips(where)
+        self._fingertips = TactileFingertips(where)
         image = self._fingertips.newest(ACTIVATION_S)
         if image is None:
             raise NoReply(f"the fingertips at {self.config.tactile_port} send nothing")

@@ -11,7 +11,7 @@ from graspsense.plugin_api import NAMES_INPUT, setting
 
 
 @frozen(kw_only=True)
-class FaultConfig:
+class RobotiqFaults:
     """Faults of the emulated gripper, by default none. Times are counted from its activation."""
 
     unplug_at_s: float = setting(
@@ -82,7 +82,7 @@ class RobotiqConfig:
         effect=NAMES_INPUT,
         meaning="Emulated only: the object between the fingers; not set: the default of body.",
     )
-    faults: FaultConfig = setting(factory=FaultConfig, meaning="Emulated only: faults of the gripper.")
+    faults: RobotiqFaults = setting(factory=RobotiqFaults, meaning="Emulated only: faults of the gripper.")
 
     def __attrs_post_init__(self) -> None:
         if self.port == "emulated":

@@ -26,7 +26,7 @@ class NoReply(Exception):
 
 
 @final
-class Link:
+class ModbusLink:
     """A gripper at `/dev/...` or `socket:HOST:PORT`. Raises OSError if it cannot be opened, ValueError for the text."""
 
     def __init__(self, port: str, address: int, timeout_s: float) -> None:

@@ -21,7 +21,7 @@ MOVING, STOPPED_OPENING, STOPPED_CLOSING, THERE = range(4)
 """The meaning of the object bits."""
 
 
-class Model(NamedTuple):
+class GripperModel(NamedTuple):
     """A model of gripper: its stroke, the position bytes at both ends, and its least and greatest speed and force."""
 
     name: str
@@ -46,9 +46,9 @@ class Model(NamedTuple):
 
 
 MODELS: Final = {
-    "2f-85": Model("Robotiq 2F-85", 0.085, 3, 230, (0.020, 0.150), (20.0, 235.0)),
-    "2f-140": Model("Robotiq 2F-140", 0.140, 3, 230, (0.030, 0.250), (10.0, 125.0)),
-    "hand-e": Model("Robotiq Hand-E", 0.050, 0, 255, (0.020, 0.150), (20.0, 185.0)),
+    "2f-85": GripperModel("Robotiq 2F-85", 0.085, 3, 230, (0.020, 0.150), (20.0, 235.0)),
+    "2f-140": GripperModel("Robotiq 2F-140", 0.140, 3, 230, (0.030, 0.250), (10.0, 125.0)),
+    "hand-e": GripperModel("Robotiq Hand-E", 0.050, 0, 255, (0.020, 0.150), (20.0, 185.0)),
 }
 
 

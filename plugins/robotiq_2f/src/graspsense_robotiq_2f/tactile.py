@@ -27,8 +27,8 @@ class TactileImage(NamedTuple):
 
 
 @final
-class Fingertips:
-    """Fingertips at a serial port, which send by themselves from construction to `close`. Raises OSError."""
+class TactileFingertips:
+    """TactileFingertips at a serial port, which send by themselves from construction to `close`. Raises OSError."""
 
     def __init__(self, port: str) -> None:
         import serial

@@ -9,7 +9,7 @@ from typing import Final, final
 
 from graspsense.gripper_api import EmulatedDevice
 from graspsense_robotiq_2f.config import RobotiqConfig
-from graspsense_robotiq_2f.emulator.fingertips import Felt, Fingertips
+from graspsense_robotiq_2f.emulator.fingertips import EmulatedFingertips, Felt
 from graspsense_robotiq_2f.emulator.hand import Hand
 from graspsense_robotiq_2f.emulator.modbus import answered
 from graspsense_robotiq_2f.emulator.port import SerialPort
@@ -47,7 +47,7 @@ class EmulatedGripper(EmulatedDevice):
         self._began_s = time.monotonic()
         self._data = b""
         self._port: SerialPort | None = None
-        self._fingertips = Fingertips(self._felt) if config.tactile_port == "emulated" else None
+        self._fingertips = EmulatedFingertips(self._felt) if config.tactile_port == "emulated" else None
         self._tactile_port: SerialPort | None = None
         self._told = self._failed = ""
         self._requests = 0

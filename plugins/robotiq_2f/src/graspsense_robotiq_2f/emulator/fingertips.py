@@ -48,7 +48,7 @@ class Felt(NamedTuple):
     right_n: float
 
 
-class Fingertips:
+class EmulatedFingertips:
     """Two fingertips whose forces `felt` returns. `heard` and `unasked` are the two sides of a port."""
 
     def __init__(self, felt: Callable[[], Felt]) -> None:
