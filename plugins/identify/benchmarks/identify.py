@@ -68,9 +68,11 @@ from graspsense_identify.interval import LEVEL, interval_of_mean, normal
 from graspsense_identify.laws import SLOTS
 from graspsense_identify.run import identify
 from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.run.drawing import FRICTION
 from graspsense_sim_gripper.scene.instance import _draws_of_number
 from graspsense_sim_gripper.scene.library import SCENE_IN_MEMORY
 from graspsense_sim_gripper.scene.library import find as find_object
+from graspsense_sim_gripper.scene.random_numbers import GRASP, draw_normals, key_of
 from graspsense_sim_gripper.scene.terms.gas import Gas
 
 WIDTH_M: Final = 0.05
@@ -323,8 +325,9 @@ def drawn_are_covered(row: Mapping[str, Any]) -> bool | None:
     if row["sensor"] == "ideal":
         return None
     (seed,) = seeds_of(row["scene"], row["sensor"], 1, row["repeat"])
-    # `sample` draws five numbers of the placement before.
-    return bool(abs(np.random.default_rng(seed).standard_normal(6)[5]) < normal())
+    friction = np.empty(2)
+    draw_normals(key_of(seed), GRASP, FRICTION, len(friction), friction)
+    return bool(abs(friction[0]) < normal())
 
 
 def measured(

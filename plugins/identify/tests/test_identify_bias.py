@@ -20,10 +20,10 @@ from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.build import build, drive_and_pads, instantiate
 
 
-def squeeze_of(name, **gripper):
+def squeeze_of(name, seed=7, **gripper):
     """Return a simulated squeeze of a scene of the benchmark, whose cells measure a share of 0.6 of the force."""
     text = scene_text(SCENES[name], 0.0).replace("share_spread = 0.01", "share_spread = 0.0")
-    (squeeze,) = squeezes_of(text, name, gripper, ["1"], [7])
+    (squeeze,) = squeezes_of(text, name, gripper, ["1"], [seed])
     return squeeze
 
 
@@ -74,8 +74,10 @@ def test_the_balance_of_energy_gives_the_share_of_the_cells_without_bias(name):
     drive, _ = drive_and_pads(SimConfig())
     ideal = squeeze_of(name, sensor="ideal", coulomb_spread_n=0.0)
     assert measured_share(ideal.trace, prepared(ideal, 0.0), drive) == pytest.approx(1.0, rel=5e-4)
-    cells = squeeze_of(name, sensor="pads", coulomb_spread_n=0.0)
-    assert measured_share(cells.trace, prepared(cells, 0.0), drive) == pytest.approx(0.6, rel=4e-3)
+    squeezes = [squeeze_of(name, seed, sensor="pads", coulomb_spread_n=0.0) for seed in range(7, 11)]
+    shares = [measured_share(one.trace, prepared(one, 0.0), drive) for one in squeezes]
+    # The noise of the cells scatters the share of a squeeze by 0.3 %.
+    assert np.mean(shares) == pytest.approx(0.6, rel=4e-3)
 
 
 def test_the_benchmark_knows_the_friction_that_a_squeeze_has_drawn():

@@ -77,7 +77,7 @@ def test_lost_reports_are_told_and_a_quarter_of_them_ends_the_grasp(drop, outcom
 
 
 def test_a_pad_that_grows_numb_in_the_squeeze_is_told():
-    faults = FaultConfig(pad_fault="numb", pad_side="left", pad_at_s=3.3)
+    faults = FaultConfig(pad_fault="numb", pad_side="left", pad_at_s=3.22)
     grasp = gripper_faults.grasped(gripper_faults.controller_named("hybrid"), faults)
     assert any(warning.startswith("pads disagree") for warning in grasp.warnings)
 
