@@ -232,7 +232,7 @@ def test_missing_folder(tmp_path: Path) -> None:
         read_recording(f"{tmp_path}/nowhere/full_bottle_1.txt")
 
 
-KNOWN = "csv:, icub:, mcap:, npz:, parquet:, rosbag:, store:, manifest:"
+KNOWN = "csv:, icub:, mcap:, npz:, parquet:, rosbag:, store:, lerobot:, manifest:"
 
 
 @pytest.mark.parametrize(
