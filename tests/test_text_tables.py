@@ -148,6 +148,15 @@ def recordings(folder, lines, text=""):
     return list(read_recordings(str(folder / "m.toml")))
 
 
+@pytest.mark.parametrize("bad", [[HEADER], [HEADER, *ROWS[:9], '0.09,"1,000.5","1.000,5",1', *ROWS[10:]]])
+def test_a_part_of_a_file_that_cannot_be_read_leaves_the_others(bad, tmp_path):
+    keys = 'files = "{day}.csv"\nstart = "^grasp (?P<label>\\\\w+)"\ntime = "t"\ngap = "pos [mm]"\nforce = "f1"\n'
+    lines = ["grasp can", HEADER, *ROWS, "grasp cup", *bad, "grasp jar", HEADER, *ROWS]
+    found = recordings(tmp_path, lines, keys)
+    assert [getattr(one, "label", "none") for one in found] == ["can", "none", "jar"]
+    assert "line" in str(found[1].error)
+
+
 def test_a_large_loss_is_a_warning(tmp_path):
     half = [row if k % 4 else row.rpartition(",")[0] + ",nan" for k, row in enumerate(ROWS)]
     (found,) = recordings(tmp_path, [HEADER, *half])

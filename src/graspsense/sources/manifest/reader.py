@@ -65,9 +65,11 @@ def tables_of(manifest: ReadManifest, file: NamedFile) -> list[ColumnTable]:
     if split == "rows":
         if too_many := RECORDINGS.exceeded(sum(map(len, tables))):
             raise DataDamaged(f"{file.path}: {too_many}")
-        return [table.rows(slice(k, k + 1), f"row {k + 1}") for table in tables for k in range(len(table))]
+        damaged = [table for table in tables if table.damage]
+        rows = [table.rows(slice(k, k + 1), f"row {k + 1}") for table in tables for k in range(len(table))]
+        return [*rows, *damaged]
     if split and split != "force":
-        return [part for table in tables for part in _by_column(table, split)]
+        return [part for table in tables for part in ([table] if table.damage else _by_column(table, split))]
     return tables
 
 
@@ -78,6 +80,8 @@ def grasps_in(
 
     What is wrong with one of several squeezes is told in its place. Raises ConfigError, DataDamaged.
     """
+    if table.damage:
+        raise DataDamaged(table.damage)
     columns = samples(manifest, table)
     if manifest.keys.split != "force":
         yield _grasp(manifest, file, table, columns)

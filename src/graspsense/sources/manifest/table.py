@@ -43,6 +43,9 @@ class ColumnTable:
     not_numbers: Mapping[str, str] = field(factory=dict)
     """For a column of text that begins with a number: its first line with another text, in words."""
 
+    damage: str = ""
+    """Why this part of a file cannot be read, where the others can."""
+
     def __len__(self) -> int:
         """Return the number of rows."""
         for column in (*self.numbers.values(), *self.texts.values()):

@@ -34,18 +34,33 @@ def read_text(path: Path, start: str = "") -> list[ColumnTable]:
     """Return the tables in a text file: one, or with `start` one for each line that this regular expression matches.
 
     The named groups of `start` become fields of the table that begins there; lines before the first match are left out.
-    Raises ConfigError if the file cannot be read, DataDamaged with the line that does not fit.
+    One of several tables that cannot be read has its `damage`. Raises ConfigError if the file cannot be read,
+    DataDamaged with the line that does not fit.
     """
     lines, ended = read_lines(path)
     parts = list(_parts(lines, start))
+    several = len(parts) > 1
     found = [
-        (part, table_of(path, part.lines, ended=ended or k < len(parts))) for k, part in enumerate(parts, 1)
+        _part_table(path, part, ended=ended or k < len(parts), several=several)
+        for k, part in enumerate(parts, 1)
     ]
-    tables = [(part, table) for part, table in found if table.names]
+    tables = [table for table in found if table is not None]
     if not tables:
         what = f"no line of it matches start = {start!r}" if start else "it has no line with columns"
         raise DataDamaged(f"{path} has no recording: {what}")
-    return [_columns(path, part, table, several=len(tables) > 1) for part, table in tables]
+    return tables
+
+
+def _part_table(path: Path, part: _Part, *, ended: bool, several: bool) -> ColumnTable | None:
+    """Return the table of a part; None if it has no line with columns. Raises DataDamaged for the only part."""
+    try:
+        table = table_of(path, part.lines, ended=ended)
+        return _columns(path, part, table, several=several) if table.names else None
+    except DataDamaged as error:
+        if not several:
+            raise
+        where = f", line {part.lines[0][0]}" if part.lines else ""
+        return ColumnTable(source=f"{path.name}{where}", fields=part.fields, damage=str(error))
 
 
 def _parts(lines: Sequence[Line], start: str) -> Iterator[_Part]:
