@@ -426,7 +426,7 @@ def whole_grasp(way: Way) -> None:
     code, trial = ran("run", "--json", "--gripper", "pr2", *(word for one in options for word in ("-o", one)))
     features = trial.get("features", {})
     missing = {name for name, value in features.items() if value is None}
-    # A cell image takes 11 reports: at 100 Hz the fingers may stand when the contact is seen, and then no rate is known.
+    # A cell image takes 11 reports: at 100 Hz the fingers may stand when the contact is seen. Then no rate is known.
     unknown = {"dp_dt", "df_dt"} if way.grasp_hz == 100 and features.get("delta_t") == 0.0 else set()
     check(
         code == 0
