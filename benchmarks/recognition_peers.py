@@ -173,7 +173,7 @@ def synthetic() -> dict:
     labels = np.array(["soft", "stiff"] * 12)
     steep = np.where(labels == "stiff", 2.0, 1.0)
     curves = steep[:, np.newaxis, np.newaxis] * np.linspace(0.0, 1.0, 128)
-    curves += 0.05 * rng.normal(size=(24, 2, 128))
+    curves = curves + 0.05 * rng.normal(size=(24, 2, 128))
     return {
         "labels": labels, "instances": np.arange(24) // 2, "features": curves.mean(axis=2), "curves": curves,
         "folds": np.arange(24) // 2 % 2,
