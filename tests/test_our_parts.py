@@ -29,6 +29,8 @@ def settings(name, folder):
             "unplugged": {"faults": {"unplug_at_s": 0.5}},
             "absent": {"transport": "hidraw", "serial": "not there"},
         }
+    if name == "graspsense-robotiq-2f/robotiq":
+        return {"keys": {"port": "emulated"}}
     return {}
 
 

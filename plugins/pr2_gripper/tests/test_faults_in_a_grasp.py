@@ -12,6 +12,10 @@ TELLS_NOTHING = {"hold", "squeeze"}
 """Within the last quarter of a second there is no time left to see a fault, and nothing moves any more."""
 
 
+TICK_S = 0.001 + 1e-9
+"""A fault is seen in the tick in which it comes; durations are counted in ticks."""
+
+
 def check(row: FaultyGrasp, healthy: FaultyGrasp) -> None:
     """The invariants of one grasp: effort, true force on the object, and time until the release."""
     name = f"{row.fault}, {row.side}, {row.phase}, {row.controller}: {row.outcome} ({row.words})"
@@ -19,7 +23,7 @@ def check(row: FaultyGrasp, healthy: FaultyGrasp) -> None:
     allowed_n = 2.0 * CEILING_N if motor else CEILING_N
     assert row.largest_effort_n <= allowed_n + 1e-6, name
     # A motor that does twice what it is told is seen within a tenth of a second.
-    assert row.strong_s <= healthy.strong_s + (0.1 if motor else 0.0), name
+    assert row.strong_s <= healthy.strong_s + (0.1 if motor else TICK_S), name
     assert row.largest_force_n <= 1.5 * healthy.largest_force_n, name
     assert row.outcome != "running", name
     # Until the contact, a drift that begins late has moved the force by a quarter of a newton: it has no consequence.

@@ -119,8 +119,8 @@ def step(params: HybridParams, state: HybridState, reading: Reading) -> tuple[Co
         effort, integral = closing_effort(params.velocity, integral, frame.velocity_m_s, frame.dt_s)
         approach_effort = effort
         contact_t = frame.t_s
-        # The fingers stop where both pads touch.
-        sent = Raised(sent.force_n, frame.t_s, frame.gap_m)
+        if params.kind == POSITION:  # the fingers stop where both pads touch
+            sent = Raised(sent.force_n, frame.t_s, frame.gap_m)
     else:
         # A gripper that closes by itself is corrected when its own loop has come to rest.
         if params.kind != POSITION or (
