@@ -35,8 +35,8 @@ from graspsense.plugin_api import (
 from graspsense.simulator_api import CompiledExtraction
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.backend import SimBackend
-from graspsense_sim_gripper.run.batch import threads, worker
 from graspsense_sim_gripper.run.batch import job as batch_job
+from graspsense_sim_gripper.run.batch import threads, worker
 from graspsense_sim_gripper.run.batch.job import Job, grasp_plain
 from graspsense_sim_gripper.run.batch.scenes import Scenes
 from graspsense_sim_gripper.run.batch.threads import SLICE, WORTH_A_PROCESS, run_many, slices_of
