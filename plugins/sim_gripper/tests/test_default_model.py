@@ -72,7 +72,7 @@ def test_nothing_there_is_unknown(pipeline):
 
 def test_its_sets_are_calibrated_for_each_label():
     assert KEPT["sets"]["unit"] == "instances"
-    assert {one["units"] for one in KEPT["sets"]["thresholds"].values()} == {400}
+    assert {one["units"] for one in KEPT["sets"]["thresholds"].values()} == {1000}
 
 
 def test_a_grasp_has_predictions_while_it_goes_on_and_the_answer_of_the_whole_grasp(pipeline):
