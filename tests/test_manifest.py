@@ -614,7 +614,7 @@ def test_where_no_file_can_be_read_the_first_error_is_told(tmp_path, capsys):
     for k in range(3):
         (tmp_path / f"jar_{k}.csv").write_text("t,gap\n0,1\n")
     described = manifest(tmp_path, PLAIN.replace("{label}.csv", "{label}_{order:d}.csv"))
-    code, _, err = run(capsys, "import", described, "--check")
+    code, _, err = run(capsys, "import", described, "--check", "--plot", tmp_path / "x.png")
     assert code == 2
     assert "none of 3 recordings can be read. The first: " in " ".join(err.split())
     assert not list(tmp_path.glob("*.png"))
@@ -709,13 +709,13 @@ def test_most_grasps_too_wide_is_an_error_that_stores_nothing(tmp_path, capsys):
     for k in range(5):
         pandas_csv(tmp_path / f"jar_{k}.csv", {"t": T_S, "gap": gap, "F": force * (1.0 + 0.1 * k)})
     place = manifest(tmp_path, 'files = "{label}_{order:d}.csv"\ntime = "t"\ngap = "gap"\nforce = "F"')
-    for options in (("--check",), ("--save", tmp_path / "trials")):
+    for options in (("--check", "--plot", tmp_path / "x.png"), ("--save", tmp_path / "trials")):
         code, _, err = run(capsys, "import", place, *options, "-o", "controller.too_wide_m=0.05")
         assert code == 2
         assert "5 of 5 recordings end as too wide" in err
         assert "controller.too_wide_m=0" in err
     assert not (tmp_path / "trials").exists()
-    code, out, _ = run(capsys, "import", place, "--check")
+    code, out, _ = run(capsys, "import", place, "--check", "--plot", tmp_path / "x.png")
     assert code == 0
     assert "5 steady" in out
 
