@@ -154,7 +154,9 @@ def test_a_plot_is_that_of_run_and_can_be_added_to(monkeypatch):
 def test_a_plot_and_a_notebook_show_arrays_at_their_moments_and_fast_channels(monkeypatch):
     monkeypatch.setenv("MPLBACKEND", "Agg")
     pyplot = pytest.importorskip("matplotlib.pyplot")
-    grasp = load_pipeline(options=["gripper.acceleration=true"]).grasp(object="odwalla:full_open", seed=1)
+    grasp = load_pipeline(options=["gripper.type=pr2", "gripper.transport=emulated"]).grasp(
+        object="odwalla:full_open", seed=1
+    )
 
     forces, _ = grasp.trace.plot()
 

@@ -157,8 +157,8 @@ def test_a_board_without_an_accelerometer_grasps_as_before_and_says_so() -> None
     old = Pr2Config(
         transport="emulated",
         calibration="none",
-        object="can:empty_open",
-        body_config={"open_gap_m": 0.075, "acceleration": False},
+        faults=FaultConfig(identity={"accelerometer_g": 0}),
+        **NEAR,
     )
     with_it, without = (
         run_grasp(Pr2Backend(config), create("controller", "hybrid"), RunConfig(seed=1))

@@ -112,7 +112,7 @@ def test_free_motion_changes_no_bit_of_the_catalogue(controller, sensor):
     [
         {"drive_lag_s": 0.01},
         {"object": "none"},
-        *(pytest.param(one, marks=pytest.mark.slow) for one in ({"acceleration": True}, {"explain": True})),
+        pytest.param({"explain": True}, marks=pytest.mark.slow),
     ],
 )
 def test_settings_under_which_motion_is_not_free_give_the_same_too(settings):

@@ -128,7 +128,7 @@ def test_the_features_of_the_pipeline_are_verified_too(spec, above_n, flagged):
 
 
 class Shaken(ForceAbove):
-    """The same of a set that cannot do without the accelerometer of the palm."""
+    """The same of a set that needs a signal which the simulator does not have."""
 
     requires = (Channel("force_left", "N"), Channel("acceleration", "m/s2"))
 

@@ -184,6 +184,18 @@ def put_on_arm(spec: mujoco.MjSpec) -> None:
         body.gravcomp = 1.0
 
 
+def _light(spec: mujoco.MjSpec) -> None:
+    """Light the scene for pictures, on white where the model has no sky of its own."""
+    spec.visual.headlight.ambient = [0.4, 0.4, 0.4]
+    spec.visual.headlight.diffuse = [0.6, 0.6, 0.6]
+    sky = mujoco.mjtTexture.mjTEXTURE_SKYBOX
+    if all(texture.type != sky for texture in spec.textures):
+        white, flat = [1.0, 1.0, 1.0], mujoco.mjtBuiltin.mjBUILTIN_FLAT
+        spec.add_texture(
+            name=PREFIX + "sky", type=sky, builtin=flat, rgb1=white, rgb2=white, width=8, height=48
+        )
+
+
 def add_thing(spec: mujoco.MjSpec, model: SceneModel, place: Floats, axis: Floats) -> None:
     """Add the thing at a place, its x axis along the closing direction, and the table under it.
 
@@ -193,8 +205,7 @@ def add_thing(spec: mujoco.MjSpec, model: SceneModel, place: Floats, axis: Float
     assert child is not None
     for body in child.bodies:
         body.gravcomp = float(not scene.table)
-    spec.visual.headlight.ambient = [0.4, 0.4, 0.4]
-    spec.visual.headlight.diffuse = [0.6, 0.6, 0.6]
+    _light(spec)
     if scene.needs_friction:
         # MuJoCo would else take the larger friction of thing and finger, and the mean of their stiffness.
         for part in (*child.geoms, *child.flexes):

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from math import nan
+from random import Random
 from typing import Any, Final
 
 from graspsense.plugin_api import Channel, FastChannel, Samples, signal_type
@@ -25,6 +26,11 @@ FREE_FALL_M_S2: Final = 9.81
 CHANNEL: Final = FastChannel(
     "acceleration", "m/s2", RATE_HZ, samples=MAX_SAMPLES, axes=("x", "y", "z"), clock="sensor"
 )
+
+SAMPLES_PER_REPORT: Final = 3
+"""Number of samples in a report of an emulated board: 3 kHz at 1000 reports a second."""
+REST_NOISE_M_S2: Final = 0.2
+"""Standard deviation of each axis of an emulated sensor at rest: assumed, somewhat more than a step of 10 bits."""
 
 _SIGNALS: Final = signal_type((CHANNEL,))
 _NONE: Final = ((nan, nan, nan),) * MAX_SAMPLES
@@ -43,6 +49,20 @@ class Accelerometer:
         m_s2, new = self._m_s2, len(words)
         rows = [(m_s2[word & 0x3FF], m_s2[word >> 10 & 0x3FF], m_s2[word >> 20 & 0x3FF]) for word in words]
         return _SIGNALS(Samples(t_s, sampled, new, (*rows, *_FILL[new])))
+
+
+class PalmAtRest:
+    """The samples of an emulated sensor that nothing moves: free fall along z, and noise that follows from the seed."""
+
+    def __init__(self, seed: int) -> None:
+        self._gauss = Random(seed).gauss
+
+    def samples(self) -> list[tuple[float, float, float]]:
+        """Return the samples (m/s2) of the next report."""
+        gauss, sd = self._gauss, REST_NOISE_M_S2
+        return [
+            (gauss(0.0, sd), gauss(0.0, sd), gauss(FREE_FALL_M_S2, sd)) for _ in range(SAMPLES_PER_REPORT)
+        ]
 
 
 def has_accelerometer(channels: Iterable[Channel]) -> bool:

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from typing import Any, Final, NamedTuple
 
-from attrs import fields_dict, has
-
 from graspsense.plugin_api import ConfigError, DeviceInfo, SensorBackend, create
-from graspsense_pr2_gripper.accelerometer import RANGE_G, has_accelerometer
+from graspsense_pr2_gripper.accelerometer import RANGE_G
 from graspsense_pr2_gripper.ceilings import EFFORT_CEILING_N, SPEED_CEILING_M_S
 from graspsense_pr2_gripper.config import Pr2Config
 from graspsense_pr2_gripper.faults import Wire
@@ -48,17 +46,11 @@ class Emulation(NamedTuple):
 
 
 def emulated_body(config: Pr2Config) -> SensorBackend[Any]:
-    """Return the backend that the emulated board drives, not yet opened. Raises ConfigError.
-
-    A body with a setting `acceleration` simulates the acceleration of its palm, unless the board has no accelerometer.
-    """
+    """Return the backend that the emulated board drives, not yet opened. Raises ConfigError."""
     values = dict(config.body_config)
     if config.object is not None:
         values["object"] = config.object
     body: SensorBackend[Any] = create("sensor-backend", config.body, **values)
-    own = type(body.config)
-    if config.accelerometer and has(own) and "acceleration" in fields_dict(own):
-        body = create("sensor-backend", config.body, **{"acceleration": True, **values})
     return body
 
 
@@ -84,7 +76,7 @@ def emulated_board(config: Pr2Config, seed: int) -> Emulation:
         image_period_us=IMAGE_PERIOD_US,
         watchdog_ms=WATCHDOG_MS,
         encoder_ticks_rev=ENCODER_TICKS,
-        accelerometer_g=RANGE_G if has_accelerometer(body.channels) else 0,
+        accelerometer_g=RANGE_G,
     )._replace(**config.faults.identity)
     try:
         encode_identity(identity)
@@ -93,4 +85,4 @@ def emulated_board(config: Pr2Config, seed: int) -> Emulation:
             f"the emulated board cannot have this identity: {error}. It follows from gripper.serial, "
             "gripper.body_config and gripper.faults.identity"
         ) from error
-    return Emulation(Wire(Firmware(body, identity), config.faults, seed), body, info)
+    return Emulation(Wire(Firmware(body, identity, seed), config.faults, seed), body, info)

@@ -12,7 +12,7 @@ from typing import Any, Final
 
 from graspsense.gripper_api import gap_and_rate, revolutions_at
 from graspsense.plugin_api import EFFORT, Command, Frame, Pads, Samples, SensorBackend
-from graspsense_pr2_gripper.accelerometer import has_accelerometer, word_of
+from graspsense_pr2_gripper.accelerometer import PalmAtRest, has_accelerometer, word_of
 from graspsense_pr2_gripper.fingertip import CELLS
 from graspsense_pr2_gripper.linkage import LINKAGES
 from graspsense_pr2_gripper.protocol import (
@@ -48,10 +48,11 @@ STRONG_N: Final = 30.0
 class Firmware:
     """A board with this identity that drives `body`, which has been opened.
 
-    It sends the samples of the channel `acceleration` of the body; none where the body or the board has none.
+    It sends the samples of the channel `acceleration` of the body. Where the body has no such channel, they are those
+    of a palm at rest, with the noise of this seed. A board without an accelerometer sends none.
     """
 
-    def __init__(self, body: SensorBackend[Any], identity: Identity) -> None:
+    def __init__(self, body: SensorBackend[Any], identity: Identity, seed: int = 0) -> None:
         self.identity = identity
         self.effort_un = 0
         """The effort of the motor before the limit of speed; 0 when relaxed."""
@@ -82,7 +83,8 @@ class Firmware:
         self._gone_out = True
         self._cells = [0] * IMAGE_CELLS
         self._range_g = identity.accelerometer_g
-        self._has_accelerometer = self._range_g > 0 and has_accelerometer(body.channels)
+        self._body_has_accelerometer = has_accelerometer(body.channels)
+        self._palm = PalmAtRest(seed)
         self._counter = 0
         """Number of samples that the accelerometer of the body had taken at the last report."""
 
@@ -147,7 +149,7 @@ class Firmware:
             self.largest_effort_n = frame.effort_n
         self._measure(frame)
         self._latch(pads, now_us)
-        words = self._sampled(signals.acceleration) if self._has_accelerometer else ()
+        words = self._sampled(signals) if self._range_g > 0 else ()
         report = InputReport(
             sequence=(self._step - 1) & 0xFFFFFFFF,
             time_us=now_us,
@@ -190,9 +192,12 @@ class Firmware:
         self._velocity_mtick_s = _clamped(frame.velocity_m_s / self._rate_m_rev * ticks_rev * 1e3)
         self._velocity_um_s = frame.velocity_m_s * 1e6
 
-    def _sampled(self, samples: Samples) -> tuple[int, ...]:
+    def _sampled(self, signals: Any) -> tuple[int, ...]:
         """Return the words of the new samples, and set the status bit if some were missed."""
         self._status &= ~SAMPLES_MISSED
+        if not self._body_has_accelerometer:
+            return tuple(word_of(sample, self._range_g) for sample in self._palm.samples())
+        samples: Samples = signals.acceleration
         if samples.counter - self._counter > samples.new:
             self._status |= SAMPLES_MISSED
         self._counter = samples.counter

@@ -30,10 +30,6 @@ class SimConfig:
         default="pads",
         meaning="pads: encoder, and 22 cells a fingertip every 41 ms. ideal: exact values at every tick.",
     )
-    acceleration: bool = setting(
-        default=False,
-        meaning="Whether the gripper has an accelerometer in its palm: the channel acceleration, three samples a tick.",
-    )
     accuracy: float = setting(
         default=0.01,
         minimum=1e-4,

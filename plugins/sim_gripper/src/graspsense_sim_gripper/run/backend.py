@@ -34,7 +34,6 @@ from graspsense.simulator_api import (
 )
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant.fingertip import CELL_OFFSET, CELLS, FIRST_PAD_CELL, fingertips
-from graspsense_sim_gripper.plant.palm import PalmBuffers, PalmSignals, channel, palm_signals
 from graspsense_sim_gripper.plant.sensing import (
     PAD_COUNTS_PER_N,
     PadBuffers,
@@ -61,8 +60,6 @@ from graspsense_sim_gripper.scene.terms.term import LAW_ERRORS
 
 SIDES: Final = ("left", "right")
 
-NOISE_TICKS: Final = 512
-"""Ticks for which the noise of the palm is drawn at once."""
 
 MOST_FREE_TICKS: Final = 1024
 """Largest number of ticks of free motion that are run at once."""
@@ -107,7 +104,6 @@ class SimBackend(BatchBackend[SimConfig]):
             Channel("effort", "N", frames_hz),
             *forces,
             fingertips(pads_hz),
-            *((channel(frames_hz),) if self.config.acceleration else ()),
         )
 
     def objects(self) -> tuple[ObjectKind, ...]:
@@ -143,7 +139,7 @@ class SimBackend(BatchBackend[SimConfig]):
             self._reduction = select(problem, self._controller or default_controller(self.config))
         setup = instantiate(problem, self._reduction, seed)
         self._setup = setup = evolve(setup, sensor=with_listed_cells(setup.sensor))
-        composed = composition(setup.kinds, setup.plant, has_palm=setup.has_palm)
+        composed = composition(setup.kinds, setup.plant)
         self._move = composed_move(composed)
         self._free_ticks = None if self._controller is None else free_motion(composed, self._controller.step)
         self._table = [[0.0] * MOST_FREE_TICKS for _ in COLUMNS]
@@ -153,8 +149,6 @@ class SimBackend(BatchBackend[SimConfig]):
         self._ticks = 0
         zero = (CELL_OFFSET[0],) * CELLS
         self._buffers = PadBuffers(zero, zero, [], [])
-        self._palm, self._palm_state = setup.palm, setup.palm_state
-        self._palm_buffers = PalmBuffers([], ())
         self._pads = no_pads(CELLS)
         self._effort_n: float | None = None
         self._explains = self.config.explain
@@ -185,7 +179,7 @@ class SimBackend(BatchBackend[SimConfig]):
         if count != self._pads.counter:
             image = buffers.images[count - 1]
             self._pads = Pads(self._sensor.image_t_s, count, tuple(image[0]), tuple(image[1]))
-        return _reading(frame, self._pads, self._further_signals(frame) if self._palm else ())
+        return _reading(frame, self._pads, ())
 
     def _move_on(self, effort_n: float) -> None:
         """Move the plant to the next tick. Raises TermFailed."""
@@ -218,16 +212,6 @@ class SimBackend(BatchBackend[SimConfig]):
         columns = t, repeat(setup.dt_s), gap, velocity, efforts, left, right, edge_left, edge_right, repeat(0)
         frames = list(map(Frame._make, zip(*columns, strict=False)))
         return FreeRun(self._ticks - first, frames, commands, state)
-
-    def _further_signals(self, frame: Frame) -> PalmSignals:
-        """Return the samples of the palm in this tick."""
-        noise = self._palm_buffers.noise
-        if self._ticks >= len(noise):
-            noise.extend(self._setup.palm_noise(len(noise), NOISE_TICKS).tolist())
-        signals, self._palm_state = palm_signals(
-            self._palm, self._palm_state, self._state, frame.t_s, frame.dt_s, self._ticks, self._palm_buffers
-        )
-        return signals
 
     def _moved(self, effort_n: float) -> PlantState:
         """Return the plant after a tick. Raises TermFailed."""

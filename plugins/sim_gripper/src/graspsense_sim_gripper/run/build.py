@@ -20,7 +20,6 @@ from graspsense_sim_gripper.plant.contact import ObjectModel, PadCompliance
 from graspsense_sim_gripper.plant.drive import Drive, Friction
 from graspsense_sim_gripper.plant.drive_models import LINKAGES, STRAIGHT
 from graspsense_sim_gripper.plant.fingertip import CELL_OFFSET, CELLS
-from graspsense_sim_gripper.plant.palm import AT_REST, palm_params
 from graspsense_sim_gripper.plant.sensing import (
     ImageClock,
     PadCells,
@@ -178,10 +177,6 @@ def _setup(
     plant, state = _plant(config, instance, drawn)
     if instance is not None and reduction is not None:
         plant = reduction.applied_to(plant)
-    palm: dict[str, Any] = {}
-    if config.acceleration:
-        params = palm_params(_linkage(config), 1.0 / config.rate_hz, ideal=config.sensor == "ideal")
-        palm = {"palm": params, "palm_state": AT_REST}
     return GraspSetup(
         kinds=instance.kinds if instance else (),
         terms=instance.terms if instance else (),
@@ -191,7 +186,6 @@ def _setup(
         sensor_state=_gripper(config).sensor_state,
         dt_s=1.0 / config.rate_hz,
         seed=seed or 0,
-        **palm,
     )
 
 

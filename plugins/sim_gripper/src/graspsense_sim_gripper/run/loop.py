@@ -55,8 +55,6 @@ class GraspParams(NamedTuple):
     controller: TickParams
     dt_s: float
     max_ticks: int
-    palm: Any = ()
-    """`PalmParams`; () without an accelerometer."""
     macro_steps: int = 0
     """1: steps of the plant may last several ticks (`macro_ticks`), and the ticks of an approach are run at once
     (`approach`)."""
@@ -128,8 +126,6 @@ class SimulationState(NamedTuple):
     plant: PlantState
     sensor: SensorState
     controller: TickState
-    palm: Any = ()
-    """`PalmState`; () without an accelerometer."""
 
 
 class Ending(NamedTuple):
@@ -168,8 +164,6 @@ class Buffers(NamedTuple):
     """(9, n) The values of `COLUMNS` at each tick from the approach on."""
     phases: Any
     """(n,) The phase of each tick, and above `EVENT_SHIFT` bits the events that the controller told in it."""
-    palm: Any = ()
-    """`PalmBuffers`; () without an accelerometer."""
 
 
 EVENT_SHIFT: Final = 8
@@ -190,12 +184,6 @@ def move_unbound(plant: PlantParams, state: PlantState, effort_n: float, dt_s: f
 def control_unbound(params: TickParams, state: TickState, reading: Reading) -> tuple[Command, TickState]:
     """Raise TypeError: the composition binds the controller."""
     raise TypeError("the loop has no controller: compose.grasp_loop binds one")
-
-
-def _no_signals(
-    params: Any, state: Any, plant: PlantState, t_s: float, dt_s: float, tick: int, buffers: Any
-) -> tuple[Any, Any]:
-    return (), state
 
 
 def no_step(plant: PlantState, control: MacroControl) -> Ahead:
@@ -220,14 +208,6 @@ def _every_tick(
     return at
 
 
-def _keep_nothing(signals: Any, buffers: Any, row: int) -> None:
-    pass
-
-
-further_signals: Callable[..., tuple[Any, Any]] = _no_signals
-"""What gives `Reading.signals`: `palm.palm_signals` of a gripper with an accelerometer."""
-keep_signals: Callable[[Any, Any, int], None] = _keep_nothing
-"""What records them: `palm.keep_samples` of a gripper with an accelerometer."""
 move: Callable[[PlantParams, PlantState, float, float], PlantState] = move_unbound
 control: Callable[[TickParams, TickState, Reading], tuple[Command, TickState]] = control_unbound
 begin_macro_step: Callable[..., Ahead] = _never_begins
@@ -245,7 +225,7 @@ def grasp(params: GraspParams, progress: SimulationState, buffers: Buffers) -> S
     """
     dt_s, pad_buffers, images = params.dt_s, buffers.pads, buffers.pads.images
     ticks, recorded, phase, tare_from, effort, failed, macro = progress.loop
-    plant, sensor, state, palm = progress.plant, progress.sensor, progress.controller, progress.palm
+    plant, sensor, state = progress.plant, progress.sensor, progress.controller
     capacity = len(buffers.columns[0]) - ROWS_AT_ONCE
     # The macro-step that is being taken, its number of ticks (0: there is none), and how many of them are over.
     ahead, n, k, peak, count = no_step(plant, macro), 0, 0, plant.peak_n, sensor.images
@@ -259,8 +239,7 @@ def grasp(params: GraspParams, progress: SimulationState, buffers: Buffers) -> S
             count = sensor.images
             buffers.image_times[count - 1] = sensor.image_t_s
             pads = Pads(sensor.image_t_s, count, images[count - 1][0], images[count - 1][1])
-        signals, palm = further_signals(params.palm, palm, plant, t_s, dt_s, ticks, buffers.palm)
-        command, state = control(params.controller, state, Reading(frame, pads, signals))
+        command, state = control(params.controller, state, Reading(frame, pads, ()))
         past_tare, same_phase = phase != TARING, state.phase == phase
         if not same_phase:
             if phase == TARING and count > tare_from:
@@ -269,7 +248,6 @@ def grasp(params: GraspParams, progress: SimulationState, buffers: Buffers) -> S
         effort, ends = command.value, state.done == 1 or state.guard.stopped == 1
         if phase > TARING and past_tare:
             _record(buffers, recorded & NOT_NEGATIVE, frame, effort, state)
-            keep_signals(signals, buffers.palm, recorded & NOT_NEGATIVE)
             recorded += 1
         ticks += 1
         if n > 0 and (ends or effort != last_effort):
@@ -295,7 +273,7 @@ def grasp(params: GraspParams, progress: SimulationState, buffers: Buffers) -> S
             at = run_approach_ticks(params, at, frame, buffers.columns, buffers.phases)
             ticks, recorded, effort, plant, sensor, state = at
     ended = LoopState(ticks, recorded, phase, tare_from, effort, failed, macro)
-    return SimulationState(ended, plant, sensor, state, palm)
+    return SimulationState(ended, plant, sensor, state)
 
 
 def before_failure(

@@ -13,11 +13,10 @@ from numpy.typing import NDArray
 from graspsense.plugin_api import Controller, DeviceInfo, FeatureSet
 from graspsense.simulator_api import RunConfig
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.plant.palm import NUMBERS
 from graspsense_sim_gripper.plant.sensing import SensorParams, SensorState
 from graspsense_sim_gripper.plant.state import PlantState
 from graspsense_sim_gripper.run.drawing import image_noise
-from graspsense_sim_gripper.scene.random_numbers import PALM, key_of, normal_rows
+from graspsense_sim_gripper.scene.random_numbers import key_of
 from graspsense_sim_gripper.scene.spec import ObjectSpec, TermParams
 from graspsense_sim_gripper.solve.scheme import PlantParams
 
@@ -67,23 +66,10 @@ class GraspSetup:
     sensor_state: SensorState
     dt_s: float
     seed: int
-    palm: Any = ()
-    """`PalmParams` of a gripper with an accelerometer, otherwise ()."""
-    palm_state: Any = ()
-    """Its `PalmState`, otherwise ()."""
-
-    @property
-    def has_palm(self) -> bool:
-        """Whether the gripper has an accelerometer."""
-        return bool(self.palm)
 
     def noise(self, first: int, count: int) -> NDArray[np.float64]:
         """Return the noise of the cell images from image `first` on: normal numbers (count, 2 CELLS)."""
         return image_noise(key_of(self.seed), first, count)
-
-    def palm_noise(self, first: int, count: int) -> NDArray[np.float64]:
-        """Return the noise of the palm in the ticks from tick `first` on: normal numbers (count, NUMBERS)."""
-        return normal_rows(key_of(self.seed), PALM, first, count, NUMBERS)
 
 
 @frozen(kw_only=True)

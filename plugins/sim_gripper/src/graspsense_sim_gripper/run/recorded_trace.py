@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from graspsense.gripper_api import Phase
 from graspsense.plugin_api import GraspEvent, Trace
 from graspsense.simulator_api import event_name
-from graspsense.testing_api import SampleTrace
 from graspsense_sim_gripper.plant.fingertip import CELLS
 from graspsense_sim_gripper.run.loop import COLUMNS, EVENT_SHIFT
 
@@ -21,13 +20,12 @@ def recorded_trace(
     phases: NDArray[np.int64],
     images: NDArray[np.float64],
     times: NDArray[np.float64],
-    signals: Mapping[str, SampleTrace],
 ) -> Trace:
     """Return the trace of a grasp.
 
     `event_names`: `Controller.events`. `table`, shape (columns, n), and `phases`, shape (n,): `Buffers.columns` and
     `Buffers.phases`; the events are removed from the latter. `images` and `times`: the cell images, and when each was
-    taken (s). `signals`: those with a clock of their own.
+    taken (s).
     """
     events: tuple[GraspEvent, ...] = ()
     if event_names:
@@ -44,7 +42,6 @@ def recorded_trace(
         pad_t_s=np.array(times[begin:]),
         pad_left=images[begin:, 0].copy(),
         pad_right=images[begin:, 1].copy(),
-        signals=signals,
         events=events,
     )
 

@@ -30,8 +30,8 @@ BLOCK: Final = 4
 """Numbers of a block. A table is drawn from the beginning of a block on."""
 TO_UNIT, MIDDLE = 2.0**-32, 2.0**-33
 LARGEST_SEED: Final = (1 << 64) - 1
-GRASP, NOISE, PALM, OBJECT = np.uint64(0), np.uint64(1), np.uint64(2), np.uint64(3)
-"""Streams: what a grasp begins with, the noise of its cells, that of its palm, and a numbered object."""
+GRASP, NOISE, OBJECT = np.uint64(0), np.uint64(1), np.uint64(3)
+"""Streams: what a grasp begins with, the noise of its cells, and a numbered object."""
 INTERVALS: Final = 1024
 QUANTILES: Final = np.array([0.0, *(NormalDist().inv_cdf(k / INTERVALS) for k in range(1, INTERVALS)), 0.0])
 """Those of the standard normal distribution. The first and the last interval are its tails."""

@@ -93,7 +93,7 @@ def _from_trace(
     feature_set: FeatureSet[Any], table: NDArray[np.float64], phases: NDArray[np.int64]
 ) -> Features:
     none = np.zeros(0)
-    return feature_set.extract(recorded_trace((), table, phases.copy(), none, none, {}))
+    return feature_set.extract(recorded_trace((), table, phases.copy(), none, none))
 
 
 def beyond(grasp: OwnFeatures | None, expected: OwnFeatures | None, accuracy: float) -> tuple[str, ...]:

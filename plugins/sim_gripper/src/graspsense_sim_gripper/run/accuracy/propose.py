@@ -194,7 +194,7 @@ def _with_settings(steps: Steps, config: SimConfig) -> Steps:
     """Return the steps with the length and the convergence that the settings prescribe."""
     if config.step_s is not None:
         steps = steps._replace(tolerance=math.inf, longest_s=float(config.step_s), growth=math.inf)
-    if config.step_s is not None or config.drive_lag_s > 0.0 or config.acceleration:
+    if config.step_s is not None or config.drive_lag_s > 0.0:
         steps = steps._replace(macro_tolerance=0.0)
     if config.fidelity == "reference":
         steps = steps._replace(

@@ -27,7 +27,6 @@ from graspsense.simulator_api import (
 )
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant.fingertip import CELLS
-from graspsense_sim_gripper.plant.palm import NUMBERS, PalmBuffers
 from graspsense_sim_gripper.plant.sensing import Bias, PadBuffers
 from graspsense_sim_gripper.plant.state import Motion, PlantState
 from graspsense_sim_gripper.run.accuracy.error import SCALES, UNIT_SCALES, GraspRecord, deviation
@@ -247,7 +246,7 @@ class TrialGrasps:
 
     def _begun(self, state: PlantState, setup: GraspSetup, *, from_open: bool) -> _Stage:
         controller = first_state(self.controller.controller.init())
-        progress = SimulationState(NOT_STARTED, state, setup.sensor_state, controller, setup.palm_state)
+        progress = SimulationState(NOT_STARTED, state, setup.sensor_state, controller)
         return _Stage(progress, (), from_open)
 
     def _closed_in(self, setup: GraspSetup, stage: _Stage) -> tuple[_Stage, bool]:
@@ -287,7 +286,6 @@ class TrialGrasps:
                 params,
                 setup.dt_s,
                 until,
-                made.palm,
                 macro_steps=uses_macro_steps(steps),
             )
             while not has_ended(progress.controller) and progress.loop.ticks < until:
@@ -296,8 +294,7 @@ class TrialGrasps:
                 phases = np.zeros(table.shape[1], np.int64)
                 recorded = (table, phases) if on_arrays else (table.tolist(), phases.tolist())
                 progress = progress._replace(loop=progress.loop._replace(recorded=0))
-                palm = _palm_buffers(on_arrays, table.shape[1]) if made.has_palm else ()
-                start, written = progress, Buffers(*buffers, *recorded)._replace(palm=palm)
+                start, written = progress, Buffers(*buffers, *recorded)
                 progress = loop(grasp_params, start, written)
                 if progress.loop.failed == 1:
                     before = before_failure(loop, grasp_params, start, written, progress.loop.ticks)
@@ -338,7 +335,7 @@ class TrialGrasps:
         """Return whether the loop is compiled, the loop, and its setup. Raises NotCompilable."""
         on_arrays = self.compiled
         made = padded(setup, self.padding) if on_arrays else setup
-        composed = composition(made.kinds, made.plant, has_palm=made.has_palm)
+        composed = composition(made.kinds, made.plant)
         if not on_arrays:
             return False, grasp_loop(composed, self.controller.step), made
         return True, self._loops.of(composed), made
@@ -381,12 +378,6 @@ def _ideal_buffers(on_arrays: bool) -> tuple[PadBuffers, Any]:
         return PadBuffers(zero[0], zero[1], noise, images), np.zeros(1)
     left, right = zero.tolist()
     return PadBuffers(left, right, noise.tolist(), images.tolist()), [0.0]
-
-
-def _palm_buffers(on_arrays: bool, ticks: int) -> PalmBuffers:
-    """Return buffers for the palm of an ideal sensor, which reads the first row of the noise only."""
-    noise, samples = np.zeros((1, NUMBERS)), np.zeros((NUMBERS, ticks))
-    return PalmBuffers(noise, samples) if on_arrays else PalmBuffers(noise.tolist(), samples.tolist())
 
 
 def _record(end: _Stage, columns: NDArray[np.float64], bias: Bias, dt_s: float) -> GraspRecord:

@@ -209,7 +209,7 @@ def drawn_scene(
     which that of this scene is added.
     """
     spec = problem.spec
-    if spec is None or reduction is None or example.has_palm:
+    if spec is None or reduction is None:
         return None
     layout, config = layout_of(example), problem.config
     composition = composition_of(example)

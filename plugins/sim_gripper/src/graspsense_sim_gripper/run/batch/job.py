@@ -25,10 +25,8 @@ from graspsense.simulator_api import (
     seconds_at_most,
     tick_params,
 )
-from graspsense.testing_api import SampleTrace
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant.fingertip import CELL_OFFSET, CELLS
-from graspsense_sim_gripper.plant.palm import NUMBERS, PalmBuffers, sample_trace
 from graspsense_sim_gripper.plant.sensing import PadBuffers, with_listed_cells
 from graspsense_sim_gripper.plant.state import PlantState
 from graspsense_sim_gripper.run.build import device_info
@@ -314,16 +312,13 @@ def result_of(
             return done.finished(form.result(measured), None)
     table, numbers = np.asarray(columns)[:, :n], np.asarray(phases)[:n]
     images, times = np.asarray(buffers.pads.images[:k]), np.asarray(buffers.image_times[:k])
-    signals: dict[str, SampleTrace] = {}
-    if buffers.palm:
-        signals["acceleration"] = sample_trace(table[0], np.asarray(buffers.palm.samples)[:, :n])
     if job.traces and 2 * n < len(columns[0]):
-        trace = recorded_trace(events, table.copy(), numbers.copy(), images, times, signals)
+        trace = recorded_trace(events, table.copy(), numbers.copy(), images, times)
         return done.finished(None if job.extract is None else job.extract(trace), trace)
     # A trace that fills most of the buffers, or that only features are extracted from, is a view of them.
     # While a column of it is referenced, those buffers are kept, and the next grasps have new ones.
     references = sys.getrefcount(columns), sys.getrefcount(phases)
-    trace = recorded_trace(events, table, numbers, images, times, signals)
+    trace = recorded_trace(events, table, numbers, images, times)
     extracted = None if job.extract is None else job.extract(trace)
     result = done.finished(extracted, trace if job.traces else None)
     del trace, extracted
@@ -341,17 +336,12 @@ def _run(job: Job, setup: GraspSetup, loop: GraspLoop, storage: Storage) -> tupl
     if not ideal:
         buffers.pads.noise[:] = setup.noise(0, len(buffers.pads.noise))
     begin_images(buffers)
-    if setup.has_palm:
-        ticks = len(buffers.phases)
-        buffers = buffers._replace(palm=PalmBuffers(setup.palm_noise(0, ticks), np.zeros((NUMBERS, ticks))))
     if not on_arrays:
         # The interpreter indexes lists faster than arrays.
         buffers = _as_lists(buffers)
     params, progress = started(job, setup, on_arrays=on_arrays)
     most_ticks = params.max_ticks
     while True:
-        if setup.has_palm:
-            params = params._replace(max_ticks=min(most_ticks, len(buffers.palm.noise)))
         end = run(params, progress, buffers)
         if end.ending.failed == 1:
             before = partial(before_failure, loop, params, progress, buffers, end.ending.ticks)
@@ -362,7 +352,7 @@ def _run(job: Job, setup: GraspSetup, loop: GraspLoop, storage: Storage) -> tupl
         if not ideal and end.ending.images == len(buffers.pads.images):
             buffers = with_more_images(buffers, key_of(setup.seed))
         else:
-            buffers = _with_more_ticks(buffers, setup)
+            buffers = _with_more_ticks(buffers)
         if not on_arrays:
             buffers = _as_lists(buffers)
 
@@ -375,18 +365,14 @@ def started(job: Job, setup: GraspSetup, *, on_arrays: bool) -> tuple[GraspParam
         controller=job.params,
         dt_s=setup.dt_s,
         max_ticks=math.ceil(seconds_at_most(job.run) / setup.dt_s),
-        palm=setup.palm,
         macro_steps=uses_macro_steps(setup.plant.steps),
     )
-    return params, SimulationState(
-        NOT_STARTED, setup.state, setup.sensor_state, job.initial, setup.palm_state
-    )
+    return params, SimulationState(NOT_STARTED, setup.state, setup.sensor_state, job.initial)
 
 
 def _as_lists(buffers: Buffers) -> Buffers:
     pads = PadBuffers(*(np.asarray(array).tolist() for array in buffers.pads))
-    palm = PalmBuffers(*(np.asarray(array).tolist() for array in buffers.palm)) if buffers.palm else ()
-    return Buffers(pads, *(np.asarray(array).tolist() for array in buffers[1:-1]))._replace(palm=palm)
+    return Buffers(pads, *(np.asarray(array).tolist() for array in buffers[1:]))
 
 
 def begin_images(buffers: Buffers) -> None:
@@ -407,19 +393,12 @@ def with_more_images(buffers: Buffers, key: Word) -> Buffers:
     )
 
 
-def _with_more_ticks(buffers: Buffers, setup: GraspSetup) -> Buffers:
+def _with_more_ticks(buffers: Buffers) -> Buffers:
     """Return buffers for twice as many ticks; they begin with the same values."""
-    columns, phases, palm = np.asarray(buffers.columns), np.asarray(buffers.phases), buffers.palm
-    if setup.has_palm:
-        noise, samples = np.asarray(palm.noise), np.asarray(palm.samples)
-        palm = PalmBuffers(
-            np.concatenate([noise, setup.palm_noise(len(noise), len(noise))]),
-            np.concatenate([samples, np.zeros_like(samples)], axis=1),
-        )
+    columns, phases = np.asarray(buffers.columns), np.asarray(buffers.phases)
     return buffers._replace(
         columns=np.concatenate([columns, np.zeros_like(columns)], axis=1),
         phases=np.concatenate([phases, np.zeros_like(phases)]),
-        palm=palm,
     )
 
 

@@ -22,7 +22,6 @@ from graspsense_sim_gripper.plant.contact import (
     no_event,
     solve_contact,
 )
-from graspsense_sim_gripper.plant.palm import keep_samples, palm_signals
 from graspsense_sim_gripper.plant.sensing import SensorState
 from graspsense_sim_gripper.plant.state import Contact, ContactState, Motion, Past, PlantState, StepState
 from graspsense_sim_gripper.run.approach import approach_ticks
@@ -250,19 +249,17 @@ class Composition(NamedTuple):
     """Whether the steps of a tick are halved until the result no longer changes."""
     lags: bool = False
     """Whether the force of the drive lags behind the command."""
-    has_palm: bool = False
-    """Whether the gripper has an accelerometer."""
     hardens: bool = False
     """Whether the pads are nonlinear."""
     held: bool = False
     """Whether the object is held fast, so that its state has two halves."""
 
 
-def composition(kinds: tuple[str, ...], plant: PlantParams, *, has_palm: bool = False) -> Composition:
+def composition(kinds: tuple[str, ...], plant: PlantParams) -> Composition:
     """Return the composition of a loop for this plant."""
     converges, lags = plant.steps.settle > 0.0, plant.drive.lag_s > 0.0
     held = plant.object.held == 1
-    return Composition(kinds, converges, lags, has_palm, hardens(plant.object), held)
+    return Composition(kinds, converges, lags, hardens(plant.object), held)
 
 
 def hardens(model: ObjectModel) -> bool:
@@ -370,7 +367,7 @@ def free_motion(
 
 def _may_last_several_ticks(composition: Composition) -> bool:
     """Return whether a step of this plant may last several ticks."""
-    return not (composition.converges or composition.lags or composition.has_palm)
+    return not (composition.converges or composition.lags)
 
 
 def _loop_of(
@@ -388,8 +385,6 @@ def _loop_of(
                 if force
                 else bind_reachable(approach_ticks, law)
             )
-    if composition.has_palm:
-        parts |= {"further_signals": palm_signals, "keep_signals": keep_samples}
     loop = bind_reachable(grasp, parts)
     return bind_reachable(loop, {"object_force": force}, INTERPRETED) if force else loop
 

@@ -79,7 +79,7 @@ def stored_grasp(
     is drawn where the grasp comes to it.
     """
     params, state = tuples_of(pattern, start, arrays)
-    pads, image_times, columns, phases, palm = buffers
+    pads, image_times, columns, phases = buffers
     left_zero, right_zero, of_images, images = pads
     most, n = len(images), FIRST_IMAGES if noise.is_drawn == 1 else len(images)
     drawn, going = 0, True
@@ -92,7 +92,7 @@ def stored_grasp(
             # The loop reads it as the image before the first one.
             images[n - 1] = math.nan
         part = PadBuffers(left_zero, right_zero, of_images, images[:n])
-        state = grasp(params, state, Buffers(part, image_times, columns, phases, palm))
+        state = grasp(params, state, Buffers(part, image_times, columns, phases))
         done = ending(state)
         going = done.ended == 0 and done.failed == 0 and done.images == n and n < most
         drawn, n = n, n + IMAGES_AT_ONCE

@@ -78,7 +78,7 @@ def compiled_kinds(kinds: tuple[str, ...]) -> tuple[str, ...]:
 def composition_of(setup: GraspSetup, *, pad: bool = True) -> Composition:
     """Return the composition in which a grasp is compiled; not `pad`: with the object's own terms."""
     kinds = layout_of(setup).kinds if pad else setup.kinds
-    return composition(kinds, setup.plant, has_palm=setup.has_palm)
+    return composition(kinds, setup.plant)
 
 
 def padded(setup: GraspSetup, kinds: tuple[str, ...] | None = None) -> GraspSetup:
@@ -102,8 +102,6 @@ def padded(setup: GraspSetup, kinds: tuple[str, ...] | None = None) -> GraspSetu
         sensor_state=setup.sensor_state,
         dt_s=setup.dt_s,
         seed=setup.seed,
-        palm=setup.palm,
-        palm_state=setup.palm_state,
     )
 
 
