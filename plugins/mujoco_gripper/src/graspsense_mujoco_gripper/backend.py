@@ -30,7 +30,7 @@ from graspsense.plugin_api import (
 )
 from graspsense.simulator_api import BatchBackend, BatchOptions, Grasped, SimulationVariant, Viewer
 from graspsense_mujoco_gripper.batch import GraspingJob, grasps
-from graspsense_mujoco_gripper.camera import Camera, Window, offscreen, require_screen
+from graspsense_mujoco_gripper.camera import Camera, Window, free_camera, offscreen, require_screen
 from graspsense_mujoco_gripper.catalogue import catalogue
 from graspsense_mujoco_gripper.config import MujocoConfig
 from graspsense_mujoco_gripper.draft import Draft, drafted
@@ -158,7 +158,9 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
             self._camera = Camera(model, travel.place, travel.axis, travel.open_m)
             self._next_picture_s = 0.0
         if self._viewer is not None and self._viewer.window:
-            self._window = Window(model, self._opened())
+            self._window = Window(
+                model, self._opened(), free_camera(travel.place, travel.axis, travel.open_m)
+            )
         return self._described()
 
     def _begin(self, model: mujoco.MjModel, travel: Travel, generator: np.random.Generator) -> None:

@@ -118,10 +118,14 @@ def require_screen() -> None:
 class Window:
     """MuJoCo's own viewer, which follows the grasp in real time."""
 
-    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, view: mujoco.MjvCamera) -> None:
         from mujoco import viewer
 
         self._handle = viewer.launch_passive(model, data)
+        with self._handle.lock():
+            own = self._handle.cam
+            own.lookat, own.distance = view.lookat, view.distance
+            own.azimuth, own.elevation = view.azimuth, view.elevation
         self._began, self._next_s = perf_counter(), 0.0
 
     def follow(self, t_s: float) -> None:
