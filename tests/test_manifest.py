@@ -720,6 +720,45 @@ def test_most_grasps_too_wide_is_an_error_that_stores_nothing(tmp_path, capsys):
     assert "5 steady" in out
 
 
+COUNTS = 'files = "{label}_{order:d}.csv"\ntime = "t"\ngap = "gap"\nforce = "F [counts]"\n'
+
+
+def test_counts_below_zero_throughout_are_an_error_that_says_what_to_set(tmp_path, capsys):
+    """A signed sensor of 24 bit with an offset: no contact force above zero can be found in it."""
+    gap, force = squeezing()
+    for k in range(5):
+        counts = np.round(-8_300_000 + 20_000.0 * (1.0 + 0.1 * k) * force)
+        pandas_csv(tmp_path / f"jar_{k}.csv", {"t": T_S, "gap": gap, "F": counts})
+    for options in (("--check", "--plot", tmp_path / "x.png"), ("--save", tmp_path / "trials")):
+        code, _, err = run(capsys, "import", manifest(tmp_path, COUNTS), *options)
+        assert code == 2
+        assert "5 of 5 recordings is below zero" in err
+        assert 'zero = "10 samples"' in err
+    assert not (tmp_path / "trials").exists()
+    zeroed = manifest(tmp_path, COUNTS + 'zero = "10 samples"')
+    code, out, _ = run(capsys, "import", zeroed, "--check", "--plot", tmp_path / "x.png")
+    assert code == 0
+    assert "5 steady" in out
+
+
+def test_counts_that_fall_on_contact_are_asked_about(tmp_path):
+    gap, force = squeezing()
+    rng = np.random.default_rng(0)
+    counts = np.round(999.0 - 60.0 * force + rng.normal(size=len(force)))
+    pandas_csv(tmp_path / "jar_0.csv", {"t": T_S, "gap": gap, "F": counts})
+    (one,) = recordings(tmp_path, COUNTS)
+    assert any("fall on contact" in notice for notice in one.notices)
+    (turned,) = recordings(tmp_path, COUNTS.replace("F [counts]", "999 - F [counts]"))
+    assert not turned.notices
+    # A hold that relaxes falls too, but is never steady at first.
+    hold = np.round(999.0 - 600.0 * (1.0 - np.exp(-(T_S - T_S[0]) / (0.1 * np.ptp(T_S)))))
+    pandas_csv(
+        tmp_path / "jar_0.csv", {"t": T_S, "gap": 0.05 - 0.001 * np.arange(len(gap)) / len(gap), "F": hold}
+    )
+    (held,) = recordings(tmp_path, COUNTS)
+    assert not any("fall on contact" in notice for notice in held.notices)
+
+
 def test_features_after_the_end_that_the_controller_saw(tmp_path, capsys):
     """A squeeze that rests, and is released long after: the whole recording counts, as for a data set."""
     gap, force = squeezing()

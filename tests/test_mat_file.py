@@ -45,6 +45,13 @@ def test_numbers_and_texts_are_what_scipy_reads_and_the_rest_is_left_out(compres
     assert_same(mat_variables(path), expected)
 
 
+def test_a_file_of_structures_alone_says_how_to_save_it(tmp_path):
+    path = tmp_path / "a.mat"
+    savemat(path, {"jar": {"gap": np.arange(9.0), "force": np.arange(9.0)}})
+    with pytest.raises(ConfigError, match=r"structures.*-v7\.3"):
+        mat_variables(path)
+
+
 def test_version_4(tmp_path):
     path = tmp_path / "a.mat"
     savemat(

@@ -12,7 +12,9 @@ from test_evaluate import learner
 
 from graspsense.cli.main import main
 from graspsense.evaluation.intervals import difference
-from graspsense.evaluation.ranking import OutsideAnswers, rank
+from graspsense.evaluation.ranking import CandidateResult, OutsideAnswers, rank, ranking_of
+from graspsense.report.ranking_page import ranking_page
+from graspsense.report.verdict import in_hundred
 
 
 def crossed(**other):
@@ -134,6 +136,25 @@ def test_the_page_has_verdict_rates_losses_sets_and_the_command(tmp_path, capsys
         assert f"{heading}</h2>" in text
     assert "--classifiers tree,knn" in text
     assert "http" not in text.replace("http-equiv", "").replace("http://www.w3.org/2000/svg", "")
+
+
+def test_the_headline_of_the_page_has_the_rate_without_the_luck_of_the_choice():
+    """Thirty-two candidates that guess one of two labels: the best of them seems far better than that."""
+    trials = bottles(12)
+    rng = np.random.default_rng(0)
+    measured = {
+        ("guess", f"set{k}"): CandidateResult(
+            right={"folds": (rng.random(len(trials)) < 0.5).tolist()}, training_s=1.0
+        )
+        for k in range(32)
+    }
+    found = ranking_of(measured, "folds", trials, ())
+    best = found.candidates[0].rates["folds"].rate
+
+    assert best > found.chosen.rate + 0.05
+    headline = ranking_page(found, "graspsense compare").headline
+    assert in_hundred(found.chosen.rate) in headline
+    assert in_hundred(best) not in headline
 
 
 @pytest.mark.parametrize("sign", [1, -1])

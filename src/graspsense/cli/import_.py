@@ -231,9 +231,9 @@ def _import(
     """Import the recordings and print what became of each; those that cannot be replayed join `unreadable`."""
     from graspsense.core.values.errors import ConfigError
     from graspsense.recording.readable import error_of_all
-    from graspsense.sources.import_outcomes import outcomes_of, refuse_too_wide
+    from graspsense.sources.import_outcomes import outcomes_of, refuse_useless
 
-    refuse_too_wide(outcomes_of(recordings, chosen.settings), chosen.settings(recordings[0]))
+    refuse_useless(recordings, outcomes_of(recordings, chosen.settings), chosen.settings(recordings[0]))
     stored = _store(save, recordings, unreadable, chosen)
     if not stored.kept and not stored.refused:
         raise error_of_all(unreadable)
@@ -332,7 +332,7 @@ def _show(
     picture: Path,
     as_json: bool,
 ) -> None:
-    """Print what was understood of the recordings, and draw one of them. Raises ConfigError if most are too wide."""
+    """Print what was understood of the recordings, and draw one of them. Raises ConfigError if most are useless."""
     from attrs import asdict
 
     from graspsense.cli.import_check import echo_channels
@@ -342,7 +342,7 @@ def _show(
     from graspsense.core.values.errors import DataDamaged, PluginUnavailable
     from graspsense.recording.readable import readable
     from graspsense.sources.dataset_recordings import handed_over
-    from graspsense.sources.import_outcomes import outcomes_of, refuse_too_wide
+    from graspsense.sources.import_outcomes import outcomes_of, refuse_useless
 
     summary, outcomes = _summary(recordings), outcomes_of(recordings, chosen.settings)
     ends = {outcome.words: count for outcome, count in outcomes.most_common()}
@@ -363,7 +363,7 @@ def _show(
         draw_grasp(trial, picture)
     except (DataDamaged, PluginUnavailable) as error:
         echo(f"no picture: {error}", Style.CAUTION, err=True)
-    refuse_too_wide(outcomes, chosen.settings(recordings[0]))
+    refuse_useless(recordings, outcomes, chosen.settings(recordings[0]))
 
 
 def _summary(recordings: Sequence[ImportedRecording]) -> ImportSummary:

@@ -5,7 +5,8 @@ A classifier with one of these tables is a baseline for the full feature set.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Final, TypedDict
 
 from graspsense.core.components.registry import installed
@@ -71,8 +72,23 @@ def controls(
     )
 
 
-def without_width(found: Controls, why: str) -> Controls:
-    """Return controls without the width of the object, with the reason."""
+def without_constant_gap(found: Controls, gaps: Iterable[Iterable[float]]) -> Controls:
+    """Return controls without the width of the object if the gap does not change in any recording.
+
+    `gaps` has those of each recording; none is read after one that changes.
+    """
+    width = found["width"]
+    if width is None or bool((width.table.values != width.table.values).all()):
+        return found  # there is none in any trial
+    known = False
+    for gap in gaps:
+        values = {value for value in gap if not math.isnan(value)}
+        if len(values) > 1:
+            return found
+        known = known or bool(values)
+    if not known:
+        return found
+    why = "the gap does not change in any recording, so it tells no width"
     return Controls(**{**found, "width": None, "no_width": why})
 
 

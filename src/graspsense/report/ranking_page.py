@@ -13,13 +13,14 @@ from graspsense.report.wording import CONTROLS, control_words, protocol_words
 def ranking_page(ranking: Ranking, command: str) -> Page:
     """Return the page; `command` is the command line that measured the comparison."""
     best = ranking.candidates[0]
-    rate = best.rates[ranking.protocol].rate
+    # Without the luck of the choice, which the rate of the best contains.
+    rate = (ranking.chosen or best.rates[ranking.protocol]).rate
     return Page(
         kind="Comparison of classifiers",
         title=ranking.source,
         question=f"Which classifier recognises most, with which features, on {ranking.source}?",
         answer=ranking.verdict,
-        headline=f"{best.name} recognises most: {in_hundred(rate)} grasps",
+        headline=f"{best.name} recognises most: expect {in_hundred(rate)} new grasps",
         beside=bullets(ranking.notes, "notes"),
         sections=(_rates(ranking), _differences(ranking), _sets(ranking), _made_of(ranking, command)),
     )

@@ -36,8 +36,11 @@ def outcomes_of(
     return found
 
 
-def refuse_too_wide(outcomes: Counter[Outcome], settings: Settings) -> None:
-    """Raise ConfigError if most recordings end as too wide, so that all but a few of their samples are left out."""
+def refuse_useless(
+    recordings: Sequence[ImportedRecording], outcomes: Counter[Outcome], settings: Settings
+) -> None:
+    """Raise ConfigError if most recordings end as too wide, soon after they began, or can have no contact."""
+    _refuse_below_zero(recordings)
     wide, tried = outcomes[Outcome.TOO_WIDE], outcomes.total()
     if tried < FEWEST or 2 * wide <= tried:
         return
@@ -48,4 +51,20 @@ def refuse_too_wide(outcomes: Counter[Outcome], settings: Settings) -> None:
         f"contact_force_n = {contact:g} before the gap has closed by too_wide_m = {travel:g}. If the recordings "
         "begin close to the object, add -o controller.too_wide_m=0. If the force without contact is larger than "
         "this, add -o controller.contact_force_n=FORCE. Or leave both out, so that they follow from the recordings"
+    )
+
+
+def _refuse_below_zero(recordings: Sequence[ImportedRecording]) -> None:
+    """Raise ConfigError if the forces of most recordings are below zero throughout."""
+    frames = [[reading.frame for reading in one.labelled.recording.readings] for one in recordings]
+    below = sum(
+        max((min(each.force_left_n, each.force_right_n) for each in grasp), default=0.0) < 0.0
+        for grasp in frames
+    )
+    if len(frames) < FEWEST or 2 * below <= len(frames):
+        return
+    raise ConfigError(
+        f"the force of {below} of {len(frames)} recordings is below zero throughout, so that no contact can be found. "
+        'If the fingers were free at the beginning, write zero = "10 samples" in the manifest; else subtract the known '
+        'zero of the sensor: force = "FORCE + OFFSET". If it falls on contact, turn its sign: -FORCE'
     )

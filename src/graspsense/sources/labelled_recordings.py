@@ -21,7 +21,7 @@ from graspsense.core.values.features import Features, FeatureTable, table_of
 from graspsense.core.values.signals import APPROACH
 from graspsense.core.values.trace import SI_UNITS, Trace, trace_of
 from graspsense.recording.before_contact import before_contact
-from graspsense.recording.controls import Controls, controls, without_width
+from graspsense.recording.controls import Controls, controls, without_constant_gap
 from graspsense.recording.labelled_recording import LabelledRecording, UnreadableRecording
 from graspsense.recording.readable import each_readable, error_of_all, note_on
 from graspsense.recording.replayable import Recording
@@ -163,14 +163,9 @@ def _controls(
     found = controls(
         table, table_of(before), before_missing=_why_missing(before), first_line=_first_lines(facts)
     )
-    if any(map(_gap_changes, facts)):
-        return found
-    return without_width(found, "the gap does not change in any recording, so it tells no width")
-
-
-def _gap_changes(one: LabelledRecording) -> bool:
-    first = one.recording.readings[0].frame.gap_m
-    return any(reading.frame.gap_m != first for reading in one.recording.readings)
+    return without_constant_gap(
+        found, ([reading.frame.gap_m for reading in one.recording.readings] for one in facts)
+    )
 
 
 def _why_missing(before: Sequence[Features]) -> str:

@@ -350,6 +350,8 @@ def _ends(measured: Sequence[_Noise], scale: _Scale, contact: float) -> tuple[di
                 f"pads feel an object in a gap of {_CLOSED_M * 1e3:g} mm or less)"
             )
         words = "; ".join(parts)
+        if not any(float(np.ptp(one.gap)) > 0.0 for one in measured):
+            words = "the gap does not change, so nothing is too wide or closed by it"
     if scale.t != "s":
         duration = float(np.median([one.times[-1] - one.times[0] for one in measured]))
         chosen["controller.slip_time_s"] = max(_SLIP_SHARE * duration, 1.0)

@@ -23,7 +23,7 @@ from graspsense.core.learn.labelled import Labelled
 from graspsense.core.learn.target_value import TargetValue, values_of_labels
 from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.core.values.features import FeatureTable
-from graspsense.recording.controls import controls
+from graspsense.recording.controls import Controls, controls, without_constant_gap
 from graspsense.recording.provenance import recipe
 from graspsense.recording.readable import note_on, readable
 from graspsense.recording.reader import read_recorded
@@ -31,7 +31,7 @@ from graspsense.recording.same_grasp import curve_bytes, grasp_numbers
 from graspsense.recording.trial_record import FeatureValues
 from graspsense.store.changes import with_changed_numbers
 from graspsense.store.extract_again import ExtractedTrials, extract_again
-from graspsense.store.first_line import first_lines
+from graspsense.store.first_line import first_lines, imported_gaps
 from graspsense.store.opening import decoded
 from graspsense.store.rows import StoredTrial
 from graspsense.store.store import COUNTS, Store
@@ -126,8 +126,8 @@ def labelled_store(
             settings, components = _with_gripper(extracted, settings, components)
         else:
             tables = _stored_tables(store, folder, rows, feature_set)
-        first_line, unused = first_lines(store, rows.recording, rows.origin), _unused(store)
-        content = _contents(store, rows)
+        found = _controls(store, rows, tables)
+        content, unused = _contents(store, rows), _unused(store)
     order, no_order = order_recorded(rows.made_at, rows.origin, rows.labels)
     return Labelled(
         source=f"store:{folder}",
@@ -138,13 +138,7 @@ def labelled_store(
         order=order,
         no_order=no_order,
         content=content,
-        **controls(
-            tables.features,
-            tables.before,
-            no_before="the trials do not have the same features from before contact",
-            before_missing=tables.before_missing,
-            first_line=first_line,
-        ),
+        **found,
         value=target,
         notes=(*notes, *_notes(len(set(rows.recipe)), sum(rows.simulated), len(rows)), *unused),
         provenance=_provenance(folder, rows, newest.summary.id, settings, components),
@@ -221,6 +215,17 @@ class _Tables:
     features: FeatureTable
     before: FeatureTable | None
     before_missing: str
+
+
+def _controls(store: Store, rows: _Rows, tables: _Tables) -> Controls:
+    found = controls(
+        tables.features,
+        tables.before,
+        no_before="the trials do not have the same features from before contact",
+        before_missing=tables.before_missing,
+        first_line=first_lines(store, rows.recording, rows.origin),
+    )
+    return without_constant_gap(found, imported_gaps(store, rows.recording, rows.origin))
 
 
 def _read_rows(store: Store, wanted: str, feature_set: int | None) -> _Rows:

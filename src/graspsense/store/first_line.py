@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from typing import TYPE_CHECKING, Final
 
@@ -11,7 +11,7 @@ import numpy as np
 from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.core.values.features import FeatureTable
 from graspsense.core.values.signals import CHANNELS, Frame
-from graspsense.recording.reader import read_first_frame
+from graspsense.recording.reader import read_first_frame, read_recorded
 
 if TYPE_CHECKING:
     from graspsense.store.store import Store
@@ -50,3 +50,14 @@ def first_lines(store: Store, recordings: Sequence[str], origins: Sequence[str])
                 values[row] = numbers_of(frame)
     values[np.isinf(values)] = np.nan
     return FeatureTable(names=NAMES, units=UNITS, values=values)
+
+
+def imported_gaps(store: Store, recordings: Sequence[str], origins: Sequence[str]) -> Iterator[list[float]]:
+    """Yield the gaps of each imported recording that can be read."""
+    for recording, origin in zip(recordings, origins, strict=True):
+        if origin == "import":
+            with suppress(ConfigError, DataDamaged):
+                yield [
+                    reading.frame.gap_m
+                    for reading in read_recorded(store.recording_path(recording)).readings()
+                ]

@@ -16,6 +16,7 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
+from graspsense.core.values.errors import ConfigError
 from graspsense.recording.readable import readable, refuse_devices
 from graspsense.recording.unpacked import Unpacked
 from graspsense.sources.manifest.hdf5_file import hdf5_arrays
@@ -65,7 +66,12 @@ def mat_variables(path: Path) -> dict[str, NDArray[Any]]:
                 (element,) = _elements(unpacked.unpack("zlib", element.data), order)
             if element.kind == _MATRIX and (variable := _variable(element.data, order)) is not None:
                 found[variable[0]] = variable[1]
-        return found
+    if not found:
+        raise ConfigError(
+            f"{path} has no array at its top level, and structures and cells are not read. Save the file with "
+            "save(NAME, '-v7.3'), which gives the fields of a structure paths: arrays = \"S/{label}/{column}\""
+        )
+    return found
 
 
 def _elements(data: bytes, order: str) -> Iterator[_Element]:

@@ -55,7 +55,12 @@ def notices_of(columns: GraspColumns, *, zeroed: bool) -> Iterator[str]:
                 "the forces are whole numbers, as counts of a sensor are: give a factor to newtons, or write "
                 'force = "COLUMN [counts]", or [gf] for the grams of a scale'
             )
-    if high > low and start - low > BEGINS_LOADED * (high - low):
+    if _falls_on_contact(columns):
+        yield (
+            "the force falls while the gap closes: does the sensor fall on contact? Turn its sign and write its zero: "
+            'force = "-FORCE" and zero = "10 samples", or force = "999 - FORCE" where 999 is its value without contact'
+        )
+    elif high > low and start - low > BEGINS_LOADED * (high - low):
         if zeroed:
             yield (
                 "the recording begins in contact, so the zero of its first samples removes a part of the force: leave "
@@ -76,6 +81,15 @@ def notices_of(columns: GraspColumns, *, zeroed: bool) -> Iterator[str]:
             + _FOUND * _has_several_squeezes(columns)
             + 'split = "COLUMN" splits it by a column'
         )
+
+
+def _falls_on_contact(columns: GraspColumns) -> bool:
+    """Return whether a force in counts is steady at first and then falls by most of its range as the gap closes."""
+    force, gap = columns.force_n, columns.gap_m
+    fall, span = float(force[0] - force.min()), float(np.ptp(force))
+    closed = float(gap[0] - gap[int(force.argmin())])
+    falls = fall > (1.0 - STEADY) * span > 0.0 and closed > 0.5 * float(np.ptp(gap)) > 0.0
+    return bool(columns.units.get("force")) and falls and _is_steady(force)
 
 
 def _is_steady(force: Numbers) -> bool:
