@@ -155,12 +155,12 @@ def _is_measured(column: NDArray[np.float64], repeated: int) -> bool:
         )
         cells = 10.0**digits / 1e6
     else:
-        cells = _cells(distinct)
+        cells = cells_in_range(distinct)
     ties = len(given) - len(distinct)
     return ties * _SURE < repeated and _SURE * len(given) ** 2 / (2.0 * cells) < repeated
 
 
-def _cells(distinct: NDArray[np.float64]) -> float:
+def cells_in_range(distinct: NDArray[np.float64]) -> float:
     """Return how many values fit into the range of these at the resolution that they show."""
     span = float(distinct[-1] - distinct[0])
     step = span
@@ -181,7 +181,9 @@ def _can_be_chance(distinct: NDArray[np.float64], repeated: int) -> bool:
     if distinct.shape[1] == 1:
         return True
     different = [np.unique(column[~np.isnan(column)]) for column in distinct.T]
-    combinations = math.prod(len(one) if len(one) < _FEW else _cells(one) for one in different if len(one))
+    combinations = math.prod(
+        len(one) if len(one) < _FEW else cells_in_range(one) for one in different if len(one)
+    )
     trials = len(distinct) + repeated
     if _SURE_OF_ALL * trials**2 / (2.0 * combinations) >= repeated:
         return True
