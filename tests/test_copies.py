@@ -184,3 +184,17 @@ def test_equal_features_of_recordings_that_were_compared_and_differ_are_no_copie
     found = without_copies(labelled(values, content=tuple("abcdefgh")))
     assert len(found) == 8
     assert len(without_copies(labelled(values, content=tuple("aaaaefgh")))) == 5
+
+
+@pytest.mark.parametrize("change", ["another value", "a missing value"])
+def test_copies_with_one_value_changed_are_told(change):
+    rng = np.random.default_rng(1)
+    values = rng.normal(size=(40, 3)).round(4)
+    edited = values.copy()
+    edited[:, 2] = np.nan if change == "a missing value" else edited[:, 2] + 0.5
+    labels = ("a",) * 20 + ("b",) * 20
+    table = FeatureTable(names=("x", "y", "z"), units=("",) * 3, values=np.concatenate([values, edited]))
+    found = without_copies(Labelled(source="t", table=table, labels=labels * 2))
+    assert any("single feature: 40 (trial 41 from trial 1)" in note for note in found.notes)
+    alone = FeatureTable(names=("x", "y", "z"), units=("",) * 3, values=values)
+    assert without_copies(Labelled(source="t", table=alone, labels=labels)).notes == ()

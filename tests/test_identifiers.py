@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from graspsense.core.values.errors import ConfigError
 from graspsense.sources.features_csv import read_labelled
-from graspsense.sources.identifiers import identifies
+from graspsense.sources.identifiers import identifies, keeps_rising, text_identifies
 
 LABELS = ("can",) * 30 + ("jar",) * 30
 N = len(LABELS)
@@ -128,3 +128,80 @@ def test_an_identifier_is_said_and_used_only_where_it_is_named(tmp_path):
 def test_a_table_of_identifiers_alone_says_why_nothing_is_left(tmp_path):
     with pytest.raises(ConfigError, match=r"trial_id.*to include them"):
         read_labelled(table(tmp_path / "t.csv", "trial_id", range(N), measured=False), "object")
+
+
+def shuffled(values, labels=LABELS, seed=3):
+    order = np.random.default_rng(seed).permutation(len(labels))
+    return np.array(values)[order], [labels[i] for i in order]
+
+
+REPEATED = {
+    "two lines each, falling": [(N - i) // 2 for i in range(N)],
+    "three lines each": [(i + 1) // 3 for i in range(N)],
+    "days in seconds since 1970": [1_793_404_800 + 86_400 * (i // 10) for i in range(N)],
+    "hashed days": [int(x) for x in np.repeat(np.random.default_rng(0).integers(1 << 32, size=6), 10)],
+}
+
+
+@pytest.mark.parametrize("counter", REPEATED)
+def test_numbers_that_several_lines_share_are_no_feature_in_any_order(counter):
+    assert identifies("x", "", REPEATED[counter], LABELS)
+    assert identifies("x", "", *shuffled(REPEATED[counter]))
+
+
+@pytest.mark.parametrize(
+    "counter",
+    [
+        [0.1 * i for i in range(N)],
+        [1000 + 7 * i for i in range(N)],
+        [46_000.0 + i * 37 / 1440 + 1e-4 * (i % 3) for i in range(N)],
+    ],
+    ids=["a tenth", "every seventh", "days of a table"],
+)
+def test_steps_that_are_equal_are_a_counter_where_the_lines_are_shuffled(counter):
+    assert identifies("x", "", *shuffled(counter))
+
+
+def test_a_time_with_any_steps_is_no_feature():
+    rises = np.cumsum(np.random.default_rng(0).exponential(1.0, N))
+    assert identifies("t", "s", rises, LABELS)
+    assert keeps_rising(rises)
+
+
+@given(seed=st.integers(0, 10_000), digits=st.integers(1, 4), scale=st.sampled_from([1e-3, 1.0, 50.0]))
+def test_what_was_measured_with_few_digits_is_a_feature_in_any_order(seed, digits, scale):
+    rng = np.random.default_rng(seed)
+    for values in (rng.normal([0.0] * 30 + [3.0] * 30, 1.0), rng.exponential(1.0, N)):
+        assert not identifies("x", "", scale * np.round(values, digits), LABELS)
+
+
+SESSIONS = {
+    "letters": ["ABCDEF"[i // 10] for i in range(N)],
+    "weekdays": [("Monday", "Tuesday", "Friday")[i // 20] for i in range(N)],
+    "names": [("cola", "tonic", "water", "beans", "honey", "jam")[i // 10] for i in range(N)],
+    "numbered, with a group in both labels": [f"group{(i + 1) // 10}" for i in range(N)],
+}
+
+
+@pytest.mark.parametrize("texts", SESSIONS)
+def test_texts_that_name_a_session_or_an_object_are_no_feature(texts):
+    assert text_identifies(SESSIONS[texts], LABELS)
+
+
+def test_texts_that_describe_an_object_are_a_feature():
+    rng = np.random.default_rng(2)
+    colours = rng.choice(["red", "green", "blue", "grey", "white", "black"], N)
+    assert not text_identifies(colours.tolist(), LABELS)
+    odours = rng.choice(["a", "l", "n"], 30).tolist() + rng.choice(["f", "c", "m", "p"], 30).tolist()
+    assert not text_identifies(odours, LABELS)
+
+
+def test_hashes_are_texts_although_some_have_digits_alone(tmp_path):
+    hashes = [f"{(i + 1) * 2654435761 % 2**32:08x}" for i in range(N - 2)] + ["12345678", "1234e567"]
+    found = read_labelled(table(tmp_path / "t.csv", "hash", hashes), "object")
+    assert found.table.names == ("s",)
+
+
+def test_a_column_that_says_the_label_in_other_words_is_told(tmp_path):
+    found = read_labelled(table(tmp_path / "t.csv", "class", [1] * 30 + [2] * 30), "object")
+    assert any("class" in note and "label" in note for note in found.notes)

@@ -117,8 +117,9 @@ class CsvColumns:
         return values
 
     def has_numbers(self, name: str) -> bool:
-        """Return whether any cell of a column is a number."""
-        return any(is_number(cell) for cell in self.cells[name])
+        """Return whether half of the cells of a column are numbers: a few may be so by chance, as those of hashes."""
+        given = [cell for cell in self.cells[name] if not is_missing(cell)]
+        return 2 * sum(map(is_number, given)) >= len(given) > 0
 
     def is_blank(self, name: str) -> bool:
         """Return whether every cell of a column is missing."""

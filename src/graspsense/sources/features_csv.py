@@ -28,7 +28,7 @@ from graspsense.recording.controls import Controls, controls
 from graspsense.sources.arff_columns import ArffColumns
 from graspsense.sources.csv_columns import CsvColumns
 from graspsense.sources.exported_table import ExportedTable, exported
-from graspsense.sources.identifiers import identifies, text_identifies
+from graspsense.sources.identifiers import identifies, keeps_rising, says_the_label, text_identifies
 
 SMALL: Final = 1e-3
 """A column that varies by less than this has few values that differ by J48's 1e-5."""
@@ -74,6 +74,8 @@ def read_labelled(
     ranks, no_order = _order(columns, order, export, notes)
     identified = partial(_identified, columns, labels, ranks) if export is None else _measured
     table = _feature_table(columns, features, reserved, identified, notes)
+    if export is None and target is None:
+        notes += _doubts(columns, labels, [name for name in columns.names if name not in reserved], table)
     _note_similar_labels(labels, notes)
     return Labelled(
         source=str(path),
@@ -203,6 +205,28 @@ def _identified(columns: CsvColumns, labels: Sequence[str], order: Sequence[int]
     if columns.is_nominal(name):
         return text_identifies(columns.texts(name), labels)
     return identifies(name, columns.units[name], columns.numbers(name), labels, order)
+
+
+def _doubts(
+    columns: CsvColumns, labels: Sequence[str], names: Sequence[str], table: FeatureTable
+) -> list[str]:
+    """Return notes on features that may reveal the labels, although no value shows it for certain."""
+    used = [name for name in names if set(columns.columns_of(name)) <= set(table.names)]
+    number = [name for name in used if not columns.is_nominal(name)]
+    rising = [name for name in number if keeps_rising(columns.numbers(name))]
+    same = [name for name in used if says_the_label(columns.cells[name], labels)]
+    notes = []
+    if rising:
+        notes.append(
+            f"used, although every line has more than the one before, or every line less: {listed(rising)}. If it is a "
+            f"time or a counter it reveals the labels: leave it out ({option('features', python='columns')})"
+        )
+    if same:
+        notes.append(
+            f"used, although each label has one value of its own: {listed(same)}. If it is the label in other words, "
+            f"leave it out ({option('features', python='columns')})"
+        )
+    return notes
 
 
 def _measured(name: str) -> str:

@@ -3,7 +3,7 @@
 Trials are often recorded one label after the other, so that such a column reveals the labels, in whatever order the
 lines are. A measured column may be distinct in every line as well, and may increase with the labels of a sorted file;
 what distinguishes an identifier is that it follows the lines within each label, that it is a calendar date or a clock,
-or that it consists of integers that repeat less than measured ones can.
+or that its values lie on a grid and repeat less, or more evenly, than measured ones can.
 """
 
 from __future__ import annotations
@@ -11,11 +11,14 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from datetime import datetime
+from itertools import groupby
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
+
+from graspsense.core.learn.copies import cells_in_range
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -63,6 +66,14 @@ _ORDERS: Final = 10_000
 """Number of orders of the lines within the labels from which on a rank correlation is no chance."""
 _IRREGULAR: Final = 0.7
 """Quartile range of the steps of a clock over their median; of sorted measurements it is 1.6 or more on average."""
+_SPACED: Final = 30
+"""Number of lines from which on steps that are alike show a clock, in whatever order the lines are."""
+_ALIKE: Final = 0.35
+"""The same ratio of a clock whose lines are in any order: of 30 measurements it is less once in a million."""
+_ENDS: Final = 2
+"""Objects that may have fewer lines than the others: the one that came before all others, and the last one."""
+_HASHED: Final = 1e7
+"""Integers from this one on are hashes, if they number objects and are no multiples of 1000."""
 _EPOCHS: Final = tuple((6.3e8 * unit, 4.2e9 * unit) for unit in (1.0, 1e3, 1e6, 1e9))
 """The years 1990 to 2100 in seconds, and smaller units, since 1970."""
 _MOST_VALUES: Final = 1.0 / 3.0
@@ -70,6 +81,7 @@ _MOST_VALUES: Final = 1.0 / 3.0
 _DATE_TEXT: Final = re.compile(
     r"(\d{1,4}([-./])\d{1,2}\2\d{1,4})?[T ]?(\d{1,2}(:\d{2}){1,2}(\.\d+)?)?( ?Z| ?[+-]\d\d:?\d\d)?"
 )
+_WEEKDAYS: Final = frozenset(["monday", "tuesday", "wednesday", "thursday", "friday", "saturday", "sunday"])
 _DATES: Final = ("%Y%m%d", "%Y%m%d%H%M", "%Y%m%d%H%M%S")
 
 
@@ -91,21 +103,38 @@ def identifies(
     if _is_calendar(column):
         return "are dates or times"
     whole = bool((column == np.floor(column)).all())
-    distinct = len(np.unique(column))
+    values_of = np.unique(column)
+    cells = cells_in_range(values_of) + 1.0
     if len(set(zip(column.tolist(), known, strict=True))) >= (1.0 - _TIES) * len(column):
         named = bool(_NAMES & set(_words(name)))
         for lines in (given, None if order is None else np.array(order)[given]):
-            if (
-                lines is not None
-                and _follows(column, lines, known)
-                and (whole or named or _is_regular(column))
+            if lines is not None and (
+                (_follows(column, lines, known) and (whole or named or _is_regular(values_of)))
+                or (unit in _TIMES and _follows_in_labels(column, lines, known))
             ):
                 return "follow the order of the lines as a counter or a time does"
-        if whole and (_hardly_repeats(column, distinct) or (named and distinct == len(column))):
+        if _hardly_repeats(len(column), len(values_of), cells) or (
+            named and whole and len(values_of) == len(column)
+        ):
             return "number the trials"
-    if whole and _numbers_objects(column, known):
+        if len(values_of) == len(column) >= _SPACED and _is_regular(values_of, _ALIKE):
+            return "have equal steps, as those of a clock or a counter"
+    hashed = whole and column.max() >= _HASHED and bool((column % 1000.0).any())
+    if (hashed or cells <= 2.0 * len(values_of)) and _name_objects(column.tolist(), known):
         return "number the objects (name them by --instance)"
     return ""
+
+
+def keeps_rising(values: Sequence[float]) -> bool:
+    """Return whether each value is larger than the one before, or each is smaller, in lines that are not few."""
+    steps = np.diff(np.array(values, dtype=np.float64))
+    return len(steps) >= 2 * _LEAST and bool((steps > 0.0).all() or (steps < 0.0).all())
+
+
+def says_the_label(values: Sequence[Hashable], labels: Sequence[str]) -> bool:
+    """Return whether each value belongs to one label and each label to one value, as the label in other words does."""
+    pairs = set(zip(values, labels, strict=True))
+    return 1 < len(pairs) == len(set(values)) == len(set(labels)) < len(labels)
 
 
 def text_identifies(texts: Sequence[str], labels: Sequence[str]) -> str:
@@ -117,13 +146,15 @@ def text_identifies(texts: Sequence[str], labels: Sequence[str]) -> str:
     counts = Counter(text for text, _ in given)
     if len(counts) < 2:
         return ""
-    if all(map(_is_date, counts)):
+    if all(map(_is_date, counts)) or (len(counts) > 2 and {text.lower() for text in counts} <= _WEEKDAYS):
         return "are dates or times"
     if len(counts) > max(2, len(given) * _MOST_VALUES):
         return "are texts that hardly repeat, as names of trials, files and remarks do"
     numbered = all(re.search(r"\d", text) for text in counts)
-    objects = max(_LEAST, 2 * len(set(labels)) + 1)
-    if numbered and len(counts) >= objects and len(set(given)) == len(counts):
+    values, known = [text for text, _ in given], [label for _, label in given]
+    if (numbered and _enough_objects(len(counts), known) and len(set(given)) == len(counts)) or _name_objects(
+        values, known
+    ):
         return "name the objects (say so by --instance)"
     return ""
 
@@ -164,8 +195,11 @@ def _is_written_date(text: str) -> bool:
 def _follows(column: NDArray[np.float64], lines: NDArray[np.int64], labels: Sequence[str]) -> bool:
     """Return whether the values rise, or fall, with these positions within each label, or over all of them."""
     steps = np.diff(column[np.argsort(lines)])
-    if (steps > 0.0).all() or (steps < 0.0).all():
-        return True
+    return bool((steps > 0.0).all() or (steps < 0.0).all()) or _follows_in_labels(column, lines, labels)
+
+
+def _follows_in_labels(column: NDArray[np.float64], lines: NDArray[np.int64], labels: Sequence[str]) -> bool:
+    """Return whether the values rise, or fall, with these positions within each label, which is no chance."""
     codes = np.unique(np.array(labels), return_inverse=True)[1]
     sizes = Counter(np.bincount(codes).tolist())
     if sum(times * math.lgamma(size + 1) for size, times in sizes.items()) < math.log(_ORDERS):
@@ -187,32 +221,39 @@ def _ranks(values: NDArray[np.float64], codes: NDArray[np.int64]) -> NDArray[np.
     return ranks - (counts[codes] - 1) / 2.0
 
 
-def _is_regular(column: NDArray[np.float64]) -> bool:
-    """Return whether the steps between these values are alike, as those of a clock are."""
-    low, middle, high = np.quantile(np.diff(np.unique(column)), (0.25, 0.5, 0.75))
-    return bool(high - low < _IRREGULAR * middle)
+def _is_regular(values: NDArray[np.float64], most: float = _IRREGULAR) -> bool:
+    """Return whether the steps between these rising values are alike, as those of a clock are."""
+    low, middle, high = np.quantile(np.diff(values), (0.25, 0.5, 0.75))
+    return bool(high - low < most * middle)
 
 
-def _hardly_repeats(column: NDArray[np.float64], distinct: int) -> bool:
-    """Return whether integers repeat so rarely that they cannot be measured, if all in their range are as frequent."""
-    n, cells = len(column), float(column.max() - column.min()) + 1.0
+def _hardly_repeats(n: int, distinct: int, cells: float) -> bool:
+    """Return whether values on a grid repeat too rarely to be measured, if all its cells are as frequent."""
     ties = n - distinct
     if ties == 0:
         return bool(np.log1p(-np.arange(n) / max(cells, n)).sum() < math.log(_BY_CHANCE))
-    expected = n - cells * (1.0 - (1.0 - 1.0 / cells) ** n)
+    expected = n - cells * -math.expm1(n * math.log1p(-1.0 / cells))
     # The number of ties is about a Poisson variable.
     terms = [math.exp(k * math.log(expected) - expected - math.lgamma(k + 1)) for k in range(ties + 1)]
     return sum(terms) < _BY_CHANCE
 
 
-def _numbers_objects(column: NDArray[np.float64], labels: Sequence[str]) -> bool:
-    """Return whether integers number objects: each belongs to one label, and all have as many lines, or one block."""
-    pairs = set(zip(column.tolist(), labels, strict=True))
-    counts = Counter(column.tolist())
+def _name_objects(values: Sequence[Hashable], labels: Sequence[str]) -> bool:
+    """Return whether values name objects: each belongs to one label, and all have as many lines, or one block.
+
+    Where two labels meet, an object may have lines of both. The objects at the ends may have fewer lines.
+    """
+    counts = Counter(values)
     objects = len(counts)
-    if len(pairs) > objects or objects < max(_LEAST, 2 * len(set(labels)) + 1):
+    among = len(set(labels))
+    if not _enough_objects(objects, labels) or len(set(zip(values, labels, strict=True))) >= objects + among:
         return False
-    if column.max() - column.min() + 1.0 > 2.0 * objects or min(counts.values()) < 2:
-        return False
-    blocks = 1 + int((np.diff(column) != 0.0).sum())
-    return blocks == objects or len(set(counts.values())) == 1
+    most = max(counts.values())
+    fewer = sum(count < most for count in counts.values())
+    in_blocks = sum(1 for _ in groupby(values)) == objects
+    return most > 1 and (fewer <= _ENDS or (in_blocks and min(counts.values()) > 1))
+
+
+def _enough_objects(objects: int, labels: Sequence[str]) -> bool:
+    """Return whether there are more objects than a feature has values that tell the labels apart."""
+    return objects >= max(_LEAST, 2 * len(set(labels)) + 1)

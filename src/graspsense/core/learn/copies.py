@@ -2,7 +2,8 @@
 
 A copy in training and test data at once makes every rate too high, and every interval too narrow. Trials are copies
 of each other if their recordings are equal, or if all of their features are. Features that are counted, or rounded
-coarsely, can be equal by chance; such trials are kept, and a note says so.
+coarsely, can be equal by chance; such trials are kept, and a note says so. A note also tells of trials that differ from
+another one in a single feature, as an edited copy does.
 """
 
 from __future__ import annotations
@@ -49,11 +50,19 @@ def without_copies(labelled: Labelled) -> Labelled:
             f"{by_chance} trials have exactly the features of another one. They count, because features that are "
             "counted or rounded can be equal by chance: make sure that no trial is in the data twice"
         )
-    if not len(left_out):
-        return evolve(labelled, notes=tuple(notes)) if by_chance else labelled
-    notes.append(_left_out(labelled, left_out, original))
     kept = np.flatnonzero(original == np.arange(len(labelled)))
-    return evolve(labelled.rows(kept), notes=tuple(notes))
+    if len(left_out):
+        notes.append(_left_out(labelled, left_out, original))
+    edited = [] if by_chance else _edited_copies(with_codes(labelled.table)[1][kept])
+    if edited:
+        before, copy = (int(kept[k]) + 1 for k in edited[0])
+        notes.append(
+            f"trials that differ from another one in a single feature: {len(edited)} (trial {copy} from trial {before})"
+            ". They count: make sure that they are no copies with a value that was changed"
+        )
+    if len(notes) == len(labelled.notes):
+        return labelled
+    return evolve(labelled.rows(kept) if len(left_out) else labelled, notes=tuple(notes))
 
 
 def apart_from(tested: Labelled, training: Labelled) -> Labelled:
@@ -121,6 +130,26 @@ def _originals(table: FeatureTable, content: Sequence[str] | None) -> tuple[NDAr
     return _best_of(families, known.sum(axis=1).tolist()), len(repeated) - len(sure)
 
 
+def _edited_copies(values: NDArray[np.float64]) -> list[tuple[int, int]]:
+    """Return the trials that differ in a single feature from one before, each behind that one, if chance makes none."""
+    columns = [np.unique(column[~np.isnan(column)]) for column in values.T]
+    cells = np.array([1.0 if len(one) < _FEW else cells_in_range(one) for one in columns])
+    found: dict[int, int] = {}
+    for left_out in range(values.shape[1]):
+        combinations = np.delete(cells, left_out)
+        if (combinations > 1.0).sum() < 2:
+            continue
+        seen: dict[bytes, int] = {}
+        pairs = {}
+        for i, row in enumerate(np.delete(values, left_out, axis=1)):
+            before = seen.setdefault(row.tobytes(), i)
+            if before != i:
+                pairs[i] = before
+        if len(pairs) > _SURE_OF_ALL * len(values) ** 2 / (2.0 * math.prod(combinations.tolist())):
+            found |= pairs
+    return [(before, i) for i, before in sorted(found.items())]
+
+
 def _known_to_differ(content: Sequence[str] | None, i: int, k: int) -> bool:
     """Return whether two recordings were compared and are different, so that equal features are chance."""
     return content is not None and content[i] != "" and content[k] != "" and content[i] != content[k]
@@ -155,12 +184,12 @@ def _is_measured(column: NDArray[np.float64], repeated: int) -> bool:
         )
         cells = 10.0**digits / 1e6
     else:
-        cells = _cells(distinct)
+        cells = cells_in_range(distinct)
     ties = len(given) - len(distinct)
     return ties * _SURE < repeated and _SURE * len(given) ** 2 / (2.0 * cells) < repeated
 
 
-def _cells(distinct: NDArray[np.float64]) -> float:
+def cells_in_range(distinct: NDArray[np.float64]) -> float:
     """Return how many values fit into the range of these at the resolution that they show."""
     span = float(distinct[-1] - distinct[0])
     step = span
@@ -181,7 +210,9 @@ def _can_be_chance(distinct: NDArray[np.float64], repeated: int) -> bool:
     if distinct.shape[1] == 1:
         return True
     different = [np.unique(column[~np.isnan(column)]) for column in distinct.T]
-    combinations = math.prod(len(one) if len(one) < _FEW else _cells(one) for one in different if len(one))
+    combinations = math.prod(
+        len(one) if len(one) < _FEW else cells_in_range(one) for one in different if len(one)
+    )
     trials = len(distinct) + repeated
     if _SURE_OF_ALL * trials**2 / (2.0 * combinations) >= repeated:
         return True
