@@ -40,6 +40,7 @@ class FreeEffort:
         return Fault(
             "moves too easily",
             f"the fingers move with {mean_n:.1f} N, and their friction is {self._friction_n:.1f} N: the motor may "
-            "press with more than it reports; check its scale, or measure the friction again (graspsense calibrate friction)",
+            "press with more than it reports; check its scale, or measure the friction again (graspsense calibrate "
+            "friction)",
             ends=mean_n < ENDS * self._friction_n,
         )
