@@ -1,77 +1,57 @@
-"""Generated from the table of graspsense.gripper_api by `core/components/lazy_names.py`: change the table."""
+"""Generated from the table of graspsense.experiment_api by `core/components/lazy_names.py`: change the table."""
 
-# Finding devices and their faults
-from graspsense.core.components.entries import FoundDevice as FoundDevice
-from graspsense.core.components.entries import Finding as Finding
-from graspsense.core.values.faults import StatusBit as StatusBit
-from graspsense.core.values.errors import TareRefused as TareRefused
-from graspsense.core.values.errors import GraspsenseError as GraspsenseError
+# Declaring kinds of experiments
+from graspsense.core.components.entries import ExperimentKindEntry as ExperimentKindEntry
+from graspsense.core.components.entries import ExperimentEntry as ExperimentEntry
+from graspsense.experiments.experiment import ExperimentCase as ExperimentCase
+from graspsense.core.components.figure_origins import ORIGINS as ORIGINS
+from graspsense.core.components.setting import fitted_defaults as fitted_defaults
+from graspsense.core.components.config import settings_from as settings_from
+from graspsense.core.components.strict import structured as structured
 
-# Emulated devices
-from graspsense.core.components.emulated import EmulatedDevice as EmulatedDevice
-from graspsense.core.components.entries import EmulatorEntry as EmulatorEntry
+# Trials and recognition
+from graspsense.core.learn.labelled import ControlFeatures as ControlFeatures
+from graspsense.core.learn.labelled import Labelled as Labelled
+from graspsense.sources.trial_source import TrialSource as TrialSource
+from graspsense.sources.trial_source import SIMULATED as SIMULATED
+from graspsense.sources.trial_source import groups_of as groups_of
+from graspsense.sources.simulated import plan_trials as plan_trials
+from graspsense.sources.simulated import simulated_objects as simulated_objects
+from graspsense.experiments.recognise import EvaluationSettings as EvaluationSettings
+from graspsense.experiments.recognise import recognise as recognise
+from graspsense.experiments.task_results import MOST_KEPT_GRASPS as MOST_KEPT_GRASPS
+from graspsense.experiments.task_results import RecognitionResult as RecognitionResult
 
-# Reading threads and clocks of devices
-from graspsense.core.grasp.reading_thread import ReadingThread as ReadingThread
-from graspsense.core.grasp.device_clock import DeviceClock as DeviceClock
+# Results and their statistics
+from graspsense.experiments.summary import ConditionResult as ConditionResult
+from graspsense.experiments.summary import Summary as Summary
+from graspsense.evaluation.confusion import Confusion as Confusion
+from graspsense.evaluation.over_seeds import MeanDifference as MeanDifference
+from graspsense.evaluation.over_seeds import OverSeeds as OverSeeds
+from graspsense.evaluation.over_seeds import mean_difference as mean_difference
+from graspsense.evaluation.intervals import wilson as wilson
 
-# Fingers, and where the gripper is mounted
-from graspsense.core.values.fingers import FingerForce as FingerForce
-from graspsense.core.values.fingers import opposed_forces as opposed_forces
-from graspsense.core.values.mounting import Mounting as Mounting
+# Findings: tables and words
+from graspsense.experiments.findings import CONTROLS as CONTROLS
+from graspsense.experiments.findings import Findings as Findings
+from graspsense.experiments.findings import FoundTable as FoundTable
+from graspsense.experiments.findings import code as code
+from graspsense.experiments.findings import control_cells as control_cells
+from graspsense.experiments.findings import percent as percent
+from graspsense.experiments.findings import span as span
 
-# Signals of grippers that lack some
-from graspsense.core.values.signals import NO_GAP as NO_GAP
-from graspsense.core.values.signals import no_pads as no_pads
-from graspsense.core.components.channels import no_signals as no_signals
-
-# Calibration: from cell counts to newtons
-from graspsense.core.grasp.calibration import LoadTable as LoadTable
-from graspsense.core.grasp.calibration import cells_force as cells_force
-from graspsense.core.grasp.calibration import edge_force as edge_force
-from graspsense.core.grasp.calibration import load_of as load_of
-from graspsense.core.grasp.calibration import masked as masked
-from graspsense.core.grasp.calibration import pad_force as pad_force
-from graspsense.core.grasp.calibration import tare as tare
-from graspsense.core.grasp.calibration import zero_of as zero_of
-from graspsense.core.grasp.calibration_files import calibrations_of as calibrations_of
-from graspsense.core.grasp.calibration_files import stored_friction as stored_friction
-from graspsense.core.grasp.calibration_files import stored_gain as stored_gain
-from graspsense.core.grasp.calibration_files import stored_tables as stored_tables
-from graspsense.core.grasp.calibration_files import stored_zero as stored_zero
-
-# Transmission: from motor revolutions to the gap
-from graspsense.core.grasp.transmission import ScrewLinkage as ScrewLinkage
-from graspsense.core.grasp.transmission import gap_and_rate as gap_and_rate
-from graspsense.core.grasp.transmission import revolutions_at as revolutions_at
-from graspsense.core.grasp.transmission import screw_linkage as screw_linkage
-
-# Rest where the gap is coarse
-from graspsense.core.grasp.gap_resolution import GapResolution as GapResolution
-from graspsense.core.grasp.gap_resolution import gap_resolution as gap_resolution
-from graspsense.core.grasp.gap_resolution import gap_resolution_by_sample as gap_resolution_by_sample
-from graspsense.core.grasp.gap_resolution import window_of_rest as window_of_rest
-from graspsense.core.control.contact import first_rest as first_rest
-
-# Observers of a grasp while it goes on
-from graspsense.core.components.entries import LiveObserverEntry as LiveObserverEntry
-
-# Readers of tables with several squeezes, and writers of data sets
-from graspsense.store.stored_grasps import StoredGrasp as StoredGrasp
-from graspsense.recording.atomic_file import SaveFailed as SaveFailed
-from graspsense.sources.manifest.parquet_format import read_parquet as read_parquet
-from graspsense.sources.manifest.steps import squeezes as squeezes
-from graspsense.sources.manifest.table import ColumnTable as ColumnTable
-from graspsense.core.values.errors import TooLarge as TooLarge
-
-# Recordings as they are replayed
-from graspsense.recording.replayable import Recording as Recording
-from graspsense.core.values.errors import RecordingEnded as RecordingEnded
-
-# Commands, phases and outcomes as enumerations, and the outcomes that few laws report
-from graspsense.core.values.signals import Phase as Phase
-from graspsense.core.values.signals import Outcome as Outcome
-from graspsense.core.values.signals import TOO_WIDE as TOO_WIDE
-from graspsense.core.values.signals import SIDE_IMPACT as SIDE_IMPACT
-from graspsense.core.values.signals import CRUSHED as CRUSHED
-from graspsense.core.values.signals import SLIPPED as SLIPPED
+# Pictures and sections of a report
+from graspsense.report.grasp_curve import GraspCurve as GraspCurve
+from graspsense.report.grasp_curve import grasp_curve as grasp_curve
+from graspsense.report.html import Section as Section
+from graspsense.report.html import bullets as bullets
+from graspsense.report.html import figure as figure
+from graspsense.report.html import pair as pair
+from graspsense.report.html import panels as panels
+from graspsense.report.html import paragraph as paragraph
+from graspsense.report.matrix import confusion_table as confusion_table
+from graspsense.report.svg import INKS as INKS
+from graspsense.report.svg import Picture as Picture
+from graspsense.report.svg import reaching as reaching
+from graspsense.report.traces import one_grasp as one_grasp
+from graspsense.report.tree import tree_list as tree_list
