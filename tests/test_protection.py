@@ -11,6 +11,9 @@ from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.protection.cells import Fingertips
 from graspsense.core.grasp.protection.drift import PadDrift
 from graspsense.core.grasp.protection.effort_ceiling import effort_ceiling_n, limited
+from graspsense.core.grasp.protection.felt_force import FeltForce
+from graspsense.core.grasp.protection.free_effort import FreeEffort
+from graspsense.core.grasp.protection.gap_speed import GapSpeed
 from graspsense.core.grasp.protection.motor import Motor
 from graspsense.core.grasp.protection.reports import Reports
 from graspsense.core.grasp.protection.status import StatusWatch
@@ -539,3 +542,92 @@ def test_a_force_that_is_none_does_not_lift_the_ceiling(asked):
             return asked
 
     assert effort_ceiling_n(gripper(friction_n=nan), Careless(HybridConfig()), RunConfig()) == 25.0
+
+
+# ------------------------------------------------------------ a motor that reports what it was told, and gaps
+
+
+def felt(left, right, commands=(20.0,), seconds=0.5):
+    """Return the last fault of pads that feel these forces after these commands."""
+    felt_force = FeltForce(1000.0, 24.39)
+    for value in commands:
+        felt_force.apply(Command(EFFORT, value, inf, inf))
+    faults = [felt_force.see(frame(0.001 * k, left=left, right=right)) for k in range(round(seconds * 1000))]
+    return faults[-1]
+
+
+def test_pads_that_both_feel_more_than_the_motor_was_told():
+    # A quarter and 1.5 N more are told, a half and 3 N more end the grasp.
+    assert felt(26.0, 60.0) is None
+    assert not felt(28.0, 28.0).ends
+    assert felt(34.0, 60.0).ends
+
+
+def test_fingers_that_hold_by_themselves_press_on_with_the_largest_command():
+    assert felt(25.0, 25.0, commands=(30.0, 0.0)) is None
+
+
+def test_one_image_that_is_wrong_is_no_force():
+    assert felt(100.0, 100.0, seconds=0.041) is None
+
+
+def eased(effort, friction=7.0, speed=0.01, kind=EFFORT):
+    free_effort = FreeEffort(friction)
+    faults = [
+        free_effort.see(frame(0.001 * k, velocity=-speed), Command(kind, effort, inf, inf))
+        for k in range(1500)
+    ]
+    return next((fault for fault in reversed(faults) if fault is not None), None)
+
+
+@pytest.mark.parametrize(("effort", "ends"), [(4.0, False), (2.4, True)])
+def test_fingers_that_move_with_less_than_their_friction(effort, ends):
+    assert eased(effort).ends is ends
+
+
+@pytest.mark.parametrize(
+    "sound",
+    [
+        {"effort": 5.0},
+        {"effort": 1.0, "friction": 0.0},
+        {"effort": 0.0, "speed": 0.0},
+        {"effort": 1.0, "kind": FORCE},
+    ],
+)
+def test_a_sound_motor_does_not_move_too_easily(sound):
+    assert eased(**sound) is None
+
+
+def travelled(velocity, gap, seconds=1.0, dt=0.001):
+    """Return the first fault of this velocity (m/s) and this gap (m), each a function of time."""
+    gap_speed = GapSpeed(1.0 / dt)
+    for k in range(round(seconds / dt)):
+        fault = gap_speed.see(frame(dt * k, gap=gap(dt * k), velocity=velocity(dt * k), dt=dt))
+        if fault is not None:
+            return fault
+    return None
+
+
+@pytest.mark.parametrize("said", [0.0, 0.01, -1.0])
+def test_a_velocity_that_is_not_that_of_the_gap_ends_the_grasp(said):
+    assert travelled(lambda t: said, lambda t: 0.09 - 0.01 * t).ends
+
+
+def test_a_gap_that_stands_still_while_the_fingers_move_ends_the_grasp():
+    assert travelled(lambda t: -0.01, lambda t: 0.09 - 0.01 * min(t, 0.4)).ends
+
+
+@pytest.mark.parametrize("speed", [0.002, 0.01, 0.1])
+@pytest.mark.parametrize(
+    ("dt", "step", "late_s"), [(0.001, 0.0, 0.02), (0.01, 0.0004, 0.05), (0.04, 0.0004, 0.08)]
+)
+def test_a_late_velocity_and_a_gap_in_steps_agree(speed, dt, step, late_s):
+    def gap(t):
+        exact = 0.2 - speed * t
+        return step * round(exact / step) if step else exact
+
+    assert travelled(lambda t: -speed * (t >= late_s), gap, dt=dt) is None
+
+
+def test_a_gripper_without_velocity_agrees():
+    assert travelled(lambda t: nan, lambda t: 0.09 - 0.01 * t) is None

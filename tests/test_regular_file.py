@@ -7,6 +7,9 @@ import pytest
 
 from graspsense.cli.main import main
 from graspsense.core.files.regular_file import NotAFile, first_bytes
+from graspsense.core.grasp.calibration_files import read_calibration
+from graspsense.core.values.errors import ConfigError
+from graspsense.sources.icub import read_grasp
 
 ZERO = Path("/dev/zero")
 
@@ -45,11 +48,23 @@ def test_no_more_is_read_than_asked(tmp_path):
         ("run", "--object", "{}"),
         ("run", "--pipeline", "{}"),
         ("predict", "{}", "{}"),
+        ("import", "csv:{}", "--check", "--label", "can"),
+        ("import", "csv:{}?time=t&gap=g&force=f", "--check", "--label", "can"),
+        ("run", "-o", "gripper.type=replay", "-o", "gripper.recording=csv:{}"),
     ],
 )
 def test_a_pipe_for_settings_a_scene_or_a_model_is_refused(pipe, command, capsys):
     assert exit_code(*[word.format(pipe) for word in command]) == 2
     assert "Traceback" not in capsys.readouterr().err
+
+
+def test_a_pipe_for_a_recorded_grasp_or_a_calibration_is_refused(tmp_path):
+    os.mkfifo(tmp_path / "can_1.txt")
+    with pytest.raises(ConfigError, match="pipe"):
+        read_grasp(tmp_path / "can_1.txt")
+    os.mkfifo(tmp_path / "tare.json")
+    with pytest.raises(ConfigError, match="pipe"):
+        read_calibration(tmp_path / "tare.json")
 
 
 @pytest.mark.skipif(not ZERO.exists(), reason="needs /dev/zero")

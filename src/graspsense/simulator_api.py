@@ -83,9 +83,10 @@ _TABLE: Final[Table] = {
             "is_on_disk",
         ),
     },
-    "Where to keep files": {
+    "Where to keep files, and reading those that a user names": {
         "core.files.user_folders": ("cache_folder",),
         "core.files.whole_file": ("write_whole",),
+        "core.files.regular_file": ("first_bytes",),
         "core.files.closed_paths": ("is_closed", "make_closed"),
     },
 }

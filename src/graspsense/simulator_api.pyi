@@ -83,8 +83,9 @@ from graspsense.core.compiling.compiling import entry_point as entry_point
 from graspsense.core.compiling.compiling import first_call as first_call
 from graspsense.core.compiling.compiling import is_on_disk as is_on_disk
 
-# Where to keep files
+# Where to keep files, and reading those that a user names
 from graspsense.core.files.user_folders import cache_folder as cache_folder
 from graspsense.core.files.whole_file import write_whole as write_whole
+from graspsense.core.files.regular_file import first_bytes as first_bytes
 from graspsense.core.files.closed_paths import is_closed as is_closed
 from graspsense.core.files.closed_paths import make_closed as make_closed

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
@@ -204,6 +205,28 @@ def test_a_model_includes_nothing_outside_of_its_folder(tmp_path):
     (inside / "m.xml").write_text('<mujoco><include file="../secret.xml"/></mujoco>')
     with pytest.raises(ConfigError, match="outside of its folder"):
         create("sensor-backend", "mujoco", file=str(gripper_file(inside, inside / "m.xml"))).open(0)
+
+
+@pytest.mark.parametrize("place", ["gripper file", "model", "include", "mesh", "picture", "scene", "thing"])
+def test_a_pipe_in_the_place_of_a_file_is_refused(tmp_path, place):
+    """Whoever opens a pipe without a writer waits for ever; MuJoCo opens meshes and pictures itself."""
+    endings = {"gripper file": ".toml", "scene": ".toml", "mesh": ".obj", "picture": ".png"}
+    pipe = tmp_path / f"pipe{endings.get(place, '.xml')}"
+    os.mkfifo(pipe)
+    added = {
+        "include": f'<include file="{pipe.name}"/>',
+        "mesh": f'<asset><mesh name="m" file="{pipe.name}"/></asset>',
+        "picture": f'<asset><texture name="t" type="2d" file="{pipe.name}"/></asset>',
+    }.get(place, "")
+    (tmp_path / "m.xml").write_text(PARALLEL.read_text().replace("<worldbody>", added + "<worldbody>", 1))
+    file = gripper_file(tmp_path, pipe if place == "model" else tmp_path / "m.xml")
+    with pytest.raises((ConfigError, UnknownName), match="pipe"):
+        create(
+            "sensor-backend",
+            "mujoco",
+            file=str(pipe if place == "gripper file" else file),
+            object=str(pipe) if place in ("scene", "thing") else "can",
+        ).open(0)
 
 
 def test_what_mujoco_refuses_is_told_with_its_message(tmp_path):

@@ -107,3 +107,10 @@ def test_a_picture_and_a_notebook_show_the_reason_and_the_warnings() -> None:
         line.startswith("Object: ") and line.endswith(f"seed {trial.run.seed}") for line in _words(trial)
     )
     assert "left fingertip stuck" in trial._repr_html_()
+
+
+def test_a_motor_that_reports_what_it_was_told_presses_nothing_with_more():
+    faults = FaultConfig(motor_gain=3.0, motor_at_s=0.9, effort_report_gain=1.0 / 3.0, effort_report_at_s=0.9)
+    grasp = gripper_faults.grasped(gripper_faults.controller_named("hybrid"), faults)
+    assert grasp.reason.startswith("moves too easily")
+    assert grasp.report["largest_force_n"] == 0.0

@@ -13,6 +13,7 @@ import numpy as np
 
 from graspsense.core.components.channels import from_json, further
 from graspsense.core.files.csv_text import text_of_cell
+from graspsense.core.files.regular_file import first_bytes
 from graspsense.core.values.channel import FLOATS, Channel, FastChannel, TactileArray
 from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.core.values.limits import CELLS, CHANNEL_NUMBERS
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
     Columns = dict[str, NDArray[Any]]
 
 TABLE_SUFFIXES: Final = (".csv", ".parquet")
+HEADER_BYTES: Final = 2**20
+"""Bytes in which the first line of a file is looked for."""
 
 
 def read_exported_tables(path: Path) -> tuple[Columns, str]:
@@ -134,8 +137,8 @@ def _names(path: Path) -> Sequence[str]:
 def header_of(path: Path) -> Sequence[str]:
     """Return the names in the first line of a CSV file; none if it cannot be read."""
     try:
-        with path.open(newline="", encoding="utf-8") as file:
-            return [text_of_cell(cell) for cell in next(csv.reader(file), ())]
+        text = first_bytes(path, HEADER_BYTES).decode("utf-8", errors="replace")
+        return [text_of_cell(cell) for cell in next(csv.reader(io.StringIO(text, newline="")), ())]
     except (OSError, ValueError, csv.Error):
         return ()
 

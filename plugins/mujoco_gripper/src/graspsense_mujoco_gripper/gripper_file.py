@@ -27,10 +27,18 @@ from typing import Any, Final
 from attrs import field, frozen
 
 from graspsense.plugin_api import ConfigError
-from graspsense.simulator_api import TomlError, ValidationFailed, structured, toml_values
+from graspsense.simulator_api import TomlError, ValidationFailed, first_bytes, structured, toml_values
 
 LARGEST_BYTES: Final = 512 * 1024
 """Limit on the size of a gripper file."""
+
+
+def text_of(path: Path, most: int, what: str) -> str:
+    """Return the text of a regular file. Raises OSError, UnicodeDecodeError; ConfigError if it has more bytes."""
+    content = first_bytes(path, most)
+    if len(content) > most:
+        raise ConfigError(f"{path} is no {what}: it has more than {most} bytes")
+    return content.decode("utf-8")
 
 
 @frozen(kw_only=True)
@@ -162,9 +170,7 @@ def read_gripper(name: str) -> tuple[GripperFile, Path]:
         else Path(name).expanduser()
     )
     try:
-        if path.stat().st_size > LARGEST_BYTES:
-            raise ConfigError(f"{path} is no gripper file: it has more than {LARGEST_BYTES} bytes")
-        values = toml_values(path.read_text(encoding="utf-8"))
+        values = toml_values(text_of(path, LARGEST_BYTES, "gripper file"))
     except (OSError, UnicodeDecodeError) as error:
         raise ConfigError(f"gripper.file: {path} cannot be read: {error}") from error
     except TomlError as error:

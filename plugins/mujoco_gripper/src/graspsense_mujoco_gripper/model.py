@@ -12,6 +12,7 @@ import mujoco
 import numpy as np
 
 from graspsense.plugin_api import ConfigError
+from graspsense.simulator_api import first_bytes
 from graspsense_mujoco_gripper.gripper_file import GripperFile
 
 OBJ: Final = mujoco.mjtObj
@@ -48,9 +49,11 @@ def read_spec(path: Path) -> mujoco.MjSpec:
     """Return the model in a file, not compiled. Raises ConfigError with MuJoCo's message."""
     _check_includes(path, path.parent.resolve(), set())
     try:
-        return mujoco.MjSpec.from_file(str(path))
+        spec = mujoco.MjSpec.from_file(str(path))
     except (ValueError, OSError) as error:
         raise ConfigError(f"MuJoCo {mujoco.mj_versionString()} refuses {path}: {error}") from error
+    _check_assets(spec, path)
+    return spec
 
 
 POINT: Final = "graspsense/"
@@ -153,17 +156,31 @@ def _count(model: mujoco.MjModel, kind: mujoco.mjtObj) -> int:
     return int(counts[kind])
 
 
+def _check_assets(spec: mujoco.MjSpec, path: Path) -> None:
+    """Raise ConfigError for a mesh or a picture that is a pipe or a device, for which MuJoCo would wait."""
+    meshes, pictures = path.parent / spec.meshdir, path.parent / spec.texturedir
+    named = [meshes / asset.file for asset in (*spec.meshes, *spec.hfields, *spec.skins) if asset.file]
+    for picture in spec.textures:
+        named += [pictures / name for name in (picture.file, *picture.cubefiles) if name]
+    for asset in named:
+        if asset.exists() and not asset.is_file():
+            raise ConfigError(
+                f"the model {path} names {asset}, which is a pipe, a device or a folder, not a file"
+            )
+
+
 def _check_includes(path: Path, folder: Path, seen: set[Path]) -> None:
     """Raise ConfigError for an include outside of the folder of the model, or a model that is too large."""
     if path in seen:
         return
     seen.add(path)
     try:
-        if path.stat().st_size > LARGEST_BYTES:
-            raise ConfigError(f"the model {path} has more than {LARGEST_BYTES} bytes")
-        text = path.read_text(encoding="utf-8", errors="replace")
+        content = first_bytes(path, LARGEST_BYTES)
     except OSError as error:
         raise ConfigError(f"the model {path} cannot be read: {error}") from error
+    if len(content) > LARGEST_BYTES:
+        raise ConfigError(f"the model {path} has more than {LARGEST_BYTES} bytes")
+    text = content.decode("utf-8", errors="replace")
     for name in (unescape("".join(quoted)) for quoted in _INCLUDE.findall(text)):
         included = (folder / name).resolve()
         if not included.is_relative_to(folder):

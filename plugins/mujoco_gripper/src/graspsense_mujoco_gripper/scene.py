@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from graspsense.plugin_api import ConfigError
 from graspsense.simulator_api import TomlError, ValidationFailed, structured, toml_values
 from graspsense_mujoco_gripper.catalogue import Thing, Walls, thing_named
+from graspsense_mujoco_gripper.gripper_file import text_of
 from graspsense_mujoco_gripper.model import compiled
 
 Floats = NDArray[np.float64]
@@ -127,9 +128,7 @@ def read_scene(name: str) -> SceneModel:
 
 def _scene_of(path: Path) -> Scene:
     try:
-        if path.stat().st_size > LARGEST_BYTES:
-            raise ConfigError(f"{path} is no scene file: it has more than {LARGEST_BYTES} bytes")
-        return structured(toml_values(path.read_text(encoding="utf-8")), Scene, "a scene file")
+        return structured(toml_values(text_of(path, LARGEST_BYTES, "scene file")), Scene, "a scene file")
     except (OSError, UnicodeDecodeError) as error:
         raise ConfigError(f"gripper.object: {path} cannot be read: {error}") from error
     except TomlError as error:

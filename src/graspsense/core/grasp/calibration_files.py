@@ -19,6 +19,7 @@ from typing import Any, Final
 from attrs import frozen
 
 from graspsense.core.files.closed_paths import make_closed, why_open
+from graspsense.core.files.regular_file import first_bytes
 from graspsense.core.files.user_folders import NOWHERE, data_folder
 from graspsense.core.files.whole_file import write_whole
 from graspsense.core.grasp.calibration import Cells, LoadTable
@@ -28,6 +29,8 @@ FORMAT: Final = "graspsense-calibration"
 VERSION: Final = 1
 KINDS: Final = ("tare", "gain", "load-cell", "friction")
 UNCALIBRATED: Final = "none"
+CALIBRATION_BYTES: Final = 2**20
+"""Of a longer file, only so many are read, which are then no JSON."""
 """The value of the setting for the use without calibration."""
 
 
@@ -94,13 +97,13 @@ def read_calibration(path: Path) -> Calibration:
     since it was written, or has invalid numbers; FileNotFoundError if it is missing.
     """
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = json.loads(first_bytes(path, CALIBRATION_BYTES))
     except FileNotFoundError:
         raise
     except OSError as error:
         raise ConfigError(
-            f"calibration {path} cannot be read: {error.strerror}. Its content may be whole: check the disk and the "
-            "permissions of the file"
+            f"calibration {path} cannot be read: {error.strerror or error}. Its content may be whole: check the disk "
+            "and the permissions of the file"
         ) from error
     except (ValueError, RecursionError) as error:
         raise DataDamaged(f"{path} cannot be read as a calibration: {error}") from error

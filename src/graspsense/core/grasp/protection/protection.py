@@ -17,6 +17,9 @@ from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.protection.cells import Fingertips
 from graspsense.core.grasp.protection.drift import Drift
 from graspsense.core.grasp.protection.effort_ceiling import asked_effort_n, effort_ceiling_n, limited
+from graspsense.core.grasp.protection.felt_force import FeltForce
+from graspsense.core.grasp.protection.free_effort import FreeEffort
+from graspsense.core.grasp.protection.gap_speed import GapSpeed
 from graspsense.core.grasp.protection.motor import Motor
 from graspsense.core.grasp.protection.pad_balance import PadBalance
 from graspsense.core.grasp.protection.reports import Reports
@@ -77,6 +80,8 @@ class Protection:
         pads_hz = min(rates.get("force_left", 0.0), rates.get("force_right", 0.0))
         self._touch, self._drift = Touch(contact_n, run.first_effort_n, pads_hz), Drift(contact_n)
         self._stuck, self._balance = StuckForce(pads_hz), PadBalance()
+        self._felt, self._gap_speed = FeltForce(info.rate_hz, pads_hz), GapSpeed(info.rate_hz)
+        self._free_effort = FreeEffort(info.friction_n)
         self._fingertips = Fingertips()
         self._motor = Motor("effort" in rates, info.rate_hz)
         self._status = StatusWatch(info.status_bits)
@@ -104,9 +109,16 @@ class Protection:
             self._see(self._rush.see(frame))
         if not self._declared and frame.force_left_n == frame.force_left_n:
             self._has_pads = True
+        closing = phase in (APPROACH, SQUEEZE, HOLD)
+        if closing:
+            self._see(self._gap_speed.see(frame))
         if self._has_pads:
             self._see_pads(reading, phase, command)
         allowed = self._limited(phase, command)
+        if closing:
+            self._felt.apply(allowed)
+        if phase == APPROACH and self._touch.free():
+            self._see(self._free_effort.see(frame, allowed))
         self.acted += allowed.value != command.value or self._gives(command) > asked_effort_n(allowed)
         self._motor.apply(frame, allowed)
         return allowed
@@ -131,6 +143,8 @@ class Protection:
         frame = reading.frame
         closing = phase in (APPROACH, SQUEEZE, HOLD)
         self._see(self._touch.see(frame, phase, command))
+        if closing:
+            self._see(self._felt.see(frame))
         free = self._touch.free()
         for fault in self._fingertips.see(reading.pads, free):
             # Fingers that are open hurt nothing; before they close, `before_closing` refuses.
