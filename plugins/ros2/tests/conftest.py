@@ -1,0 +1,16 @@
+"""What the tests of ROS 2 share."""
+
+from __future__ import annotations
+
+import pytest
+
+
+@pytest.fixture
+def router(monkeypatch):
+    """A router of zenoh, to which every node of the test and of its programs connects: its port."""
+    from routers import opened_router
+
+    port, running = opened_router()
+    monkeypatch.setenv("ZENOH_CONFIG_OVERRIDE", f'connect/endpoints=["tcp/127.0.0.1:{port}"]')
+    yield port
+    running.close()

@@ -1,0 +1,52 @@
+"""Types of ROS 2: hashes that others computed, and messages that are damaged."""
+
+from __future__ import annotations
+
+import pytest
+from graspsense_ros2.message_types import BadMessage, decode, encode, hash_of
+from hypothesis import given
+from hypothesis import strategies as st
+
+PUBLISHED = {
+    "std_msgs/msg/String": "df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18",
+    "sensor_msgs/msg/JointState": "a13ee3a330e346c9d87b5aa18d24e11690752bd33a0350f11c5882bc9179260e",
+    "std_srvs/srv/Trigger": "eeff2cd6fa5ad9d27cdf4dec64818317839b62f212a91e6b5304b634b2062c5f",
+}
+"""Hashes that nodes of ROS 2 announce: of messages, and of a service with its event."""
+GOAL = "control_msgs/action/GripperCommand_SendGoal_Request"
+
+
+@pytest.mark.parametrize("name", PUBLISHED)
+def test_hashes_are_those_of_ros(name):
+    assert hash_of(name) == f"RIHS01_{PUBLISHED[name]}"
+
+
+def test_a_goal_is_written_and_read():
+    data = encode(
+        GOAL, {"goal_id": {"uuid": range(16)}, "goal": {"command": {"position": 0.03, "max_effort": 12.0}}}
+    )
+
+    goal = decode(GOAL, data)
+
+    assert list(goal.goal_id.uuid) == list(range(16))
+    assert (goal.goal.command.position, goal.goal.command.max_effort) == (0.03, 12.0)
+
+
+def test_an_empty_request_has_the_byte_that_idl_demands():
+    assert encode("std_srvs/srv/Trigger_Request", {}) == b"\0\1\0\0\0"
+
+
+@pytest.mark.parametrize("name", ["sensor_msgs/msg/JointState", GOAL, "std_msgs/msg/Float64MultiArray"])
+@given(data=st.binary(max_size=200))
+def test_bytes_that_are_no_message_are_refused(name, data):
+    for head in (b"", b"\0\1\0\0"):
+        try:
+            decode(name, head + data)
+        except BadMessage as error:
+            assert name in str(error)
+
+
+@pytest.mark.parametrize("values", [{"position": "wide"}, {"joints": []}, {"name": 5}])
+def test_values_that_do_not_fit_are_refused(values):
+    with pytest.raises(BadMessage):
+        encode("sensor_msgs/msg/JointState", values)
