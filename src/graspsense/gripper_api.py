@@ -62,9 +62,8 @@ _TABLE: Final[Table] = {
     "Observers of a grasp while it goes on, and commands that grasp": {
         "core.components.entries": ("LiveObserverEntry",),
         "live.feeds": ("LiveFeed",),
-        "cli.options": ("pipeline_options", "settings_of"),
-        "core.pipeline.pipeline": ("GraspInterrupted", "grasp_with"),
-        "core.components.registry": ("installed",),
+        "core.pipeline.pipeline": ("GraspInterrupted", "Pipeline", "load_pipeline"),
+        "core.grasp.interrupts": ("Interrupts",),
     },
     "Readers of tables with several squeezes, and writers of data sets": {
         "store.stored_grasps": ("StoredGrasp",),

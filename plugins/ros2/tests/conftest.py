@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from robots import Robot
 
 
 @pytest.fixture
@@ -14,3 +15,18 @@ def router(monkeypatch):
     monkeypatch.setenv("ZENOH_CONFIG_OVERRIDE", f'connect/endpoints=["tcp/127.0.0.1:{port}"]')
     yield port
     running.close()
+
+
+@pytest.fixture
+def robot(router):
+    """What starts the robot, with the type of its action."""
+    running = []
+
+    def start(kind="GripperCommand"):
+        running.append(Robot(kind))
+        return running[0]
+
+    yield start
+    for one in running:
+        one.process.kill()
+        one.process.communicate()

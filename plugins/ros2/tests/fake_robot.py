@@ -1,6 +1,6 @@
 """A robot with a gripper, in a process of its own: topics at 100 Hz and an action. It prints a line for each goal.
 
-python fake_robot.py KIND: KIND is GripperCommand or ParallelGripperCommand. Each line of its input is a fault from now on:
+python fake_robot.py KIND: KIND is GripperCommand or ParallelGripperCommand. A line of its input is a fault from now on:
 silent (no wrenches), nan, wrong (bytes that are no wrench), late (stamps that fall behind), refuse (goals).
 """
 
@@ -49,7 +49,9 @@ class Hand:
             self.target_m, self.effort_n = command.position, command.max_effort
         else:
             self.target_m, self.effort_n = float(command.position[0]), float(command.effort[0])
-        sys.stdout.write(json.dumps({"gap": self.gap_m, "position": self.target_m, "effort": self.effort_n}) + "\n")
+        sys.stdout.write(
+            json.dumps({"gap": self.gap_m, "position": self.target_m, "effort": self.effort_n}) + "\n"
+        )
         sys.stdout.flush()
         return True
 

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import pytest
-from graspsense_ros2.message_types import BadMessage, decode, encode, hash_of
 from hypothesis import given
 from hypothesis import strategies as st
+
+from graspsense_ros2.message_types import BadMessage, decode, encode, hash_of
 
 PUBLISHED = {
     "std_msgs/msg/String": "df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18",
@@ -40,10 +43,8 @@ def test_an_empty_request_has_the_byte_that_idl_demands():
 @given(data=st.binary(max_size=200))
 def test_bytes_that_are_no_message_are_refused(name, data):
     for head in (b"", b"\0\1\0\0"):
-        try:
-            decode(name, head + data)
-        except BadMessage as error:
-            assert name in str(error)
+        with suppress(BadMessage):
+            assert decode(name, head + data).__msgtype__ == name
 
 
 @pytest.mark.parametrize("values", [{"position": "wide"}, {"joints": []}, {"name": 5}])

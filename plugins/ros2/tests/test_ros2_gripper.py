@@ -2,60 +2,13 @@
 
 from __future__ import annotations
 
-import json
-import subprocess
-import sys
-from pathlib import Path
-
 import pytest
+from robots import OPTIONS
 
 from graspsense.core.pipeline.pipeline import load_pipeline
 from graspsense.core.values.signals import Outcome
 
-ROBOT = Path(__file__).with_name("fake_robot.py")
 OBJECT_M = 0.05
-OPTIONS = (
-    "gripper.type=ros2",
-    "gripper.gap='/joint_states.position'[0]*2",
-    "gripper.left=-'/wrench.wrench.force.z'",
-    "gripper.right=-'/wrench.wrench.force.z'",
-    "gripper.through=zenoh",
-    "controller.type=send-and-watch",
-    "controller.probing_force_n=15",
-    "classifier.type=none",
-)
-
-
-class Robot:
-    """The robot's process: its faults, and the goals that it was sent."""
-
-    def __init__(self, kind):
-        self.process = subprocess.Popen(
-            [sys.executable, str(ROBOT), kind], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-        )
-
-    def fault(self, name):
-        self.process.stdin.write(name + "\n")
-        self.process.stdin.flush()
-
-    def goals(self):
-        """End the robot, and return its goals."""
-        self.process.kill()
-        return [json.loads(line) for line in self.process.communicate()[0].splitlines()]
-
-
-@pytest.fixture
-def robot(router):
-    running = []
-
-    def start(kind="GripperCommand"):
-        running.append(Robot(kind))
-        return running[0]
-
-    yield start
-    for one in running:
-        one.process.kill()
-        one.process.communicate()
 
 
 def grasp(on_event=None, *options):
@@ -85,9 +38,15 @@ def test_a_grasp_by_topics_and_action(robot, kind):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("fault", "words"), [
-    ("silent", "/wrench"), ("nan", "nan"), ("wrong", "damaged"), ("late", "/wrench"),
-])
+@pytest.mark.parametrize(
+    ("fault", "words"),
+    [
+        ("silent", "/wrench"),
+        ("nan", "nan"),
+        ("wrong", "damaged"),
+        ("late", "/wrench"),
+    ],
+)
 def test_a_fault_of_a_topic_ends_the_grasp_and_opens_the_fingers(robot, fault, words):
     faulty = robot()
 

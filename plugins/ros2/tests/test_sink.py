@@ -9,6 +9,7 @@ import time
 from collections import defaultdict
 
 import pytest
+
 from graspsense_ros2.message_types import decode
 from graspsense_ros2.sink import ARRAY, JOINT_STATE, NUMBER, TEXT, WRENCH, publish_grasps
 from graspsense_ros2.zenoh_node import ZenohNode

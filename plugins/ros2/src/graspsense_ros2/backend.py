@@ -87,7 +87,7 @@ class Ros2Backend(SensorBackend[Ros2Config]):
                     raise NoDevice(f"no message on {newest.topic}, although it is announced{_damage(newest)}")
             self._action = self._answering(until)
             self._began_s = self._last_s = self._due_s = time.monotonic()
-            self._good = {name: (nan, self._began_s) for name in self._numbers}
+            self._good = dict.fromkeys(self._numbers, (nan, self._began_s))
             self._recent: deque[tuple[float, float]] = deque(maxlen=SLOPE_FRAMES)
             self._gap_m = self._measured()["gap"]
         except (DeviceLost, ConfigError) as error:
@@ -132,12 +132,16 @@ class Ros2Backend(SensorBackend[Ros2Config]):
         config = self.config
         stops = kind not in (POSITION, FORCE) or (kind == FORCE and value <= 0.0)
         goal = self._gap_m if stops else value if kind == POSITION else 0.0
-        effort = config.least_effort_n if stops else effort_limit if kind == POSITION else min(value, effort_limit)
+        effort = (
+            config.least_effort_n if stops else effort_limit if kind == POSITION else min(value, effort_limit)
+        )
         speed = min(speed_limit, config.speed_limit_m_s)
         step = speed / config.rate_hz
         # Where the fingers turn, the target that is left from the other direction would still push or pull.
         ahead = (self._gap_m, inf) if goal > self._gap_m else (self._gap_m - AHEAD_M, self._gap_m)
-        self._target_m = min(max(self._target_m + min(max(goal - self._target_m, -step), step), ahead[0]), ahead[1])
+        self._target_m = min(
+            max(self._target_m + min(max(goal - self._target_m, -step), step), ahead[0]), ahead[1]
+        )
         if stops:
             self._target_m = self._gap_m
         self._opening = goal >= config.open_gap_m
@@ -177,13 +181,11 @@ class Ros2Backend(SensorBackend[Ros2Config]):
 
     def _told_to_open(self, action: GripperAction) -> bool:
         config = self.config
-        for tell in (
-            lambda: action.send(Target(config.position_open, config.effort_limit_n, config.speed_limit_m_s)),
-            action.cancel,
-        ):
-            with suppress(ServiceFailed):
-                tell()
-                return True
+        with suppress(ServiceFailed):
+            action.send(Target(config.position_open, config.effort_limit_n, config.speed_limit_m_s))
+            return True
+        with suppress(ServiceFailed):
+            action.cancel()
         return False
 
     def _position(self, gap_m: float) -> float:
@@ -264,7 +266,9 @@ class Ros2Backend(SensorBackend[Ros2Config]):
             opening=Command(POSITION, config.open_gap_m, config.effort_limit_n, config.speed_limit_m_s),
             relaxed=Command(FORCE, 0.0, inf, inf),
             numbers={name: number.text for name, number in self._numbers.items()},
-            notes=("forces and gap are those of ROS topics; their calibration and their zero are a matter of the driver",),
+            notes=(
+                "forces and gap are those of ROS topics; their calibration and their zero are a matter of the driver",
+            ),
         )
 
 

@@ -55,13 +55,21 @@ class Ros2Config:
         meaning="The least effort that is asked for; many drivers take 0 as no limit.",
     )
     effort_limit_n: float = setting(
-        default=40.0, unit="N", above=0.0, plausible=(0.1, 500.0), meaning="The greatest effort that is asked for."
+        default=40.0,
+        unit="N",
+        above=0.0,
+        plausible=(0.1, 500.0),
+        meaning="The greatest effort that is asked for.",
     )
     speed_limit_m_s: float = setting(
         default=0.05, unit="m/s", above=0.0, plausible=(1e-4, 0.5), meaning="The greatest speed of the gap."
     )
     rate_hz: float = setting(
-        default=100.0, unit="Hz", above=0.0, plausible=(5.0, 1000.0), meaning="Frames a second, of the newest messages."
+        default=100.0,
+        unit="Hz",
+        above=0.0,
+        plausible=(5.0, 1000.0),
+        meaning="Frames a second, of the newest messages.",
     )
     silent_s: float = setting(
         default=0.5,
@@ -71,7 +79,11 @@ class Ros2Config:
         meaning="Age of the newest message of a topic from which on the gripper is lost.",
     )
     open_timeout_s: float = setting(
-        default=5.0, unit="s", above=0.0, plausible=(0.1, 120.0), meaning="Longest wait for the topics and the action."
+        default=5.0,
+        unit="s",
+        above=0.0,
+        plausible=(0.1, 120.0),
+        meaning="Longest wait for the topics and the action.",
     )
     through: Literal["auto", "rclpy", "zenoh"] = setting(
         default="auto", meaning="auto: rclpy where it can be imported, otherwise zenoh."
@@ -80,7 +92,9 @@ class Ros2Config:
     def __attrs_post_init__(self) -> None:
         self.numbers()
         if not is_name(self.action):
-            raise ValueError(f"action {self.action!r} is no name of ROS: write it as in /gripper_controller/gripper_cmd")
+            raise ValueError(
+                f"action {self.action!r} is no name of ROS: write it as in /gripper_controller/gripper_cmd"
+            )
         if self.position_open == self.position_closed:
             raise ValueError("position_open and position_closed are equal: give the positions of both ends")
         if self.least_effort_n > self.effort_limit_n:

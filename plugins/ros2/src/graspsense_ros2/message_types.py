@@ -135,7 +135,9 @@ def _service_type(name: str) -> Typesdict:
         return Nodetype.NAME, type_name
 
     parts = [(part, f"{name}_{part.capitalize()}") for part in ("request", "response")]
-    event = [(part, (Nodetype.SEQUENCE, (named(type_name), 1))) for part, type_name in parts]
+    event: list[tuple[str, Any]] = [
+        (part, (Nodetype.SEQUENCE, (named(type_name), 1))) for part, type_name in parts
+    ]
     messages = [*parts, ("event", f"{name}_Event")]
     return {
         f"{name}_Event": ([], [("info", named("service_msgs/msg/ServiceEventInfo")), *event]),

@@ -70,9 +70,7 @@ class RclpyNode:
 
     def types_of(self, topic: str) -> Sequence[str]:
         """Return the types that a topic is published with."""
-        return tuple(
-            info.topic_type for info in self._node.get_publishers_info_by_topic(absolute(topic))
-        )
+        return tuple(info.topic_type for info in self._node.get_publishers_info_by_topic(absolute(topic)))
 
     def service(self, name: str, type_name: str, answer: Callable[[bytes], bytes]) -> None:
         """Answer each request; one for which `answer` raises gets an empty response, which says no."""

@@ -51,7 +51,7 @@ class GraspTopics:
         self._began_s: float | None = None
         self._channels: dict[str, Mapping[str, Any]] = {}
         # A tick fills these again, which is quicker than new ones.
-        self._joint = message(JOINT_STATE, {"name": [JOINT], **dict.fromkeys(_JOINT_FIELDS, [0.0])})
+        self._joint = message(JOINT_STATE, {"name": [JOINT], **{name: [0.0] for name in _JOINT_FIELDS}})
         self._wrenches = [message(WRENCH, {"header": {"frame_id": side}}) for side in ("left", "right")]
 
     def publish(self, live: Mapping[str, Any]) -> None:

@@ -95,7 +95,9 @@ class ZenohNode:
     def types_of(self, topic: str) -> Sequence[str]:
         """Return the types that a topic is published with."""
         found = self._session.liveliness().get(publishers_of(self._names.domain, topic), timeout=LISTING_S)
-        return tuple(dict.fromkeys(type_in(str(reply.ok.key_expr)) for reply in found if reply.ok is not None))
+        return tuple(
+            dict.fromkeys(type_in(str(reply.ok.key_expr)) for reply in found if reply.ok is not None)
+        )
 
     def service(self, name: str, type_name: str, answer: Callable[[bytes], bytes]) -> None:
         """Answer each request; one for which `answer` raises gets an error."""
@@ -114,7 +116,7 @@ class ZenohNode:
             except Exception as error:
                 query.reply_err(f"{type(error).__name__}: {error}".encode())
             finally:
-                query.drop()  # type: ignore[no-untyped-call]
+                query.drop()  # type: ignore[no-untyped-call, unused-ignore]
                 free.release()
 
         def take(query: zenoh.Query) -> None:
@@ -148,7 +150,8 @@ class ZenohNode:
             )
             for reply in replies:
                 if reply.ok is not None:
-                    return reply.ok.payload.to_bytes()
+                    data: bytes = reply.ok.payload.to_bytes()
+                    return data
                 assert reply.err is not None
                 said = reply.err.payload.to_bytes()[:200].decode(errors="replace")
                 raise ServiceFailed(f"{name} refuses: {said}")
@@ -162,7 +165,7 @@ class ZenohNode:
         for each in declared:
             each.undeclare()
         if declared:
-            self._session.close()  # type: ignore[no-untyped-call]
+            self._session.close()  # type: ignore[no-untyped-call, unused-ignore]
 
     def _announce(self, kind: Kind, name: str, type_name: str, quality: str) -> bytes:
         """Declare the token of an endpoint, and return its gid."""

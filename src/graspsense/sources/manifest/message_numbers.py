@@ -34,7 +34,9 @@ class MessageNumber:
         expression = parse(self.text)
         for node in ast.walk(expression.tree):
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in OVER_TIME:
-                raise ConfigError(f"{self.text!r}: {node.func.id} is over a whole grasp, which is not known yet")
+                raise ConfigError(
+                    f"{self.text!r}: {node.func.id} is over a whole grasp, which is not known yet"
+                )
         for name in expression.names:
             topic, dot, _ = name.partition(".")
             if not (topic.startswith("/") and dot) or set("*?") & set(topic):
@@ -59,4 +61,7 @@ class MessageNumber:
 
 def message_columns(message: Any, topic: str) -> dict[str, NDArray[np.float64]]:
     """Return the numbers in a message as columns with a single row: shape (1,), or (1, k) for an array of k numbers."""
-    return {name: np.reshape(value, (1, -1) if np.size(value) > 1 else 1) for name, value in numbers_in(message, topic)}
+    return {
+        name: np.reshape(value, (1, -1) if np.size(value) > 1 else 1)
+        for name, value in numbers_in(message, topic)
+    }
