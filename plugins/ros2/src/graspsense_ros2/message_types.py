@@ -103,6 +103,13 @@ def decode(type_name: str, data: bytes) -> Any:
 
 @cache
 def _store() -> Typestore:
+    return typestore(_SERVICES, _ACTIONS)
+
+
+def typestore(
+    services: Mapping[str, tuple[str, str]], actions: Mapping[str, tuple[str, str, str]]
+) -> Typestore:
+    """Return the common interfaces with these services and actions, and all types that belong to them."""
     from rosbags.typesys import Stores, get_typestore
 
     store = get_typestore(Stores.ROS2_JAZZY)
@@ -110,7 +117,7 @@ def _store() -> Typestore:
         store.fielddefs.pop(name, None)
     store.register(_parsed(_MESSAGES))
     definitions: dict[str, str] = {}
-    for name, (goal, result, feedback) in _ACTIONS.items():
+    for name, (goal, result, feedback) in actions.items():
         definitions |= {f"{name}_Goal": goal, f"{name}_Result": result, f"{name}_Feedback": feedback}
         uuid = "unique_identifier_msgs/UUID goal_id"
         definitions[f"{name}_FeedbackMessage"] = f"{uuid}\n{name}_Feedback feedback"
@@ -118,11 +125,10 @@ def _store() -> Typestore:
         definitions[f"{name}_SendGoal_Response"] = "bool accepted\nbuiltin_interfaces/Time stamp"
         definitions[f"{name}_GetResult_Request"] = uuid
         definitions[f"{name}_GetResult_Response"] = f"int8 status\n{name}_Result result"
-    for name, (request, response) in _SERVICES.items():
+    for name, (request, response) in services.items():
         definitions |= {f"{name}_Request": request, f"{name}_Response": response}
     store.register(_parsed(definitions))
-    services = [*_SERVICES, *(f"{name}_{part}" for name in _ACTIONS for part in ("SendGoal", "GetResult"))]
-    for name in services:
+    for name in (*services, *(f"{name}_{part}" for name in actions for part in ("SendGoal", "GetResult"))):
         store.register(_service_type(name))
     return store
 

@@ -75,9 +75,9 @@ def publishers_of(domain: int, topic: str) -> str:
 
 
 def type_in(token: str) -> str:
-    """Return the type that the token of a publisher names."""
-    package, group, _, name = token.split("/")[10].split("::")
-    return f"{package}/{group}/{name.removesuffix('_')}"
+    """Return the type that the token of a publisher names, empty if it names none."""
+    parts = "/".join(token.split("/")[10:11]).split("::")
+    return f"{parts[0]}/{parts[1]}/{parts[3].removesuffix('_')}" if len(parts) == 4 else ""
 
 
 def gid_of(token: str) -> bytes:
