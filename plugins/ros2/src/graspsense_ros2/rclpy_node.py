@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Sequence
+from importlib import import_module
 from typing import Any, Final
 
 from graspsense.plugin_api import ConfigError
@@ -115,12 +116,14 @@ class RclpyNode:
 
 def _class_of(type_name: str) -> Any:
     """Return the class of a message, of a service, or of a part of an action. Raises ConfigError."""
-    from rosidl_runtime_py.utilities import get_action, get_message, get_service
-
-    action, _, part = type_name.rpartition("_")
+    package, group, name = type_name.split("/")
+    whole, _, part = name.rpartition("_")
     try:
-        if part in _OF_ACTIONS and "/action/" in type_name:
-            return getattr(get_action(action).Impl, _OF_ACTIONS[part])
-        return get_service(type_name) if "/srv/" in type_name else get_message(type_name)
-    except (ImportError, AttributeError, ValueError) as error:
-        raise ConfigError(f"ROS has no type {type_name}: {error}. Install its package") from error
+        module = import_module(f"{package}.{group}")
+        if group == "action" and part in _OF_ACTIONS:
+            return getattr(getattr(module, whole).Impl, _OF_ACTIONS[part])
+        return getattr(module, name)
+    except (ImportError, AttributeError) as error:
+        raise ConfigError(
+            f"ROS has no type {type_name}: {error}. Install its package, as ros-jazzy-{package.replace('_', '-')}"
+        ) from error
