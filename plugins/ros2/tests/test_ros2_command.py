@@ -11,13 +11,13 @@ import uuid
 from contextlib import contextmanager
 
 import pytest
+from robots import OPTIONS
+
+from graspsense.cli.main import main
 from graspsense_ros2.command import ACTION, GRASP, GRIPPER_COMMAND, TRIGGER
 from graspsense_ros2.message_types import decode, encode
 from graspsense_ros2.node import ServiceFailed
 from graspsense_ros2.zenoh_node import ZenohNode
-from robots import OPTIONS
-
-from graspsense.cli.main import main
 
 PATIENCE_S = 60.0
 CANCEL = "action_msgs/srv/CancelGoal"
@@ -49,8 +49,14 @@ class Caller:
 
     def __init__(self):
         self.node = ZenohNode("caller")
-        parts = {"send_goal": f"{ACTION}_SendGoal", "get_result": f"{ACTION}_GetResult", "cancel_goal": CANCEL}
-        self.asks = {name: self.node.client(f"{GRIPPER_COMMAND}/_action/{name}", parts[name]) for name in parts}
+        parts = {
+            "send_goal": f"{ACTION}_SendGoal",
+            "get_result": f"{ACTION}_GetResult",
+            "cancel_goal": CANCEL,
+        }
+        self.asks = {
+            name: self.node.client(f"{GRIPPER_COMMAND}/_action/{name}", parts[name]) for name in parts
+        }
         self.trigger = self.node.client(GRASP, TRIGGER)
 
     def send(self, position, effort):
@@ -86,7 +92,7 @@ def test_a_grasp_is_asked_for(robot, caller):
 
         told = json.loads(answer.message)
         assert (answer.success, told["outcome"]) == (True, "steady")
-        assert set(told) == {"outcome", "reason", "features", "prediction"}
+        assert set(told) == {"outcome", "reason", "features", "prediction", "counts"}
         # What was not asked for is not offered.
         with pytest.raises(ServiceFailed):
             caller.cancel({})
@@ -165,7 +171,11 @@ def test_rubbish_is_answered_with_an_error(robot, caller, request_bytes):
 
 @pytest.mark.parametrize(
     ("words", "said"),
-    [([], "--grasp"), (["--action", "--gripper", "pr2"], "positions or velocities"), (["--grasp", "-o", "a.b=1"], "a")],
+    [
+        ([], "--grasp"),
+        (["--action", "--gripper", "pr2"], "positions or velocities"),
+        (["--grasp", "-o", "a.b=1"], "a"),
+    ],
 )
 def test_wrong_uses(words, said, capsys):
     with pytest.raises(SystemExit) as ended:

@@ -7,7 +7,9 @@ from robots import OPTIONS
 
 from graspsense.testing import examine
 
-KEYS = dict(option.removeprefix("gripper.").split("=", 1) for option in OPTIONS if option.startswith("gripper."))
+KEYS = dict(
+    option.removeprefix("gripper.").split("=", 1) for option in OPTIONS if option.startswith("gripper.")
+)
 
 
 @pytest.mark.slow

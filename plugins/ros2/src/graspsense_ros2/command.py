@@ -214,6 +214,7 @@ def _told(trial: Trial) -> dict[str, Any]:
             for name, value in zip(trial.features.names, features, strict=True)
         },
         "prediction": None,
+        "counts": dict(trial.counts),
     }
     if trial.prediction is not None:
         told["prediction"] = {

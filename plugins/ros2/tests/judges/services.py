@@ -1,7 +1,7 @@
 """zenoh-ros2-sdk lists our services, asks for a grasp, and moves the gripper by the services and topics of its action.
 
-python services.py GRASPSENSE: GRASPSENSE is the program. The definitions below are the fields of the messages on the wire,
-one after the other, so that what they decode does not depend on our types.
+python services.py GRASPSENSE: GRASPSENSE is the program. The definitions below are the fields of the messages on
+the wire, one after the other, so that what they decode does not depend on our types.
 """
 
 from __future__ import annotations
@@ -57,7 +57,8 @@ def wait_for_services(port, process):
 
 
 def client(port, service):
-    info = get_service_info(service, router_port=port, timeout=1.0, verbose=True)
+    while (info := get_service_info(service, router_port=port, timeout=1.0, verbose=True)) is None:
+        time.sleep(0.2)
     request, response = FIELDS[service]
     return ROS2ServiceClient(
         service,
@@ -100,7 +101,9 @@ def judge(port):
     assert grasped.success, grasped
     told = json.loads(grasped.message)
     assert told["outcome"], told
-    sys.stdout.write(f"services: {len(EXPECTED)}, {len(feedback)} times feedback, {result}, {told['outcome']}\n")
+    sys.stdout.write(
+        f"services: {len(EXPECTED)}, {len(feedback)} times feedback, {result}, {told['outcome']}\n"
+    )
 
 
 def main(graspsense):

@@ -1,6 +1,7 @@
 """zenoh-ros2-sdk lists and decodes every topic of a grasp, for an environment that has it but not graspsense.
 
-python topics.py GRASPSENSE: GRASPSENSE is the program. The first grasp is listed, the second one is decoded.
+python topics.py GRASPSENSE: GRASPSENSE is the program. Its node is asked for two grasps. The topics of
+the first one are listed, and those of the second one decoded.
 """
 
 from __future__ import annotations
@@ -8,6 +9,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -16,13 +18,21 @@ from itertools import pairwise
 
 from rosbags.typesys import Stores, get_typestore
 from routers import opened_router
-from zenoh_ros2_sdk import ROS2Subscriber, get_topic_info, get_topic_names_and_types
+from zenoh_ros2_sdk import (
+    ROS2ServiceClient,
+    ROS2Subscriber,
+    get_service_info,
+    get_topic_info,
+    get_topic_names_and_types,
+)
 from zenoh_ros2_sdk.utils import compute_type_hash_from_msg
 
 RUN = (
-    *("run", "--live", "--json", "--gripper", "pr2", "--object", "odwalla:full_open", "--seed", "3"),
-    *("-o", "gripper.transport=emulated", "-o", "gripper.pace=device"),
+    *("ros2", "--grasp", "--gripper", "pr2", "-o", "gripper.transport=emulated"),
+    *("-o", "gripper.object=odwalla:full_open", "-o", "run.seed=3"),
 )
+GRASP = "/graspsense/grasp"
+PATIENCE_S = 120.0
 EXPECTED = {
     "/graspsense/joint_states": "sensor_msgs/msg/JointState",
     "/graspsense/wrench/left": "geometry_msgs/msg/WrenchStamped",
@@ -47,46 +57,76 @@ def definitions(type_name):
     return whole, own, used
 
 
-def listed(port, process):
-    """Return the topics that were listed while a grasp went on, and the hash of each type."""
-    types, hashes = {}, {}
-    while process.poll() is None:
-        for topic, names in get_topic_names_and_types(router_port=port, timeout=0.2):
-            if topic not in types:
-                (types[topic],) = names
-                info = get_topic_info(topic, router_port=port, timeout=0.2, verbose=True)
-                if info is not None and info.publishers:
-                    hashes[topic] = info.publishers[0].type_hash
-                else:
-                    del types[topic]
-    return types, hashes
+def asked_to_grasp(port):
+    """Ask for a grasp, and return what the answer tells of it."""
+    # While peers connect, their tokens come and go.
+    info = wait_for(lambda: get_service_info(GRASP, router_port=port, timeout=0.5, verbose=True), GRASP)
+    client = ROS2ServiceClient(
+        GRASP,
+        "std_srvs/srv/Trigger",
+        request_definition="uint8 structure_needs_at_least_one_member",
+        response_definition="bool success\nstring message",
+        type_hash=info.servers[0].type_hash,
+        router_port=port,
+        timeout=PATIENCE_S,
+    )
+    answer = client.call(structure_needs_at_least_one_member=0)
+    assert answer.success, answer
+    return json.loads(answer.message)
+
+
+def wait_for(found, what):
+    """Wait until this returns something true, and return it."""
+    until = time.monotonic() + PATIENCE_S
+    while not (result := found()):
+        assert time.monotonic() < until, what
+        time.sleep(0.2)
+    return result
+
+
+def listed_topics(port):
+    """Return the listed topics with their types, nothing while one is missing."""
+    listed = {
+        topic: types[0]
+        for topic, types in get_topic_names_and_types(router_port=port, timeout=0.5)
+        if topic.startswith("/graspsense/")
+    }
+    return listed if EXPECTED.items() <= listed.items() else {}
+
+
+def judge_node(port):
+    """List the topics of a first grasp, subscribe to them, and receive a second one."""
+    asked_to_grasp(port)
+    listed = wait_for(lambda: listed_topics(port), "topics")
+    messages = defaultdict(list)
+    for topic, type_name in listed.items():
+        whole, own, used = definitions(type_name)
+        type_hash = compute_type_hash_from_msg(type_name, own, used)
+        info = wait_for(lambda name=topic: get_topic_info(name, router_port=port, verbose=True), topic)
+        assert info.publishers[0].type_hash == type_hash, (topic, info, type_hash)
+        ROS2Subscriber(topic, type_name, messages[topic].append, whole, type_hash=type_hash, router_port=port)
+    trial = asked_to_grasp(port)
+    wait_for(lambda: messages["/graspsense/outcome"], "outcome")
+    judge(trial, messages)
 
 
 def main(graspsense):
     port, _router = opened_router()
     environment = {**os.environ, "ZENOH_CONFIG_OVERRIDE": f'connect/endpoints=["tcp/127.0.0.1:{port}"]'}
-    process = subprocess.Popen([graspsense, *RUN], env=environment, stdout=subprocess.DEVNULL)
-    types, hashes = listed(port, process)
-    assert process.returncode == 0, process.returncode
-    missing = EXPECTED.items() - types.items()
-    # The outcome is published in the last moment of the process, which the listing may miss.
-    assert {topic for topic, _ in missing} <= {"/graspsense/outcome"}, missing
-    messages = defaultdict(list)
-    for topic, type_name in EXPECTED.items():
-        whole, own, used = definitions(type_name)
-        type_hash = compute_type_hash_from_msg(type_name, own, used)
-        assert hashes.get(topic, type_hash) == type_hash, (topic, hashes[topic], type_hash)
-        ROS2Subscriber(topic, type_name, messages[topic].append, whole, type_hash=type_hash, router_port=port)
-    done = subprocess.run([graspsense, *RUN], env=environment, capture_output=True, text=True, check=True)
-    time.sleep(1.0)
-    judge(json.loads(done.stdout), done.stderr, messages)
+    process = subprocess.Popen([graspsense, *RUN], env=environment)
+    try:
+        judge_node(port)
+        process.send_signal(signal.SIGINT)
+        assert process.wait(PATIENCE_S) == 0, process.returncode
+    finally:
+        process.kill()
 
 
-def judge(trial, said, messages):
+def judge(trial, messages):
     """Compare the messages with what the program printed."""
-    assert "could not follow" not in said, said
-    counts = {topic: len(messages[topic]) for topic in EXPECTED}
+    counts = {topic: len(found) for topic, found in messages.items()}
     sys.stdout.write(f"{counts}\n")
+    assert all(counts.values()), counts
     ticks = trial["counts"]["ticks"]
     for topic in ("joint_states", "wrench/left", "wrench/right"):
         assert counts[f"/graspsense/{topic}"] == ticks, (topic, counts, ticks)

@@ -17,16 +17,17 @@ import time
 import rclpy
 from action_msgs.msg import GoalStatus
 from geometry_msgs.msg import WrenchStamped
-from graspsense_ros2 import message_types
-from graspsense_ros2.action_server import ActionServer
-from graspsense_ros2.node import open_node
-from graspsense_ros2.rclpy_node import RclpyNode
 from rclpy.action import ActionClient
 from rclpy.executors import SingleThreadedExecutor
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, String
 from std_srvs.srv import Trigger
 from test_msgs.action import Fibonacci
+
+from graspsense_ros2 import message_types
+from graspsense_ros2.action_server import ActionServer
+from graspsense_ros2.node import open_node
+from graspsense_ros2.rclpy_node import RclpyNode
 
 PATIENCE_S = 60.0
 RUN = ("-m", "graspsense", "ros2", "--grasp", "--gripper", "pr2")
@@ -90,7 +91,9 @@ def judge_action(node, executor):
     goal = until_done(executor, sent)
     assert goal.accepted
     result = until_done(executor, goal.get_result_async())
-    assert (result.status, list(result.result.sequence)) == (GoalStatus.STATUS_SUCCEEDED, [0, 1, 1, 2]), result
+    assert (result.status, list(result.result.sequence)) == (GoalStatus.STATUS_SUCCEEDED, [0, 1, 1, 2]), (
+        result
+    )
     assert list(feedback[0].feedback.sequence) == [0, 1], feedback
 
     assert not until_done(executor, client.send_goal_async(Fibonacci.Goal(order=0))).accepted
