@@ -49,7 +49,9 @@ def test_a_component_of_ours_conforms(name, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", sorted({*(name.partition("/")[0] for name in components()), "graspsense-ros2"}))
+@pytest.mark.parametrize(
+    "name", sorted({*(name.partition("/")[0] for name in components()), "graspsense-ros2"})
+)
 def test_a_distribution_of_ours_conforms(name):
     examined = examine(name, wheel=False)  # .ci/run builds the wheels and runs from them
     examined.subjects = examined.subjects[:1]

@@ -47,6 +47,8 @@ def open_node(name: str, through: Through = "auto") -> Node:
         from graspsense_ros2.rclpy_node import RclpyNode
 
         return RclpyNode(name)
+    if find_spec("zenoh") is None:
+        raise ConfigError('zenoh cannot be imported: pip install "graspsense[ros2]"')
     from graspsense_ros2.zenoh_node import ZenohNode
 
     return ZenohNode(name)

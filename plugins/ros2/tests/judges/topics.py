@@ -59,7 +59,6 @@ def definitions(type_name):
 
 def asked_to_grasp(port):
     """Ask for a grasp, and return what the answer tells of it."""
-    # While peers connect, their tokens come and go.
     info = wait_for(lambda: get_service_info(GRASP, router_port=port, timeout=0.5, verbose=True), GRASP)
     client = ROS2ServiceClient(
         GRASP,
