@@ -14,6 +14,10 @@ OPTIONS = (
     "gripper.left=-'/wrench.wrench.force.z'",
     "gripper.right=-'/wrench.wrench.force.z'",
     "gripper.through=zenoh",
+    # The tests share their processors with others.
+    "gripper.delay_s=0.4",
+    "controller.step_time_s=0.4",
+    "gripper.silent_s=1.0",
     "controller.type=send-and-watch",
     "controller.probing_force_n=15",
     "classifier.type=none",

@@ -8,11 +8,15 @@ import socket
 import zenoh
 
 
-def opened_router():
-    """Return the port of a new router on loopback, and the router, which lives as long as it is held."""
+def free_port():
     with socket.socket() as found:
         found.bind(("127.0.0.1", 0))
-        port = found.getsockname()[1]
+        return found.getsockname()[1]
+
+
+def opened_router(port=None):
+    """Return the port of a new router on loopback, and the router, which lives as long as it is held."""
+    port = port or free_port()
     config = zenoh.Config()
     for key, value in {
         "mode": "router",

@@ -38,8 +38,6 @@ GOAL_PERIOD_S: Final = 0.05
 AHEAD_M: Final = 0.004
 """How far the target can be ahead of the fingers while they close."""
 LOOK_AGAIN_S: Final = 0.1
-COMMAND_DELAY_S: Final = 0.1
-"""A goal waits for the one before it, and is sent, answered and acted upon by the driver of the gripper."""
 _MUST_BE_NUMBERS: Final = frozenset({"gap", "force_left", "force_right"})
 _UNITS: Final = {"gap": "m", "velocity": "m/s", "effort": "N", "force_left": "N", "force_right": "N"}
 
@@ -55,11 +53,11 @@ class Ros2Backend(SensorBackend[Ros2Config]):
             "force": "goals that approach the closed position at its speed, with this force as their effort",
         }
     )
-    command_delay_s = COMMAND_DELAY_S
 
     def __init__(self, config: Ros2Config) -> None:
         super().__init__(config)
         self.least_force_n = config.least_effort_n
+        self.command_delay_s = config.delay_s
         self._numbers = config.numbers()
         self._node: Node | None = None
         self._action: GripperAction | None = None

@@ -71,6 +71,13 @@ class Ros2Config:
         plausible=(5.0, 1000.0),
         meaning="Frames a second, of the newest messages.",
     )
+    delay_s: float = setting(
+        default=0.1,
+        unit="s",
+        minimum=0.0,
+        plausible=(0.0, 2.0),
+        meaning="Longest time from a goal to the motion that follows; the controller has to wait as long (step_time_s).",
+    )
     silent_s: float = setting(
         default=0.5,
         unit="s",

@@ -46,6 +46,7 @@ SESSION: Final[Mapping[str, Any]] = {
 """The settings with which rmw_zenoh opens a session, as far as they differ from those of zenoh."""
 LISTING_S: Final = 1.0
 """Longest wait for the names of publishers."""
+LOOK_AGAIN_S: Final = 0.01
 _ENCODING: Final = zenoh.Encoding("application/cdr")
 
 
@@ -133,11 +134,16 @@ class ZenohNode:
         """Return what sends a request and waits so many seconds for the answer. It raises ServiceFailed."""
         key = key_expression(self._names.domain, name, type_name)
         gid = self._announce("SC", name, type_name, VOLATILE)
+        querier: Any = self._session.declare_querier(key, target=zenoh.QueryTarget.ALL_COMPLETE)
+        self._declared.append(querier)
         sequence = 0
 
         def ask(request: bytes, timeout_s: float) -> bytes:
             nonlocal sequence
             sequence += 1
+            until = time.monotonic() + timeout_s
+            while not querier.matching_status.matching and time.monotonic() < until:
+                time.sleep(LOOK_AGAIN_S)
             replies = self._session.get(
                 key,
                 payload=request,
@@ -145,7 +151,7 @@ class ZenohNode:
                 attachment=attachment(sequence, time.time_ns(), gid),
                 target=zenoh.QueryTarget.ALL_COMPLETE,
                 consolidation=zenoh.ConsolidationMode.NONE,
-                timeout=timeout_s,
+                timeout=max(until - time.monotonic(), LOOK_AGAIN_S),
             )
             for reply in replies:
                 if reply.ok is not None:
