@@ -76,7 +76,7 @@ class Ros2Config:
         unit="s",
         minimum=0.0,
         plausible=(0.0, 2.0),
-        meaning="Longest time from a goal to the motion that follows; the controller has to wait as long (step_time_s).",
+        meaning="Longest time from a goal to the motion that follows; a controller waits as long (its step_time_s).",
     )
     silent_s: float = setting(
         default=0.5,
