@@ -62,7 +62,7 @@ _TABLE: Final[Table] = {
     "Observers of a grasp while it goes on, and commands that grasp": {
         "core.components.entries": ("LiveObserverEntry",),
         "live.feeds": ("LiveFeed",),
-        "core.pipeline.pipeline": ("GraspInterrupted", "Pipeline", "load_pipeline"),
+        "core.pipeline.pipeline": ("Pipeline", "load_pipeline"),
         "core.grasp.interrupts": ("Interrupts",),
     },
     "Readers of tables with several squeezes, and writers of data sets": {

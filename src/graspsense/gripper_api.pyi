@@ -56,7 +56,6 @@ from graspsense.core.control.contact import first_rest as first_rest
 # Observers of a grasp while it goes on, and commands that grasp
 from graspsense.core.components.entries import LiveObserverEntry as LiveObserverEntry
 from graspsense.live.feeds import LiveFeed as LiveFeed
-from graspsense.core.pipeline.pipeline import GraspInterrupted as GraspInterrupted
 from graspsense.core.pipeline.pipeline import Pipeline as Pipeline
 from graspsense.core.pipeline.pipeline import load_pipeline as load_pipeline
 from graspsense.core.grasp.interrupts import Interrupts as Interrupts
