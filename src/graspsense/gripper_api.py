@@ -59,8 +59,11 @@ _TABLE: Final[Table] = {
         ),
         "core.control.contact": ("first_rest",),
     },
-    "Observers of a grasp while it goes on": {
+    "Observers of a grasp while it goes on, and commands that grasp": {
         "core.components.entries": ("LiveObserverEntry",),
+        "live.feeds": ("LiveFeed",),
+        "core.pipeline.pipeline": ("Pipeline", "load_pipeline"),
+        "core.grasp.interrupts": ("Interrupts",),
     },
     "Readers of tables with several squeezes, and writers of data sets": {
         "store.stored_grasps": ("StoredGrasp",),
@@ -69,6 +72,9 @@ _TABLE: Final[Table] = {
         "sources.manifest.steps": ("squeezes",),
         "sources.manifest.table": ("ColumnTable",),
         "core.values.errors": ("TooLarge",),
+    },
+    "Numbers in ROS messages": {
+        "sources.manifest.message_numbers": ("MessageNumber", "message_columns"),
     },
     "Recordings as they are replayed": {
         "recording.replayable": ("Recording",),

@@ -53,8 +53,12 @@ from graspsense.core.grasp.gap_resolution import gap_resolution_by_sample as gap
 from graspsense.core.grasp.gap_resolution import window_of_rest as window_of_rest
 from graspsense.core.control.contact import first_rest as first_rest
 
-# Observers of a grasp while it goes on
+# Observers of a grasp while it goes on, and commands that grasp
 from graspsense.core.components.entries import LiveObserverEntry as LiveObserverEntry
+from graspsense.live.feeds import LiveFeed as LiveFeed
+from graspsense.core.pipeline.pipeline import Pipeline as Pipeline
+from graspsense.core.pipeline.pipeline import load_pipeline as load_pipeline
+from graspsense.core.grasp.interrupts import Interrupts as Interrupts
 
 # Readers of tables with several squeezes, and writers of data sets
 from graspsense.store.stored_grasps import StoredGrasp as StoredGrasp
@@ -63,6 +67,10 @@ from graspsense.sources.manifest.parquet_format import read_parquet as read_parq
 from graspsense.sources.manifest.steps import squeezes as squeezes
 from graspsense.sources.manifest.table import ColumnTable as ColumnTable
 from graspsense.core.values.errors import TooLarge as TooLarge
+
+# Numbers in ROS messages
+from graspsense.sources.manifest.message_numbers import MessageNumber as MessageNumber
+from graspsense.sources.manifest.message_numbers import message_columns as message_columns
 
 # Recordings as they are replayed
 from graspsense.recording.replayable import Recording as Recording

@@ -34,6 +34,7 @@ _PR2 = Shipped("graspsense-pr2-gripper", "pr2_gripper", "pr2")
 _SIM = Shipped("graspsense-sim-gripper", "sim_gripper", "sim")
 _MUJOCO = Shipped("graspsense-mujoco-gripper", "mujoco_gripper", "mujoco")
 _ROBOTIQ = Shipped("graspsense-robotiq-2f", "robotiq_2f", "robotiq")
+_ROS2 = Shipped("graspsense-ros2", "ros2", "ros2")
 _C45 = Shipped("graspsense-c45", "c45", "c45")
 _PAPER = Shipped("graspsense-paper", "paper", "paper")
 _IDENTIFY = Shipped("graspsense-identify", "identify", "identify")
@@ -43,6 +44,7 @@ SHIPPED: Final[dict[tuple[Role, str], Shipped]] = {
     ("sensor-backend", "sim"): _SIM,
     ("sensor-backend", "mujoco"): _MUJOCO,
     ("sensor-backend", "robotiq"): _ROBOTIQ,
+    ("sensor-backend", "ros2"): _ROS2,
     ("feature-set", "chitta-without-pads"): _ROBOTIQ,
     ("classifier", "c45"): _C45,
 }

@@ -65,9 +65,9 @@ def _collected(
     times: dict[str, Messages] = {}
     kept = Unpacked(path)
     for topic, recorded_ns, message in _messages(path, topics):
-        numbers_in = dict(_numbers_in(message, topic))
-        kept.add(sum(_NUMBER_BYTES + 8 * np.size(one) for one in numbers_in.values()))
-        values.setdefault(topic, []).append(numbers_in)
+        columns = dict(numbers_in(message, topic))
+        kept.add(sum(_NUMBER_BYTES + 8 * np.size(one) for one in columns.values()))
+        values.setdefault(topic, []).append(columns)
         times.setdefault(topic, Messages()).add(recorded_ns, stamp_ns(message))
     values = {topic: found for topic, found in values.items() if found[0]}
     if not values:
@@ -148,7 +148,7 @@ def _mcap_records(path: Path) -> Iterator[McapRecord]:
                 yield record
 
 
-def _numbers_in(value: Any, name: str) -> Iterator[tuple[str, Any]]:
+def numbers_in(value: Any, name: str) -> Iterator[tuple[str, Any]]:
     """Yield the name and the value of each number, and of each array of numbers, in a message."""
     for field in getattr(value, "__dataclass_fields__", ()):
         if field.startswith("__"):
@@ -161,7 +161,7 @@ def _numbers_in(value: Any, name: str) -> Iterator[tuple[str, Any]]:
         ):
             yield here, inner.astype(np.float64)
         elif hasattr(inner, "__dataclass_fields__") and field != "header":
-            yield from _numbers_in(inner, here)
+            yield from numbers_in(inner, here)
 
 
 def read_topics(path: Path) -> list[ColumnTable]:

@@ -1,0 +1,276 @@
+"""A gripper behind ROS 2 as a sensor backend: topics measure, an action moves."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections import deque
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from math import inf, isfinite, nan
+from types import MappingProxyType
+from typing import Final, final
+
+from graspsense.plugin_api import (
+    FORCE,
+    NO_PADS,
+    POSITION,
+    Channel,
+    Command,
+    ConfigError,
+    DeviceInfo,
+    DeviceLost,
+    Frame,
+    NoDevice,
+    Pads,
+    Reading,
+    SensorBackend,
+)
+from graspsense_ros2.action_client import MOST_FAILURES, GripperAction, Target
+from graspsense_ros2.config import Ros2Config
+from graspsense_ros2.message_types import is_known
+from graspsense_ros2.newest_messages import NewestMessage
+from graspsense_ros2.node import Node, ServiceFailed, open_node
+
+SLOPE_FRAMES: Final = 6
+GOAL_PERIOD_S: Final = 0.05
+"""Time between two goals while the target moves."""
+AHEAD_M: Final = 0.004
+"""How far the target can be ahead of the fingers while they close."""
+LOOK_AGAIN_S: Final = 0.1
+_MUST_BE_NUMBERS: Final = frozenset({"gap", "force_left", "force_right"})
+_UNITS: Final = {"gap": "m", "velocity": "m/s", "effort": "N", "force_left": "N", "force_right": "N"}
+
+
+@final
+class Ros2Backend(SensorBackend[Ros2Config]):
+    """A gripper that is measured by topics and closes by itself to the goals of an action."""
+
+    accepts = ("position", "force")
+    closes_itself: Mapping[str, str] = MappingProxyType(
+        {
+            "position": "goals that approach the target at its speed, with its force as their effort",
+            "force": "goals that approach the closed position at its speed, with this force as their effort",
+        }
+    )
+
+    def __init__(self, config: Ros2Config) -> None:
+        super().__init__(config)
+        self.least_force_n = config.least_effort_n
+        self.command_delay_s = config.delay_s
+        self._numbers = config.numbers()
+        self._node: Node | None = None
+        self._action: GripperAction | None = None
+        self._topics: dict[str, NewestMessage] = {}
+        self._frames = 0
+        self._report: dict[str, float | int | str | bool] = {}
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """The gap, its rate, and what else the settings name."""
+        names = dict.fromkeys(("gap", "velocity", *self._numbers))
+        return tuple(Channel(name, _UNITS[name], self.config.rate_hz) for name in names)
+
+    def open(self, seed: int) -> DeviceInfo:
+        """Subscribe to the topics and look for the action; no finger moves. Raises NoDevice."""
+        self.close()
+        self._report = {}
+        until = time.monotonic() + self.config.open_timeout_s
+        try:
+            self._node = open_node(f"graspsense_gripper_{os.getpid()}", self.config.through)
+            topics = sorted({topic for number in self._numbers.values() for topic in number.topics})
+            self._topics = {topic: self._subscribed(topic, until) for topic in topics}
+            for newest in self._topics.values():
+                if not newest.wait(max(0.0, until - time.monotonic())):
+                    raise NoDevice(f"no message on {newest.topic}, although it is announced{_damage(newest)}")
+            self._action = self._answering(until)
+            self._began_s = self._last_s = self._due_s = time.monotonic()
+            self._good = dict.fromkeys(self._numbers, (nan, self._began_s))
+            self._recent: deque[tuple[float, float]] = deque(maxlen=SLOPE_FRAMES)
+            self._gap_m = self._measured()["gap"]
+        except (DeviceLost, ConfigError) as error:
+            self.close()
+            raise NoDevice(str(error)) from error
+        except NoDevice:
+            self.close()
+            raise
+        self._frames = 0
+        self._target_m, self._opening = self._gap_m, True
+        self._sent: Target | None = None
+        self._sent_s = -inf
+        return self._described()
+
+    def read(self, timeout_s: float) -> Reading | None:
+        """Wait for the next frame, and return the newest numbers. Raises DeviceLost."""
+        if self._action is None:
+            raise DeviceLost("the gripper behind ROS 2 is not open")
+        wait_s = self._due_s - time.monotonic()
+        time.sleep(max(0.0, min(wait_s, timeout_s)))
+        if wait_s > timeout_s:
+            return None
+        self._due_s = max(self._due_s, time.monotonic()) + 1.0 / self.config.rate_hz
+        if self._action.failures >= MOST_FAILURES:
+            raise DeviceLost(f"{MOST_FAILURES} goals in a row failed: {self._action.said}")
+        numbers = self._measured()
+        now_s = time.monotonic()
+        t_s, dt_s, self._last_s = now_s - self._began_s, now_s - self._last_s, now_s
+        self._gap_m = numbers["gap"]
+        self._recent.append((t_s, self._gap_m))
+        (start_s, start_m), span = self._recent[0], len(self._recent)
+        slope = (self._gap_m - start_m) / (t_s - start_s) if span > 1 else 0.0
+        velocity, effort = numbers.get("velocity", slope), numbers.get("effort", nan)
+        left, right = numbers.get("force_left", nan), numbers.get("force_right", nan)
+        self._frames += 1
+        return Reading(Frame(t_s, dt_s, self._gap_m, velocity, effort, left, right, nan, nan, 0), NO_PADS)
+
+    def apply(self, command: Command) -> None:
+        """Send the goal that this command becomes, unless it was sent already."""
+        assert self._action is not None
+        kind, value, effort_limit, speed_limit = command
+        config = self.config
+        stops = kind not in (POSITION, FORCE) or (kind == FORCE and value <= 0.0)
+        goal = self._gap_m if stops else value if kind == POSITION else 0.0
+        effort = (
+            config.least_effort_n if stops else effort_limit if kind == POSITION else min(value, effort_limit)
+        )
+        speed = min(speed_limit, config.speed_limit_m_s)
+        step = speed / config.rate_hz
+        # Where the fingers turn, the target that is left from the other direction would still push or pull.
+        ahead = (self._gap_m, inf) if goal > self._gap_m else (self._gap_m - AHEAD_M, self._gap_m)
+        self._target_m = min(
+            max(self._target_m + min(max(goal - self._target_m, -step), step), ahead[0]), ahead[1]
+        )
+        if stops:
+            self._target_m = self._gap_m
+        self._opening = goal >= config.open_gap_m
+        target = Target(
+            position=self._position(self._target_m),
+            effort=min(max(effort, config.least_effort_n), config.effort_limit_n),
+            speed=speed,
+        )
+        now_s = time.monotonic()
+        if target != self._sent and now_s - self._sent_s >= GOAL_PERIOD_S:
+            self._sent, self._sent_s = target, now_s
+            self._action.want(target)
+
+    def tare(self, images: Sequence[Pads]) -> None:
+        """Do nothing: the topics give forces, whose zero is a matter of the driver."""
+
+    def close(self) -> None:
+        """Tell the fingers to open if they were not, and leave the network."""
+        node, self._node = self._node, None
+        action, self._action = self._action, None
+        if action is not None:
+            action.end()
+            if self._sent is not None and not self._opening:
+                self._report["told_to_open"] = self._told_to_open(action)
+            self._report |= {
+                "frames": self._frames,
+                "goals": action.goals,
+                "damaged_messages": sum(newest.damaged for newest in self._topics.values()),
+                "late_messages": sum(newest.late for newest in self._topics.values()),
+            }
+        if node is not None:
+            node.close()
+
+    def report(self) -> dict[str, float | int | str | bool]:
+        """Return the number of frames, of goals, and of messages that could not be used."""
+        return self._report
+
+    def _told_to_open(self, action: GripperAction) -> bool:
+        config = self.config
+        with suppress(ServiceFailed):
+            action.send(Target(config.position_open, config.effort_limit_n, config.speed_limit_m_s))
+            return True
+        with suppress(ServiceFailed):
+            action.cancel()
+        return False
+
+    def _position(self, gap_m: float) -> float:
+        """Return the position of the action for a gap, within its ends."""
+        config = self.config
+        share = min(max(gap_m / config.open_gap_m, 0.0), 1.0)
+        return config.position_closed + share * (config.position_open - config.position_closed)
+
+    def _measured(self) -> dict[str, float]:
+        """Return the newest number of each channel. Raises DeviceLost where one is missing for too long."""
+        config, now_s = self.config, time.monotonic()
+        columns: dict[str, object] = {}
+        for newest in self._topics.values():
+            if newest.age_s() > config.silent_s:
+                raise DeviceLost(
+                    f"no message on {newest.topic} for {config.silent_s:g} s{_damage(newest)}: look at the node that "
+                    "publishes it (gripper.silent_s)"
+                )
+            columns |= newest.columns
+        numbers = {}
+        for name, number in self._numbers.items():
+            try:
+                value = number.value(columns)  # type: ignore[arg-type]
+            except ConfigError as error:
+                raise DeviceLost(f"gripper settings, {name}: {error}") from error
+            if isfinite(value) or name not in _MUST_BE_NUMBERS:
+                self._good[name] = (value, now_s)
+            elif now_s - self._good[name][1] > config.silent_s or self._good[name][0] != self._good[name][0]:
+                raise DeviceLost(f"{number.text} is {value} for longer than {config.silent_s:g} s")
+            numbers[name] = self._good[name][0]
+        return numbers
+
+    def _subscribed(self, topic: str, until: float) -> NewestMessage:
+        """Subscribe to a topic with the type that it is published with. Raises NoDevice."""
+        assert self._node is not None
+        types: Sequence[str] = ()
+        while not types:
+            types = self._node.types_of(topic)
+            if not types and time.monotonic() > until:
+                raise NoDevice(
+                    f"nobody publishes {topic} within {self.config.open_timeout_s:g} s. Look at ROS_DOMAIN_ID, at the "
+                    "router (ros2 run rmw_zenoh_cpp rmw_zenohd), and at the names in the settings of the gripper"
+                )
+            time.sleep(0.0 if types else LOOK_AGAIN_S)
+        if len(types) > 1 or not is_known(types[0]):
+            raise NoDevice(
+                f"{topic} has the type {', '.join(types)}: it has to be one, of the common interfaces of ROS, such as "
+                "sensor_msgs/msg/JointState, geometry_msgs/msg/WrenchStamped or std_msgs/msg/Float64MultiArray"
+            )
+        newest = NewestMessage(topic, types[0])
+        self._node.subscribe(topic, types[0], newest.take)
+        return newest
+
+    def _answering(self, until: float) -> GripperAction:
+        """Return the action once it answers. Raises NoDevice."""
+        assert self._node is not None
+        config = self.config
+        action = GripperAction(self._node, config.action, config.action_type, config.joint)
+        while True:
+            try:
+                # Without a goal there is nothing to cancel: this asks only whether it is there.
+                action.cancel()
+                return action
+            except ServiceFailed as error:
+                if time.monotonic() > until:
+                    action.end()
+                    raise NoDevice(f"the action {config.action} ({config.action_type}): {error}") from error
+                time.sleep(LOOK_AGAIN_S)
+
+    def _described(self) -> DeviceInfo:
+        config = self.config
+        return DeviceInfo(
+            name=f"gripper behind ROS 2 ({config.action})",
+            clock="device",
+            rate_hz=config.rate_hz,
+            effort_limit_n=config.effort_limit_n,
+            speed_limit_m_s=config.speed_limit_m_s,
+            opening=Command(POSITION, config.open_gap_m, config.effort_limit_n, config.speed_limit_m_s),
+            relaxed=Command(FORCE, 0.0, inf, inf),
+            numbers={name: number.text for name, number in self._numbers.items()},
+            notes=(
+                "forces and gap are those of ROS topics; their calibration and their zero are a matter of the driver",
+            ),
+        )
+
+
+def _damage(newest: NewestMessage) -> str:
+    counts = {"damaged": newest.damaged, "late": newest.late}
+    words = [f"{count} {what}" for what, count in counts.items() if count]
+    return f" ({', '.join(words)})" if words else ""

@@ -1,0 +1,75 @@
+"""The newest message of each topic that a gripper is measured by, and how old it is."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Mapping
+from math import inf
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from attrs import define, field
+
+from graspsense.gripper_api import message_columns
+from graspsense_ros2.message_types import BadMessage, decode
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+
+@define(eq=False)
+class NewestMessage:
+    """The newest message of one topic; what cannot be used counts as if it had not come.
+
+    A message that is damaged or not of the type is `damaged`. One whose stamp is before that of the newest one is
+    `late`, and is left out. A stamp that falls behind makes a message as old as it says: `age_s` adds by how much later
+    it came than the quickest one.
+    """
+
+    topic: str
+    type_name: str
+    damaged: int = 0
+    late: int = 0
+    columns: Mapping[str, NDArray[np.float64]] = field(factory=dict)
+    _came_s: float = -inf
+    _stamp_s: float = -inf
+    _quickest_s: float = inf
+    _lateness_s: float = 0.0
+    _came: threading.Event = field(factory=threading.Event)
+
+    def take(self, data: bytes) -> None:
+        """Receive a message. It is called in the thread of the network."""
+        now_s = time.monotonic()
+        try:
+            message = decode(self.type_name, data)
+        except BadMessage:
+            self.damaged += 1
+            return
+        stamp_s = _stamp_of(message)
+        if stamp_s is not None:
+            if stamp_s < self._stamp_s:
+                self.late += 1
+                return
+            self._stamp_s = stamp_s
+            self._quickest_s = min(self._quickest_s, now_s - stamp_s)
+            self._lateness_s = now_s - stamp_s - self._quickest_s
+        self.columns = message_columns(message, self.topic)
+        self._came_s = now_s
+        self._came.set()
+
+    def age_s(self) -> float:
+        """Return how old the newest message is; inf if none came."""
+        return time.monotonic() - self._came_s + self._lateness_s
+
+    def wait(self, timeout_s: float) -> bool:
+        """Wait for the first message, and return whether it came."""
+        return self._came.wait(timeout_s)
+
+
+def _stamp_of(message: Any) -> float | None:
+    """Return the stamp (s) in the header of a message; None without one, or where it was not set."""
+    stamp = getattr(getattr(message, "header", None), "stamp", None)
+    if stamp is None or not (stamp.sec or stamp.nanosec):
+        return None
+    return float(stamp.sec) + 1e-9 * float(stamp.nanosec)
