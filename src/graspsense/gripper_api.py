@@ -14,6 +14,9 @@ _TABLE: Final[Table] = {
     },
     "Emulated devices": {
         "core.components.emulated": ("EmulatedDevice",),
+        "core.components.emulated_port": ("EmulatedPort",),
+        "core.components.emulated_serial": ("EmulatedSerial", "SerialFaults"),
+        "core.grasp.emulated_fingers": ("EmulatedFingers", "FingerTarget"),
         "core.components.entries": ("EmulatorEntry",),
     },
     "Reading threads and clocks of devices": {

@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from graspsense.gripper_api import EmulatedPort
 from graspsense.plugin_api import POSITION, Command, create
 from graspsense.testing_api import parametrize_checks
 from graspsense_robotiq_2f.emulator import fingertips
-from graspsense_robotiq_2f.emulator.fingertips import COUNTS_PER_N, REST_COUNTS, EmulatedFingertips, Felt
-from graspsense_robotiq_2f.emulator.port import SerialPort
+from graspsense_robotiq_2f.emulator.fingertips import COUNTS_PER_N, REST_COUNTS, EmulatedFingertips
 from graspsense_robotiq_2f.tactile import TactileFingertips
 from graspsense_robotiq_2f.tactile_protocol import (
     CELLS,
@@ -73,7 +73,7 @@ def clock(monkeypatch):
 
 
 def test_every_period_has_one_packet_and_images_come_at_60_hz(clock):
-    tips = EmulatedFingertips(lambda: Felt(2.0, 4.0))
+    tips = EmulatedFingertips(lambda: (2.0, 4.0))
     tips.heard(packet(0x58, bytes((1,))))
     packets = Packets()
     found = []
@@ -92,7 +92,7 @@ def test_every_period_has_one_packet_and_images_come_at_60_hz(clock):
 
 
 def test_they_are_silent_until_asked_and_after_a_period_of_zero(clock):
-    tips = EmulatedFingertips(lambda: Felt(0.0, 0.0))
+    tips = EmulatedFingertips(lambda: (0.0, 0.0))
     clock.now_s = 1.0
     assert tips.unasked() == b""
     [(command, _)] = Packets().fed(tips.heard(packet(READ)))
@@ -104,8 +104,8 @@ def test_they_are_silent_until_asked_and_after_a_period_of_zero(clock):
 
 @pytest.fixture
 def port():
-    tips = EmulatedFingertips(lambda: Felt(2.0, 4.0))
-    port = SerialPort("pty", tips.heard, tips.unasked, 0.001)
+    tips = EmulatedFingertips(lambda: (2.0, 4.0))
+    port = EmulatedPort("pty", tips.heard, tips.unasked, 0.001)
     yield port
     port.close()
 

@@ -2,34 +2,12 @@
 
 from __future__ import annotations
 
-from math import inf
 from typing import Any, Literal
 
 from attrs import frozen
 
+from graspsense.gripper_api import SerialFaults
 from graspsense.plugin_api import NAMES_INPUT, setting
-
-
-@frozen(kw_only=True)
-class RobotiqFaults:
-    """Faults of the emulated gripper, by default none. Times are counted from its activation."""
-
-    unplug_at_s: float = setting(
-        default=inf, unit="s", minimum=0.0, meaning="Time at which the cable is pulled; inf: never."
-    )
-    mood: Literal["well", "silent", "damaged", "late", "repeated"] = setting(
-        default="well",
-        meaning="silent: no reply. damaged: a bit of each reply is flipped. late: each reply comes after late_s. "
-        "repeated: each reply comes twice.",
-    )
-    mood_at_s: float = setting(default=0.0, unit="s", minimum=0.0, meaning="Time from which on mood acts.")
-    late_s: float = setting(
-        default=0.3,
-        unit="s",
-        above=0.0,
-        plausible=(1e-4, 10.0),
-        meaning="Time by which a late reply is late.",
-    )
 
 
 @frozen(kw_only=True)
@@ -82,7 +60,7 @@ class RobotiqConfig:
         effect=NAMES_INPUT,
         meaning="Emulated only: the object between the fingers; not set: the default of body.",
     )
-    faults: RobotiqFaults = setting(factory=RobotiqFaults, meaning="Emulated only: faults of the gripper.")
+    faults: SerialFaults = setting(factory=SerialFaults, meaning="Emulated only: faults of the gripper.")
 
     def __attrs_post_init__(self) -> None:
         if self.port == "emulated":

@@ -43,7 +43,6 @@ SHIPPED: Final[dict[tuple[Role, str], Shipped]] = {
     ("sensor-backend", "sim"): _SIM,
     ("sensor-backend", "mujoco"): _MUJOCO,
     ("sensor-backend", "robotiq"): _ROBOTIQ,
-    ("feature-set", "chitta-without-pads"): _ROBOTIQ,
     ("classifier", "c45"): _C45,
 }
 """Components in other distributions of this project, for the hint if one is not installed."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import Final, NamedTuple
+from typing import Final
 
 from graspsense_robotiq_2f.tactile_protocol import (
     ACCELERATION,
@@ -41,22 +41,15 @@ _SHAPE: Final = [
 _TOTAL: Final = sum(_SHAPE)
 
 
-class Felt(NamedTuple):
-    """What the pads feel: the forces (N) on the left and the right one."""
-
-    left_n: float
-    right_n: float
-
-
 class EmulatedFingertips:
     """Two fingertips whose forces `felt` returns. `heard` and `unasked` are the two sides of a port."""
 
-    def __init__(self, felt: Callable[[], Felt]) -> None:
+    def __init__(self, felt: Callable[[], tuple[float, float]]) -> None:
         self._felt = felt
         self._packets = Packets()
         self._began_s = time.monotonic()
         self._period_s = self._due_s = self._pressed_s = 0.0
-        self._last = Felt(0.0, 0.0)
+        self._last = (0.0, 0.0)
         self.sent = 0
         """The number of packets with measurements."""
 
