@@ -34,10 +34,13 @@ _TABLE: Final[Table] = {
     "Calibration: from cell counts to newtons": {
         "core.grasp.calibration": (
             "LoadTable",
+            "MotorTable",
             "cells_force",
             "edge_force",
             "load_of",
+            "load_within",
             "masked",
+            "motor_at",
             "pad_force",
             "tare",
             "zero_of",
@@ -46,6 +49,7 @@ _TABLE: Final[Table] = {
             "calibrations_of",
             "stored_friction",
             "stored_gain",
+            "stored_motor_tables",
             "stored_tables",
             "stored_zero",
         ),

@@ -34,6 +34,7 @@ _PR2 = Shipped("graspsense-pr2-gripper", "pr2_gripper", "pr2")
 _SIM = Shipped("graspsense-sim-gripper", "sim_gripper", "sim")
 _MUJOCO = Shipped("graspsense-mujoco-gripper", "mujoco_gripper", "mujoco")
 _ROBOTIQ = Shipped("graspsense-robotiq-2f", "robotiq_2f", "robotiq")
+_SO101 = Shipped("graspsense-so101-gripper", "so101_gripper", "so101")
 _C45 = Shipped("graspsense-c45", "c45", "c45")
 _PAPER = Shipped("graspsense-paper", "paper", "paper")
 _IDENTIFY = Shipped("graspsense-identify", "identify", "identify")
@@ -43,6 +44,7 @@ SHIPPED: Final[dict[tuple[Role, str], Shipped]] = {
     ("sensor-backend", "sim"): _SIM,
     ("sensor-backend", "mujoco"): _MUJOCO,
     ("sensor-backend", "robotiq"): _ROBOTIQ,
+    ("sensor-backend", "so101"): _SO101,
     ("classifier", "c45"): _C45,
 }
 """Components in other distributions of this project, for the hint if one is not installed."""
