@@ -40,7 +40,7 @@ from graspsense_so101_gripper.emulator.arm import EmulatedArm
 from graspsense_so101_gripper.faults import STATUS_BITS
 from graspsense_so101_gripper.force import ForceOfMotor
 from graspsense_so101_gripper.identity import Unfit, jaw_of
-from graspsense_so101_gripper.jaw import RADIANS_A_STEP, Jaw
+from graspsense_so101_gripper.jaw import RADIANS_A_STEP
 from graspsense_so101_gripper.registers import (
     AMPERES_A_STEP,
     FULL_LOAD,
@@ -138,8 +138,8 @@ class So101Backend(SensorBackend[So101Config]):
             memory = self._tried(lambda bus: bus.read(config.motor, *IDENTITY))
             self._jaw = jaw_of(memory, config, arm)
             state = self._state()
-            self._found = state.asked
-            self._hold(state)
+            self._found, self._position, self._stopped = state.asked, state.position, True
+            self._ask(self._asked_of(state.position, SPEED_LIMIT_M_S, config.moving_force_n))
         except (OSError, NoReply, Unfit) as error:
             self.close()
             raise NoDevice(
@@ -160,7 +160,7 @@ class So101Backend(SensorBackend[So101Config]):
         if wait_s > 0.0:
             time.sleep(wait_s)
         # On a grid of times, so that the duration of an exchange does not lower the rate; lost time is not made up.
-        self._due_s = max(self._due_s, time.monotonic()) + 1.0 / RATE_HZ
+        self._due_s = max(self._due_s + 1.0 / RATE_HZ, time.monotonic())
         state = self._still_ours(self._kept(self._state))
         now_s = time.monotonic()
         t_s, dt_s, self._last_s = now_s - self._began_s, now_s - self._last_s, now_s
@@ -209,8 +209,8 @@ class So101Backend(SensorBackend[So101Config]):
         """Stop the jaw if the motor still responds, give it back as it was found, and close the bus."""
         bus, self._bus = self._bus, None
         if bus is not None:
-            if (found := self._found) is not None:
-                _tried(bus, lambda bus: self._give_back(bus, found))
+            if self._found is not None:
+                self._give_back(bus, self._found)
             bus.close()
         self._found = self._asked = None
         emulated, self._emulated = self._emulated, None
@@ -230,11 +230,6 @@ class So101Backend(SensorBackend[So101Config]):
             return So101Backend(config)
         return So101Backend(evolve(config, port="emulated", arm_calibration="", calibration="none"))
 
-    def _hold(self, state: MotorState) -> None:
-        """Ask the motor to stay where it is, with the limits of this gripper."""
-        self._position, self._stopped = state.position, True
-        self._ask(self._asked_of(state.position, SPEED_LIMIT_M_S, inf))
-
     def _asked_of(self, goal: int, speed_m_s: float, force_n: float) -> Asked:
         # A speed of 0 is the highest one to this motor.
         speed = max(int(self._jaw.speed(self._jaw.gap_m(self._position), min(speed_m_s, SPEED_LIMIT_M_S))), 1)
@@ -247,8 +242,15 @@ class So101Backend(SensorBackend[So101Config]):
             self._asked = asked
 
     def _give_back(self, bus: ServoBus, found: Asked) -> None:
-        position = motor_state(bus.read(self.config.motor, *STATE)).position
-        bus.write(self.config.motor, STATE[0], found._replace(goal_position=position, goal_time=0).written())
+        """Let the motor stay where it is, with the torque and the limits that it had before, also if it only hears."""
+        motor, position = self.config.motor, self._position
+        with suppress(NoReply, OSError):
+            position = motor_state(bus.read(motor, *STATE)).position
+        stop = found._replace(goal_position=position, goal_time=0).written()
+        for _ in range(ATTEMPTS):
+            with suppress(NoReply, OSError):
+                bus.write(motor, STATE[0], stop)
+                return
 
     def _state(self) -> MotorState:
         return motor_state(self._tried(lambda bus: bus.read(self.config.motor, *STATE)))
@@ -262,7 +264,9 @@ class So101Backend(SensorBackend[So101Config]):
             if not state.asked.torque_enable
             else "another program commands it: end that"
         )
-        raise DeviceLost(f"motor {self.config.motor} at {self.config.port} is not asked what was written: {why}")
+        raise DeviceLost(
+            f"motor {self.config.motor} at {self.config.port} is not asked what was written: {why}"
+        )
 
     def _tried(self, exchange: Callable[[ServoBus], ReplyT]) -> ReplyT:
         """Return the result of an exchange, which is repeated without a reply. Raises NoReply, OSError."""
@@ -293,7 +297,7 @@ class So101Backend(SensorBackend[So101Config]):
             "is in nine of ten readings"
             if self._force.calibrated
             else f"effort is the motor's {config.force_from} times its stall torque over gripper.jaw_length_m: an "
-            "assumption, until `graspsense calibrate load-cell`"
+            "assumption, off by up to the full force until `graspsense calibrate load-cell`"
         )
         return DeviceInfo(
             name="emulated SO-101 gripper" if emulated else "SO-101 gripper",
@@ -311,11 +315,3 @@ class So101Backend(SensorBackend[So101Config]):
             status_bits=STATUS_BITS,
             notes=(measured, *(("emulated: no gripper was touched",) if emulated else ())),
         )
-
-
-def _tried(bus: ServoBus, exchange: Callable[[ServoBus], None]) -> None:
-    """Do an exchange, up to three times, whatever becomes of it."""
-    for _ in range(ATTEMPTS):
-        with suppress(NoReply, OSError):
-            exchange(bus)
-            return

@@ -40,7 +40,8 @@ class SerialLine:
 
     def clearPort(self) -> None:  # noqa: N802
         """Forget what came before the next request."""
-        self._serial.reset_input_buffer()
+        # Not by flushing, which raises no OSError where the port is gone.
+        self._serial.read(self._serial.in_waiting)
 
     def writePort(self, packet: list[int]) -> int:  # noqa: N802
         """Send a packet, and return the number of its bytes."""

@@ -16,7 +16,10 @@ class So101Faults(SerialFaults):
     """Faults of the emulated arm, by default none."""
 
     model_number: int = setting(
-        default=MODEL_NUMBER, minimum=0, maximum=65535, meaning="Model that the motor of the gripper says it is."
+        default=MODEL_NUMBER,
+        minimum=0,
+        maximum=65535,
+        meaning="Model that the motor of the gripper says it is.",
     )
 
 
@@ -35,7 +38,8 @@ class So101Config:
         meaning="The calibration file of the arm that LeRobot wrote (JSON); empty: the limits in the motor.",
     )
     calibration: str = setting(
-        default="", meaning="Folder of calibrations of the force; empty: that of the user; none: no calibration."
+        default="",
+        meaning="Folder of calibrations of the force; empty: that of the user; none: no calibration.",
     )
     force_from: Literal["load", "current"] = setting(
         default="load", meaning="Which measurement of the motor the force is estimated from."
@@ -62,7 +66,10 @@ class So101Config:
         meaning="Current of the motor at full load; used with force_from = current.",
     )
     largest_load: float = setting(
-        default=0.7, above=0.0, maximum=1.0, meaning="Largest share of the stall torque that is ever asked for."
+        default=0.7,
+        above=0.0,
+        maximum=1.0,
+        meaning="Largest share of the stall torque that is ever asked for.",
     )
     moving_force_n: float = setting(
         default=3.0,

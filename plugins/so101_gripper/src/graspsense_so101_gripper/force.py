@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import nan
 from typing import Any, NamedTuple, final
 
 from graspsense.gripper_api import load_within, motor_at, stored_motor_tables
@@ -12,7 +11,7 @@ from graspsense_so101_gripper.registers import AMPERES_A_STEP, FULL_LOAD, MotorS
 
 
 class ForceEstimate(NamedTuple):
-    """A force (N, positive closes) and how far off it can be (N); NaN where nobody has measured it."""
+    """A force (N, positive closes) and how far off it can be (N); the full force where no load cell has measured it."""
 
     force_n: float
     error_n: float
@@ -45,10 +44,10 @@ class ForceOfMotor:
     def estimate(self, push: float) -> ForceEstimate:
         """Return the force at this push, by the table of the direction in which the motor pushes."""
         if self._tables is None:
-            return ForceEstimate(self._by_stall_torque(push), nan)
+            return ForceEstimate(self._by_stall_torque(push), self._config.full_force_n)
         closing, opening = self._tables
         force_n, error_n = load_within(closing if push >= 0.0 else opening, abs(push))
-        return ForceEstimate(force_n if push >= 0.0 else -force_n, error_n)
+        return ForceEstimate(force_n if push >= 0.0 else -force_n, min(error_n, self._config.full_force_n))
 
     def torque_limit(self, force_n: float) -> int:
         """Return the torque limit with which the motor presses with at most this force."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Iterable, Sequence
-from math import ceil, nan
+from math import ceil, inf
 from typing import Final, NamedTuple
 
 from graspsense.core.values.errors import ConfigError, TareRefused
@@ -245,9 +245,9 @@ def motor_table(readings: Sequence[tuple[float, float]]) -> MotorTable:
 
 
 def load_within(table: MotorTable, motor: float) -> tuple[float, float]:
-    """Return the force (N, not negative) at this load or current, and how far off it can be; NaN outside the table."""
+    """Return the force (N, not negative) at this load or current, and how far off it can be: inf outside the table."""
     load_n, inside = load_of(table.table, motor)
-    return max(load_n, 0.0), table.error_n if inside else nan
+    return max(load_n, 0.0), table.error_n if inside else inf
 
 
 def motor_at(table: MotorTable, load_n: float) -> float:

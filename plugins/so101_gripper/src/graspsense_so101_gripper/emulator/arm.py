@@ -35,9 +35,7 @@ class EmulatedArm(EmulatedSerial):
     def __init__(self, config: So101Config, wire: str, seed: int) -> None:
         super().__init__(wire, config.faults)
         self._gripper = GripperMotor(config, seed)
-        self._others = {
-            number: Motor(number, MODEL_NUMBER) for number in MOTORS if number != config.motor
-        }
+        self._others = {number: Motor(number, MODEL_NUMBER) for number in MOTORS if number != config.motor}
         # One of them holds the arm, as while another program has it.
         next(iter(self._others.values())).put("torque_enable", 1)
         self._requests_of_bus = Requests({**self._others, config.motor: self._gripper})
@@ -63,7 +61,8 @@ class EmulatedArm(EmulatedSerial):
                 for motor in (self._gripper, *self._others.values()):
                     motor.power_up()
             else:
-                self._gripper.put("goal_position", self._gripper.number("max_position_limit"))
+                limits = [self._gripper.number(f"{end}_position_limit") for end in ("min", "max")]
+                self._gripper.put("goal_position", sum(limits) // 2)
 
     def close(self) -> None:
         """Unplug it and release the body."""

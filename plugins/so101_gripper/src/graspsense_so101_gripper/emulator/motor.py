@@ -17,6 +17,8 @@ OFFSET: Final = -120
 """Closed position and offset of the emulated gripper."""
 VOLTS: Final = 7.4
 CELSIUS: Final = 30
+DEAD_STEPS: Final = 1
+"""Distance from its goal at which the motor does not push."""
 MOVING_STEPS_S: Final = 5.0
 GEARS: Final = {"coulomb_n": 1.5, "breakaway_n": 2.0, "coulomb_spread_n": 0.1}
 """Friction (N) of the simulator's body where the settings give none: that of a geared motor, an assumption."""
@@ -104,8 +106,9 @@ class GripperMotor(Motor):
         jaw, fingers = self._jaw, self.fingers
         goal = self.number("goal_position")
         speed = abs(self.number("goal_velocity")) or FASTEST
+        there = abs(goal - self.number("present_position")) <= DEAD_STEPS
         target = FingerTarget(
-            jaw.gap_m(goal),
+            fingers.gap_m if there else jaw.gap_m(goal),
             abs(jaw.gap_rate(jaw.position(fingers.gap_m), speed)),
             self._full_n * min(self.number("torque_limit"), FULL_LOAD) / FULL_LOAD,
         )

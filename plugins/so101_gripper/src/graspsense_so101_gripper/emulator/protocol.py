@@ -76,9 +76,7 @@ class Requests:
                 self._write(given[start], given[0], given[start + 1 : start + size])
             return b""
         addressed = list(self._motors) if target == BROADCAST else [target]
-        replies = [
-            self._single(motor, instruction, given) for motor in addressed if motor in self._motors
-        ]
+        replies = [self._single(motor, instruction, given) for motor in addressed if motor in self._motors]
         return b"".join(replies) if target != BROADCAST or instruction == PING else b""
 
     def _single(self, motor: int, instruction: int, given: bytes) -> bytes:
