@@ -41,8 +41,8 @@ def read_arm_calibration(path: Path) -> ArmMotor:
         ) from error
     except (ValueError, TypeError, RecursionError) as error:
         raise DataDamaged(
-            f"{path} is no calibration of an arm that LeRobot wrote ({error}): give its file, or calibrate the arm with "
-            "lerobot-calibrate"
+            f"{path} is no calibration of an arm that LeRobot wrote ({error}): give its file, or calibrate the arm "
+            "with lerobot-calibrate"
         ) from error
 
 

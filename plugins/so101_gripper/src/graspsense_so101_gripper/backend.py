@@ -285,7 +285,8 @@ class So101Backend(SensorBackend[So101Config]):
             return exchange()
         except (NoReply, OSError) as error:
             raise DeviceLost(
-                f"motor {self.config.motor} at {self.config.port} does not answer ({error}): look at its cable and power"
+                f"motor {self.config.motor} at {self.config.port} does not answer ({error}): look at its "
+                "cable and power"
             ) from error
 
     def _described(

@@ -16,7 +16,7 @@ def graspsense_sensor_backends() -> Iterable[SensorBackendEntry]:
     yield SensorBackendEntry(
         name="so101",
         target="graspsense_so101_gripper.backend:So101Backend",
-        summary="the gripper of an SO-101 arm (Feetech STS3215 on a serial bus); position, load and current of its motor",
+        summary="the gripper of an SO-101 arm (Feetech STS3215 on a serial bus); position, load and current",
         needs='pip install "graspsense[so101]"; on Linux your user in the group dialout',
     )
 

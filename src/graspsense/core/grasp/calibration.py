@@ -245,9 +245,13 @@ def motor_table(readings: Sequence[tuple[float, float]]) -> MotorTable:
 
 
 def load_within(table: MotorTable, motor: float) -> tuple[float, float]:
-    """Return the force (N, not negative) at this load or current, and how far off it can be: inf outside the table."""
+    """Return the force (N, not negative) at this load or current, and how far off it can be.
+
+    That is inf beyond the last reading. Below the first one, it can be any force up to that of this reading.
+    """
     load_n, inside = load_of(table.table, motor)
-    return max(load_n, 0.0), table.error_n if inside else inf
+    least_n = table.table.load_n[1] if motor < table.table.pad_n[1] else 0.0
+    return max(load_n, 0.0), max(table.error_n, least_n) if inside else inf
 
 
 def motor_at(table: MotorTable, load_n: float) -> float:
