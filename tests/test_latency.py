@@ -12,7 +12,17 @@ from graspsense.cli.main import main
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.calibrating import CalibrationFailed
 from graspsense.core.grasp.latency import latency_findings, measured_latency
-from graspsense.plugin_api import EFFORT, NO_PADS, VELOCITY, Channel, Command, DeviceInfo, Frame, Reading, SensorBackend
+from graspsense.plugin_api import (
+    EFFORT,
+    NO_PADS,
+    VELOCITY,
+    Channel,
+    Command,
+    DeviceInfo,
+    Frame,
+    Reading,
+    SensorBackend,
+)
 
 RATE_HZ = 200.0
 FRICTION_N = 5.0
@@ -92,6 +102,7 @@ def test_without_a_block_or_enough_force_it_is_said_why_there_is_none():
     assert len(measured.motion_s) == 2
     assert not measured.force_s
     assert "block" in measured.no_force
+    gripper = DelayedGripper(2)
     with pytest.raises(CalibrationFailed, match="first_effort_n"):
         measured_latency(gripper, gripper.accepts, gripper.info(), RunConfig(first_effort_n=4.0), 1)
 

@@ -21,7 +21,7 @@ _TABLE: Final[Table] = {
     },
     "Reading threads and clocks of devices": {
         "core.grasp.reading_thread": ("ReadingThread",),
-        "core.grasp.device_clock": ("DeviceClock",),
+        "core.grasp.device_clock": ("DeviceClock", "clock_report"),
     },
     "Fingers, and where the gripper is mounted": {
         "core.values.fingers": ("FingerForce", "opposed_forces"),

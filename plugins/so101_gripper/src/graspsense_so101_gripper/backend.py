@@ -103,6 +103,7 @@ class So101Backend(SensorBackend[So101Config]):
         self._found: Asked | None = None
         self._asked: Asked | None = None
         self._frames = self._retries = 0
+        self._exchange_s = 0.0
         self._body_report: Mapping[str, float | int | str | bool] = {}
 
     def objects(self) -> Sequence[ObjectKind]:
@@ -133,6 +134,7 @@ class So101Backend(SensorBackend[So101Config]):
         found = calibrations_of(config.calibration, serial, numbers)
         self._force = ForceOfMotor(config, found)
         self._frames = self._retries = 0
+        self._exchange_s = 0.0
         try:
             self._bus = ServoBus(port, config.reply_timeout_s)
             memory = self._tried(lambda bus: bus.read(config.motor, *IDENTITY))
@@ -161,8 +163,10 @@ class So101Backend(SensorBackend[So101Config]):
             time.sleep(wait_s)
         # On a grid of times, so that the duration of an exchange does not lower the rate; lost time is not made up.
         self._due_s = max(self._due_s + 1.0 / RATE_HZ, time.monotonic())
+        asked_s = time.monotonic()
         state = self._still_ours(self._kept(self._state))
         now_s = time.monotonic()
+        self._exchange_s = max(self._exchange_s, now_s - asked_s)
         t_s, dt_s, self._last_s = now_s - self._began_s, now_s - self._last_s, now_s
         self._position = state.position
         gap_m = self._jaw.gap_m(state.position)
@@ -221,7 +225,12 @@ class So101Backend(SensorBackend[So101Config]):
     def report(self) -> dict[str, float | int | str | bool]:
         """Return the number of frames, and of repeated exchanges, with what the emulated body knows."""
         body = self._body_report if self._emulated is None else self._emulated.body_report
-        return {**body, "frames": self._frames, "repeated": self._retries}
+        return {
+            **body,
+            "frames": self._frames,
+            "repeated": self._retries,
+            "frame_uncertainty_s": self._exchange_s,
+        }
 
     def dry_run_backend(self) -> So101Backend:
         """Return the emulated gripper."""

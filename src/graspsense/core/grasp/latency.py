@@ -11,6 +11,8 @@ from math import inf, isnan
 from statistics import median
 from typing import Any, Final, NamedTuple
 
+from attrs import evolve
+
 from graspsense.core.components.entries import Finding
 from graspsense.core.components.roles import SensorBackend
 from graspsense.core.components.run_config import RunConfig
@@ -46,7 +48,7 @@ def measured_latency(
 ) -> Latency:
     """Move an open gripper so many times, and squeeze what is between its fingers with the limits of a first use.
 
-    `accepts` are the kinds of command that it declares. Raises CalibrationFailed if the fingers do not move, DeviceLost.
+    `accepts` are the kinds of command that it declares. Raises CalibrationFailed if the fingers do not move.
     """
     meter = _Meter(backend, accepts, info, run)
     motion, force, no_force = [], [], ""
@@ -80,10 +82,9 @@ def _finding(subject: str, latencies_s: tuple[float, ...], declared_s: float, in
     return Finding(
         subject,
         "problem" if slow else "ok",
-        f"{median(latencies_s) * 1e3:.1f} ms (median of {len(latencies_s)}), at most {largest_s * 1e3:.1f} ms; of this up "
-        f"to {frame_s * 1e3:.1f} ms are the time of a frame",
-        f"it declares {declared_s * 1e3:g} ms: look at the load of this computer and at the latency timer of the serial "
-        "port"
+        f"{median(latencies_s) * 1e3:.1f} ms (median of {len(latencies_s)}), at most {largest_s * 1e3:.1f} ms; of this "
+        f"up to {frame_s * 1e3:.1f} ms are the time of a frame",
+        f"it declares {declared_s * 1e3:g} ms: look at the load of this computer and at the latency timer of the port"
         if slow
         else "",
         numbers={
@@ -99,7 +100,9 @@ class _Meter:
     def __init__(
         self, backend: SensorBackend[Any], accepts: Sequence[str], info: DeviceInfo, run: RunConfig
     ) -> None:
-        self.rig = Rig(backend, info, run)
+        # At the speed of a first use, a wide gripper needs its time to open.
+        patient = evolve(run, opening_timeout_s=max(run.opening_timeout_s, CLOSING_S))
+        self.rig = Rig(backend, info, patient)
         self._speed_m_s = run.first_speed_m_s
         self._moved_m = LEAST_M
         self._most_n = run.first_effort_n
@@ -136,7 +139,7 @@ class _Meter:
         if more_n <= light_n:
             return (
                 inf,
-                f"run.first_effort_n is {more_n:g} N, not more than the {light_n:g} N that close the fingers: raise it",
+                f"raise run.first_effort_n: it is {more_n:g} N, and {light_n:g} N only close the fingers",
             )
         quiet = self._until_they_stand(light_n)
         if not quiet:
@@ -147,11 +150,9 @@ class _Meter:
         noise_n = _noise(map(_force_n, quiet))
         level_n = max(map(_force_n, quiet))
         found = self._until(more_n, before, lambda frame: _force_n(frame) - level_n > max(noise_n, LEAST_N))
-        return (
-            (inf, f"no force followed within {ANSWER_S:g} s: raise run.first_effort_n")
-            if found is None
-            else (found, "")
-        )
+        if found is None:
+            return inf, f"no force followed within {ANSWER_S:g} s: raise run.first_effort_n"
+        return found, ""
 
     def _closing(self, force_n: float) -> Command:
         value = {EFFORT: force_n, VELOCITY: -self._speed_m_s, POSITION: 0.0, FORCE: force_n}[self._kind]
