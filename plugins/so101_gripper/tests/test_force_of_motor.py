@@ -14,7 +14,7 @@ from graspsense_so101_gripper import backend
 from graspsense_so101_gripper.config import So101Config
 from graspsense_so101_gripper.emulator.motor import CLOSED, GripperMotor
 from graspsense_so101_gripper.jaw import Jaw
-from graspsense_so101_gripper.registers import FULL_LOAD, STATE, Asked
+from graspsense_so101_gripper.registers import FULL_LOAD, STATE, MotorRequest
 
 PATIENT_S = 60.0
 LIMITS = [190, 300, 260, 420, 350, 500, 440, 320, 250, 380, 470, 330, 210, 290, 390, 460, 340, 240, 490, 310]
@@ -31,7 +31,7 @@ def closed_on_a_block(limits):
 
     def goes(goal, limit, seconds):
         nonlocal now_s
-        motor.write(STATE[0], Asked(1, 50, goal, 0, 60, limit).written())
+        motor.write(STATE[0], MotorRequest(1, 50, goal, 0, 60, limit).written())
         for _ in range(round(seconds * 100)):
             now_s += 0.01
             motor.look(now_s)

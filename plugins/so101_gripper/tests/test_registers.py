@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from graspsense_so101_gripper.emulator.motor import Motor
+from graspsense_so101_gripper.emulator.motor import EmulatedMotor
 from graspsense_so101_gripper.emulator.protocol import PING, READ, SYNC_READ, SYNC_WRITE, Requests, packet
 from graspsense_so101_gripper.jaw import Jaw
-from graspsense_so101_gripper.registers import REGISTERS, STATE, Asked, motor_state
+from graspsense_so101_gripper.registers import REGISTERS, STATE, MotorRequest, motor_state
 
 
 def test_the_sign_of_the_load_is_bit_10():
@@ -32,11 +32,11 @@ def test_what_is_written_is_read(data):
 
 
 def test_what_is_asked_is_one_write_of_neighbours():
-    asked = Asked(1, 50, 2000, 0, 300, 420)
-    motor = Motor(6, 777)
+    asked = MotorRequest(1, 50, 2000, 0, 300, 420)
+    motor = EmulatedMotor(6, 777)
     motor.write(STATE[0], asked.written())
     assert motor_state(motor.read(*STATE)).asked == asked
-    places = [REGISTERS[name] for name in Asked._fields]
+    places = [REGISTERS[name] for name in MotorRequest._fields]
     assert [a.address + a.size for a in places[:-1]] == [b.address for b in places[1:]]
 
 
@@ -62,15 +62,15 @@ def test_the_gap_is_the_chord_of_the_jaw():
 
 @given(st.binary(max_size=200), st.integers(1, 30))
 def test_any_bytes_in_any_pieces_are_taken(data, size):
-    motors = {1: Motor(1, 777), 6: Motor(6, 777)}
-    whole = Requests({1: Motor(1, 777), 6: Motor(6, 777)}).fed(data)
+    motors = {1: EmulatedMotor(1, 777), 6: EmulatedMotor(6, 777)}
+    whole = Requests({1: EmulatedMotor(1, 777), 6: EmulatedMotor(6, 777)}).fed(data)
     pieces = Requests(motors)
     assert b"".join(pieces.fed(data[i : i + size]) for i in range(0, len(data), size)) == whole
 
 
 def test_requests_of_the_manual():
     """The manual's ping of motor 1, and its reply: FF FF 01 02 01 FB, FF FF 01 02 00 FC."""
-    motors = {1: Motor(1, 777), 6: Motor(6, 777)}
+    motors = {1: EmulatedMotor(1, 777), 6: EmulatedMotor(6, 777)}
     bus = Requests(motors)
     assert packet(1, PING) == bytes.fromhex("ff ff 01 02 01 fb")
     assert bus.fed(packet(1, PING)) == bytes.fromhex("ff ff 01 02 00 fc")

@@ -21,11 +21,11 @@ from graspsense.plugin_api import (
 )
 from graspsense.testing_api import parametrize_checks
 from graspsense_so101_gripper import backend
-from graspsense_so101_gripper.bus import NoReply, ServoBus
+from graspsense_so101_gripper.bus import NoStatusPacket, ServoBus
 from graspsense_so101_gripper.config import So101Config, So101Faults
 from graspsense_so101_gripper.discovery import diagnose
 from graspsense_so101_gripper.emulator.arm import EmulatedArm
-from graspsense_so101_gripper.registers import STATE, Asked, motor_state
+from graspsense_so101_gripper.registers import STATE, MotorRequest, motor_state
 
 PATIENT_S = 60.0
 """For a reply that comes: when it does is this machine's business."""
@@ -211,8 +211,8 @@ def test_a_late_or_repeated_reply_is_not_taken_for_that_of_the_next_request(emul
         arm.tell("repeated")
         assert len(bus.read(6, *STATE)) == STATE[1]
         arm.tell("well")
-        bus.write(6, STATE[0], Asked(0, 7, 2000, 0, 11, 300).written())
-        assert motor_state(bus.read(6, *STATE)).asked == Asked(0, 7, 2000, 0, 11, 300)
+        bus.write(6, STATE[0], MotorRequest(0, 7, 2000, 0, 11, 300).written())
+        assert motor_state(bus.read(6, *STATE)).asked == MotorRequest(0, 7, 2000, 0, 11, 300)
     bus.close()
 
 
@@ -309,6 +309,6 @@ def test_doctor_tells_the_gripper_from_another_motor_from_a_silent_bus_and_from_
 
 def test_another_motor_is_silent(emulated):
     bus = ServoBus(emulated().where, 0.05)
-    with pytest.raises(NoReply):
+    with pytest.raises(NoStatusPacket):
         bus.read(9, *STATE)
     bus.close()

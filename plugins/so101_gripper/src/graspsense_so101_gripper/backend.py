@@ -9,7 +9,7 @@ from contextlib import suppress
 from math import inf, isnan, nan
 from pathlib import Path
 from types import MappingProxyType
-from typing import Final, TypeVar, final
+from typing import Any, Final, TypeVar, final
 
 from attrs import evolve
 
@@ -33,7 +33,7 @@ from graspsense.plugin_api import (
     signal_type,
 )
 from graspsense_so101_gripper.arm_calibration import read_arm_calibration
-from graspsense_so101_gripper.bus import NoReply, ServoBus
+from graspsense_so101_gripper.bus import NoStatusPacket, ServoBus
 from graspsense_so101_gripper.config import So101Config
 from graspsense_so101_gripper.discovery import serial_number
 from graspsense_so101_gripper.emulator.arm import EmulatedArm
@@ -49,7 +49,7 @@ from graspsense_so101_gripper.registers import (
     REGISTERS,
     STATE,
     VOLTS_A_STEP,
-    Asked,
+    MotorRequest,
     MotorState,
     motor_state,
 )
@@ -74,7 +74,7 @@ CHANNELS: Final = (
     Channel("motor_voltage", "V", RATE_HZ),
     Channel("motor_temperature", "K", RATE_HZ),
 )
-SIGNALS: Final = signal_type(CHANNELS)
+SIGNALS: Final[Any] = signal_type(CHANNELS)
 ReplyT = TypeVar("ReplyT")
 
 
@@ -100,8 +100,8 @@ class So101Backend(SensorBackend[So101Config]):
         self.least_speed_m_s = self.least_step_m
         self._bus: ServoBus | None = None
         self._emulated: EmulatedArm | None = None
-        self._found: Asked | None = None
-        self._asked: Asked | None = None
+        self._found: MotorRequest | None = None
+        self._asked: MotorRequest | None = None
         self._frames = self._retries = 0
         self._exchange_s = 0.0
         self._body_report: Mapping[str, float | int | str | bool] = {}
@@ -142,7 +142,7 @@ class So101Backend(SensorBackend[So101Config]):
             state = self._state()
             self._found, self._position, self._stopped = state.asked, state.position, True
             self._ask(self._asked_of(state.position, SPEED_LIMIT_M_S, config.moving_force_n))
-        except (OSError, NoReply, Unfit) as error:
+        except (OSError, NoStatusPacket, Unfit) as error:
             self.close()
             raise NoDevice(
                 f"no gripper of an SO-101 arm at {config.port}, motor {config.motor}: {error}. Look at the arm's power "
@@ -239,25 +239,25 @@ class So101Backend(SensorBackend[So101Config]):
             return So101Backend(config)
         return So101Backend(evolve(config, port="emulated", arm_calibration="", calibration="none"))
 
-    def _asked_of(self, goal: int, speed_m_s: float, force_n: float) -> Asked:
+    def _asked_of(self, goal: int, speed_m_s: float, force_n: float) -> MotorRequest:
         # A speed of 0 is the highest one to this motor.
         speed = max(int(self._jaw.speed(self._jaw.gap_m(self._position), min(speed_m_s, SPEED_LIMIT_M_S))), 1)
-        return Asked(1, self.config.acceleration, goal, 0, speed, self._force.torque_limit(force_n))
+        return MotorRequest(1, self.config.acceleration, goal, 0, speed, self._force.torque_limit(force_n))
 
-    def _ask(self, asked: Asked) -> None:
+    def _ask(self, asked: MotorRequest) -> None:
         if asked != self._asked:
             data = asked.written()
             self._kept(lambda: self._tried(lambda bus: bus.write(self.config.motor, STATE[0], data)))
             self._asked = asked
 
-    def _give_back(self, bus: ServoBus, found: Asked) -> None:
+    def _give_back(self, bus: ServoBus, found: MotorRequest) -> None:
         """Let the motor stay where it is, with the torque and the limits that it had before, also if it only hears."""
         motor, position = self.config.motor, self._position
-        with suppress(NoReply, OSError):
+        with suppress(NoStatusPacket, OSError):
             position = motor_state(bus.read(motor, *STATE)).position
         stop = found._replace(goal_position=position, goal_time=0).written()
         for _ in range(ATTEMPTS):
-            with suppress(NoReply, OSError):
+            with suppress(NoStatusPacket, OSError):
                 bus.write(motor, STATE[0], stop)
                 return
 
@@ -278,10 +278,10 @@ class So101Backend(SensorBackend[So101Config]):
         )
 
     def _tried(self, exchange: Callable[[ServoBus], ReplyT]) -> ReplyT:
-        """Return the result of an exchange, which is repeated without a reply. Raises NoReply, OSError."""
+        """Return the result of an exchange, which is repeated without a reply. Raises NoStatusPacket, OSError."""
         assert self._bus is not None
         for _ in range(ATTEMPTS - 1):
-            with suppress(NoReply):
+            with suppress(NoStatusPacket):
                 return exchange(self._bus)
             self._retries += 1
         return exchange(self._bus)
@@ -292,14 +292,14 @@ class So101Backend(SensorBackend[So101Config]):
             raise DeviceLost("the gripper of the arm is not open")
         try:
             return exchange()
-        except (NoReply, OSError) as error:
+        except (NoStatusPacket, OSError) as error:
             raise DeviceLost(
                 f"motor {self.config.motor} at {self.config.port} does not answer ({error}): look at its "
                 "cable and power"
             ) from error
 
     def _described(
-        self, serial: str, firmware: str, numbers: Mapping[str, float | str], found: Mapping[str, object]
+        self, serial: str, firmware: str, numbers: Mapping[str, float | str], found: Mapping[str, Any]
     ) -> DeviceInfo:
         emulated, config = self._emulated is not None, self.config
         measured = (

@@ -23,7 +23,7 @@ OVERHEAD: Final = 2
 """Bytes that the length of a reply counts besides its data."""
 
 
-class NoReply(Exception):
+class NoStatusPacket(Exception):
     """No reply came in time, or an invalid one; the text describes it."""
 
 
@@ -83,7 +83,7 @@ class ServoBus:
             raise OSError(_why_not(port)) from error
 
     def read(self, motor: int, address: int, count: int) -> bytes:
-        """Return `count` bytes of a motor's memory. Raises NoReply, OSError."""
+        """Return `count` bytes of a motor's memory. Raises NoStatusPacket, OSError."""
         self._requests += 1
         length = count + self._requests % LENGTHS
         return self._reply(motor, length, lambda: self._handler.readTx(self._line, motor, address, length))[
@@ -91,7 +91,7 @@ class ServoBus:
         ]
 
     def write(self, motor: int, address: int, data: bytes) -> None:
-        """Write into a motor's memory. Raises NoReply, OSError."""
+        """Write into a motor's memory. Raises NoStatusPacket, OSError."""
 
         def send() -> Any:
             result = self._handler.writeTxOnly(self._line, motor, address, len(data), list(data))
@@ -105,16 +105,16 @@ class ServoBus:
         self._line.close()
 
     def _reply(self, motor: int, length: int, send: Callable[[], Any]) -> bytes:
-        """Return the data of the reply to a request. Raises NoReply, OSError."""
+        """Return the data of the reply to a request. Raises NoStatusPacket, OSError."""
         from scservo_sdk import COMM_SUCCESS
 
         self._line.is_using = False
         if send() != COMM_SUCCESS:
-            raise NoReply("the request could not be sent")
+            raise NoStatusPacket("the request could not be sent")
         while True:
             packet, result = self._handler.rxPacket(self._line)
             if result != COMM_SUCCESS:
-                raise NoReply("no reply, or a damaged one")
+                raise NoStatusPacket("no reply, or a damaged one")
             if packet[2] == motor and packet[3] == length + OVERHEAD:
                 return bytes(packet[5 : 5 + length])
             # A reply of another motor, or to an earlier request.

@@ -11,7 +11,7 @@ from typing import Final
 from graspsense.gripper_api import Finding, FoundDevice
 from graspsense.plugin_api import ConfigError, DataDamaged
 from graspsense_so101_gripper.arm_calibration import read_arm_calibration
-from graspsense_so101_gripper.bus import NoReply, ServoBus
+from graspsense_so101_gripper.bus import NoStatusPacket, ServoBus
 from graspsense_so101_gripper.config import So101Config
 from graspsense_so101_gripper.faults import STATUS_BITS
 from graspsense_so101_gripper.identity import Unfit, jaw_of
@@ -91,7 +91,7 @@ def _motor(bus: ServoBus, config: So101Config) -> Iterator[Finding]:
         memory = bus.read(config.motor, *IDENTITY)
         state = motor_state(bus.read(config.motor, *STATE))
         jaw = jaw_of(memory, config, arm)
-    except (NoReply, OSError) as error:
+    except (NoStatusPacket, OSError) as error:
         others = ", ".join(map(str, _answering(bus))) or "none"
         yield Finding(
             "so101",
@@ -124,6 +124,6 @@ def _answering(bus: ServoBus) -> Iterator[int]:
     for motor in MOTORS:
         try:
             bus.read(motor, *IDENTITY)
-        except (NoReply, OSError):
+        except (NoStatusPacket, OSError):
             continue
         yield motor

@@ -24,7 +24,7 @@ class Register(NamedTuple):
     size: int
     sign_bit: int | None = None
 
-    def number(self, memory: bytes, start: int = 0) -> int:
+    def number(self, memory: bytes | bytearray, start: int = 0) -> int:
         """Return the number in a memory that begins at the address `start`."""
         offset = self.address - start
         value = int.from_bytes(memory[offset : offset + self.size], "little")
@@ -74,7 +74,7 @@ STATE: Final = 40, 31
 """Those of what it was asked and of what it measures, up to the current: one read has it all."""
 
 
-class Asked(NamedTuple):
+class MotorRequest(NamedTuple):
     """What the motor is asked: neighbouring registers that are written at once."""
 
     torque_enable: int
@@ -92,7 +92,7 @@ class Asked(NamedTuple):
 class MotorState(NamedTuple):
     """What one read says of a motor."""
 
-    asked: Asked
+    asked: MotorRequest
     position: int
     velocity: int
     load: int
@@ -105,9 +105,9 @@ class MotorState(NamedTuple):
 def motor_state(memory: bytes) -> MotorState:
     """Return the state in the bytes of `STATE`."""
     start = STATE[0]
+    measured = ("position", "velocity", "load", "voltage", "temperature", "current")
     return MotorState(
-        Asked(*(REGISTERS[name].number(memory, start) for name in Asked._fields)),
-        *(REGISTERS[f"present_{name}"].number(memory, start) for name in MotorState._fields[1:6]),
-        REGISTERS["status"].number(memory, start),
-        REGISTERS["present_current"].number(memory, start),
+        asked=MotorRequest(*(REGISTERS[name].number(memory, start) for name in MotorRequest._fields)),
+        status=REGISTERS["status"].number(memory, start),
+        **{name: REGISTERS[f"present_{name}"].number(memory, start) for name in measured},
     )

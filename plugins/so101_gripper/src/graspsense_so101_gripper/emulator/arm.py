@@ -8,7 +8,7 @@ from typing import Final, final
 
 from graspsense.gripper_api import EmulatedSerial
 from graspsense_so101_gripper.config import So101Config
-from graspsense_so101_gripper.emulator.motor import GripperMotor, Motor
+from graspsense_so101_gripper.emulator.motor import EmulatedMotor, GripperMotor
 from graspsense_so101_gripper.emulator.protocol import Requests
 from graspsense_so101_gripper.registers import MODEL_NUMBER
 
@@ -35,7 +35,9 @@ class EmulatedArm(EmulatedSerial):
     def __init__(self, config: So101Config, wire: str, seed: int) -> None:
         super().__init__(wire, config.faults)
         self._gripper = GripperMotor(config, seed)
-        self._others = {number: Motor(number, MODEL_NUMBER) for number in MOTORS if number != config.motor}
+        self._others = {
+            number: EmulatedMotor(number, MODEL_NUMBER) for number in MOTORS if number != config.motor
+        }
         # One of them holds the arm, as while another program has it.
         next(iter(self._others.values())).put("torque_enable", 1)
         self._requests_of_bus = Requests({**self._others, config.motor: self._gripper})

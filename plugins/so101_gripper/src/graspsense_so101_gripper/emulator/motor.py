@@ -24,7 +24,7 @@ GEARS: Final = {"coulomb_n": 1.5, "breakaway_n": 2.0, "coulomb_spread_n": 0.1}
 """Friction (N) of the simulator's body where the settings give none: that of a geared motor, an assumption."""
 
 
-class Motor:
+class EmulatedMotor:
     """A motor that is where it is asked to be, and moves nothing."""
 
     def __init__(self, number: int, model_number: int) -> None:
@@ -76,7 +76,7 @@ class Motor:
             self.put("present_position", self.number("goal_position"))
 
 
-class GripperMotor(Motor):
+class GripperMotor(EmulatedMotor):
     """The motor of the gripper, which moves the fingers of a body, at the time (s) of `look`."""
 
     def __init__(self, config: So101Config, seed: int) -> None:
