@@ -12,7 +12,7 @@ from typing import Final, final
 
 from attrs import evolve
 
-from graspsense.gripper_api import clock_report, no_pads, pad_force, tare
+from graspsense.gripper_api import no_pads, pad_force, tare
 from graspsense.plugin_api import (
     FORCE,
     NO_PADS,
@@ -242,21 +242,21 @@ class RobotiqBackend(SensorBackend[RobotiqConfig]):
                 model=config.model,
                 address=config.address,
                 newtons_per_ampere=config.newtons_per_ampere,
-                tactile_port="emulated" if config.tactile_port else "",
+                tactile_port=",".join("emulated" for _ in config.tactile_ports),
                 pad_counts_per_newton=config.pad_counts_per_newton,
             )
         return RobotiqBackend(config)
 
     def _open_fingertips(self) -> None:
-        where = self.config.tactile_port
-        if not where:
+        if not self.config.tactile_port:
             return
-        if where == "emulated":
+        where = self.config.tactile_port
+        if "emulated" in self.config.tactile_ports:
             assert self._emulated is not None
             where = self._emulated.tactile_where
         self._pads = no_pads(CELLS)
         self._zero = ((0.0,) * CELLS, (0.0,) * CELLS)
-        self._fingertips = TactileFingertips(where)
+        self._fingertips = TactileFingertips(where.split(","))
         image = self._fingertips.newest(ACTIVATION_S)
         if image is None:
             raise NoReply(f"the fingertips at {self.config.tactile_port} send nothing")
@@ -272,10 +272,7 @@ class RobotiqBackend(SensorBackend[RobotiqConfig]):
         if image is not None:
             # An image that was measured before the gripper was opened has its time.
             self._pads = Pads(max(image.host_s - self._began_s, 0.0), image.counter, image.left, image.right)
-            self._clock_report = {
-                **clock_report("tactile", self._fingertips.clock, (channel.name for channel in PADS)),
-                "tactile_damaged": self._fingertips.damaged,
-            }
+            self._clock_report = self._fingertips.report()
         if self._fingertips.age_s() > PADS_SILENT_S:
             raise DeviceLost(
                 f"the fingertips at {self.config.tactile_port} send nothing any more: look at their cable"

@@ -23,7 +23,8 @@ class RobotiqConfig:
     )
     tactile_port: str = setting(
         default="",
-        meaning="Serial port of TSF-85 fingertips; empty: none; emulated: those of the emulated gripper.",
+        meaning="Serial port of TSF-85 fingertips, or two, of the left and of the right one, with a comma between; empty: "
+        "none; emulated, or emulated,emulated: those of the emulated gripper.",
     )
     pad_counts_per_newton: float = setting(
         default=1000.0,
@@ -62,10 +63,19 @@ class RobotiqConfig:
     )
     faults: SerialFaults = setting(factory=SerialFaults, meaning="Emulated only: faults of the gripper.")
 
+    @property
+    def tactile_ports(self) -> tuple[str, ...]:
+        """The ports of the fingertips, of which there are none, one or two."""
+        return tuple(self.tactile_port.split(",")) if self.tactile_port else ()
+
     def __attrs_post_init__(self) -> None:
+        if len(self.tactile_ports) > 2 or "" in self.tactile_ports:
+            raise ValueError(
+                f"tactile_port is {self.tactile_port!r}: give one port, or two with a comma between"
+            )
         if self.port == "emulated":
             return
-        if self.tactile_port == "emulated":
+        if "emulated" in self.tactile_ports:
             raise ValueError(
                 f"tactile_port is emulated, but port is {self.port!r}: give the port of the fingertips, or set "
                 "gripper.port to emulated"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Final, final
 
 from graspsense.gripper_api import EmulatedPort, EmulatedSerial
@@ -32,13 +33,18 @@ class EmulatedGripper(EmulatedSerial):
         self._config = config
         self._hand = Hand(config, seed)
         self._data = b""
-        self._fingertips = EmulatedFingertips(self._felt) if config.tactile_port == "emulated" else None
-        self._tactile_port: EmulatedPort | None = None
+        both = [(0, 1)] if len(config.tactile_ports) == 1 else [(0,), (1,)]
+        self._fingertips = [
+            EmulatedFingertips(partial(self._felt, fingers))
+            for fingers in both
+            if "emulated" in config.tactile_ports
+        ]
+        self._tactile_ports: list[EmulatedPort] = []
 
     @property
     def tactile_where(self) -> str:
         """What `gripper.tactile_port` has to be, empty without fingertips or while it is unplugged."""
-        return "" if self._tactile_port is None else self._tactile_port.where
+        return ",".join(port.where for port in self._tactile_ports)
 
     @property
     def body_report(self) -> Mapping[str, float | int | str | bool]:
@@ -48,11 +54,13 @@ class EmulatedGripper(EmulatedSerial):
     def tell(self, word: str) -> None:
         """Execute one of `words`. Raises KeyError for any other."""
         super().tell(word)
-        if word == "plug" and self._tactile_port is None and (tips := self._fingertips) is not None:
-            self._tactile_port = EmulatedPort("pty", tips.heard, tips.unasked, TACTILE_TICK_S)
+        if word == "plug" and not self._tactile_ports:
+            self._tactile_ports = [
+                EmulatedPort("pty", tips.heard, tips.unasked, TACTILE_TICK_S) for tips in self._fingertips
+            ]
         elif word == "unplug":
-            port, self._tactile_port = self._tactile_port, None
-            if port is not None:
+            ports, self._tactile_ports = self._tactile_ports, []
+            for port in ports:
                 port.close()
 
     def close(self) -> None:
@@ -85,6 +93,7 @@ class EmulatedGripper(EmulatedSerial):
             "going": self._hand.going,
         }
 
-    def _felt(self) -> tuple[float, float]:
+    def _felt(self, fingers: tuple[int, ...]) -> tuple[float, ...]:
         # Not by waiting: who unplugs may hold the lock, and waits for the thread that calls this.
-        return self._hand.fingers.forces_n
+        forces_n = self._hand.fingers.forces_n
+        return tuple(forces_n[finger] for finger in fingers)
