@@ -166,7 +166,7 @@ def test_a_gripper_and_two_boards_are_three_ports_and_a_trial_tells_how_far_thei
 @pytest.mark.parametrize("ports", ["a,b,c", ",", "a,", "emulated,/dev/ttyACM0"])
 def test_ports_that_cannot_be_are_told(ports):
     with pytest.raises(ConfigError, match="tactile_port"):
-        create("sensor-backend", "robotiq", port="/dev/ttyUSB0", tactile_port=ports)
+        create("sensor-backend", "robotiq", port="emulated", tactile_port=ports)
 
 
 def test_fingertips_that_are_unplugged_are_told(port):

@@ -23,8 +23,8 @@ class RobotiqConfig:
     )
     tactile_port: str = setting(
         default="",
-        meaning="Serial port of TSF-85 fingertips, or two, of the left and of the right one, with a comma between; empty: "
-        "none; emulated, or emulated,emulated: those of the emulated gripper.",
+        meaning="Serial port of TSF-85 fingertips, or two (left,right) with a comma between; empty: none; emulated, or "
+        "emulated,emulated: those of the emulated gripper.",
     )
     pad_counts_per_newton: float = setting(
         default=1000.0,
@@ -69,9 +69,11 @@ class RobotiqConfig:
         return tuple(self.tactile_port.split(",")) if self.tactile_port else ()
 
     def __attrs_post_init__(self) -> None:
-        if len(self.tactile_ports) > 2 or "" in self.tactile_ports:
+        kinds = {port == "emulated" for port in self.tactile_ports}
+        if len(self.tactile_ports) > 2 or "" in self.tactile_ports or len(kinds) > 1:
             raise ValueError(
-                f"tactile_port is {self.tactile_port!r}: give one port, or two with a comma between"
+                f"tactile_port is {self.tactile_port!r}: give one port, or two with a comma between, both emulated or "
+                "none"
             )
         if self.port == "emulated":
             return

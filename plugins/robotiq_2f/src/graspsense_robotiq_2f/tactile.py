@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from contextlib import suppress
+from math import inf
 from typing import Any, Final, NamedTuple, final
 
 from graspsense.gripper_api import DeviceClock, ReadingThread, clock_report
@@ -15,6 +16,8 @@ BAUD: Final = 115200
 PERIOD_MS: Final = 1
 READ_S: Final = 0.1
 """Longest wait of one read, so that the thread can end."""
+LEAST_S: Final = 1e-6
+"""Least time between two images."""
 TICKS_S: Final = 1e6
 """Ticks of the fingertips' clock in a second: an assumption, which their description does not give."""
 
@@ -47,6 +50,7 @@ class TactileFingertips:
         self._last: list[BoardImage | None] = [None] * len(ports)
         self._counter = 0
         self._apart_s = 0.0
+        self._image_s = -inf
         try:
             for port in ports:
                 self._boards.append(TactileBoard(port, len(SIDES) // len(ports)))
@@ -70,8 +74,10 @@ class TactileFingertips:
         times = [image.host_s for image in last]
         self._apart_s = max(self._apart_s, max(times) - min(times))
         self._counter += 1
+        # What is learnt of a clock can put an image before the one that came before it.
+        self._image_s = max(min(times), self._image_s + LEAST_S)
         left, right = (cells for image in last for cells in image.cells)
-        return TactileImage(min(times), self._counter, left, right)
+        return TactileImage(self._image_s, self._counter, left, right)
 
     def age_s(self) -> float:
         """Return the time (s) since the last image of the board that is silent for longest."""

@@ -41,7 +41,7 @@ _TOTAL: Final = sum(_SHAPE)
 
 
 class EmulatedFingertips:
-    """A board with a fingertip for each force that `felt` returns. `heard` and `unasked` are the two sides of a port."""
+    """A board with a fingertip for each force of `felt`. `heard` and `unasked` are the two sides of a port."""
 
     def __init__(self, felt: Callable[[], tuple[float, ...]]) -> None:
         self._felt = felt
