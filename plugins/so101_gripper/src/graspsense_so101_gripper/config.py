@@ -82,7 +82,7 @@ class So101Config:
         default=50, minimum=1, maximum=254, meaning="Acceleration of the motor, in 100 steps/s2."
     )
     reply_timeout_s: float = setting(
-        default=0.05, unit="s", above=0.0, plausible=(1e-3, 120.0), meaning="Longest wait for a reply."
+        default=0.1, unit="s", above=0.0, plausible=(1e-3, 120.0), meaning="Longest wait for a reply."
     )
     body: str = setting(
         default="sim",
