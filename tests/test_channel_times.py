@@ -46,6 +46,7 @@ def test_two_clocks_are_not_further_apart_than_is_said(first, second, seed):
 
 def test_one_device_is_measured_at_once_and_an_unknown_clock_promises_nothing():
     trace = SimpleNamespace(pad_t_s=np.array([0.0, 0.02, 0.05]), t_s=np.array([0.0, 0.06]))
+    trace.force_left_n = trace.force_right_n = np.array([1.0, 1.0, 2.0, 2.0, 3.0])
     clock, _ = fed(0.0, 0.0, 0.001, 1)
     report = clock_report("tactile", clock, PADS)
     sure = clock.line().uncertainty_s
@@ -57,6 +58,10 @@ def test_one_device_is_measured_at_once_and_an_unknown_clock_promises_nothing():
     assert apart_s(trace, report, "force_left", "gap") == pytest.approx(0.004 + sure + 0.03)
     assert apart_s(trace, report, "force_left", "force_right") == 0.0
     assert apart_s(trace, report, "force_left", "pads") == pytest.approx(0.03)
+    # One that changes in each frame does not come from the images, which are fewer.
+    trace.force_right_n = np.arange(5.0)
+    assert apart_s(trace, report, "force_right", "gap") == pytest.approx(0.004 + sure)
+    assert apart_s(trace, {}, "force_left", "gap") == pytest.approx(0.03), "one device"
 
 
 def test_a_trial_tells_it_and_names_its_channels():

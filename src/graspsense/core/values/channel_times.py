@@ -24,7 +24,7 @@ def apart_s(trace: Trace, report: Mapping[str, Any], one: str, other: str) -> fl
     its clock, and is not in it.
     """
     sources = [_source(report, name) for name in (one, other)]
-    ages_s = [_age_s(trace, report, name) for name in (one, other)]
+    ages_s = [_age_s(trace, name) for name in (one, other)]
     if sources[0] == sources[1]:
         return 0.0 if ages_s[0] == ages_s[1] else max(ages_s)
     return sum(float(report.get(f"{source}_uncertainty_s", inf)) for source in sources) + sum(ages_s)
@@ -37,9 +37,15 @@ def _source(report: Mapping[str, Any], channel: str) -> str:
     return FRAME
 
 
-def _age_s(trace: Trace, report: Mapping[str, Any], channel: str) -> float:
-    """Return how old the image of this number is at most in a frame; 0 for what is measured with the frame."""
-    if channel not in OF_IMAGES or _source(report, channel) == FRAME or not len(trace.pad_t_s):
+def _age_s(trace: Trace, channel: str) -> float:
+    """Return how old the image of this number is at most in a frame; 0 for what is measured with the frame.
+
+    A number that does not change more often than there are images comes from them.
+    """
+    if channel not in OF_IMAGES or not len(trace.pad_t_s):
+        return 0.0
+    values = getattr(trace, f"{channel}_n")
+    if int((values[1:] != values[:-1]).sum()) > len(trace.pad_t_s):
         return 0.0
     ages = [
         float(end_s - begin_s)
