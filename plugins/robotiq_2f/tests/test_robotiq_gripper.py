@@ -114,7 +114,7 @@ def test_a_gripper_lost_in_a_grasp_ends_it_and_is_told(fault, at_s):
         else ["gripper.faults.mood=silent", f"gripper.faults.mood_at_s={0.2 + at_s}"]
     )
     pipeline = load_pipeline(
-        "robotiq", options=["gripper.port=emulated", "gripper.reply_timeout_s=0.05", *faults]
+        "robotiq", options=["gripper.port=emulated", "gripper.reply_timeout_s=0.5", *faults]
     )
     trial = pipeline.grasp()
     assert trial.outcome.words == "device lost"

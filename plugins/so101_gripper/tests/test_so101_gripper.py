@@ -152,7 +152,8 @@ def test_a_gripper_lost_in_a_grasp_ends_it_and_is_told(fault, at_s):
         if fault == "unplug"
         else ["gripper.faults.mood=silent", f"gripper.faults.mood_at_s={at_s}"]
     )
-    trial = load_pipeline("so101", options=["gripper.port=emulated", *faults]).grasp()
+    options = ["gripper.port=emulated", "gripper.reply_timeout_s=0.5", *faults]
+    trial = load_pipeline("so101", options=options).grasp()
     assert trial.outcome.words == "device lost"
     assert "cable and power" in trial.reason
 

@@ -156,7 +156,7 @@ class RobotiqBackend(SensorBackend[RobotiqConfig]):
         if wait_s > 0.0:
             time.sleep(wait_s)
         # On a grid of times, so that the duration of an exchange does not lower the rate; lost time is not made up.
-        self._due_s = max(self._due_s, time.monotonic()) + 1.0 / RATE_HZ
+        self._due_s = max(self._due_s + 1.0 / RATE_HZ, time.monotonic())
         asked_s = time.monotonic()
         status = self._status()
         now_s = time.monotonic()
