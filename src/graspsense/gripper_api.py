@@ -14,11 +14,14 @@ _TABLE: Final[Table] = {
     },
     "Emulated devices": {
         "core.components.emulated": ("EmulatedDevice",),
+        "core.components.emulated_port": ("EmulatedPort",),
+        "core.components.emulated_serial": ("EmulatedSerial", "SerialFaults"),
+        "core.grasp.emulated_fingers": ("EmulatedFingers", "FingerTarget"),
         "core.components.entries": ("EmulatorEntry",),
     },
     "Reading threads and clocks of devices": {
         "core.grasp.reading_thread": ("ReadingThread",),
-        "core.grasp.device_clock": ("DeviceClock",),
+        "core.grasp.device_clock": ("DeviceClock", "clock_report"),
     },
     "Fingers, and where the gripper is mounted": {
         "core.values.fingers": ("FingerForce", "opposed_forces"),
@@ -31,10 +34,13 @@ _TABLE: Final[Table] = {
     "Calibration: from cell counts to newtons": {
         "core.grasp.calibration": (
             "LoadTable",
+            "MotorTable",
             "cells_force",
             "edge_force",
             "load_of",
+            "load_within",
             "masked",
+            "motor_at",
             "pad_force",
             "tare",
             "zero_of",
@@ -43,6 +49,7 @@ _TABLE: Final[Table] = {
             "calibrations_of",
             "stored_friction",
             "stored_gain",
+            "stored_motor_tables",
             "stored_tables",
             "stored_zero",
         ),

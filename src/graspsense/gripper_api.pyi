@@ -9,11 +9,17 @@ from graspsense.core.values.errors import GraspsenseError as GraspsenseError
 
 # Emulated devices
 from graspsense.core.components.emulated import EmulatedDevice as EmulatedDevice
+from graspsense.core.components.emulated_port import EmulatedPort as EmulatedPort
+from graspsense.core.components.emulated_serial import EmulatedSerial as EmulatedSerial
+from graspsense.core.components.emulated_serial import SerialFaults as SerialFaults
+from graspsense.core.grasp.emulated_fingers import EmulatedFingers as EmulatedFingers
+from graspsense.core.grasp.emulated_fingers import FingerTarget as FingerTarget
 from graspsense.core.components.entries import EmulatorEntry as EmulatorEntry
 
 # Reading threads and clocks of devices
 from graspsense.core.grasp.reading_thread import ReadingThread as ReadingThread
 from graspsense.core.grasp.device_clock import DeviceClock as DeviceClock
+from graspsense.core.grasp.device_clock import clock_report as clock_report
 
 # Fingers, and where the gripper is mounted
 from graspsense.core.values.fingers import FingerForce as FingerForce
@@ -27,16 +33,20 @@ from graspsense.core.components.channels import no_signals as no_signals
 
 # Calibration: from cell counts to newtons
 from graspsense.core.grasp.calibration import LoadTable as LoadTable
+from graspsense.core.grasp.calibration import MotorTable as MotorTable
 from graspsense.core.grasp.calibration import cells_force as cells_force
 from graspsense.core.grasp.calibration import edge_force as edge_force
 from graspsense.core.grasp.calibration import load_of as load_of
+from graspsense.core.grasp.calibration import load_within as load_within
 from graspsense.core.grasp.calibration import masked as masked
+from graspsense.core.grasp.calibration import motor_at as motor_at
 from graspsense.core.grasp.calibration import pad_force as pad_force
 from graspsense.core.grasp.calibration import tare as tare
 from graspsense.core.grasp.calibration import zero_of as zero_of
 from graspsense.core.grasp.calibration_files import calibrations_of as calibrations_of
 from graspsense.core.grasp.calibration_files import stored_friction as stored_friction
 from graspsense.core.grasp.calibration_files import stored_gain as stored_gain
+from graspsense.core.grasp.calibration_files import stored_motor_tables as stored_motor_tables
 from graspsense.core.grasp.calibration_files import stored_tables as stored_tables
 from graspsense.core.grasp.calibration_files import stored_zero as stored_zero
 

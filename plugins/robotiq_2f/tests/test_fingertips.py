@@ -9,11 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from graspsense.plugin_api import POSITION, Command, create
+from graspsense import load_pipeline
+from graspsense.gripper_api import EmulatedPort
+from graspsense.plugin_api import POSITION, Command, ConfigError, create
 from graspsense.testing_api import parametrize_checks
 from graspsense_robotiq_2f.emulator import fingertips
-from graspsense_robotiq_2f.emulator.fingertips import COUNTS_PER_N, REST_COUNTS, EmulatedFingertips, Felt
-from graspsense_robotiq_2f.emulator.port import SerialPort
+from graspsense_robotiq_2f.emulator.fingertips import COUNTS_PER_N, REST_COUNTS, EmulatedFingertips
 from graspsense_robotiq_2f.tactile import TactileFingertips
 from graspsense_robotiq_2f.tactile_protocol import (
     CELLS,
@@ -73,7 +74,7 @@ def clock(monkeypatch):
 
 
 def test_every_period_has_one_packet_and_images_come_at_60_hz(clock):
-    tips = EmulatedFingertips(lambda: Felt(2.0, 4.0))
+    tips = EmulatedFingertips(lambda: (2.0, 4.0))
     tips.heard(packet(0x58, bytes((1,))))
     packets = Packets()
     found = []
@@ -92,7 +93,7 @@ def test_every_period_has_one_packet_and_images_come_at_60_hz(clock):
 
 
 def test_they_are_silent_until_asked_and_after_a_period_of_zero(clock):
-    tips = EmulatedFingertips(lambda: Felt(0.0, 0.0))
+    tips = EmulatedFingertips(lambda: (0.0, 0.0))
     clock.now_s = 1.0
     assert tips.unasked() == b""
     [(command, _)] = Packets().fed(tips.heard(packet(READ)))
@@ -104,14 +105,14 @@ def test_they_are_silent_until_asked_and_after_a_period_of_zero(clock):
 
 @pytest.fixture
 def port():
-    tips = EmulatedFingertips(lambda: Felt(2.0, 4.0))
-    port = SerialPort("pty", tips.heard, tips.unasked, 0.001)
+    tips = EmulatedFingertips(lambda: (2.0, 4.0))
+    port = EmulatedPort("pty", tips.heard, tips.unasked, 0.001)
     yield port
     port.close()
 
 
 def test_the_driver_reads_images_in_a_thread_with_their_age(port):
-    driver = TactileFingertips(port.where)
+    driver = TactileFingertips([port.where])
     images = [driver.newest(PATIENT_S) for _ in range(5)]
     driver.close()
     counters = [image.counter for image in images]
@@ -119,12 +120,57 @@ def test_the_driver_reads_images_in_a_thread_with_their_age(port):
     for image in images:
         assert sum(image.left) - CELLS * REST_COUNTS == pytest.approx(2000, abs=CELLS / 2)
         assert sum(image.right) - CELLS * REST_COUNTS == pytest.approx(4000, abs=CELLS / 2)
-    assert driver.clock.latency_s() >= 0.0
-    assert driver.damaged == 0
+    report = driver.report()
+    assert report["tactile_channels"] == "pads force_left force_right"
+    assert report["tactile_latency_s"] >= 0.0
+    assert report["tactile_damaged"] == 0
+
+
+def test_two_boards_give_one_image_and_each_its_clock():
+    ports = [
+        EmulatedPort("pty", tips.heard, tips.unasked, 0.001)
+        for tips in (EmulatedFingertips(lambda: (2.0,)), EmulatedFingertips(lambda: (4.0,)))
+    ]
+    driver = TactileFingertips([port.where for port in ports])
+    images = []
+    while len(images) < 3:
+        if (image := driver.newest(PATIENT_S)) is not None:
+            images.append(image)
+    report = driver.report()
+    driver.close()
+    for port in ports:
+        port.close()
+    for number, image in enumerate(images, 1):
+        assert image.counter == number
+        assert sum(image.left) - CELLS * REST_COUNTS == pytest.approx(2000, abs=CELLS / 2)
+        assert sum(image.right) - CELLS * REST_COUNTS == pytest.approx(4000, abs=CELLS / 2)
+    assert [report[f"{name}_channels"] for name in ("tactile_left", "tactile_right", "pads")] == [
+        "force_left",
+        "force_right",
+        "pads",
+    ]
+    sides_s = max(report[f"tactile_{side}_uncertainty_s"] for side in ("left", "right"))
+    assert report["pads_uncertainty_s"] >= sides_s
+
+
+@pytest.mark.slow
+def test_a_gripper_and_two_boards_are_three_ports_and_a_trial_tells_how_far_their_times_can_be_apart():
+    options = ["gripper.port=emulated", "gripper.tactile_port=emulated,emulated", "features.type=chitta"]
+    trial = load_pipeline("robotiq", options=options).grasp()
+    assert len(trial.trace.pad_t_s) > 10
+    for one, other in (("gap", "force_left"), ("force_left", "force_right"), ("gap", "pads")):
+        assert 0.0 < trial.apart_s(one, other) < 1.0
+    assert trial.apart_s("gap", "effort") == 0.0
+
+
+@pytest.mark.parametrize("ports", ["a,b,c", ",", "a,", "emulated,/dev/ttyACM0"])
+def test_ports_that_cannot_be_are_told(ports):
+    with pytest.raises(ConfigError, match="tactile_port"):
+        create("sensor-backend", "robotiq", port="emulated", tactile_port=ports)
 
 
 def test_fingertips_that_are_unplugged_are_told(port):
-    driver = TactileFingertips(port.where)
+    driver = TactileFingertips([port.where])
     assert driver.newest(PATIENT_S) is not None
     port.close()
     with pytest.raises(OSError, match=r"Input/output|device reports readiness|disconnected"):

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
-import numpy as np
 import pytest
 
 from graspsense import WiringError, load_pipeline
+from graspsense.core.components import emulated_serial
 from graspsense.plugin_api import POSITION, VELOCITY, Command, DeviceLost, NoDevice, create
 from graspsense.testing_api import parametrize_checks
 from graspsense_robotiq_2f import backend
 from graspsense_robotiq_2f.config import RobotiqConfig
 from graspsense_robotiq_2f.discovery import diagnose
-from graspsense_robotiq_2f.emulator import device
 from graspsense_robotiq_2f.emulator.device import EmulatedGripper
 from graspsense_robotiq_2f.emulator.modbus import checksum
-from graspsense_robotiq_2f.features import _without_start
 from graspsense_robotiq_2f.link import ModbusLink, NoReply
 from graspsense_robotiq_2f.registers import MODELS, byte_of
 
@@ -39,7 +37,7 @@ def own_time(monkeypatch):
         return now_s
 
     monkeypatch.setattr(backend, "time", SimpleNamespace(monotonic=look, sleep=sleep))
-    monkeypatch.setattr(device, "time", SimpleNamespace(monotonic=lambda: now_s))
+    monkeypatch.setattr(emulated_serial, "time", SimpleNamespace(monotonic=lambda: now_s))
 
 
 @pytest.fixture
@@ -116,7 +114,7 @@ def test_a_gripper_lost_in_a_grasp_ends_it_and_is_told(fault, at_s):
         else ["gripper.faults.mood=silent", f"gripper.faults.mood_at_s={0.2 + at_s}"]
     )
     pipeline = load_pipeline(
-        "robotiq", options=["gripper.port=emulated", "gripper.reply_timeout_s=0.05", *faults]
+        "robotiq", options=["gripper.port=emulated", "gripper.reply_timeout_s=0.5", *faults]
     )
     trial = pipeline.grasp()
     assert trial.outcome.words == "device lost"
@@ -233,11 +231,3 @@ def test_bytes_never_ask_for_more_than_was_said():
     for model in MODELS.values():
         for position in (model.open_byte, 100, model.closed_byte):
             assert model.position(model.gap_m(position)) == position
-
-
-def test_the_effort_that_starts_the_fingers_is_not_a_contact():
-    gap_m = np.array([0.085, 0.085, 0.084, 0.080, 0.070, 0.0695])
-    effort_n = np.array([0.0, 20.0, 7.0, 7.0, 15.0, 20.0])
-    assert _without_start(gap_m, effort_n, 10.5).tolist() == [0.0, 0.0, 7.0, 7.0, 15.0, 20.0]
-    touching = np.array([0.0, 20.0, 20.0, 20.0, 20.0, 20.0])
-    assert _without_start(gap_m, touching, 10.5).tolist() == touching.tolist()

@@ -83,7 +83,7 @@ def gain(readings: str, replace: bool, as_json: bool, **asked: Any) -> None:
 
     with _set_up(asked, replace) as setup:
         cells = _fingertips(setup).cells
-        rows = _sided(readings, "cell", "counts", "load_n")
+        rows = _grouped(readings, "side", ("left", "right"), ("cell", "counts", "load_n"))
         gains = {}
         for side, numbers in rows.items():
             gains[side] = counts_per_newton([(_cell(row[0]), row[1], row[2]) for row in numbers], cells)
@@ -94,13 +94,16 @@ def gain(readings: str, replace: bool, as_json: bool, **asked: Any) -> None:
 @click.argument("readings", type=click.Path(exists=True, dir_okay=False))
 @_options
 def load_cell(readings: str, replace: bool, as_json: bool, **asked: Any) -> None:
-    """Store a table from the pad force to the force of a load cell, computed from READINGS.
+    """Store a table from what the gripper measures to the force of a load cell, computed from READINGS.
 
-    READINGS is a CSV file with the columns side (left or right), pad_counts (sum of the 15 pad cells over their tare)
-    and load_n (force of the load cell).
+    READINGS is a CSV file with the column load_n (force of the load cell). For a gripper with pads, its other columns
+    are side (left or right) and pad_counts (sum of the pad cells over their tare). For a gripper whose motor tells its
+    load, they are direction (closing or opening, in which the motor pushes) and motor (its load or current, without
+    sign): at least nine readings in each direction, while the force rises and while it falls.
     """
     with _set_up(asked, replace) as setup:
-        data = _tables(readings, _counts_per_n(setup))
+        pads = any(channel.name == "pads" for channel in setup.backend.channels)
+        data = _tables(readings, _counts_per_n(setup)) if pads else _motor_tables(readings)
         _store(setup, "load-cell", data, as_json)
 
 
@@ -234,14 +237,30 @@ def _tables(path: str, counts_per_n: float) -> dict[str, Any]:
     from graspsense.core.grasp.calibration import load_table
 
     tables = {}
-    for side, rows in _sided(path, "pad_counts", "load_n").items():
+    for side, rows in _grouped(path, "side", ("left", "right"), ("pad_counts", "load_n")).items():
         table = load_table((pad_counts / counts_per_n, load_n) for pad_counts, load_n in rows)
         tables[side] = {"pad_n": list(table.pad_n), "load_n": list(table.load_n)}
     return tables
 
 
-def _sided(path: str, *names: str) -> dict[str, list[tuple[float, ...]]]:
-    """Return the numbers in these columns of a CSV file, by the side of the gripper. Raises DataDamaged."""
+def _motor_tables(path: str) -> dict[str, Any]:
+    from graspsense.core.grasp.calibration import motor_table
+    from graspsense.core.grasp.calibration_files import DIRECTIONS
+
+    tables = {}
+    for direction, rows in _grouped(path, "direction", DIRECTIONS, ("motor", "load_n")).items():
+        (motor, load_n), error_n = motor_table([(motor, load_n) for motor, load_n in rows])
+        tables[direction] = {"motor": list(motor), "load_n": list(load_n), "error_n": error_n}
+    return tables
+
+
+def _grouped(
+    path: str, group: str, values: tuple[str, ...], names: tuple[str, ...]
+) -> dict[str, list[tuple[float, ...]]]:
+    """Return the numbers in the columns `names` of a CSV file, by the value in the column `group`.
+
+    Raises DataDamaged for a missing column, and for a value of the group that is not one of `values`.
+    """
     from math import isfinite
     from pathlib import Path
 
@@ -249,15 +268,15 @@ def _sided(path: str, *names: str) -> dict[str, list[tuple[float, ...]]]:
     from graspsense.sources.csv_columns import CsvColumns
 
     columns = CsvColumns(Path(path))
-    missing = {"side", *names} - set(columns.names)
+    missing = {group, *names} - set(columns.names)
     if missing:
         raise DataDamaged(f"{path} lacks the columns {', '.join(sorted(missing))}")
-    found: dict[str, list[tuple[float, ...]]] = {"left": [], "right": []}
+    found: dict[str, list[tuple[float, ...]]] = {value: [] for value in values}
     rows = zip(*map(columns.numbers, names), strict=True)
-    for line, side, numbers in zip(columns.lines, columns.cells["side"], rows, strict=True):
-        if side not in found:
-            raise DataDamaged(f"{path}:{line}: side is {side[:40]!r}, expected left or right")
+    for line, value, numbers in zip(columns.lines, columns.cells[group], rows, strict=True):
+        if value not in found:
+            raise DataDamaged(f"{path}:{line}: {group} is {value[:40]!r}, expected {' or '.join(values)}")
         if not all(map(isfinite, numbers)):
             raise DataDamaged(f"{path}:{line}: expected numbers in the columns {', '.join(names)}")
-        found[side].append(tuple(map(float, numbers)))
+        found[value].append(tuple(map(float, numbers)))
     return found

@@ -12,6 +12,7 @@ from graspsense.cli.output import echo_json
 from graspsense.cli.terminal import Style, echo, echo_as_it_is, echo_entry, state_style
 
 if TYPE_CHECKING:
+    from graspsense.core.components.config import Settings
     from graspsense.core.components.entries import Finding
     from graspsense.core.components.registry import Diagnosis, Plugins
 
@@ -31,23 +32,36 @@ _MARK: Final = 11
     show_default=True,
     help="Measuring time for each plugin, in seconds.",
 )
+@click.option(
+    "--latency",
+    "repetitions",
+    type=click.IntRange(1, 100),
+    is_flag=False,
+    flag_value=5,
+    help="Move the gripper, 5 times or as often as given: time from a command to the first motion, and to the first "
+    "force on a block between its fingers.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
-def doctor(timeout_s: float, as_json: bool, **asked: Any) -> None:
-    """Check plugins, libraries, permissions and devices; measure rate, loss and latency. Nothing moves.
+def doctor(timeout_s: float, repetitions: int | None, as_json: bool, **asked: Any) -> None:
+    """Check plugins, libraries, permissions and devices; measure rate, loss and latency.
 
-    With --gripper and -o, it looks for that gripper (-o gripper.vendor_id=..., -o gripper.serial=...), and reports a
-    problem if it is missing. Exit code 0: no problem; 1: a problem.
+    Nothing moves without --latency. With --gripper and -o, it looks for that gripper (-o gripper.vendor_id=...,
+    -o gripper.serial=...), and reports a problem if it is missing. Exit code 0: no problem; 1: a problem.
     """
     from graspsense.core.components.registry import Diagnosis, installed
     from graspsense.core.control.garbage_collection import no_collection
 
     plugins = installed()
     config = None
+    settings = None
     if any(asked.values()):
-        config = settings_of(**{**asked, "options": (*GRIPPER_ALONE, *asked["options"])}).gripper.config
+        settings = settings_of(**{**asked, "options": (*GRIPPER_ALONE, *asked["options"])})
+        config = settings.gripper.config
     # A collection within a measurement would be told as a late report of the device.
     with no_collection():
         diagnoses = [Diagnosis("graspsense", _ourselves(plugins)), *plugins.diagnose(config, timeout_s)]
+        if repetitions is not None:
+            diagnoses.append(_latency(settings, repetitions))
     problems = sum(one.error != "" for one in diagnoses) + sum(
         finding.state == "problem" for one in diagnoses for finding in one.findings
     )
@@ -95,6 +109,26 @@ def _ourselves(plugins: Plugins) -> tuple[Finding, ...]:
                 )
             )
     return tuple(found)
+
+
+def _latency(settings: Settings | None, repetitions: int) -> Diagnosis:
+    """Return the measured latencies of the gripper of these settings. It is left open, whatever happens."""
+    from graspsense.core.components.registry import Diagnosis
+    from graspsense.core.grasp.latency import latency_findings
+    from graspsense.core.values.errors import GraspsenseError
+
+    if settings is None:
+        raise click.UsageError("--latency moves a gripper: name it by --gripper or --pipeline")
+    gripper, run = settings.gripper, settings.run
+    backend = gripper.create()
+    try:
+        info = backend.open(run.seed)
+        found = latency_findings(backend, gripper.declared.accepts, info, run, repetitions)
+        return Diagnosis(gripper.component.qualified, found)
+    except GraspsenseError as error:
+        return Diagnosis(gripper.component.qualified, error=str(error))
+    finally:
+        backend.close()
 
 
 def _as_json(diagnosis: Diagnosis) -> dict[str, Any]:

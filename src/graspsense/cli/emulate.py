@@ -31,7 +31,7 @@ EXIT_FAILED: Final = 4
 @click.option(
     "--wire",
     default="",
-    help="Type of the emulated device: uhid or usb.  [default: the first that works]",
+    help="How the emulated device is reached: uhid, usb, pty or socket.  [default: the first that works]",
 )
 @pipeline_options
 @click.option(

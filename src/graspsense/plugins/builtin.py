@@ -47,6 +47,11 @@ def graspsense_feature_sets() -> Iterable[FeatureSetEntry]:
         summary="the six features of Table I (Chitta, Piccoli, Sturm 2010)",
     )
     yield FeatureSetEntry(
+        name="chitta-without-pads",
+        target="graspsense.plugins.features.without_pads:WithoutPads",
+        summary="the four features of Table I that need no force, with contact from the effort",
+    )
+    yield FeatureSetEntry(
         name="curve",
         target="graspsense.plugins.features.curve:CurveFeatures",
         summary="stiffness, work, relaxation, hysteresis and shape of the whole force curve",

@@ -98,7 +98,8 @@ class RobotiqBackend(SensorBackend[RobotiqConfig]):
         self._zero = ((0.0,) * CELLS, (0.0,) * CELLS)
         self._asked = Request(active=True, go=False, position=0, speed=0, force=0)
         self._frames = self._retries = 0
-        self._clock_report: Mapping[str, float | int | str | bool] = {}
+        self._clock_report: Mapping[str, float | str] = {}
+        self._exchange_s = 0.0
         self._body_report: Mapping[str, float | int | str | bool] = {}
 
     @property
@@ -130,6 +131,7 @@ class RobotiqBackend(SensorBackend[RobotiqConfig]):
             port = self._emulated.where
         self._asked = Request(active=True, go=False, position=0, speed=0, force=0)
         self._frames = self._retries = 0
+        self._exchange_s = 0.0
         try:
             self._link = ModbusLink(port, config.address, config.reply_timeout_s)
             status = self._activated()
@@ -154,9 +156,11 @@ class RobotiqBackend(SensorBackend[RobotiqConfig]):
         if wait_s > 0.0:
             time.sleep(wait_s)
         # On a grid of times, so that the duration of an exchange does not lower the rate; lost time is not made up.
-        self._due_s = max(self._due_s, time.monotonic()) + 1.0 / RATE_HZ
+        self._due_s = max(self._due_s + 1.0 / RATE_HZ, time.monotonic())
+        asked_s = time.monotonic()
         status = self._status()
         now_s = time.monotonic()
+        self._exchange_s = max(self._exchange_s, now_s - asked_s)
         t_s, dt_s, self._last_s = now_s - self._began_s, now_s - self._last_s, now_s
         gap_m = self._model.gap_m(status.position)
         self._recent.append((t_s, gap_m))
@@ -221,7 +225,13 @@ class RobotiqBackend(SensorBackend[RobotiqConfig]):
     def report(self) -> dict[str, float | int | str | bool]:
         """Return the number of frames, and of repeated exchanges, with what the emulated body knows."""
         body = self._body_report if self._emulated is None else self._emulated.body_report
-        return {**body, "frames": self._frames, "repeated": self._retries, **self._clock_report}
+        return {
+            **body,
+            "frames": self._frames,
+            "repeated": self._retries,
+            "frame_uncertainty_s": self._exchange_s,
+            **self._clock_report,
+        }
 
     def dry_run_backend(self) -> RobotiqBackend:
         """Return the emulated gripper."""
@@ -232,21 +242,21 @@ class RobotiqBackend(SensorBackend[RobotiqConfig]):
                 model=config.model,
                 address=config.address,
                 newtons_per_ampere=config.newtons_per_ampere,
-                tactile_port="emulated" if config.tactile_port else "",
+                tactile_port=",".join("emulated" for _ in config.tactile_ports),
                 pad_counts_per_newton=config.pad_counts_per_newton,
             )
         return RobotiqBackend(config)
 
     def _open_fingertips(self) -> None:
-        where = self.config.tactile_port
-        if not where:
+        if not self.config.tactile_port:
             return
-        if where == "emulated":
+        where = self.config.tactile_port
+        if "emulated" in self.config.tactile_ports:
             assert self._emulated is not None
             where = self._emulated.tactile_where
         self._pads = no_pads(CELLS)
         self._zero = ((0.0,) * CELLS, (0.0,) * CELLS)
-        self._fingertips = TactileFingertips(where)
+        self._fingertips = TactileFingertips(where.split(","))
         image = self._fingertips.newest(ACTIVATION_S)
         if image is None:
             raise NoReply(f"the fingertips at {self.config.tactile_port} send nothing")
@@ -262,13 +272,7 @@ class RobotiqBackend(SensorBackend[RobotiqConfig]):
         if image is not None:
             # An image that was measured before the gripper was opened has its time.
             self._pads = Pads(max(image.host_s - self._began_s, 0.0), image.counter, image.left, image.right)
-            line = self._fingertips.clock.line()
-            self._clock_report = {
-                "tactile_drift": line.drift,
-                "tactile_uncertainty_s": line.uncertainty_s,
-                "tactile_latency_s": self._fingertips.clock.latency_s(),
-                "tactile_damaged": self._fingertips.damaged,
-            }
+            self._clock_report = self._fingertips.report()
         if self._fingertips.age_s() > PADS_SILENT_S:
             raise DeviceLost(
                 f"the fingertips at {self.config.tactile_port} send nothing any more: look at their cable"

@@ -2,34 +2,12 @@
 
 from __future__ import annotations
 
-from math import inf
 from typing import Any, Literal
 
 from attrs import frozen
 
+from graspsense.gripper_api import SerialFaults
 from graspsense.plugin_api import NAMES_INPUT, setting
-
-
-@frozen(kw_only=True)
-class RobotiqFaults:
-    """Faults of the emulated gripper, by default none. Times are counted from its activation."""
-
-    unplug_at_s: float = setting(
-        default=inf, unit="s", minimum=0.0, meaning="Time at which the cable is pulled; inf: never."
-    )
-    mood: Literal["well", "silent", "damaged", "late", "repeated"] = setting(
-        default="well",
-        meaning="silent: no reply. damaged: a bit of each reply is flipped. late: each reply comes after late_s. "
-        "repeated: each reply comes twice.",
-    )
-    mood_at_s: float = setting(default=0.0, unit="s", minimum=0.0, meaning="Time from which on mood acts.")
-    late_s: float = setting(
-        default=0.3,
-        unit="s",
-        above=0.0,
-        plausible=(1e-4, 10.0),
-        meaning="Time by which a late reply is late.",
-    )
 
 
 @frozen(kw_only=True)
@@ -45,7 +23,8 @@ class RobotiqConfig:
     )
     tactile_port: str = setting(
         default="",
-        meaning="Serial port of TSF-85 fingertips; empty: none; emulated: those of the emulated gripper.",
+        meaning="Serial port of TSF-85 fingertips, or two (left,right) with a comma between; empty: none; emulated, or "
+        "emulated,emulated: those of the emulated gripper.",
     )
     pad_counts_per_newton: float = setting(
         default=1000.0,
@@ -82,12 +61,23 @@ class RobotiqConfig:
         effect=NAMES_INPUT,
         meaning="Emulated only: the object between the fingers; not set: the default of body.",
     )
-    faults: RobotiqFaults = setting(factory=RobotiqFaults, meaning="Emulated only: faults of the gripper.")
+    faults: SerialFaults = setting(factory=SerialFaults, meaning="Emulated only: faults of the gripper.")
+
+    @property
+    def tactile_ports(self) -> tuple[str, ...]:
+        """The ports of the fingertips, of which there are none, one or two."""
+        return tuple(self.tactile_port.split(",")) if self.tactile_port else ()
 
     def __attrs_post_init__(self) -> None:
+        kinds = {port == "emulated" for port in self.tactile_ports}
+        if len(self.tactile_ports) > 2 or "" in self.tactile_ports or len(kinds) > 1:
+            raise ValueError(
+                f"tactile_port is {self.tactile_port!r}: give one port, or two with a comma between, both emulated or "
+                "none"
+            )
         if self.port == "emulated":
             return
-        if self.tactile_port == "emulated":
+        if "emulated" in self.tactile_ports:
             raise ValueError(
                 f"tactile_port is emulated, but port is {self.port!r}: give the port of the fingertips, or set "
                 "gripper.port to emulated"

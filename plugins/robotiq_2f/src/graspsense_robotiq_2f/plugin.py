@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from graspsense.gripper_api import EmulatorEntry, Finding, FoundDevice
-from graspsense.plugin_api import FeatureSetEntry, PipelineEntry, SensorBackendEntry, hookimpl
+from graspsense.plugin_api import PipelineEntry, SensorBackendEntry, hookimpl
 
 GRASPSENSE_API = (2, 0)
 
@@ -18,16 +18,6 @@ def graspsense_sensor_backends() -> Iterable[SensorBackendEntry]:
         target="graspsense_robotiq_2f.backend:RobotiqBackend",
         summary="Robotiq 2F-85, 2F-140 or Hand-E over Modbus RTU (serial port or socket); position and motor current",
         needs='pip install "graspsense[robotiq]"; on Linux your user in the group dialout',
-    )
-
-
-@hookimpl
-def graspsense_feature_sets() -> Iterable[FeatureSetEntry]:
-    """Return the features that need no pads."""
-    yield FeatureSetEntry(
-        name="chitta-without-pads",
-        target="graspsense_robotiq_2f.features:WithoutPads",
-        summary="the four features of Table I that need no force, with contact from the effort",
     )
 
 

@@ -35,6 +35,7 @@ _SIM = Shipped("graspsense-sim-gripper", "sim_gripper", "sim")
 _MUJOCO = Shipped("graspsense-mujoco-gripper", "mujoco_gripper", "mujoco")
 _ROBOTIQ = Shipped("graspsense-robotiq-2f", "robotiq_2f", "robotiq")
 _ROS2 = Shipped("graspsense-ros2", "ros2", "ros2")
+_SO101 = Shipped("graspsense-so101-gripper", "so101_gripper", "so101")
 _C45 = Shipped("graspsense-c45", "c45", "c45")
 _PAPER = Shipped("graspsense-paper", "paper", "paper")
 _IDENTIFY = Shipped("graspsense-identify", "identify", "identify")
@@ -45,7 +46,7 @@ SHIPPED: Final[dict[tuple[Role, str], Shipped]] = {
     ("sensor-backend", "mujoco"): _MUJOCO,
     ("sensor-backend", "robotiq"): _ROBOTIQ,
     ("sensor-backend", "ros2"): _ROS2,
-    ("feature-set", "chitta-without-pads"): _ROBOTIQ,
+    ("sensor-backend", "so101"): _SO101,
     ("classifier", "c45"): _C45,
 }
 """Components in other distributions of this project, for the hint if one is not installed."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Iterable, Sequence
+from math import ceil, inf
 from typing import Final, NamedTuple
 
 from graspsense.core.values.errors import ConfigError, TareRefused
@@ -207,6 +208,60 @@ def load_table(readings: Iterable[tuple[float, float]]) -> LoadTable:
     pad_n = [pad for _, pads in pools for pad in pads]
     load_n = [load for load, pads in pools for _ in pads]
     return LoadTable((0.0, *pad_n), (0.0, *load_n))
+
+
+class MotorTable(NamedTuple):
+    """The force (N) that a load cell measured at each load or current of a motor that pushes in one direction.
+
+    Nine of ten further readings are within `error_n` of it. The friction of the motor is in the table, and how much
+    the force differs while it rises and falls is in the error.
+    """
+
+    table: LoadTable
+    error_n: float
+
+
+LEAST_READINGS: Final = 9
+"""Readings from which on the largest of their errors holds for nine of ten further ones."""
+
+
+def motor_table(readings: Sequence[tuple[float, float]]) -> MotorTable:
+    """Return the table of these readings (load or current of the motor, without sign; force of the load cell in N).
+
+    The error of each reading is taken from the table of the others, and `error_n` is exceeded by one of ten. Raises
+    ConfigError for fewer than `LEAST_READINGS`, and as `load_table` does.
+    """
+    if len(readings) < LEAST_READINGS:
+        raise ConfigError(
+            f"{len(readings)} readings of the motor in one direction: take at least {LEAST_READINGS}, while the force "
+            "rises and while it falls"
+        )
+    errors = []
+    for i, (motor, load_n) in enumerate(readings):
+        others = load_table([*readings[:i], *readings[i + 1 :]])
+        errors.append(abs(load_of(others, motor)[0] - load_n))
+    rank = ceil(0.9 * (len(errors) + 1))
+    return MotorTable(load_table(readings), sorted(errors)[rank - 1])
+
+
+def load_within(table: MotorTable, motor: float) -> tuple[float, float]:
+    """Return the force (N, not negative) at this load or current, and how far off it can be.
+
+    That is inf beyond the last reading. Below the first one, it can be any force up to that of this reading.
+    """
+    load_n, inside = load_of(table.table, motor)
+    least_n = table.table.load_n[1] if motor < table.table.pad_n[1] else 0.0
+    return max(load_n, 0.0), max(table.error_n, least_n) if inside else inf
+
+
+def motor_at(table: MotorTable, load_n: float) -> float:
+    """Return the largest load or current with which the motor presses with at most this force; at most the last one."""
+    motor, loads = table.table
+    i = bisect_right(loads, load_n)
+    if i == len(loads):
+        return motor[-1]
+    share = (load_n - loads[i - 1]) / (loads[i] - loads[i - 1])
+    return motor[i - 1] + share * (motor[i] - motor[i - 1])
 
 
 def load_of(table: LoadTable, pad_n: float) -> tuple[float, bool]:

@@ -22,12 +22,14 @@ from graspsense.core.files.closed_paths import make_closed, why_open
 from graspsense.core.files.regular_file import first_bytes
 from graspsense.core.files.user_folders import NOWHERE, data_folder
 from graspsense.core.files.whole_file import write_whole
-from graspsense.core.grasp.calibration import Cells, LoadTable
+from graspsense.core.grasp.calibration import Cells, LoadTable, MotorTable
 from graspsense.core.values.errors import ConfigError, DataDamaged
 
 FORMAT: Final = "graspsense-calibration"
 VERSION: Final = 1
 KINDS: Final = ("tare", "gain", "load-cell", "friction")
+DIRECTIONS: Final = ("closing", "opening")
+"""In which a motor pushes."""
 UNCALIBRATED: Final = "none"
 CALIBRATION_BYTES: Final = 2**20
 """Of a longer file, only so many are read, which are then no JSON."""
@@ -210,15 +212,35 @@ def stored_gain(calibration: Calibration) -> tuple[Cells, Cells]:
 
 def stored_tables(calibration: Calibration) -> tuple[LoadTable, LoadTable]:
     """Return the stored load tables of the left and of the right pad."""
-    tables = []
-    for side in ("left", "right"):
-        pads, loads = _numbers(calibration.data[side]["pad_n"]), _numbers(calibration.data[side]["load_n"])
-        if len(pads) != len(loads) or len(pads) < 2:
-            raise ValueError(f"the {side} load table has {len(pads)} and {len(loads)} numbers")
-        if any(a >= b for a, b in pairwise(pads)) or list(loads) != sorted(loads):
-            raise ValueError(f"the {side} load table does not rise")
-        tables.append(LoadTable(pads, loads))
-    return tables[0], tables[1]
+    left, right = (_table(calibration, side, "pad_n") for side in ("left", "right"))
+    return left, right
+
+
+def stored_motor_tables(calibration: Calibration) -> tuple[MotorTable, MotorTable]:
+    """Return the stored tables of a motor that pushes to close and of one that pushes to open."""
+    errors = _numbers([calibration.data[direction]["error_n"] for direction in DIRECTIONS])
+    if min(errors) < 0.0:
+        raise ValueError("the error of a table is negative")
+    closing, opening = (
+        MotorTable(_table(calibration, direction, "motor"), error_n)
+        for direction, error_n in zip(DIRECTIONS, errors, strict=True)
+    )
+    return closing, opening
+
+
+def _load_cell(calibration: Calibration) -> object:
+    """Return the stored tables, whichever they are: of two pads, or of the two directions of a motor."""
+    pads = "left" in calibration.data
+    return stored_tables(calibration) if pads else stored_motor_tables(calibration)
+
+
+def _table(calibration: Calibration, name: str, column: str) -> LoadTable:
+    measured, loads = (_numbers(calibration.data[name][key]) for key in (column, "load_n"))
+    if len(measured) != len(loads) or len(measured) < 2:
+        raise ValueError(f"the {name} load table has {len(measured)} and {len(loads)} numbers")
+    if any(a >= b for a, b in pairwise(measured)) or list(loads) != sorted(loads):
+        raise ValueError(f"the {name} load table does not rise")
+    return LoadTable(measured, loads)
 
 
 def stored_friction(calibration: Calibration) -> tuple[Cells, Cells, Cells]:
@@ -232,7 +254,7 @@ def stored_friction(calibration: Calibration) -> tuple[Cells, Cells, Cells]:
 _READERS: Final = {
     "tare": stored_zero,
     "gain": stored_gain,
-    "load-cell": stored_tables,
+    "load-cell": _load_cell,
     "friction": stored_friction,
 }
 

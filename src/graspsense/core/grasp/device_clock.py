@@ -8,6 +8,7 @@ through these, with the median of all slopes between them (Theil and Sen), gives
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Iterable
 from math import inf, nan
 from statistics import median
 from typing import Final, NamedTuple, final
@@ -83,6 +84,21 @@ class DeviceClock:
             self._kept.append(self._block)
             self._line = _line_of(list(self._kept))
         self._began_s, self._block = host_s, (nan, inf)
+
+
+def clock_report(name: str, clock: DeviceClock, channels: Iterable[str]) -> dict[str, float | str]:
+    """Return for `SensorBackend.report` which channels have the times of this clock, and how sure these are.
+
+    Each has the host's time of its device's time. `Trial.apart_s` tells from it how far two channels can be apart.
+    """
+    line = clock.line()
+    return {
+        f"{name}_channels": " ".join(channels),
+        f"{name}_offset_s": line.offset_s,
+        f"{name}_drift": line.drift,
+        f"{name}_uncertainty_s": line.uncertainty_s,
+        f"{name}_latency_s": clock.latency_s(),
+    }
 
 
 def _line_of(points: list[tuple[float, float]]) -> ClockLine:

@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 from attrs import field, frozen
 
+from graspsense.core.values.channel_times import apart_s
 from graspsense.core.values.display import html
+from graspsense.core.values.errors import UnknownName
 from graspsense.core.values.events import GraspEvent, event_as_json
 from graspsense.core.values.printable import in_one_line
 from graspsense.core.values.signals import Outcome
@@ -62,6 +64,17 @@ class Trial:
 
     def _repr_html_(self) -> str:
         return html(self)
+
+    def apart_s(self, one: str, other: str) -> float:
+        """Return by how much (s) the times of two channels can be apart at most; inf where the gripper does not tell.
+
+        Channels of one device are measured together. Raises UnknownName for a channel that the gripper does not have.
+        """
+        known = tuple(channel.name for channel in self.device.channels)
+        for name in (one, other):
+            if name not in known:
+                raise UnknownName(f"no channel {name!r}: the gripper has {', '.join(known)}")
+        return apart_s(self.trace, self.report, one, other)
 
 
 def trial_as_json(trial: Trial) -> dict[str, Any]:

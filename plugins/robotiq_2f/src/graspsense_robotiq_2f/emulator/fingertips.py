@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import Final, NamedTuple
+from typing import Final
 
 from graspsense_robotiq_2f.tactile_protocol import (
     ACCELERATION,
@@ -12,7 +12,6 @@ from graspsense_robotiq_2f.tactile_protocol import (
     CELLS,
     COLUMNS,
     DYNAMIC,
-    FINGERS,
     GYROSCOPE,
     PRESSURE,
     READ,
@@ -41,22 +40,15 @@ _SHAPE: Final = [
 _TOTAL: Final = sum(_SHAPE)
 
 
-class Felt(NamedTuple):
-    """What the pads feel: the forces (N) on the left and the right one."""
-
-    left_n: float
-    right_n: float
-
-
 class EmulatedFingertips:
-    """Two fingertips whose forces `felt` returns. `heard` and `unasked` are the two sides of a port."""
+    """A board with a fingertip for each force of `felt`. `heard` and `unasked` are the two sides of a port."""
 
-    def __init__(self, felt: Callable[[], Felt]) -> None:
+    def __init__(self, felt: Callable[[], tuple[float, ...]]) -> None:
         self._felt = felt
         self._packets = Packets()
         self._began_s = time.monotonic()
         self._period_s = self._due_s = self._pressed_s = 0.0
-        self._last = Felt(0.0, 0.0)
+        self._last = tuple(0.0 for _ in felt())
         self.sent = 0
         """The number of packets with measurements."""
 
@@ -92,8 +84,7 @@ class EmulatedFingertips:
             self._pressed_s = now_s + PRESSURE_S
             self._last = self._felt()
         fields = []
-        for finger in range(FINGERS):
-            force_n, before_n = self._last[finger], before[finger]
+        for finger, (force_n, before_n) in enumerate(zip(self._last, before, strict=True)):
             fields.append(Field(TIMESTAMP, finger, (round(now_s * 1e6),)))
             if pressed:
                 fields.append(Field(PRESSURE, finger, _cells(force_n)))

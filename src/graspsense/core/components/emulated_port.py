@@ -15,7 +15,7 @@ LARGEST: Final = 4096
 
 
 @final
-class SerialPort:
+class EmulatedPort:
     """A port on a `pty` or a `socket`; `heard(data)` is called with what arrives, and returns what is sent back.
 
     `idle` is called at most every `period_s`, where that is given, and returns what is sent unasked.

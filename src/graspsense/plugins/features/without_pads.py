@@ -1,4 +1,4 @@
-"""The features of Table I that need no force, with contact detected from the effort."""
+"""The features of Table I that need no force, with contact detected from the effort, for grippers without pads."""
 
 from __future__ import annotations
 

@@ -1,0 +1,1 @@
+"""The gripper of an SO-101 arm for graspsense."""

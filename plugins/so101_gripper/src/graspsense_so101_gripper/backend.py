@@ -1,0 +1,327 @@
+"""The gripper of an arm as a sensor backend. It writes to the gripper's motor only."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from math import inf, isnan, nan
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Final, TypeVar, final
+
+from attrs import evolve
+
+from graspsense.gripper_api import calibrations_of
+from graspsense.plugin_api import (
+    FORCE,
+    NO_PADS,
+    POSITION,
+    VELOCITY,
+    Channel,
+    Command,
+    DeviceInfo,
+    DeviceLost,
+    Frame,
+    NoDevice,
+    ObjectKind,
+    Pads,
+    Reading,
+    SensorBackend,
+    create,
+    signal_type,
+)
+from graspsense_so101_gripper.arm_calibration import read_arm_calibration
+from graspsense_so101_gripper.bus import NoStatusPacket, ServoBus
+from graspsense_so101_gripper.config import So101Config
+from graspsense_so101_gripper.discovery import serial_number
+from graspsense_so101_gripper.emulator.arm import EmulatedArm
+from graspsense_so101_gripper.faults import STATUS_BITS
+from graspsense_so101_gripper.force import ForceOfMotor
+from graspsense_so101_gripper.identity import Unfit, jaw_of
+from graspsense_so101_gripper.jaw import RADIANS_A_STEP
+from graspsense_so101_gripper.registers import (
+    AMPERES_A_STEP,
+    FULL_LOAD,
+    IDENTITY,
+    KELVIN,
+    REGISTERS,
+    STATE,
+    VOLTS_A_STEP,
+    MotorRequest,
+    MotorState,
+    motor_state,
+)
+
+RATE_HZ: Final = 100.0
+ATTEMPTS: Final = 3
+SLOPE_FRAMES: Final = 6
+SPEED_LIMIT_M_S: Final = 0.3
+FORCE_SPEED_M_S: Final = 0.02
+"""Speed of a closing that only a force was asked for."""
+COMMAND_DELAY_S: Final = 0.02
+"""A command is written at once (1 ms), and seen in the next frame (10 ms); the rest is for the motor to start."""
+
+CHANNELS: Final = (
+    Channel("gap", "m", RATE_HZ),
+    Channel("velocity", "m/s", RATE_HZ),
+    Channel("effort", "N", RATE_HZ),
+    Channel("effort_error", "N", RATE_HZ),
+    Channel("load", "1", RATE_HZ),
+    Channel("current", "A", RATE_HZ),
+    Channel("motor_speed", "rad/s", RATE_HZ),
+    Channel("motor_voltage", "V", RATE_HZ),
+    Channel("motor_temperature", "K", RATE_HZ),
+)
+SIGNALS: Final[Any] = signal_type(CHANNELS)
+ReplyT = TypeVar("ReplyT")
+
+
+@final
+class So101Backend(SensorBackend[So101Config]):
+    """Turns commands into a goal with a speed and a torque limit; each read is one packet."""
+
+    channels = CHANNELS
+    accepts = ("velocity", "position", "force")
+    closes_itself: Mapping[str, str] = MappingProxyType(
+        {
+            "velocity": "the open or closed position, with this speed",
+            "position": "the target, with the limits of the command as speed and torque limit",
+            "force": "the closed position, with a torque limit for this force and at most 20 mm/s",
+        }
+    )
+    command_delay_s = COMMAND_DELAY_S
+
+    def __init__(self, config: So101Config) -> None:
+        super().__init__(config)
+        self.least_force_n = config.moving_force_n
+        self.least_step_m = config.jaw_length_m * RADIANS_A_STEP
+        self.least_speed_m_s = self.least_step_m
+        self._bus: ServoBus | None = None
+        self._emulated: EmulatedArm | None = None
+        self._found: MotorRequest | None = None
+        self._asked: MotorRequest | None = None
+        self._frames = self._retries = 0
+        self._exchange_s = 0.0
+        self._body_report: Mapping[str, float | int | str | bool] = {}
+
+    def objects(self) -> Sequence[ObjectKind]:
+        """Return what the body of the emulated arm can hold."""
+        config = self.config
+        if config.port != "emulated":
+            return ()
+        return tuple(create("sensor-backend", config.body, **config.body_config).objects())
+
+    def with_object(self, name: str) -> SensorBackend[So101Config]:
+        """Return the emulated gripper with this object. Raises ConfigError for a real one."""
+        if self.config.port != "emulated":
+            return super().with_object(name)
+        return So101Backend(evolve(self.config, object=name))
+
+    def open(self, seed: int) -> DeviceInfo:
+        """Open the bus, compare the motor with what is known of it, and hold it where it is. Raises NoDevice."""
+        self.close()
+        config = self.config
+        arm = read_arm_calibration(Path(config.arm_calibration)) if config.arm_calibration else None
+        port = config.port
+        if port == "emulated":
+            self._emulated = EmulatedArm(config, "pty", seed)
+            self._emulated.tell("plug")
+            port = self._emulated.where
+        serial = serial_number(config, port)
+        numbers = {"jaw_length_m": config.jaw_length_m, "force_from": config.force_from}
+        found = calibrations_of(config.calibration, serial, numbers)
+        self._force = ForceOfMotor(config, found)
+        self._frames = self._retries = 0
+        self._exchange_s = 0.0
+        try:
+            self._bus = ServoBus(port, config.reply_timeout_s)
+            memory = self._tried(lambda bus: bus.read(config.motor, *IDENTITY))
+            self._jaw = jaw_of(memory, config, arm)
+            state = self._state()
+            self._found, self._position, self._stopped = state.asked, state.position, True
+            self._ask(self._asked_of(state.position, SPEED_LIMIT_M_S, config.moving_force_n))
+        except (OSError, NoStatusPacket, Unfit) as error:
+            self.close()
+            raise NoDevice(
+                f"no gripper of an SO-101 arm at {config.port}, motor {config.motor}: {error}. Look at the arm's power "
+                "and cable, at gripper.port and gripper.motor; on Linux be in the group dialout"
+            ) from error
+        self._began_s = self._last_s = self._due_s = time.monotonic()
+        self._recent: deque[tuple[float, float]] = deque(maxlen=SLOPE_FRAMES)
+        firmware = [REGISTERS[f"firmware_{part}_version"].number(memory) for part in ("major", "minor")]
+        return self._described(serial, ".".join(map(str, firmware)), numbers, found)
+
+    def read(self, timeout_s: float) -> Reading | None:
+        """Wait for the next multiple of 10 ms, then read the motor. Raises DeviceLost."""
+        wait_s = self._due_s - time.monotonic()
+        if wait_s > timeout_s:
+            time.sleep(timeout_s)
+            return None
+        if wait_s > 0.0:
+            time.sleep(wait_s)
+        # On a grid of times, so that the duration of an exchange does not lower the rate; lost time is not made up.
+        self._due_s = max(self._due_s + 1.0 / RATE_HZ, time.monotonic())
+        asked_s = time.monotonic()
+        state = self._still_ours(self._kept(self._state))
+        now_s = time.monotonic()
+        self._exchange_s = max(self._exchange_s, now_s - asked_s)
+        t_s, dt_s, self._last_s = now_s - self._began_s, now_s - self._last_s, now_s
+        self._position = state.position
+        gap_m = self._jaw.gap_m(state.position)
+        self._recent.append((t_s, gap_m))
+        (start_s, start_m), span = self._recent[0], len(self._recent)
+        velocity = (gap_m - start_m) / (t_s - start_s) if span > 1 else 0.0
+        load = state.load * self._jaw.opens / FULL_LOAD
+        effort_n, error_n = self._force.estimate(self._force.push(state, self._jaw.opens))
+        self._frames += 1
+        signals = SIGNALS(
+            error_n,
+            load,
+            state.current * AMPERES_A_STEP,
+            state.velocity * RADIANS_A_STEP,
+            state.voltage * VOLTS_A_STEP,
+            state.temperature + KELVIN,
+        )
+        frame = Frame(t_s, dt_s, gap_m, velocity, effort_n, nan, nan, nan, nan, state.status)
+        return Reading(frame, NO_PADS, signals)
+
+    def apply(self, command: Command) -> None:
+        """Write the goal of this command, unless it is the present one. Raises DeviceLost."""
+        kind, value, effort_limit, speed_limit = command
+        jaw, force = self._jaw, effort_limit
+        if kind == VELOCITY:
+            speed, goal = min(abs(value), speed_limit), jaw.opened if value > 0.0 else jaw.closed
+        elif kind == POSITION:
+            speed, goal = speed_limit, jaw.position(value)
+        elif kind == FORCE:
+            speed, goal, force = min(FORCE_SPEED_M_S, speed_limit), jaw.closed, min(value, effort_limit)
+        else:
+            speed, goal = 0.0, self._position
+        assert self._asked is not None
+        if speed <= 0.0 or isnan(value):
+            # It stops once, where it is: a goal that followed the jaw would let it creep.
+            goal, speed = (self._asked.goal_position if self._stopped else self._position), 0.0
+        self._stopped = speed <= 0.0
+        self._ask(self._asked_of(goal, speed or SPEED_LIMIT_M_S, force))
+
+    def tare(self, images: Sequence[Pads]) -> None:
+        """Do nothing: there are no pads."""
+
+    def close(self) -> None:
+        """Stop the jaw if the motor still responds, give it back as it was found, and close the bus."""
+        bus, self._bus = self._bus, None
+        if bus is not None:
+            if self._found is not None:
+                self._give_back(bus, self._found)
+            bus.close()
+        self._found = self._asked = None
+        emulated, self._emulated = self._emulated, None
+        if emulated is not None:
+            self._body_report = emulated.body_report
+            emulated.close()
+
+    def report(self) -> dict[str, float | int | str | bool]:
+        """Return the number of frames, and of repeated exchanges, with what the emulated body knows."""
+        body = self._body_report if self._emulated is None else self._emulated.body_report
+        return {
+            **body,
+            "frames": self._frames,
+            "repeated": self._retries,
+            "frame_uncertainty_s": self._exchange_s,
+        }
+
+    def dry_run_backend(self) -> So101Backend:
+        """Return the emulated gripper."""
+        config = self.config
+        if config.port == "emulated":
+            return So101Backend(config)
+        return So101Backend(evolve(config, port="emulated", arm_calibration="", calibration="none"))
+
+    def _asked_of(self, goal: int, speed_m_s: float, force_n: float) -> MotorRequest:
+        # A speed of 0 is the highest one to this motor.
+        speed = max(int(self._jaw.speed(self._jaw.gap_m(self._position), min(speed_m_s, SPEED_LIMIT_M_S))), 1)
+        return MotorRequest(1, self.config.acceleration, goal, 0, speed, self._force.torque_limit(force_n))
+
+    def _ask(self, asked: MotorRequest) -> None:
+        if asked != self._asked:
+            data = asked.written()
+            self._kept(lambda: self._tried(lambda bus: bus.write(self.config.motor, STATE[0], data)))
+            self._asked = asked
+
+    def _give_back(self, bus: ServoBus, found: MotorRequest) -> None:
+        """Let the motor stay where it is, with the torque and the limits that it had before, also if it only hears."""
+        motor, position = self.config.motor, self._position
+        with suppress(NoStatusPacket, OSError):
+            position = motor_state(bus.read(motor, *STATE)).position
+        stop = found._replace(goal_position=position, goal_time=0).written()
+        for _ in range(ATTEMPTS):
+            with suppress(NoStatusPacket, OSError):
+                bus.write(motor, STATE[0], stop)
+                return
+
+    def _state(self) -> MotorState:
+        return motor_state(self._tried(lambda bus: bus.read(self.config.motor, *STATE)))
+
+    def _still_ours(self, state: MotorState) -> MotorState:
+        """Return the state if the motor is asked what was written. Raises DeviceLost."""
+        if state.asked == self._asked:
+            return state
+        why = (
+            "its torque was switched off, by a loss of power or another program"
+            if not state.asked.torque_enable
+            else "another program commands it: end that"
+        )
+        raise DeviceLost(
+            f"motor {self.config.motor} at {self.config.port} is not asked what was written: {why}"
+        )
+
+    def _tried(self, exchange: Callable[[ServoBus], ReplyT]) -> ReplyT:
+        """Return the result of an exchange, which is repeated without a reply. Raises NoStatusPacket, OSError."""
+        assert self._bus is not None
+        for _ in range(ATTEMPTS - 1):
+            with suppress(NoStatusPacket):
+                return exchange(self._bus)
+            self._retries += 1
+        return exchange(self._bus)
+
+    def _kept(self, exchange: Callable[[], ReplyT]) -> ReplyT:
+        """Return the result of an exchange with an open gripper. Raises DeviceLost."""
+        if self._bus is None:
+            raise DeviceLost("the gripper of the arm is not open")
+        try:
+            return exchange()
+        except (NoStatusPacket, OSError) as error:
+            raise DeviceLost(
+                f"motor {self.config.motor} at {self.config.port} does not answer ({error}): look at its "
+                "cable and power"
+            ) from error
+
+    def _described(
+        self, serial: str, firmware: str, numbers: Mapping[str, float | str], found: Mapping[str, Any]
+    ) -> DeviceInfo:
+        emulated, config = self._emulated is not None, self.config
+        measured = (
+            f"effort is estimated from the motor's {config.force_from} by a load cell; effort_error is how far off it "
+            "is in nine of ten readings"
+            if self._force.calibrated
+            else f"effort is the motor's {config.force_from} times its stall torque over gripper.jaw_length_m: an "
+            "assumption, off by up to the full force until `graspsense calibrate load-cell`"
+        )
+        return DeviceInfo(
+            name="emulated SO-101 gripper" if emulated else "SO-101 gripper",
+            serial=serial,
+            firmware=firmware,
+            clock="device",
+            simulated=emulated,
+            rate_hz=RATE_HZ,
+            effort_limit_n=config.full_force_n * config.largest_load,
+            speed_limit_m_s=SPEED_LIMIT_M_S,
+            opening=Command(POSITION, self._jaw.stroke_m, inf, 0.05),
+            relaxed=Command(VELOCITY, 0.0, inf, inf),
+            calibration={kind: one.sha256 for kind, one in found.items()},
+            numbers=numbers,
+            status_bits=STATUS_BITS,
+            notes=(measured, *(("emulated: no gripper was touched",) if emulated else ())),
+        )

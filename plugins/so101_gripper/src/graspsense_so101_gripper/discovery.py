@@ -1,0 +1,129 @@
+"""Search for an arm: the serial ports of this computer, and what answers at the port of the settings."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Final
+
+from graspsense.gripper_api import Finding, FoundDevice
+from graspsense.plugin_api import ConfigError, DataDamaged
+from graspsense_so101_gripper.arm_calibration import read_arm_calibration
+from graspsense_so101_gripper.bus import NoStatusPacket, ServoBus
+from graspsense_so101_gripper.config import So101Config
+from graspsense_so101_gripper.faults import STATUS_BITS
+from graspsense_so101_gripper.identity import Unfit, jaw_of
+from graspsense_so101_gripper.registers import FULL_LOAD, IDENTITY, STATE, VOLTS_A_STEP, motor_state
+
+CONVERTERS: Final = {(0x1A86, 0x55D3), (0x1A86, 0x7523)}
+"""USB numbers of the CH343 and CH340 chips on bus boards of such arms. Others have them too."""
+MOTORS: Final = range(1, 7)
+NO_PERMISSION: Final = (
+    "add your user to the group dialout (`sudo usermod -aG dialout $USER`), and log in again"
+)
+
+
+def serial_number(config: So101Config, port: str) -> str:
+    """Return the name by which calibrations are kept: that of the bus board at this port, and the motor."""
+    from serial.tools.list_ports import comports
+
+    board = "emulated" if config.port == "emulated" else "unknown"
+    for found in comports():
+        if os.path.realpath(found.device) == os.path.realpath(port) and found.serial_number:
+            board = re.sub(r"[^\w+-]", "_", found.serial_number)
+    return f"{board}-{config.motor}"
+
+
+def found_devices() -> Sequence[FoundDevice]:
+    """Return the converters, for `graspsense devices`. What hangs on them is not known before it is asked."""
+    from serial.tools.list_ports import comports
+
+    found = []
+    for port in comports():
+        if (port.vid, port.pid) in CONVERTERS:
+            ready = os.access(port.device, os.R_OK | os.W_OK)
+            found.append(
+                FoundDevice(
+                    backend="so101",
+                    serial=port.serial_number or "",
+                    where=port.device,
+                    ready=ready,
+                    advice="a serial converter, perhaps of an SO-101 arm" if ready else NO_PERMISSION,
+                )
+            )
+    return found
+
+
+def diagnose(config: object, timeout_s: float) -> Iterator[Finding]:
+    """Return the findings about the gripper of these settings, by default about the converters. Nothing moves."""
+    if config is None:
+        found = found_devices()
+        if not found:
+            yield Finding("so101", "note", "no USB converter of an SO-101 arm")
+        for device in found:
+            found_words = f"a converter at {device.where}"
+            yield Finding("so101", "ok" if device.ready else "problem", found_words, device.advice)
+    elif isinstance(config, So101Config):
+        yield from _asked(config, timeout_s)
+
+
+def _asked(config: So101Config, timeout_s: float) -> Iterator[Finding]:
+    if config.port == "emulated":
+        yield Finding("so101", "note", "gripper.port is emulated, so no device is searched")
+        return
+    try:
+        bus = ServoBus(config.port, min(config.reply_timeout_s, timeout_s))
+    except OSError as error:
+        advice = NO_PERMISSION if "permission" in str(error) else "look at gripper.port, power and cable"
+        yield Finding("so101", "problem", f"{config.port}: {error}", advice)
+        return
+    try:
+        yield from _motor(bus, config)
+    finally:
+        bus.close()
+
+
+def _motor(bus: ServoBus, config: So101Config) -> Iterator[Finding]:
+    try:
+        arm = read_arm_calibration(Path(config.arm_calibration)) if config.arm_calibration else None
+        memory = bus.read(config.motor, *IDENTITY)
+        state = motor_state(bus.read(config.motor, *STATE))
+        jaw = jaw_of(memory, config, arm)
+    except (NoStatusPacket, OSError) as error:
+        others = ", ".join(map(str, _answering(bus))) or "none"
+        yield Finding(
+            "so101",
+            "problem",
+            f"{config.port} opens, but motor {config.motor} gives: {error}. Motors that answer: {others}",
+            "look at the power of the arm, the cable from motor to motor, and gripper.motor",
+        )
+        return
+    except (Unfit, ConfigError, DataDamaged) as error:
+        yield Finding("so101", "problem", f"motor {config.motor}: {error}", "look at gripper.motor")
+        return
+    yield Finding(
+        "so101",
+        "ok",
+        f"motor {config.motor} at {config.port}, torque {'on' if state.asked.torque_enable else 'off'}",
+        numbers={
+            "position": state.position,
+            "gap_m": jaw.gap_m(state.position),
+            "load": state.load * jaw.opens / FULL_LOAD,
+            "voltage_v": state.voltage * VOLTS_A_STEP,
+            "temperature_c": state.temperature,
+        },
+    )
+    for bit in STATUS_BITS:
+        if bit.mask & state.status:
+            yield Finding("so101", "problem", f"status {state.status}: {bit.name}", bit.meaning)
+
+
+def _answering(bus: ServoBus) -> Iterator[int]:
+    for motor in MOTORS:
+        try:
+            bus.read(motor, *IDENTITY)
+        except (NoStatusPacket, OSError):
+            continue
+        yield motor

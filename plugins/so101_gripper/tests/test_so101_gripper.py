@@ -1,0 +1,315 @@
+"""The driver of the gripper's motor against the emulated arm."""
+
+from __future__ import annotations
+
+import json
+from types import SimpleNamespace
+
+import pytest
+
+from graspsense import WiringError, load_pipeline
+from graspsense.core.components import emulated_serial
+from graspsense.plugin_api import (
+    POSITION,
+    VELOCITY,
+    Command,
+    ConfigError,
+    DataDamaged,
+    DeviceLost,
+    NoDevice,
+    create,
+)
+from graspsense.testing_api import parametrize_checks
+from graspsense_so101_gripper import backend
+from graspsense_so101_gripper.bus import NoStatusPacket, ServoBus
+from graspsense_so101_gripper.config import So101Config, So101Faults
+from graspsense_so101_gripper.discovery import diagnose
+from graspsense_so101_gripper.emulator.arm import EmulatedArm
+from graspsense_so101_gripper.registers import STATE, MotorRequest, motor_state
+
+PATIENT_S = 60.0
+"""For a reply that comes: when it does is this machine's business."""
+FAST = Command(POSITION, 0.0, 8.0, 0.05)
+
+
+@pytest.fixture
+def own_time(monkeypatch):
+    """Driver and emulator have a time of their own, which passes while the driver sleeps or looks at it."""
+    now_s = 0.0
+
+    def sleep(seconds):
+        nonlocal now_s
+        now_s += seconds
+
+    def look():
+        sleep(0.001)
+        return now_s
+
+    monkeypatch.setattr(backend, "time", SimpleNamespace(monotonic=look, sleep=sleep))
+    monkeypatch.setattr(emulated_serial, "time", SimpleNamespace(monotonic=lambda: now_s))
+
+
+@pytest.fixture
+def emulated():
+    """Makes emulated arms that are plugged in, and unplugs them."""
+    made = []
+
+    def make(**keys):
+        arm = EmulatedArm(So101Config(port="emulated", **keys), "pty", 1)
+        made.append(arm)
+        arm.tell("plug")
+        return arm
+
+    yield make
+    for arm in made:
+        arm.close()
+
+
+def driver_of(arm, **keys):
+    return create(
+        "sensor-backend",
+        "so101",
+        **{"port": arm.where, "reply_timeout_s": PATIENT_S, "calibration": "none", **keys},
+    )
+
+
+@pytest.mark.usefixtures("own_time")
+@parametrize_checks(
+    "graspsense-so101-gripper",
+    keys={"port": "emulated", "reply_timeout_s": PATIENT_S},
+    unplugged={"faults": {"unplug_at_s": 0.5}, "reply_timeout_s": 1.0},
+    absent={"port": "/dev/nowhere"},
+)
+def test_conformance(check):
+    check.run()
+
+
+@pytest.mark.usefixtures("own_time")
+def test_a_grasp_writes_to_no_other_motor_and_gives_the_gripper_back_as_it_was(emulated):
+    arm = emulated()
+    bus = ServoBus(arm.where, PATIENT_S)
+    before = {motor: bus.read(motor, *STATE) for motor in range(1, 7)}
+    bus.close()
+    options = [
+        f"gripper.port={arm.where}",
+        f"gripper.reply_timeout_s={PATIENT_S}",
+        "gripper.calibration=none",
+    ]
+    trial = load_pipeline("so101", options=options).grasp()
+
+    assert trial.outcome.words == "steady", trial.reason
+    assert not trial.features.reasons
+    # The jaw opens by 86 mm, and the block of the simulator is narrower.
+    assert 0.05 < trial.features["p_steady"] <= trial.features["p_first"] < 0.08
+    assert set(trial.trace.signals) == {channel.name for channel in backend.CHANNELS[3:]}
+    assert arm.state()["written_to_others"] == 0
+    bus = ServoBus(arm.where, PATIENT_S)
+    after = {motor: bus.read(motor, *STATE) for motor in range(1, 7)}
+    bus.close()
+    assert {m: after[m] for m in range(1, 6)} == {m: before[m] for m in range(1, 6)}
+    asked, found = motor_state(after[6]).asked, motor_state(before[6]).asked
+    assert asked._replace(goal_position=0) == found._replace(goal_position=0)
+
+
+@pytest.mark.usefixtures("own_time")
+def test_a_frame_is_one_read(emulated):
+    arm = emulated()
+    driver = driver_of(arm)
+    driver.open(1)
+    before = arm.state()["requests"]
+    frames = [driver.read(0.1).frame for _ in range(50)]
+    assert arm.state()["requests"] - before == 50
+    assert 1.0 / 110.0 < (frames[-1].t_s - frames[0].t_s) / 49 < 1.0 / 99.0
+    driver.close()
+
+
+@pytest.mark.usefixtures("own_time")
+def test_it_closes_with_the_torque_limit_of_the_force_and_tells_load_current_and_supply(emulated):
+    arm = emulated()
+    driver = driver_of(arm, jaw_length_m=0.1, stall_torque_nm=2.0)
+    driver.open(1)
+    for _ in range(300):
+        reading = driver.read(0.1)
+        driver.apply(FAST)
+    driver.close()
+    frame, signals = reading.frame, reading.signals
+    # 2 N m at 0.1 m is 20 N, so that 8 N is 40 % of the load and of the 2.4 A.
+    assert signals.load == pytest.approx(0.4)
+    assert frame.effort_n == pytest.approx(8.0)
+    # No load cell has measured it: it can be anything up to the full force.
+    assert signals.effort_error == pytest.approx(20.0)
+    assert signals.current == pytest.approx(0.4 * 2.4, abs=0.0065)
+    assert (signals.motor_voltage, signals.motor_temperature) == (pytest.approx(7.4), pytest.approx(303.15))
+    assert 0.005 < frame.gap_m < 0.08
+
+
+@pytest.mark.usefixtures("own_time")
+@pytest.mark.parametrize("at_s", [0.02, 0.5, 2.0])
+@pytest.mark.parametrize("fault", ["unplug", "silent"])
+def test_a_gripper_lost_in_a_grasp_ends_it_and_is_told(fault, at_s):
+    faults = (
+        [f"gripper.faults.unplug_at_s={at_s}"]
+        if fault == "unplug"
+        else ["gripper.faults.mood=silent", f"gripper.faults.mood_at_s={at_s}"]
+    )
+    options = ["gripper.port=emulated", "gripper.reply_timeout_s=0.5", *faults]
+    trial = load_pipeline("so101", options=options).grasp()
+    assert trial.outcome.words == "device lost"
+    assert "cable and power" in trial.reason
+
+
+@pytest.mark.usefixtures("own_time")
+@pytest.mark.parametrize("mood", ["damaged", "silent", "late", "repeated"])
+def test_whatever_becomes_of_replies_the_jaw_is_told_to_stop(emulated, mood):
+    """The motor still hears: what it is told last is to stay where it is, without torque, as it was found."""
+    arm = emulated()
+    driver = driver_of(arm, reply_timeout_s=0.5)
+    driver.open(1)
+    for _ in range(20):
+        driver.read(0.1)
+        driver.apply(Command(VELOCITY, -0.03, 8.0, 0.15))
+    assert arm.state()["torque"]
+    assert arm.state()["steps_to_go"] > 100
+    arm.tell(mood)
+    try:
+        for _ in range(4):
+            driver.read(0.1)
+    except DeviceLost:
+        assert mood in ("damaged", "silent")
+    else:
+        assert mood in ("late", "repeated")
+    driver.close()
+    assert not arm.state()["torque"]
+    assert arm.state()["written_to_others"] == 0
+
+
+@pytest.mark.usefixtures("own_time")
+@pytest.mark.parametrize(("word", "why"), [("takeover", "another program"), ("restart", "power")])
+def test_a_motor_that_is_not_asked_what_was_written_ends_the_grasp(emulated, word, why):
+    arm = emulated()
+    driver = driver_of(arm)
+    driver.open(1)
+    driver.read(0.1)
+    arm.tell(word)
+    with pytest.raises(DeviceLost, match=why):
+        driver.read(0.1)
+    driver.close()
+    assert not arm.state()["torque"]
+
+
+def test_a_second_host_is_refused_the_port(emulated):
+    arm = emulated()
+    bus = ServoBus(arm.where, PATIENT_S)
+    with pytest.raises(NoDevice, match="another program"):
+        driver_of(arm).open(1)
+    bus.close()
+
+
+def test_a_late_or_repeated_reply_is_not_taken_for_that_of_the_next_request(emulated):
+    arm = emulated()
+    bus = ServoBus(arm.where, PATIENT_S)
+    for _ in range(2):
+        arm.tell("repeated")
+        assert len(bus.read(6, *STATE)) == STATE[1]
+        arm.tell("well")
+        bus.write(6, STATE[0], MotorRequest(0, 7, 2000, 0, 11, 300).written())
+        assert motor_state(bus.read(6, *STATE)).asked == MotorRequest(0, 7, 2000, 0, 11, 300)
+    bus.close()
+
+
+@pytest.mark.parametrize(
+    ("keys", "emulator", "why"),
+    [
+        ({}, {"faults": So101Faults(model_number=1284)}, "model 1284"),
+        ({"motor": 9, "reply_timeout_s": 0.05}, {}, "motor 9: no reply"),
+        ({"motor": 3}, {}, "lerobot-calibrate"),
+        ({"port": "/dev/nowhere"}, {}, "no such port"),
+    ],
+)
+def test_another_device_is_told_with_what_to_look_at_and_not_written_to(emulated, keys, emulator, why):
+    arm = emulated(**emulator)
+    with pytest.raises(NoDevice, match=why):
+        driver_of(arm, **keys).open(1)
+    assert not arm.state()["torque"]
+    assert arm.state()["written_to_others"] == 0
+
+
+def arm_file(path, **changed):
+    motors = {
+        name: {"id": i, "drive_mode": 0, "homing_offset": 10 * i, "range_min": 900, "range_max": 3000}
+        for i, name in enumerate(
+            ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll"), 1
+        )
+    }
+    gripper = {"id": 6, "drive_mode": 0, "homing_offset": -120, "range_min": 1600, "range_max": 2179}
+    path.write_text(json.dumps({**motors, "gripper": {**gripper, **changed}}))
+    return str(path)
+
+
+@pytest.mark.usefixtures("own_time")
+def test_the_calibration_of_lerobot_has_to_be_that_of_this_arm(emulated, tmp_path):
+    arm = emulated()
+    bus = ServoBus(arm.where, PATIENT_S)
+    opened = int.from_bytes(bus.read(6, 11, 2), "little")
+    bus.close()
+    driver = driver_of(arm, arm_calibration=arm_file(tmp_path / "arm.json", range_max=opened))
+    driver.open(1)
+    assert driver.read(1.0).frame.gap_m == pytest.approx(0.086, abs=5e-4)
+    driver.close()
+    for changed in ({"range_max": opened + 5}, {"homing_offset": 4, "range_max": opened}, {"id": 5}):
+        with pytest.raises(NoDevice, match="another arm"):
+            driver_of(arm, arm_calibration=arm_file(tmp_path / "other.json", **changed)).open(1)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "[]",
+        "{}",
+        '{"gripper": 3}',
+        '{"gripper": {"id": "6"}}',
+        "\x00\xff",
+        '{"gripper": {}}',
+        "[" * 100_000,
+    ],
+)
+def test_a_damaged_calibration_of_an_arm_is_told(tmp_path, text):
+    path = tmp_path / "arm.json"
+    path.write_text(text, encoding="latin-1")
+    with pytest.raises(DataDamaged, match="LeRobot"):
+        create("sensor-backend", "so101", arm_calibration=str(path)).open(1)
+    with pytest.raises(ConfigError, match="cannot be read"):
+        create("sensor-backend", "so101", arm_calibration=str(tmp_path / "none.json")).open(1)
+
+
+@pytest.mark.parametrize("changed", [{"range_min": 3000}, {"homing_offset": 1e9}, {"id": True}])
+def test_a_calibration_of_an_arm_with_impossible_numbers_is_told(tmp_path, changed):
+    path = arm_file(tmp_path / "arm.json", **changed)
+    with pytest.raises(DataDamaged, match="lerobot-calibrate"):
+        create("sensor-backend", "so101", arm_calibration=path).open(1)
+
+
+def test_less_than_moves_the_geared_motor_is_refused_before_anything_moves():
+    with pytest.raises(WiringError, match="3 N"):
+        load_pipeline("so101", options=["gripper.port=/dev/nowhere", "controller.approach_force_n=2"])
+
+
+def test_doctor_tells_the_gripper_from_another_motor_from_a_silent_bus_and_from_none(emulated):
+    arm = emulated()
+    found = {}
+    for port, motor in ((arm.where, 6), (arm.where, 2), (arm.where, 9), ("/dev/nowhere", 6)):
+        config = So101Config(port=port, motor=motor, reply_timeout_s=1.0 if motor == 9 else PATIENT_S)
+        finding = next(iter(diagnose(config, PATIENT_S)))
+        found[port, motor] = finding.state
+        if motor == 9:
+            assert "answer: 1, 2, 3, 4, 5, 6" in finding.found
+    assert list(found.values()) == ["ok", "problem", "problem", "problem"]
+    assert not arm.state()["torque"]
+
+
+def test_another_motor_is_silent(emulated):
+    bus = ServoBus(emulated().where, 0.05)
+    with pytest.raises(NoStatusPacket):
+        bus.read(9, *STATE)
+    bus.close()

@@ -1,0 +1,167 @@
+"""An emulated gripper behind a serial port or a socket: plugged in, unplugged, and with faults of the line."""
+
+from __future__ import annotations
+
+import threading
+import time
+from abc import abstractmethod
+from collections.abc import Mapping
+from math import inf
+from typing import Final, Literal
+
+from attrs import frozen
+
+from graspsense.core.components.emulated import EmulatedDevice
+from graspsense.core.components.emulated_port import EmulatedPort
+from graspsense.core.components.setting import setting
+
+KEEP_UP_S: Final = 0.02
+"""How often the fingers move on without a request, so that the next one need not wait until they have."""
+MOODS: Final = {
+    "well": "behave again",
+    "silent": "take requests, but send no replies",
+    "damaged": "flip a bit of each reply",
+    "late": "send each reply late",
+    "repeated": "send each reply twice",
+}
+
+
+@frozen(kw_only=True)
+class SerialFaults:
+    """Faults of an emulated gripper on a line, by default none. Times are counted from its activation."""
+
+    unplug_at_s: float = setting(
+        default=inf, unit="s", minimum=0.0, meaning="Time at which the cable is pulled; inf: never."
+    )
+    mood: Literal["well", "silent", "damaged", "late", "repeated"] = setting(
+        default="well",
+        meaning="silent: no reply. damaged: a bit of each reply is flipped. late: each reply comes after late_s. "
+        "repeated: each reply comes twice.",
+    )
+    mood_at_s: float = setting(default=0.0, unit="s", minimum=0.0, meaning="Time from which on mood acts.")
+    late_s: float = setting(
+        default=0.3,
+        unit="s",
+        above=0.0,
+        plausible=(1e-4, 10.0),
+        meaning="Time by which a late reply is late.",
+    )
+
+
+class EmulatedSerial(EmulatedDevice):
+    """A device behind an `EmulatedPort`, in the time (s) of the host since it was made. Unplugged, it keeps its power.
+
+    A subclass answers requests and moves its fingers; both are called under a lock, never at the same time. What they
+    raise ends the device as a lost one, since the body of the fingers can be a user's code.
+    """
+
+    def __init__(self, wire: str, faults: SerialFaults) -> None:
+        self.wire = wire
+        self._faults = faults
+        self._lock = threading.Lock()
+        self._began_s = time.monotonic()
+        self._port: EmulatedPort | None = None
+        self._told = self._failed = ""
+        self._requests = 0
+
+    @abstractmethod
+    def answer(self, data: bytes, now_s: float) -> bytes:
+        """Return the replies to the requests that these bytes complete; `b""` forgets what is incomplete."""
+
+    @abstractmethod
+    def move(self, now_s: float) -> None:
+        """Move the fingers up to this time."""
+
+    @abstractmethod
+    def active_s(self, now_s: float) -> float:
+        """Return for how long (s) the device has been active; -inf if it is not."""
+
+    @abstractmethod
+    def details(self) -> Mapping[str, float | int | str | bool]:
+        """Return what `state` tells besides the port."""
+
+    @property
+    def where(self) -> str:
+        """What `gripper.port` has to be, empty while it is unplugged."""
+        return "" if self._port is None else self._port.where
+
+    @property
+    def words(self) -> Mapping[str, str]:
+        """The words that `tell` understands, with their effects."""
+        return {
+            "plug": "plug it in, as a new port",
+            "unplug": "pull the plug; the gripper keeps its power",
+            **MOODS,
+        }
+
+    def tell(self, word: str) -> None:
+        """Execute one of `words`. Raises KeyError for any other."""
+        if word == "plug":
+            if self._port is None:
+                self.answer(b"", self._now_s())
+                self._port = EmulatedPort(self.wire, self._heard, self._moved_on, KEEP_UP_S)
+        elif word == "unplug":
+            port, self._port = self._port, None
+            if port is not None:
+                port.close()
+        else:
+            self._told = {word: word for word in MOODS}[word]
+
+    def state(self) -> Mapping[str, float | int | str | bool]:
+        """Return where it is reached, and the state of its fingers."""
+        with self._lock:
+            if not self._failed:
+                self.move(self._now_s())
+            return {
+                "port": self.where,
+                "plugged": self._port is not None,
+                "mood": self._mood_now(),
+                "requests": self._requests,
+                **self.details(),
+                "failed": self._failed,
+            }
+
+    def close(self) -> None:
+        """Unplug it."""
+        self.tell("unplug")
+
+    def _now_s(self) -> float:
+        return time.monotonic() - self._began_s
+
+    def _mood_now(self) -> str:
+        if self._told:
+            return self._told
+        return self._faults.mood if self.active_s(self._now_s()) >= self._faults.mood_at_s else "well"
+
+    def _moved_on(self) -> bytes:
+        with self._lock:
+            try:
+                self.move(self._now_s())
+            except Exception as error:
+                self._fail(error)
+        return b""
+
+    def _fail(self, error: Exception) -> None:
+        self._failed = f"{type(error).__name__}: {error}"
+        self.tell("unplug")
+
+    def _heard(self, data: bytes) -> bytes:
+        with self._lock:
+            now_s = self._now_s()
+            if self.active_s(now_s) >= self._faults.unplug_at_s:
+                self.tell("unplug")
+                return b""
+            try:
+                reply = self.answer(data, now_s)
+            except Exception as error:
+                self._fail(error)
+                return b""
+            self._requests += bool(reply)
+            mood = self._mood_now()
+        if mood == "silent":
+            return b""
+        if mood == "damaged" and reply:
+            return reply[:-3] + bytes([reply[-3] ^ 1]) + reply[-2:]
+        if mood == "late":
+            threading.Event().wait(self._faults.late_s)
+        return reply * 2 if mood == "repeated" else reply
