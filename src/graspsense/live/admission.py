@@ -6,9 +6,9 @@ import errno
 import json
 import secrets
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from http import HTTPStatus
-from typing import Any, Final
+from typing import Any, Final, Protocol
 
 MOST_VIEWERS: Final = 16
 MOST_CONNECTIONS: Final = 64
@@ -21,6 +21,13 @@ HISTORY_BYTES: Final = 16 << 20
 LOOPBACK: Final = ("127.0.0.1", "localhost", "[::1]")
 
 Refusal = tuple[HTTPStatus, str]
+
+
+class Headers(Protocol):
+    """The headers of a request."""
+
+    def get(self, name: str, default: str, /) -> str:
+        """Return a header, or the default."""
 
 
 class Address:
@@ -36,7 +43,7 @@ class Address:
         host = f"[{self.host}]" if ":" in self.host else self.host
         return f"{self._scheme}://{host}:{self.port}/{self.token}/"
 
-    def refusal(self, token: str, headers: Mapping[str, str]) -> Refusal | None:
+    def refusal(self, token: str, headers: Headers) -> Refusal | None:
         """Return why a request with this token is not answered; None if it is."""
         if not secrets.compare_digest(token.encode(), self.token.encode()):
             return HTTPStatus.NOT_FOUND, "wrong address: open the one that graspsense printed\n"
@@ -46,12 +53,10 @@ class Address:
         return None
 
 
-def viewer_refusal(
-    headers: Mapping[str, str], is_known_origin: Callable[[str], bool], viewers: int
-) -> Refusal | None:
+def viewer_refusal(headers: Headers, is_known_origin: Callable[[str], bool], viewers: int) -> Refusal | None:
     """Return why a viewer beside so many others may not look; None if it may."""
-    origin = headers.get("Origin")
-    if origin is not None and not is_known_origin(origin):
+    origin = headers.get("Origin", "")
+    if origin and not is_known_origin(origin):
         return HTTPStatus.FORBIDDEN, "wrong origin\n"
     if viewers >= MOST_VIEWERS:
         return HTTPStatus.SERVICE_UNAVAILABLE, f"{MOST_VIEWERS} viewers already\n"
