@@ -19,7 +19,7 @@ CHANNELS = (
 Signals = signal_type(CHANNELS)
 
 
-def device():
+def device(channels=CHANNELS):
     return DeviceInfo(
         name="hand",
         simulated=True,
@@ -29,7 +29,7 @@ def device():
         speed_limit_m_s=0.1,
         opening=COMMAND,
         relaxed=COMMAND,
-        channels=CHANNELS,
+        channels=channels,
     )
 
 

@@ -183,7 +183,7 @@ def test_a_viewer_who_comes_later_sees_the_last_grasp_alone(feed):
 
 def test_what_is_kept_for_viewers_who_come_later_does_not_grow(monkeypatch):
     monkeypatch.setattr(foxglove_process, "HISTORY_BYTES", 10_000)
-    grasp = foxglove_process.Grasp()
+    grasp = foxglove_process.RunningGrasp()
     tick = TICK_WIRE.pack(IS_TICK, *reading(1).frame, SQUEEZE, *COMMAND)
     kept = []
     for _ in range(3):
@@ -208,6 +208,31 @@ def test_without_the_token_nothing_is_answered(feed, path):
 )
 def test_the_pages_of_others_cannot_listen(feed, headers, status):
     assert refused(feed, headers=headers) == status
+
+
+@pytest.mark.parametrize(
+    ("head", "status"),
+    [
+        ("GET {path} HTTP/1.1\r\nHost: elsewhere.example:{port}\r\n\r\n", 403),
+        ("POST {path} HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n\r\n", 400),
+        ("\r\n\r\n", 400),
+        ("GET {path} HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nOrigin: http://[\r\n\r\n", 400),
+        ("x" * 100_000, None),
+        ("GET {path} HTTP/1.1\r\n" + "A: 1\r\n" * 500 + "\r\n", None),
+    ],
+    ids=["host", "post", "empty", "origin", "long", "headers"],
+)
+def test_what_is_no_request_of_a_viewer_is_refused_or_dropped(feed, head, status):
+    address = feed.answer["address"]
+    text = head.format(path="/" + address.split("/", 3)[3], port=port_of(feed))
+    with socket.create_connection(("127.0.0.1", port_of(feed)), PATIENCE_S) as link:
+        with suppress(ConnectionError):
+            link.sendall(text.encode())
+        answer = b""
+        with suppress(ConnectionError):
+            while data := link.recv(4096):
+                answer += data
+    assert answer.split(b" ")[1:2] == ([] if status is None else [str(status).encode()])
 
 
 def test_what_is_no_viewer_of_foxglove_is_told_so(feed):

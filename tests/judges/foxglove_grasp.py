@@ -105,7 +105,8 @@ def main(ticks: int, rate_hz: float, *viewer: str) -> int:
     counts = {name: values["count"] for name, values in found.items()}
     say(f"decoded {counts} in {seconds:.0f} s; not handed over: {feed.dropped}")
     if error or found != wanted:
-        print(f"foxglove: sent { ({name: values['count'] for name, values in wanted.items()}) }. {error}")
+        sent = {name: values["count"] for name, values in wanted.items()}
+        say(f"sent {sent}. {error}")
     return int(bool(error) or found != wanted)
 
 

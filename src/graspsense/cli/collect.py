@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from graspsense.cli.live import Asked, Live, live_options, shown_live, viewer_options
+from graspsense.cli.live import Live, LiveOptions, live_options, shown_live, viewer_options
 from graspsense.cli.options import (
     GRIPPER_ALONE,
     contradiction,
@@ -66,10 +66,7 @@ def collect(
     options: tuple[str, ...],
     seed: int | None,
     force: bool,
-    live: bool,
-    live_address: str | None,
-    foxglove: int | None,
-    rerun: str | None,
+    live: LiveOptions,
     as_json: bool,
 ) -> None:
     """Prompt for the next object, grasp it and store the trial.
@@ -101,8 +98,7 @@ def collect(
     def settings_for(word: str, number: int) -> Settings:
         return settings_of(pipeline, gripper, word if selects else object_name, options, number, force)
 
-    asked = Asked(live, live_address, foxglove, rerun)
-    with Store.open(save) as store, shown_live(asked, save) as shown:
+    with Store.open(save) as store, shown_live(live, save) as shown:
         _prepare(store, values)
         collection = Collection(
             store=store,

@@ -5,7 +5,8 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeVar
+from functools import wraps
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeVar, cast
 
 import click
 
@@ -24,20 +25,47 @@ ROWS: Final = 12
 """Grasps of the store that the page lists."""
 
 
+class LiveOptions(NamedTuple):
+    """What is to show the grasps of a command: the options."""
+
+    live: bool = False
+    live_address: str | None = None
+    foxglove: int | None = None
+    rerun: str | None = None
+
+    @property
+    def page(self) -> bool:
+        """Whether there is to be a page."""
+        return self.live or self.live_address is not None
+
+
 def live_options(command: _Command) -> _Command:
-    """Add `--live` and `--live-address` to a command."""
-    command = click.option(
+    """Add `--live` and `--live-address` to a command, whose parameter `live` receives all options as `LiveOptions`."""
+
+    @wraps(command)
+    def with_options(
+        *args: Any,
+        live: bool,
+        live_address: str | None,
+        foxglove: int | None = None,
+        rerun: str | None = None,
+        **others: Any,
+    ) -> Any:
+        return command(*args, live=LiveOptions(live, live_address, foxglove, rerun), **others)
+
+    added = click.option(
         "--live-address",
         metavar="HOST[:PORT]",
         help="--live on another address than loopback, or on a port that you choose.",
-    )(command)
-    return click.option("--live", is_flag=True, help="Show it on a page in the browser while it goes on.")(
-        command
+    )(with_options)
+    added = click.option("--live", is_flag=True, help="Show it on a page in the browser while it goes on.")(
+        added
     )
+    return cast("_Command", added)
 
 
 def viewer_options(command: _Command) -> _Command:
-    """Add `--foxglove` and `--rerun` to a command that grasps."""
+    """Add `--foxglove` and `--rerun` to a command with `live_options` that grasps."""
     command = click.option(
         "--rerun",
         is_flag=False,
@@ -53,20 +81,6 @@ def viewer_options(command: _Command) -> _Command:
         metavar="[PORT]",
         help="Serve it to Foxglove while it goes on.",
     )(command)
-
-
-class Asked(NamedTuple):
-    """What is to show the grasps of a command: the options."""
-
-    live: bool = False
-    live_address: str | None = None
-    foxglove: int | None = None
-    rerun: str | None = None
-
-    @property
-    def page(self) -> bool:
-        """Whether there is to be a page."""
-        return self.live or self.live_address is not None
 
 
 class Live:
@@ -98,7 +112,7 @@ class Live:
 
 
 @contextmanager
-def shown_live(asked: Asked, save: str | None = None) -> Iterator[Live]:
+def shown_live(asked: LiveOptions, save: str | None = None) -> Iterator[Live]:
     """Show in this context what is asked for, and print its addresses.
 
     At a terminal, what is served remains until Ctrl-C. Raises PluginUnavailable without the package that is needed, and
@@ -127,7 +141,7 @@ def _wait_for_interrupt() -> None:
         talk("")
 
 
-def _start(asked: Asked, feeds: list[LiveFeed]) -> None:
+def _start(asked: LiveOptions, feeds: list[LiveFeed]) -> None:
     """Start what is asked for, and add it to the feeds."""
     if asked.page:
         host, port = _host_and_port(asked.live_address)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from graspsense.cli.live import Asked, live_options, shown_live, viewer_options
+from graspsense.cli.live import LiveOptions, live_options, shown_live, viewer_options
 from graspsense.cli.live_rows import LiveRows
 from graspsense.cli.model_table import print_model, print_not_verified, print_selection, print_without
 from graspsense.cli.options import contradiction, names_object, pipeline_options, settings_of
@@ -95,10 +95,7 @@ def run(
     picture: str | None,
     video: str | None,
     viewer: bool,
-    live: bool,
-    live_address: str | None,
-    foxglove: int | None,
-    rerun: str | None,
+    live: LiveOptions,
     dry_run: bool,
     as_json: bool,
 ) -> None:
@@ -109,8 +106,7 @@ def run(
     """
     from graspsense.core.pipeline.wiring import check
 
-    asked = Asked(live, live_address, foxglove, rerun)
-    if beside and (asked != Asked() or any((plot, explain_model, dry_run, picture, video, viewer))):
+    if beside and any((plot, explain_model, dry_run, picture, video, viewer, live != LiveOptions())):
         raise click.UsageError(
             "--beside goes without --plot, --explain-model, --dry-run, --picture, --video, --viewer, --live, "
             "--foxglove and --rerun"
@@ -132,7 +128,7 @@ def run(
         return
     film = _film(picture, video, viewer)
     sinks: tuple[Sink, ...] = film if as_json else (LiveRows(), *film)
-    with shown_live(asked, save) as shown:
+    with shown_live(live, save) as shown:
         trial, interrupted, kept = _performed(settings, (*sinks, *shown.sinks), save, label, changed)
         if drawn:
             talk(f"seed {seed}, drawn for this trial; --seed {seed} repeats the grasp")

@@ -64,40 +64,35 @@ BACKLOG: Final = 1 << 20
 HOST: Final = "127.0.0.1"
 LARGEST_HEAD: Final = 8192
 PUMP_BYTES: Final = 1 << 16
+CLOSE_S: Final = 0.5
 PROTOCOLS: Final = ("foxglove.sdk.v1", "foxglove.websocket.v1")
 """Names of the protocol: of the SDK, and the older one of which it is an extension."""
 APP: Final = "https://app.foxglove.dev"
 _KEY: Final = re.compile(r"[A-Za-z0-9+/=]{24}")
 _T_S: Final = struct.Struct("<d")
-LOST: Final = (OSError, EOFError, asyncio.LimitOverrunError, HTTPException)
-"""How a connection ends that breaks off, is too slow or says something else than expected."""
+LOST: Final = (OSError, EOFError, ValueError, RuntimeError, asyncio.LimitOverrunError, HTTPException)
+"""How a connection ends that breaks off, is too slow or says something wrong. RuntimeError is the SDK's."""
 
 Logged = tuple[int, int, bytes]
 """A message: the number of its topic, the time at which it is logged, and its bytes in CDR."""
 
 
-class Viewer(ServerListener):
+class FoxgloveViewer(ServerListener):
     """One viewer of a grasp: its server of the SDK, its channels, and how much waits for it.
 
     It receives what it subscribes to, from the beginning of the grasp.
     The SDK calls `on_subscribe` and `on_unsubscribe` in threads of its own.
     """
 
-    def __init__(self, grasp: Grasp) -> None:
-        self._grasp, self._context = grasp, foxglove.Context()
+    def __init__(self, grasp: RunningGrasp, transport: asyncio.WriteTransport) -> None:
+        self._grasp, self._transport, self._context = grasp, transport, foxglove.Context()
         self._channels: list[foxglove.Channel] = []
         self._subscribed: set[int] = set()
         self.logged = self.sent = 0
         """Bytes that the SDK was given, and that were passed on."""
-        self.tasks: list[asyncio.Task[None]] = []
         # A page that guesses would have to find one of 2^24 addresses beside the port.
         inner = ".".join(["127", *(str(secrets.randbelow(254) + 1) for _ in range(3))])
         self.host = inner if sys.platform == "linux" else "127.0.0.1"
-        with grasp.lock:
-            for topic in grasp.topics:
-                self.announce(*topic)
-            grasp.viewers.add(self)
-        # Without the lock: the SDK starts with threads that may wait for it in `on_subscribe`.
         self.server = foxglove.start_server(
             name="graspsense",
             host=self.host,
@@ -106,6 +101,10 @@ class Viewer(ServerListener):
             context=self._context,
             message_backlog_size=BACKLOG,
         )
+        with grasp.lock:
+            for topic in grasp.topics:
+                self.announce(*topic)
+            grasp.viewers.add(self)
 
     @property
     def has_all(self) -> bool:
@@ -147,18 +146,17 @@ class Viewer(ServerListener):
 
     def drop(self) -> None:
         """End the connection at once."""
-        for task in self.tasks:
-            task.cancel()
+        self._transport.abort()
 
 
-class Grasp:
+class RunningGrasp:
     """The topics, the messages of the running grasp, and the viewers."""
 
     def __init__(self) -> None:
         self.lock = Lock()
         self.topics = [(TICK_TOPIC, *TICK_SCHEMA)]
         self.history: deque[Logged] = deque()
-        self.viewers: set[Viewer] = set()
+        self.viewers: set[FoxgloveViewer] = set()
         self._size, self._clock = 0, LogClock()
 
     def take(self, buffer: bytearray) -> None:
@@ -198,7 +196,7 @@ class Gate:
     """Lets viewers in who name the token, and passes bytes between them and their servers."""
 
     def __init__(self) -> None:
-        self.address, self.grasp = Address("ws", HOST), Grasp()
+        self.address, self.grasp = Address("ws", HOST), RunningGrasp()
         self._connected = 0
 
     async def answer(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
@@ -209,7 +207,7 @@ class Gate:
                 await self._shake(reader, writer)
         finally:
             self._connected -= 1
-            writer.transport.abort()
+            writer.close()
 
     async def _shake(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         with suppress(*LOST):
@@ -222,10 +220,9 @@ class Gate:
                 writer.write(
                     f"{text}Content-Length: {len(reason)}\r\nConnection: close\r\n\r\n{reason}".encode()
                 )
-                writer.close()
-                await writer.wait_closed()
                 return
-            viewer = Viewer(self.grasp)
+            writer.transport.set_write_buffer_limits(0)  # so that what was sent has left this process
+            viewer = FoxgloveViewer(self.grasp, writer.transport)
             try:
                 await _served(viewer, headers, reader, writer)
             finally:
@@ -249,7 +246,15 @@ class Gate:
             async with asyncio.timeout(FLUSH_S):
                 while not all(viewer.has_all for viewer in self.grasp.viewers):
                     await asyncio.sleep(0.01)
-        for viewer in list(self.grasp.viewers):
+        viewers = list(self.grasp.viewers)
+        # Each waits until its viewer has answered the end.
+        stops = [asyncio.to_thread(viewer.server.stop) for viewer in viewers]
+        with suppress(TimeoutError):
+            async with asyncio.timeout(CLOSE_S):
+                await asyncio.gather(*stops)
+                while self.grasp.viewers:
+                    await asyncio.sleep(0.01)
+        for viewer in self.grasp.viewers:
             viewer.drop()
 
 
@@ -271,7 +276,7 @@ def _is_known_origin(origin: str) -> bool:
 
 
 async def _served(
-    viewer: Viewer, headers: Message, reader: asyncio.StreamReader, writer: asyncio.StreamWriter
+    viewer: FoxgloveViewer, headers: Message, reader: asyncio.StreamReader, writer: asyncio.StreamWriter
 ) -> None:
     """Pass bytes between a viewer and its server until one of them ends, or the viewer is dropped."""
     inner_reader, inner_writer = await asyncio.open_connection(viewer.host, viewer.server.port)
@@ -288,13 +293,16 @@ async def _served(
             f"Sec-WebSocket-Accept: {answer['Sec-WebSocket-Accept']}\r\n"
             f"Sec-WebSocket-Protocol: {_protocol(headers)}\r\n\r\n".encode()
         )
-        viewer.tasks = [
+        tasks = [
             asyncio.create_task(_take_from(reader, inner_writer)),
             asyncio.create_task(_send_to(viewer, inner_reader, writer)),
         ]
-        await asyncio.wait(viewer.tasks, return_when=asyncio.FIRST_COMPLETED)
-        viewer.drop()
-        await asyncio.gather(*viewer.tasks, return_exceptions=True)
+        done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+        if tasks[0] in done:  # it has left, or has sent too much
+            viewer.drop()
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
     finally:
         inner_writer.transport.abort()
 
@@ -307,7 +315,7 @@ async def _take_from(reader: asyncio.StreamReader, inner: asyncio.StreamWriter) 
         await inner.drain()
 
 
-async def _send_to(viewer: Viewer, inner: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+async def _send_to(viewer: FoxgloveViewer, inner: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
     while data := await inner.read(PUMP_BYTES):
         writer.write(data)
         await writer.drain()
