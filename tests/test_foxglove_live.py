@@ -12,6 +12,8 @@ import sys
 import threading
 import time
 from contextlib import ExitStack, closing, suppress
+from importlib.resources import files
+from xml.etree import ElementTree
 
 import pytest
 from live_grasp import COMMAND, device, port_of, reading
@@ -22,7 +24,7 @@ from graspsense.core.components.registry import installed
 from graspsense.core.values.errors import ConfigError
 from graspsense.core.values.signals import SQUEEZE
 from graspsense.live.feeds import LiveFeed
-from graspsense.recording.layout import IS_TICK, TICK_WIRE
+from graspsense.recording.layout import IS_TICK, TICK_FIELDS, TICK_WIRE
 from graspsense.store.record_grasp import record_grasp
 from graspsense.store.store import Store
 
@@ -323,6 +325,26 @@ def test_a_viewer_that_stalls_is_dropped_and_no_tick_waits(feed):
     assert messages_until_the_end(stalled) < n
     feed.close()
     check_complete(good.ended(), n)
+
+
+def test_the_layouts_show_fields_that_a_recording_has():
+    folder = files("graspsense.live")
+    layout = json.loads((folder / "foxglove_layout.json").read_text())
+    panels = layout["configById"]
+    paths = [one["value"] for panel in panels.values() for one in panel.get("paths", ())]
+    paths += [panel["xAxisPath"]["value"] for panel in panels.values() if "xAxisPath" in panel]
+    root = ElementTree.fromstring((folder / "plotjuggler_layout.xml").read_text())
+    curves = [curve.get("name") for curve in root.iter("curve")]
+    for shown_paths, between in ((paths, "."), (curves, "/")):
+        assert {"gap_m", "force_left_n", "effort_n", "phase"} <= {
+            path.removeprefix(f"/grasp/tick{between}") for path in shown_paths
+        }
+        assert {path.removeprefix(f"/grasp/tick{between}") for path in shown_paths} <= set(TICK_FIELDS)
+
+    def leaves(place):
+        return [place] if isinstance(place, str) else [*leaves(place["first"]), *leaves(place["second"])]
+
+    assert sorted(leaves(layout["layout"])) == sorted(panels)
 
 
 def test_a_port_that_is_taken_is_an_error_before_the_grasp(tmp_path):
