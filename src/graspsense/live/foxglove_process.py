@@ -24,11 +24,10 @@ from http.client import HTTPException, parse_headers
 from io import BytesIO
 from threading import Lock
 from time import time_ns
-from typing import Any, Final
+from typing import Any, Final, cast
 from urllib.parse import urlsplit
 
 import foxglove
-from foxglove.websocket import ServerListener
 
 from graspsense.live.admission import (
     FLUSH_S,
@@ -77,11 +76,11 @@ Logged = tuple[int, int, bytes]
 """A message: the number of its topic, the time at which it is logged, and its bytes in CDR."""
 
 
-class FoxgloveViewer(ServerListener):
+class FoxgloveViewer:
     """One viewer of a grasp: its server of the SDK, its channels, and how much waits for it.
 
-    It receives what it subscribes to, from the beginning of the grasp.
-    The SDK calls `on_subscribe` and `on_unsubscribe` in threads of its own.
+    It receives what it subscribes to, from the beginning of the grasp. The SDK calls `on_subscribe` and
+    `on_unsubscribe` in threads of its own.
     """
 
     def __init__(self, grasp: RunningGrasp, transport: asyncio.WriteTransport) -> None:
@@ -97,7 +96,7 @@ class FoxgloveViewer(ServerListener):
             name="graspsense",
             host=self.host,
             port=0,
-            server_listener=self,
+            server_listener=cast("Any", self),  # it has what a viewer can cause without further capabilities
             context=self._context,
             message_backlog_size=BACKLOG,
         )
