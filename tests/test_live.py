@@ -15,11 +15,13 @@ from urllib.request import Request, urlopen
 
 import click
 import pytest
+from click.testing import CliRunner
 from live_grasp import COMMAND, device, port_of, reading
 
 from graspsense.cli.live import _host_and_port
+from graspsense.cli.main import cli
 from graspsense.core.pipeline.pipeline import load_pipeline
-from graspsense.core.values.errors import ConfigError
+from graspsense.core.values.errors import ConfigError, PluginUnavailable
 from graspsense.core.values.signals import SQUEEZE
 from graspsense.live.feeds import LiveFeed
 
@@ -251,9 +253,22 @@ def test_a_page_that_is_killed_loses_no_grasp(feed):
     assert trial.reason == ""
 
 
+@pytest.mark.parametrize(
+    ("option", "module"), [("live", "websockets"), ("foxglove", "foxglove"), ("rerun", "rerun")]
+)
+def test_a_package_that_is_missing_is_named_before_the_grasp(monkeypatch, option, module):
+    monkeypatch.setitem(sys.modules, module, None)
+    done = CliRunner().invoke(cli, ["run", f"--{option}"])
+    assert isinstance(done.exception, PluginUnavailable)
+    assert f"graspsense[{option}]" in str(done.exception)
+
+
 def test_a_trial_is_stored_as_without_a_page(tmp_path):
+    pytest.importorskip("foxglove")
+    pytest.importorskip("rerun")
     said = []
-    for name, live in (("with", ["--live"]), ("without", [])):
+    shown_by = ["--live", "--foxglove", "--rerun", str(tmp_path / "grasp.rrd")]
+    for name, live in (("with", shown_by), ("without", [])):
         asked = ["run", "--save", str(tmp_path / name), "--seed", "3", "--json", *live]
         done = graspsense(*asked)
         assert done.returncode == 0, done.stderr
