@@ -334,7 +334,7 @@ def main() -> None:
         "date": date.today().isoformat(),
         "machine": f"{platform.machine()}, {os.cpu_count()} cores, {platform.system()} {platform.release()}",
         "load_average": round(os.getloadavg()[0], 2),
-        "scheduler": SCHEDULERS.get(os.sched_getscheduler(0), "other"),
+        "scheduler": SCHEDULERS.get(os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK, "other"),
         "python": platform.python_version(),
         "graspsense-pr2-gripper": version("graspsense-pr2-gripper"),
         **distribution("tick", ticks_us(asked.grasps, sent, feature)),
