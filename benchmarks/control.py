@@ -7,9 +7,11 @@ handed to the wire: decode, count, convert, the hybrid controller's step, the gu
 an emulated grasp, recorded first and played back, so that neither the emulated board nor the simulator is in the
 figure. The reports are played back twice more by the clock, without and with the predictions of the default model at
 its checkpoints, in turn: *paced* is the time from when a report is due to its command, in the squeeze, and *predicting*
-the same in the ticks during which the thread beside the loop computes. Two further times they are played back without
-and with a live page that a viewer receives: *unseen* and *live* are as *paced*, and *handed_over* is what the runner
-spends on the page after the command of a tick. The wake-up is measured apart, against a board
+the same in the ticks during which the thread beside the loop computes. Further times they are played back, in turn,
+without anything that shows them (*unseen*) and with each of the sinks: a live page (*live*) and Foxglove (*foxglove*)
+that a viewer receives, a file of Rerun (*rerun*), an observer of a plugin (*observer*). Of each, `median_p99` is the
+median of the 99th percentiles of the grasps, `added_p99` how much more that is than of *unseen*, and *handed_over* what
+the runner spends on the sink after the command of a tick. The wake-up is measured apart, against a board
 that runs by the clock in a thread of the same process: how long after the report with the shortest delay, in device
 time, a report was in the driver's hands.
 """
@@ -24,11 +26,16 @@ import platform
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from datetime import date
 from importlib.metadata import version
+from pathlib import Path
+from statistics import median
+from tempfile import TemporaryDirectory
 from typing import Any
 
+import numpy as np
 from attrs import evolve
 
 from graspsense.core.components.config import resolve
@@ -37,7 +44,7 @@ from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.runner import Sink, run_grasp
 from graspsense.core.learn.model import model_for
 from graspsense.core.pipeline.anytime import Anytime, anytime_of
-from graspsense.live.feeds import LiveFeed
+from graspsense.live.feeds import FILE_TIMEOUT_S, LiveFeed
 from graspsense.plugin_api import SQUEEZE, DeviceInfo, create
 from graspsense_pr2_gripper import backend as driver
 from graspsense_pr2_gripper import emulation, opening
@@ -129,12 +136,14 @@ class Timed:
 
 
 VIEWER = """
-import sys
+import json, sys
 from websockets.sync.client import connect
-with connect(sys.argv[1], max_size=None) as viewer:
+with connect(sys.argv[1], max_size=None, subprotocols=sys.argv[2:] or None) as viewer:
     print("connected", flush=True)
-    for text in viewer:
-        pass
+    for said in viewer:
+        for channel in json.loads(said).get("channels", ()) if sys.argv[2:] and isinstance(said, str) else ():
+            wanted = [{"id": channel["id"], "channelId": channel["id"]}]
+            viewer.send(json.dumps({"op": "subscribe", "subscriptions": wanted}))
 """
 
 
@@ -214,26 +223,60 @@ def paced_us(grasps: int, sent: Sequence[bytes], feature: bytes) -> dict[str, li
     return found
 
 
-def live_us(grasps: int, sent: Sequence[bytes], feature: bytes) -> dict[str, list[float]]:
-    """Return the times of the ticks of a squeeze, in turn alone and with a page that one viewer receives."""
-    period_s = 1.0 / decode_identity(feature).report_rate_hz
-    found: dict[str, list[float]] = {"unseen": [], "live": []}
-    feed = LiveFeed("graspsense.live.page_process", ["127.0.0.1", "0"])
-    timed = Timed(feed)
-    frames = feed.answer["address"].replace("http", "ws", 1) + "frames"
-    with subprocess.Popen([sys.executable, "-c", VIEWER, frames], stdout=subprocess.PIPE) as viewer:
+def observe(batches: Iterable[Any]) -> None:
+    """Take everything, as an observer of a plugin."""
+    for _ in batches:
+        pass
+
+
+@contextmanager
+def watched_feeds(folder: Path) -> Iterator[dict[str, LiveFeed]]:
+    """Start each sink, with a viewer where it has one."""
+    os.environ["PYTHONPATH"] = str(Path(__file__).parent)
+    feeds = {
+        "live": LiveFeed("graspsense.live.page_process", ["127.0.0.1", "0"]),
+        "foxglove": LiveFeed("graspsense.live.foxglove_process", ["0"]),
+        "rerun": LiveFeed("graspsense.live.rerun_process", [str(folder / "grasps.rrd")], FILE_TIMEOUT_S),
+        "observer": LiveFeed("graspsense.live.observer_process", ["control:observe"]),
+    }
+    frames = feeds["live"].answer["address"].replace("http", "ws", 1) + "frames"
+    viewers = [[frames], [feeds["foxglove"].answer["address"], "foxglove.sdk.v1"]]
+    commands = [[sys.executable, "-c", VIEWER, *viewer] for viewer in viewers]
+    watching = [subprocess.Popen(command, stdout=subprocess.PIPE) for command in commands]
+    for viewer in watching:
         assert viewer.stdout is not None
         viewer.stdout.readline()  # it is connected
+    yield feeds
+    for name, feed in feeds.items():
+        assert (error := feed.close()) == "", error
+        assert not feed.dropped, name
+    for viewer in watching:
+        assert viewer.stdout is not None
+        viewer.stdout.close()
+        assert viewer.wait() == 0
+
+
+def watched_us(grasps: int, sent: Sequence[bytes], feature: bytes) -> dict[str, Any]:
+    """Return the times of the ticks of a squeeze, in turn alone and with each sink, and what the sinks take."""
+    period_s = 1.0 / decode_identity(feature).report_rate_hz
+    found: dict[str, list[list[float]]] = {}
+    with TemporaryDirectory() as folder, watched_feeds(Path(folder)) as feeds:
+        timed = {name: Timed(feed) for name, feed in feeds.items()}
         for _ in range(grasps):
-            for name, sinks in (("unseen", ()), ("live", (timed,))):
+            for name in ("unseen", *timed):
                 wire = Playback(sent, feature, period_s)
                 watched = Watched(None, wire)
-                played(wire, feature, watched, sinks)
-                found[name] += [wire.ticks_ns[k] / 1e3 for k in watched.squeeze]
-        feed.close()
-    assert not feed.dropped
-    assert not viewer.returncode
-    return {**found, "handed_over": timed.us}
+                played(wire, feature, watched, [timed[name]] if name in timed else ())
+                found.setdefault(name, []).append([wire.ticks_ns[k] / 1e3 for k in watched.squeeze])
+    result: dict[str, Any] = {}
+    p99 = {name: median(float(np.quantile(us, 0.99)) for us in runs) for name, runs in found.items()}
+    for name, runs in found.items():
+        result |= distribution(name, [us for run in runs for us in run])
+        result[f"{name}_median_p99_us"] = round(p99[name], 1)
+        if name in timed:
+            result[f"{name}_added_p99_us"] = round(p99[name] - p99["unseen"], 1)
+            result |= distribution(f"{name}_handed_over", timed[name].us)
+    return result
 
 
 def wake_ups_us(seconds: float) -> list[float]:
@@ -286,17 +329,17 @@ def main() -> None:
         asked.grasps, asked.seconds = 1, 0.5
     sent, feature = recorded()
     paced = paced_us(asked.grasps, sent, feature)
-    live = live_us(asked.grasps, sent, feature)
+    watched = watched_us(asked.grasps, sent, feature)
     result = {
         "date": date.today().isoformat(),
         "machine": f"{platform.machine()}, {os.cpu_count()} cores, {platform.system()} {platform.release()}",
         "load_average": round(os.getloadavg()[0], 2),
-        "scheduler": SCHEDULERS.get(os.sched_getscheduler(0), "other"),
+        "scheduler": SCHEDULERS.get(os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK, "other"),
         "python": platform.python_version(),
         "graspsense-pr2-gripper": version("graspsense-pr2-gripper"),
         **distribution("tick", ticks_us(asked.grasps, sent, feature)),
         **{key: value for name, us in paced.items() if us for key, value in distribution(name, us).items()},
-        **{key: value for name, us in live.items() for key, value in distribution(name, us).items()},
+        **watched,
         **distribution("wake_up", wake_ups_us(asked.seconds)),
     }
     if asked.json:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import os
 import signal
 import socket
@@ -16,15 +15,15 @@ from urllib.request import Request, urlopen
 
 import click
 import pytest
+from click.testing import CliRunner
+from live_grasp import COMMAND, device, port_of, reading
 
 from graspsense.cli.live import _host_and_port
+from graspsense.cli.main import cli
 from graspsense.core.pipeline.pipeline import load_pipeline
-from graspsense.core.values.channel import Channel, FastChannel, TactileArray
-from graspsense.core.values.device import DeviceInfo
-from graspsense.core.values.errors import ConfigError
-from graspsense.core.values.signals import EFFORT, NO_PADS, SQUEEZE, Command, Frame, Image, Reading, Samples
+from graspsense.core.values.errors import ConfigError, PluginUnavailable
+from graspsense.core.values.signals import SQUEEZE
 from graspsense.live.feeds import LiveFeed
-from graspsense.plugin_api import signal_type
 
 pytest.importorskip("websockets")
 
@@ -32,38 +31,6 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 PATIENCE_S = 60.0
-COMMAND = Command(EFFORT, 5.0, math.inf, math.inf)
-CHANNELS = (
-    Channel("gap", "m", 1000.0),
-    Channel("temperature", "K", 1000.0),
-    TactileArray("skin", "counts", 100.0, rows=2, columns=3),
-    FastChannel("sound", "V", 4000.0, samples=4, axes=("x", "y")),
-)
-
-
-Signals = signal_type(CHANNELS)
-
-
-def device():
-    return DeviceInfo(
-        name="hand",
-        simulated=True,
-        clock="device",
-        rate_hz=1000.0,
-        effort_limit_n=100.0,
-        speed_limit_m_s=0.1,
-        opening=COMMAND,
-        relaxed=COMMAND,
-        channels=CHANNELS,
-    )
-
-
-def reading(k):
-    t_s, nan = k / 1000, math.nan
-    frame = Frame(t_s, 0.001, 0.05 - k * 1e-5, 0.0, 1.0 + k, nan, nan, nan, nan, 0)
-    skin = Image(t_s, k + 1, tuple(float(k + i) for i in range(6)))
-    sound = Samples(t_s, 4 * k + 3, 3, (*((k + i / 4, -1.0) for i in range(3)), (nan, nan)))
-    return Reading(frame, NO_PADS, Signals(300.0 + k, skin, sound))
 
 
 @pytest.fixture
@@ -75,10 +42,6 @@ def feed():
 
 def frames_of(feed):
     return feed.answer["address"].replace("http", "ws", 1) + "frames"
-
-
-def port_of(feed):
-    return int(feed.answer["address"].split(":")[2].partition("/")[0])
 
 
 def received(viewer, until):
@@ -290,9 +253,22 @@ def test_a_page_that_is_killed_loses_no_grasp(feed):
     assert trial.reason == ""
 
 
+@pytest.mark.parametrize(
+    ("option", "module"), [("live", "websockets"), ("foxglove", "foxglove"), ("rerun", "rerun")]
+)
+def test_a_package_that_is_missing_is_named_before_the_grasp(monkeypatch, option, module):
+    monkeypatch.setitem(sys.modules, module, None)
+    done = CliRunner().invoke(cli, ["run", f"--{option}"])
+    assert isinstance(done.exception, PluginUnavailable)
+    assert f"graspsense[{option}]" in str(done.exception)
+
+
 def test_a_trial_is_stored_as_without_a_page(tmp_path):
+    pytest.importorskip("foxglove")
+    pytest.importorskip("rerun")
     said = []
-    for name, live in (("with", ["--live"]), ("without", [])):
+    shown_by = ["--live", "--foxglove", "--rerun", str(tmp_path / "grasp.rrd")]
+    for name, live in (("with", shown_by), ("without", [])):
         asked = ["run", "--save", str(tmp_path / name), "--seed", "3", "--json", *live]
         done = graspsense(*asked)
         assert done.returncode == 0, done.stderr

@@ -4,19 +4,22 @@ from __future__ import annotations
 
 import json
 import math
+import resource
+from pathlib import Path
 
 import browser as browsers
 import pytest
+from live_grasp import COMMAND, device
 
 from graspsense.core.pipeline.pipeline import load_pipeline
 from graspsense.core.values.channel import Channel, FastChannel, TactileArray
-from graspsense.core.values.device import DeviceInfo
-from graspsense.core.values.signals import EFFORT, NO_PADS, SQUEEZE, Command, Frame, Image, Reading, Samples
+from graspsense.core.values.signals import NO_PADS, SQUEEZE, Frame, Image, Reading, Samples
 from graspsense.live.feeds import LiveFeed
 from graspsense.plugin_api import signal_type
 
 pytest.importorskip("websockets")
 pytestmark = pytest.mark.browser
+PAGE_BYTES = resource.getpagesize()
 
 
 @pytest.fixture(scope="module")
@@ -113,28 +116,15 @@ CHANNELS = (
 
 def test_arrays_are_heat_maps_and_fast_channels_have_a_spectrogram_and_nothing_grows(browser, feed):
     """A tone of an eighth of the rate stands at a quarter of the spectrogram; a curve keeps its last points."""
-    command, nan = Command(EFFORT, 5.0, math.inf, math.inf), math.nan
-    signals, ticks = signal_type(CHANNELS), 31_000
+    signals, ticks, nan = signal_type(CHANNELS), 31_000, math.nan
     browser.show(feed.answer["address"], 1280)
-    feed.opened(
-        DeviceInfo(
-            name="hand",
-            clock="device",
-            simulated=True,
-            rate_hz=1000.0,
-            effort_limit_n=100.0,
-            speed_limit_m_s=0.1,
-            opening=command,
-            relaxed=command,
-            channels=CHANNELS,
-        )
-    )
+    feed.opened(device(CHANNELS))
     for k in range(ticks):
         frame = Frame(k / 1000, 0.001, 0.05, 0.0, nan, nan, nan, nan, nan, 0)
         cells = tuple(float(k * i) for i in range(6))
         tone = tuple((math.sin(2 * math.pi * (4 * k + i) / 8),) for i in range(4))
         new = Samples(k / 1000, 4 * k + 4, 4, tone)
-        feed.take(Reading(frame, NO_PADS, signals(Image(k / 1000, k + 1, cells), new)), SQUEEZE, command)
+        feed.take(Reading(frame, NO_PADS, signals(Image(k / 1000, k + 1, cells), new)), SQUEEZE, COMMAND)
         if k % 4000 == 0:
             feed.told("progress", {"text": f"tick {k}"})
             shown(browser, "$('done').textContent", f"tick {k}")
@@ -151,3 +141,32 @@ def test_arrays_are_heat_maps_and_fast_channels_have_a_spectrogram_and_nothing_g
         "d[4 * b] + d[4 * b + 1] - d[4 * a] - d[4 * a + 1])[0]; })()"
     )
     assert abs(127 - strongest - 32) <= 1
+
+
+@pytest.mark.parametrize("ticks", [100_000, pytest.param(600_000, marks=pytest.mark.long)])
+def test_fifty_channels_do_not_grow_the_page_or_its_process(browser, feed, ticks):
+    """At 1 kHz these are 100 s, and the ten minutes of the full count; a curve and the process keep the last 30 s."""
+    names = [f"channel_{i:02d}" for i in range(50)]
+    channels = (Channel("gap", "m", 1000.0), *(Channel(name, "N", 1000.0) for name in names))
+    signals, nan = signal_type(channels), math.nan
+    browser.show(feed.answer["address"], 1280)
+    feed.opened(device(channels))
+    kept = []
+    for k in range(ticks):
+        frame = Frame(k / 1000, 0.001, 0.05, 0.0, nan, nan, nan, nan, nan, 0)
+        feed.take(Reading(frame, NO_PADS, signals(*(k + i for i in range(50)))), SQUEEZE, COMMAND)
+        if k % 2000 == 1999:
+            feed.told("progress", {"text": f"tick {k}"})
+            shown(browser, "$('done').textContent", f"tick {k}")
+        if k % 10_000 == 9_999 and k >= 50_000:
+            browser.call("HeapProfiler.collectGarbage")
+            used = browser.call("Runtime.getHeapUsage")
+            pages = Path(f"/proc/{feed._process.pid}/statm").read_text().split()[1]
+            kept.append((used["usedSize"] + used.get("backingStorageSize", 0), int(pages) * PAGE_BYTES))
+    assert browser.run("series.size") == 52
+    assert browser.run("[...series.values()].every((one) => one.n === 30000)")
+    assert browser.run("series.get('channel channel_49').last()") == ticks - 1 + 49
+    assert feed.dropped == 0
+    page, process = ([one[side] for one in kept] for side in (0, 1))
+    assert max(page) < page[0] + (4 << 20), kept
+    assert max(process) < process[0] + (8 << 20), kept

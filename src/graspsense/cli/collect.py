@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from graspsense.cli.live import Live, live_options, shown_live
+from graspsense.cli.live import Live, LiveOptions, live_options, shown_live, viewer_options
 from graspsense.cli.options import (
     GRIPPER_ALONE,
     contradiction,
@@ -51,6 +51,7 @@ _LABEL = 14
 @click.option("--changed", is_flag=True, help="Continue with another gripper or other settings.")
 @pipeline_options
 @live_options
+@viewer_options
 @click.option("--json", "as_json", is_flag=True, help="Print a summary as JSON at the end.")
 def collect(
     labels: str,
@@ -65,8 +66,7 @@ def collect(
     options: tuple[str, ...],
     seed: int | None,
     force: bool,
-    live: bool,
-    live_address: str | None,
+    live: LiveOptions,
     as_json: bool,
 ) -> None:
     """Prompt for the next object, grasp it and store the trial.
@@ -98,7 +98,7 @@ def collect(
     def settings_for(word: str, number: int) -> Settings:
         return settings_of(pipeline, gripper, word if selects else object_name, options, number, force)
 
-    with Store.open(save) as store, shown_live(live, live_address, save) as shown:
+    with Store.open(save) as store, shown_live(live, save) as shown:
         _prepare(store, values)
         collection = Collection(
             store=store,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from graspsense.cli.live import Live, live_options, shown_live
+from graspsense.cli.live import Live, LiveOptions, live_options, shown_live
 from graspsense.cli.options import force_option
 from graspsense.cli.output import echo_json
 from graspsense.cli.terminal import Style, echo, echo_entry, echo_table, talk
@@ -74,8 +74,7 @@ def experiment(
     workers: int | None,
     options: tuple[str, ...],
     force: bool,
-    live: bool,
-    live_address: str | None,
+    live: LiveOptions,
     dry_run: bool,
     as_json: bool,
 ) -> None:
@@ -105,7 +104,7 @@ def experiment(
     if dry_run:
         _plan(planned, results, workers or os.cpu_count() or 1, as_json)
         return
-    with shown_live(live, live_address) as shown:
+    with shown_live(live) as shown:
         account = _run(planned, results, make, resume, shown)
         found = summarise(planned, results)
         page, problem = _written_page(found, results)

@@ -1,11 +1,12 @@
-"""`--live`: a page of the grasps of a command, and the observers of plugins, while they go on."""
+"""`--live`, `--foxglove`, `--rerun`: the grasps of a command while they go on, on a page and in other viewers."""
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, Final, TypeVar
+from functools import wraps
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeVar, cast
 
 import click
 
@@ -16,28 +17,77 @@ if TYPE_CHECKING:
     from graspsense.live.feeds import LiveFeed
 
 _Command = TypeVar("_Command", bound=Callable[..., Any])
-HINT: Final = "--live needs the package websockets: pip install 'graspsense[live]'"
+EXTRAS: Final = {"--live": "websockets", "--foxglove": "foxglove", "--rerun": "rerun"}
+"""The module that each option needs; the extra has the name of the option."""
+RERUN_VIEWER: Final = "rerun+http://127.0.0.1:9876/proxy"
+"""Where a viewer of Rerun listens that was started by `rerun`."""
 ROWS: Final = 12
 """Grasps of the store that the page lists."""
 
 
+class LiveOptions(NamedTuple):
+    """What is to show the grasps of a command: the options."""
+
+    live: bool = False
+    live_address: str | None = None
+    foxglove: int | None = None
+    rerun: str | None = None
+
+    @property
+    def page(self) -> bool:
+        """Whether there is to be a page."""
+        return self.live or self.live_address is not None
+
+
 def live_options(command: _Command) -> _Command:
-    """Add `--live` and `--live-address` to a command."""
-    command = click.option(
+    """Add `--live` and `--live-address` to a command, whose parameter `live` receives all options as `LiveOptions`."""
+
+    @wraps(command)
+    def with_options(
+        *args: Any,
+        live: bool,
+        live_address: str | None,
+        foxglove: int | None = None,
+        rerun: str | None = None,
+        **others: Any,
+    ) -> Any:
+        return command(*args, live=LiveOptions(live, live_address, foxglove, rerun), **others)
+
+    added = click.option(
         "--live-address",
         metavar="HOST[:PORT]",
         help="--live on another address than loopback, or on a port that you choose.",
-    )(command)
-    return click.option("--live", is_flag=True, help="Show it on a page in the browser while it goes on.")(
-        command
+    )(with_options)
+    added = click.option("--live", is_flag=True, help="Show it on a page in the browser while it goes on.")(
+        added
     )
+    return cast("_Command", added)
+
+
+def viewer_options(command: _Command) -> _Command:
+    """Add `--foxglove` and `--rerun` to a command with `live_options` that grasps."""
+    command = click.option(
+        "--rerun",
+        is_flag=False,
+        flag_value=RERUN_VIEWER,
+        metavar="[FILE.rrd]",
+        help="Log it to a file of Rerun, or to its viewer, which runs.",
+    )(command)
+    return click.option(
+        "--foxglove",
+        is_flag=False,
+        flag_value=0,
+        type=click.IntRange(0, 65535),
+        metavar="[PORT]",
+        help="Serve it to Foxglove while it goes on.",
+    )(command)
 
 
 class Live:
     """What shows the grasps of a command while they go on: `sinks` for the runner, none if that is not asked for."""
 
-    def __init__(self, sinks: Sequence[LiveFeed] = ()) -> None:
-        self.sinks = tuple(sinks)
+    def __init__(self, sinks: Sequence[LiveFeed]) -> None:
+        self.sinks = sinks
 
     def finished(self, trial: Trial, save: str | None = None) -> None:
         """Show how a grasp ended, and the last grasps of the store in which it was saved."""
@@ -52,7 +102,7 @@ class Live:
             sink.told(name, values)
 
     def close(self) -> None:
-        """End the page and the observers, and print what was wrong with them."""
+        """End what shows the grasps, and print what was wrong with it."""
         for sink in self.sinks:
             error = sink.close()
             if error:
@@ -62,22 +112,21 @@ class Live:
 
 
 @contextmanager
-def shown_live(live: bool, address: str | None, save: str | None = None) -> Iterator[Live]:
-    """Serve the page in this context, and print its address; nothing is shown if neither is given.
+def shown_live(asked: LiveOptions, save: str | None = None) -> Iterator[Live]:
+    """Show in this context what is asked for, and print its addresses.
 
-    At a terminal, the page remains until Ctrl-C. Raises PluginUnavailable without the package websockets, and
-    ConfigError if the address cannot be used.
+    At a terminal, what is served remains until Ctrl-C. Raises PluginUnavailable without the package that is needed, and
+    ConfigError if an address or a file cannot be used.
     """
-    if not live and address is None:
-        yield Live()
-        return
-    shown = _started(*_host_and_port(address))
+    feeds: list[LiveFeed] = []
+    shown = Live(feeds)
     try:
+        _start(asked, feeds)
         if save is not None:
             shown.told("stored", {"rows": _last_grasps(save)})
         yield shown
-        if sys.stderr.isatty():
-            talk("the page remains: Ctrl-C ends it")
+        if sys.stderr.isatty() and (asked.page or asked.foxglove is not None):
+            talk("the grasps can still be seen: Ctrl-C ends it")
             _wait_for_interrupt()
     finally:
         shown.close()
@@ -92,25 +141,65 @@ def _wait_for_interrupt() -> None:
         talk("")
 
 
-def _started(host: str, port: int) -> Live:
+def _start(asked: LiveOptions, feeds: list[LiveFeed]) -> None:
+    """Start what is asked for, and add it to the feeds."""
+    if asked.page:
+        host, port = _host_and_port(asked.live_address)
+        feeds.append(_started("--live", "page", host, str(port)))
+        feeds += _observers()
+    if asked.foxglove is not None:
+        feeds.append(_started("--foxglove", "foxglove", str(asked.foxglove)))
+    if asked.rerun is not None:
+        feeds.append(_started("--rerun", "rerun", _rerun_target(asked.rerun)))
+
+
+def _started(option: str, name: str, *arguments: str) -> LiveFeed:
+    """Start the process of an option, and print its address."""
     from importlib.util import find_spec
 
+    from graspsense.core.values.errors import PluginUnavailable
+    from graspsense.live.feeds import END_TIMEOUT_S, FILE_TIMEOUT_S, LiveFeed
+
+    extra = option.removeprefix("--")
+    if find_spec(EXTRAS[option]) is None:
+        raise PluginUnavailable(f"{option} needs a further package: pip install 'graspsense[{extra}]'")
+    timeout_s = FILE_TIMEOUT_S if arguments[0].endswith(".rrd") else END_TIMEOUT_S
+    feed = LiveFeed(f"graspsense.live.{name}_process", arguments, timeout_s)
+    talk(f"{extra}: {feed.answer['address']}")
+    return feed
+
+
+def _rerun_target(target: str) -> str:
+    """Return the file or the address of a viewer. Raises UsageError for what is neither."""
+    from urllib.parse import urlsplit
+
+    if target.endswith(".rrd"):
+        return target
+    try:
+        address = urlsplit(target)
+        if address.scheme == "rerun+http" and address.hostname and address.port and address.path == "/proxy":
+            return target
+    except ValueError:  # a port that is none
+        pass
+    raise click.UsageError(
+        f"--rerun is {target!r}: name a file that ends in .rrd, or a viewer as in {RERUN_VIEWER}"
+    )
+
+
+def _observers() -> list[LiveFeed]:
+    """Start the observers of plugins, and print which cannot be."""
     from graspsense.core.components.registry import installed
-    from graspsense.core.values.errors import ConfigError, PluginUnavailable
+    from graspsense.core.values.errors import ConfigError
     from graspsense.live.feeds import LiveFeed
 
-    if find_spec("websockets") is None:
-        raise PluginUnavailable(HINT)
-    page = LiveFeed("graspsense.live.page_process", [host, str(port)])
-    talk(f"live: {page.answer['address']}")
-    feeds = [page]
+    feeds = []
     for observer in installed().live_observers():
         try:
             feeds.append(LiveFeed("graspsense.live.observer_process", [observer.entry.target]))
         except ConfigError as error:
             needs = f": {observer.entry.needs}" if observer.entry.needs else ""
             warn(f"live observer {observer.qualified}: {error}{needs}")
-    return Live(feeds)
+    return feeds
 
 
 def _host_and_port(address: str | None) -> tuple[str, int]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from graspsense.cli.live import live_options, shown_live
+from graspsense.cli.live import LiveOptions, live_options, shown_live, viewer_options
 from graspsense.cli.live_rows import LiveRows
 from graspsense.cli.model_table import print_model, print_not_verified, print_selection, print_without
 from graspsense.cli.options import contradiction, names_object, pipeline_options, settings_of
@@ -76,6 +76,7 @@ MANY_GUARDED: Final = 0.1
 @click.option("--video", metavar="FILE", help="Film a gripper that can be seen: .mp4, .webp or .gif.")
 @click.option("--viewer", is_flag=True, help="Show a gripper that can be seen, in a window.")
 @live_options
+@viewer_options
 @click.option("--dry-run", is_flag=True, help="Print what would be done, and open nothing.")
 @click.option("--json", "as_json", is_flag=True, help="Print the trial as JSON.")
 def run(
@@ -94,8 +95,7 @@ def run(
     picture: str | None,
     video: str | None,
     viewer: bool,
-    live: bool,
-    live_address: str | None,
+    live: LiveOptions,
     dry_run: bool,
     as_json: bool,
 ) -> None:
@@ -106,9 +106,10 @@ def run(
     """
     from graspsense.core.pipeline.wiring import check
 
-    if beside and any((plot, explain_model, dry_run, picture, video, viewer, live, live_address)):
+    if beside and any((plot, explain_model, dry_run, picture, video, viewer, live != LiveOptions())):
         raise click.UsageError(
-            "--beside goes without --plot, --explain-model, --dry-run, --picture, --video, --viewer and --live"
+            "--beside goes without --plot, --explain-model, --dry-run, --picture, --video, --viewer, --live, "
+            "--foxglove and --rerun"
         )
     if explain_model:
         options = (*options, "gripper.explain=true")
@@ -127,7 +128,7 @@ def run(
         return
     film = _film(picture, video, viewer)
     sinks: tuple[Sink, ...] = film if as_json else (LiveRows(), *film)
-    with shown_live(live, live_address, save) as shown:
+    with shown_live(live, save) as shown:
         trial, interrupted, kept = _performed(settings, (*sinks, *shown.sinks), save, label, changed)
         if drawn:
             talk(f"seed {seed}, drawn for this trial; --seed {seed} repeats the grasp")

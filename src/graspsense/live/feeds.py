@@ -26,16 +26,19 @@ QUEUE_BYTES: Final = 8 << 20
 """Limit on what waits for an observer; what is beyond it is dropped."""
 START_TIMEOUT_S: Final = 30.0
 END_TIMEOUT_S: Final = 3.0
+FILE_TIMEOUT_S: Final = 60.0
+"""`end_timeout_s` of a process that writes a file."""
 
 
 class LiveFeed(Feed):
     """A sink that passes grasps to the process of one observer, `python -m MODULE ARGUMENTS`.
 
-    The process prints a line of JSON once it is ready, with what it found as values, or `error`. Raises ConfigError
-    with that error, and if the process does not start.
+    The process prints a line of JSON once it is ready, with what it found as values, or `error`. After the last message
+    it has `end_timeout_s` to end. Raises ConfigError with its error, and if it does not start.
     """
 
-    def __init__(self, module: str, arguments: Sequence[str]) -> None:
+    def __init__(self, module: str, arguments: Sequence[str], end_timeout_s: float = END_TIMEOUT_S) -> None:
+        self._end_timeout_s = end_timeout_s
         self.name = " ".join((module, *arguments))
         """The process, for messages."""
         try:
@@ -91,9 +94,9 @@ class LiveFeed(Feed):
 
     def close(self) -> str:
         """End the process and return the error that it reports; empty if there is none."""
-        self._drain(b"", END_TIMEOUT_S)
+        self._drain(b"", self._end_timeout_s)
         try:
-            out, _ = self._process.communicate(timeout=END_TIMEOUT_S)
+            out, _ = self._process.communicate(timeout=self._end_timeout_s)
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.communicate()

@@ -7,20 +7,17 @@ from __future__ import annotations
 
 import json
 import os
-import signal
 import sys
 from importlib import import_module
 
 from graspsense.core.values.errors import FAILURES, named
 from graspsense.live.stream import batches
+from graspsense.recording.beside_control import leave_control_alone
 
 
 def main(target: str) -> int:
     """Run the observer until the grasping program ends. Print a line of JSON once it is imported, and its error."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    # On Linux, a batch process does not preempt the control loop when it wakes up.
-    if hasattr(os, "SCHED_BATCH"):
-        os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
+    leave_control_alone()
     answers = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)  # what the observer prints is no answer
     module, _, name = target.partition(":")

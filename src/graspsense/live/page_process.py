@@ -9,17 +9,13 @@ anything, or that does not take what it is sent, is dropped.
 from __future__ import annotations
 
 import asyncio
-import errno
 import json
-import os
-import secrets
-import signal
 import sys
 from collections import deque
 from contextlib import suppress
 from http import HTTPStatus
 from importlib.resources import files
-from typing import Any, Final
+from typing import Final
 
 from websockets.asyncio.server import ServerConnection, serve
 from websockets.datastructures import Headers
@@ -27,25 +23,29 @@ from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
 from graspsense.core.values.json_values import json_ready
+from graspsense.live.admission import (
+    FLUSH_S,
+    HISTORY_BYTES,
+    MOST_CONNECTIONS,
+    MOST_VIEWERS,
+    SHAKE_TIMEOUT_S,
+    Address,
+    say,
+    viewer_refusal,
+    why_not,
+)
 from graspsense.live.stream import Message, batches
+from graspsense.recording.beside_control import leave_control_alone
 from graspsense.recording.layout import TICK_FIELDS
 
-MOST_VIEWERS: Final = 16
-MOST_CONNECTIONS: Final = 64
-"""Connections at a time, with those that have not asked for anything yet; further ones are closed."""
 WAITING_BYTES: Final = 8 << 20
 """Text that may wait for a viewer before it is dropped."""
-HISTORY_BYTES: Final = 16 << 20
-"""Text of the running grasp that is kept for viewers who come later; of a longer grasp they see the end."""
 LARGEST_MESSAGE: Final = 1024
-SHAKE_TIMEOUT_S: Final = 5.0
-FLUSH_S: Final = 2.0
 FILES: Final = {"": "text/html", "page.js": "text/javascript", "curves.js": "text/javascript"}
 POLICY: Final = (
     "default-src 'none'; script-src 'self'; style-src 'unsafe-inline'; connect-src 'self'; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
-LOOPBACK: Final = ("127.0.0.1", "localhost", "[::1]")
 STICKY: Final = ("grasp", "stored", "progress", "prediction", "outcome")
 """Messages of which a viewer who comes later needs the newest."""
 _SHOWN: Final = (
@@ -127,34 +127,23 @@ class LivePage:
     """The page under its token, and the viewers that are connected to it."""
 
     def __init__(self, host: str) -> None:
-        self.host, self.port, self.token = host, 0, secrets.token_urlsafe(24)
+        self.address = Address("http", host)
         self.history = History()
         self.viewers: dict[ServerConnection, _Waiting] = {}
         folder = files("graspsense.live")
         self._files = {name: (folder / (name or "page.html")).read_bytes() for name in FILES}
 
-    @property
-    def address(self) -> str:
-        """The address to open."""
-        host = f"[{self.host}]" if ":" in self.host else self.host
-        return f"http://{host}:{self.port}/{self.token}/"
-
     def answer(self, connection: ServerConnection, request: Request) -> Response | None:
         """Return the answer to an HTTP request; None lets a WebSocket open."""
         folder, _, name = request.path.removeprefix("/").partition("/")
-        host, origin = request.headers.get("Host", ""), request.headers.get("Origin")
-        if not secrets.compare_digest(folder.encode(), self.token.encode()):
-            return connection.respond(
-                HTTPStatus.NOT_FOUND, "wrong address: open the one that graspsense printed\n"
-            )
-        if self.host in LOOPBACK and host not in {f"{one}:{self.port}" for one in LOOPBACK}:
-            return connection.respond(HTTPStatus.FORBIDDEN, "wrong host\n")
-        if name == "frames":
-            if origin is not None and origin != f"http://{host}":
-                return connection.respond(HTTPStatus.FORBIDDEN, "wrong origin\n")
-            if len(self.viewers) >= MOST_VIEWERS:
-                return connection.respond(HTTPStatus.SERVICE_UNAVAILABLE, f"{MOST_VIEWERS} viewers already\n")
-            return None
+        refusal = self.address.refusal(folder, request.headers)
+        if refusal is None and name == "frames":
+            own = f"http://{request.headers.get('Host', '')}"
+            refusal = viewer_refusal(request.headers, own.__eq__, len(self.viewers))
+            if refusal is None:
+                return None
+        if refusal is not None:
+            return connection.respond(*refusal)
         if name not in FILES:
             return connection.respond(HTTPStatus.NOT_FOUND, "no such page\n")
         body = self._files[name]
@@ -244,11 +233,11 @@ async def serve_page(host: str, port: int) -> None:
             ping_timeout=10,
         )
     except OSError as error:
-        _say({"error": _why_not(host, port, error)})
+        say({"error": why_not("--live-address", host, port, error)})
         return
     async with server:
-        page.port = next(iter(server.sockets)).getsockname()[1]
-        _say({"address": page.address})
+        page.address.port = next(iter(server.sockets)).getsockname()[1]
+        say({"address": page.address.text})
         incoming = batches(0)
         while (messages := await loop.run_in_executor(None, next, incoming, None)) is not None:
             page.pass_on(messages)
@@ -256,23 +245,9 @@ async def serve_page(host: str, port: int) -> None:
             await page.end()
 
 
-def _why_not(host: str, port: int, error: OSError) -> str:
-    if error.errno == errno.EADDRINUSE:
-        return f"--live-address: port {port} of {host} is taken: name another one, or leave it out for a free one"
-    return f"--live-address: cannot listen on {host}, port {port}: {error.strerror or error}"
-
-
-def _say(answer: dict[str, Any]) -> None:
-    sys.stdout.write(json.dumps(answer) + "\n")
-    sys.stdout.flush()
-
-
 def main(host: str, port: str) -> int:
-    """Serve the page. Ctrl-C is meant for the grasping program; this process ends when its input ends."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    # On Linux, a batch process does not preempt the control loop when it wakes up.
-    if hasattr(os, "SCHED_BATCH"):
-        os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
+    """Serve the page until the input ends."""
+    leave_control_alone()
     asyncio.run(serve_page(host, int(port)))
     return 0
 

@@ -28,22 +28,33 @@ BATCH_S: Final = 0.033
 Message = dict[str, Any]
 
 
-def batches(fd: int) -> Iterator[list[Message]]:
-    """Yield the messages that have come since the last batch, until the grasping program ends."""
-    decoder, buffer = _Decoder(), bytearray()
+def buffers(fd: int) -> Iterator[bytearray]:
+    """Yield the buffer each time more has come, until the grasping program ends. Take complete messages out of it."""
+    buffer = bytearray()
     while data := os.read(fd, READ_BYTES):
         buffer += data
         if len(data) < READ_BYTES:
             time.sleep(BATCH_S)
+        yield buffer
+
+
+def batches(fd: int, every_image: bool = False) -> Iterator[list[Message]]:
+    """Yield the messages that have come since the last batch, until the grasping program ends.
+
+    Of the images of an array, a batch has only the newest unless `every_image` is set.
+    """
+    decoder = _Decoder(every_image)
+    for buffer in buffers(fd):
         messages = decoder.messages(buffer)
         if messages:
             yield messages
 
 
 class _Decoder:
-    """Turns messages of the pipe into dictionaries: ticks as columns, of an array the newest image."""
+    """Turns messages of the pipe into dictionaries: ticks as columns, of an array the newest image or every one."""
 
-    def __init__(self) -> None:
+    def __init__(self, every_image: bool) -> None:
+        self._every_image = every_image
         self._topics: list[tuple[Topic, struct.Struct]] = []
         self._done: list[Message] = []
         self._open: dict[str, Message] = {}
@@ -107,7 +118,10 @@ class _Decoder:
             self._image(name, values[0], values[1], cells)
 
     def _image(self, name: str, t_s: float, counter: int, cells: tuple[float, ...]) -> None:
-        self._open[f"image {name}"] = {
+        key = f"image {name}"
+        if self._every_image and key in self._open:
+            self._done.append(self._open[key])
+        self._open[key] = {
             "kind": "image",
             "name": name,
             "t_s": t_s,

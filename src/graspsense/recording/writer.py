@@ -21,6 +21,7 @@ from mcap.writer import CompressionType, Writer
 from graspsense import __version__
 from graspsense.core.files.whole_file import sync_folder
 from graspsense.recording.layout import CDR_HEADER, PADS_TOPIC, PART, TICK_SCHEMA, TICK_TOPIC, Topic
+from graspsense.recording.log_clock import LogClock
 from graspsense.recording.recording_info import RecordingInfo
 
 CHUNK_NS: Final = 50_000_000
@@ -30,9 +31,8 @@ _T_S: Final = struct.Struct("<d")
 class RecordingWriter:
     """Writes one recording.
 
-    Messages are logged at the gripper's time plus `base_ns`, the wall-clock time at time 0 of the gripper's clock. If
-    `base_ns` is None, it is taken from the first message. Raises FileExistsError if the recording already exists, and
-    OSError from every method if the disk cannot be written.
+    Messages are logged at the times of a `LogClock` with `base_ns`. Raises FileExistsError if the recording already
+    exists, and OSError from every method if the disk cannot be written.
     """
 
     def __init__(self, path: Path, base_ns: int | None = None) -> None:
@@ -55,7 +55,7 @@ class RecordingWriter:
         self._counts: dict[str, int] = {}
         self._topics: list[str] = []
         self._register(TICK_TOPIC, *TICK_SCHEMA)
-        self._base_ns = base_ns
+        self._clock = LogClock(base_ns)
         self._chunk_log_ns = self._chunk_wall_ns = 0
         self._open_chunk = False
 
@@ -118,9 +118,7 @@ class RecordingWriter:
 
     def _add(self, topic: str, t_s: float, body: bytes) -> None:
         now_ns = time.time_ns()
-        if self._base_ns is None:
-            self._base_ns = now_ns - _ns(t_s)
-        log_ns = min(max(0, self._base_ns + _ns(t_s)), _LAST_NS)
+        log_ns = self._clock.log_ns(t_s, now_ns)
         if not self._open_chunk:
             self._open_chunk, self._chunk_log_ns, self._chunk_wall_ns = True, log_ns, now_ns
         number = self._counts[topic]
@@ -153,11 +151,3 @@ class _Hashed:
 
     def close(self) -> None:
         os.close(self.fd)
-
-
-_LAST_NS: Final = 2**64 - 1
-"""The last time that a message can have, in the year 2554."""
-
-
-def _ns(t_s: float) -> int:
-    return round(t_s * 1e9) if abs(t_s) < 1e9 else 0

@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import json
 import os
-import signal
 import struct
 import sys
 import time
 from pathlib import Path
 from typing import Final
 
+from graspsense.recording.beside_control import leave_control_alone
 from graspsense.recording.layout import IS_END, IS_SIGNAL, IS_TICK, IS_TOPIC, READY, Topic
 from graspsense.recording.wire_messages import complete_messages
 from graspsense.recording.writer import RecordingWriter
@@ -30,13 +30,8 @@ BEHIND: Final = 1 << 16
 
 def main(path: str) -> int:
     """Write the recording. Print `READY` once the file exists, and at its end the result or the error as JSON."""
-    # Ctrl-C is meant for the grasping program. This process ends when its input ends.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    leave_control_alone()
     try:
-        # On Linux, a batch process does not preempt the control loop when it wakes up. Its nice value is unchanged: on
-        # a busy machine, a nice process would fall behind further than a crash may lose.
-        if hasattr(os, "SCHED_BATCH"):
-            os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
         answer = _write(Path(path))
     except OSError as error:
         answer = {"error": error.strerror or str(error), "errno": error.errno}

@@ -1,0 +1,370 @@
+"""Grasps in Foxglove while they go on: the messages of a recording, and what bad viewers cannot do."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import os
+import socket
+import struct
+import subprocess
+import sys
+import threading
+import time
+from contextlib import ExitStack, closing, suppress
+from importlib.resources import files
+from xml.etree import ElementTree
+
+import pytest
+from live_grasp import COMMAND, device, port_of, reading
+from mcap.reader import make_reader
+
+from graspsense import load_pipeline
+from graspsense.core.components.registry import installed
+from graspsense.core.values.errors import ConfigError
+from graspsense.core.values.signals import SQUEEZE
+from graspsense.live.feeds import LiveFeed
+from graspsense.recording.layout import IS_TICK, TICK_FIELDS, TICK_WIRE
+from graspsense.store.record_grasp import record_grasp
+from graspsense.store.store import Store
+
+pytest.importorskip("websockets")
+pytest.importorskip("foxglove")
+
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import connect
+
+from graspsense.live import foxglove_process
+
+PATIENCE_S = 60.0
+SDK = "foxglove.sdk.v1"
+
+
+@pytest.fixture
+def feed():
+    running = LiveFeed("graspsense.live.foxglove_process", ["0"])
+    yield running
+    assert running.close() == ""
+
+
+def opened(feed, protocol=SDK):
+    """Return a connection that the test or the server ends."""
+    return connect(feed.answer["address"], subprotocols=[protocol], max_size=None).__enter__()
+
+
+class Viewer:
+    """Subscribes to everything, until the connection ends."""
+
+    def __init__(self, feed, protocol=SDK):
+        self.link = opened(feed, protocol)
+        self.topics, self.found = {}, {}
+        self.has_come = threading.Condition()
+        self.thread = threading.Thread(target=self.listen)
+        self.thread.start()
+
+    def listen(self):
+        try:
+            for message in self.link:
+                with self.has_come:
+                    self.take(message)
+                    self.has_come.notify_all()
+        except ConnectionClosed:
+            pass
+
+    def take(self, message):
+        if isinstance(message, bytes):
+            kind, number, log_ns = struct.unpack_from("<BIQ", message)
+            assert kind == 1
+            self.found[self.topics[number]["topic"]].append((log_ns, message[13:]))
+            return
+        said = json.loads(message)
+        for channel in said.get("channels", ()):
+            self.topics[channel["id"]], self.found[channel["topic"]] = channel, []
+            wanted = [{"id": channel["id"], "channelId": channel["id"]}]
+            self.link.send(json.dumps({"op": "subscribe", "subscriptions": wanted}))
+
+    def wait_for(self, topic, count):
+        with self.has_come:
+            assert self.has_come.wait_for(lambda: len(self.found.get(topic, ())) >= count, PATIENCE_S)
+
+    def wait_for_all(self, n=20):
+        for topic in ("tick", "scalars", "signals/skin", "signals/sound"):
+            self.wait_for(f"/grasp/{topic}", n)
+
+    def ended(self):
+        """Wait until the connection has ended, and return the messages by topic."""
+        self.thread.join(PATIENCE_S)
+        assert not self.thread.is_alive()
+        return self.found
+
+
+def refused(feed, address=None, headers=None, protocols=(SDK,)):
+    """Return the status with which a viewer is refused."""
+    address = address or feed.answer["address"]
+    with (
+        pytest.raises(InvalidStatus) as answer,
+        connect(address, subprotocols=protocols or None, additional_headers=headers),
+    ):
+        pass
+    return answer.value.response.status_code
+
+
+def messages_until_the_end(link):
+    """Return how many messages come until the server ends the connection."""
+    for count in itertools.count():
+        try:
+            link.recv(timeout=PATIENCE_S)
+        except ConnectionClosed:
+            return count
+
+
+def shown(feed, n=20):
+    feed.opened(device())
+    for k in range(n):
+        feed.take(reading(k), SQUEEZE, COMMAND)
+    feed.told("outcome", {"outcome": "steady", "reason": ""})
+
+
+def check_complete(found, n=20):
+    times = [struct.unpack_from("<4xd", data)[0] for _, data in found["/grasp/tick"]]
+    assert times == [k / 1000 for k in range(n)]
+    skin = [struct.unpack_from("<4xdq6d", data)[2:] for _, data in found["/grasp/signals/skin"]]
+    assert skin == [tuple(float(k + i) for i in range(6)) for k in range(n)]
+    assert len(found["/grasp/signals/sound"]) == len(found["/grasp/scalars"]) == n
+
+
+def test_viewers_receive_the_messages_and_schemas_of_the_recording_and_late_ones_too(feed, tmp_path):
+    settings = load_pipeline(options=["classifier.type=none"]).settings
+    early = Viewer(feed)
+    with Store.open(tmp_path) as store:
+        record_grasp(store, settings, installed(), labels={}, origin="run", sinks=[feed])
+    (path,) = (tmp_path / "recordings").glob("*.mcap")
+    recorded, schemas = {}, {}
+    with path.open("rb") as file:
+        for schema, channel, message in make_reader(file).iter_messages(log_time_order=False):
+            recorded.setdefault(channel.topic, []).append((message.log_time, message.data))
+            schemas[channel.topic] = (schema.name, schema.encoding, schema.data.decode(), "cdr")
+    late = Viewer(feed)
+    for viewer in (early, late):
+        for topic, messages in recorded.items():
+            viewer.wait_for(topic, len(messages))
+    feed.close()
+    assert {"/grasp/tick", "/grasp/pads"} <= recorded.keys()
+    for viewer in (early, late):
+        found = viewer.ended()
+        data = {topic: [body for _, body in messages] for topic, messages in found.items()}
+        assert data == {topic: [body for _, body in messages] for topic, messages in recorded.items()}
+        keys = ("schemaName", "schemaEncoding", "schema", "encoding")
+        assert {one["topic"]: tuple(map(one.get, keys)) for one in viewer.topics.values()} == schemas
+        spans = [
+            messages[-1][0] - messages[0][0] for messages in (found["/grasp/tick"], recorded["/grasp/tick"])
+        ]
+        assert spans[0] == spans[1]
+
+
+def test_images_samples_and_further_channels_come_too(feed):
+    viewer = Viewer(feed, "foxglove.websocket.v1")
+    assert viewer.link.subprotocol == "foxglove.websocket.v1"
+    shown(feed)
+    viewer.wait_for_all()
+    feed.close()
+    check_complete(viewer.ended())
+
+
+def test_a_viewer_who_comes_later_sees_the_last_grasp_alone(feed):
+    early = Viewer(feed)
+    shown(feed, 30)
+    early.wait_for_all(30)
+    shown(feed, 5)
+    early.wait_for_all(35)
+    viewer = Viewer(feed)
+    viewer.wait_for_all(5)
+    feed.close()
+    check_complete(viewer.ended(), 5)
+
+
+def test_what_is_kept_for_viewers_who_come_later_does_not_grow(monkeypatch):
+    monkeypatch.setattr(foxglove_process, "HISTORY_BYTES", 10_000)
+    grasp = foxglove_process.RunningGrasp()
+    tick = TICK_WIRE.pack(IS_TICK, *reading(1).frame, SQUEEZE, *COMMAND)
+    kept = []
+    for _ in range(3):
+        grasp.take(bytearray(tick * 10_000))
+        kept.append(sum(len(data) for _, _, data in grasp.history))
+    assert kept[0] == kept[1] == kept[2]
+    assert 10_000 - len(tick) < kept[0] <= 10_000
+
+
+@pytest.mark.parametrize("path", ["", "wrong", "wrong/"])
+def test_without_the_token_nothing_is_answered(feed, path):
+    assert refused(feed, f"ws://127.0.0.1:{port_of(feed)}/{path}") == 404
+
+
+@pytest.mark.parametrize(
+    ("headers", "status"),
+    [
+        ({"Origin": "https://elsewhere.example"}, 403),
+        ({"Origin": "null"}, 403),
+        ({"Origin": "https://app.foxglove.dev.elsewhere.example"}, 403),
+    ],
+)
+def test_the_pages_of_others_cannot_listen(feed, headers, status):
+    assert refused(feed, headers=headers) == status
+
+
+@pytest.mark.parametrize(
+    ("head", "status"),
+    [
+        ("GET {path} HTTP/1.1\r\nHost: elsewhere.example:{port}\r\n\r\n", 403),
+        ("POST {path} HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n\r\n", 400),
+        ("\r\n\r\n", 400),
+        ("GET {path} HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nOrigin: http://[\r\n\r\n", 400),
+        ("x" * 100_000, None),
+        ("GET {path} HTTP/1.1\r\n" + "A: 1\r\n" * 500 + "\r\n", None),
+    ],
+    ids=["host", "post", "empty", "origin", "long", "headers"],
+)
+def test_what_is_no_request_of_a_viewer_is_refused_or_dropped(feed, head, status):
+    address = feed.answer["address"]
+    text = head.format(path="/" + address.split("/", 3)[3], port=port_of(feed))
+    with socket.create_connection(("127.0.0.1", port_of(feed)), PATIENCE_S) as link:
+        with suppress(ConnectionError):
+            link.sendall(text.encode())
+        answer = b""
+        with suppress(ConnectionError):
+            while data := link.recv(4096):
+                answer += data
+    assert answer.split(b" ")[1:2] == ([] if status is None else [str(status).encode()])
+
+
+def test_what_is_no_viewer_of_foxglove_is_told_so(feed):
+    assert refused(feed, protocols=()) == 400
+    assert refused(feed, protocols=("chat",)) == 400
+
+
+@pytest.mark.parametrize("origin", ["https://app.foxglove.dev", "file://"])
+def test_foxglove_itself_is_let_in(feed, origin):
+    with connect(feed.answer["address"], subprotocols=[SDK], additional_headers={"Origin": origin}) as viewer:
+        assert json.loads(viewer.recv(timeout=PATIENCE_S))["op"] == "serverInfo"
+
+
+@pytest.mark.parametrize(
+    "sent",
+    [
+        "x",
+        b"\x99" * 100,
+        '{"op":"subscribe"}',
+        '{"op":"subscribe","subscriptions":[{"id":1,"channelId":99}]}',
+        '{"op":"fetchAsset","uri":"package://../../etc/passwd","requestId":1}',
+        '{"op":"setParameters","parameters":[{"name":"x","value":1}]}',
+    ],
+)
+def test_what_is_not_a_subscription_is_an_error_and_the_others_go_on(feed, sent):
+    good = Viewer(feed)
+    with connect(feed.answer["address"], subprotocols=[SDK]) as bad:
+        bad.send(sent)
+        said = [json.loads(bad.recv(timeout=PATIENCE_S)) for _ in range(3)]
+    assert said[-1]["op"] == "status"
+    shown(feed)
+    good.wait_for_all()
+    feed.close()
+    check_complete(good.ended())
+
+
+def test_a_viewer_that_sends_more_than_subscriptions_is_dropped(feed):
+    good = Viewer(feed)
+    with closing(opened(feed)) as bad:
+        with suppress(ConnectionClosed):
+            bad.send("x" * (2 << 20))
+        messages_until_the_end(bad)
+    shown(feed)
+    good.wait_for_all()
+    feed.close()
+    check_complete(good.ended())
+
+
+def test_viewers_beyond_the_limit_are_refused(feed):
+    with ExitStack() as viewers:
+        for _ in range(16):
+            viewers.enter_context(connect(feed.answer["address"], subprotocols=[SDK]))
+        assert refused(feed) == 503
+
+
+@pytest.mark.slow
+def test_rubbish_and_a_thousand_connections_disturb_nobody(feed):
+    good = Viewer(feed)
+    crowd = []
+    for k in range(1000):
+        one = socket.create_connection(("127.0.0.1", port_of(feed)))
+        crowd.append(one)
+        if k % 100 == 0:
+            one.sendall(os.urandom(20_000))
+    shown(feed)
+    good.wait_for_all()
+    for one in crowd:
+        one.close()
+    feed.close()
+    check_complete(good.ended())
+
+
+@pytest.mark.slow
+def test_a_viewer_that_stalls_is_dropped_and_no_tick_waits(feed):
+    stalled = opened(feed)
+    stalled.recv(timeout=PATIENCE_S)
+    (tick,) = json.loads(stalled.recv(timeout=PATIENCE_S))["channels"]
+    wanted = [{"id": 1, "channelId": tick["id"]}]
+    stalled.send(json.dumps({"op": "subscribe", "subscriptions": wanted}))
+    good = Viewer(feed)
+    feed.opened(device())
+    n = 300_000
+    for k in range(n):
+        feed.take(reading(k), SQUEEZE, COMMAND)
+        if k % 1000 == 999:
+            good.wait_for("/grasp/tick", k + 1)
+    assert feed.dropped == 0
+    assert messages_until_the_end(stalled) < n
+    feed.close()
+    check_complete(good.ended(), n)
+
+
+def test_the_layouts_show_fields_that_a_recording_has():
+    folder = files("graspsense.live")
+    layout = json.loads((folder / "foxglove_layout.json").read_text())
+    panels = layout["configById"]
+    paths = [one["value"] for panel in panels.values() for one in panel.get("paths", ())]
+    paths += [panel["xAxisPath"]["value"] for panel in panels.values() if "xAxisPath" in panel]
+    root = ElementTree.fromstring((folder / "plotjuggler_layout.xml").read_text())
+    curves = [curve.get("name") for curve in root.iter("curve")]
+    for shown_paths, between in ((paths, "."), (curves, "/")):
+        assert {"gap_m", "force_left_n", "effort_n", "phase"} <= {
+            path.removeprefix(f"/grasp/tick{between}") for path in shown_paths
+        }
+        assert {path.removeprefix(f"/grasp/tick{between}") for path in shown_paths} <= set(TICK_FIELDS)
+
+    def leaves(place):
+        return [place] if isinstance(place, str) else [*leaves(place["first"]), *leaves(place["second"])]
+
+    assert sorted(leaves(layout["layout"])) == sorted(panels)
+
+
+def test_a_port_that_is_taken_is_an_error_before_the_grasp(tmp_path):
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        with pytest.raises(ConfigError, match=f"--foxglove.*{port}"):
+            LiveFeed("graspsense.live.foxglove_process", [str(port)])
+        command = [sys.executable, "-m", "graspsense", "run", "--foxglove", str(port), "--save", "store"]
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 2
+    assert str(port) in done.stderr
+    assert not (tmp_path / "store").exists()
+
+
+def test_a_grasp_without_a_viewer_is_as_any_other(feed):
+    began = time.monotonic()
+    trial = load_pipeline("default").grasp(sinks=[feed])
+    feed.finished(trial)
+    assert (trial.outcome.words, trial.reason, feed.dropped) == ("steady", "", 0)
+    assert feed.close() == ""
+    assert time.monotonic() - began < PATIENCE_S
