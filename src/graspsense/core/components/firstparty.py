@@ -36,6 +36,7 @@ _MUJOCO = Shipped("graspsense-mujoco-gripper", "mujoco_gripper", "mujoco")
 _ROBOTIQ = Shipped("graspsense-robotiq-2f", "robotiq_2f", "robotiq")
 _C45 = Shipped("graspsense-c45", "c45", "c45")
 _PAPER = Shipped("graspsense-paper", "paper", "paper")
+_ROMANO = Shipped("graspsense-romano", "romano", "romano")
 _IDENTIFY = Shipped("graspsense-identify", "identify", "identify")
 
 SHIPPED: Final[dict[tuple[Role, str], Shipped]] = {
@@ -45,6 +46,12 @@ SHIPPED: Final[dict[tuple[Role, str], Shipped]] = {
     ("sensor-backend", "robotiq"): _ROBOTIQ,
     ("feature-set", "chitta-without-pads"): _ROBOTIQ,
     ("classifier", "c45"): _C45,
+    ("controller", "find-contact"): _ROMANO,
+    ("controller", "force-servo"): _ROMANO,
+    ("controller", "slip-servo"): _ROMANO,
+    ("controller", "grab"): _ROMANO,
+    ("controller", "release"): _ROMANO,
+    ("controller", "pick-and-place"): _ROMANO,
 }
 """Components in other distributions of this project, for the hint if one is not installed."""
 

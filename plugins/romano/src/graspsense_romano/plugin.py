@@ -1,0 +1,23 @@
+"""What this distribution brings to graspsense: control laws by touch, and experiments with them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from graspsense.plugin_api import ControllerEntry, hookimpl
+
+GRASPSENSE_API = (2, 0)
+
+
+@hookimpl
+def graspsense_controllers() -> Iterable[ControllerEntry]:
+    """Return the control laws of Romano et al. (IEEE T-RO 27(6), 2011)."""
+    for name, target, summary in (
+        ("find-contact", "FindContact", "closes until both pads touch"),
+        ("force-servo", "ForceServo", "brings the weaker finger to a force"),
+        ("slip-servo", "SlipServo", "holds lightly, with more force whenever the thing slips"),
+        ("grab", "Grab", "chooses the force from the contact, and adds to it whenever the thing slips"),
+        ("release", "Release", "holds until the thing is put down, then opens"),
+        ("pick-and-place", "PickAndPlace", "grabs, holds what an arm lifts, and opens when it is put down"),
+    ):
+        yield ControllerEntry(name=name, target=f"graspsense_romano.controllers:{target}", summary=summary)
