@@ -11,6 +11,7 @@ force = [[0.8, 0.0], [1.8, 5.0]]             # seconds after both fingers touch,
 
 from __future__ import annotations
 
+from importlib.resources import files
 from itertools import pairwise
 from math import isfinite
 from pathlib import Path
@@ -41,6 +42,9 @@ ARM_KG: Final = 1000.0
 """Inertia of the arm: so heavy that the gripper does not move it."""
 ARM_RAD_S: Final = 200.0
 """Natural frequency of the servo of the arm, critically damped."""
+SCENES: Final = Path(str(files("graspsense_mujoco_gripper") / "scenes"))
+SHIPPED_SCENES: Final = ("tugged", "filled", "placed")
+"""The scene files of this package."""
 LARGEST_BYTES: Final = 64 * 1024
 MASS_SPREAD, FRICTION_SPREAD, STIFFNESS_SPREAD, SIZE_SPREAD = 0.1, 0.15, 0.1, 0.01
 """Standard deviations of the logarithms of what instances and seeds draw."""
@@ -126,7 +130,9 @@ def read_scene(name: str) -> SceneModel:
     """
     name, number, instance = name.partition("#")
     scene, beside = Scene(thing=name), Path()
-    if name.endswith(".toml"):
+    if name in SHIPPED_SCENES:
+        scene = _scene_of(SCENES / f"{name}.toml")
+    elif name.endswith(".toml"):
         beside = Path(name).expanduser().parent
         scene = _scene_of(Path(name).expanduser())
     if scene.walls is not None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from graspsense.plugin_api import ControllerEntry, hookimpl
+from graspsense.plugin_api import ControllerEntry, PipelineEntry, hookimpl
 
 GRASPSENSE_API = (2, 0)
 
@@ -21,3 +21,13 @@ def graspsense_controllers() -> Iterable[ControllerEntry]:
         ("pick-and-place", "PickAndPlace", "grabs, holds what an arm lifts, and opens when it is put down"),
     ):
         yield ControllerEntry(name=name, target=f"graspsense_romano.controllers:{target}", summary=summary)
+
+
+@hookimpl
+def graspsense_pipelines() -> Iterable[PipelineEntry]:
+    """Return the pipelines of a simulated gripper with soft pads."""
+    for name, summary in (
+        ("hold", "holds a simulated block with the least force that does not slip"),
+        ("place", "picks a simulated block up and puts it down, by touch"),
+    ):
+        yield PipelineEntry(name=name, resource=f"graspsense_romano:pipelines/{name}.toml", summary=summary)
