@@ -55,7 +55,7 @@ CONTACT_S: Final = 0.05
 """Time for which the gap of the contact is kept, and its greatest force taken."""
 CLOSE, TOUCH, LOAD, KEEP = range(4)
 """Stages: close until both pads touch, stay there, reach the force, hold."""
-PLACE_BIT, UNFELT_BIT = 16, 128
+SLIP_BIT, PLACE_BIT, UNFELT_BIT = 8, 16, 128
 
 
 class Plan(NamedTuple):
@@ -140,6 +140,8 @@ def step(params: Params, state: State, reading: Reading) -> tuple[Command, State
         else:
             progress = keeping(params, before, signals, now, frame)
     events = begun(state.conditions, now)
+    if before.stage != KEEP:
+        events &= ~SLIP_BIT
     if params.plan.places == 1:
         if progress.stage == KEEP and before.stage == LOAD and signals.acceleration.present == 0:
             events |= UNFELT_BIT

@@ -17,7 +17,6 @@ EVENTS: Final = (
     "no acceleration is measured: placing is told by force alone",
 )
 """The events that every law of this package tells, in the order of their bits."""
-LEFT, RIGHT, BOTH, SLIP, PLACE, SIDE, SHOCK, UNFELT = (1 << k for k in range(8))
 
 SIDE_OR_SHOCK, SLIP_AND_SHOCK, ANY, SLIP_ALONE, SHOCK_ALONE = range(5)
 """What counts as placing, with the numbers of the published trigger conditions."""

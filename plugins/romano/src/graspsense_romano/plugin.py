@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from graspsense.experiment_api import ExperimentEntry, ExperimentKindEntry
 from graspsense.plugin_api import ControllerEntry, PipelineEntry, hookimpl
 
 GRASPSENSE_API = (2, 0)
@@ -31,3 +32,24 @@ def graspsense_pipelines() -> Iterable[PipelineEntry]:
         ("place", "picks a simulated block up and puts it down, by touch"),
     ):
         yield PipelineEntry(name=name, resource=f"graspsense_romano:pipelines/{name}.toml", summary=summary)
+
+
+@hookimpl
+def graspsense_experiment_kinds() -> Iterable[ExperimentKindEntry]:
+    """Return the kind of the experiments in MuJoCo."""
+    yield ExperimentKindEntry(
+        name="touch",
+        run="graspsense_romano.touch:touch",
+        keys="graspsense_romano.touch:TouchSettings",
+        result="graspsense_romano.touch:TouchRow",
+        findings="graspsense_romano.findings:findings",
+        seconds_per_trial=15.0,
+        summary="grasps a thing of a MuJoCo scene, lifts it, tugs at it or fills it, puts it down",
+    )
+
+
+@hookimpl
+def graspsense_experiments() -> Iterable[ExperimentEntry]:
+    """Return the experiments on grab, slip and placing."""
+    for name in ("romano_grab", "romano_slip", "romano_place"):
+        yield ExperimentEntry(name, f"graspsense_romano:experiments/{name}.toml", seconds_per_trial=15.0)
