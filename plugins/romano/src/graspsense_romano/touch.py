@@ -28,6 +28,22 @@ AROUND_S: Final = (-0.05, 0.3)
 """What counts as being put down, around the time at which the arm is as high as the table."""
 
 
+STARTING_S: Final = 0.2
+"""Time in which the arm reaches its speed, and in which it stops."""
+POINTS: Final = 20
+
+
+def _moved(start_s: float, begin_m: float, end_m: float, speed_m_s: float) -> list[list[float]]:
+    """Return times and heights of the arm from one height to another, with a constant acceleration at both ends."""
+    sign, share = (1.0 if end_m > begin_m else -1.0), np.arange(POINTS + 1) / POINTS
+    travel_s = max(abs(end_m - begin_m) / speed_m_s, STARTING_S)
+    speed_m_s = abs(end_m - begin_m) / travel_s
+    starting = 0.5 * share**2 * STARTING_S * speed_m_s
+    first = zip(start_s + share * STARTING_S, begin_m + sign * starting, strict=True)
+    last = zip(start_s + travel_s + share * STARTING_S, end_m - sign * starting[::-1], strict=True)
+    return [[round(float(t), 5), round(float(z), 7)] for t, z in (*first, *last)]
+
+
 @frozen(kw_only=True)
 class TouchSettings:
     """The keys of `[judge]`: the scene. What is 0 does not happen."""
@@ -57,15 +73,15 @@ class TouchSettings:
         """When the thing is as high as the table again, after both fingers touched; NaN without a way down."""
         if not self.lower_m_s:
             return float("nan")
-        return DISTURBED_S + (self.lift_m - self.table_rise_m) / self.lower_m_s
+        return DISTURBED_S + 0.5 * STARTING_S + (self.lift_m - self.table_rise_m) / self.lower_m_s
 
     def toml(self) -> str:
         """Return the scene file."""
         lines = [f'thing = "{self.thing}"', "table = true", f"friction = {self.friction}"]
         lines += [f"mass_kg = {self.mass_kg}", f"roughness_m = {self.roughness_m}"]
-        arm = [[LIFT_S[0], 0.0], [LIFT_S[1], self.lift_m]]
+        arm = _moved(LIFT_S[0], 0.0, self.lift_m, self.lift_m / (LIFT_S[1] - LIFT_S[0]))
         if self.lower_m_s:
-            arm += [[DISTURBED_S, self.lift_m], [DISTURBED_S + self.lift_m / self.lower_m_s, 0.0]]
+            arm += _moved(DISTURBED_S, self.lift_m, 0.0, self.lower_m_s)
         lines.append(f"arm = {arm}")
         end_s = DISTURBED_S + self.ramp_s
         if self.fill_kg:
