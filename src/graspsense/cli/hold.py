@@ -46,6 +46,8 @@ def hold(
     from graspsense.cli.run import finish, grasped, print_trial
     from graspsense.core.pipeline.wiring import check
 
+    if seconds != seconds:
+        raise click.BadParameter("nan is no time: give a number of seconds", param_hint="--seconds")
     lasting = (f"run.hold_s={seconds}", f"run.grasp_timeout_s={max(seconds + TO_GRASP_S, 300.0)}")
     settings = settings_of(pipeline or PIPELINE, gripper, object_name, (*lasting, *options), seed, force)
     check(settings)
