@@ -153,6 +153,14 @@ def test_a_gripper_file_that_cannot_be_says_why(wrong, said):
 
 @pytest.mark.slow
 def test_a_trace_has_the_acceleration_and_the_cells():
-    trial = load_pipeline("default", options=["gripper.type=mujoco", "gripper.file=soft_pads", "classifier.type=none", "controller.sends=velocity"]).grasp(object="block")
+    trial = load_pipeline(
+        "default",
+        options=[
+            "gripper.type=mujoco",
+            "gripper.file=soft_pads",
+            "classifier.type=none",
+            "controller.sends=velocity",
+        ],
+    ).grasp(object="block")
     assert trial.trace.signals["acceleration"].values.shape[1] == 3
     assert trial.trace.pad_left.shape[1] == 15

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from math import inf, nan
+from typing import NamedTuple
 
 import pytest
 
@@ -28,9 +30,16 @@ CONTROLLERS = ("find-contact", "force-servo", "slip-servo", "grab", "release", "
 THRESHOLDS = Thresholds(1.2, 0.1, 0.007, 0.048, 0.18, 0.008, 0.2, 3.25, 1)
 
 
-class Palm:
-    def __init__(self, *values):
-        self.acceleration = Samples(0.0, len(values), len(values), tuple((0.0, 0.0, v) for v in values))
+class Palm(NamedTuple):
+    acceleration: Samples
+
+
+class OtherSignals(NamedTuple):
+    motor_temperature: float
+
+
+def palm(*values):
+    return Palm(Samples(0.0, len(values), len(values), tuple((0.0, 0.0, v) for v in values)))
 
 
 def reading(t_s, force_n, signals=(), gap_m=0.05):
@@ -90,10 +99,15 @@ def test_gravity_is_no_shock_and_every_sample_of_a_tick_counts():
     """The published controller looks at the last sample of a tick alone, and begins its filter at zero."""
     signals = no_signals()
     for k in range(100):
-        signals = updated(filters(), signals, reading(k * 0.001, 0.0, Palm(9.8, 9.8, 9.8)))
+        signals = updated(filters(), signals, reading(k * 0.001, 0.0, palm(9.8, 9.8, 9.8)))
         assert conditions(THRESHOLDS, signals).shock == 0
-    signals = updated(filters(), signals, reading(0.1, 0.0, Palm(9.8, 20.0, 9.8)))
+    signals = updated(filters(), signals, reading(0.1, 0.0, palm(9.8, 20.0, 9.8)))
     assert conditions(THRESHOLDS, signals).shock == 1
+
+
+def test_a_gripper_with_other_signals_has_no_acceleration():
+    for signals in ((), OtherSignals(20.0)):
+        assert updated(filters(), no_signals(), reading(0.0, 0.0, signals)).acceleration.present == 0
 
 
 def test_pads_are_sampled_every_41_ms_whatever_the_tick():
@@ -104,7 +118,7 @@ def test_pads_are_sampled_every_41_ms_whatever_the_tick():
             signals = updated(filters(), signals, Reading(frame, NO_PADS))
             if signals.fresh:
                 times.append(k * dt_s)
-        assert all(abs(b - a - 0.041) <= dt_s for a, b in zip(times, times[1:]))
+        assert all(abs(b - a - 0.041) <= dt_s for a, b in pairwise(times))
 
 
 def test_events_are_told_once():

@@ -104,7 +104,9 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
         channels += [Channel(name, one.unit, rate) for name, one in gripper.channels.items()]
         if gripper.accelerometer is not None:
             steps = self._steps_of_a_tick()
-            channels.append(FastChannel("acceleration", "m/s2", steps * rate, samples=steps, axes=("x", "y", "z")))
+            channels.append(
+                FastChannel("acceleration", "m/s2", steps * rate, samples=steps, axes=("x", "y", "z"))
+            )
         return tuple(channels)
 
     def _steps_of_a_tick(self) -> int:
@@ -134,7 +136,13 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
         for name in dict.fromkeys(scenes):
             read_scene(name)
         gripper, _ = read_gripper(self.config.file)
-        return grasps(GraspingJob(self.config, controller, options, bool(gripper.channels) or gripper.accelerometer is not None), scenes, seeds)
+        return grasps(
+            GraspingJob(
+                self.config, controller, options, bool(gripper.channels) or gripper.accelerometer is not None
+            ),
+            scenes,
+            seeds,
+        )
 
     def see(self, viewer: Viewer) -> None:
         """Make pictures of the next grasp without a screen, or show it in MuJoCo's own viewer."""
@@ -216,7 +224,10 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
             self._rough = Roughness(model, data, self._gripper, thing, rms_m, generator)
         self._palm: Palm | None = None
         if self._gripper.accelerometer is not None:
-            self._palm, self._kept = Palm(model, data, self._gripper.accelerometer, generator), [1] * self._steps
+            self._palm, self._kept = (
+                Palm(model, data, self._gripper.accelerometer, generator),
+                [1] * self._steps,
+            )
         self._noises: Iterator[float] = iter(())
         self._tick_s, self._timestep_s = 1.0 / self.config.rate_hz, model.opt.timestep
         self._warnings, self._values = plain(data.warning.number), plain(data.sensordata)

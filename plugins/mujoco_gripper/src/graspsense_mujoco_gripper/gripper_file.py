@@ -178,7 +178,9 @@ class GripperFile:
         if bool(self.left.cells) != bool(self.right.cells):
             raise ValueError("both fingers have cells on springs, or neither")
         if self.accelerometer is not None and "acceleration" in self.channels:
-            raise ValueError("acceleration is the channel of the accelerometer: give another name in channels")
+            raise ValueError(
+                "acceleration is the channel of the accelerometer: give another name in channels"
+            )
 
 
 def read_gripper(name: str) -> tuple[GripperFile, Path]:

@@ -41,9 +41,14 @@ class Roughness:
         self._springs = model.jnt_qposadr[joints]
         self._bodies = model.jnt_bodyid[joints]
         sides = np.repeat([0, 1], [len(gripper.left.cells), len(gripper.right.cells)])
-        length_m = np.exp(generator.uniform(*np.log(WAVELENGTH_M), (2, WAVES)))
+        length_m = np.exp(generator.uniform(np.log(WAVELENGTH_M[0]), np.log(WAVELENGTH_M[1]), (2, WAVES)))
         direction, phase = generator.uniform(0.0, 2.0 * np.pi, (2, 2, WAVES))
-        wave = 2.0 * np.pi / length_m * np.stack([np.zeros_like(direction), np.cos(direction), np.sin(direction)])
+        wave = (
+            2.0
+            * np.pi
+            / length_m
+            * np.stack([np.zeros_like(direction), np.cos(direction), np.sin(direction)])
+        )
         self._waves: NDArray[np.float64] = wave.transpose(1, 0, 2)[sides]
         self._phases: NDArray[np.float64] = phase[sides]
         self._height_m = rms_m * np.sqrt(2.0 / WAVES)

@@ -40,7 +40,10 @@ class FindContactConfig:
         default=0.1, unit="N", above=0.0, meaning="High band of a pad above which it touches."
     )
     side_n: float = setting(
-        default=0.2, unit="N", above=0.0, meaning="High band of an edge cell above which it was hit from the side."
+        default=0.2,
+        unit="N",
+        above=0.0,
+        meaning="High band of an edge cell above which it was hit from the side.",
     )
     find_timeout_s: float = setting(
         default=10.0,
@@ -57,7 +60,10 @@ class FindContactConfig:
         meaning="Greatest force on a pad that is asked for. Published is no limit.",
     )
     closed_gap_m: float = setting(
-        default=0.003, unit="m", plausible=(-0.05, 0.1), meaning="Gap at which there is nothing between the fingers."
+        default=0.003,
+        unit="m",
+        plausible=(-0.05, 0.1),
+        meaning="Gap at which there is nothing between the fingers.",
     )
     stiffness_n_m: float = setting(
         default=20_000.0, unit="N/m", minimum=0.0, meaning="Position servo: effort per error of the gap."
@@ -66,7 +72,10 @@ class FindContactConfig:
         default=5_000.0, unit="N s/m", minimum=0.0, meaning="Position servo: effort per error of the speed."
     )
     friction_n: float = setting(
-        default=7.0, unit="N", minimum=0.0, meaning="Position servo: friction of the drive that is fed forward."
+        default=7.0,
+        unit="N",
+        minimum=0.0,
+        meaning="Position servo: friction of the drive that is fed forward.",
     )
 
 
@@ -87,13 +96,23 @@ class ForceServoConfig(FindContactConfig):
         default=0.3, unit="N", above=0.0, meaning="Largest error of a force that is reached."
     )
     speed_tolerance_m_s: float = setting(
-        default=0.001, unit="m/s", above=0.0, meaning="Largest speed of the fingers with a force that is reached."
+        default=0.001,
+        unit="m/s",
+        above=0.0,
+        meaning="Largest speed of the fingers with a force that is reached.",
     )
     settle_s: float = setting(
-        default=0.25, unit="s", minimum=0.0, meaning="Time for which force and speed are within their tolerances."
+        default=0.25,
+        unit="s",
+        minimum=0.0,
+        meaning="Time for which force and speed are within their tolerances.",
     )
     force_timeout_s: float = setting(
-        default=6.0, unit="s", above=0.0, plausible=(0.1, 600.0), meaning="Longest time from contact to the force."
+        default=6.0,
+        unit="s",
+        above=0.0,
+        plausible=(0.1, 600.0),
+        meaning="Longest time from contact to the force.",
     )
     deformation_limit_m: float = setting(
         default=0.03, unit="m", above=0.0, meaning="The fingers close no further than this after the contact."
@@ -108,7 +127,9 @@ class SlipServoConfig(ForceServoConfig):
         default=1.2, unit="N", above=0.0, plausible=(0.3, 200.0), meaning="Force at which it begins."
     )
     slip_share: float = setting(
-        default=0.007, above=0.0, meaning="Share of the force that its high band exceeds in a slip (at most 0.2 N)."
+        default=0.007,
+        above=0.0,
+        meaning="Share of the force that its high band exceeds in a slip (at most 0.2 N).",
     )
     slip_least_n: float = setting(
         default=0.048, unit="N", above=0.0, meaning="Least high band of the force in a slip."
@@ -152,7 +173,11 @@ class PlaceConfig(GrabConfig):
         meaning="Time after the grip was reached before which no shock counts as putting down: that of the lift.",
     )
     place_timeout_s: float = setting(
-        default=60.0, unit="s", above=0.0, plausible=(0.1, 3600.0), meaning="Longest time until it is put down."
+        default=60.0,
+        unit="s",
+        above=0.0,
+        plausible=(0.1, 3600.0),
+        meaning="Longest time until it is put down.",
     )
 
 
@@ -161,5 +186,9 @@ class ReleaseConfig(PlaceConfig):
     """Settings of release."""
 
     force_n: float = setting(
-        default=5.0, unit="N", above=0.0, plausible=(0.3, 200.0), meaning="Force that holds the thing until then."
+        default=5.0,
+        unit="N",
+        above=0.0,
+        plausible=(0.3, 200.0),
+        meaning="Force that holds the thing until then.",
     )

@@ -56,7 +56,9 @@ NOTHING: Final = Conditions(0, 0, 0, 0, 0, 0)
 
 def touches(params: Thresholds, pad: PadSignal) -> bool:
     """Return whether a pad touches: its force is large enough, or changes fast enough."""
-    return abs(pad.high_n) > params.contact_high_n or pad.force_n > params.lightest_n - CONTACT_BELOW_LIGHTEST_N
+    return (
+        abs(pad.high_n) > params.contact_high_n or pad.force_n > params.lightest_n - CONTACT_BELOW_LIGHTEST_N
+    )
 
 
 def slips(pad: PadSignal, share: float, least_n: float, low_n: float) -> bool:

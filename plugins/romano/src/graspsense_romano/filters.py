@@ -52,7 +52,9 @@ def band_pass(low_hz: float, high_hz: float, sample_s: float) -> BandPass:
     [0.6323, -0.6294, -0.2647]
     """
     if not 0.0 < low_hz < high_hz < 0.5 / sample_s:
-        raise ValueError(f"a band of {low_hz:g} to {high_hz:g} Hz needs more than {2.0 * high_hz:g} samples a second")
+        raise ValueError(
+            f"a band of {low_hz:g} to {high_hz:g} Hz needs more than {2.0 * high_hz:g} samples a second"
+        )
     low, high = tan(pi * low_hz * sample_s), tan(pi * high_hz * sample_s)
     width = (high - low) / sqrt(10.0 ** (RIPPLE_DB / 10.0) - 1.0)
     centre = low * high

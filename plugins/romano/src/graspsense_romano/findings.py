@@ -30,7 +30,11 @@ def findings(summary: Summary) -> Findings:
     slipped = [r.slip_high_n for r in rows if r.slip_high_n is not None and r.slip_m > SLIPPED_M]
     if still and slipped:
         note = f"{len(slipped)} grasps slipped by more than 1 mm, {len(still)} by less than 0.3 mm."
-        tables.append(_trade("slip", "Slip told by the high band of the pads, N", note, SLIP_THRESHOLDS_N, slipped, still))
+        tables.append(
+            _trade(
+                "slip", "Slip told by the high band of the pads, N", note, SLIP_THRESHOLDS_N, slipped, still
+            )
+        )
     before = [r.shock_before_m_s2 for r in rows if r.shock_before_m_s2 is not None]
     at = [r.shock_at_m_s2 for r in rows if r.shock_at_m_s2 is not None]
     if before and at:
@@ -58,7 +62,10 @@ def _cases(cases: dict[str, list[TouchRow]]) -> FoundTable:
     table = []
     for name, rows in cases.items():
         kept = sum(row.outcome in HELD for row in rows)
-        cells = [f"{kept} of {len(rows)} ({_interval(kept, len(rows))} %)", str(sum(row.broken for row in rows))]
+        cells = [
+            f"{kept} of {len(rows)} ({_interval(kept, len(rows))} %)",
+            str(sum(row.broken for row in rows)),
+        ]
         cells += [_spread([f(row) for row in rows], factor) for _, f, factor in columns]
         table.append((name, *cells))
     return FoundTable(

@@ -42,7 +42,9 @@ def raised_force(target_n: float, slips: int, dt_s: float, limit_n: float) -> fl
     return min(target_n * (1.0 + SLIP_GROWTH_1_S * dt_s), limit_n) if slips == 1 else target_n
 
 
-def grab_force(contact_n: float, speed_m_s: float, hardness: float, lightest_n: float, limit_n: float) -> float:
+def grab_force(
+    contact_n: float, speed_m_s: float, hardness: float, lightest_n: float, limit_n: float
+) -> float:
     """Return the force (N) that fits a thing which gave this force at contact, closed upon at this speed (grab).
 
     A hard thing gives more force at contact than a soft one of the same place and is gripped harder.
@@ -50,7 +52,9 @@ def grab_force(contact_n: float, speed_m_s: float, hardness: float, lightest_n: 
     return min(max(hardness * contact_n / speed_m_s, lightest_n), limit_n)
 
 
-def servo_effort(servo: PositionServo, gap_m: float, velocity_m_s: float, wanted_m: float, rate_m_s: float) -> float:
+def servo_effort(
+    servo: PositionServo, gap_m: float, velocity_m_s: float, wanted_m: float, rate_m_s: float
+) -> float:
     """Return the effort (N) that brings the gap to a position that moves at a rate."""
     friction = 0.0
     if rate_m_s < 0.0:

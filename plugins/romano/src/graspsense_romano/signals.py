@@ -6,8 +6,8 @@ filters are linear, so the sum of the cells is filtered instead of each cell.
 
 from __future__ import annotations
 
-from math import nan, sqrt
-from typing import NamedTuple
+from math import sqrt
+from typing import Any, NamedTuple
 
 from graspsense.plugin_api import Frame, Reading, Samples
 from graspsense_romano.filters import (
@@ -29,9 +29,6 @@ ACCELERATION_SAMPLE_S = 1.0 / 3000.0
 SPEED_HZ = 5.0
 LONGEST_S = 0.05
 """Ticks that are longer count as this long for the low pass of the speed: it needs two for each period."""
-
-NO_SAMPLES = Samples(0.0, 0, 0, ((nan, nan, nan),))
-"""The acceleration of a gripper that has no accelerometer."""
 
 
 class Filters(NamedTuple):
@@ -120,6 +117,15 @@ def felt(coefficients: Filters, before: Acceleration, samples: Samples) -> Accel
     return Acceleration(present, x, y, z, norm)
 
 
+def felt_if_measured(coefficients: Filters, before: Acceleration, signals: Any) -> Acceleration:
+    """Return the acceleration after a tick; of a gripper without an accelerometer, that of before: none."""
+    if len(signals) == 0:  # a compiler leaves the rest out
+        return before
+    if hasattr(signals, "acceleration"):
+        return felt(coefficients, before, signals.acceleration)
+    return before
+
+
 def updated(coefficients: Filters, before: Signals, reading: Reading) -> Signals:
     """Return the signals after this reading."""
     frame: Frame = reading.frame
@@ -141,7 +147,5 @@ def updated(coefficients: Filters, before: Signals, reading: Reading) -> Signals
         b, a = low_pass(coefficients.speed_hz, min(frame.dt_s, LONGEST_S))
         speed = b * (frame.velocity_m_s + rate) - a * speed
         rate = frame.velocity_m_s
-    acceleration = felt(
-        coefficients, before.acceleration, getattr(reading.signals, "acceleration", NO_SAMPLES)
-    )
+    acceleration = felt_if_measured(coefficients, before.acceleration, reading.signals)
     return Signals(fresh, sampled_s, left, right, edge_left, edge_right, acceleration, speed, rate)

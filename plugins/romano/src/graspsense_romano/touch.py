@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 from attrs import evolve, field, frozen
@@ -179,14 +179,15 @@ def followed(trace: Trace) -> list[Signals]:
     return found
 
 
-@frozen
-class _Fast:
+class _Fast(NamedTuple):
     acceleration: Samples
 
 
 def measured(trace: Trace, scene: TouchSettings) -> dict[str, Any]:
     """Return the quantities of a `TouchRow` that a trace has."""
-    told = [(event.t_s, event.what, int(event.phase)) for event in trace.events if event.source == "controller"]
+    told = [
+        (event.t_s, event.what, int(event.phase)) for event in trace.events if event.source == "controller"
+    ]
     contacts = [t_s for t_s, what, _ in told if what == "both in contact"]
     if not contacts:
         return {}
@@ -208,7 +209,10 @@ def measured(trace: Trace, scene: TouchSettings) -> dict[str, Any]:
     down_s = since_s + scene.down_s
     if down_s == down_s:
         shocks = np.array([one.acceleration.norm_m_s2 for one in signals])
-        begun, at = t_s > since_s + DISTURBED_S - 0.1, (t_s > down_s + AROUND_S[0]) & (t_s < down_s + AROUND_S[1])
+        begun, at = (
+            t_s > since_s + DISTURBED_S - 0.1,
+            (t_s > down_s + AROUND_S[0]) & (t_s < down_s + AROUND_S[1]),
+        )
         before = begun & (t_s <= down_s + AROUND_S[0]) & (trace.phase == HOLD)
         row["shock_before_m_s2"] = float(shocks[before].max()) if before.any() else None
         at &= trace.phase == HOLD
