@@ -42,7 +42,8 @@ def squeezed(backend, gap_m, ticks):
 def thing_file(folder, geom):
     path = folder / "thing.xml"
     path.write_text(
-        f'<mujoco><worldbody><body name="thing"><freejoint/><geom {geom} mass="0.05" {RIGID}/></body></worldbody></mujoco>'
+        f'<mujoco><worldbody><body name="thing"><freejoint/><geom {geom} mass="0.05" {RIGID}/></body></worldbody>'
+        "</mujoco>"
     )
     return path
 
