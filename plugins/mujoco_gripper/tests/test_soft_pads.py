@@ -8,7 +8,7 @@ import pytest
 
 from graspsense import ConfigError, load_pipeline
 from graspsense.plugin_api import POSITION, Command, create
-from graspsense_mujoco_gripper.gripper_file import Accelerometer, Finger
+from graspsense_mujoco_gripper.gripper_file import Finger, PalmSensor
 from graspsense_mujoco_gripper.scene import read_scene
 
 CELL_N_M = 1500.0
@@ -144,7 +144,7 @@ def test_a_scene_that_cannot_be_says_why(tmp_path, lines, said):
         (lambda: Finger(geoms=("a",), cells=("a", "b"), rows=1, columns=1), "cells"),
         (lambda: Finger(geoms=("a",), cells=("a",)), "rows"),
         (lambda: Finger(geoms=("a",), cells=("a",), sensor="s", rows=1, columns=1), "sensor"),
-        (lambda: Accelerometer(sensor="a", floor_m_s2=-1.0), "floor"),
+        (lambda: PalmSensor(sensor="a", floor_m_s2=-1.0), "floor"),
     ],
 )
 def test_a_gripper_file_that_cannot_be_says_why(wrong, said):

@@ -21,13 +21,13 @@ from graspsense.plugin_api import (
     Samples,
     create,
 )
-from graspsense_romano.events import EVENTS, NOTHING, Thresholds, begun, conditions, placed, slips
+from graspsense_romano.events import EVENTS, NOTHING, EventThresholds, begun, conditions, placed, slips
 from graspsense_romano.filters import NOT_BEGUN
 from graspsense_romano.laws import Servo, force_rate, grab_force, raised_force
 from graspsense_romano.signals import PadSignal, filters, no_signals, updated
 
 CONTROLLERS = ("find-contact", "force-servo", "slip-servo", "grab", "release", "pick-and-place")
-THRESHOLDS = Thresholds(1.2, 0.1, 0.007, 0.048, 0.18, 0.008, 0.2, 3.25, 1)
+THRESHOLDS = EventThresholds(1.2, 0.1, 0.007, 0.048, 0.18, 0.008, 0.2, 3.25, 1)
 
 
 class Palm(NamedTuple):

@@ -112,7 +112,7 @@ class ModelSensor:
 
 
 @frozen(kw_only=True)
-class Accelerometer:
+class PalmSensor:
     """The accelerometer of the palm, read in each step of MuJoCo, as the channel `acceleration`.
 
     Its noise on each axis is `floor_m_s2` at rest, and grows by `gear_1_s` times the rate of the gap (m/s).
@@ -152,7 +152,7 @@ class GripperFile:
     effort_limit_n: float = field(default=0.0)
     speed_limit_m_s: float = field(default=0.1)
     channels: Mapping[str, ModelSensor] = field(factory=dict)
-    accelerometer: Accelerometer | None = None
+    accelerometer: PalmSensor | None = None
 
     def __attrs_post_init__(self) -> None:
         if not self.actuators:

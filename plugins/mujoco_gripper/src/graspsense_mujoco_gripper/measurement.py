@@ -12,7 +12,7 @@ from attrs import frozen
 from numpy.typing import NDArray
 
 from graspsense.plugin_api import ConfigError, Samples
-from graspsense_mujoco_gripper.gripper_file import Accelerometer, Finger, Gap, GripperFile
+from graspsense_mujoco_gripper.gripper_file import Finger, Gap, GripperFile, PalmSensor
 from graspsense_mujoco_gripper.model import OBJ, POINT, identifier
 
 Floats = NDArray[np.float64]
@@ -184,7 +184,7 @@ class Palm:
         self,
         model: mujoco.MjModel,
         data: mujoco.MjData,
-        accelerometer: Accelerometer,
+        accelerometer: PalmSensor,
         generator: np.random.Generator,
     ) -> None:
         sensor = identifier(model, OBJ.mjOBJ_SENSOR, accelerometer.sensor, "sensor")

@@ -37,7 +37,15 @@ from graspsense_romano.config import (
     ReleaseConfig,
     SlipServoConfig,
 )
-from graspsense_romano.events import EVENTS, NOTHING, Conditions, Thresholds, begun, conditions, placed
+from graspsense_romano.events import (
+    EVENTS,
+    NOTHING,
+    EventThresholds,
+    TouchConditions,
+    begun,
+    conditions,
+    placed,
+)
 from graspsense_romano.laws import PositionServo, Servo, force_rate, grab_force, raised_force, servo_effort
 from graspsense_romano.signals import Filters, Signals, filters, no_signals, updated
 
@@ -58,7 +66,7 @@ CLOSE, TOUCH, LOAD, KEEP = range(4)
 SLIP_BIT, PLACE_BIT, UNFELT_BIT = 8, 16, 128
 
 
-class Plan(NamedTuple):
+class HoldingPlan(NamedTuple):
     """What a controller does after the contact (0 or 1 each), with which forces (N) and times (s)."""
 
     loads: int
@@ -85,9 +93,9 @@ class Params(NamedTuple):
     """Parameters of the step; `kind` is the command kind that it sends."""
 
     kind: int
-    plan: Plan
+    plan: HoldingPlan
     filters: Filters
-    thresholds: Thresholds
+    thresholds: EventThresholds
     servo: Servo
     position: PositionServo
 
@@ -115,7 +123,7 @@ class State(NamedTuple):
     progress: Progress
     wanted_m: float
     signals: Signals
-    conditions: Conditions
+    conditions: TouchConditions
 
 
 NOT_BEGUN: Final = -1
@@ -157,7 +165,7 @@ def ended(now: Progress, outcome: int) -> Progress:
     return Progress(phase, outcome, stage, since, settling, contact_m, contact_n, target)
 
 
-def closing(plan: Plan, now: Progress, seen: Conditions, frame: Frame) -> Progress:
+def closing(plan: HoldingPlan, now: Progress, seen: TouchConditions, frame: Frame) -> Progress:
     """Close until both pads touch, or it is clear that they will not."""
     elapsed = frame.t_s - now.since_s
     if elapsed >= IGNORED_S and seen.left == 1 and seen.right == 1:
@@ -170,7 +178,7 @@ def closing(plan: Plan, now: Progress, seen: Conditions, frame: Frame) -> Progre
     return now
 
 
-def touching(plan: Plan, now: Progress, frame: Frame) -> Progress:
+def touching(plan: HoldingPlan, now: Progress, frame: Frame) -> Progress:
     """Take the greatest force while the gap of the contact is kept, and choose the force of the grip from it."""
     phase, outcome, stage, since, settling, contact_m, contact_n, target_n = now
     contact_n = max(contact_n, 0.5 * (frame.force_left_n + frame.force_right_n))
@@ -187,7 +195,7 @@ def touching(plan: Plan, now: Progress, frame: Frame) -> Progress:
     return Progress(phase, outcome, stage, since, settling, contact_m, contact_n, target_n)
 
 
-def loading(plan: Plan, now: Progress, signals: Signals, frame: Frame) -> Progress:
+def loading(plan: HoldingPlan, now: Progress, signals: Signals, frame: Frame) -> Progress:
     """Wait until the weaker finger has its force and the fingers are at rest."""
     phase, outcome, stage, since, settling, contact_m, contact_n, target_n = now
     error_n = target_n - min(frame.force_left_n, frame.force_right_n)
@@ -204,7 +212,7 @@ def loading(plan: Plan, now: Progress, signals: Signals, frame: Frame) -> Progre
     return Progress(phase, outcome, stage, since, settling, contact_m, contact_n, target_n)
 
 
-def keeping(params: Params, now: Progress, signals: Signals, seen: Conditions, frame: Frame) -> Progress:
+def keeping(params: Params, now: Progress, signals: Signals, seen: TouchConditions, frame: Frame) -> Progress:
     """Hold, with more force where the thing slips, until it is lost or put down."""
     phase, outcome, stage, since, settling, contact_m, contact_n, target_n = now
     plan, held_s = params.plan, frame.t_s - since
@@ -285,7 +293,7 @@ class _Romano(Controller[ConfigT]):
         place = config if isinstance(config, PlaceConfig) else PlaceConfig()
         slip = config if isinstance(config, SlipServoConfig) else place
         loads, grabs, slips, places = self.does
-        plan = Plan(
+        plan = HoldingPlan(
             loads,
             grabs,
             slips,
@@ -305,7 +313,7 @@ class _Romano(Controller[ConfigT]):
             place_after_s=float(place.place_after_s),
             place_timeout_s=float(place.place_timeout_s),
         )
-        thresholds = Thresholds(
+        thresholds = EventThresholds(
             lightest_n=float(config.lightest_n),
             contact_high_n=float(config.contact_high_n),
             slip_share=float(slip.slip_share),

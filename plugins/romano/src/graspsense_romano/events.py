@@ -26,7 +26,7 @@ CONTACT_BELOW_LIGHTEST_N = 0.25
 PLACE_LOW_BAND_N = 0.2
 
 
-class Thresholds(NamedTuple):
+class EventThresholds(NamedTuple):
     """The thresholds of the events, in SI units."""
 
     lightest_n: float
@@ -40,7 +40,7 @@ class Thresholds(NamedTuple):
     place_by: int
 
 
-class Conditions(NamedTuple):
+class TouchConditions(NamedTuple):
     """Which conditions hold in this tick (0 or 1)."""
 
     left: int
@@ -51,10 +51,10 @@ class Conditions(NamedTuple):
     shock: int
 
 
-NOTHING: Final = Conditions(0, 0, 0, 0, 0, 0)
+NOTHING: Final = TouchConditions(0, 0, 0, 0, 0, 0)
 
 
-def touches(params: Thresholds, pad: PadSignal) -> bool:
+def touches(params: EventThresholds, pad: PadSignal) -> bool:
     """Return whether a pad touches: its force is large enough, or changes fast enough."""
     return (
         abs(pad.high_n) > params.contact_high_n or pad.force_n > params.lightest_n - CONTACT_BELOW_LIGHTEST_N
@@ -67,7 +67,7 @@ def slips(pad: PadSignal, share: float, least_n: float, low_n: float) -> bool:
     return abs(pad.high_n) > disturbance and abs(pad.low.y1) < low_n
 
 
-def conditions(params: Thresholds, signals: Signals) -> Conditions:
+def conditions(params: EventThresholds, signals: Signals) -> TouchConditions:
     """Return the conditions that these signals meet."""
     left, right = signals.left, signals.right
     share, least_n, low_n = params.slip_share, params.least_n, params.slip_low_n
@@ -75,7 +75,7 @@ def conditions(params: Thresholds, signals: Signals) -> Conditions:
     share = params.place_share
     place = slips(left, share, least_n, PLACE_LOW_BAND_N) or slips(right, share, least_n, PLACE_LOW_BAND_N)
     side = signals.edge_left.high_n > params.side_n or signals.edge_right.high_n > params.side_n
-    return Conditions(
+    return TouchConditions(
         int(touches(params, left)),
         int(touches(params, right)),
         int(slip),
@@ -85,7 +85,7 @@ def conditions(params: Thresholds, signals: Signals) -> Conditions:
     )
 
 
-def placed(params: Thresholds, now: Conditions, measured: int) -> bool:
+def placed(params: EventThresholds, now: TouchConditions, measured: int) -> bool:
     """Return whether the thing is put down. Without an acceleration (`measured` is 0) a slip stands for it."""
     shock = now.shock if measured == 1 else now.place_slip
     if params.place_by == SLIP_AND_SHOCK:
@@ -97,7 +97,7 @@ def placed(params: Thresholds, now: Conditions, measured: int) -> bool:
     return now.side == 1 or shock == 1 or (params.place_by == ANY and now.place_slip == 1)
 
 
-def begun(before: Conditions, now: Conditions) -> int:
+def begun(before: TouchConditions, now: TouchConditions) -> int:
     """Return the bits of the events that begin in this tick."""
     bits = 0
     if now.left > before.left:
