@@ -36,7 +36,7 @@ POINTS: Final = 20
 def _moved(start_s: float, begin_m: float, end_m: float, speed_m_s: float) -> list[list[float]]:
     """Return times and heights of the arm from one height to another, with a constant acceleration at both ends."""
     sign, share = (1.0 if end_m > begin_m else -1.0), np.arange(POINTS + 1) / POINTS
-    travel_s = max(abs(end_m - begin_m) / speed_m_s, STARTING_S)
+    travel_s = max(abs(end_m - begin_m) / speed_m_s, STARTING_S + 1e-3)
     speed_m_s = abs(end_m - begin_m) / travel_s
     starting = 0.5 * share**2 * STARTING_S * speed_m_s
     first = zip(start_s + share * STARTING_S, begin_m + sign * starting, strict=True)
