@@ -40,7 +40,7 @@ def hold(
 ) -> None:
     """Close, hold with little force, add force whenever the thing slips, and open at the end.
 
-    Without --pipeline it is the pipeline hold, with a simulated gripper. The fingers open at the end, on Ctrl-C, and
+    Without --pipeline it is the pipeline hold of graspsense-romano, with a simulated gripper. The fingers open at the end, on Ctrl-C, and
     when the gripper is lost or the thing is. Exit codes are those of run.
     """
     from graspsense.cli.run import finish, grasped, print_trial

@@ -89,10 +89,12 @@ EXPERIMENTS: Final[dict[str, Shipped]] = dict.fromkeys(
         *("why_force", "worn_bottles"),
     ),
     _PAPER,
-)
+) | dict.fromkeys(("romano_grab", "romano_place", "romano_slip"), _ROMANO)
 """Experiments in other distributions of this project."""
 
-EXPERIMENT_KINDS: Final[dict[str, Shipped]] = dict.fromkeys(("grasp", "paper", "table"), _PAPER)
+EXPERIMENT_KINDS: Final[dict[str, Shipped]] = dict.fromkeys(("grasp", "paper", "table"), _PAPER) | {
+    "touch": _ROMANO
+}
 """Kinds of experiments in other distributions of this project."""
 
 IDENTIFIERS: Final[dict[str, Shipped]] = {"sim": _IDENTIFY}
