@@ -40,8 +40,8 @@ def hold(
 ) -> None:
     """Close, hold with little force, add force whenever the thing slips, and open at the end.
 
-    Without --pipeline it is the pipeline hold of graspsense-romano, with a simulated gripper. The fingers open at the end, on Ctrl-C, and
-    when the gripper is lost or the thing is. Exit codes are those of run.
+    Without --pipeline it is the pipeline hold of graspsense-romano, with a simulated gripper. The fingers open at the
+    end, on Ctrl-C, and when the gripper is lost or the thing is. Exit codes are those of run.
     """
     from graspsense.cli.run import finish, grasped, print_trial
     from graspsense.core.pipeline.wiring import check
@@ -56,6 +56,11 @@ def hold(
     print_trial(trial, events=False)
     talk(rows.summary())
     finish(trial, interrupted)
+
+
+for _option in hold.params:
+    if isinstance(_option, click.Option) and _option.name == "pipeline":
+        _option.help = f"Name of a pipeline, or a .toml file.  [default: {PIPELINE}]"
 
 
 class HoldRows:
