@@ -120,7 +120,7 @@ class TouchRow:
     shock_before_m_s2: float | None = None
     """The greatest acceleration band on the way down, before the table."""
     shock_at_m_s2: float | None = None
-    """The greatest acceleration band when the thing meets the table."""
+    """The greatest acceleration band when the thing meets the table, if it is not let go by then."""
     placed_s: float | None = None
     """When the law let go, from the time at which the thing is as high as the table."""
     source: str = "grasps simulated by MuJoCo"
@@ -215,7 +215,7 @@ def measured(trace: Trace, scene: TouchSettings) -> dict[str, Any]:
         )
         before = begun & (t_s <= down_s + AROUND_S[0]) & (trace.phase == HOLD)
         row["shock_before_m_s2"] = float(shocks[before].max()) if before.any() else None
-        at &= trace.phase == HOLD
-        row["shock_at_m_s2"] = float(shocks[at].max()) if at.any() else None
+        kept = at.any() and bool((trace.phase[at] == HOLD).all())
+        row["shock_at_m_s2"] = float(shocks[at].max()) if kept else None
         row["placed_s"] = next((t - down_s for t, what, _ in told if what == "place"), None)
     return row
