@@ -137,7 +137,7 @@ def run(
         if plot is not None:
             draw_grasp(trial, Path(plot))
         _write_film(film, save, kept)
-    _exit(trial, interrupted, "" if kept is None else kept["problem"])
+    finish(trial, interrupted, "" if kept is None else kept["problem"])
 
 
 def _performed(
@@ -145,7 +145,7 @@ def _performed(
 ) -> tuple[Trial, bool, dict[str, Any] | None]:
     """Grasp, and return the trial, whether it was interrupted, and its place in a store if it is saved."""
     if save is None:
-        return (*_grasped(settings, sinks), None)
+        return (*grasped(settings, sinks), None)
     return _kept(save, label, settings, sinks, changed)
 
 
@@ -193,7 +193,7 @@ def _run_beside(
         if kept is not None and kept["trial"] is not None:
             talk(f"kept as trial {kept['trial']} in {save}")
     for trial, interrupted, kept in both:
-        _exit(trial, interrupted, "" if kept is None else kept["problem"])
+        finish(trial, interrupted, "" if kept is None else kept["problem"])
 
 
 def _as_json(trial: Trial, kept: Mapping[str, Any] | None) -> dict[str, Any]:
@@ -209,7 +209,7 @@ def _print_further(settings: Settings, trial: Trial, condition: Conditions | Non
     _print_model(trial, condition)
 
 
-def _grasped(settings: Settings, sinks: Sequence[Sink]) -> tuple[Trial, bool]:
+def grasped(settings: Settings, sinks: Sequence[Sink]) -> tuple[Trial, bool]:
     """Grasp, and return the trial and whether it was interrupted."""
     from graspsense.core.components.registry import installed
     from graspsense.core.pipeline.pipeline import GraspInterrupted, grasp_with
@@ -220,7 +220,7 @@ def _grasped(settings: Settings, sinks: Sequence[Sink]) -> tuple[Trial, bool]:
         return error.trial, True
 
 
-def _exit(trial: Trial, interrupted: bool, problem: str) -> None:
+def finish(trial: Trial, interrupted: bool, problem: str = "") -> None:
     """End the command with an exit code if the trial was not stored, did not end by itself, or was interrupted."""
     from graspsense.core.values.signals import Outcome
 
@@ -374,8 +374,8 @@ def _kept(
     return grasp.trial, grasp.interrupted, kept
 
 
-def print_trial(trial: Trial) -> None:
-    """Print outcome, features, prediction, and what qualifies them."""
+def print_trial(trial: Trial, *, events: bool = True) -> None:
+    """Print outcome, features, events, prediction, and what qualifies them."""
     echo()
     reason = f": {trial.reason}" if trial.reason else ""
     echo_entry("outcome", f"{trial.outcome.words}{reason}", outcome_style(trial.outcome.words))
@@ -388,7 +388,7 @@ def print_trial(trial: Trial) -> None:
         echo_entry(name, _shown(value, unit, features.reasons.get(name, "")), width=wide)
     if more:
         echo_entry("features", more, width=wide)
-    for event in trial.trace.events:
+    for event in trial.trace.events if events else ():
         unit = trial.trace.units["t"]
         echo_entry("event", f"{event.what} at {event.t_s:.3f} {unit} ({event.phase.name.lower()})")
     if trial.prediction is not None:

@@ -21,6 +21,7 @@ from graspsense.plugin_api import (
     Controller,
     DeviceInfo,
     DeviceLost,
+    FastChannel,
     Frame,
     ObjectKind,
     Pads,
@@ -36,8 +37,18 @@ from graspsense_mujoco_gripper.config import MujocoConfig
 from graspsense_mujoco_gripper.draft import Draft, drafted
 from graspsense_mujoco_gripper.drive import ActuatorDrive, Travel, instability, test_move
 from graspsense_mujoco_gripper.gripper_file import read_gripper
-from graspsense_mujoco_gripper.measurement import ForceGauge, GapGauge, cells_of, plain, width_m
+from graspsense_mujoco_gripper.measurement import (
+    ForceGauge,
+    GapGauge,
+    Palm,
+    SpringCells,
+    cells_of,
+    geoms_of,
+    plain,
+    width_m,
+)
 from graspsense_mujoco_gripper.model import OBJ, compiled, gripper_spec, identifier
+from graspsense_mujoco_gripper.roughness import Roughness
 from graspsense_mujoco_gripper.scene import (
     PREFIX,
     ArmMotion,
@@ -56,6 +67,8 @@ SOFT: Final = -1
 """The number of the geom of a contact with a soft body."""
 DEEPEST_M: Final = 1e-3
 """A thing that begins deeper in a finger is refused."""
+TOUCH_N: Final = 0.1
+"""Force on both fingers from which on the motion of the scene begins: less may be the palm that swings."""
 MANY: Final = 256
 """Errors of the forces that are drawn at once."""
 SWING, MOST_SWINGS = 0.1, 20
@@ -85,11 +98,19 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
             ("force_right", "N"),
         ]
         channels = [Channel(name, unit, rate) for name, unit in frame]
-        if gripper.left.array:
+        if gripper.left.rows:
             left = gripper.left
             channels.append(TactileArray("pads", "N", rate, rows=left.rows, columns=left.columns))
         channels += [Channel(name, one.unit, rate) for name, one in gripper.channels.items()]
+        if gripper.accelerometer is not None:
+            steps = self._steps_of_a_tick()
+            channels.append(
+                FastChannel("acceleration", "m/s2", steps * rate, samples=steps, axes=("x", "y", "z"))
+            )
         return tuple(channels)
+
+    def _steps_of_a_tick(self) -> int:
+        return ceil(1.0 / (self.config.rate_hz * self.config.timestep_s) - 1e-9)
 
     def objects(self) -> Sequence[ObjectKind]:
         """Return the things of the catalogue."""
@@ -115,7 +136,13 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
         for name in dict.fromkeys(scenes):
             read_scene(name)
         gripper, _ = read_gripper(self.config.file)
-        return grasps(GraspingJob(self.config, controller, options, bool(gripper.channels)), scenes, seeds)
+        return grasps(
+            GraspingJob(
+                self.config, controller, options, bool(gripper.channels) or gripper.accelerometer is not None
+            ),
+            scenes,
+            seeds,
+        )
 
     def see(self, viewer: Viewer) -> None:
         """Make pictures of the next grasp without a screen, or show it in MuJoCo's own viewer."""
@@ -137,7 +164,7 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
         self._gripper, path = read_gripper(config.file)
         scene = read_scene(config.object)
         self._thing, self._scene = scene.thing, scene.scene
-        self._steps = ceil(1.0 / (config.rate_hz * config.timestep_s) - 1e-9)
+        self._steps = self._steps_of_a_tick()
         timestep_s = 1.0 / (config.rate_hz * self._steps)
         spec = gripper_spec(path, self._gripper, timestep_s)
         if scene.scene.arm:
@@ -173,8 +200,12 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
         if model.nflex:
             things.add(SOFT)
         fingers = self._gripper.left, self._gripper.right
-        self._forces = ForceGauge(model, data, fingers, things, travel.axis)
-        self._cells = cells_of(model, self._gripper)
+        self._cells = cells_of(model, data, self._gripper)
+        self._forces: ForceGauge | SpringCells = (
+            self._cells
+            if isinstance(self._cells, SpringCells)
+            else ForceGauge(model, data, fingers, things, travel.axis)
+        )
         self._sensors = [
             int(model.sensor_adr[identifier(model, OBJ.mjOBJ_SENSOR, one.sensor, "sensor")])
             for one in self._gripper.channels.values()
@@ -184,10 +215,21 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
             identifier(model, OBJ.mjOBJ_EQUALITY, PREFIX + name, "equality") for name in self._thing.shell
         ]
         self._drive = ActuatorDrive(model, data, self._gripper, travel)
-        self._motion = ArmMotion(model, self._scene)
+        self._motion = ArmMotion(model, self._scene, min(geoms_of(model, self._gripper.left)))
         self._data = data
         self._check_start(data)
         self._kept = kept_steps(self._steps, self._drive.longest_s / model.opt.timestep)
+        self._rough: Roughness | None = None
+        if self._scene.roughness_m and isinstance(self._cells, SpringCells):
+            thing = next(k for k in range(model.nbody) if is_thing(model, k))
+            rms_m = self._scene.roughness_m
+            self._rough = Roughness(model, data, self._gripper, thing, rms_m, generator)
+        self._palm: Palm | None = None
+        if self._gripper.accelerometer is not None:
+            self._palm, self._kept = (
+                Palm(model, data, self._gripper.accelerometer, generator),
+                [1] * self._steps,
+            )
         self._noises: Iterator[float] = iter(())
         self._tick_s, self._timestep_s = 1.0 / self.config.rate_hz, model.opt.timestep
         self._warnings, self._values = plain(data.warning.number), plain(data.sensordata)
@@ -238,11 +280,15 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
             mujoco.mj_step(model, data, nstep=steps)
             before_m, self._gap_m = self._gap_m, self._measured_gap_m()
             self._rate_m_s = (self._gap_m - before_m) / kept_s
+            if self._palm is not None:
+                self._palm.measure(self._rate_m_s)
             if self._shell and not self._broken:
                 self._break_shell(data)
         if any(self._warnings) and (problem := instability(data)):
             raise DeviceLost(f"the simulation became unstable: {problem}. Use a smaller gripper.timestep_s")
         self._ticks += 1
+        if self._rough is not None:
+            self._rough.set()
         if self._viewer is not None:
             self._show(self._viewer, data, self._ticks / self.config.rate_hz)
         return self._reading(data)
@@ -263,14 +309,17 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
         self._greatest_n = max(self._greatest_n, left, right)
         t_s = self._ticks * tick_s
         if self._motion.moves:
-            self._motion.set(data, t_s, touched=min(left, right) > 0.0)
+            self._motion.set(data, t_s, touched=min(left, right) > TOUCH_N)
         if self.config.force_noise_n:
             left, right = left + self._noise(), right + self._noise()
         frame = Frame(t_s, tick_s, measured_m, velocity, self._drive.effort_n, left, right, nan, nan, 0)
         pads = NO_PADS
         if self._cells is not None:
             pads = Pads(t_s, self._ticks, *self._cells.images(data))
-        signals = self._signals(*(self._values[k] for k in self._sensors)) if self._sensors else ()
+        signals: Any = ()
+        if self._sensors or self._palm is not None:
+            palm = () if self._palm is None else (self._palm.samples(t_s),)
+            signals = self._signals(*(self._values[k] for k in self._sensors), *palm)
         return Reading(frame, pads, signals)
 
     def _break_shell(self, data: mujoco.MjData) -> None:

@@ -117,7 +117,8 @@ def thing_named(name: str, beside: Path = Path()) -> tuple[Thing, mujoco.MjSpec 
         return Thing(summary=path.stem), read_spec(path)
     if name not in catalogue():
         raise UnknownName(
-            f"gripper.object: there is no thing {name!r}. Known: {', '.join(catalogue())}, none, an MJCF file (.xml), "
+            f"gripper.object: there is no thing {name!r}. Known: {', '.join(catalogue())}, none, the scenes tugged, "
+            "filled and placed, an MJCF file (.xml), "
             f"or a scene file (.toml).{suggestion(name, catalogue())}"
         )
     thing = catalogue()[name]

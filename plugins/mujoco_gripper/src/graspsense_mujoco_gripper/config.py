@@ -15,8 +15,8 @@ class MujocoConfig:
 
     file: str = setting(
         default="",
-        meaning="The gripper file (TOML), which names the MuJoCo model, its actuators and its sensors. Empty: the "
-        "parallel gripper that comes with graspsense-mujoco-gripper.",
+        meaning="The gripper file (TOML), which names the MuJoCo model, its actuators and its sensors. "
+        "parallel (or empty) and soft_pads come with graspsense-mujoco-gripper.",
     )
     object: str = setting(
         default="block",

@@ -29,6 +29,8 @@ from attrs import field, frozen
 from graspsense.plugin_api import ConfigError
 from graspsense.simulator_api import TomlError, ValidationFailed, first_bytes, structured, toml_values
 
+SHIPPED: Final = ("parallel", "soft_pads")
+"""The gripper files of this package."""
 LARGEST_BYTES: Final = 512 * 1024
 """Limit on the size of a gripper file."""
 
@@ -85,21 +87,28 @@ class Finger:
 
     Without `sensor` the force is the sum of the contact forces on these geoms along the closing direction; with it, the
     value of a touch sensor, or of a force sensor along that direction. `array` names a tactile sensor with `rows` times
-    `columns` cells (the plugin `mujoco.sensor.touch_grid`).
+    `columns` cells (the plugin `mujoco.sensor.touch_grid`). `cells` names instead the joints of as many cells, row by
+    row, each a slide on a spring: the force of a cell is that of its spring, the force on the finger their sum.
     """
 
     geoms: tuple[str, ...] = ()
     bodies: tuple[str, ...] = ()
     sensor: str = ""
     array: str = ""
+    cells: tuple[str, ...] = ()
     rows: int = 0
     columns: int = 0
 
     def __attrs_post_init__(self) -> None:
         if not self.geoms and not self.bodies:
             raise ValueError("name the geoms of the finger that touch things, or the bodies that have them")
-        if bool(self.array) != (self.rows > 0 and self.columns > 0):
-            raise ValueError("an array has rows and columns: give array, rows and columns together")
+        if bool(self.array or self.cells) != (self.rows > 0 and self.columns > 0):
+            raise ValueError("an array has rows and columns: give array or cells, rows and columns together")
+        if self.cells and (self.array or self.sensor or len(self.cells) != self.rows * self.columns):
+            raise ValueError(
+                f"cells has {len(self.cells)} names for {self.rows} rows and {self.columns} columns: give a joint for "
+                "each cell, and neither array nor sensor"
+            )
 
 
 @frozen(kw_only=True)
@@ -108,6 +117,22 @@ class ModelSensor:
 
     sensor: str
     unit: str
+
+
+@frozen(kw_only=True)
+class PalmSensor:
+    """The accelerometer of the palm, read in each step of MuJoCo, as the channel `acceleration`.
+
+    Its noise on each axis is `floor_m_s2` at rest, and grows by `gear_1_s` times the rate of the gap (m/s).
+    """
+
+    sensor: str
+    floor_m_s2: float = 0.0
+    gear_1_s: float = 0.0
+
+    def __attrs_post_init__(self) -> None:
+        if not (0.0 <= self.floor_m_s2 < inf and 0.0 <= self.gear_1_s < inf):
+            raise ValueError("floor_m_s2 and gear_1_s are at least 0")
 
 
 @frozen(kw_only=True)
@@ -135,6 +160,7 @@ class GripperFile:
     effort_limit_n: float = field(default=0.0)
     speed_limit_m_s: float = field(default=0.1)
     channels: Mapping[str, ModelSensor] = field(factory=dict)
+    accelerometer: PalmSensor | None = None
 
     def __attrs_post_init__(self) -> None:
         if not self.actuators:
@@ -157,18 +183,22 @@ class GripperFile:
             )
         if self.left.rows * self.left.columns != self.right.rows * self.right.columns:
             raise ValueError("the arrays of both fingers have the same number of cells")
+        if bool(self.left.cells) != bool(self.right.cells):
+            raise ValueError("both fingers have cells on springs, or neither")
+        if self.accelerometer is not None and "acceleration" in self.channels:
+            raise ValueError(
+                "acceleration is the channel of the accelerometer: give another name in channels"
+            )
 
 
 def read_gripper(name: str) -> tuple[GripperFile, Path]:
     """Return a gripper file and the path of its model. Raises ConfigError with what was found and what to do.
 
-    An empty name is the parallel gripper of this package.
+    A name of `SHIPPED` is a gripper of this package, and an empty name its parallel gripper.
     """
-    path = (
-        Path(str(files("graspsense_mujoco_gripper") / "parallel.toml"))
-        if not name
-        else Path(name).expanduser()
-    )
+    path = Path(name).expanduser()
+    if not name or name in SHIPPED:
+        path = Path(str(files("graspsense_mujoco_gripper") / f"{name or 'parallel'}.toml"))
     try:
         values = toml_values(text_of(path, LARGEST_BYTES, "gripper file"))
     except (OSError, UnicodeDecodeError) as error:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Set
+from math import hypot
 from typing import Any
 
 import mujoco
@@ -10,8 +11,8 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from graspsense.plugin_api import ConfigError
-from graspsense_mujoco_gripper.gripper_file import Finger, Gap, GripperFile
+from graspsense.plugin_api import ConfigError, Samples
+from graspsense_mujoco_gripper.gripper_file import Finger, Gap, GripperFile, PalmSensor
 from graspsense_mujoco_gripper.model import OBJ, POINT, identifier
 
 Floats = NDArray[np.float64]
@@ -151,6 +152,63 @@ class ForceGauge:
         return factors[0], factors[1]
 
 
+class SpringCells:
+    """The cells of both fingers that are slides on springs: their forces (N), and the sums of them."""
+
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, gripper: GripperFile) -> None:
+        self._positions, self._rests, self._springs = plain(data.qpos), plain(model.qpos_spring), []
+        for finger in (gripper.left, gripper.right):
+            joints = [identifier(model, OBJ.mjOBJ_JOINT, name, "joint") for name in finger.cells]
+            springs = [(int(model.jnt_qposadr[k]), float(model.jnt_stiffness[k].flat[0])) for k in joints]
+            for name, (_, stiffness) in zip(finger.cells, springs, strict=True):
+                if stiffness <= 0.0:
+                    raise ConfigError(f"gripper.file: the joint {name!r} of a cell has no stiffness")
+            self._springs.append(springs)
+
+    def images(self, _data: mujoco.MjData | None) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Return the cells of the left and the right finger, row by row."""
+        values, rests = self._positions, self._rests
+        left, right = (tuple((values[k] - rests[k]) * n_m for k, n_m in side) for side in self._springs)
+        return left, right
+
+    def forces_n(self) -> tuple[float, float]:
+        """Return the force on the left and on the right finger."""
+        left, right = self.images(None)
+        return sum(left), sum(right)
+
+
+class Palm:
+    """The accelerometer of the palm: a sample of each step of MuJoCo, with noise."""
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        accelerometer: PalmSensor,
+        generator: np.random.Generator,
+    ) -> None:
+        sensor = identifier(model, OBJ.mjOBJ_SENSOR, accelerometer.sensor, "sensor")
+        if model.sensor_type[sensor] != mujoco.mjtSensor.mjSENS_ACCELEROMETER:
+            raise ConfigError(f"gripper.file: the sensor {accelerometer.sensor!r} is not an accelerometer")
+        address = int(model.sensor_adr[sensor])
+        self._values: Floats = data.sensordata[address : address + 3]
+        self._floor_m_s2, self._gear_1_s = accelerometer.floor_m_s2, accelerometer.gear_1_s
+        self._generator, self._count = generator, 0
+        self._rows: list[tuple[float, ...]] = []
+
+    def measure(self, rate_m_s: float) -> None:
+        """Take a sample, at this rate of the gap."""
+        spread = hypot(self._floor_m_s2, self._gear_1_s * rate_m_s)
+        row: Floats = self._values + spread * self._generator.standard_normal(3)
+        self._rows.append(tuple(row.tolist()))
+
+    def samples(self, t_s: float) -> Samples:
+        """Return the samples since the last tick, the last of them at this time (s)."""
+        rows, self._rows = tuple(self._rows), []
+        self._count += len(rows)
+        return Samples(t_s, self._count, len(rows), rows)
+
+
 @frozen
 class Cells:
     """The sensors of the cells of both fingers: where their values are, and how many."""
@@ -164,8 +222,10 @@ class Cells:
         return left, right
 
 
-def cells_of(model: mujoco.MjModel, gripper: GripperFile) -> Cells | None:
+def cells_of(model: mujoco.MjModel, data: mujoco.MjData, gripper: GripperFile) -> Cells | SpringCells | None:
     """Return the cells of the fingers; None without arrays. Raises ConfigError for another number of values."""
+    if gripper.left.cells:
+        return SpringCells(model, data, gripper)
     if not gripper.left.array:
         return None
     addresses = []

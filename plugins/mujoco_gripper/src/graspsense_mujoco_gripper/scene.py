@@ -11,6 +11,7 @@ force = [[0.8, 0.0], [1.8, 5.0]]             # seconds after both fingers touch,
 
 from __future__ import annotations
 
+from importlib.resources import files
 from itertools import pairwise
 from math import isfinite
 from pathlib import Path
@@ -33,6 +34,8 @@ PREFIX: Final = "thing/"
 """Before each name of the thing in the combined model."""
 ARM: Final = "arm"
 """Before each name of a slide of the arm."""
+TABLE: Final = "table"
+"""The name of the body of the table, which has no joint: it is where it is put."""
 TABLE_BIT: Final = 8
 """Of `contype` and `conaffinity`: the table touches things, and not the gripper."""
 TABLE_HALF_M: Final = (0.3, 0.3, 0.02)
@@ -40,6 +43,9 @@ ARM_KG: Final = 1000.0
 """Inertia of the arm: so heavy that the gripper does not move it."""
 ARM_RAD_S: Final = 200.0
 """Natural frequency of the servo of the arm, critically damped."""
+SCENES: Final = Path(str(files("graspsense_mujoco_gripper") / "scenes"))
+SHIPPED_SCENES: Final = ("tugged", "filled", "placed")
+"""The scene files of this package."""
 LARGEST_BYTES: Final = 64 * 1024
 MASS_SPREAD, FRICTION_SPREAD, STIFFNESS_SPREAD, SIZE_SPREAD = 0.1, 0.15, 0.1, 0.01
 """Standard deviations of the logarithms of what instances and seeds draw."""
@@ -70,21 +76,33 @@ class Cord:
 class Scene:
     """What the gripper grasps, and what happens to it. Without a table the thing has no weight.
 
-    `arm` is the height (m) of the gripper over the time (s) since both fingers touched. `mass_kg` and `friction`
-    replace those of the thing.
+    `arm` is the height (m) of the gripper over the time (s) since both fingers touched, `table_height` that of the
+    table, which may rise while the thing is in the air, and `fill` the mass (kg) that was filled in by then. `mass_kg`
+    and `friction` replace those of the thing. `roughness_m` is the rms height of its surface, which cells on springs
+    feel.
     """
 
     thing: str
     walls: Walls | None = None
     table: bool = False
+    table_height: Schedule = ()
     arm: Schedule = ()
+    fill: Schedule = ()
     cord: Cord | None = None
     mass_kg: float | None = field(default=None)
     friction: float | None = field(default=None)
+    roughness_m: float = field(default=0.0)
 
     def __attrs_post_init__(self) -> None:
-        if self.arm:
-            _check_schedule("arm", self.arm)
+        for name in ("arm", "table_height", "fill"):
+            if getattr(self, name):
+                _check_schedule(name, getattr(self, name))
+        if self.table_height and not self.table:
+            raise ValueError("table_height moves a table: add table = true")
+        if any(mass_kg < 0.0 for _, mass_kg in self.fill):
+            raise ValueError("fill is a mass (kg), at least 0")
+        if not 0.0 <= self.roughness_m <= 1e-3:
+            raise ValueError(f"roughness_m is {self.roughness_m}: it is from 0 to 0.001")
         if self.mass_kg is not None and not 0.0 < self.mass_kg < float("inf"):
             raise ValueError(f"mass_kg is {self.mass_kg}: it is above 0")
         if self.friction is not None and not 0.0 <= self.friction < float("inf"):
@@ -93,7 +111,7 @@ class Scene:
     @property
     def needs_friction(self) -> bool:
         """Whether the friction of the thing decides what happens."""
-        return self.table or bool(self.arm) or self.cord is not None or self.friction is not None
+        return self.table or bool(self.arm or self.fill) or self.cord is not None or self.friction is not None
 
 
 @frozen(eq=False)
@@ -113,7 +131,9 @@ def read_scene(name: str) -> SceneModel:
     """
     name, number, instance = name.partition("#")
     scene, beside = Scene(thing=name), Path()
-    if name.endswith(".toml"):
+    if name in SHIPPED_SCENES:
+        scene = _scene_of(SCENES / f"{name}.toml")
+    elif name.endswith(".toml"):
         beside = Path(name).expanduser().parent
         scene = _scene_of(Path(name).expanduser())
     if scene.walls is not None:
@@ -219,11 +239,12 @@ def add_thing(spec: mujoco.MjSpec, model: SceneModel, place: Floats, axis: Float
         if scene.table:
             _set_bits(child)
             half = TABLE_HALF_M[2]
-            spec.worldbody.add_geom(
+            position = [float(place[0]), float(place[1]), float(place[2]) + lowest_m - half]
+            table = spec.worldbody.add_body(name=TABLE, mocap=True, pos=position)
+            table.add_geom(
                 name=PREFIX + "table",
                 type=mujoco.mjtGeom.mjGEOM_BOX,
                 size=list(TABLE_HALF_M),
-                pos=[float(place[0]), float(place[1]), float(place[2]) + lowest_m - half],
                 contype=TABLE_BIT,
                 conaffinity=TABLE_BIT,
                 friction=[0.5, 0.005, 0.0001],
@@ -314,18 +335,27 @@ def _scale_size(child: mujoco.MjSpec, factor: float) -> None:
 class ArmMotion:
     """Moves the arm and pulls the cord, by the time since both fingers touched."""
 
-    def __init__(self, model: mujoco.MjModel, scene: Scene) -> None:
+    def __init__(self, model: mujoco.MjModel, scene: Scene, finger: int) -> None:
+        """`finger` is a geom of a finger, with which the height of the thing is compared."""
+        self._finger = finger
         self._scene, self._contact_s = scene, float("inf")
         self._servos = [k for k in range(model.nu) if _actuator(model, k).startswith(f"{ARM}/")]
         things = [k for k in range(model.nbody) if is_thing(model, k)]
         heaviest = model.body_mass[things] if things else np.zeros(0)
         self._body = things[0] if things else -1
         self._bodies, self._masses = things, heaviest
-        self.moves = bool(things) and (scene.cord is not None or bool(scene.arm))
-        schedules = (scene.arm, () if scene.cord is None else scene.cord.force)
+        self.moves = bool(things) and (
+            scene.cord is not None or bool(scene.arm or scene.table_height or scene.fill)
+        )
+        cord = () if scene.cord is None else scene.cord.force
+        schedules = (scene.arm, scene.table_height, scene.fill, cord)
+        self._model = model
+        self._empty_kg = float(model.body_mass[self._body]) if things else 0.0
+        self._table_m = _table_height(model)
         self._end_s = max((rows[-1][0] for rows in schedules if rows), default=0.0)
         self._start_m: Floats = np.zeros(3)
-        self._highest_m, self._height_m = 0.0, 0.0
+        self._above_finger_m = 0.0
+        self._highest_m, self._height_m, self._slip_m = 0.0, 0.0, 0.0
 
     def set(self, data: mujoco.MjData, t_s: float, *, touched: bool) -> None:
         """Set the servo of the arm and the force of the cord for the time after this tick."""
@@ -334,6 +364,7 @@ class ArmMotion:
         if touched and not isfinite(self._contact_s):
             self._contact_s = t_s
             self._start_m = self._centre(data)
+            self._above_finger_m = self._start_m[2] - data.geom_xpos[self._finger, 2]
         if not isfinite(self._contact_s):
             return
         since_s = t_s - self._contact_s
@@ -341,10 +372,23 @@ class ArmMotion:
             return
         self._height_m = float((self._centre(data) - self._start_m)[2])
         self._highest_m = max(self._highest_m, self._height_m)
+        above_m = float(self._centre(data)[2] - data.geom_xpos[self._finger, 2])
+        self._slip_m = max(self._slip_m, self._above_finger_m - above_m)
         if self._servos:
             data.ctrl[self._servos] = _value(self._scene.arm, since_s)
         if self._scene.cord is not None:
             data.xfrc_applied[self._body, :3] = self._scene.cord.pull_n(since_s)
+        if self._scene.table_height:
+            data.mocap_pos[0, 2] = self._table_m + _value(self._scene.table_height, since_s)
+        if self._scene.fill:
+            self._fill(_value(self._scene.fill, since_s))
+
+    def _fill(self, filled_kg: float) -> None:
+        """Give the thing this mass more, spread over its first body as its own."""
+        model, body = self._model, self._body
+        factor = (self._empty_kg + filled_kg) / float(model.body_mass[body])
+        model.body_mass[body] *= factor
+        model.body_inertia[body] *= factor
 
     def _centre(self, data: mujoco.MjData) -> Floats:
         """Return the centre of mass of the thing."""
@@ -354,9 +398,16 @@ class ArmMotion:
     def report(self) -> dict[str, float]:
         """Return how high above where it was touched the thing was lifted, and how high it was at the end (m).
 
-        The end is that of the motion and the pull that the scene gives; the release comes after it.
+        The end is that of the motion and the pull that the scene gives; the release comes after it. `slip_m` is how far
+        the thing came down in the fingers by then.
         """
-        return {"highest_m": self._highest_m, "height_m": self._height_m}
+        return {"highest_m": self._highest_m, "height_m": self._height_m, "slip_m": self._slip_m}
+
+
+def _table_height(model: mujoco.MjModel) -> float:
+    """Return the height (m) of the body of the table; 0 where there is none."""
+    body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, TABLE)
+    return 0.0 if body < 0 else float(model.body_pos[body, 2])
 
 
 def _actuator(model: mujoco.MjModel, number: int) -> str:

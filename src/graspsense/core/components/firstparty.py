@@ -38,6 +38,7 @@ _ROS2 = Shipped("graspsense-ros2", "ros2", "ros2")
 _SO101 = Shipped("graspsense-so101-gripper", "so101_gripper", "so101")
 _C45 = Shipped("graspsense-c45", "c45", "c45")
 _PAPER = Shipped("graspsense-paper", "paper", "paper")
+_ROMANO = Shipped("graspsense-romano", "romano", "romano")
 _IDENTIFY = Shipped("graspsense-identify", "identify", "identify")
 
 SHIPPED: Final[dict[tuple[Role, str], Shipped]] = {
@@ -48,6 +49,12 @@ SHIPPED: Final[dict[tuple[Role, str], Shipped]] = {
     ("sensor-backend", "ros2"): _ROS2,
     ("sensor-backend", "so101"): _SO101,
     ("classifier", "c45"): _C45,
+    ("controller", "find-contact"): _ROMANO,
+    ("controller", "force-servo"): _ROMANO,
+    ("controller", "slip-servo"): _ROMANO,
+    ("controller", "grab"): _ROMANO,
+    ("controller", "release"): _ROMANO,
+    ("controller", "pick-and-place"): _ROMANO,
 }
 """Components in other distributions of this project, for the hint if one is not installed."""
 
@@ -85,10 +92,12 @@ EXPERIMENTS: Final[dict[str, Shipped]] = dict.fromkeys(
         *("why_force", "worn_bottles"),
     ),
     _PAPER,
-)
+) | dict.fromkeys(("romano_grab", "romano_place", "romano_slip"), _ROMANO)
 """Experiments in other distributions of this project."""
 
-EXPERIMENT_KINDS: Final[dict[str, Shipped]] = dict.fromkeys(("grasp", "paper", "table"), _PAPER)
+EXPERIMENT_KINDS: Final[dict[str, Shipped]] = dict.fromkeys(("grasp", "paper", "table"), _PAPER) | {
+    "touch": _ROMANO
+}
 """Kinds of experiments in other distributions of this project."""
 
 IDENTIFIERS: Final[dict[str, Shipped]] = {"sim": _IDENTIFY}

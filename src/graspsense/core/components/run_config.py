@@ -30,7 +30,7 @@ class RunConfig:
         unit="s",
         minimum=0.0,
         maximum=inf,
-        plausible=(0.0, 60.0),
+        plausible=(0.0, 3600.0),
         meaning="Time for which a steady grasp is held before the fingers open.",
     )
     opening_timeout_s: float = setting(

@@ -1,0 +1,167 @@
+"""The gripper with soft pads, its accelerometer, and scenes that are filled and put down. Simulated."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import pytest
+
+from graspsense import ConfigError, load_pipeline
+from graspsense.plugin_api import POSITION, Command, create
+from graspsense_mujoco_gripper.gripper_file import Finger, PalmSensor
+from graspsense_mujoco_gripper.scene import read_scene
+
+CELL_N_M = 1500.0
+STEP_S = 0.00033334
+RIGID = 'solref="0.002 1" solimp="0.99 0.999 0.0001"'
+
+
+def opened(thing, **settings):
+    backend = create(
+        "sensor-backend",
+        "mujoco",
+        file="soft_pads",
+        object=str(thing),
+        timestep_s=STEP_S,
+        spread=False,
+        force_noise_n=0.0,
+        **settings,
+    )
+    backend.open(0)
+    return backend
+
+
+def squeezed(backend, gap_m, ticks):
+    """Close to a gap and return the last reading."""
+    for _ in range(ticks):
+        backend.apply(Command(POSITION, gap_m, 50.0, 0.05))
+        reading = backend.read(1.0)
+    return reading
+
+
+def thing_file(folder, geom):
+    path = folder / "thing.xml"
+    path.write_text(
+        f'<mujoco><worldbody><body name="thing"><freejoint/><geom {geom} mass="0.05" {RIGID}/></body></worldbody>'
+        "</mujoco>"
+    )
+    return path
+
+
+def test_a_cell_image_is_the_pressure_of_a_bed_of_springs(tmp_path):
+    """A sphere of radius R compresses a spring at the distance r from its centre by r^2 / 2R less (Winkler's bed).
+
+    The tips of the cells are spheres of 1.9 mm, which makes R larger by as much.
+    """
+    backend = opened(thing_file(tmp_path, 'type="sphere" size="0.02"'))
+    reading = squeezed(backend, 0.0395, 1500)
+    image = np.array(reading.pads.left).reshape(5, 3)
+    rows, columns = np.meshgrid([-8, -4, 0, 4, 8], [-4, 0, 4], indexing="ij")
+    deeper_m = (rows**2 + columns**2) * 1e-6 / (2.0 * (0.02 + 0.0019))
+    expected = np.maximum(image[2, 1] - CELL_N_M * deeper_m, 0.0)
+    assert image[2, 1] > 0.3
+    assert image == pytest.approx(expected, abs=0.06)
+    assert reading.frame.force_left_n == pytest.approx(image.sum())
+
+
+def test_a_flat_thing_presses_on_all_cells_alike(tmp_path):
+    backend = opened(thing_file(tmp_path, 'type="box" size="0.02 0.02 0.02"'))
+    image = np.array(squeezed(backend, 0.0395, 1500).pads.right)
+    assert image.min() > 0.1
+    assert np.ptp(image) < 0.1 * image.mean()
+
+
+def test_the_palm_feels_gravity_and_the_motion_of_the_fingers(tmp_path):
+    backend = opened("none")
+    still = [backend.read(1.0).signals.acceleration for _ in range(200)]
+    assert still[-1].new == 3
+    assert still[-1].counter == 600
+    values = np.concatenate([one.values for one in still[100:]])
+    assert values.mean(axis=0) == pytest.approx([0.0, 0.0, 9.81], abs=0.05)
+    moving = []
+    for _ in range(200):
+        backend.apply(Command(POSITION, 0.05, 50.0, 0.1))
+        moving.append(backend.read(1.0).signals.acceleration)
+    # 0.2 m/s2 of floor noise, and 27 1/s times 0.1 m/s of gear noise.
+    assert np.concatenate([one.values for one in moving[100:]])[:, 1].std() > 5.0 * values[:, 1].std()
+
+
+def scene(folder, *lines):
+    path = folder / "scene.toml"
+    path.write_text("\n".join(['thing = "block"', "table = true", *lines]) + "\n")
+    return path
+
+
+def test_a_thing_that_is_filled_weighs_more(tmp_path):
+    backend = opened(scene(tmp_path, "fill = [[0.0, 0.0], [0.2, 0.3]]"))
+    squeezed(backend, 0.035, 1500)
+    model = backend._model
+    masses = [model.body_mass[k] for k in range(model.nbody) if model.body(k).name.startswith("thing/")]
+    assert sum(masses) == pytest.approx(0.15 + 0.3)
+
+
+def test_the_table_rises_as_the_scene_says(tmp_path):
+    backend = opened(scene(tmp_path, "table_height = [[0.0, 0.0], [0.2, 0.02]]"))
+    before = float(backend._data.mocap_pos[0, 2])
+    squeezed(backend, 0.035, 1700)
+    assert backend._data.mocap_pos[0, 2] - before == pytest.approx(0.02)
+
+
+def test_roughness_disturbs_cells_that_slide_and_no_others(tmp_path):
+    backend = opened(scene(tmp_path, "friction = 0.05", "roughness_m = 4e-5"))
+    still = [squeezed(backend, 0.0395, 1500 if k == 0 else 1).frame.force_left_n for k in range(100)]
+    thing = next(k for k in range(backend._model.nbody) if backend._model.body(k).name.startswith("thing/"))
+    sliding = []
+    for _ in range(100):
+        backend._data.xfrc_applied[thing, 1] = 3.0
+        sliding.append(squeezed(backend, 0.0395, 1).frame.force_left_n)
+    assert np.std(sliding) > 5.0 * np.std(still)
+
+
+@pytest.mark.parametrize("name", ["tugged", "filled", "placed"])
+def test_the_scenes_of_the_package_are_read(name):
+    assert isinstance(read_scene(name).spec, mujoco.MjSpec)
+
+
+@pytest.mark.parametrize(
+    ("lines", "said"),
+    [
+        (("fill = [[0.0, -1.0]]",), "fill"),
+        (("roughness_m = 1.0",), "roughness_m"),
+        (("table = false", "table_height = [[0.0, 0.0]]"), "table"),
+    ],
+)
+def test_a_scene_that_cannot_be_says_why(tmp_path, lines, said):
+    path = tmp_path / "scene.toml"
+    path.write_text("\n".join(['thing = "block"', *lines]) + "\n")
+    with pytest.raises(ConfigError, match=said):
+        read_scene(str(path))
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        (lambda: Finger(geoms=("a",), cells=("a", "b"), rows=1, columns=1), "cells"),
+        (lambda: Finger(geoms=("a",), cells=("a",)), "rows"),
+        (lambda: Finger(geoms=("a",), cells=("a",), sensor="s", rows=1, columns=1), "sensor"),
+        (lambda: PalmSensor(sensor="a", floor_m_s2=-1.0), "floor"),
+    ],
+)
+def test_a_gripper_file_that_cannot_be_says_why(wrong, said):
+    with pytest.raises(ValueError, match=said):
+        wrong()
+
+
+@pytest.mark.slow
+def test_a_trace_has_the_acceleration_and_the_cells():
+    trial = load_pipeline(
+        "default",
+        options=[
+            "gripper.type=mujoco",
+            "gripper.file=soft_pads",
+            "classifier.type=none",
+            "controller.sends=velocity",
+        ],
+    ).grasp(object="block")
+    assert trial.trace.signals["acceleration"].values.shape[1] == 3
+    assert trial.trace.pad_left.shape[1] == 15

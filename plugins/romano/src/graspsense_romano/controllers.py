@@ -1,0 +1,382 @@
+"""The controllers: one step, which closes, loads, holds and lets go, by the laws that a controller has.
+
+The states are those of the paper: close, load, lift and hold, replace, open.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import inf
+from typing import Any, ClassVar, Final, NamedTuple, TypeVar
+
+from graspsense.gripper_api import SLIPPED
+from graspsense.plugin_api import (
+    APPROACH,
+    EFFORT,
+    HOLD,
+    NEVER_STEADY,
+    NOTHING_THERE,
+    ONE_FINGER,
+    POSITION,
+    RUNNING,
+    SQUEEZE,
+    STEADY,
+    VELOCITY,
+    Channel,
+    Command,
+    Controller,
+    Frame,
+    Reading,
+)
+from graspsense_romano.config import (
+    PLACE_BY,
+    FindContactConfig,
+    ForceServoConfig,
+    GrabConfig,
+    PlaceConfig,
+    ReleaseConfig,
+    SlipServoConfig,
+)
+from graspsense_romano.events import (
+    EVENTS,
+    NOTHING,
+    EventThresholds,
+    TouchConditions,
+    begun,
+    conditions,
+    placed,
+)
+from graspsense_romano.laws import PositionServo, Servo, force_rate, grab_force, raised_force, servo_effort
+from graspsense_romano.signals import Filters, Signals, filters, no_signals, updated
+
+CHANNELS: Final = (
+    Channel("gap", "m"),
+    Channel("velocity", "m/s"),
+    Channel("force_left", "N"),
+    Channel("force_right", "N"),
+)
+"""What every law reads. Edge forces and `acceleration` are used where the gripper has them."""
+KINDS: Final = {"effort": EFFORT, "velocity": VELOCITY, "position": POSITION}
+IGNORED_S: Final = 0.2
+"""Time after the start in which no contact counts, as published: the motion itself disturbs the forces."""
+CONTACT_S: Final = 0.05
+"""Time for which the gap of the contact is kept, and its greatest force taken."""
+CLOSE, TOUCH, LOAD, KEEP = range(4)
+"""Stages: close until both pads touch, stay there, reach the force, hold."""
+SLIP_BIT, PLACE_BIT, UNFELT_BIT = 8, 16, 128
+
+
+class HoldingPlan(NamedTuple):
+    """What a controller does after the contact (0 or 1 each), with which forces (N) and times (s)."""
+
+    loads: int
+    grabs: int
+    slips: int
+    places: int
+    force_n: float
+    hardness: float
+    lightest_n: float
+    limit_n: float
+    close_speed_m_s: float
+    closed_gap_m: float
+    deformation_m: float
+    force_tolerance_n: float
+    speed_tolerance_m_s: float
+    settle_s: float
+    find_timeout_s: float
+    force_timeout_s: float
+    place_after_s: float
+    place_timeout_s: float
+
+
+class Params(NamedTuple):
+    """Parameters of the step; `kind` is the command kind that it sends."""
+
+    kind: int
+    plan: HoldingPlan
+    filters: Filters
+    thresholds: EventThresholds
+    servo: Servo
+    position: PositionServo
+
+
+class Progress(NamedTuple):
+    """How far a grasp is. Times are those of frames (s)."""
+
+    phase: int
+    outcome: int
+    stage: int
+    since_s: float
+    settling_s: float
+    contact_m: float
+    """The gap at the contact; before it, at the start."""
+    contact_n: float
+    target_n: float
+
+
+class State(NamedTuple):
+    """State of the step; `wanted_m` is where the position servo is to be."""
+
+    phase: int
+    outcome: int
+    events: int
+    progress: Progress
+    wanted_m: float
+    signals: Signals
+    conditions: TouchConditions
+
+
+NOT_BEGUN: Final = -1
+
+
+def step(params: Params, state: State, reading: Reading) -> tuple[Command, State]:
+    """Close until both pads touch, then load, hold and let go as planned."""
+    frame, before, wanted = reading.frame, state.progress, state.wanted_m
+    if before.stage == NOT_BEGUN:
+        before = Progress(APPROACH, RUNNING, CLOSE, frame.t_s, frame.t_s, frame.gap_m, 0.0, 0.0)
+        wanted = frame.gap_m
+    signals = updated(params.filters, state.signals, reading)
+    now = conditions(params.thresholds, signals)
+    progress = before
+    if before.outcome == RUNNING or before.outcome == STEADY:
+        if before.stage == CLOSE:
+            progress = closing(params.plan, before, now, frame)
+        elif before.stage == TOUCH:
+            progress = touching(params.plan, before, frame)
+        elif before.stage == LOAD:
+            progress = loading(params.plan, before, signals, frame)
+        else:
+            progress = keeping(params, before, signals, now, frame)
+    events = begun(state.conditions, now)
+    if before.stage != KEEP:
+        events &= ~SLIP_BIT
+    if params.plan.places == 1:
+        if progress.stage == KEEP and before.stage == LOAD and signals.acceleration.present == 0:
+            events |= UNFELT_BIT
+        if progress.outcome == STEADY and before.outcome == RUNNING:
+            events |= PLACE_BIT
+    command, wanted = commanded(params, progress, wanted, frame)
+    return command, State(progress.phase, progress.outcome, events, progress, wanted, signals, now)
+
+
+def ended(now: Progress, outcome: int) -> Progress:
+    """Return this progress with an outcome."""
+    phase, _, stage, since, settling, contact_m, contact_n, target = now
+    return Progress(phase, outcome, stage, since, settling, contact_m, contact_n, target)
+
+
+def closing(plan: HoldingPlan, now: Progress, seen: TouchConditions, frame: Frame) -> Progress:
+    """Close until both pads touch, or it is clear that they will not."""
+    elapsed = frame.t_s - now.since_s
+    if elapsed >= IGNORED_S and seen.left == 1 and seen.right == 1:
+        force_n = 0.5 * (frame.force_left_n + frame.force_right_n)
+        return Progress(SQUEEZE, RUNNING, TOUCH, frame.t_s, frame.t_s, frame.gap_m, force_n, 0.0)
+    if frame.gap_m <= plan.closed_gap_m:
+        return ended(now, NOTHING_THERE)
+    if elapsed > max(plan.find_timeout_s, 1.5 * now.contact_m / plan.close_speed_m_s):
+        return ended(now, ONE_FINGER if seen.left + seen.right == 1 else NOTHING_THERE)
+    return now
+
+
+def touching(plan: HoldingPlan, now: Progress, frame: Frame) -> Progress:
+    """Take the greatest force while the gap of the contact is kept, and choose the force of the grip from it."""
+    phase, outcome, stage, since, settling, contact_m, contact_n, target_n = now
+    contact_n = max(contact_n, 0.5 * (frame.force_left_n + frame.force_right_n))
+    if frame.t_s - since >= CONTACT_S:
+        if plan.loads == 0:
+            phase, outcome = HOLD, STEADY
+        else:
+            stage, since, settling = LOAD, frame.t_s, frame.t_s
+            target_n = min(max(plan.force_n, plan.lightest_n), plan.limit_n)
+            if plan.grabs == 1:
+                target_n = grab_force(
+                    contact_n, plan.close_speed_m_s, plan.hardness, plan.lightest_n, plan.limit_n
+                )
+    return Progress(phase, outcome, stage, since, settling, contact_m, contact_n, target_n)
+
+
+def loading(plan: HoldingPlan, now: Progress, signals: Signals, frame: Frame) -> Progress:
+    """Wait until the weaker finger has its force and the fingers are at rest."""
+    phase, outcome, stage, since, settling, contact_m, contact_n, target_n = now
+    error_n = target_n - min(frame.force_left_n, frame.force_right_n)
+    reached = abs(error_n) < plan.force_tolerance_n and abs(signals.speed_m_s) < plan.speed_tolerance_m_s
+    if not reached:
+        settling = frame.t_s
+    if frame.gap_m <= plan.closed_gap_m:
+        outcome = SLIPPED
+    elif frame.t_s - settling > plan.settle_s:
+        phase, stage, since = HOLD, KEEP, frame.t_s
+        outcome = RUNNING if plan.places == 1 else STEADY
+    elif frame.t_s - since > plan.force_timeout_s:
+        outcome = NEVER_STEADY
+    return Progress(phase, outcome, stage, since, settling, contact_m, contact_n, target_n)
+
+
+def keeping(params: Params, now: Progress, signals: Signals, seen: TouchConditions, frame: Frame) -> Progress:
+    """Hold, with more force where the thing slips, until it is lost or put down."""
+    phase, outcome, stage, since, settling, contact_m, contact_n, target_n = now
+    plan, held_s = params.plan, frame.t_s - since
+    weaker_n = min(signals.left.force_n, signals.right.force_n)
+    if weaker_n < plan.lightest_n - 0.25 or frame.gap_m <= plan.closed_gap_m:
+        return ended(now, SLIPPED)
+    if plan.slips == 1:
+        target_n = raised_force(target_n, seen.slip, frame.dt_s, plan.limit_n)
+    if plan.places == 1 and outcome == RUNNING and held_s >= plan.place_after_s:
+        if placed(params.thresholds, seen, signals.acceleration.present):
+            outcome = STEADY
+        elif held_s > plan.place_timeout_s:
+            outcome = NEVER_STEADY
+    return Progress(phase, outcome, stage, since, settling, contact_m, contact_n, target_n)
+
+
+def commanded(params: Params, now: Progress, wanted_m: float, frame: Frame) -> tuple[Command, float]:
+    """Return the command of this stage, and the gap (m) that the position servo is to reach."""
+    plan, rate = params.plan, 0.0
+    if now.stage == CLOSE:
+        rate = -plan.close_speed_m_s
+    elif now.stage >= LOAD:
+        rate = force_rate(params.servo, now.target_n, frame.force_left_n, frame.force_right_n)
+        if rate < 0.0 and frame.gap_m <= now.contact_m - plan.deformation_m:
+            rate = 0.0
+    bound, limit = params.position.bound_m, params.position.effort_limit_n
+    wanted_m += rate * frame.dt_s
+    if now.stage == TOUCH:
+        wanted_m = now.contact_m
+    wanted_m = min(max(wanted_m, frame.gap_m - bound), frame.gap_m + bound)
+    command = Command(VELOCITY, rate, limit, inf)
+    if params.kind == POSITION:
+        command = Command(POSITION, max(wanted_m, 0.0), limit, plan.close_speed_m_s)
+    elif params.kind == EFFORT:
+        effort = servo_effort(params.position, frame.gap_m, frame.velocity_m_s, wanted_m, rate)
+        command = Command(EFFORT, effort, inf, inf)
+    return command, wanted_m
+
+
+ConfigT = TypeVar("ConfigT", bound=FindContactConfig)
+
+
+class _Romano(Controller[ConfigT]):
+    """What the controllers of this package share; a subclass says what its law does after the contact."""
+
+    requires = CHANNELS
+    commands = ("effort",)
+    alternatives = ("velocity", "position")
+    becomes: ClassVar[Mapping[str, str]] = {
+        "velocity": "the rate of the gap that its force servo gives",
+        "position": "the gap that its force servo gives, with the greatest force that is allowed",
+    }
+    events = EVENTS
+    step = staticmethod(step)
+    does: ClassVar[tuple[int, int, int, int]]
+    """Whether it loads, takes the force from the contact, adds force on slip, and lets go when put down."""
+
+    def asked_force_n(self) -> float:
+        """Return the greatest force (N) that is asked for."""
+        return float(self.config.force_limit_n)
+
+    def gentlest_force_n(self) -> float:
+        """Return the least force (N) of a grip."""
+        return float(self.config.lightest_n)
+
+    def asked_speed_m_s(self) -> float:
+        """Return the closing speed (m/s)."""
+        return float(self.config.close_speed_m_s)
+
+    def contact_force_n(self) -> float:
+        """Return the force (N) from which on a pad touches."""
+        return float(self.config.lightest_n - 0.25)
+
+    def params(self) -> Params:
+        """Return the parameters of the step."""
+        config: Any = self.config
+        force = config if isinstance(config, ForceServoConfig) else ForceServoConfig()
+        place = config if isinstance(config, PlaceConfig) else PlaceConfig()
+        slip = config if isinstance(config, SlipServoConfig) else place
+        loads, grabs, slips, places = self.does
+        plan = HoldingPlan(
+            loads,
+            grabs,
+            slips,
+            places,
+            force_n=float(force.force_n),
+            hardness=float(config.hardness if isinstance(config, GrabConfig) else place.hardness),
+            lightest_n=float(config.lightest_n),
+            limit_n=float(config.force_limit_n),
+            close_speed_m_s=float(config.close_speed_m_s),
+            closed_gap_m=float(config.closed_gap_m),
+            deformation_m=float(force.deformation_limit_m),
+            force_tolerance_n=float(force.force_tolerance_n),
+            speed_tolerance_m_s=float(force.speed_tolerance_m_s),
+            settle_s=float(force.settle_s),
+            find_timeout_s=float(config.find_timeout_s),
+            force_timeout_s=float(force.force_timeout_s),
+            place_after_s=float(place.place_after_s),
+            place_timeout_s=float(place.place_timeout_s),
+        )
+        thresholds = EventThresholds(
+            lightest_n=float(config.lightest_n),
+            contact_high_n=float(config.contact_high_n),
+            slip_share=float(slip.slip_share),
+            least_n=float(slip.slip_least_n),
+            slip_low_n=float(slip.slip_low_n),
+            place_share=float(place.place_share),
+            side_n=float(config.side_n),
+            shock_m_s2=float(place.acceleration_m_s2),
+            place_by=PLACE_BY.index(place.place_by),
+        )
+        servo = Servo(float(force.opening_gain_m_s_n), float(force.closing_gain_m_s_n), FASTEST_M_S)
+        position = PositionServo(
+            float(config.stiffness_n_m),
+            float(config.damping_n_s_m),
+            float(config.friction_n),
+            BOUND_M,
+            EFFORT_SHARE * float(config.force_limit_n) + float(config.friction_n),
+        )
+        return Params(KINDS[config.sends], plan, filters(), thresholds, servo, position)
+
+    def init(self) -> State:
+        """Return the state before the first tick."""
+        progress = Progress(APPROACH, RUNNING, NOT_BEGUN, 0.0, 0.0, 0.0, 0.0, 0.0)
+        return State(APPROACH, RUNNING, 0, progress, 0.0, no_signals(), NOTHING)
+
+
+FASTEST_M_S: Final = 0.5
+BOUND_M: Final = 0.03
+EFFORT_SHARE: Final = 1.25
+"""The position servo may exceed the force limit by a quarter, plus friction, as the effort ceiling does."""
+
+
+class FindContact(_Romano[FindContactConfig]):
+    """Closes until both pads touch, and stays there."""
+
+    does = (0, 0, 0, 0)
+
+
+class ForceServo(_Romano[ForceServoConfig]):
+    """Closes, and brings the weaker finger to a force."""
+
+    does = (1, 0, 0, 0)
+
+
+class SlipServo(_Romano[SlipServoConfig]):
+    """Closes, holds with a light force, and adds force whenever the thing slips."""
+
+    does = (1, 0, 1, 0)
+
+
+class Grab(_Romano[GrabConfig]):
+    """Closes, chooses the force from the contact, and adds force whenever the thing slips."""
+
+    does = (1, 1, 1, 0)
+
+
+class Release(_Romano[ReleaseConfig]):
+    """Holds with a force until the thing is put down, and then opens."""
+
+    does = (1, 0, 0, 1)
+
+
+class PickAndPlace(_Romano[PlaceConfig]):
+    """Grabs, holds what an arm lifts, adds force on slip, and opens when the thing is put down."""
+
+    does = (1, 1, 1, 1)

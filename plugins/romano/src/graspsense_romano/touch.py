@@ -1,0 +1,221 @@
+"""The task `touch`: grasp a thing of a MuJoCo scene, lift it, tug at it or fill it, put it down; say how it went."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+import numpy as np
+from attrs import evolve, field, frozen
+from attrs.validators import ge, gt, le
+
+from graspsense.experiment_api import settings_from, structured
+from graspsense.plugin_api import HOLD, NO_PADS, ConfigError, Frame, Reading, Samples
+from graspsense.simulator_api import BatchBackend
+from graspsense_romano.signals import Signals, filters, no_signals, updated
+
+if TYPE_CHECKING:
+    from graspsense.plugin_api import Trace
+
+LIFT_S: Final = (2.0, 2.5)
+"""When the arm lifts, after both fingers touched."""
+DISTURBED_S: Final = 3.0
+"""When the tug, the filling or the way down begins."""
+LAST_S: Final = 0.15
+AROUND_S: Final = (-0.05, 0.3)
+"""What counts as being put down, around the time at which the arm is as high as the table."""
+
+
+STARTING_S: Final = 0.2
+"""Time in which the arm reaches its speed, and in which it stops."""
+POINTS: Final = 20
+
+
+def _moved(start_s: float, begin_m: float, end_m: float, speed_m_s: float) -> list[list[float]]:
+    """Return times and heights of the arm from one height to another, with a constant acceleration at both ends."""
+    sign, share = (1.0 if end_m > begin_m else -1.0), np.arange(POINTS + 1) / POINTS
+    travel_s = max(abs(end_m - begin_m) / speed_m_s, STARTING_S + 1e-3)
+    speed_m_s = abs(end_m - begin_m) / travel_s
+    starting = 0.5 * share**2 * STARTING_S * speed_m_s
+    first = zip(start_s + share * STARTING_S, begin_m + sign * starting, strict=True)
+    last = zip(start_s + travel_s + share * STARTING_S, end_m - sign * starting[::-1], strict=True)
+    return [[round(float(t), 5), round(float(z), 7)] for t, z in (*first, *last)]
+
+
+@frozen(kw_only=True)
+class TouchSettings:
+    """The keys of `[judge]`: the scene. What is 0 does not happen."""
+
+    thing: str = "block"
+    stiffness_n_m: float = field(default=0.0, validator=ge(0.0))
+    """Above 0, the thing is two walls on springs, 40 mm wide, instead of one of the catalogue."""
+    mass_kg: float = field(default=0.15, validator=gt(0.0))
+    friction: float = field(default=0.5, validator=ge(0.0))
+    roughness_m: float = field(default=4e-5, validator=[ge(0.0), le(1e-3)])
+    lift_m: float = field(default=0.05, validator=ge(0.0))
+    tug_n: float = field(default=0.0, validator=ge(0.0))
+    fill_kg: float = field(default=0.0, validator=ge(0.0))
+    ramp_s: float = field(default=2.0, validator=gt(0.0))
+    """Time over which the tug or the filling grows."""
+    lower_m_s: float = field(default=0.0, validator=ge(0.0))
+    """Speed at which the arm goes down again."""
+    table_rise_m: float = field(default=0.0, validator=ge(0.0))
+    """How far the table has risen by then."""
+
+    def __attrs_post_init__(self) -> None:
+        if self.lower_m_s and self.table_rise_m >= self.lift_m:
+            raise ValueError("table_rise_m is below lift_m: the table must not reach the thing in the air")
+
+    @property
+    def down_s(self) -> float:
+        """When the thing is as high as the table again, after both fingers touched; NaN without a way down."""
+        if not self.lower_m_s:
+            return float("nan")
+        return DISTURBED_S + 0.5 * STARTING_S + (self.lift_m - self.table_rise_m) / self.lower_m_s
+
+    def toml(self) -> str:
+        """Return the scene file."""
+        lines = [f'thing = "{self.thing}"', "table = true", f"friction = {self.friction}"]
+        lines += [f"mass_kg = {self.mass_kg}", f"roughness_m = {self.roughness_m}"]
+        arm = _moved(LIFT_S[0], 0.0, self.lift_m, self.lift_m / (LIFT_S[1] - LIFT_S[0]))
+        if self.lower_m_s:
+            arm += _moved(DISTURBED_S, self.lift_m, 0.0, self.lower_m_s)
+        lines.append(f"arm = {arm}")
+        end_s = DISTURBED_S + self.ramp_s
+        if self.fill_kg:
+            lines.append(f"fill = [[{DISTURBED_S}, 0.0], [{end_s}, {self.fill_kg}]]")
+        if self.table_rise_m:
+            lines.append(f"table_height = [[{LIFT_S[1]}, 0.0], [{DISTURBED_S}, {self.table_rise_m}]]")
+        if self.tug_n:
+            lines.append(f"cord = {{ force = [[{DISTURBED_S}, 0.0], [{end_s}, {self.tug_n}]] }}")
+        if self.stiffness_n_m:
+            lines += ["[walls]", "width_m = 0.04", f"stiffness_n_m = {self.stiffness_n_m}"]
+            lines += ["damping_n_s_m = 20.0", f"mass_kg = {self.mass_kg}", f"friction = {self.friction}"]
+        return "\n".join(lines) + "\n"
+
+
+@frozen(kw_only=True)
+class TouchRow:
+    """How one grasp went. Forces are of the weaker finger; a quantity that is not defined is None."""
+
+    outcome: str
+    broken: bool = False
+    lifted_m: float = 0.0
+    slip_m: float = 0.0
+    contact_n: float | None = None
+    """The greatest force within 50 ms after both pads touch."""
+    grip_n: float | None = None
+    """The force when the grip is reached."""
+    greatest_n: float | None = None
+    """The greatest force while it is held."""
+    deformed_m: float | None = None
+    """How far the gap closed from the contact on."""
+    slips: int = 0
+    slip_high_n: float | None = None
+    """The greatest high band of a pad after the lift, where no force is added: the least threshold that tells no slip.
+
+    The last 0.15 s are left out, in which a thing that is lost falls."""
+    shock_before_m_s2: float | None = None
+    """The greatest acceleration band on the way down, before the table."""
+    shock_at_m_s2: float | None = None
+    """The greatest acceleration band when the thing meets the table, if it is not let go by then."""
+    placed_s: float | None = None
+    """When the law let go, from the time at which the thing is as high as the table."""
+    source: str = "grasps simulated by MuJoCo"
+    simulated: bool = True
+
+
+def touch(params: Mapping[str, Any], seed: int) -> TouchRow:
+    """Return how a grasp of the scene went. Raises ConfigError for a gripper that is not simulated by MuJoCo."""
+    scene = structured(params["judge"], TouchSettings, "[judge]")
+    settings = settings_from(params["settings"], "the settings of the task")
+    backend = settings.gripper.create()
+    if not isinstance(backend, BatchBackend) or settings.gripper.component.name != "mujoco":
+        raise ConfigError("experiments of kind touch need scenes in MuJoCo: gripper.type = 'mujoco'")
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "scene.toml"
+        path.write_text(scene.toml(), encoding="utf-8")
+        grasped = backend.run_many(
+            settings.controller.create(),
+            [str(path)],
+            [seed],
+            run=evolve(settings.run, seed=seed),
+            extract=lambda trace: measured(trace, scene),
+            workers=1,
+        )[0]
+    report, found = grasped.report, dict(grasped.extracted)
+    if settings.controller.component.name != "force-servo":
+        found.pop("slip_high_n", None)
+    return TouchRow(
+        outcome=grasped.outcome.name.lower(),
+        broken=bool(report.get("broken", False)),
+        lifted_m=float(report.get("highest_m", 0.0)),
+        slip_m=float(report.get("slip_m", 0.0)),
+        **found,
+    )
+
+
+def followed(trace: Trace) -> list[Signals]:
+    """Return the signals after each frame of a trace."""
+    coefficients, now, found = filters(), no_signals(), []
+    fast = trace.signals.get("acceleration")
+    counts = np.zeros(0, int) if fast is None else np.searchsorted(fast.t_s, trace.t_s, side="right")
+    nan, begun = float("nan"), 0
+    dt_s = np.diff(trace.t_s, prepend=trace.t_s[0])
+    for k in range(len(trace)):
+        signals: Any = ()
+        if fast is not None:
+            rows = tuple(map(tuple, fast.values[begun : counts[k]].tolist()))
+            begun = counts[k]
+            signals = _Fast(Samples(float(trace.t_s[k]), int(begun), len(rows), rows))
+        frame = Frame(
+            float(trace.t_s[k]), float(dt_s[k]), float(trace.gap_m[k]), float(trace.velocity_m_s[k]), nan,
+            float(trace.force_left_n[k]), float(trace.force_right_n[k]), nan, nan, 0,
+        )  # fmt: skip
+        now = updated(coefficients, now, Reading(frame, NO_PADS, signals))
+        found.append(now)
+    return found
+
+
+class _Fast(NamedTuple):
+    acceleration: Samples
+
+
+def measured(trace: Trace, scene: TouchSettings) -> dict[str, Any]:
+    """Return the quantities of a `TouchRow` that a trace has."""
+    told = [
+        (event.t_s, event.what, int(event.phase)) for event in trace.events if event.source == "controller"
+    ]
+    contacts = [t_s for t_s, what, _ in told if what == "both in contact"]
+    if not contacts:
+        return {}
+    signals, t_s, since_s = followed(trace), trace.t_s, contacts[0]
+    weaker = np.minimum(trace.force_left_n, trace.force_right_n)
+    first = int(np.searchsorted(t_s, since_s))
+    row: dict[str, Any] = {
+        "contact_n": float(weaker[first : np.searchsorted(t_s, since_s + 0.05) + 1].max()),
+        "slips": sum(what == "slip" for _, what, _ in told),
+    }
+    held = np.flatnonzero(trace.phase == HOLD)
+    if not len(held):
+        return row
+    row["grip_n"], row["greatest_n"] = float(weaker[held[0]]), float(weaker[held].max())
+    row["deformed_m"] = float(trace.gap_m[first] - trace.gap_m[held].min())
+    disturbed = held[(t_s[held] > since_s + DISTURBED_S - 0.2) & (t_s[held] < t_s[held[-1]] - LAST_S)]
+    high = [max(abs(signals[k].left.high_n), abs(signals[k].right.high_n)) for k in disturbed]
+    row["slip_high_n"] = max(high, default=None)
+    down_s = since_s + scene.down_s
+    if down_s == down_s:
+        shocks = np.array([one.acceleration.norm_m_s2 for one in signals])
+        begun, at = (
+            t_s > since_s + DISTURBED_S - 0.1,
+            (t_s > down_s + AROUND_S[0]) & (t_s < down_s + AROUND_S[1]),
+        )
+        before = begun & (t_s <= down_s + AROUND_S[0]) & (trace.phase == HOLD)
+        row["shock_before_m_s2"] = float(shocks[before].max()) if before.any() else None
+        kept = at.any() and bool((trace.phase[at] == HOLD).all())
+        row["shock_at_m_s2"] = float(shocks[at].max()) if kept else None
+        row["placed_s"] = next((t - down_s for t, what, _ in told if what == "place"), None)
+    return row

@@ -1,0 +1,94 @@
+"""`graspsense hold` as a user runs it, and the laws compiled together with the simulator. Simulated."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from graspsense.cli.main import main
+from graspsense.plugin_api import create
+from graspsense.testing_api import parametrize_checks
+
+COMMAND = [sys.executable, "-m", "graspsense", "hold"]
+PR2 = ["--gripper", "pr2", "-o", "gripper.transport=emulated", "-o", "controller.sends=effort"]
+
+
+def hold(*arguments):
+    """Return the exit code of the command."""
+    with pytest.raises(SystemExit) as ended:
+        main(["hold", *arguments])
+    return ended.value.code
+
+
+@pytest.mark.slow
+@parametrize_checks("graspsense-romano")
+def test_conformance(check):
+    check.run()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--seconds", "0"], "seconds"),
+        (["--seconds", "nan"], "seconds"),
+        (["--gripper", "mujocco"], "mujoco"),
+        (["-o", "controller.force_n=-1"], "force_n"),
+        (["-o", "controller.sends=effect"], "effort"),
+        (["--object", "tuged"], "tugged"),
+    ],
+)
+def test_bad_input_is_a_wrong_use(arguments, said, capsys):
+    assert hold(*arguments) == 2
+    assert said in capsys.readouterr().err
+
+
+def test_a_gripper_that_is_lost_ends_it(capsys):
+    assert hold("--seconds", "30", *PR2, "-o", "gripper.faults.unplug_at_s=2") == 4
+    assert "device lost" in capsys.readouterr().out
+
+
+@pytest.mark.slow
+def test_a_tugged_block_is_held_with_more_force_from_the_first_slip_on(capsys):
+    assert hold("--seconds", "5") == 0
+    out, err = capsys.readouterr()
+    told = [line.split() for line in err.splitlines() if line.endswith(("slip", "holds"))]
+    slips = [float(t) for t, _, _, _, what in told if what == "slip"]
+    forces = {float(t): float(force) for t, _, force, _, what in told if what == "holds"}
+    assert slips
+    before, after = forces[min(forces)], forces[max(forces)]
+    # 0.15 kg and 3 N at a friction of 0.4 need (1.47 + 3) / 0.8 = 5.6 N; it begins at 2.5 N.
+    assert before == pytest.approx(2.5, abs=0.3)
+    assert 5.6 < after < 12.0
+    assert "steady" in out
+
+
+@pytest.mark.slow
+def test_ctrl_c_lets_go():
+    running = subprocess.Popen(
+        [*COMMAND, "--seconds", "600", *PR2], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    for line in running.stderr:
+        if line.rstrip().endswith("holds"):
+            running.send_signal(signal.SIGINT)
+            break
+    out, _ = running.communicate(timeout=120)
+    assert running.returncode == 4
+    assert "interrupted" in out
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "acceleration"), [("grab", False), ("pick-and-place", True)])
+def test_laws_give_the_same_grasp_compiled_and_plain(name, acceleration):
+    law, runs = create("controller", name), []
+    for compiled in ("always", "never"):
+        gripper = create("sensor-backend", "sim", acceleration=acceleration, compile=compiled)
+        runs.append(gripper.run_many(law, ["odwalla:full_open"], [1], workers=1, traces=True)[0])
+    always, never = runs
+    assert always.outcome == never.outcome
+    assert np.allclose(always.trace.gap_m, never.trace.gap_m, atol=1e-9)
+    assert np.allclose(always.trace.command, never.trace.command, atol=1e-6)
+    assert [event.what for event in always.trace.events] == [event.what for event in never.trace.events]

@@ -1,0 +1,184 @@
+"""The laws and the conditions of events, against the figures that Romano et al. print."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from math import inf, nan
+from typing import NamedTuple
+
+import pytest
+
+from graspsense.plugin_api import (
+    EFFORT,
+    HOLD,
+    NO_PADS,
+    POSITION,
+    RUNNING,
+    STEADY,
+    VELOCITY,
+    Frame,
+    Reading,
+    Samples,
+    create,
+)
+from graspsense_romano.events import EVENTS, NOTHING, EventThresholds, begun, conditions, placed, slips
+from graspsense_romano.filters import NOT_BEGUN
+from graspsense_romano.laws import Servo, force_rate, grab_force, raised_force
+from graspsense_romano.signals import PadSignal, filters, no_signals, updated
+
+CONTROLLERS = ("find-contact", "force-servo", "slip-servo", "grab", "release", "pick-and-place")
+THRESHOLDS = EventThresholds(1.2, 0.1, 0.007, 0.048, 0.18, 0.008, 0.2, 3.25, 1)
+
+
+class Palm(NamedTuple):
+    acceleration: Samples
+
+
+class OtherSignals(NamedTuple):
+    motor_temperature: float
+
+
+def palm(*values):
+    return Palm(Samples(0.0, len(values), len(values), tuple((0.0, 0.0, v) for v in values)))
+
+
+def reading(t_s, force_n, signals=(), gap_m=0.05):
+    return Reading(Frame(t_s, 0.001, gap_m, 0.0, 0.0, force_n, force_n, nan, nan, 0), NO_PADS, signals)
+
+
+def test_grab_takes_its_force_from_the_contact():
+    """1 N at 20 mm/s with the published gain of 0.03 gives 1.5 N; the floor is 1.2 N."""
+    assert grab_force(1.0, 0.02, 0.03, 1.2, 20.0) == pytest.approx(1.5)
+    assert grab_force(0.2, 0.02, 0.03, 1.2, 20.0) == 1.2
+    assert grab_force(50.0, 0.02, 0.03, 1.2, 20.0) == 20.0
+
+
+def test_the_force_servo_looks_at_the_weaker_finger_and_closes_faster_than_it_opens():
+    servo = Servo(0.0008, 0.0016, 0.5)
+    assert force_rate(servo, 5.0, 4.0, 9.0) == pytest.approx(-0.0016)
+    assert force_rate(servo, 5.0, 6.0, 9.0) == pytest.approx(0.0008)
+    assert force_rate(servo, 1e6, 0.0, 0.0) == -0.5
+
+
+def test_a_slip_of_one_pad_sample_adds_as_much_force_at_every_tick_rate():
+    """1.002 a millisecond: about 8.5 % in the 41 ms of an image."""
+    for dt_s in (0.001, 0.0005, 0.041 / 8):
+        force_n = 5.0
+        for _ in range(round(0.041 / dt_s)):
+            force_n = raised_force(force_n, 1, dt_s, 100.0)
+        assert force_n / 5.0 == pytest.approx(1.085, abs=0.001)
+    assert raised_force(5.0, 0, 0.001, 100.0) == 5.0
+    assert raised_force(5.0, 1, 0.001, 5.0) == 5.0
+
+
+def test_a_slip_is_a_disturbance_while_the_force_itself_is_quiet():
+    quiet, loud = NOT_BEGUN, NOT_BEGUN._replace(y1=0.19)
+    assert slips(PadSignal(1, 5.0, 0.05, quiet), 0.007, 0.048, 0.18)
+    assert not slips(PadSignal(1, 5.0, 0.047, quiet), 0.007, 0.048, 0.18)
+    assert not slips(PadSignal(1, 5.0, 0.05, loud), 0.007, 0.048, 0.18)
+    # 0.7 % of 10 N is 0.07 N; of 100 N it would be 0.7 N, and 0.2 N is the most.
+    assert not slips(PadSignal(1, 10.0, 0.06, quiet), 0.007, 0.048, 0.18)
+    assert slips(PadSignal(1, 100.0, 0.21, quiet), 0.007, 0.048, 0.18)
+
+
+@pytest.mark.parametrize(
+    ("place_by", "with_shock", "with_slip"), [(0, 1, 0), (1, 0, 0), (2, 1, 1), (3, 0, 1), (4, 1, 0)]
+)
+def test_placing_is_told_by_the_published_conditions(place_by, with_shock, with_slip):
+    params = THRESHOLDS._replace(place_by=place_by)
+    shock, slip = NOTHING._replace(shock=1), NOTHING._replace(place_slip=1)
+    assert placed(params, shock, 1) == bool(with_shock)
+    assert placed(params, slip, 1) == bool(with_slip)
+    assert placed(params, NOTHING._replace(shock=1, place_slip=1), 1)
+    assert not placed(params, NOTHING, 1)
+    # Without an acceleration, a slip stands for the shock.
+    assert placed(params, slip, 0)
+
+
+def test_gravity_is_no_shock_and_every_sample_of_a_tick_counts():
+    """The published controller looks at the last sample of a tick alone, and begins its filter at zero."""
+    signals = no_signals()
+    for k in range(100):
+        signals = updated(filters(), signals, reading(k * 0.001, 0.0, palm(9.8, 9.8, 9.8)))
+        assert conditions(THRESHOLDS, signals).shock == 0
+    signals = updated(filters(), signals, reading(0.1, 0.0, palm(9.8, 20.0, 9.8)))
+    assert conditions(THRESHOLDS, signals).shock == 1
+
+
+def test_a_gripper_with_other_signals_has_no_acceleration():
+    for signals in ((), OtherSignals(20.0)):
+        assert updated(filters(), no_signals(), reading(0.0, 0.0, signals)).acceleration.present == 0
+
+
+def test_pads_are_sampled_every_41_ms_whatever_the_tick():
+    for dt_s in (0.001, 0.0003):
+        signals, times = no_signals(), []
+        for k in range(int(0.5 / dt_s)):
+            frame = reading(k * dt_s, 1.0).frame._replace(dt_s=dt_s)
+            signals = updated(filters(), signals, Reading(frame, NO_PADS))
+            if signals.fresh:
+                times.append(k * dt_s)
+        assert all(abs(b - a - 0.041) <= dt_s for a, b in pairwise(times))
+
+
+def test_events_are_told_once():
+    both = NOTHING._replace(left=1, right=1)
+    names = [EVENTS[k] for k in range(len(EVENTS)) if begun(NOTHING, both) >> k & 1]
+    assert names == ["left contact", "right contact", "both in contact"]
+    assert begun(both, both) == 0
+
+
+def spring(controller, *, ends_s=6.0, stiffness_n_m=2000.0, lost_s=inf, **settings):
+    """Run a law that commands rates on a spring of 50 mm without mass; return its states and forces."""
+    law = create("controller", controller, sends="velocity", **settings)
+    state, params, gap_m, states, forces = law.init(), law.params(), 0.06, [], []
+    for k in range(int(ends_s / 0.001)):
+        force_n = max(0.05 - gap_m, 0.0) * stiffness_n_m if k * 0.001 < lost_s else 0.0
+        command, state = law.step(params, state, reading(k * 0.001, force_n, gap_m=gap_m))
+        assert command.kind == VELOCITY
+        gap_m += command.value * 0.001
+        states.append(state)
+        forces.append(force_n)
+    return states, forces
+
+
+def test_find_contact_stops_where_both_pads_touch():
+    states, forces = spring("find-contact", ends_s=2.0)
+    assert states[-1].outcome == STEADY
+    assert states[-1].phase == HOLD
+    # The high band tells of 20 mm/s * 2000 N/m = 40 N/s at the first image of the contact, within 41 ms.
+    assert 0.1 < forces[-1] <= 40.0 * 0.083
+    assert forces[-1] == forces[-500]
+
+
+def test_the_force_servo_reaches_its_force():
+    states, forces = spring("force-servo", force_n=5.0)
+    assert states[-1].outcome == STEADY
+    assert forces[-1] == pytest.approx(5.0, abs=0.05)
+
+
+def test_grab_grips_a_hard_thing_harder_than_a_soft_one():
+    (_, soft), (_, hard) = spring("grab", stiffness_n_m=500.0), spring("grab", stiffness_n_m=3000.0)
+    assert hard[-1] > 1.5 * soft[-1]
+
+
+def test_a_thing_that_is_lost_ends_the_grasp():
+    states, _ = spring("slip-servo", force_n=5.0, lost_s=4.0)
+    assert states[-1].outcome not in (RUNNING, STEADY)
+
+
+@pytest.mark.parametrize("sends", ["effort", "velocity", "position"])
+@pytest.mark.parametrize("name", CONTROLLERS)
+def test_each_law_sends_each_kind(name, sends):
+    law = create("controller", name, sends=sends)
+    command, _ = law.step(law.params(), law.init(), reading(0.0, 0.0))
+    assert command.kind == {"effort": EFFORT, "velocity": VELOCITY, "position": POSITION}[sends]
+
+
+def test_pick_and_place_says_that_it_has_no_acceleration():
+    states, _ = spring("pick-and-place")
+    told = 0
+    for state in states:
+        told |= state.events
+    assert "no acceleration" in EVENTS[7]
+    assert told >> 7 & 1

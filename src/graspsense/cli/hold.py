@@ -1,0 +1,101 @@
+"""`graspsense hold`: keep a thing with the least force that does not slip, and say so as it goes on."""
+
+from __future__ import annotations
+
+from math import inf
+from typing import TYPE_CHECKING, Final
+
+import click
+
+from graspsense.cli.options import pipeline_options, settings_of
+from graspsense.cli.terminal import talk
+
+if TYPE_CHECKING:
+    from graspsense.core.values.events import GraspEvent
+    from graspsense.core.values.signals import Command, Reading
+
+PIPELINE: Final = "hold"
+LONGEST_S: Final = 3500.0
+TO_GRASP_S: Final = 60.0
+"""Time that is allowed for the grasp itself."""
+
+
+@click.command(short_help="Hold a thing with the least force that does not slip.")
+@click.option(
+    "--seconds",
+    type=click.FloatRange(0.0, LONGEST_S, min_open=True),
+    default=60.0,
+    show_default=True,
+    help="Time from the grip until the fingers open.",
+)
+@pipeline_options
+def hold(
+    seconds: float,
+    pipeline: str | None,
+    gripper: str | None,
+    object_name: str | None,
+    options: tuple[str, ...],
+    seed: int | None,
+    force: bool,
+) -> None:
+    """Close, hold with little force, add force whenever the thing slips, and open at the end.
+
+    Without --pipeline it is the pipeline hold of graspsense-romano, with a simulated gripper. The fingers open at the
+    end, on Ctrl-C, and when the gripper is lost or the thing is. Exit codes are those of run.
+    """
+    from graspsense.cli.run import finish, grasped, print_trial
+    from graspsense.core.pipeline.wiring import check
+
+    if seconds != seconds:
+        raise click.BadParameter("nan is no time: give a number of seconds", param_hint="--seconds")
+    lasting = (f"run.hold_s={seconds}", f"run.grasp_timeout_s={max(seconds + TO_GRASP_S, 300.0)}")
+    settings = settings_of(pipeline or PIPELINE, gripper, object_name, (*lasting, *options), seed, force)
+    check(settings)
+    rows = HoldRows()
+    trial, interrupted = grasped(settings, (rows,))
+    print_trial(trial, events=False)
+    talk(rows.summary())
+    finish(trial, interrupted)
+
+
+for _option in hold.params:
+    if isinstance(_option, click.Option) and _option.name == "pipeline":
+        _option.help = f"Name of a pipeline, or a .toml file.  [default: {PIPELINE}]"
+
+
+class HoldRows:
+    """Prints what the controller tells, the weaker finger's force beside it, and that force every second."""
+
+    def __init__(self) -> None:
+        self._force_n, self._t_s, self._greatest_n, self._slips, self._shown = 0.0, -inf, 0.0, 0, ""
+
+    def take(self, reading: Reading, phase: int, command: Command) -> None:
+        """Take one tick."""
+        from graspsense.core.values.signals import HOLD
+
+        del command
+        frame = reading.frame
+        self._force_n = min(frame.force_left_n, frame.force_right_n)
+        if phase == HOLD:
+            self._greatest_n = max(self._greatest_n, self._force_n)
+            if frame.t_s - self._t_s >= 1.0:
+                self._row(frame.t_s, "holds")
+
+    def event(self, event: GraspEvent) -> None:
+        """Print an event of the controller; a slip each time, and others once for each second."""
+        from graspsense.core.values.signals import HOLD
+
+        if event.source != "controller":
+            return
+        slip = event.what == "slip"
+        self._slips += slip and event.phase == HOLD
+        if slip or event.what != self._shown or event.t_s - self._t_s >= 1.0:
+            self._row(event.t_s, event.what)
+
+    def _row(self, t_s: float, what: str) -> None:
+        self._t_s, self._shown = t_s, what
+        talk(f"{t_s:8.3f} s  {self._force_n:6.2f} N  {what}")
+
+    def summary(self) -> str:
+        """Return the number of slips, and the greatest force while it was held."""
+        return f"slips: {self._slips}; greatest force while holding: {self._greatest_n:.2f} N"
