@@ -15,6 +15,7 @@ _TABLE: Final[Table] = {
     "Emulated devices": {
         "core.components.emulated": ("EmulatedDevice",),
         "core.components.entries": ("EmulatorEntry",),
+        "core.grasp.emulated_fingers": ("EmulatedFingers", "Goal"),
     },
     "Reading threads and clocks of devices": {
         "core.grasp.reading_thread": ("ReadingThread",),

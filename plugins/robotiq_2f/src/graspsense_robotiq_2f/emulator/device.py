@@ -65,7 +65,7 @@ class EmulatedGripper(EmulatedDevice):
     @property
     def body_report(self) -> Mapping[str, float | int | str | bool]:
         """What the body knows."""
-        return self._hand.body.report()
+        return self._hand.fingers.body.report()
 
     @property
     def words(self) -> Mapping[str, str]:
@@ -104,8 +104,8 @@ class EmulatedGripper(EmulatedDevice):
                 "plugged": self._port is not None,
                 "mood": self._mood_now(),
                 "requests": self._requests,
-                "gap_m": round(self._hand.gap_m, 5),
-                "effort_n": round(self._hand.effort_n, 3),
+                "gap_m": round(self._hand.fingers.gap_m, 5),
+                "effort_n": round(self._hand.fingers.effort_n, 3),
                 "going": self._hand.going,
                 "failed": self._failed,
             }
