@@ -32,6 +32,7 @@ _TABLE: Final[Table] = {
     "Calibration: from cell counts to newtons": {
         "core.grasp.calibration": (
             "LoadTable",
+            "asked_force",
             "cells_force",
             "edge_force",
             "load_of",
@@ -42,6 +43,7 @@ _TABLE: Final[Table] = {
         ),
         "core.grasp.calibration_files": (
             "calibrations_of",
+            "stored_delivered_force",
             "stored_friction",
             "stored_gain",
             "stored_tables",

@@ -33,6 +33,7 @@ class Shipped:
 _PR2 = Shipped("graspsense-pr2-gripper", "pr2_gripper", "pr2")
 _SIM = Shipped("graspsense-sim-gripper", "sim_gripper", "sim")
 _MUJOCO = Shipped("graspsense-mujoco-gripper", "mujoco_gripper", "mujoco")
+_FRANKA = Shipped("graspsense-franka-hand", "franka_hand", "franka")
 _ROBOTIQ = Shipped("graspsense-robotiq-2f", "robotiq_2f", "robotiq")
 _C45 = Shipped("graspsense-c45", "c45", "c45")
 _PAPER = Shipped("graspsense-paper", "paper", "paper")
@@ -42,8 +43,10 @@ SHIPPED: Final[dict[tuple[Role, str], Shipped]] = {
     ("sensor-backend", "pr2"): _PR2,
     ("sensor-backend", "sim"): _SIM,
     ("sensor-backend", "mujoco"): _MUJOCO,
+    ("sensor-backend", "franka"): _FRANKA,
     ("sensor-backend", "robotiq"): _ROBOTIQ,
     ("feature-set", "chitta-without-pads"): _ROBOTIQ,
+    ("feature-set", "width-and-time"): _FRANKA,
     ("classifier", "c45"): _C45,
 }
 """Components in other distributions of this project, for the hint if one is not installed."""

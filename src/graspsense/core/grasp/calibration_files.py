@@ -1,6 +1,6 @@
 """Calibration files: a folder for each serial number, and in it a file for each kind, with its version and hash.
 
-    FOLDER/SERIAL/tare.json, gain.json, load-cell.json, friction.json
+    FOLDER/SERIAL/tare.json, gain.json, load-cell.json, friction.json, delivered-force.json
 
 A file names the device that it was made on; its use with another device is an error.
 """
@@ -26,7 +26,7 @@ from graspsense.core.values.errors import ConfigError, DataDamaged
 
 FORMAT: Final = "graspsense-calibration"
 VERSION: Final = 1
-KINDS: Final = ("tare", "gain", "load-cell", "friction")
+KINDS: Final = ("tare", "gain", "load-cell", "friction", "delivered-force")
 UNCALIBRATED: Final = "none"
 """The value of the setting for the use without calibration."""
 
@@ -207,15 +207,13 @@ def stored_gain(calibration: Calibration) -> tuple[Cells, Cells]:
 
 def stored_tables(calibration: Calibration) -> tuple[LoadTable, LoadTable]:
     """Return the stored load tables of the left and of the right pad."""
-    tables = []
-    for side in ("left", "right"):
-        pads, loads = _numbers(calibration.data[side]["pad_n"]), _numbers(calibration.data[side]["load_n"])
-        if len(pads) != len(loads) or len(pads) < 2:
-            raise ValueError(f"the {side} load table has {len(pads)} and {len(loads)} numbers")
-        if any(a >= b for a, b in pairwise(pads)) or list(loads) != sorted(loads):
-            raise ValueError(f"the {side} load table does not rise")
-        tables.append(LoadTable(pads, loads))
-    return tables[0], tables[1]
+    left, right = calibration.data["left"], calibration.data["right"]
+    return _table(left, "pad_n", "load_n"), _table(right, "pad_n", "load_n")
+
+
+def stored_delivered_force(calibration: Calibration) -> LoadTable:
+    """Return the stored table from the force asked for (N) to the force that the gripper delivered (N)."""
+    return _table(calibration.data, "asked_n", "delivered_n")
 
 
 def stored_friction(calibration: Calibration) -> tuple[Cells, Cells, Cells]:
@@ -231,7 +229,17 @@ _READERS: Final = {
     "gain": stored_gain,
     "load-cell": stored_tables,
     "friction": stored_friction,
+    "delivered-force": stored_delivered_force,
 }
+
+
+def _table(data: Mapping[str, Any], given: str, measured: str) -> LoadTable:
+    forces, loads = _numbers(data[given]), _numbers(data[measured])
+    if len(forces) != len(loads) or len(forces) < 2:
+        raise ValueError(f"the table has {len(forces)} and {len(loads)} forces")
+    if any(a >= b for a, b in pairwise(forces)) or list(loads) != sorted(loads):
+        raise ValueError("the table does not rise")
+    return LoadTable(forces, loads)
 
 
 def _numbers(values: Any) -> Cells:
