@@ -63,10 +63,11 @@ class HandServer:
             while not self._closed.is_set():
                 sources = [self._door, *([] if self._host is None else [self._host])]
                 ready, _, _ = select.select(sources, [], [], LOOK_S)
-                if self._door in ready:
-                    self._accept()
+                # First of the present host: it may have gone, and come back.
                 if self._host is not None and self._host in ready:
                     self._hear(self._host)
+                if self._door in ready:
+                    self._accept()
                 self._look()
         except Exception as error:
             # The simulated fingers can be a user's code and fail; the host then sees a hand that is gone.
