@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from contextlib import suppress
 
 import numpy as np
 import pytest
@@ -245,14 +246,10 @@ REQUESTS = st.one_of(
 
 @given(st.lists(REQUESTS, max_size=5), st.integers(1, 20))
 def test_requests_in_any_pieces_are_taken(given_requests, size):
-    data = b"".join(
-        request_bytes(command, k, *values) for k, (command, *values) in enumerate(given_requests)
-    )
+    data = b"".join(request_bytes(command, k, *values) for k, (command, *values) in enumerate(given_requests))
     requests = Requests()
     found = [
-        request
-        for start in range(0, len(data), size)
-        for request in requests.fed(data[start : start + size])
+        request for start in range(0, len(data), size) for request in requests.fed(data[start : start + size])
     ]
     assert found == [
         Request(command, k, tuple(values)) for k, (command, *values) in enumerate(given_requests)
@@ -261,10 +258,9 @@ def test_requests_in_any_pieces_are_taken(given_requests, size):
 
 @given(st.binary(max_size=200))
 def test_any_bytes_are_requests_or_refused(data):
-    try:
-        Requests().fed(data)
-    except ProtocolError as error:
-        assert "command" in str(error)
+    with suppress(ProtocolError):
+        for request in Requests().fed(data):
+            assert request.command <= STOP
 
 
 def test_a_state_has_the_layout_of_the_protocol():
@@ -273,7 +269,10 @@ def test_a_state_has_the_layout_of_the_protocol():
 
 @given(
     st.lists(
-        st.tuples(st.floats(1.0, 100.0), st.floats(1.0, 100.0)), min_size=2, max_size=8, unique_by=lambda x: x[0]
+        st.tuples(st.floats(1.0, 100.0), st.floats(1.0, 100.0)),
+        min_size=2,
+        max_size=8,
+        unique_by=lambda x: x[0],
     ),
     st.floats(0.0, 150.0),
 )
@@ -290,7 +289,14 @@ def test_the_force_to_ask_for_never_delivers_more_than_is_wanted(readings, wante
 def test_delivered_force_is_stored_and_used(tmp_path):
     readings = tmp_path / "readings.csv"
     readings.write_text("asked_n,delivered_n\n20,30\n40,50\n60,70\n60,74\n")
-    options = ["--gripper", "franka", "-o", "gripper.host=emulated", "-o", f"gripper.calibration={tmp_path}/kept"]
+    options = [
+        "--gripper",
+        "franka",
+        "-o",
+        "gripper.host=emulated",
+        "-o",
+        f"gripper.calibration={tmp_path}/kept",
+    ]
     (tmp_path / "kept").mkdir(mode=0o700)
     done = CliRunner().invoke(cli, ["calibrate", "delivered-force", str(readings), *options, "--json"])
     assert done.exit_code == 0, done.output
@@ -309,7 +315,14 @@ def test_delivered_force_is_stored_and_used(tmp_path):
 def test_damaged_readings_are_refused_with_their_line(tmp_path):
     readings = tmp_path / "readings.csv"
     readings.write_text("asked_n,delivered_n\n20,30\n40,\n")
-    options = ["--gripper", "franka", "-o", "gripper.host=emulated", "-o", f"gripper.calibration={tmp_path}/kept"]
+    options = [
+        "--gripper",
+        "franka",
+        "-o",
+        "gripper.host=emulated",
+        "-o",
+        f"gripper.calibration={tmp_path}/kept",
+    ]
     done = CliRunner().invoke(cli, ["calibrate", "delivered-force", str(readings), *options])
     assert isinstance(done.exception, DataDamaged)
     assert ":3:" in str(done.exception)
@@ -325,6 +338,5 @@ def test_a_lost_hand_is_said_with_its_address():
     )
     driver.open(0)
     with pytest.raises(DeviceLost, match="emulated"):
-        for _ in range(10):
-            driver.read(1.0)
+        [driver.read(1.0) for _ in range(10)]
     driver.close()

@@ -22,7 +22,6 @@ from graspsense_robotiq_2f.registers import MODELS, byte_of
 
 PATIENT_S = 60.0
 """For a reply that comes: when it does is this machine's business."""
-EMULATED = ["gripper.port=emulated", f"gripper.reply_timeout_s={PATIENT_S}"]
 
 
 @pytest.fixture
@@ -58,11 +57,10 @@ def emulated():
         gripper.close()
 
 
-@pytest.mark.usefixtures("own_time")
 @parametrize_checks(
     "graspsense-robotiq-2f",
-    keys={"port": "emulated", "reply_timeout_s": PATIENT_S},
-    unplugged={"faults": {"unplug_at_s": 0.5}, "reply_timeout_s": 1.0},
+    keys={"port": "emulated"},
+    unplugged={"faults": {"unplug_at_s": 0.5}},
     absent={"port": "/dev/nowhere"},
 )
 def test_conformance(check):
@@ -83,10 +81,9 @@ def test_a_grasp_over_every_wire(emulated, wire):
     assert not gripper.state()["going"]
 
 
-@pytest.mark.usefixtures("own_time")
 @pytest.mark.parametrize("model", MODELS)
 def test_every_model_closes_with_its_own_limits(model):
-    gripper = create("sensor-backend", "robotiq", model=model, port="emulated", reply_timeout_s=PATIENT_S)
+    gripper = create("sensor-backend", "robotiq", model=model, port="emulated")
     info = gripper.open(1)
     frames = []
     for _ in range(400):
@@ -106,7 +103,6 @@ def test_every_model_closes_with_its_own_limits(model):
     assert gripper.report()["true_peak_force_n"] < 40.0
 
 
-@pytest.mark.usefixtures("own_time")
 @pytest.mark.parametrize("at_s", [0.02, 0.5, 2.0])
 @pytest.mark.parametrize("fault", ["unplug", "silent"])
 def test_a_gripper_lost_in_a_grasp_ends_it_and_is_told(fault, at_s):
@@ -172,9 +168,8 @@ def test_an_active_gripper_is_not_activated_again(emulated):
     driver.close()
 
 
-@pytest.mark.usefixtures("own_time")
 def test_a_slow_velocity_is_a_target_that_moves():
-    gripper = create("sensor-backend", "robotiq", port="emulated", reply_timeout_s=PATIENT_S)
+    gripper = create("sensor-backend", "robotiq", port="emulated")
     gripper.open(0)
     frames = []
     for _ in range(200):

@@ -1,4 +1,4 @@
-"""`graspsense calibrate`: files by device serial with the zero, gains, load table, friction and delivered force of a gripper."""
+"""`graspsense calibrate`: files by device serial with zero, gains, load table, friction and delivered force."""
 
 from __future__ import annotations
 
@@ -122,7 +122,9 @@ def delivered_force(readings: str, replace: bool, as_json: bool, **asked: Any) -
         data = {"asked_n": list(table.pad_n), "delivered_n": list(table.load_n)}
         _store(setup, "delivered-force", data, as_json)
         if not as_json:
-            echo_table(("ASKED N", "DELIVERED N"), [(f"{a:.1f}", f"{b:.1f}") for a, b in zip(*table, strict=True)])
+            echo_table(
+                ("ASKED N", "DELIVERED N"), [(f"{a:.1f}", f"{b:.1f}") for a, b in zip(*table, strict=True)]
+            )
 
 
 @calibrate.command()

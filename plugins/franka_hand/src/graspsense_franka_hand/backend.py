@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections import deque
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -43,7 +42,6 @@ from graspsense_franka_hand.orders import (
     STOP,
     WIDEST_M,
     HandGone,
-    HandState,
     Link,
     Order,
 )

@@ -61,9 +61,7 @@ class WidthAndTime(FeatureSet[WidthAndTimeConfig]):
         times, gaps = times[known], gaps[known]
         if len(gaps) == 0:
             return self.undefined("the grasp has no tick in which the fingers close")
-        found = first_rest(
-            times, gaps, gaps < gaps[0] - MOVED_M, config.rest_speed_m_s, config.rest_window_s
-        )
+        found = first_rest(times, gaps, gaps < gaps[0] - MOVED_M, config.rest_speed_m_s, config.rest_window_s)
         if found is None:
             return self.undefined("the fingers did not come to rest on anything")
         first = found[0]

@@ -21,8 +21,8 @@ from typing import Any, Final, NamedTuple
 LEAST_PERIOD_S: Final = 0.04
 """A faster hand is read 25 times a second."""
 SILENT_S: Final = 0.6
-"""Time without a state after which the hand is given up. libfranka waits for 1 s, and then shuts the connection, so that
-the fingers could not be told to stop any more."""
+"""Time without a state after which the hand is given up. libfranka waits for 1 s, and then shuts the connection, by
+which the fingers could be told to stop."""
 STOP_S: Final = 1.0
 """Longest wait until the hand has answered that it stops."""
 CONNECT_S: Final = 1.0
@@ -152,7 +152,9 @@ class HandProcess:
         except Exception as error:
             _tell(pipe, {"error": f"{error}"})
 
-    def _give(self, pipe: int, kind: str, width_m: float = 0.0, speed: float = 0.0, force_n: float = 0.0) -> None:
+    def _give(
+        self, pipe: int, kind: str, width_m: float = 0.0, speed: float = 0.0, force_n: float = 0.0
+    ) -> None:
         """Give a command, and write why it was refused; nothing if it was not."""
         try:
             if kind == "grasp":

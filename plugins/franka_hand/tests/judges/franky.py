@@ -16,5 +16,6 @@ with MujocoSimulator(enable_visualization=False) as simulator:
     # The fingers cannot go where the thing is.
     robot.set_hand_goal = lambda width_m, speed, force_n: went(max(width_m, THING_M), speed, force_n)
     with franky_sim.SimulationServer(simulator, hostname_candidates=[sys.argv[1]]) as server:
-        print("ready", flush=True)
+        sys.stdout.write("ready\n")
+        sys.stdout.flush()
         server.run_forever()

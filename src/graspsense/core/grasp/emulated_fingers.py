@@ -1,4 +1,4 @@
-"""The fingers of an emulated gripper that goes to its target on its own, over a simulated gripper that takes an effort."""
+"""The fingers of an emulated gripper that goes to its target on its own, over a body that takes an effort."""
 
 from __future__ import annotations
 

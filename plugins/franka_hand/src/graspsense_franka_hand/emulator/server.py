@@ -35,7 +35,9 @@ class HandServer:
     A second host is refused. A host that goes away leaves the fingers as they are, as a real hand does.
     """
 
-    def __init__(self, hand: Hand, mood: Callable[[], str], late_s: float, clock: Callable[[], float]) -> None:
+    def __init__(
+        self, hand: Hand, mood: Callable[[], str], late_s: float, clock: Callable[[], float]
+    ) -> None:
         self._hand, self._mood, self._late_s, self._clock = hand, mood, late_s, clock
         self._door = _door()
         self.where: str = self._door.getsockname()[0]
@@ -120,7 +122,9 @@ class HandServer:
         if self._state_port is not None and now_s >= self._due_s:
             self._due_s = max(self._due_s + 1.0 / RATE_HZ, now_s)
             hand = self._hand
-            data = protocol.state(round(now_s * 1e3), hand.width_m, hand.widest_m, hand.grasped, TEMPERATURE_C)
+            data = protocol.state(
+                round(now_s * 1e3), hand.width_m, hand.widest_m, hand.grasped, TEMPERATURE_C
+            )
             where = self._state_port
             data = data[:-3] if self._mood() == "damaged" else data
             self._send(lambda: self._states.sendto(data, where))

@@ -51,10 +51,10 @@ class Felt(NamedTuple):
 class EmulatedFingertips:
     """Two fingertips whose forces `felt` returns. `heard` and `unasked` are the two sides of a port."""
 
-    def __init__(self, felt: Callable[[], Felt]) -> None:
-        self._felt = felt
+    def __init__(self, felt: Callable[[], Felt], monotonic: Callable[[], float] | None = None) -> None:
+        self._felt, self._monotonic = felt, monotonic or time.monotonic
         self._packets = Packets()
-        self._began_s = time.monotonic()
+        self._began_s = self._monotonic()
         self._period_s = self._due_s = self._pressed_s = 0.0
         self._last = Felt(0.0, 0.0)
         self.sent = 0
@@ -68,7 +68,7 @@ class EmulatedFingertips:
         """Return the packets that are due, with one of each period, none twice."""
         if not self._period_s:
             return b""
-        now_s = time.monotonic() - self._began_s
+        now_s = self._monotonic() - self._began_s
         packets: list[bytes] = []
         while self._due_s <= now_s and len(packets) < MOST_AT_ONCE:
             packets.append(self._measured(self._due_s))
@@ -76,7 +76,7 @@ class EmulatedFingertips:
         return b"".join(packets)
 
     def _reply(self, command: int, given: bytes) -> bytes:
-        now_s = time.monotonic() - self._began_s
+        now_s = self._monotonic() - self._began_s
         if command in AUTOSEND and given:
             self._period_s, self._due_s = given[0] / 1000.0, now_s
         elif command == READ:
