@@ -118,7 +118,7 @@ def delivered_force(readings: str, replace: bool, as_json: bool, **asked: Any) -
 
     with _set_up(asked, replace) as setup:
         columns = _columns(readings, "asked_n", "delivered_n")
-        table = load_table(_rows(readings, columns, "asked_n", "delivered_n"))
+        table = load_table((one, two) for one, two in _rows(readings, columns, "asked_n", "delivered_n"))
         data = {"asked_n": list(table.pad_n), "delivered_n": list(table.load_n)}
         _store(setup, "delivered-force", data, as_json)
         if not as_json:

@@ -79,6 +79,7 @@ class FrankaBackend(SensorBackend[FrankaConfig]):
     def __init__(self, config: FrankaConfig) -> None:
         super().__init__(config)
         self._link: Link | None = None
+        self._waiting: Order | None = None
         self._table: LoadTable | None = None
         self._frames = self._sent = 0
         self._body_report: Mapping[str, float | int | str | bool] = {}
@@ -145,7 +146,7 @@ class FrankaBackend(SensorBackend[FrankaConfig]):
         self._velocity_m_s = (state.width_m - start_m) / (t_s - start_s) if t_s > start_s else 0.0
         self._frames += 1
         frame = Frame(t_s, dt_s, state.width_m, self._velocity_m_s, nan, nan, nan, nan, nan, 0)
-        signals = signal_type(self.channels)(float(state.grasped), state.temperature_c + KELVIN)
+        signals = signal_type(self.channels)(*(float(state.grasped), state.temperature_c + KELVIN))
         return Reading(frame, NO_PADS, signals)
 
     def apply(self, command: Command) -> None:

@@ -47,7 +47,7 @@ class EmulatedGripper(EmulatedDevice):
         self._began_s = time.monotonic()
         self._data = b""
         self._port: SerialPort | None = None
-        self._fingertips = EmulatedFingertips(self._felt) if config.tactile_port == "emulated" else None
+        self._fingertips = EmulatedFingertips(self._felt, seed=seed) if config.tactile_port == "emulated" else None
         self._tactile_port: SerialPort | None = None
         self._told = self._failed = ""
         self._requests = 0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from random import Random
 from typing import Final, NamedTuple
 
 from graspsense_robotiq_2f.tactile_protocol import (
@@ -28,13 +29,16 @@ from graspsense_robotiq_2f.tactile_protocol import (
 PRESSURE_S: Final = 1.0 / 60.0
 COUNTS_PER_N: Final = 1000.0
 """Counts of all cells under one newton: an assumption, as is the shape of the pressure."""
-REST_COUNTS: Final = 200
-"""Counts of a cell that nothing touches."""
+REST_COUNTS: Final = (150, 250)
+"""Counts of cells that nothing touches: each has its own between these."""
+NOISE_COUNTS: Final = 3.0
+"""Standard deviation of a cell: an assumption. One that never changes is stuck, and the protection ends the grasp."""
 G_COUNTS: Final = 16384
 MOST_AT_ONCE: Final = 50
 """Packets that are made up for at once, if the machine was busy."""
+# The thing does not reach the ends of the pad: what raises all cells alike is drift (core/grasp/protection/drift.py).
 _SHAPE: Final = [
-    (1.0 - abs(row - 3) / 4.0) * (1.0 - abs(column - 1.5) / 2.0)
+    (1.0 - abs(row - 3) / 3.0) * (1.0 - abs(column - 1.5) / 2.0)
     for row in range(ROWS)
     for column in range(COLUMNS)
 ]
@@ -51,7 +55,14 @@ class Felt(NamedTuple):
 class EmulatedFingertips:
     """Two fingertips whose forces `felt` returns. `heard` and `unasked` are the two sides of a port."""
 
-    def __init__(self, felt: Callable[[], Felt], monotonic: Callable[[], float] | None = None) -> None:
+    def __init__(
+        self, felt: Callable[[], Felt], monotonic: Callable[[], float] | None = None, seed: int = 0
+    ) -> None:
+        self._random = Random(seed)
+        self.rest = tuple(
+            tuple(self._random.randint(*REST_COUNTS) for _ in range(CELLS)) for _ in range(FINGERS)
+        )
+        """The counts of each cell of each finger that nothing touches."""
         self._felt, self._monotonic = felt, monotonic or time.monotonic
         self._packets = Packets()
         self._began_s = self._monotonic()
@@ -96,7 +107,7 @@ class EmulatedFingertips:
             force_n, before_n = self._last[finger], before[finger]
             fields.append(Field(TIMESTAMP, finger, (round(now_s * 1e6),)))
             if pressed:
-                fields.append(Field(PRESSURE, finger, _cells(force_n)))
+                fields.append(Field(PRESSURE, finger, self._cells(finger, force_n)))
             change = round(min(max((force_n - before_n) * COUNTS_PER_N, -32768.0), 32767.0))
             fields.append(Field(DYNAMIC, finger, (change,)))
             fields.append(Field(ACCELERATION, finger, (0, 0, G_COUNTS)))
@@ -104,7 +115,9 @@ class EmulatedFingertips:
         self.sent += 1
         return encoded(fields)
 
-
-def _cells(force_n: float) -> tuple[int, ...]:
-    counts = max(force_n, 0.0) * COUNTS_PER_N / _TOTAL
-    return tuple(min(REST_COUNTS + round(counts * share), 0xFFFF) for share in _SHAPE[:CELLS])
+    def _cells(self, finger: int, force_n: float) -> tuple[int, ...]:
+        counts = max(force_n, 0.0) * COUNTS_PER_N / _TOTAL
+        return tuple(
+            min(max(round(rest + counts * share + self._random.gauss(0.0, NOISE_COUNTS)), 0), 0xFFFF)
+            for rest, share in zip(self.rest[finger], _SHAPE, strict=True)
+        )

@@ -26,7 +26,7 @@ class LockStepGripper:
         self._config = config
         self._hand = Hand(config, seed)
         self._now_s = 0.0
-        self._tips = EmulatedFingertips(lambda: self._hand.felt, self.monotonic)
+        self._tips = EmulatedFingertips(lambda: self._hand.felt, self.monotonic, seed)
 
     @property
     def body_report(self) -> Mapping[str, float | int | str | bool]:
