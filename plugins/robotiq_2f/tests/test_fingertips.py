@@ -207,7 +207,12 @@ def test_what_was_not_asked_for_in_time_is_kept_up_to_three_frames():
 @pytest.mark.parametrize("seed", range(6))
 def test_a_grasp_in_which_one_finger_touches_first_is_not_taken_for_a_fault(seed, thing):
     """Cells without noise were taken for stuck or unplugged ones, and a thing that pressed on all cells for drift."""
-    options = ["gripper.port=emulated", "gripper.tactile_port=emulated", "features.type=chitta", f"run.seed={seed}"]
+    options = [
+        "gripper.port=emulated",
+        "gripper.tactile_port=emulated",
+        "features.type=chitta",
+        f"run.seed={seed}",
+    ]
     trial = load_pipeline("robotiq", options=options).grasp(object=f"{thing}#{seed}")
     assert trial.outcome.words == "steady", trial.reason
     assert not trial.features.reasons

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from math import inf, nan
 from types import MappingProxyType
-from typing import Final, final
+from typing import Any, Final, final
 
 from attrs import evolve
 
@@ -146,7 +146,8 @@ class FrankaBackend(SensorBackend[FrankaConfig]):
         self._velocity_m_s = (state.width_m - start_m) / (t_s - start_s) if t_s > start_s else 0.0
         self._frames += 1
         frame = Frame(t_s, dt_s, state.width_m, self._velocity_m_s, nan, nan, nan, nan, nan, 0)
-        signals = signal_type(self.channels)(*(float(state.grasped), state.temperature_c + KELVIN))
+        made: Any = signal_type(self.channels)
+        signals = made(float(state.grasped), state.temperature_c + KELVIN)
         return Reading(frame, NO_PADS, signals)
 
     def apply(self, command: Command) -> None:

@@ -47,6 +47,7 @@ from graspsense_robotiq_2f.registers import (
 )
 from graspsense_robotiq_2f.tactile import CHANNELS, TactileData, TactileFingertips
 from graspsense_robotiq_2f.tactile_protocol import CELLS, COLUMNS, ROWS
+from graspsense_robotiq_2f.ur_cap import PREFIX, UrCapLink, opened_link
 
 RATE_HZ: Final = 100.0
 ACTIVATION_S: Final = 5.0
@@ -93,7 +94,7 @@ class RobotiqBackend(SensorBackend[RobotiqConfig]):
         self._model = MODELS[config.model]
         self.least_force_n = self._model.forces_n[0]
         self.least_step_m = self._model.step_m
-        self._link: ModbusLink | LockStepGripper | None = None
+        self._link: ModbusLink | UrCapLink | LockStepGripper | None = None
         self._fingertips: TactileFingertips | LockStepFingertips | None = None
         self._time: Any = time
         self._pads = NO_PADS
@@ -106,8 +107,9 @@ class RobotiqBackend(SensorBackend[RobotiqConfig]):
 
     @property
     def channels(self) -> tuple[Channel, ...]:
-        """Those of the bare gripper, and with fingertips their forces and cells."""
-        return BARE + PADS if self.config.tactile_port else BARE
+        """Those of the bare gripper, and with fingertips their forces and cells. A UR cap does not tell the current."""
+        bare = BARE[:2] if self.config.port.startswith(PREFIX) else BARE
+        return bare + PADS if self.config.tactile_port else bare
 
     def objects(self) -> Sequence[ObjectKind]:
         """Return what the body of the emulated gripper can hold."""
@@ -132,7 +134,7 @@ class RobotiqBackend(SensorBackend[RobotiqConfig]):
             if config.port == "emulated":
                 self._link = self._time = LockStepGripper(config, seed)
             else:
-                self._link = ModbusLink(config.port, config.address, config.reply_timeout_s)
+                self._link = opened_link(config.port, config.address, config.reply_timeout_s)
                 self._time = time
             status = self._activated()
             self._open_fingertips()
@@ -164,7 +166,8 @@ class RobotiqBackend(SensorBackend[RobotiqConfig]):
         self._recent.append((t_s, gap_m))
         (start_s, start_m), span = self._recent[0], len(self._recent)
         velocity = (gap_m - start_m) / (t_s - start_s) if span > 1 else 0.0
-        effort = status.current * AMPERES_A_STEP * self.config.newtons_per_ampere
+        told = not isinstance(self._link, UrCapLink)
+        effort = status.current * AMPERES_A_STEP * self.config.newtons_per_ampere if told else nan
         self._frames += 1
         forces, signals = self._felt()
         return Reading(

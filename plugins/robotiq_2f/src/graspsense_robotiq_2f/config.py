@@ -41,7 +41,8 @@ class RobotiqConfig:
     )
     port: str = setting(
         default="/dev/ttyUSB0",
-        meaning="A serial port; socket:HOST:PORT for RTU through a socket; or emulated, a gripper in software.",
+        meaning="A serial port; socket:HOST:PORT for RTU through a socket; ur:HOST for the UR cap of a robot; or "
+        "emulated, a gripper in software.",
     )
     tactile_port: str = setting(
         default="",

@@ -13,6 +13,8 @@ from graspsense_robotiq_2f.emulator.fingertips import EmulatedFingertips, Felt
 from graspsense_robotiq_2f.emulator.hand import Hand
 from graspsense_robotiq_2f.emulator.modbus import answered
 from graspsense_robotiq_2f.emulator.port import SerialPort
+from graspsense_robotiq_2f.emulator.ur_cap import answered as answered_by_ur_cap
+from graspsense_robotiq_2f.ur_cap import PREFIX
 
 RATE_HZ: Final = 100.0
 TACTILE_TICK_S: Final = 0.001
@@ -28,7 +30,10 @@ MOODS: Final = {
 
 
 def emulate(config: object, wire: str, seed: int) -> EmulatedGripper:
-    """Return an emulated gripper not connected yet, on a `pty` (by default) or a `socket`. Raises ConfigError."""
+    """Return an emulated gripper not connected yet, on a `pty` (by default), a `socket`, or as a `ur` cap.
+
+    Raises ConfigError.
+    """
     assert isinstance(config, RobotiqConfig)
     return EmulatedGripper(config, wire or "pty", seed)
 
@@ -47,7 +52,9 @@ class EmulatedGripper(EmulatedDevice):
         self._began_s = time.monotonic()
         self._data = b""
         self._port: SerialPort | None = None
-        self._fingertips = EmulatedFingertips(self._felt, seed=seed) if config.tactile_port == "emulated" else None
+        self._fingertips = (
+            EmulatedFingertips(self._felt, seed=seed) if config.tactile_port == "emulated" else None
+        )
         self._tactile_port: SerialPort | None = None
         self._told = self._failed = ""
         self._requests = 0
@@ -55,7 +62,9 @@ class EmulatedGripper(EmulatedDevice):
     @property
     def where(self) -> str:
         """What `gripper.port` has to be, empty while it is unplugged."""
-        return "" if self._port is None else self._port.where
+        if self._port is None:
+            return ""
+        return self._port.where.replace("socket:", PREFIX) if self.wire == "ur" else self._port.where
 
     @property
     def tactile_where(self) -> str:
@@ -151,9 +160,11 @@ class EmulatedGripper(EmulatedDevice):
                 self.tell("unplug")
                 return b""
             try:
-                reply, self._data = answered(
-                    self._hand, self._config.address, self._data + data, self._now_s()
-                )
+                data = self._data + data
+                if self.wire == "ur":
+                    reply, self._data = answered_by_ur_cap(self._hand, data, self._now_s())
+                else:
+                    reply, self._data = answered(self._hand, self._config.address, data, self._now_s())
             except Exception as error:
                 # The simulated fingers can be a user's code and fail; the host then sees a lost device.
                 self._failed = f"{type(error).__name__}: {error}"

@@ -43,6 +43,11 @@ class Hand:
         self.active_since_s = inf
 
     @property
+    def registers(self) -> tuple[int, ...]:
+        """The output registers as they were written last."""
+        return tuple(self._registers)
+
+    @property
     def felt(self) -> Felt:
         """The forces on the pads of the body."""
         return Felt(*self.fingers.forces_n)
