@@ -56,11 +56,12 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("folder", type=Path)
-    summary = summarise(Results(parser.parse_args().folder))
+    results = Results(parser.parse_args().folder)
+    summary = summarise(results.experiment(), results)
     text = PAGE.read_text(encoding="utf-8")
     before, rest = text.split(BEGIN)
     after = rest.split(END)[1]
-    written = f"{BEGIN}\nMeasured: {where_measured()}.\n\n{tables(summary)}\n{END}"
+    written = f"{BEGIN}\nMeasured: {where_measured().partition(', python')[0]}.\n\n{tables(summary)}\n{END}"
     PAGE.write_text(before + written + after, encoding="utf-8")
 
 

@@ -30,7 +30,7 @@ from graspsense.testing_api import a_trial, parametrize_checks
 from graspsense_franka_hand import link, protocol
 from graspsense_franka_hand.config import FrankaConfig
 from graspsense_franka_hand.discovery import diagnose
-from graspsense_franka_hand.emulator.hand import Hand
+from graspsense_franka_hand.emulator.hand import FrankaHand
 from graspsense_franka_hand.protocol import (
     ABORTED,
     CONNECT,
@@ -39,8 +39,8 @@ from graspsense_franka_hand.protocol import (
     MOVE,
     STOP,
     SUCCESS,
-    ProtocolError,
-    Request,
+    HandRequest,
+    NotARequest,
     Requests,
     request_bytes,
 )
@@ -212,26 +212,26 @@ def test_without_pylibfranka_the_user_is_told_what_to_install(monkeypatch):
 
 
 def _hand():
-    hand = Hand(FrankaConfig(host="emulated"), 1)
+    hand = FrankaHand(FrankaConfig(host="emulated"), 1)
     hand.look(0.1)
     return hand
 
 
 def test_the_hand_answers_each_command_as_libfranka_expects():
     hand = _hand()
-    hand.ask(Request(GRASP, 1, (0.0, 1.0, 1.0, 0.05, 40.0)), 0.1)
-    hand.ask(Request(MOVE, 2, (0.07, 0.05)), 0.2)
-    assert hand.ended() == [(Request(GRASP, 1, (0.0, 1.0, 1.0, 0.05, 40.0)), ABORTED)]
+    hand.ask(HandRequest(GRASP, 1, (0.0, 1.0, 1.0, 0.05, 40.0)), 0.1)
+    hand.ask(HandRequest(MOVE, 2, (0.07, 0.05)), 0.2)
+    assert hand.ended() == [(HandRequest(GRASP, 1, (0.0, 1.0, 1.0, 0.05, 40.0)), ABORTED)]
     hand.look(2.0)
     assert [status for _, status in hand.ended()] == [SUCCESS]
-    hand.ask(Request(MOVE, 3, (0.2, 0.05)), 2.0)
+    hand.ask(HandRequest(MOVE, 3, (0.2, 0.05)), 2.0)
     assert [status for _, status in hand.ended()] == [FAILED]
-    hand.ask(Request(GRASP, 4, (0.0, 1.0, 1.0, 0.05, 40.0)), 2.1)
+    hand.ask(HandRequest(GRASP, 4, (0.0, 1.0, 1.0, 0.05, 40.0)), 2.1)
     hand.look(6.0)
     assert [status for _, status in hand.ended()] == [SUCCESS]
     assert hand.grasped
     assert hand.pressing
-    hand.ask(Request(STOP, 5, ()), 6.0)
+    hand.ask(HandRequest(STOP, 5, ()), 6.0)
     assert not hand.pressing
     hand.close()
 
@@ -252,13 +252,13 @@ def test_requests_in_any_pieces_are_taken(given_requests, size):
         request for start in range(0, len(data), size) for request in requests.fed(data[start : start + size])
     ]
     assert found == [
-        Request(command, k, tuple(values)) for k, (command, *values) in enumerate(given_requests)
+        HandRequest(command, k, tuple(values)) for k, (command, *values) in enumerate(given_requests)
     ]
 
 
 @given(st.binary(max_size=200))
 def test_any_bytes_are_requests_or_refused(data):
-    with suppress(ProtocolError):
+    with suppress(NotARequest):
         for request in Requests().fed(data):
             assert request.command <= STOP
 

@@ -31,7 +31,7 @@ from graspsense.plugin_api import (
     signal_type,
 )
 from graspsense_franka_hand.config import EMULATED, FrankaConfig
-from graspsense_franka_hand.emulator.lock_step import LockStepLink
+from graspsense_franka_hand.emulator.lock_step import LockStepHand
 from graspsense_franka_hand.link import LibfrankaLink
 from graspsense_franka_hand.orders import (
     FASTEST_M_S,
@@ -42,7 +42,7 @@ from graspsense_franka_hand.orders import (
     STOP,
     WIDEST_M,
     HandGone,
-    Link,
+    HandLink,
     Order,
 )
 
@@ -78,7 +78,7 @@ class FrankaBackend(SensorBackend[FrankaConfig]):
 
     def __init__(self, config: FrankaConfig) -> None:
         super().__init__(config)
-        self._link: Link | None = None
+        self._link: HandLink | None = None
         self._waiting: Order | None = None
         self._table: LoadTable | None = None
         self._frames = self._sent = 0
@@ -106,7 +106,7 @@ class FrankaBackend(SensorBackend[FrankaConfig]):
         self._table = None if delivered is None else stored_delivered_force(delivered)
         try:
             if config.host == EMULATED:
-                link: Link = LockStepLink(config, seed)
+                link: HandLink = LockStepHand(config, seed)
                 first = link.newest(1.0)
                 assert first is not None
             else:
@@ -176,13 +176,13 @@ class FrankaBackend(SensorBackend[FrankaConfig]):
         if link is not None:
             with suppress(HandGone):
                 link.close()
-            if isinstance(link, LockStepLink):
+            if isinstance(link, LockStepHand):
                 self._body_report = link.body_report
 
     def report(self) -> dict[str, float | int | str | bool]:
         """Return the number of frames and of orders, with what the emulated body knows."""
         link = self._link
-        body = link.body_report if isinstance(link, LockStepLink) else self._body_report
+        body = link.body_report if isinstance(link, LockStepHand) else self._body_report
         return {**body, "frames": self._frames, "orders": self._sent}
 
     def dry_run_backend(self) -> FrankaBackend:

@@ -47,7 +47,7 @@ class HandGone(Exception):
     """The hand cannot be reached, or no longer; the text says why."""
 
 
-class Link(Protocol):
+class HandLink(Protocol):
     """A connection to a hand."""
 
     def newest(self, timeout_s: float) -> HandState | None:

@@ -31,7 +31,7 @@ _STATUS: Final = struct.Struct("<H")
 _CONNECTED: Final = struct.Struct("<HH")
 
 
-class Request(NamedTuple):
+class HandRequest(NamedTuple):
     """A command with its number and its values."""
 
     command: int
@@ -39,11 +39,11 @@ class Request(NamedTuple):
     values: tuple[float, ...]
 
 
-class ProtocolError(Exception):
+class NotARequest(Exception):
     """Bytes that are no request."""
 
 
-def reply(request: Request, status: int) -> bytes:
+def reply(request: HandRequest, status: int) -> bytes:
     """Return the reply to a command; to a connection with the version of the protocol."""
     data = _CONNECTED.pack(status, VERSION) if request.command == CONNECT else _STATUS.pack(status)
     return HEADER.pack(request.command, request.number, HEADER.size + len(data)) + data
@@ -67,17 +67,17 @@ class Requests:
     def __init__(self) -> None:
         self._data = b""
 
-    def fed(self, data: bytes) -> list[Request]:
-        """Take bytes and return the complete requests. Raises ProtocolError."""
+    def fed(self, data: bytes) -> list[HandRequest]:
+        """Take bytes and return the complete requests. Raises NotARequest."""
         self._data += data
         found = []
         while len(self._data) >= HEADER.size:
             command, number, length = HEADER.unpack_from(self._data)
             layout = REQUESTS.get(command)
             if layout is None or length != HEADER.size + layout.size:
-                raise ProtocolError(f"command {command} with {length} bytes")
+                raise NotARequest(f"command {command} with {length} bytes")
             if len(self._data) < length:
                 break
-            found.append(Request(command, number, layout.unpack_from(self._data, HEADER.size)))
+            found.append(HandRequest(command, number, layout.unpack_from(self._data, HEADER.size)))
             self._data = self._data[length:]
         return found

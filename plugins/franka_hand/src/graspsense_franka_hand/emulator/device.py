@@ -7,7 +7,7 @@ from typing import Final, final
 
 from graspsense.gripper_api import EmulatedDevice
 from graspsense_franka_hand.config import FrankaConfig
-from graspsense_franka_hand.emulator.hand import Hand
+from graspsense_franka_hand.emulator.hand import FrankaHand
 from graspsense_franka_hand.emulator.server import HandServer, real_time
 from graspsense_franka_hand.orders import RATE_HZ
 
@@ -36,7 +36,7 @@ class EmulatedHand(EmulatedDevice):
 
     def __init__(self, config: FrankaConfig, seed: int) -> None:
         self._config = config
-        self.hand = Hand(config, seed)
+        self.hand = FrankaHand(config, seed)
         self._clock = real_time()
         self._server: HandServer | None = None
         self._told = self._failed = ""

@@ -16,7 +16,7 @@ from graspsense_franka_hand.protocol import (
     STOP,
     SUCCESS,
     UNSUCCESSFUL,
-    Request,
+    HandRequest,
 )
 
 REST_S: Final = 0.1
@@ -28,7 +28,7 @@ STALLED_S: Final = 100.0
 TEMPERATURE_C: Final = 30
 
 
-class Hand:
+class FrankaHand:
     """A hand of these settings, at the time (s) that each call gives. Raises ConfigError for an unfit body."""
 
     def __init__(self, config: FrankaConfig, seed: int) -> None:
@@ -38,9 +38,9 @@ class Hand:
         self.fingers = EmulatedFingers(config.body, values, WIDEST_M, seed)
         self.widest_m = WIDEST_M
         self.grasped = False
-        self._running: Request | None = None
+        self._running: HandRequest | None = None
         self._began_s = 0.0
-        self._ended: list[tuple[Request, int]] = []
+        self._ended: list[tuple[HandRequest, int]] = []
 
     @property
     def width_m(self) -> float:
@@ -52,7 +52,7 @@ class Hand:
         """Whether the motor is on."""
         return self.fingers.goal is not None
 
-    def ask(self, request: Request, now_s: float) -> None:
+    def ask(self, request: HandRequest, now_s: float) -> None:
         """Begin a command. The one that runs is aborted."""
         self.look(now_s)
         self.abort()
@@ -97,7 +97,7 @@ class Hand:
         elif now_s - self._began_s > STALLED_S:
             self._end(request, UNSUCCESSFUL)
 
-    def ended(self) -> list[tuple[Request, int]]:
+    def ended(self) -> list[tuple[HandRequest, int]]:
         """Return the commands that have ended since the last call, each with its status."""
         ended, self._ended = self._ended, []
         return ended
@@ -106,6 +106,6 @@ class Hand:
         """Release the body."""
         self.fingers.close()
 
-    def _end(self, request: Request, status: int) -> None:
+    def _end(self, request: HandRequest, status: int) -> None:
         self._running = None
         self._ended.append((request, status))

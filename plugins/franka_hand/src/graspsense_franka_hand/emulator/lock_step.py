@@ -7,19 +7,19 @@ from typing import final
 
 from graspsense_franka_hand import orders, protocol
 from graspsense_franka_hand.config import FrankaConfig
-from graspsense_franka_hand.emulator.hand import TEMPERATURE_C, Hand
+from graspsense_franka_hand.emulator.hand import TEMPERATURE_C, FrankaHand
 from graspsense_franka_hand.orders import ANY_WIDTH_M, RATE_HZ, HandGone, HandState, Order
 
 _COMMANDS = {orders.GRASP: protocol.GRASP, orders.MOVE: protocol.MOVE, orders.STOP: protocol.STOP}
 
 
 @final
-class LockStepLink:
+class LockStepHand:
     """An emulated hand of these settings. Raises HandGone if it is to be another version, ConfigError for its body."""
 
     def __init__(self, config: FrankaConfig, seed: int) -> None:
         self._faults = config.faults
-        self.hand = Hand(config, seed)
+        self.hand = FrankaHand(config, seed)
         self._now_s = 0.0
         self._done = 0
         self._refused = ""
@@ -62,12 +62,12 @@ class LockStepLink:
             values = (order.width_m, ANY_WIDTH_M, ANY_WIDTH_M, order.speed_m_s, order.force_n)
         elif order.kind == orders.MOVE:
             values = (order.width_m, order.speed_m_s)
-        self.hand.ask(protocol.Request(_COMMANDS[order.kind], 0, values), self._now_s)
+        self.hand.ask(protocol.HandRequest(_COMMANDS[order.kind], 0, values), self._now_s)
         self._count()
 
     def close(self) -> None:
         """Stop the fingers, and release the body."""
-        self.hand.ask(protocol.Request(protocol.STOP, 0, ()), self._now_s)
+        self.hand.ask(protocol.HandRequest(protocol.STOP, 0, ()), self._now_s)
         self.hand.close()
 
     def _check(self) -> None:

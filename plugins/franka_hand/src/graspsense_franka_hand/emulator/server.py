@@ -14,9 +14,9 @@ from typing import Final, final
 
 from graspsense.gripper_api import GraspsenseError
 from graspsense_franka_hand import protocol
-from graspsense_franka_hand.emulator.hand import TEMPERATURE_C, Hand
+from graspsense_franka_hand.emulator.hand import TEMPERATURE_C, FrankaHand
 from graspsense_franka_hand.orders import RATE_HZ
-from graspsense_franka_hand.protocol import CONNECT, ProtocolError, Request, Requests
+from graspsense_franka_hand.protocol import CONNECT, HandRequest, NotARequest, Requests
 
 LOOK_S: Final = 0.005
 """How often the fingers move on."""
@@ -36,7 +36,7 @@ class HandServer:
     """
 
     def __init__(
-        self, hand: Hand, mood: Callable[[], str], late_s: float, clock: Callable[[], float]
+        self, hand: FrankaHand, mood: Callable[[], str], late_s: float, clock: Callable[[], float]
     ) -> None:
         self._hand, self._mood, self._late_s, self._clock = hand, mood, late_s, clock
         self._door = _door()
@@ -97,7 +97,7 @@ class HandServer:
             return
         try:
             requests = self._requests.fed(data)
-        except ProtocolError:
+        except NotARequest:
             self._hang_up()
             return
         for request in requests:
@@ -106,7 +106,7 @@ class HandServer:
             elif self._state_port is not None:
                 self._hand.ask(request, self._clock())
 
-    def _connect(self, host: socket.socket, request: Request) -> None:
+    def _connect(self, host: socket.socket, request: HandRequest) -> None:
         version, port = map(int, request.values)
         if version != protocol.VERSION or self._mood() == "old":
             self._reply(request, protocol.INCOMPATIBLE)
@@ -132,7 +132,7 @@ class HandServer:
             with suppress(OSError):
                 heapq.heappop(self._later)[2]()
 
-    def _reply(self, request: Request, status: int) -> None:
+    def _reply(self, request: HandRequest, status: int) -> None:
         host, data = self._host, protocol.reply(request, status)
         if host is not None:
             if self._mood() == "damaged":
