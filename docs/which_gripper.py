@@ -61,7 +61,12 @@ def main() -> None:
     text = PAGE.read_text(encoding="utf-8")
     before, rest = text.split(BEGIN)
     after = rest.split(END)[1]
-    written = f"{BEGIN}\nMeasured: {where_measured().partition(', python')[0]}.\n\n{tables(summary)}\n{END}"
+    measured = where_measured().partition(", python")[0]
+    written = f"{BEGIN}
+Measured: {measured}.
+
+{tables(summary)}
+{END}"
     PAGE.write_text(before + written + after, encoding="utf-8")
 
 
