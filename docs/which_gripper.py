@@ -62,11 +62,7 @@ def main() -> None:
     before, rest = text.split(BEGIN)
     after = rest.split(END)[1]
     measured = where_measured().partition(", python")[0]
-    written = f"{BEGIN}
-Measured: {measured}.
-
-{tables(summary)}
-{END}"
+    written = f"{BEGIN}\nMeasured: {measured}.\n\n{tables(summary)}\n{END}"
     PAGE.write_text(before + written + after, encoding="utf-8")
 
 
