@@ -54,7 +54,7 @@ class HandProcess:
     def __init__(self, host: str) -> None:
         self._host = host
         self._hand = _connected(host)
-        self._reader = _forked(self._read_states)
+        self._reader: Fork | None = _forked(self._read_states)
         self._giver: Fork | None = None
         self._orders = self._states = b""
         self._done = 0
@@ -66,13 +66,15 @@ class HandProcess:
         heard_s = time.monotonic()
         try:
             while True:
-                sources = [0, self._reader.pipe, *([] if self._giver is None else [self._giver.pipe])]
+                assert self._reader is not None
+                states = self._reader.pipe
+                sources = [0, states, *([] if self._giver is None else [self._giver.pipe])]
                 left_s = heard_s + SILENT_S - time.monotonic()
                 ready, _, _ = select.select(sources, [], [], max(left_s, 0.0))
                 if self._giver is not None and self._giver.pipe in ready:
                     self._given()
-                if self._reader.pipe in ready:
-                    self._pass_on()
+                if states in ready:
+                    self._pass_on(os.read(states, 65536))
                     heard_s = time.monotonic()
                 elif left_s <= 0.0:
                     raise Gone(f"no state came for {SILENT_S:g} s")
@@ -83,13 +85,13 @@ class HandProcess:
                     self._take(data)
                     heard_s = time.monotonic()
         finally:
-            self._reader.end()
+            if self._reader is not None:
+                self._reader.end()
             # Who only looks does not let go of what the hand holds.
             if self._ordered:
                 self._stop()
 
-    def _pass_on(self) -> None:
-        data = os.read(self._reader.pipe, 65536)
+    def _pass_on(self, data: bytes) -> None:
         *lines, self._states = (self._states + data).split(b"\n")
         for line in lines:
             message = json.loads(line)
@@ -110,8 +112,9 @@ class HandProcess:
             self._done += 1
             self._stop()
             # An answer to what was given up could be taken for that to the next command.
-            self._reader.end()
-            self._hand = None
+            if self._reader is not None:
+                self._reader.end()
+            self._hand = self._reader = None
             self._hand = _connected(self._host)
             self._reader, self._states = _forked(self._read_states), b""
         self._refused = ""
