@@ -67,9 +67,11 @@ PHASES = {
 
 def test_a_grasp_with_pylibfranka(emulated):
     hand = emulated()
+    # Held for longer than by default: a busy machine misses states, and a rest shows in three of them.
     options = [
         f"gripper.host={hand.where}",
         f"run.frame_timeout_s={PATIENT_S / 10}",
+        "run.hold_s=3.0",
         "gripper.calibration=none",
     ]
     trial = load_pipeline("franka", options=options).grasp()
@@ -85,7 +87,7 @@ def test_a_grasp_with_pylibfranka(emulated):
 @pytest.mark.parametrize("mood", ["silent", "damaged", "late"])
 def test_whatever_becomes_of_its_messages_the_hand_is_told_to_stop(emulated, mood, phase):
     """The hand still hears: what it is told last is to stop."""
-    hand = emulated()
+    hand = emulated(faults=FrankaFaults(late_s=0.05))
     driver = _driver(hand)
     PHASES[phase](driver)
     assert hand.state()["pressing"] == (phase != "at rest")
@@ -144,7 +146,12 @@ def test_doctor_tells_a_hand_from_none_and_lets_it_hold_on(emulated):
     driver._link._process.kill()
     driver.close()
     assert hand.state()["pressing"], "who is killed tells nobody to stop"
-    [finding] = diagnose(FrankaConfig(host=hand.where), PATIENT_S)
+    # The forks of the one that was killed let go of the hand at the next state.
+    until_s = time.monotonic() + PATIENT_S
+    while True:
+        [finding] = diagnose(FrankaConfig(host=hand.where), PATIENT_S)
+        if finding.state == "ok" or time.monotonic() > until_s:
+            break
     assert finding.state == "ok"
     assert finding.numbers["width_m"] == pytest.approx(hand.hand.width_m, abs=1e-4)
     assert hand.state()["pressing"]

@@ -20,7 +20,7 @@ from typing import Any, Final, NamedTuple
 
 LEAST_PERIOD_S: Final = 0.04
 """A faster hand is read 25 times a second."""
-SILENT_S: Final = 0.6
+SILENT_S: Final = 0.9
 """Time without a state after which the hand is given up. libfranka waits for 1 s, and then shuts the connection, by
 which the fingers could be told to stop."""
 STOP_S: Final = 1.0
@@ -119,7 +119,7 @@ class HandProcess:
             self._reader, self._states = _forked(self._read_states), b""
         self._refused = ""
         order = json.loads(lines[-1])
-        self._giver = _forked(lambda pipe: self._give(pipe, *order))
+        self._giver = _forked(lambda pipe: self._give(pipe, *order), self._reader)
 
     def _given(self) -> None:
         assert self._giver is not None
@@ -170,14 +170,18 @@ class HandProcess:
             os.write(pipe, f"{error}".encode()[:500])
 
 
-def _forked(work: Callable[[int], None]) -> Fork:
-    """Return a fork that does this with its end of a pipe, and then ends."""
+def _forked(work: Callable[[int], None], other: Fork | None = None) -> Fork:
+    """Return a fork that does this with its end of a pipe, and then ends; `other` is one that runs already."""
     reading, writing = os.pipe()
     process = os.fork()
     if process:
         os.close(writing)
         return Fork(process, reading)
     try:
+        # Who writes to a pipe learns that this process was killed only if no fork can read from it.
+        os.close(reading)
+        if other is not None:
+            os.close(other.pipe)
         work(writing)
     finally:
         os._exit(0)

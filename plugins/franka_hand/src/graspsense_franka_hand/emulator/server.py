@@ -20,6 +20,8 @@ from graspsense_franka_hand.protocol import CONNECT, HandRequest, NotARequest, R
 
 LOOK_S: Final = 0.005
 """How often the fingers move on."""
+MOST_STEP_S: Final = 0.05
+"""Most time by which the fingers move on at once: on a busy machine they are slow, and states still come."""
 HOSTS: Final = tuple(f"127.0.0.{i}" for i in range(1, 33))
 """The port is fixed, so that each hand has an address of its own."""
 
@@ -46,6 +48,7 @@ class HandServer:
         self._state_port: tuple[str, int] | None = None
         self._requests = Requests()
         self._due_s = 0.0
+        self._hand_s = clock()
         self._later: list[tuple[float, int, Callable[[], object]]] = []
         self._numbers = itertools.count()
         self.failed = ""
@@ -104,7 +107,7 @@ class HandServer:
             if request.command == CONNECT:
                 self._connect(host, request)
             elif self._state_port is not None:
-                self._hand.ask(request, self._clock())
+                self._hand.ask(request, self._hand_s)
 
     def _connect(self, host: socket.socket, request: HandRequest) -> None:
         version, port = map(int, request.values)
@@ -116,7 +119,8 @@ class HandServer:
 
     def _look(self) -> None:
         now_s = self._clock()
-        self._hand.look(now_s)
+        self._hand_s = min(now_s, self._hand_s + MOST_STEP_S)
+        self._hand.look(self._hand_s)
         for request, status in self._hand.ended():
             self._reply(request, status)
         if self._state_port is not None and now_s >= self._due_s:
