@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import time
 from itertools import pairwise
 from types import SimpleNamespace
 
 import pytest
+import serial
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -21,6 +23,7 @@ from graspsense_robotiq_2f.tactile_protocol import (
     DYNAMIC,
     PRESSURE,
     READ,
+    START_SENDING,
     TIMESTAMP,
     Field,
     Packets,
@@ -132,6 +135,22 @@ def test_the_driver_reads_images_in_a_thread_with_their_age(port):
     assert driver.stream.damaged == 0
     taken = [one.taken for one in data]
     assert taken == sorted(set(taken))
+
+
+def test_what_a_host_reads_late_is_not_lost(port):
+    """A terminal holds 4 kB, which is 70 ms of packets."""
+    with serial.Serial(port.where, timeout=PATIENT_S) as host:
+        host.write(START_SENDING)
+        packets, stamps = Packets(), []
+        while len(stamps) < 400:
+            if len(stamps) in range(100, 110):
+                # More comes than the terminal holds.
+                while host.in_waiting < 4000:
+                    time.sleep(0.001)
+            found = packets.fed(host.read(host.in_waiting or 1))
+            stamps += [decoded(data)[0].values[0] for command, data in found if command == READ]
+    assert packets.skipped == 0
+    assert {later - earlier for earlier, later in pairwise(stamps)} == {1000}
 
 
 def test_fingertips_that_are_unplugged_are_told(port):
