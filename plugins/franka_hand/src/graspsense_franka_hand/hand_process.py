@@ -215,7 +215,7 @@ def main() -> None:
         pass
     except Exception as error:
         with suppress(BrokenPipeError):
-            _tell(1, {"error": f"{error}"})
+            _tell(1, {"error": f"{error}".rstrip(".")})
 
 
 if __name__ == "__main__":
