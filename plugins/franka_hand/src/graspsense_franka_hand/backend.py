@@ -48,7 +48,8 @@ from graspsense_franka_hand.orders import (
 
 COMMAND_DELAY_S: Final = 0.25
 """The hand has ended the command before (0.1 s at rest), which the next state tells (0.07 s), and acts on the next."""
-SLOPE_FRAMES: Final = 3
+SLOPE_S: Final = 0.2
+"""Time over which the speed is taken: states come at irregular times, and later on a busy machine."""
 THERE_M: Final = 1e-3
 """A target that is nearer than this is where the fingers are."""
 RESTS_M_S: Final = 2e-3
@@ -119,7 +120,7 @@ class FrankaBackend(SensorBackend[FrankaConfig]):
             ) from error
         self._link, self._state = link, first
         self._began_s = self._last_s = first.host_s
-        self._recent: deque[tuple[float, float]] = deque([(0.0, first.width_m)], maxlen=SLOPE_FRAMES)
+        self._recent: deque[tuple[float, float]] = deque([(0.0, first.width_m)])
         self._frames = self._sent = 0
         self._velocity_m_s = 0.0
         self._asked, self._waiting = Order(STOP), None
@@ -141,8 +142,10 @@ class FrankaBackend(SensorBackend[FrankaConfig]):
         except HandGone as error:
             raise DeviceLost(f"the Franka Hand at {self.config.host} was lost: {error}") from error
         t_s, dt_s, self._last_s = state.host_s - self._began_s, state.host_s - self._last_s, state.host_s
-        start_s, start_m = self._recent[0]
         self._recent.append((t_s, state.width_m))
+        while len(self._recent) > 2 and t_s - self._recent[1][0] >= SLOPE_S * (1.0 - 1e-9):
+            self._recent.popleft()
+        start_s, start_m = self._recent[0]
         self._velocity_m_s = (state.width_m - start_m) / (t_s - start_s) if t_s > start_s else 0.0
         self._frames += 1
         frame = Frame(t_s, dt_s, state.width_m, self._velocity_m_s, nan, nan, nan, nan, nan, 0)
