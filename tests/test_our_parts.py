@@ -31,6 +31,8 @@ def settings(name, folder):
         }
     if name == "graspsense-robotiq-2f/robotiq":
         return {"keys": {"port": "emulated"}}
+    if name == "graspsense-franka-hand/franka":
+        return {"keys": {"host": "emulated", "calibration": "none"}}
     return {}
 
 

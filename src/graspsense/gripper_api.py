@@ -35,6 +35,7 @@ _TABLE: Final[Table] = {
         "core.grasp.calibration": (
             "LoadTable",
             "MotorTable",
+            "asked_force",
             "cells_force",
             "edge_force",
             "load_of",
@@ -47,6 +48,7 @@ _TABLE: Final[Table] = {
         ),
         "core.grasp.calibration_files": (
             "calibrations_of",
+            "stored_delivered_force",
             "stored_friction",
             "stored_gain",
             "stored_motor_tables",

@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+import asyncio
+import threading
+from contextlib import suppress
 from types import SimpleNamespace
 
 import pytest
+from pymodbus import FramerType
+from pymodbus.server import ModbusTcpServer
+from pymodbus.simulator import DataType, SimData, SimDevice
 
 from graspsense import WiringError, load_pipeline
 from graspsense.core.components import emulated_serial
@@ -13,14 +19,14 @@ from graspsense.testing_api import parametrize_checks
 from graspsense_robotiq_2f import backend
 from graspsense_robotiq_2f.config import RobotiqConfig
 from graspsense_robotiq_2f.discovery import diagnose
+from graspsense_robotiq_2f.emulator import ur_cap
 from graspsense_robotiq_2f.emulator.device import EmulatedGripper
 from graspsense_robotiq_2f.emulator.modbus import checksum
 from graspsense_robotiq_2f.link import ModbusLink, NoReply
-from graspsense_robotiq_2f.registers import MODELS, byte_of
+from graspsense_robotiq_2f.registers import INPUT, MODELS, OUTPUT, byte_of
 
 PATIENT_S = 60.0
 """For a reply that comes: when it does is this machine's business."""
-EMULATED = ["gripper.port=emulated", f"gripper.reply_timeout_s={PATIENT_S}"]
 
 
 @pytest.fixture
@@ -56,11 +62,10 @@ def emulated():
         gripper.close()
 
 
-@pytest.mark.usefixtures("own_time")
 @parametrize_checks(
     "graspsense-robotiq-2f",
-    keys={"port": "emulated", "reply_timeout_s": PATIENT_S},
-    unplugged={"faults": {"unplug_at_s": 0.5}, "reply_timeout_s": 1.0},
+    keys={"port": "emulated"},
+    unplugged={"faults": {"unplug_at_s": 0.5}},
     absent={"port": "/dev/nowhere"},
 )
 def test_conformance(check):
@@ -81,10 +86,9 @@ def test_a_grasp_over_every_wire(emulated, wire):
     assert not gripper.state()["going"]
 
 
-@pytest.mark.usefixtures("own_time")
 @pytest.mark.parametrize("model", MODELS)
 def test_every_model_closes_with_its_own_limits(model):
-    gripper = create("sensor-backend", "robotiq", model=model, port="emulated", reply_timeout_s=PATIENT_S)
+    gripper = create("sensor-backend", "robotiq", model=model, port="emulated")
     info = gripper.open(1)
     frames = []
     for _ in range(400):
@@ -104,7 +108,6 @@ def test_every_model_closes_with_its_own_limits(model):
     assert gripper.report()["true_peak_force_n"] < 40.0
 
 
-@pytest.mark.usefixtures("own_time")
 @pytest.mark.parametrize("at_s", [0.02, 0.5, 2.0])
 @pytest.mark.parametrize("fault", ["unplug", "silent"])
 def test_a_gripper_lost_in_a_grasp_ends_it_and_is_told(fault, at_s):
@@ -122,7 +125,32 @@ def test_a_gripper_lost_in_a_grasp_ends_it_and_is_told(fault, at_s):
 
 
 @pytest.mark.usefixtures("own_time")
-@pytest.mark.parametrize("wire", ["pty", "socket"])
+def test_a_grasp_through_a_ur_cap_has_no_effort_and_the_features_that_need_none(emulated):
+    gripper = emulated("ur")
+    assert gripper.where.startswith("ur:127.0.0.1:")
+    options = [f"gripper.port={gripper.where}", f"gripper.reply_timeout_s={PATIENT_S}"]
+    with pytest.raises(WiringError, match="effort"):
+        load_pipeline("robotiq", options=options)
+    trial = load_pipeline("robotiq", options=[*options, "features.type=width-and-time"]).grasp()
+
+    assert trial.outcome.words == "steady", trial.reason
+    assert not trial.features.reasons
+    assert 0.05 < trial.features["p_steady"] <= trial.features["p_first"] < 0.08
+    assert np.isnan(trial.trace.effort_n).all()
+    assert not gripper.state()["going"]
+
+
+def test_a_ur_cap_takes_all_bytes_and_answers_each_line(emulated):
+    hand = emulated("ur")._hand
+    assert ur_cap.answered(hand, b"GET POS\nGET FOR\nSET PO", 1.0) == (b"POS 3\nFOR 0\n", b"SET PO")
+    assert ur_cap.answered(hand, b"SET ACT 1 GTO 1 POS 100\nGET PRE\n", 1.0) == (b"ackPRE 100\n", b"")
+    for line in (b"SET POS 256\n", b"SET XYZ 1\n", b"SET POS\n", b"PUT POS 1\n", b"\xff\n", b"\n"):
+        assert ur_cap.answered(hand, line, 1.0)[0] == b"?"
+    assert ur_cap.answered(hand, b"GET XYZ\n", 1.0)[0] == b"XYZ ?\n"
+
+
+@pytest.mark.usefixtures("own_time")
+@pytest.mark.parametrize("wire", ["pty", "socket", "ur"])
 @pytest.mark.parametrize("mood", ["damaged", "silent", "late", "repeated"])
 def test_whatever_becomes_of_replies_the_fingers_are_told_to_stop(emulated, wire, mood):
     """The gripper still hears: what it is told last is to stop."""
@@ -170,9 +198,8 @@ def test_an_active_gripper_is_not_activated_again(emulated):
     driver.close()
 
 
-@pytest.mark.usefixtures("own_time")
 def test_a_slow_velocity_is_a_target_that_moves():
-    gripper = create("sensor-backend", "robotiq", port="emulated", reply_timeout_s=PATIENT_S)
+    gripper = create("sensor-backend", "robotiq", port="emulated")
     gripper.open(0)
     frames = []
     for _ in range(200):
@@ -184,7 +211,9 @@ def test_a_slow_velocity_is_a_target_that_moves():
     assert 0.006 < moved / seconds <= 0.0115
 
 
-@pytest.mark.parametrize("port", ["/dev/nowhere", "socket:127.0.0.1:1", "socket:nonsense"])
+@pytest.mark.parametrize(
+    "port", ["/dev/nowhere", "socket:127.0.0.1:1", "socket:nonsense", "ur:127.0.0.1:1", "ur:127.0.0.1:x"]
+)
 def test_no_gripper_is_said_with_what_to_look_at(port):
     with pytest.raises(NoDevice, match=r"no Robotiq 2F-85 at .*gripper\.port"):
         create("sensor-backend", "robotiq", port=port).open(0)
@@ -209,6 +238,58 @@ def test_doctor_tells_a_gripper_from_a_silent_port_and_from_none(emulated):
         states[port, address] = next(iter(diagnose(config, 1.0))).state
     assert list(states.values()) == ["ok", "problem", "problem"]
     assert not gripper.state()["going"]
+
+
+@pytest.fixture
+def pymodbus_server():
+    """The simulator server of pymodbus: unit 9, active, with the position and current of fingers at rest."""
+    status = [0x3100, 0, 3 << 8 | 12]
+    blocks = [SimData(OUTPUT, values=[0, 0, 0], datatype=DataType.REGISTERS),
+              SimData(INPUT, values=status, datatype=DataType.REGISTERS)]  # fmt: skip
+    told = {}
+    ready, loop = threading.Event(), asyncio.new_event_loop()
+
+    async def serve():
+        told["server"] = server = ModbusTcpServer(
+            SimDevice(9, simdata=blocks), framer=FramerType.RTU, address=("127.0.0.1", 0)
+        )
+        await server.listen()
+        told["port"] = server.transport.sockets[0].getsockname()[1]
+        ready.set()
+        await server.serving
+
+    def run():
+        with suppress(asyncio.CancelledError):
+            loop.run_until_complete(serve())
+
+    thread = threading.Thread(target=run, daemon=True)
+    thread.start()
+    assert ready.wait(PATIENT_S)
+    yield f"socket:127.0.0.1:{told['port']}"
+    asyncio.run_coroutine_threadsafe(told["server"].shutdown(), loop).result(PATIENT_S)
+    thread.join(PATIENT_S)
+
+
+def test_the_simulator_server_of_pymodbus_takes_the_driver(pymodbus_server):
+    driver = create("sensor-backend", "robotiq", port=pymodbus_server, reply_timeout_s=PATIENT_S)
+    info = driver.open(0)
+    assert info.name == "Robotiq 2F-85"
+    for _ in range(5):
+        driver.apply(Command(POSITION, 0.04, 100.0, 0.05))
+        frame = driver.read(PATIENT_S).frame
+    driver.close()
+    assert frame.gap_m == pytest.approx(0.085)
+    assert frame.effort_n == pytest.approx(0.12 * 150.0)
+    link = ModbusLink(pymodbus_server, 9, PATIENT_S)
+    written = link._client.read_holding_registers(OUTPUT, count=3, device_id=9).registers
+    link.close()
+    model = MODELS["2f-85"]
+    # The last word is to stop: the rest of the request is that of the grasp.
+    assert written == [
+        0x0100,
+        model.position(0.04),
+        byte_of(0.05, model.speeds_m_s) << 8 | byte_of(100.0, model.forces_n),
+    ]
 
 
 def test_the_checksum_is_that_of_the_manual():

@@ -1,4 +1,4 @@
-"""`graspsense calibrate`: files by device serial with the zero, gains, load table and friction of a gripper."""
+"""`graspsense calibrate`: files by device serial with zero, gains, load table, friction and delivered force."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from graspsense.core.grasp.calibration_files import Calibration
     from graspsense.core.values.channel import TactileArray
     from graspsense.core.values.device import DeviceInfo
+    from graspsense.sources.csv_columns import CsvColumns
 
 
 class _Setup(NamedTuple):
@@ -105,6 +106,28 @@ def load_cell(readings: str, replace: bool, as_json: bool, **asked: Any) -> None
         pads = any(channel.name == "pads" for channel in setup.backend.channels)
         data = _tables(readings, _counts_per_n(setup)) if pads else _motor_tables(readings)
         _store(setup, "load-cell", data, as_json)
+
+
+@calibrate.command("delivered-force")
+@click.argument("readings", type=click.Path(exists=True, dir_okay=False))
+@_options
+def delivered_force(readings: str, replace: bool, as_json: bool, **asked: Any) -> None:
+    """Store a table from the force asked for to the force that the gripper delivered, computed from READINGS.
+
+    READINGS is a CSV file with the columns asked_n (force sent to the gripper) and delivered_n (force of a load cell
+    between the fingers). Readings at the same force are averaged, and neighbours until the delivered force rises.
+    """
+    from graspsense.core.grasp.calibration import load_table
+
+    with _set_up(asked, replace) as setup:
+        columns = _columns(readings, "asked_n", "delivered_n")
+        table = load_table((one, two) for one, two in _rows(readings, columns, "asked_n", "delivered_n"))
+        data = {"asked_n": list(table.pad_n), "delivered_n": list(table.load_n)}
+        _store(setup, "delivered-force", data, as_json)
+        if not as_json:
+            echo_table(
+                ("ASKED N", "DELIVERED N"), [(f"{a:.1f}", f"{b:.1f}") for a, b in zip(*table, strict=True)]
+            )
 
 
 @calibrate.command()
@@ -261,22 +284,40 @@ def _grouped(
 
     Raises DataDamaged for a missing column, and for a value of the group that is not one of `values`.
     """
-    from math import isfinite
+    from graspsense.core.values.errors import DataDamaged
+
+    columns = _columns(path, group, *names)
+    found: dict[str, list[tuple[float, ...]]] = {value: [] for value in values}
+    for line, value, numbers in zip(
+        columns.lines, columns.cells[group], _rows(path, columns, *names), strict=True
+    ):
+        if value not in found:
+            raise DataDamaged(f"{path}:{line}: {group} is {value[:40]!r}, expected {' or '.join(values)}")
+        found[value].append(numbers)
+    return found
+
+
+def _columns(path: str, *names: str) -> CsvColumns:
+    """Return the columns of a CSV file, which has these. Raises DataDamaged."""
     from pathlib import Path
 
     from graspsense.core.values.errors import DataDamaged
     from graspsense.sources.csv_columns import CsvColumns
 
     columns = CsvColumns(Path(path))
-    missing = {group, *names} - set(columns.names)
-    if missing:
+    if missing := set(names) - set(columns.names):
         raise DataDamaged(f"{path} lacks the columns {', '.join(sorted(missing))}")
-    found: dict[str, list[tuple[float, ...]]] = {value: [] for value in values}
+    return columns
+
+
+def _rows(path: str, columns: CsvColumns, *names: str) -> Iterator[tuple[float, ...]]:
+    """Yield the numbers of each row in these columns. Raises DataDamaged."""
+    from math import isfinite
+
+    from graspsense.core.values.errors import DataDamaged
+
     rows = zip(*map(columns.numbers, names), strict=True)
-    for line, value, numbers in zip(columns.lines, columns.cells[group], rows, strict=True):
-        if value not in found:
-            raise DataDamaged(f"{path}:{line}: {group} is {value[:40]!r}, expected {' or '.join(values)}")
+    for line, numbers in zip(columns.lines, rows, strict=True):
         if not all(map(isfinite, numbers)):
             raise DataDamaged(f"{path}:{line}: expected numbers in the columns {', '.join(names)}")
-        found[value].append(tuple(map(float, numbers)))
-    return found
+        yield tuple(map(float, numbers))

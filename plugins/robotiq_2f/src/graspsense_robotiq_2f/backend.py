@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from math import inf, nan
 from types import MappingProxyType
-from typing import Final, final
+from typing import Any, Final, final
 
 from attrs import evolve
 
@@ -30,9 +30,10 @@ from graspsense.plugin_api import (
     SensorBackend,
     TactileArray,
     create,
+    signal_type,
 )
 from graspsense_robotiq_2f.config import RobotiqConfig
-from graspsense_robotiq_2f.emulator.device import EmulatedGripper
+from graspsense_robotiq_2f.emulator.lock_step import LockStepFingertips, LockStepGripper
 from graspsense_robotiq_2f.faults import STATUS_BITS, bit_of
 from graspsense_robotiq_2f.link import ModbusLink, NoReply
 from graspsense_robotiq_2f.registers import (
@@ -44,8 +45,9 @@ from graspsense_robotiq_2f.registers import (
     byte_of,
     status_of,
 )
-from graspsense_robotiq_2f.tactile import TactileFingertips
+from graspsense_robotiq_2f.tactile import CHANNELS, TactileData, TactileFingertips
 from graspsense_robotiq_2f.tactile_protocol import CELLS, COLUMNS, ROWS
+from graspsense_robotiq_2f.ur_cap import PREFIX, UrCapLink, opened_link
 
 RATE_HZ: Final = 100.0
 ACTIVATION_S: Final = 5.0
@@ -66,6 +68,7 @@ PADS: Final = (
     Channel("force_left", "N", RATE_HZ),
     Channel("force_right", "N", RATE_HZ),
     TactileArray("pads", "counts", 60.0, rows=ROWS, columns=COLUMNS),
+    *CHANNELS,
 )
 TARE_IMAGES: Final = 10
 PADS_SILENT_S: Final = 0.5
@@ -91,21 +94,23 @@ class RobotiqBackend(SensorBackend[RobotiqConfig]):
         self._model = MODELS[config.model]
         self.least_force_n = self._model.forces_n[0]
         self.least_step_m = self._model.step_m
-        self._link: ModbusLink | None = None
-        self._emulated: EmulatedGripper | None = None
-        self._fingertips: TactileFingertips | None = None
+        self._link: ModbusLink | UrCapLink | LockStepGripper | None = None
+        self._fingertips: TactileFingertips | LockStepFingertips | None = None
+        self._time: Any = time
         self._pads = NO_PADS
+        self._data = TactileData(None, ((),) * len(CHANNELS), 0, 0.0)
         self._zero = ((0.0,) * CELLS, (0.0,) * CELLS)
         self._asked = Request(active=True, go=False, position=0, speed=0, force=0)
         self._frames = self._retries = 0
-        self._clock_report: Mapping[str, float | str] = {}
         self._exchange_s = 0.0
+        self._clock_report: Mapping[str, float | int | str | bool] = {}
         self._body_report: Mapping[str, float | int | str | bool] = {}
 
     @property
     def channels(self) -> tuple[Channel, ...]:
-        """Those of the bare gripper, and with fingertips their forces and cells."""
-        return BARE + PADS if self.config.tactile_port else BARE
+        """Those of the bare gripper, and with fingertips their forces and cells. A UR cap does not tell the current."""
+        bare = BARE[:2] if self.config.port.startswith(PREFIX) else BARE
+        return bare + PADS if self.config.tactile_port else bare
 
     def objects(self) -> Sequence[ObjectKind]:
         """Return what the body of the emulated gripper can hold."""
@@ -124,16 +129,15 @@ class RobotiqBackend(SensorBackend[RobotiqConfig]):
         """Open the gripper, and activate it if it is not: it then opens and closes once. Raises NoDevice."""
         self.close()
         config, model = self.config, self._model
-        port = config.port
-        if port == "emulated":
-            self._emulated = EmulatedGripper(config, "socket", seed)
-            self._emulated.tell("plug")
-            port = self._emulated.where
         self._asked = Request(active=True, go=False, position=0, speed=0, force=0)
         self._frames = self._retries = 0
         self._exchange_s = 0.0
         try:
-            self._link = ModbusLink(port, config.address, config.reply_timeout_s)
+            if config.port == "emulated":
+                self._link = self._time = LockStepGripper(config, seed)
+            else:
+                self._link = opened_link(config.port, config.address, config.reply_timeout_s)
+                self._time = time
             status = self._activated()
             self._open_fingertips()
         except (OSError, ValueError, NoReply) as error:
@@ -142,35 +146,38 @@ class RobotiqBackend(SensorBackend[RobotiqConfig]):
                 f"no {model.name} at {config.port}, unit {config.address}: {error}. Look at its power and cable, at "
                 "gripper.port and gripper.address; on Linux be in the group dialout"
             ) from error
-        self._began_s = self._last_s = self._due_s = time.monotonic()
+        self._began_s = self._last_s = self._due_s = self._time.monotonic()
         self._target_m = model.gap_m(status.position)
         self._recent: deque[tuple[float, float]] = deque(maxlen=SLOPE_FRAMES)
         return self._described()
 
     def read(self, timeout_s: float) -> Reading | None:
         """Wait for the next multiple of 10 ms, then exchange data with the gripper. Raises DeviceLost."""
-        wait_s = self._due_s - time.monotonic()
+        wait_s = self._due_s - self._time.monotonic()
         if wait_s > timeout_s:
-            time.sleep(timeout_s)
+            self._time.sleep(timeout_s)
             return None
         if wait_s > 0.0:
-            time.sleep(wait_s)
+            self._time.sleep(wait_s)
         # On a grid of times, so that the duration of an exchange does not lower the rate; lost time is not made up.
-        self._due_s = max(self._due_s + 1.0 / RATE_HZ, time.monotonic())
-        asked_s = time.monotonic()
+        self._due_s = max(self._due_s + 1.0 / RATE_HZ, self._time.monotonic())
+        asked_s = self._time.monotonic()
         status = self._status()
-        now_s = time.monotonic()
+        now_s = self._time.monotonic()
         self._exchange_s = max(self._exchange_s, now_s - asked_s)
         t_s, dt_s, self._last_s = now_s - self._began_s, now_s - self._last_s, now_s
         gap_m = self._model.gap_m(status.position)
         self._recent.append((t_s, gap_m))
         (start_s, start_m), span = self._recent[0], len(self._recent)
         velocity = (gap_m - start_m) / (t_s - start_s) if span > 1 else 0.0
-        effort = status.current * AMPERES_A_STEP * self.config.newtons_per_ampere
+        told = not isinstance(self._link, UrCapLink)
+        effort = status.current * AMPERES_A_STEP * self.config.newtons_per_ampere if told else nan
         self._frames += 1
+        forces, signals = self._felt()
         return Reading(
-            Frame(t_s, dt_s, gap_m, velocity, effort, *self._forces(), nan, nan, bit_of(status.fault)),
+            Frame(t_s, dt_s, gap_m, velocity, effort, *forces, nan, nan, bit_of(status.fault)),
             self._pads,
+            signals,
         )
 
     def apply(self, command: Command) -> None:
@@ -214,17 +221,16 @@ class RobotiqBackend(SensorBackend[RobotiqConfig]):
                     break
             with suppress(OSError):
                 link.close()
+            if isinstance(link, LockStepGripper):
+                self._body_report = link.body_report
         fingertips, self._fingertips = self._fingertips, None
         if fingertips is not None:
             fingertips.close()
-        emulated, self._emulated = self._emulated, None
-        if emulated is not None:
-            self._body_report = emulated.body_report
-            emulated.close()
 
     def report(self) -> dict[str, float | int | str | bool]:
         """Return the number of frames, and of repeated exchanges, with what the emulated body knows."""
-        body = self._body_report if self._emulated is None else self._emulated.body_report
+        link = self._link
+        body = link.body_report if isinstance(link, LockStepGripper) else self._body_report
         return {
             **body,
             "frames": self._frames,
@@ -242,37 +248,44 @@ class RobotiqBackend(SensorBackend[RobotiqConfig]):
                 model=config.model,
                 address=config.address,
                 newtons_per_ampere=config.newtons_per_ampere,
-                tactile_port=",".join("emulated" for _ in config.tactile_ports),
+                tactile_port="emulated" if config.tactile_port else "",
                 pad_counts_per_newton=config.pad_counts_per_newton,
             )
         return RobotiqBackend(config)
 
     def _open_fingertips(self) -> None:
-        if not self.config.tactile_port:
-            return
         where = self.config.tactile_port
-        if "emulated" in self.config.tactile_ports:
-            assert self._emulated is not None
-            where = self._emulated.tactile_where
+        if not where:
+            return
         self._pads = no_pads(CELLS)
         self._zero = ((0.0,) * CELLS, (0.0,) * CELLS)
-        self._fingertips = TactileFingertips(where.split(","))
-        image = self._fingertips.newest(ACTIVATION_S)
-        if image is None:
+        if where == "emulated":
+            assert isinstance(self._link, LockStepGripper)
+            self._fingertips = self._link.fingertips()
+        else:
+            self._fingertips = TactileFingertips(where)
+        data = self._fingertips.newest(ACTIVATION_S)
+        if data is None:
             raise NoReply(f"the fingertips at {self.config.tactile_port} send nothing")
+        self._data = data
 
-    def _forces(self) -> tuple[float, float]:
-        """Take the newest image, and return the forces on the pads. Raises DeviceLost."""
+    def _felt(self) -> tuple[tuple[float, float], Any]:
+        """Take what the fingertips sent, and return the forces on the pads and the signals. Raises DeviceLost."""
         if self._fingertips is None:
-            return nan, nan
+            return (nan, nan), ()
         try:
-            image = self._fingertips.newest(0.0)
+            data = self._fingertips.newest(0.0)
         except OSError as error:
             raise DeviceLost(f"the fingertips at {self.config.tactile_port} are gone: {error}") from error
+        image = None if data is None else data.image
         if image is not None:
             # An image that was measured before the gripper was opened has its time.
             self._pads = Pads(max(image.host_s - self._began_s, 0.0), image.counter, image.left, image.right)
-            self._clock_report = self._fingertips.report()
+            stream = self._fingertips.stream
+            self._clock_report = {
+                **clock_report("tactile", stream.clock, ("pads", "force_left", "force_right")),
+                "tactile_damaged": stream.damaged,
+            }
         if self._fingertips.age_s() > PADS_SILENT_S:
             raise DeviceLost(
                 f"the fingertips at {self.config.tactile_port} send nothing any more: look at their cable"
@@ -282,13 +295,14 @@ class RobotiqBackend(SensorBackend[RobotiqConfig]):
             pad_force(cells, zero, gain, 0) if self._pads.counter else 0.0
             for cells, zero in zip(self._pads[2:], self._zero, strict=True)
         )
-        return left, right
+        self._data = self._data.nothing_new() if data is None else data
+        return (left, right), signal_type(self.channels)(*self._data.signals(self._began_s))
 
     def _described(self) -> DeviceInfo:
-        model, emulated = self._model, self._emulated is not None
+        model, emulated = self._model, self.config.port == "emulated"
         return DeviceInfo(
             name=f"emulated {model.name}" if emulated else model.name,
-            clock="device",
+            clock="virtual" if emulated else "device",
             simulated=emulated,
             rate_hz=RATE_HZ,
             effort_limit_n=model.forces_n[1],
@@ -323,11 +337,11 @@ class RobotiqBackend(SensorBackend[RobotiqConfig]):
         if status.state == ACTIVE and not status.fault:
             return self._exchange(self._asked)
         self._exchange(self._asked._replace(active=False))
-        until = time.monotonic() + ACTIVATION_S
+        until = self._time.monotonic() + ACTIVATION_S
         while (status := self._exchange(self._asked)).state != ACTIVE:
-            if time.monotonic() > until:
+            if self._time.monotonic() > until:
                 raise NoReply(f"not activated after {ACTIVATION_S:g} s, fault {status.fault}")
-            time.sleep(1.0 / RATE_HZ)
+            self._time.sleep(1.0 / RATE_HZ)
         return status
 
     def _move_target(self, goal_m: float, speed_m_s: float, gap_m: float) -> None:

@@ -19,12 +19,12 @@ class RobotiqConfig:
     )
     port: str = setting(
         default="/dev/ttyUSB0",
-        meaning="A serial port; socket:HOST:PORT for RTU through a socket; or emulated, a gripper in software.",
+        meaning="A serial port; socket:HOST:PORT for RTU through a socket; ur:HOST for the UR cap of a robot; or "
+        "emulated, a gripper in software.",
     )
     tactile_port: str = setting(
         default="",
-        meaning="Serial port of TSF-85 fingertips, or two (left,right) with a comma between; empty: none; emulated, or "
-        "emulated,emulated: those of the emulated gripper.",
+        meaning="Serial port of TSF-85 fingertips; empty: none; emulated: those of the emulated gripper.",
     )
     pad_counts_per_newton: float = setting(
         default=1000.0,
@@ -63,21 +63,10 @@ class RobotiqConfig:
     )
     faults: SerialFaults = setting(factory=SerialFaults, meaning="Emulated only: faults of the gripper.")
 
-    @property
-    def tactile_ports(self) -> tuple[str, ...]:
-        """The ports of the fingertips, of which there are none, one or two."""
-        return tuple(self.tactile_port.split(",")) if self.tactile_port else ()
-
     def __attrs_post_init__(self) -> None:
-        kinds = {port == "emulated" for port in self.tactile_ports}
-        if len(self.tactile_ports) > 2 or "" in self.tactile_ports or len(kinds) > 1:
-            raise ValueError(
-                f"tactile_port is {self.tactile_port!r}: give one port, or two with a comma between, both emulated or "
-                "none"
-            )
         if self.port == "emulated":
             return
-        if "emulated" in self.tactile_ports:
+        if self.tactile_port == "emulated":
             raise ValueError(
                 f"tactile_port is emulated, but port is {self.port!r}: give the port of the fingertips, or set "
                 "gripper.port to emulated"

@@ -9,8 +9,9 @@ from typing import Final
 from graspsense.gripper_api import Finding, FoundDevice
 from graspsense_robotiq_2f.config import RobotiqConfig
 from graspsense_robotiq_2f.faults import STATUS_BITS, bit_of
-from graspsense_robotiq_2f.link import ModbusLink, NoReply
+from graspsense_robotiq_2f.link import NoReply
 from graspsense_robotiq_2f.registers import MODELS, status_of
+from graspsense_robotiq_2f.ur_cap import opened_link
 
 CONVERTERS: Final = {(0x0403, 0x6001), (0x0403, 0x6015)}
 """USB numbers of the FTDI chips in RS-485 converters. Others have them too."""
@@ -58,7 +59,7 @@ def _asked(config: RobotiqConfig, timeout_s: float) -> Iterator[Finding]:
         return
     model = MODELS[config.model]
     try:
-        link = ModbusLink(config.port, config.address, min(config.reply_timeout_s, timeout_s))
+        link = opened_link(config.port, config.address, min(config.reply_timeout_s, timeout_s))
     except (OSError, ValueError) as error:
         advice = NO_PERMISSION if "permission" in str(error) else "look at gripper.port, power and cable"
         yield Finding("robotiq", "problem", f"{config.port}: {error}", advice)

@@ -58,7 +58,7 @@ class ModbusLink:
 
         if not self._client.connected:
             raise OSError("the connection was lost")
-        self._discard_late()
+        discard_late(self._client.socket)
         try:
             reply = getattr(self._client, call)(device_id=self._address, **given)
         except ConnectionException as error:
@@ -71,13 +71,14 @@ class ModbusLink:
             raise NoReply(f"a reply of {len(reply.registers)} registers instead of {COUNT}")
         return list(reply.registers)
 
-    def _discard_late(self) -> None:
-        connection = self._client.socket
-        if not isinstance(connection, socket.socket):
-            return
-        while select.select([connection], [], [], 0.0)[0]:
-            if not connection.recv(4096):
-                raise ConnectionResetError("the other side closed the connection")
+
+def discard_late(connection: object) -> None:
+    """Throw away what came late through a socket; what else is a connection does so itself. Raises OSError."""
+    if not isinstance(connection, socket.socket):
+        return
+    while select.select([connection], [], [], 0.0)[0]:
+        if not connection.recv(4096):
+            raise ConnectionResetError("the other side closed the connection")
 
 
 def _client(port: str, timeout_s: float) -> Any:

@@ -16,7 +16,7 @@ def graspsense_sensor_backends() -> Iterable[SensorBackendEntry]:
     yield SensorBackendEntry(
         name="robotiq",
         target="graspsense_robotiq_2f.backend:RobotiqBackend",
-        summary="Robotiq 2F-85, 2F-140 or Hand-E over Modbus RTU (serial port or socket); position and motor current",
+        summary="Robotiq 2F-85, 2F-140 or Hand-E over Modbus RTU or a UR cap; position and motor current",
         needs='pip install "graspsense[robotiq]"; on Linux your user in the group dialout',
     )
 
@@ -38,7 +38,7 @@ def graspsense_emulators() -> Iterable[EmulatorEntry]:
         name="robotiq",
         target="graspsense_robotiq_2f.emulator.device:emulate",
         summary="a Robotiq gripper's registers, over a simulated gripper",
-        wires=("pty", "socket"),
+        wires=("pty", "socket", "ur"),
         options=("gripper.port=emulated",),
         needs='pip install "graspsense[robotiq]"',
     )

@@ -3,157 +3,155 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
 from contextlib import suppress
-from math import inf
+from math import nan
 from typing import Any, Final, NamedTuple, final
 
-from graspsense.gripper_api import DeviceClock, ReadingThread, clock_report
-from graspsense_robotiq_2f.tactile_protocol import AUTOSEND, PRESSURE, TIMESTAMP, Packets, decoded, packet
+from graspsense.gripper_api import DeviceClock, ReadingThread
+from graspsense.plugin_api import FastChannel, Samples
+from graspsense_robotiq_2f.tactile_protocol import (
+    ACCELERATION,
+    DYNAMIC,
+    GYROSCOPE,
+    PRESSURE,
+    START_SENDING,
+    STOP_SENDING,
+    TIMESTAMP,
+    Packets,
+    decoded,
+)
 
-SIDES: Final = ("force_left", "force_right")
 BAUD: Final = 115200
-PERIOD_MS: Final = 1
 READ_S: Final = 0.1
 """Longest wait of one read, so that the thread can end."""
-LEAST_S: Final = 1e-6
-"""Least time between two images."""
 TICKS_S: Final = 1e6
 """Ticks of the fingertips' clock in a second: an assumption, which their description does not give."""
+RATE_HZ: Final = 1000.0
+MOST: Final = 30
+"""Samples of each channel that a frame can hold: those of three frames."""
+_AXES: Final = ("x", "y", "z")
+_KINDS: Final = {
+    DYNAMIC: ("dynamic", ("value",)),
+    ACCELERATION: ("acceleration", _AXES),
+    GYROSCOPE: ("rotation", _AXES),
+}
+CHANNELS: Final = tuple(
+    FastChannel(f"{name}_{side}", "counts", RATE_HZ, samples=MOST, axes=axes, clock="sensor")
+    for name, axes in _KINDS.values()
+    for side in ("left", "right")
+)
+"""Change of pressure, acceleration and rate of turn of each fingertip, raw: no document gives a scale."""
 
-
-class BoardImage(NamedTuple):
-    """The last image of a board's fingertips, and the host's time (s) at which it was measured at the latest."""
-
-    host_s: float
-    cells: tuple[tuple[float, ...], ...]
+Row = tuple[float, ...]
 
 
 class TactileImage(NamedTuple):
-    """The last image of both fingertips, and the host's time (s) of the older one."""
+    """The last image of both fingertips, and the host's time (s) at which it was measured at the latest."""
 
     host_s: float
     counter: int
-    left: tuple[float, ...]
-    right: tuple[float, ...]
+    left: Row
+    right: Row
 
 
-@final
-class TactileFingertips:
-    """The fingertips of a gripper at serial ports: one board with both, or a board each for left and right.
+class TactileData(NamedTuple):
+    """What came since the last time: the newest image, if any, and the samples of each channel, oldest first.
 
-    They send by themselves from construction to `close`. Raises OSError.
+    `taken` is the number of packets with measurements so far, `host_s` when the last one was measured.
     """
 
-    def __init__(self, ports: Sequence[str]) -> None:
-        self._boards: list[TactileBoard] = []
-        self._last: list[BoardImage | None] = [None] * len(ports)
-        self._counter = 0
-        self._apart_s = 0.0
-        self._image_s = -inf
-        try:
-            for port in ports:
-                self._boards.append(TactileBoard(port, len(SIDES) // len(ports)))
-        except OSError:
-            self.close()
-            raise
+    image: TactileImage | None
+    rows: tuple[tuple[Row, ...], ...]
+    taken: int
+    host_s: float
 
-    def newest(self, timeout_s: float) -> TactileImage | None:
-        """Return the newest image that was not returned yet, None if none comes in time. Raises OSError.
+    def nothing_new(self) -> TactileData:
+        """Return the same without samples and image."""
+        return self._replace(image=None, rows=((),) * len(CHANNELS))
 
-        With two boards there is a new one with each image of the left board.
-        """
-        fresh = False
-        for i, board in enumerate(self._boards):
-            image = board.newest(timeout_s if self._last[i] is None or i == 0 else 0.0)
-            if image is not None:
-                fresh, self._last[i] = fresh or i == 0, image
-        last = [image for image in self._last if image is not None]
-        if not fresh or len(last) < len(self._boards):
-            return None
-        times = [image.host_s for image in last]
-        self._apart_s = max(self._apart_s, max(times) - min(times))
-        self._counter += 1
-        # What is learnt of a clock can put an image before the one that came before it.
-        self._image_s = max(min(times), self._image_s + LEAST_S)
-        left, right = (cells for image in last for cells in image.cells)
-        return TactileImage(self._image_s, self._counter, left, right)
+    def signals(self, began_s: float) -> tuple[Samples, ...]:
+        """Return the samples of `CHANNELS`, at times since the grasp began."""
+        made = []
+        for channel, rows in zip(CHANNELS, self.rows, strict=True):
+            new = rows[-MOST:]
+            fill = ((nan,) * len(channel.axes),) * (MOST - len(new))
+            made.append(Samples(self.host_s - began_s, self.taken, len(new), (*new, *fill)))
+        return tuple(made)
 
-    def age_s(self) -> float:
-        """Return the time (s) since the last image of the board that is silent for longest."""
-        return max(board.age_s() for board in self._boards)
 
-    def report(self) -> dict[str, float | str]:
-        """Return the clocks of the boards, and how many of their packets could not be understood."""
-        damaged = {"tactile_damaged": sum(board.damaged for board in self._boards)}
-        clocks = [board.clock for board in self._boards]
-        if len(clocks) == 1:
-            return {**damaged, **clock_report("tactile", clocks[0], ("pads", *SIDES))}
-        uncertain_s = max(clock.line().uncertainty_s for clock in clocks)
-        return {
-            **damaged,
-            **clock_report("tactile_left", clocks[0], SIDES[:1]),
-            **clock_report("tactile_right", clocks[1], SIDES[1:]),
-            "pads_channels": "pads",
-            "pads_uncertainty_s": uncertain_s + self._apart_s,
-        }
-
-    def close(self) -> None:
-        """Stop their sending, and close the ports."""
-        for board in self._boards:
-            board.close()
+def joined(before: TactileData, now: TactileData) -> TactileData:
+    """Return the data of both."""
+    rows = tuple((*first, *second)[-MOST:] for first, second in zip(before.rows, now.rows, strict=True))
+    return TactileData(now.image or before.image, rows, now.taken, now.host_s)
 
 
 @final
-class TactileBoard:
-    """A board with this many fingertips at a serial port. Raises OSError."""
+class TactileStream:
+    """Understands the bytes of both fingertips, in the order in which they come."""
 
-    def __init__(self, port: str, fingers: int) -> None:
-        import serial
-
+    def __init__(self) -> None:
         self.clock = DeviceClock()
         self.damaged = 0
         """The number of packets that could not be understood."""
         self._packets = Packets()
-        self._cells: dict[int, tuple[float, ...]] = {}
-        self._fingers = fingers
-        self._port: Any = serial.Serial(port, BAUD, timeout=READ_S, write_timeout=READ_S, exclusive=True)
-        self._port.write(packet(AUTOSEND[0], bytes((PERIOD_MS,))))
-        self._thread = ReadingThread(self._read, name="TSF-85")
+        self._cells: dict[int, Row] = {}
+        self._images = self._taken = 0
 
-    def newest(self, timeout_s: float) -> BoardImage | None:
-        """Return the newest image that was not returned yet, None if none comes in time. Raises OSError."""
-        return self._thread.newest(timeout_s)
-
-    def age_s(self) -> float:
-        """Return the time (s) since the last image."""
-        return self._thread.age_s()
-
-    def close(self) -> None:
-        """Stop its sending, and close the port."""
-        self._thread.close()
-        with suppress(OSError):
-            self._port.write(packet(AUTOSEND[0], bytes((0,))))
-        with suppress(OSError):
-            self._port.close()
-
-    def _read(self) -> BoardImage | None:
-        data = self._port.read(self._port.in_waiting or 1)
-        arrived_s = host_s = time.monotonic()
-        pressed = False
+    def fed(self, data: bytes, arrived_s: float) -> TactileData | None:
+        """Return what these bytes, which arrived at this time of the host, complete; None if nothing."""
+        host_s, pressed, taken = arrived_s, False, self._taken
+        rows: dict[tuple[int, int], list[Row]] = {(kind, finger): [] for kind in _KINDS for finger in (0, 1)}
         for _, given in self._packets.fed(data):
             fields = decoded(given)
             if fields is None:
                 self.damaged += 1
                 continue
+            self._taken += any(field.kind == DYNAMIC for field in fields)
             for kind, finger, values in fields:
-                if kind == TIMESTAMP and finger == min(self._cells, default=finger):
+                if kind == TIMESTAMP and finger == 0:
                     host_s = arrived_s - self.clock.age_s(values[0] / TICKS_S, arrived_s)
                 elif kind == PRESSURE:
                     self._cells[finger] = tuple(map(float, values))
                     pressed = True
-        if not pressed or len(self._cells) < self._fingers:
+                elif kind in _KINDS and finger < 2:
+                    rows[kind, finger].append(tuple(map(float, values)))
+        image = None
+        if pressed and len(self._cells) == 2:
+            self._images += 1
+            image = TactileImage(host_s, self._images, self._cells[0], self._cells[1])
+        if image is None and self._taken == taken:
             return None
-        return BoardImage(
-            host_s, tuple(self._cells[finger] for finger in sorted(self._cells)[: self._fingers])
-        )
+        return TactileData(image, tuple(map(tuple, rows.values())), self._taken, host_s)
+
+
+@final
+class TactileFingertips:
+    """Fingertips at a serial port, which send by themselves from construction to `close`. Raises OSError."""
+
+    def __init__(self, port: str) -> None:
+        import serial
+
+        self.stream = TactileStream()
+        self._port: Any = serial.Serial(port, BAUD, timeout=READ_S, write_timeout=READ_S, exclusive=True)
+        self._port.write(START_SENDING)
+        self._thread = ReadingThread(self._read, name="TSF-85", joined=joined)
+
+    def newest(self, timeout_s: float) -> TactileData | None:
+        """Return what came since the last call, None if nothing comes in time. Raises OSError."""
+        return self._thread.newest(timeout_s)
+
+    def age_s(self) -> float:
+        """Return the time (s) since something came."""
+        return self._thread.age_s()
+
+    def close(self) -> None:
+        """Stop their sending, and close the port."""
+        self._thread.close()
+        with suppress(OSError):
+            self._port.write(STOP_SENDING)
+        with suppress(OSError):
+            self._port.close()
+
+    def _read(self) -> TactileData | None:
+        data = self._port.read(self._port.in_waiting or 1)
+        return self.stream.fed(data, time.monotonic())

@@ -43,6 +43,11 @@ def packet(command: int, data: bytes = b"") -> bytes:
     return bytes((START, 0, command, len(data))) + data
 
 
+START_SENDING: Final = packet(AUTOSEND[0], bytes((1,)))
+"""Asks for a packet each millisecond."""
+STOP_SENDING: Final = packet(AUTOSEND[0], bytes((0,)))
+
+
 def encoded(fields: list[Field]) -> bytes:
     """Return the packet with these fields."""
     return packet(

@@ -12,6 +12,8 @@ from contextlib import suppress
 from typing import Final, final
 
 LARGEST: Final = 4096
+MOST_UNSENT: Final = 1 << 16
+"""Bytes that wait for a host which does not read; more is lost, as from a device with a buffer."""
 
 
 @final
@@ -32,6 +34,7 @@ class EmulatedPort:
         self._door: socket.socket | None = None
         self._call: socket.socket | None = None
         self._terminal: tuple[int, int] | None = None
+        self._unsent = b""
         if wire == "pty":
             self._terminal = os.openpty()
             for end in self._terminal:
@@ -66,7 +69,8 @@ class EmulatedPort:
                     self._accept()
                 elif set(ready) & set(self._sources()):
                     self._hear()
-                if self._idle is not None and (unasked := self._idle()):
+                unasked = b"" if self._idle is None else self._idle()
+                if unasked or self._unsent:
                     self._send(unasked)
         finally:
             self._release()
@@ -90,6 +94,8 @@ class EmulatedPort:
         with suppress(OSError):
             data = self._call.recv(LARGEST) if self._call is not None else os.read(self._handle(), LARGEST)
         if data:
+            # Who asks does not want what waited for somebody else.
+            self._unsent = b""
             reply = self._heard(data)
             if reply and not self._closed:
                 self._send(reply)
@@ -104,9 +110,11 @@ class EmulatedPort:
     def _send(self, data: bytes) -> None:
         with suppress(OSError):
             if self._terminal is not None:
-                # Where nobody reads, a terminal fills up: what has no room is lost, as on a serial line.
+                # A terminal fills up where nobody reads.
+                if len(self._unsent) <= MOST_UNSENT:
+                    self._unsent += data
                 if select.select([], [self._handle()], [], 0.0)[1]:
-                    os.write(self._handle(), data)
+                    self._unsent = self._unsent[os.write(self._handle(), self._unsent) :]
             elif self._call is not None:
                 self._call.sendall(data)
 

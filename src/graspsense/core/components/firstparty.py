@@ -33,6 +33,7 @@ class Shipped:
 _PR2 = Shipped("graspsense-pr2-gripper", "pr2_gripper", "pr2")
 _SIM = Shipped("graspsense-sim-gripper", "sim_gripper", "sim")
 _MUJOCO = Shipped("graspsense-mujoco-gripper", "mujoco_gripper", "mujoco")
+_FRANKA = Shipped("graspsense-franka-hand", "franka_hand", "franka")
 _ROBOTIQ = Shipped("graspsense-robotiq-2f", "robotiq_2f", "robotiq")
 _ROS2 = Shipped("graspsense-ros2", "ros2", "ros2")
 _SO101 = Shipped("graspsense-so101-gripper", "so101_gripper", "so101")
@@ -45,9 +46,11 @@ SHIPPED: Final[dict[tuple[Role, str], Shipped]] = {
     ("sensor-backend", "pr2"): _PR2,
     ("sensor-backend", "sim"): _SIM,
     ("sensor-backend", "mujoco"): _MUJOCO,
+    ("sensor-backend", "franka"): _FRANKA,
     ("sensor-backend", "robotiq"): _ROBOTIQ,
     ("sensor-backend", "ros2"): _ROS2,
     ("sensor-backend", "so101"): _SO101,
+    ("feature-set", "width-and-time"): _FRANKA,
     ("classifier", "c45"): _C45,
     ("controller", "find-contact"): _ROMANO,
     ("controller", "force-servo"): _ROMANO,

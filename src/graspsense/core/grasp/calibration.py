@@ -273,3 +273,22 @@ def load_of(table: LoadTable, pad_n: float) -> tuple[float, bool]:
     i = min(max(bisect_right(pads, pad_n), 1), len(pads) - 1)
     slope = (loads[i] - loads[i - 1]) / (pads[i] - pads[i - 1])
     return loads[i - 1] + slope * (pad_n - pads[i - 1]), pad_n <= pads[-1]
+
+
+def asked_force(delivered: LoadTable, wanted_n: float) -> float:
+    """Return the force (N) to ask a gripper for, so that it delivers `wanted_n` and not more.
+
+    `delivered` is a table from the force asked for to the force that a load cell measured. Above its last force the
+    last slope holds; where even the least measured force is more than wanted, the least one that was asked for.
+
+    >>> asked_force(LoadTable((0.0, 20.0, 40.0), (0.0, 30.0, 50.0)), 40.0)
+    30.0
+    """
+    asked, loads = delivered
+    if wanted_n < loads[1]:
+        return asked[1]
+    i = min(bisect_right(loads, wanted_n), len(loads) - 1)
+    while i > 1 and loads[i] <= loads[i - 1]:
+        i -= 1
+    slope = loads[i] - loads[i - 1]
+    return asked[i - 1] + (asked[i] - asked[i - 1]) * (wanted_n - loads[i - 1]) / slope

@@ -1,6 +1,6 @@
 """Calibration files: a folder for each serial number, and in it a file for each kind, with its version and hash.
 
-    FOLDER/SERIAL/tare.json, gain.json, load-cell.json, friction.json
+    FOLDER/SERIAL/tare.json, gain.json, load-cell.json, friction.json, delivered-force.json
 
 A file names the device that it was made on; its use with another device is an error.
 """
@@ -27,7 +27,7 @@ from graspsense.core.values.errors import ConfigError, DataDamaged
 
 FORMAT: Final = "graspsense-calibration"
 VERSION: Final = 1
-KINDS: Final = ("tare", "gain", "load-cell", "friction")
+KINDS: Final = ("tare", "gain", "load-cell", "friction", "delivered-force")
 DIRECTIONS: Final = ("closing", "opening")
 """In which a motor pushes."""
 UNCALIBRATED: Final = "none"
@@ -212,7 +212,7 @@ def stored_gain(calibration: Calibration) -> tuple[Cells, Cells]:
 
 def stored_tables(calibration: Calibration) -> tuple[LoadTable, LoadTable]:
     """Return the stored load tables of the left and of the right pad."""
-    left, right = (_table(calibration, side, "pad_n") for side in ("left", "right"))
+    left, right = (_table(calibration.data[side], "pad_n", "load_n") for side in ("left", "right"))
     return left, right
 
 
@@ -222,7 +222,7 @@ def stored_motor_tables(calibration: Calibration) -> tuple[MotorTable, MotorTabl
     if min(errors) < 0.0:
         raise ValueError("the error of a table is negative")
     closing, opening = (
-        MotorTable(_table(calibration, direction, "motor"), error_n)
+        MotorTable(_table(calibration.data[direction], "motor", "load_n"), error_n)
         for direction, error_n in zip(DIRECTIONS, errors, strict=True)
     )
     return closing, opening
@@ -234,13 +234,9 @@ def _load_cell(calibration: Calibration) -> object:
     return stored_tables(calibration) if pads else stored_motor_tables(calibration)
 
 
-def _table(calibration: Calibration, name: str, column: str) -> LoadTable:
-    measured, loads = (_numbers(calibration.data[name][key]) for key in (column, "load_n"))
-    if len(measured) != len(loads) or len(measured) < 2:
-        raise ValueError(f"the {name} load table has {len(measured)} and {len(loads)} numbers")
-    if any(a >= b for a, b in pairwise(measured)) or list(loads) != sorted(loads):
-        raise ValueError(f"the {name} load table does not rise")
-    return LoadTable(measured, loads)
+def stored_delivered_force(calibration: Calibration) -> LoadTable:
+    """Return the stored table from the force asked for (N) to the force that the gripper delivered (N)."""
+    return _table(calibration.data, "asked_n", "delivered_n")
 
 
 def stored_friction(calibration: Calibration) -> tuple[Cells, Cells, Cells]:
@@ -256,7 +252,17 @@ _READERS: Final = {
     "gain": stored_gain,
     "load-cell": _load_cell,
     "friction": stored_friction,
+    "delivered-force": stored_delivered_force,
 }
+
+
+def _table(data: Mapping[str, Any], given: str, measured: str) -> LoadTable:
+    forces, loads = _numbers(data[given]), _numbers(data[measured])
+    if len(forces) != len(loads) or len(forces) < 2:
+        raise ValueError(f"the table has {len(forces)} and {len(loads)} forces")
+    if any(a >= b for a, b in pairwise(forces)) or list(loads) != sorted(loads):
+        raise ValueError("the table does not rise")
+    return LoadTable(forces, loads)
 
 
 def _numbers(values: Any) -> Cells:

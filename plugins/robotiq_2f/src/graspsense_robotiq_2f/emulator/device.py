@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import partial
 from typing import Final, final
 
 from graspsense.gripper_api import EmulatedPort, EmulatedSerial
 from graspsense_robotiq_2f.config import RobotiqConfig
-from graspsense_robotiq_2f.emulator.fingertips import EmulatedFingertips
+from graspsense_robotiq_2f.emulator.fingertips import EmulatedFingertips, Felt
 from graspsense_robotiq_2f.emulator.hand import Hand
 from graspsense_robotiq_2f.emulator.modbus import answered
+from graspsense_robotiq_2f.emulator.ur_cap import answered as answered_by_ur_cap
+from graspsense_robotiq_2f.ur_cap import PREFIX
 
 RATE_HZ: Final = 100.0
 TACTILE_TICK_S: Final = 0.001
@@ -33,18 +34,21 @@ class EmulatedGripper(EmulatedSerial):
         self._config = config
         self._hand = Hand(config, seed)
         self._data = b""
-        both = [(0, 1)] if len(config.tactile_ports) == 1 else [(0,), (1,)]
-        self._fingertips = [
-            EmulatedFingertips(partial(self._felt, fingers))
-            for fingers in both
-            if "emulated" in config.tactile_ports
-        ]
-        self._tactile_ports: list[EmulatedPort] = []
+        self._fingertips = (
+            EmulatedFingertips(self._felt, seed=seed) if config.tactile_port == "emulated" else None
+        )
+        self._tactile_port: EmulatedPort | None = None
+
+    @property
+    def where(self) -> str:
+        """What `gripper.port` has to be, empty while it is unplugged."""
+        where = super().where
+        return where.replace("socket:", PREFIX) if self.wire == "ur" else where
 
     @property
     def tactile_where(self) -> str:
         """What `gripper.tactile_port` has to be, empty without fingertips or while it is unplugged."""
-        return ",".join(port.where for port in self._tactile_ports)
+        return "" if self._tactile_port is None else self._tactile_port.where
 
     @property
     def body_report(self) -> Mapping[str, float | int | str | bool]:
@@ -54,25 +58,25 @@ class EmulatedGripper(EmulatedSerial):
     def tell(self, word: str) -> None:
         """Execute one of `words`. Raises KeyError for any other."""
         super().tell(word)
-        if word == "plug" and not self._tactile_ports:
-            self._tactile_ports = [
-                EmulatedPort("pty", tips.heard, tips.unasked, TACTILE_TICK_S) for tips in self._fingertips
-            ]
+        if word == "plug" and self._tactile_port is None and (tips := self._fingertips) is not None:
+            self._tactile_port = EmulatedPort("pty", tips.heard, tips.unasked, TACTILE_TICK_S)
         elif word == "unplug":
-            ports, self._tactile_ports = self._tactile_ports, []
-            for port in ports:
+            port, self._tactile_port = self._tactile_port, None
+            if port is not None:
                 port.close()
 
     def close(self) -> None:
         """Unplug it and release the body."""
         super().close()
-        self._hand.fingers.close()
+        self._hand.close()
 
     def answer(self, data: bytes, now_s: float) -> bytes:
         """Return the reply to a request that these bytes complete."""
-        reply, self._data = answered(
-            self._hand, self._config.address, self._data + data if data else b"", now_s
-        )
+        data = self._data + data if data else b""
+        if self.wire == "ur":
+            reply, self._data = answered_by_ur_cap(self._hand, data, now_s)
+        else:
+            reply, self._data = answered(self._hand, self._config.address, data, now_s)
         return reply
 
     def move(self, now_s: float) -> None:
@@ -93,7 +97,6 @@ class EmulatedGripper(EmulatedSerial):
             "going": self._hand.going,
         }
 
-    def _felt(self, fingers: tuple[int, ...]) -> tuple[float, ...]:
+    def _felt(self) -> Felt:
         # Not by waiting: who unplugs may hold the lock, and waits for the thread that calls this.
-        forces_n = self._hand.fingers.forces_n
-        return tuple(forces_n[finger] for finger in fingers)
+        return self._hand.felt

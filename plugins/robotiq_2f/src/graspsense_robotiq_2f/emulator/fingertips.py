@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import Final
+from random import Random
+from typing import Final, NamedTuple
 
 from graspsense_robotiq_2f.tactile_protocol import (
     ACCELERATION,
@@ -12,6 +13,7 @@ from graspsense_robotiq_2f.tactile_protocol import (
     CELLS,
     COLUMNS,
     DYNAMIC,
+    FINGERS,
     GYROSCOPE,
     PRESSURE,
     READ,
@@ -27,28 +29,45 @@ from graspsense_robotiq_2f.tactile_protocol import (
 PRESSURE_S: Final = 1.0 / 60.0
 COUNTS_PER_N: Final = 1000.0
 """Counts of all cells under one newton: an assumption, as is the shape of the pressure."""
-REST_COUNTS: Final = 200
-"""Counts of a cell that nothing touches."""
+REST_COUNTS: Final = (150, 250)
+"""Counts of cells that nothing touches: each has its own between these."""
+NOISE_COUNTS: Final = 3.0
+"""Standard deviation of a cell: an assumption. One that never changes is stuck, and the protection ends the grasp."""
 G_COUNTS: Final = 16384
 MOST_AT_ONCE: Final = 50
 """Packets that are made up for at once, if the machine was busy."""
+# The thing does not reach the ends of the pad: what raises all cells alike is drift (core/grasp/protection/drift.py).
 _SHAPE: Final = [
-    (1.0 - abs(row - 3) / 4.0) * (1.0 - abs(column - 1.5) / 2.0)
+    (1.0 - abs(row - 3) / 3.0) * (1.0 - abs(column - 1.5) / 2.0)
     for row in range(ROWS)
     for column in range(COLUMNS)
 ]
 _TOTAL: Final = sum(_SHAPE)
 
 
-class EmulatedFingertips:
-    """A board with a fingertip for each force of `felt`. `heard` and `unasked` are the two sides of a port."""
+class Felt(NamedTuple):
+    """What the pads feel: the forces (N) on the left and the right one."""
 
-    def __init__(self, felt: Callable[[], tuple[float, ...]]) -> None:
-        self._felt = felt
+    left_n: float
+    right_n: float
+
+
+class EmulatedFingertips:
+    """Two fingertips whose forces `felt` returns. `heard` and `unasked` are the two sides of a port."""
+
+    def __init__(
+        self, felt: Callable[[], Felt], monotonic: Callable[[], float] | None = None, seed: int = 0
+    ) -> None:
+        self._random = Random(seed)
+        self.rest = tuple(
+            tuple(self._random.randint(*REST_COUNTS) for _ in range(CELLS)) for _ in range(FINGERS)
+        )
+        """The counts of each cell of each finger that nothing touches."""
+        self._felt, self._monotonic = felt, monotonic or time.monotonic
         self._packets = Packets()
-        self._began_s = time.monotonic()
+        self._began_s = self._monotonic()
         self._period_s = self._due_s = self._pressed_s = 0.0
-        self._last = tuple(0.0 for _ in felt())
+        self._last = Felt(0.0, 0.0)
         self.sent = 0
         """The number of packets with measurements."""
 
@@ -60,7 +79,7 @@ class EmulatedFingertips:
         """Return the packets that are due, with one of each period, none twice."""
         if not self._period_s:
             return b""
-        now_s = time.monotonic() - self._began_s
+        now_s = self._monotonic() - self._began_s
         packets: list[bytes] = []
         while self._due_s <= now_s and len(packets) < MOST_AT_ONCE:
             packets.append(self._measured(self._due_s))
@@ -68,7 +87,7 @@ class EmulatedFingertips:
         return b"".join(packets)
 
     def _reply(self, command: int, given: bytes) -> bytes:
-        now_s = time.monotonic() - self._began_s
+        now_s = self._monotonic() - self._began_s
         if command in AUTOSEND and given:
             self._period_s, self._due_s = given[0] / 1000.0, now_s
         elif command == READ:
@@ -84,10 +103,11 @@ class EmulatedFingertips:
             self._pressed_s = now_s + PRESSURE_S
             self._last = self._felt()
         fields = []
-        for finger, (force_n, before_n) in enumerate(zip(self._last, before, strict=True)):
+        for finger in range(FINGERS):
+            force_n, before_n = self._last[finger], before[finger]
             fields.append(Field(TIMESTAMP, finger, (round(now_s * 1e6),)))
             if pressed:
-                fields.append(Field(PRESSURE, finger, _cells(force_n)))
+                fields.append(Field(PRESSURE, finger, self._cells(finger, force_n)))
             change = round(min(max((force_n - before_n) * COUNTS_PER_N, -32768.0), 32767.0))
             fields.append(Field(DYNAMIC, finger, (change,)))
             fields.append(Field(ACCELERATION, finger, (0, 0, G_COUNTS)))
@@ -95,7 +115,9 @@ class EmulatedFingertips:
         self.sent += 1
         return encoded(fields)
 
-
-def _cells(force_n: float) -> tuple[int, ...]:
-    counts = max(force_n, 0.0) * COUNTS_PER_N / _TOTAL
-    return tuple(min(REST_COUNTS + round(counts * share), 0xFFFF) for share in _SHAPE[:CELLS])
+    def _cells(self, finger: int, force_n: float) -> tuple[int, ...]:
+        counts = max(force_n, 0.0) * COUNTS_PER_N / _TOTAL
+        return tuple(
+            min(max(round(rest + counts * share + self._random.gauss(0.0, NOISE_COUNTS)), 0), 0xFFFF)
+            for rest, share in zip(self.rest[finger], _SHAPE, strict=True)
+        )

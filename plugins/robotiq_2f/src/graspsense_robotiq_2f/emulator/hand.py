@@ -7,6 +7,7 @@ from typing import Final
 
 from graspsense.gripper_api import EmulatedFingers, FingerTarget
 from graspsense_robotiq_2f.config import RobotiqConfig
+from graspsense_robotiq_2f.emulator.fingertips import Felt
 from graspsense_robotiq_2f.registers import (
     ACTIVE,
     AMPERES_A_STEP,
@@ -38,6 +39,16 @@ class Hand:
         )
         self._registers = [0] * COUNT
         self.active_since_s = inf
+
+    @property
+    def registers(self) -> tuple[int, ...]:
+        """The output registers as they were written last."""
+        return tuple(self._registers)
+
+    @property
+    def felt(self) -> Felt:
+        """The forces on the pads of the body."""
+        return Felt(*self.fingers.forces_n)
 
     @property
     def going(self) -> bool:
@@ -83,6 +94,10 @@ class Hand:
         status = request.active | request.go << 3 | state << 4 | self._objects(target.gap_m) << 6
         amperes = min(round(abs(fingers.effort_n) / NEWTONS_PER_AMPERE / AMPERES_A_STEP), 255)
         return [status << 8, request.position, model.position(fingers.gap_m) << 8 | amperes]
+
+    def close(self) -> None:
+        """Release the body."""
+        self.fingers.close()
 
     def _objects(self, target_m: float) -> int:
         way_m = self.fingers.gap_m - target_m

@@ -1,0 +1,80 @@
+"""The emulated hand in the same process: each state is one period later, and nobody waits."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import final
+
+from graspsense_franka_hand import orders, protocol
+from graspsense_franka_hand.config import FrankaConfig
+from graspsense_franka_hand.emulator.hand import TEMPERATURE_C, FrankaHand
+from graspsense_franka_hand.orders import ANY_WIDTH_M, RATE_HZ, HandGone, HandState, Order
+
+_COMMANDS = {orders.GRASP: protocol.GRASP, orders.MOVE: protocol.MOVE, orders.STOP: protocol.STOP}
+
+
+@final
+class LockStepHand:
+    """An emulated hand of these settings. Raises HandGone if it is to be another version, ConfigError for its body."""
+
+    def __init__(self, config: FrankaConfig, seed: int) -> None:
+        self._faults = config.faults
+        self.hand = FrankaHand(config, seed)
+        self._now_s = 0.0
+        self._done = 0
+        self._refused = ""
+        if self._faults.mood == "old":
+            self.close()
+            raise HandGone("it speaks another version of the protocol")
+
+    @property
+    def body_report(self) -> Mapping[str, float | int | str | bool]:
+        """What the body knows."""
+        return self.hand.fingers.body.report()
+
+    def newest(self, timeout_s: float) -> HandState | None:
+        """Return the state one period later. Raises HandGone."""
+        del timeout_s
+        self._now_s += 1.0 / RATE_HZ
+        self._check()
+        self.hand.look(self._now_s)
+        mood = self._faults.mood_at(self._now_s)
+        if mood == "damaged":
+            raise HandGone("a state was damaged")
+        if mood == "silent":
+            return None
+        self._count()
+        return HandState(
+            self._now_s,
+            self.hand.width_m,
+            self.hand.widest_m,
+            self.hand.grasped,
+            float(TEMPERATURE_C),
+            self._done,
+            self._refused,
+        )
+
+    def send(self, order: Order) -> None:
+        """Order it; what it still does is aborted. Raises HandGone."""
+        self._check()
+        values: tuple[float, ...] = ()
+        if order.kind == orders.GRASP:
+            values = (order.width_m, ANY_WIDTH_M, ANY_WIDTH_M, order.speed_m_s, order.force_n)
+        elif order.kind == orders.MOVE:
+            values = (order.width_m, order.speed_m_s)
+        self.hand.ask(protocol.HandRequest(_COMMANDS[order.kind], 0, values), self._now_s)
+        self._count()
+
+    def close(self) -> None:
+        """Stop the fingers, and release the body."""
+        self.hand.ask(protocol.HandRequest(protocol.STOP, 0, ()), self._now_s)
+        self.hand.close()
+
+    def _check(self) -> None:
+        if self._now_s >= self._faults.unplug_at_s:
+            raise HandGone("its cable was pulled")
+
+    def _count(self) -> None:
+        for _, status in self.hand.ended():
+            self._done += 1
+            self._refused = "Command failed!" if status == protocol.FAILED else ""

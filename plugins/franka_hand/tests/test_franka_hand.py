@@ -1,0 +1,342 @@
+"""The driver with the emulated hand in the same process, the features of width and time, and the calibration."""
+
+from __future__ import annotations
+
+import json
+from contextlib import suppress
+
+import numpy as np
+import pytest
+from attrs import evolve
+from click.testing import CliRunner
+from hypothesis import given
+from hypothesis import strategies as st
+
+from graspsense import WiringError, load_pipeline
+from graspsense.cli.main import cli
+from graspsense.gripper_api import LoadTable, asked_force
+from graspsense.plugin_api import (
+    FORCE,
+    POSITION,
+    VELOCITY,
+    Command,
+    DataDamaged,
+    DeviceLost,
+    NoDevice,
+    PluginUnavailable,
+    create,
+)
+from graspsense.testing_api import a_trial, parametrize_checks
+from graspsense_franka_hand import link, protocol
+from graspsense_franka_hand.config import FrankaConfig
+from graspsense_franka_hand.discovery import diagnose
+from graspsense_franka_hand.emulator.hand import FrankaHand
+from graspsense_franka_hand.protocol import (
+    ABORTED,
+    CONNECT,
+    FAILED,
+    GRASP,
+    MOVE,
+    STOP,
+    SUCCESS,
+    HandRequest,
+    NotARequest,
+    Requests,
+    request_bytes,
+)
+
+EMULATED = ["gripper.host=emulated", "gripper.calibration=none"]
+
+
+@parametrize_checks(
+    "graspsense-franka-hand",
+    keys={"host": "emulated", "calibration": "none"},
+    unplugged={"faults": {"unplug_at_s": 1.0}},
+    absent={"host": "127.9.9.9", "calibration": "none"},
+)
+def test_conformance(check):
+    check.run()
+
+
+def test_a_grasp_gives_width_and_time_and_opens_the_fingers():
+    trial = load_pipeline("franka", options=EMULATED).grasp()
+
+    assert trial.outcome.words == "steady", trial.reason
+    assert not trial.features.reasons
+    features = trial.features
+    # The object of the simulator is 50 mm wide, and gives way by millimetres between 30 and 60 N.
+    assert 0.045 < features["p_steady"] < features["p_first"] < 0.05
+    assert features["squeezed"] == pytest.approx(features["p_first"] - features["p_steady"])
+    assert features["delta_t"] > 0.0
+    trace = trial.trace
+    assert np.isnan(trace.effort_n).all()
+    assert set(np.unique(trace.signals["grasped"])) == {0.0, 1.0}
+    assert trace.signals["temperature"] == pytest.approx(303.15)
+    assert trace.gap_m[-1] > 0.078
+
+
+def test_fingers_that_close_on_nothing_have_no_features_and_say_why():
+    trial = load_pipeline("franka", options=EMULATED).grasp(object="none")
+    assert trial.outcome.words == "nothing there"
+    assert set(trial.features.reasons) == set(trial.features.names)
+
+
+def test_features_that_need_a_force_are_refused_with_that_reason():
+    with pytest.raises(WiringError, match="force_left") as refused:
+        load_pipeline("franka", options=["features.type=chitta"])
+    assert "which gripper graspsense-franka-hand/franka does not have" in str(refused.value)
+
+
+def test_less_than_the_least_force_is_refused_before_anything_moves():
+    with pytest.raises(WiringError, match="30 N"):
+        load_pipeline("franka", options=["controller.approach_force_n=10"])
+
+
+def _trace(times, gaps, phases):
+    trace = a_trial().trace
+    n = len(times)
+    columns = {
+        name: np.full(n, np.nan)
+        for name in (
+            "velocity_m_s",
+            "effort_n",
+            "force_left_n",
+            "force_right_n",
+            "edge_left_n",
+            "edge_right_n",
+            "command",
+        )
+    }
+    return evolve(
+        trace,
+        t_s=np.asarray(times),
+        gap_m=np.asarray(gaps),
+        phase=np.asarray(phases),
+        status=np.zeros(n, int),
+        **columns,
+    )
+
+
+def test_the_features_are_those_of_the_widths():
+    times = np.arange(30) / 15.0
+    # 20 mm/s for 1 s to 40 mm, 6 states there, two states to 38 mm, and rest until the end.
+    gaps = [0.06 - 0.02 * t for t in times[:15]] + [0.04] * 6 + [0.039] + [0.038] * 8
+    features = create("feature-set", "width-and-time").extract(_trace(times, gaps, [2] * 30))
+    assert features["p_first"] == pytest.approx(0.04)
+    assert features["p_steady"] == pytest.approx(0.038)
+    assert features["squeezed"] == pytest.approx(0.002)
+    assert features["approach_t"] == pytest.approx(1.0)
+    assert features["delta_t"] == pytest.approx(times[22] - times[15])
+
+
+def test_fingers_that_still_move_have_no_last_rest():
+    times = np.arange(26) / 15.0
+    gaps = [0.06 - 0.02 * t for t in times[:15]] + [0.04] * 6 + [0.039, 0.037, 0.035, 0.033, 0.031]
+    features = create("feature-set", "width-and-time").extract(_trace(times, gaps, [2] * 26))
+    assert features["p_first"] == pytest.approx(0.04)
+    assert set(features.reasons) == {"p_steady", "squeezed", "delta_t"}
+
+
+def _closed(driver, command, frames=120):
+    read = [driver.read(1.0)]
+    for _ in range(frames):
+        driver.apply(command)
+        read.append(driver.read(1.0))
+    return [reading.frame for reading in read]
+
+
+@pytest.mark.parametrize("kind", [VELOCITY, POSITION, FORCE])
+def test_every_kind_of_command_closes_at_its_speed_and_not_again_and_again(kind):
+    driver = create("sensor-backend", "franka", host="emulated", calibration="none")
+    driver.open(1)
+    value = {VELOCITY: -0.02, POSITION: 0.0, FORCE: 40.0}[kind]
+    frames = _closed(driver, Command(kind, value, 40.0, 0.02))
+    assert driver.report()["orders"] == 1
+    driver.close()
+    speeds = [frame.velocity_m_s for frame in frames[5:15]]
+    assert np.mean(speeds) == pytest.approx(-0.02, rel=0.1)
+    assert 0.04 < frames[-1].gap_m < 0.05
+    assert driver.report()["true_peak_force_n"] < 45.0
+
+
+def test_a_stronger_grasp_waits_until_the_running_one_has_ended_and_an_opening_does_not():
+    driver = create("sensor-backend", "franka", host="emulated", calibration="none")
+    driver.open(1)
+    driver.apply(Command(POSITION, 0.0, 30.0, 0.02))
+    for force_n in (35.0, 40.0, 45.0):
+        driver.read(1.0)
+        driver.apply(Command(POSITION, 0.0, force_n, 0.02))
+    assert driver.report()["orders"] == 1
+    for _ in range(60):
+        driver.read(1.0)
+    assert driver.report()["orders"] == 2
+    driver.apply(Command(POSITION, 0.08, 30.0, 0.05))
+    assert driver.report()["orders"] == 3
+    driver.close()
+
+
+def test_who_is_released_is_not_pressed():
+    driver = create("sensor-backend", "franka", host="emulated", calibration="none")
+    driver.open(1)
+    hand = driver._link.hand
+    _closed(driver, Command(POSITION, 0.0, 40.0, 0.05))
+    assert hand.pressing
+    driver.close()
+    assert not hand.pressing
+
+
+@pytest.mark.parametrize("mood", ["silent", "damaged"])
+@pytest.mark.parametrize("at_s", [0.5, 2.0, 3.0, 4.0])
+def test_a_hand_lost_in_a_grasp_ends_it(mood, at_s):
+    options = [*EMULATED, f"gripper.faults.mood={mood}", f"gripper.faults.mood_at_s={at_s}"]
+    trial = load_pipeline("franka", options=options).grasp()
+    assert trial.outcome.words == "device lost"
+    # The trace begins with the opening, which is at least half a second.
+    assert 15 * (at_s - 0.5) <= len(trial.trace) <= 15 * at_s
+
+
+def test_another_version_is_no_device():
+    driver = create("sensor-backend", "franka", host="emulated", calibration="none", faults={"mood": "old"})
+    with pytest.raises(NoDevice, match="version"):
+        driver.open(0)
+
+
+def test_without_pylibfranka_the_user_is_told_what_to_install(monkeypatch):
+    monkeypatch.setattr(link.importlib.util, "find_spec", lambda name: None)
+    driver = create("sensor-backend", "franka", host="127.0.0.1", calibration="none")
+    with pytest.raises(PluginUnavailable, match="pip install pylibfranka"):
+        driver.open(0)
+    [finding] = diagnose(FrankaConfig(host="127.0.0.1"), 1.0)
+    assert finding.state == "problem"
+    assert "pip install pylibfranka" in finding.advice
+
+
+def _hand():
+    hand = FrankaHand(FrankaConfig(host="emulated"), 1)
+    hand.look(0.1)
+    return hand
+
+
+def test_the_hand_answers_each_command_as_libfranka_expects():
+    hand = _hand()
+    hand.ask(HandRequest(GRASP, 1, (0.0, 1.0, 1.0, 0.05, 40.0)), 0.1)
+    hand.ask(HandRequest(MOVE, 2, (0.07, 0.05)), 0.2)
+    assert hand.ended() == [(HandRequest(GRASP, 1, (0.0, 1.0, 1.0, 0.05, 40.0)), ABORTED)]
+    hand.look(2.0)
+    assert [status for _, status in hand.ended()] == [SUCCESS]
+    hand.ask(HandRequest(MOVE, 3, (0.2, 0.05)), 2.0)
+    assert [status for _, status in hand.ended()] == [FAILED]
+    hand.ask(HandRequest(GRASP, 4, (0.0, 1.0, 1.0, 0.05, 40.0)), 2.1)
+    hand.look(6.0)
+    assert [status for _, status in hand.ended()] == [SUCCESS]
+    assert hand.grasped
+    assert hand.pressing
+    hand.ask(HandRequest(STOP, 5, ()), 6.0)
+    assert not hand.pressing
+    hand.close()
+
+
+REQUESTS = st.one_of(
+    st.tuples(st.just(CONNECT), st.integers(0, 0xFFFF), st.integers(0, 0xFFFF)),
+    st.tuples(st.just(MOVE), *(2 * [st.floats(allow_nan=False)])),
+    st.tuples(st.just(GRASP), *(5 * [st.floats(allow_nan=False)])),
+    st.tuples(st.just(STOP)),
+)
+
+
+@given(st.lists(REQUESTS, max_size=5), st.integers(1, 20))
+def test_requests_in_any_pieces_are_taken(given_requests, size):
+    data = b"".join(request_bytes(command, k, *values) for k, (command, *values) in enumerate(given_requests))
+    requests = Requests()
+    found = [
+        request for start in range(0, len(data), size) for request in requests.fed(data[start : start + size])
+    ]
+    assert found == [
+        HandRequest(command, k, tuple(values)) for k, (command, *values) in enumerate(given_requests)
+    ]
+
+
+@given(st.binary(max_size=200))
+def test_any_bytes_are_requests_or_refused(data):
+    with suppress(NotARequest):
+        for request in Requests().fed(data):
+            assert request.command <= STOP
+
+
+def test_a_state_has_the_layout_of_the_protocol():
+    assert len(protocol.state(5, 0.04, 0.08, True, 30)) == 4 + 8 + 8 + 1 + 2
+
+
+@given(
+    st.lists(
+        st.tuples(st.floats(1.0, 100.0), st.floats(1.0, 100.0)),
+        min_size=2,
+        max_size=8,
+        unique_by=lambda x: x[0],
+    ),
+    st.floats(0.0, 150.0),
+)
+def test_the_force_to_ask_for_never_delivers_more_than_is_wanted(readings, wanted_n):
+    from graspsense.core.grasp.calibration import load_of, load_table
+
+    table = load_table(readings)
+    asked_n = asked_force(table, wanted_n)
+    assert asked_n >= 0.0
+    if wanted_n >= table.load_n[1] and len(set(table.load_n)) > 2:
+        assert load_of(table, asked_n)[0] <= wanted_n * (1.0 + 1e-6) or asked_n == table.pad_n[1]
+
+
+def test_delivered_force_is_stored_and_used(tmp_path):
+    readings = tmp_path / "readings.csv"
+    readings.write_text("asked_n,delivered_n\n20,30\n40,50\n60,70\n60,74\n")
+    options = [
+        "--gripper",
+        "franka",
+        "-o",
+        "gripper.host=emulated",
+        "-o",
+        f"gripper.calibration={tmp_path}/kept",
+    ]
+    (tmp_path / "kept").mkdir(mode=0o700)
+    done = CliRunner().invoke(cli, ["calibrate", "delivered-force", str(readings), *options, "--json"])
+    assert done.exit_code == 0, done.output
+    data = json.loads(done.stdout)["data"]
+    assert data == {"asked_n": [0.0, 20.0, 40.0, 60.0], "delivered_n": [0.0, 30.0, 50.0, 72.0]}
+
+    driver = create("sensor-backend", "franka", host="emulated", calibration=f"{tmp_path}/kept")
+    info = driver.open(1)
+    assert set(info.calibration) == {"delivered-force"}
+    # 50 N are wanted: 40 N are asked for.
+    driver.apply(Command(POSITION, 0.0, 50.0, 0.05))
+    assert driver._asked.force_n == pytest.approx(40.0)
+    driver.close()
+
+
+def test_damaged_readings_are_refused_with_their_line(tmp_path):
+    readings = tmp_path / "readings.csv"
+    readings.write_text("asked_n,delivered_n\n20,30\n40,\n")
+    options = [
+        "--gripper",
+        "franka",
+        "-o",
+        "gripper.host=emulated",
+        "-o",
+        f"gripper.calibration={tmp_path}/kept",
+    ]
+    done = CliRunner().invoke(cli, ["calibrate", "delivered-force", str(readings), *options])
+    assert isinstance(done.exception, DataDamaged)
+    assert ":3:" in str(done.exception)
+
+
+def test_a_table_that_stays_level_is_read():
+    assert asked_force(LoadTable((0.0, 10.0, 20.0, 40.0), (0.0, 30.0, 30.0, 50.0)), 40.0) == 30.0
+
+
+def test_a_lost_hand_is_said_with_its_address():
+    driver = create(
+        "sensor-backend", "franka", host="emulated", calibration="none", faults={"unplug_at_s": 0.3}
+    )
+    driver.open(0)
+    with pytest.raises(DeviceLost, match="emulated"):
+        [driver.read(1.0) for _ in range(10)]
+    driver.close()

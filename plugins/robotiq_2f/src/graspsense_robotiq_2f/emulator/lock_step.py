@@ -1,0 +1,110 @@
+"""The emulated gripper in the same process: its time passes while the driver waits, and nobody waits in fact."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Final, final
+
+from graspsense_robotiq_2f.config import RobotiqConfig
+from graspsense_robotiq_2f.emulator.fingertips import EmulatedFingertips
+from graspsense_robotiq_2f.emulator.hand import Hand
+from graspsense_robotiq_2f.link import NoReply
+from graspsense_robotiq_2f.registers import COUNT, INPUT, OUTPUT
+from graspsense_robotiq_2f.tactile import TactileData, TactileStream
+from graspsense_robotiq_2f.tactile_protocol import START_SENDING
+
+EXCHANGE_S: Final = 0.005
+"""Time of a request and its reply on a line of 115200 baud."""
+STEP_S: Final = 0.001
+
+
+@final
+class LockStepGripper:
+    """A gripper of these settings, as the link to it and as the clock. Raises ConfigError for an unfit body."""
+
+    def __init__(self, config: RobotiqConfig, seed: int) -> None:
+        self._config = config
+        self._hand = Hand(config, seed)
+        self._now_s = 0.0
+        self._tips = EmulatedFingertips(lambda: self._hand.felt, self.monotonic, seed)
+
+    @property
+    def body_report(self) -> Mapping[str, float | int | str | bool]:
+        """What the body knows."""
+        return self._hand.fingers.body.report()
+
+    @property
+    def going(self) -> bool:
+        """Whether the motor is asked to go to its target."""
+        return self._hand.going
+
+    def monotonic(self) -> float:
+        """Return the time (s) of the gripper."""
+        return self._now_s
+
+    def sleep(self, seconds: float) -> None:
+        """Let this time pass."""
+        self._now_s += seconds
+
+    def exchange(self, values: Sequence[int]) -> list[int]:
+        """Write the output registers and return the input registers. Raises NoReply, OSError."""
+        self._check_plug()
+        self._hand.write(OUTPUT, list(values), self._now_s)
+        return self.status()
+
+    def status(self) -> list[int]:
+        """Return the input registers. Raises NoReply, OSError."""
+        self._check_plug()
+        self.sleep(EXCHANGE_S)
+        faults, active_s = self._config.faults, self._now_s - self._hand.active_since_s
+        mood = faults.mood if active_s >= faults.mood_at_s else "well"
+        if mood == "late":
+            self.sleep(min(faults.late_s, self._config.reply_timeout_s))
+        if mood in ("silent", "damaged") or (mood == "late" and faults.late_s > self._config.reply_timeout_s):
+            self.sleep(self._config.reply_timeout_s)
+            raise NoReply("no reply, or a damaged one")
+        return self._hand.read(INPUT, COUNT, self._now_s)
+
+    def close(self) -> None:
+        """Release the body."""
+        self._hand.close()
+
+    def fingertips(self) -> LockStepFingertips:
+        """Return its fingertips, which begin to send."""
+        self._tips.heard(START_SENDING)
+        return LockStepFingertips(self, self._tips)
+
+    def _check_plug(self) -> None:
+        if self._now_s - self._hand.active_since_s >= self._config.faults.unplug_at_s:
+            raise OSError("the connection was lost")
+
+    def feel(self) -> None:
+        """Move the fingers on, so that the fingertips feel the present time."""
+        self._check_plug()
+        self._hand.look(self._now_s)
+
+
+@final
+class LockStepFingertips:
+    """The fingertips of this gripper, as the driver reads those at a port."""
+
+    def __init__(self, gripper: LockStepGripper, tips: EmulatedFingertips) -> None:
+        self._gripper, self._tips = gripper, tips
+        self.stream = TactileStream()
+
+    def newest(self, timeout_s: float) -> TactileData | None:
+        """Return what came since the last call, after a wait of up to this time. Raises OSError."""
+        until_s = self._gripper.monotonic() + timeout_s
+        while True:
+            self._gripper.feel()
+            data = self.stream.fed(self._tips.unasked(), self._gripper.monotonic())
+            if data is not None or self._gripper.monotonic() >= until_s:
+                return data
+            self._gripper.sleep(STEP_S)
+
+    def age_s(self) -> float:
+        """Return the time (s) since something came: 0, since they never fail alone."""
+        return 0.0
+
+    def close(self) -> None:
+        """Do nothing: they end with the gripper."""

@@ -1,0 +1,34 @@
+"""The shipped experiment with every gripper: each entry grasps, and the page has the tables of all of them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from graspsense import read_experiment
+from graspsense.core.grasp.runner import run_grasp
+from graspsense.core.pipeline.wiring import check
+
+CASES = read_experiment("which_gripper").cases
+PAGE = (Path(__file__).parents[1] / "docs" / "which_gripper.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+def test_each_gripper_grasps_the_things_of_the_experiment(case):
+    settings = case.settings
+    check(settings)
+    gripper = settings.gripper.create()
+    assert gripper.objects(), "an emulated gripper is told what to hold"
+    grasp = run_grasp(gripper.with_object("block"), settings.controller.create(), settings.run)
+    assert grasp.outcome.words == "steady", grasp.reason
+    assert not settings.features.create().extract(grasp.trace).reasons
+
+
+def test_the_page_has_a_row_for_each_gripper_and_for_each_thing():
+    for case in CASES:
+        assert PAGE.count(f"| {case.name} |") == 2, (
+            "run `graspsense experiment which_gripper` and the page's script"
+        )
+    for thing in CASES[0].data.objects:
+        assert f"| `{thing}` |" in PAGE
