@@ -34,6 +34,7 @@ from graspsense.core.components.channels import no_signals as no_signals
 # Calibration: from cell counts to newtons
 from graspsense.core.grasp.calibration import LoadTable as LoadTable
 from graspsense.core.grasp.calibration import MotorTable as MotorTable
+from graspsense.core.grasp.calibration import asked_force as asked_force
 from graspsense.core.grasp.calibration import cells_force as cells_force
 from graspsense.core.grasp.calibration import edge_force as edge_force
 from graspsense.core.grasp.calibration import load_of as load_of
@@ -44,6 +45,7 @@ from graspsense.core.grasp.calibration import pad_force as pad_force
 from graspsense.core.grasp.calibration import tare as tare
 from graspsense.core.grasp.calibration import zero_of as zero_of
 from graspsense.core.grasp.calibration_files import calibrations_of as calibrations_of
+from graspsense.core.grasp.calibration_files import stored_delivered_force as stored_delivered_force
 from graspsense.core.grasp.calibration_files import stored_friction as stored_friction
 from graspsense.core.grasp.calibration_files import stored_gain as stored_gain
 from graspsense.core.grasp.calibration_files import stored_motor_tables as stored_motor_tables

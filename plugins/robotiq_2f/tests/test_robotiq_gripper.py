@@ -7,6 +7,7 @@ import threading
 from contextlib import suppress
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from pymodbus import FramerType
 from pymodbus.server import ModbusTcpServer

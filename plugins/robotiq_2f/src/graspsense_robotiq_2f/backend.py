@@ -12,7 +12,7 @@ from typing import Any, Final, final
 
 from attrs import evolve
 
-from graspsense.gripper_api import no_pads, pad_force, tare
+from graspsense.gripper_api import clock_report, no_pads, pad_force, tare
 from graspsense.plugin_api import (
     FORCE,
     NO_PADS,
