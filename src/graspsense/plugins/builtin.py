@@ -72,6 +72,11 @@ def graspsense_feature_sets() -> Iterable[FeatureSetEntry]:
         target="graspsense.plugins.features.union:UnionFeatures",
         summary="the features of several sets together, by default of chitta, curve and quantiles",
     )
+    yield FeatureSetEntry(
+        name="contact-image",
+        target="graspsense.plugins.features.contact_image:ContactImageFeatures",
+        summary="area, centre, axes, total, shift and shear of the contact on a tactile array or a camera",
+    )
 
 
 @hookimpl

@@ -1,0 +1,198 @@
+"""The feature set `contact-image`: known contacts on an array, with three forces a cell, and before a camera."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from attrs import evolve
+from hypothesis import given
+from hypothesis import strategies as st
+
+from graspsense.core.values.signals import Phase
+from graspsense.core.values.trace import ImageTrace
+from graspsense.plugin_api import create
+from graspsense.plugins.features.contact_image import moments
+from graspsense.testing.samples import squeeze
+
+ROWS, COLUMNS = 12, 16
+PLACES = np.indices((ROWS, COLUMNS)).astype(np.float64)
+
+
+def bump(row, column, long, short, angle):
+    """A pressure whose first axis has this angle from the direction of a row; `long` and `short` are deviations."""
+    down, along = PLACES[0] - row, PLACES[1] - column
+    first, second = (
+        along * math.cos(angle) + down * math.sin(angle),
+        down * math.cos(angle) - along * math.sin(angle),
+    )
+    return np.exp(-0.5 * ((first / long) ** 2 + (second / short) ** 2))
+
+
+def grasp(images, phases=(Phase.APPROACH, Phase.SQUEEZE, Phase.HOLD, Phase.RELEASE)):
+    """A trace of four ticks, one image in each."""
+    trace = squeeze().until(-math.inf)
+    n = len(images)
+    columns = {
+        name: np.zeros(n)
+        for name in (
+            "gap_m",
+            "velocity_m_s",
+            "effort_n",
+            "force_left_n",
+            "force_right_n",
+            "edge_left_n",
+            "edge_right_n",
+            "command",
+        )
+    }
+    t_s = 0.1 * np.arange(n)
+    signals = {"tactile": ImageTrace(t_s=t_s, cells=np.asarray(images))}
+    return evolve(
+        trace,
+        **columns,
+        t_s=t_s,
+        status=np.zeros(n, np.int64),
+        phase=np.array(phases[:n], np.int64),
+        signals=signals,
+    )
+
+
+def extract(images, phases=(Phase.APPROACH, Phase.SQUEEZE, Phase.HOLD, Phase.RELEASE), **settings):
+    settings = {"array": "tactile", "rows": ROWS, "columns": COLUMNS, "least_share": 1e-3, **settings}
+    return create("feature-set", "contact-image", **settings).extract(grasp(images, phases))
+
+
+def test_a_turned_ellipse_has_its_place_its_axes_and_its_angle():
+    pressed = bump(5.5, 8.0, 2.0, 1.0, 0.5)
+    zero = np.full((ROWS, COLUMNS), 3.0)
+    images = [zero, zero + 0.6 * pressed, zero + pressed, zero + 2.0 * pressed]
+    f = extract([image.ravel() for image in images])
+
+    assert f["centre_row"] == pytest.approx(5.5, abs=0.02)
+    assert f["centre_column"] == pytest.approx(8.0, abs=0.02)
+    assert f["long_axis"] == pytest.approx(2.0, rel=0.02)
+    assert f["short_axis"] == pytest.approx(1.0, rel=0.02)
+    assert f["angle"] == pytest.approx(0.5, abs=0.01)
+    # The image in the release, which is twice as strong, does not count.
+    assert f["total"] == pytest.approx(float(np.sum(pressed)))
+    assert f["largest"] == pytest.approx(float(np.max(pressed)))
+    assert f["shift_row"] == pytest.approx(0.0, abs=1e-9)
+    assert f.reasons["shear_first"] == f.reasons["shear_second"]
+
+
+def test_the_centre_shifts_from_where_half_of_the_total_is_reached():
+    images = [np.zeros((ROWS, COLUMNS)), 0.6 * bump(4.0, 6.0, 1.0, 1.0, 0.0), bump(5.0, 9.0, 1.0, 1.0, 0.0)]
+    f = extract([image.ravel() for image in images])
+
+    assert (f["shift_row"], f["shift_column"]) == pytest.approx((1.0, 3.0), abs=0.01)
+
+
+def test_three_forces_a_cell_give_pressure_and_shear():
+    pressed = bump(5.0, 8.0, 1.5, 1.0, 0.0)
+    forces = np.stack([0.2 * pressed, -0.1 * pressed, pressed], axis=-1).reshape(-1, 3)
+    offset = np.array([1.0, 2.0, 3.0])
+    f = extract([np.tile(offset, (len(forces), 1)), forces + offset], components=3)
+
+    total = float(np.sum(pressed))
+    assert f["total"] == pytest.approx(total)
+    assert (f["shear_first"], f["shear_second"]) == pytest.approx((0.2 * total, -0.1 * total))
+
+
+def test_a_camera_counts_how_much_its_colours_change_in_either_direction():
+    empty = np.full((ROWS, COLUMNS, 3), 100, np.uint8)
+    touched = empty.copy()
+    touched[3:5, 6:10, 0] += 90
+    touched[3:5, 6:10, 1] -= 60
+    f = extract([empty, touched], components=3, dtype="uint8", unit="1")
+
+    assert f["area"] == 8 / (ROWS * COLUMNS)
+    assert f["total"] == pytest.approx(8 * 50.0)
+    assert (f["centre_row"], f["centre_column"], f["angle"]) == pytest.approx((3.5, 7.5, 0.0))
+    assert "shear_first" in f.reasons
+
+
+def test_the_mean_of_the_images_before_the_squeeze_is_the_zero():
+    noise = [np.full(ROWS * COLUMNS, value) for value in (1.0, 3.0)]
+    pressed = bump(5.0, 8.0, 1.0, 1.0, 0.0).ravel()
+    f = extract([*noise, 2.0 + pressed], (Phase.APPROACH, Phase.APPROACH, Phase.SQUEEZE))
+
+    assert f["total"] == pytest.approx(float(np.sum(pressed)))
+
+
+def test_a_recording_without_phases_begins_with_its_zero():
+    pressed = bump(5.0, 8.0, 1.0, 1.0, 0.0).ravel()
+    f = extract([np.zeros(ROWS * COLUMNS), pressed, pressed], (Phase.APPROACH,) * 3)
+
+    assert f["total"] == pytest.approx(float(np.sum(pressed)))
+
+
+@pytest.mark.parametrize(
+    ("images", "missing"),
+    [
+        ([np.zeros(ROWS * COLUMNS)], {"total", "area"}),
+        ([np.zeros(ROWS * COLUMNS)] * 2, {"area", "centre_row", "angle", "shift_row"}),
+        ([np.zeros(ROWS * COLUMNS), -np.ones(ROWS * COLUMNS)], {"area", "centre_row"}),
+        ([np.zeros(ROWS * COLUMNS), np.eye(1, ROWS * COLUMNS, 20)[0]], {"angle"}),
+    ],
+    ids=["one image", "no change", "all cells fall", "a single cell"],
+)
+def test_what_an_image_does_not_show_is_missing_with_a_reason(images, missing):
+    f = extract(images)
+
+    assert missing <= set(f.reasons)
+    assert all(math.isnan(f[name]) for name in missing)
+
+
+def test_a_cell_without_a_number_does_not_change():
+    pressed = bump(5.0, 8.0, 1.0, 1.0, 0.0).ravel()
+    broken = pressed.copy()
+    broken[0] = math.nan
+    f = extract([np.zeros(ROWS * COLUMNS), broken])
+
+    assert f["total"] == pytest.approx(float(np.sum(pressed)), abs=1e-6)
+
+
+def test_fingertips_have_features_for_each_side():
+    left, right = (bump(5.0, column, 1.0, 1.0, 0.0).ravel() for column in (4.0, 9.0))
+    trace = grasp([np.zeros(1)] * 3, (Phase.APPROACH, Phase.SQUEEZE, Phase.HOLD))
+    pads = {
+        "pad_t_s": trace.t_s,
+        "pad_left": np.outer([0.0, 0.5, 1.0], left),
+        "pad_right": np.outer([0.0, 0.0, 2.0], right),
+    }
+    f = create("feature-set", "contact-image", rows=ROWS, columns=COLUMNS).extract(evolve(trace, **pads))
+
+    assert (f["left_centre_column"], f["right_centre_column"]) == pytest.approx((4.0, 9.0), abs=0.01)
+    assert f["right_total"] == pytest.approx(2.0 * f["left_total"], rel=1e-5)
+
+
+def test_cells_in_no_such_grid_have_a_total_and_no_centre():
+    """The fingertips of the sample have 22 cells."""
+    f = create("feature-set", "contact-image").extract(squeeze())
+    assert f["left_total"] > f["left_largest"] > 0.0
+    assert "features.rows" in f.reasons["left_centre_row"]
+
+
+def test_a_gripper_without_the_array_says_so():
+    f = create("feature-set", "contact-image", array="palm").extract(squeeze())
+    assert "palm" in f.reasons["total"]
+
+
+@given(
+    st.integers(-3, 3),
+    st.integers(-4, 4),
+    st.floats(1e-200, 1e200),
+    st.integers(0, 2**32 - 1),
+)
+def test_a_contact_that_is_moved_or_pressed_harder_keeps_its_shape(down, along, factor, seed):
+    change = np.zeros((16, 20))
+    change[5:9, 7:12] = np.random.default_rng(seed).random((4, 5))
+    here, there = moments(change, 0.1), moments(factor * np.roll(change, (down, along), (0, 1)), 0.1)
+
+    assert there.centre == pytest.approx((here.centre[0] + down, here.centre[1] + along))
+    assert there.axes == pytest.approx(here.axes)
+    assert there.area == here.area
+    turned = moments(change[:, ::-1], 0.1)
+    assert math.sin(turned.angle + here.angle) == pytest.approx(0.0, abs=1e-6)
