@@ -70,6 +70,11 @@ _TABLE: Final[Table] = {
         "sources.manifest.table": ("ColumnTable",),
         "core.values.errors": ("TooLarge",),
     },
+    "A grasp that another program makes": {
+        "core.pipeline.pipeline": ("load_pipeline",),
+        "core.pipeline.anytime": ("anytime_of",),
+        "core.learn.model": ("model_for",),
+    },
     "Recordings as they are replayed": {
         "recording.replayable": ("Recording",),
         "core.values.errors": ("RecordingEnded",),

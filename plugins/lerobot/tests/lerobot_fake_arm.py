@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import lerobot_stand_in  # noqa: F401
 from lerobot.robots import Robot, RobotConfig
@@ -56,7 +57,7 @@ class FakeArmConfig(RobotConfig):
 class FakeArm(Robot):
     config_class = FakeArmConfig
     name = "fake_arm"
-    made: list = []
+    made: ClassVar[list] = []
 
     def __init__(self, config):
         super().__init__(config)

@@ -10,12 +10,13 @@ import importlib.util
 import sys
 from dataclasses import dataclass
 from types import ModuleType, SimpleNamespace
+from typing import ClassVar
 
 
 @dataclass(kw_only=True)
 class RobotConfig:
     id: str | None = None
-    known = {}
+    known: ClassVar[dict] = {}
 
     @classmethod
     def register_subclass(cls, name):

@@ -37,6 +37,10 @@ def gripper(robot_config=None, **keys):
     return create("sensor-backend", "lerobot", **{**KEYS, "robot_config": robot_config or {}, **keys})
 
 
+def readings(driver, n):
+    return [driver.read(0.1) for _ in range(n)]
+
+
 @parametrize_checks(
     "graspsense-lerobot",
     keys=KEYS,
@@ -123,8 +127,7 @@ def test_degrees_and_a_reversed_scale_become_metres():
 def test_a_damaged_answer_is_asked_again_and_a_lost_robot_is_told():
     driver = gripper({"damaged_every": 7})
     driver.open(1)
-    for _ in range(30):
-        driver.read(0.1)
+    readings(driver, 30)
     driver.close()
     assert driver.report()["frames"] == 30
     assert driver.report()["repeated"] > 0
@@ -132,8 +135,7 @@ def test_a_damaged_answer_is_asked_again_and_a_lost_robot_is_told():
     driver = gripper({"unplugged_s": 0.3})
     driver.open(1)
     with pytest.raises(DeviceLost, match="no status packet"):
-        for _ in range(30):
-            driver.read(0.1)
+        readings(driver, 30)
     driver.close()
 
 

@@ -31,7 +31,7 @@ class OneMotor:
         self._robot: Any = _made(config)
         self._require(self._robot.observation_features, "observation")
         self._require(self._robot.action_features, "action")
-        self._bus = getattr(self._robot, "bus", None)
+        self._bus: Any = getattr(self._robot, "bus", None)
         if config.load != "none" and self._bus is None:
             raise ConfigError(
                 f"gripper.load is {config.load}, but {config.robot} has no motor bus of its own: set it to none"
@@ -53,7 +53,8 @@ class OneMotor:
 
     def read(self) -> tuple[float, float]:
         """Return the position and the load, each in its unit; the load is 0 where it is not read. Raises NoAnswer."""
-        return self._asked(self._read)
+        answer: tuple[float, float] = self._asked(self._read)
+        return answer
 
     def send(self, position: float) -> None:
         """Command this position of the gripper, and of nothing else. Raises NoAnswer."""
@@ -108,7 +109,8 @@ class OneMotor:
         if key not in features:
             known = ", ".join(sorted(features)[:12])
             raise ConfigError(
-                f"no {what} of {self._config.robot} has {key!r}; there are {known}. Set gripper.motor or gripper.position"
+                f"no {what} of {self._config.robot} has {key!r}; there are {known}. Set gripper.motor or "
+                "gripper.position"
             )
 
     def _disconnect(self) -> None:

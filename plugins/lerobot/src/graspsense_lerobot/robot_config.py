@@ -1,4 +1,4 @@
-"""Settings of a LeRobot robot as a gripper: the robot, which of its motors the gripper is, and what its numbers mean."""
+"""Settings of a LeRobot robot as a gripper: the robot, the motor of the gripper, and what its numbers mean."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class LeRobotConfig:
         unit="m",
         above=0.0,
         plausible=(1e-3, 0.5),
-        meaning="Gap when open, an assumption until you measure yours. Between open and closed the gap is taken as linear.",
+        meaning="Gap when open, an assumption until you measure yours; linear between open and closed.",
     )
     closed_gap_m: float = setting(default=0.0, unit="m", minimum=0.0, meaning="Gap when closed.")
     load: Literal["none", "Present_Load", "Present_Current"] = setting(
