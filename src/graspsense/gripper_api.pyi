@@ -64,6 +64,11 @@ from graspsense.sources.manifest.steps import squeezes as squeezes
 from graspsense.sources.manifest.table import ColumnTable as ColumnTable
 from graspsense.core.values.errors import TooLarge as TooLarge
 
+# A grasp that another program makes
+from graspsense.core.pipeline.pipeline import load_pipeline as load_pipeline
+from graspsense.core.pipeline.anytime import anytime_of as anytime_of
+from graspsense.core.learn.model import model_for as model_for
+
 # Recordings as they are replayed
 from graspsense.recording.replayable import Recording as Recording
 from graspsense.core.values.errors import RecordingEnded as RecordingEnded

@@ -1,6 +1,6 @@
 """What the tests need of LeRobot where it is not installed: its abstract classes, as small as they can be.
 
-Where LeRobot is installed (`.ci/lerobot`), nothing here is used: the same tests run with the true classes.
+Where LeRobot is installed (`.ci/lerobot_itself`), nothing here is used: the same tests run with the true classes.
 """
 
 from __future__ import annotations

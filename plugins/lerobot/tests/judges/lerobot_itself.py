@@ -36,9 +36,13 @@ def loads(place: str) -> None:
     frames = [data[k] for k in range(len(data))]
     assert data.num_episodes == 4, data.num_episodes
     assert len(frames) == data.num_frames > 0
-    assert {"observation.state", "graspsense.phase", "graspsense.event", "graspsense.prediction"} <= {*frames[0]}
+    assert {"observation.state", "graspsense.phase", "graspsense.event", "graspsense.prediction"} <= {
+        *frames[0]
+    }
     assert len({frame["task"] for frame in frames}) > 1
-    print(f"{place}: {data.num_episodes} episodes, {data.num_frames} frames read by LeRobot's own loader")
+    sys.stdout.write(
+        f"{place}: {data.num_episodes} episodes, {data.num_frames} frames read by LeRobot itself\n"
+    )
 
 
 def step_runs() -> None:
@@ -50,7 +54,7 @@ def step_runs() -> None:
         (config,) = Path(folder).glob("*.json")
         again = RobotProcessorPipeline.from_pretrained(folder, config_filename=config.name, **converters)
     assert events([again(one) for one in grasp()]) == ["contact", "rest", "end"]
-    print("the step runs in LeRobot's pipeline, and is restored from what it saves")
+    sys.stdout.write("the step runs in LeRobot's pipeline, and is restored from what it saves\n")
 
 
 if __name__ == "__main__":
