@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import sys
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from types import SimpleNamespace
 
 import pytest
 from lerobot_fake_arm import Clock, FakeArm
+from lerobot_sets import write_set
 
 from graspsense import load_pipeline
 from graspsense.plugin_api import (
@@ -41,9 +44,14 @@ def readings(driver, n):
     return [driver.read(0.1) for _ in range(n)]
 
 
+EXAMPLES = TemporaryDirectory()
+write_set(Path(EXAMPLES.name) / "set", 3)
+
+
 @parametrize_checks(
     "graspsense-lerobot",
     keys=KEYS,
+    data={"lerobot": f"{EXAMPLES.name}/set"},
     unplugged={"robot_config": {"unplugged_s": 0.5}},
     absent={"robot_config": {"port": "nowhere"}},
 )
