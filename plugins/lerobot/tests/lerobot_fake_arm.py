@@ -52,6 +52,7 @@ class FakeArmConfig(RobotConfig):
     calibrated: bool = True
     damaged_every: int = 0
     object_m: float = 0.05
+    driver: bool = True
 
 
 class FakeArm(Robot):
@@ -61,6 +62,8 @@ class FakeArm(Robot):
 
     def __init__(self, config):
         super().__init__(config)
+        if not config.driver:
+            raise ModuleNotFoundError("No module named 'scservo_sdk'")
         self.config, self.bus = config, Bus(self)
         self.gap_m = self.target_m = 0.07
         self.force_n, self.asked, self.connected, self.actions = 0.0, 0, False, []

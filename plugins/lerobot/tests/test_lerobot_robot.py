@@ -179,3 +179,8 @@ def test_without_lerobot_it_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "lerobot.robots", None)
     with pytest.raises(PluginUnavailable, match="pip install lerobot"):
         gripper().open(1)
+
+
+def test_a_robot_without_its_driver_says_so():
+    with pytest.raises(PluginUnavailable, match="scservo_sdk"):
+        gripper({"driver": False}).open(1)

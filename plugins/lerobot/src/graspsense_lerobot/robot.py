@@ -139,6 +139,11 @@ def _made(config: LeRobotConfig) -> Any:
         settings = draccus.decode(robots.RobotConfig, {"type": config.robot, **config.robot_config})
         return robots.make_robot_from_config(settings)
     except Exception as error:  # whatever the classes of a robot raise
+        if isinstance(error, ImportError) or isinstance(error.__cause__, ImportError):
+            raise PluginUnavailable(
+                f"LeRobot's robot {config.robot} needs a driver: {error}\n  try: the extra of LeRobot for its motors, as "
+                'in pip install "lerobot[feetech]"'
+            ) from error
         raise ConfigError(
             f"gripper.robot_config of {config.robot}: {type(error).__name__}: {error}"
         ) from error
