@@ -141,8 +141,8 @@ def _made(config: LeRobotConfig) -> Any:
     except Exception as error:  # whatever the classes of a robot raise
         if isinstance(error, ImportError) or isinstance(error.__cause__, ImportError):
             raise PluginUnavailable(
-                f"LeRobot's robot {config.robot} needs a driver: {error}\n  try: the extra of LeRobot for its motors, as "
-                'in pip install "lerobot[feetech]"'
+                f"LeRobot's robot {config.robot} needs a driver: {error}\n  try: the extra of LeRobot for its motors, "
+                'as in pip install "lerobot[feetech]"'
             ) from error
         raise ConfigError(
             f"gripper.robot_config of {config.robot}: {type(error).__name__}: {error}"
