@@ -85,6 +85,10 @@ _TABLE: Final[Table] = {
     "Numbers in ROS messages": {
         "sources.manifest.message_numbers": ("MessageNumber", "message_columns"),
     },
+    "A grasp that another program makes": {
+        "core.pipeline.anytime": ("anytime_of",),
+        "core.learn.model": ("model_for",),
+    },
     "Recordings as they are replayed": {
         "recording.replayable": ("Recording",),
         "core.values.errors": ("RecordingEnded",),

@@ -1,0 +1,209 @@
+"""A grasp while another program makes it: from one observation after the other its phase, events and predictions."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from math import inf, isfinite, nan
+from typing import Any, Final, NamedTuple, final
+
+from graspsense.gripper_api import anytime_of, load_pipeline, model_for
+from graspsense.plugin_api import (
+    HOLD,
+    NO_PADS,
+    RELEASE,
+    RUNNING,
+    SQUEEZE,
+    STEADY,
+    VELOCITY,
+    Command,
+    ConfigError,
+    DeviceInfo,
+    Frame,
+    Prediction,
+    Reading,
+)
+from graspsense.testing_api import TraceRecorder
+from graspsense_lerobot.names import Meaning, meaning_of
+from graspsense_lerobot.place import PlaceOptions
+
+EVENTS: Final = ("nothing", "contact", "rest", "end")
+"""What the numbers of events mean."""
+KNOWN: Final = ("gap", "velocity", "effort", "force_left", "force_right")
+WIDEST_M: Final = 0.5
+
+
+class Running(NamedTuple):
+    """A grasp after an observation, in numbers.
+
+    `phase` and `outcome` are those of `Phase` and `Outcome`, `event` is one of `EVENTS`. `prediction` is the number of
+    the class, counted from 1, and 0 for none; `probability` is NaN without one.
+    """
+
+    phase: int
+    event: int
+    outcome: int
+    prediction: int
+    probability: float
+
+
+@final
+class RunningGrasp:
+    """Follows the grasps in observations by the controller, the features and the model of a pipeline.
+
+    The controller only tells the phases: what it commands goes nowhere. Raises ConfigError if the pipeline cannot be
+    used.
+    """
+
+    def __init__(self, pipeline: str, options: Sequence[str], given: PlaceOptions) -> None:
+        loaded = load_pipeline(pipeline, options=options)
+        self._settings, self._given = loaded.settings, given
+        self._model = model_for(loaded.settings, loaded.plugins)
+        self._features: Any = loaded.settings.features.create()
+        self._law: Any = loaded.settings.controller.create()
+        lacking = [one.name for one in self._features.requires if one.name not in KNOWN]
+        if lacking:
+            raise ConfigError(
+                f"the features of this pipeline need {', '.join(lacking)}; from observations come {', '.join(KNOWN)}"
+            )
+        self._contact_n = float(self._law.contact_force_n())
+        self.classes = () if self._model is None else tuple(self._model.classifier.classes())
+        """The classes, in the order of their numbers."""
+        self.prediction: Prediction | None = None
+        """The last prediction of this grasp, with its reasons."""
+        self.missing = 0
+        """The number of observations that lacked a number."""
+        self.reset()
+
+    def reset(self) -> None:
+        """Begin anew, as at the beginning of an episode."""
+        self._meaning: Meaning | None = None
+        self._frames = 0
+        self._last: Frame | None = None
+        self._now = Running(int(self._law.init().phase), 0, RUNNING, 0, nan)
+        self._begin()
+
+    def add(self, numbers: Mapping[str, float]) -> Running:
+        """Return the grasp after this observation. Raises ConfigError if gap or force are not in it."""
+        t_s = self._frames / self._given.fps if self._given.fps else time.monotonic()
+        self._frames += 1
+        frame = self._frame(t_s, numbers)
+        if frame is None:
+            self.missing += 1
+            self._now = self._now._replace(event=0)
+            return self._now
+        self._last = frame
+        free = max(frame.force_left_n, frame.force_right_n) < self._contact_n
+        if self._over and free:
+            self._begin()
+        if not self._over:
+            self._follow(Reading(frame, NO_PADS))
+        else:
+            self._now = self._now._replace(phase=RELEASE, event=0)
+        return self._now
+
+    def _begin(self) -> None:
+        self._recorder, self._over, self._hold_until_s = TraceRecorder(), False, inf
+        self._state = self._law.init()
+        self._anytime = (
+            None if self._model is None else anytime_of(self._model, self._features, self._settings)
+        )
+        if self._anytime is not None:
+            self._anytime.begin(self._recorder, _observations(self._given.fps or 30.0), _nobody)
+        self.prediction = None
+
+    def _follow(self, reading: Reading) -> None:
+        frame, before = reading.frame, int(self._state.phase)
+        if self._hold_until_s == inf:
+            command, self._state = self._law.step(self._law.params(), self._state, reading)
+        else:
+            command = Command(VELOCITY, 0.0, inf, inf)
+        phase, outcome = int(self._state.phase), int(self._state.outcome)
+        self._recorder.add(reading, phase, command)
+        event = 0
+        if phase != before:
+            event = {SQUEEZE: 1, HOLD: 2}.get(phase, 0)
+        if self._anytime is not None:
+            self._anytime.watch(frame, phase)
+            if self._anytime.predictions:
+                self.prediction = self._anytime.predictions[-1].prediction
+        if outcome != RUNNING and self._hold_until_s == inf:
+            self._hold_until_s = frame.t_s + (self._settings.run.hold_s if outcome == STEADY else 0.0)
+        if frame.t_s >= self._hold_until_s:
+            event, self._over = 3, True
+            if self._model is not None:
+                self.prediction = self._model.predict(
+                    self._features.extract(self._recorder.trace()), None, None
+                )
+        self._now = Running(phase, event, outcome, *self._predicted())
+
+    def _predicted(self) -> tuple[int, float]:
+        made = self.prediction
+        if made is None or made.label not in self.classes:
+            return 0, nan
+        return self.classes.index(made.label) + 1, float(made.probabilities[made.label])
+
+    def _frame(self, t_s: float, numbers: Mapping[str, float]) -> Frame | None:
+        """Return the frame of these numbers, None if one of them is missing. Raises ConfigError."""
+        given = self._given
+        if self._meaning is None:
+            self._meaning = self._understood(numbers)
+        meaning = self._meaning
+        sides = [*((name,) for name in meaning.forces), *(() if meaning.forces else _normals(meaning))]
+        try:
+            gap = float(numbers[meaning.gap[0]])
+            forces = [sum(float(numbers[name]) for name in names) for names in sides]
+        except KeyError:
+            return None
+        if not all(map(isfinite, (gap, *forces))):
+            return None
+        scale = given.force_n_per_unit or 1.0
+        gap_m = gap if given.gap_m_per_unit is None else given.gap_m_per_unit * (gap - given.gap_zero)
+        if abs(gap_m) > WIDEST_M:
+            raise ConfigError(
+                f"the gap {meaning.gap[0]} is {gap_m:g}, which is not in metres: give gap_m_per_unit, and gap_zero"
+            )
+        if meaning.forces:
+            forces = [abs(force) for force in forces]
+        left = scale * forces[0]
+        right = scale * sum(forces[1:]) / (len(forces) - 1) if len(forces) > 1 else left
+        dt_s = 0.0 if self._last is None else t_s - self._last.t_s
+        velocity = (gap_m - self._last.gap_m) / dt_s if self._last is not None and dt_s > 0.0 else 0.0
+        return Frame(t_s, dt_s, gap_m, velocity, nan, left, right, nan, nan, 0)
+
+    def _understood(self, numbers: Mapping[str, float]) -> Meaning:
+        """Return the names of gap and forces, as the reader of data sets finds them. Raises ConfigError."""
+        found = meaning_of(numbers)
+        gap = (self._given.gap,) if self._given.gap else found.gap[:1]
+        forces = tuple(name for name in self._given.force.split(",") if name) or found.forces
+        if not forces and not found.arrays:
+            forces = found.effort[:1]
+        lacking = [name for name in (*gap, *forces) if name not in numbers]
+        if not gap or lacking or not (forces or found.arrays):
+            raise ConfigError(
+                f"no gap or no force in the observations (gap={', '.join(gap) or 'none'}, "
+                f"force={', '.join(forces) or 'none'}): name them, as in gap=NAME&force=NAME. There are "
+                f"{', '.join(list(numbers)[:12])}"
+            )
+        return Meaning(gap=gap, forces=forces, arrays=found.arrays)
+
+
+def _normals(meaning: Meaning) -> list[tuple[str, ...]]:
+    return [cells.normal for cells in meaning.arrays]
+
+
+def _observations(rate_hz: float) -> DeviceInfo:
+    """Return what stands for the gripper: predictions are computed within the observation."""
+    return DeviceInfo(
+        name="observations",
+        clock="virtual",
+        rate_hz=rate_hz,
+        effort_limit_n=inf,
+        speed_limit_m_s=inf,
+        opening=None,
+        relaxed=Command(VELOCITY, 0.0, inf, inf),
+    )
+
+
+def _nobody(t_s: float, phase: int, words: str, prediction: Prediction | None) -> None:
+    """Receive what is told of a checkpoint, which the caller reads from the numbers."""

@@ -1,0 +1,128 @@
+"""graspsense as a step of a LeRobot processor: it follows the grasps in observations and adds what it knows."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from itertools import product
+from pathlib import Path
+
+import lerobot_stand_in  # noqa: F401
+import numpy as np
+import pytest
+
+from graspsense import Phase
+from graspsense.plugin_api import ConfigError, PluginUnavailable
+from graspsense_lerobot.processor import ADDED, processor_step
+from graspsense_lerobot.running import EVENTS
+
+FPS = 50
+READING = f"gap_m_per_unit=0.0008&fps={FPS}"
+OPTIONS = ["classifier.type=none", "controller.type=hybrid"]
+
+
+def grasp(width_m=0.05, stiffness_n_m=4000.0, most_n=17.0, speed_m_s=0.02):
+    """Return observations of a gripper that closes from 70 mm on a spring until a force, holds, and opens."""
+    gap_m, observations = 0.07, []
+    closed_m = width_m - most_n / stiffness_n_m
+    path = list(np.arange(0.07, closed_m, -speed_m_s / FPS)) + [closed_m] * FPS
+    path += list(np.arange(closed_m, 0.07, speed_m_s / FPS)) + [0.07] * 5
+    for gap_m in path:
+        force_n = stiffness_n_m * max(width_m - gap_m, 0.0)
+        cells = {}
+        for finger, cell, axis in product("01", "01", "xyz"):
+            cells[f"f{finger}.p{cell}.f{axis}"] = force_n / 2 * (axis == "z")
+        observations.append({"shoulder.pos": 1.0, "gripper.pos": gap_m / 0.0008, **cells})
+    return observations
+
+
+def processed(step, observations):
+    """Return what LeRobot makes of the observations with this step in a processor."""
+    return [step({"observation": one})["observation"] for one in observations]
+
+
+def events(seen):
+    return [EVENTS[int(one["graspsense.event"])] for one in seen if one["graspsense.event"]]
+
+
+def test_the_step_tells_contact_rest_and_end_of_each_grasp():
+    step = processor_step()("default", OPTIONS, READING)
+    observations = [*grasp(), *grasp(width_m=0.04)]
+    seen = processed(step, observations)
+
+    assert events(seen) == ["contact", "rest", "end"] * 2
+    first = next(k for k, one in enumerate(seen) if one["graspsense.event"] == 1)
+    assert observations[first]["gripper.pos"] * 0.0008 == pytest.approx(0.05, abs=1e-3)
+    assert {int(one["graspsense.phase"]) for one in seen} == {
+        Phase.APPROACH,
+        Phase.SQUEEZE,
+        Phase.HOLD,
+        Phase.RELEASE,
+    }
+    assert all({*one} == {*given, *ADDED} for one, given in zip(seen, observations, strict=True))
+    assert all(one["graspsense.prediction"] == 0 for one in seen)
+
+
+def test_a_model_predicts_at_the_end_of_the_grasp(tmp_path, monkeypatch):
+    from graspsense.cli.main import main
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", ["graspsense"])
+    samples = Path(__file__).parents[3] / "samples" / "trials"
+    train = ["train", f"store:{samples}", "--classifier", "tree", "--out", "model.json"]
+    with pytest.raises(SystemExit) as ended:
+        main(train)
+    assert not ended.value.code
+    options = ["classifier.type=tree", "classifier.model=model.json"]
+    step = processor_step()("default", options, READING)
+    # As wide, stiff and slow as the cans of the training: what is unlike them would be unknown.
+    can = grasp(width_m=0.0659, stiffness_n_m=2800.0, most_n=6.5, speed_m_s=0.01)
+    (end,) = [one for one in processed(step, can) if one["graspsense.event"] == EVENTS.index("end")]
+
+    assert step.grasp.classes == ("can:empty_open", "can:full_open")
+    assert end["graspsense.prediction"] in (1, 2)
+    assert 0.5 <= end["graspsense.probability"] <= 1.0
+
+
+def test_reset_begins_anew_and_a_missing_number_is_counted():
+    step = processor_step()("default", OPTIONS, READING)
+    observations = grasp()
+    seen = processed(step, observations[:60])
+    step.reset()
+    damaged = [{**one, "gripper.pos": math.nan} for one in observations[:3]]
+    again = processed(step, [*damaged, *observations])
+    assert len(seen) == 60
+    assert step.grasp.missing == 3
+    assert events(again) == ["contact", "rest", "end"]
+
+
+def test_the_step_declares_what_it_adds_and_can_be_stored():
+    step = processor_step()("default", OPTIONS, READING)
+    from lerobot.configs.types import PipelineFeatureType
+
+    features = step.transform_features({PipelineFeatureType.OBSERVATION: {"observation.state": 1}})
+    assert {*features[PipelineFeatureType.OBSERVATION]} == {"observation.state", *ADDED}
+    kept = json.loads(json.dumps(step.get_config()))
+    assert processor_step()(**kept).get_config() == kept
+
+
+@pytest.mark.parametrize(
+    ("reading", "word"),
+    [("", "metres"), ("gap=claw", "claw"), ("gap_m_per_unit=0.0008&force=nothing", "nothing")],
+)
+def test_observations_that_are_not_understood_are_told(reading, word):
+    step = processor_step()("default", OPTIONS, reading)
+    with pytest.raises(ConfigError, match=word):
+        processed(step, grasp()[:1])
+
+
+def test_features_that_need_more_than_numbers_are_refused():
+    with pytest.raises(ConfigError, match="pads"):
+        processor_step()("default", ["classifier.type=none", "features.type=contact-image"], READING)
+
+
+def test_without_lerobot_it_says_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "lerobot.processor", None)
+    with pytest.raises(PluginUnavailable, match="pip install lerobot"):
+        processor_step.__wrapped__()
