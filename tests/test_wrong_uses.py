@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from attrs import fields
+from attrs import evolve, fields
 from hypothesis import given
 from hypothesis import strategies as st
 from kept import keep
@@ -20,8 +20,9 @@ from graspsense.core.components.firstparty import EXAMPLES
 from graspsense.core.components.nearest_key import nearest_path
 from graspsense.core.components.strict import ValidationFailed, structured
 from graspsense.core.components.toml_kinds import KINDS, toml_kind
+from graspsense.core.learn.copies import without_copies
 from graspsense.core.learn.labelled import Labelled
-from graspsense.core.values.errors import ConfigError
+from graspsense.core.values.errors import ConfigError, counted
 from graspsense.core.values.features import FeatureTable
 from graspsense.experiments.experiment import Experiment
 from graspsense.sources.manifest.description import Manifest
@@ -32,6 +33,7 @@ FILES = {
     "pipe.toml": 'extends = "default"\n[controller]\nprobing_force_n = 15.0\n',
     "scene.toml": 'width_m = 0.06\n[[terms]]\ntype = "elastic"\nk1_n_m = 2000.0\n',
     "ex.toml": 'title = "x"\n[sweep]\n"controller.probing_force_n" = [17.0]\n',
+    "table.csv": "what,a\nx,1\ny,2\n",
     "man.toml": 'files = "{label}.csv"\ntime = "t"\ngap = "g"\n',
 }
 
@@ -82,7 +84,10 @@ def run(capsys, monkeypatch, tmp_path):
         ("predict simulated default", "predict default simulated"),
         ("run --gripper robotiq-2f85", "pip install -e ./examples/robotiq_2f85"),
         ("run -o features.type=grasp-curve", "pip install -e ./examples/grasp_curve"),
-        ("evaluate x.csv", "--label COLUMN"),
+        ("evaluate table.csv", "--label COLUMN"),
+        ("evaluate nothere.csv", "no file of this name"),
+        ("compare nothere.csv", "no file of this name"),
+        ("train nothere.csv --out model.json", "no file of this name"),
     ],
 )
 def test_the_right_words_are_told(run, typed, meant):
@@ -183,6 +188,19 @@ def test_the_classifier_of_an_evaluation_is_named_once():
     found = evaluate("c45", some_trials([1.0, 2.0] * 6), folds=2, permutations=1)
     assert found.classifier.startswith("graspsense-c45/c45 ")
     assert found.headline.rate == 1.0
+
+
+def test_a_note_on_one_thing_is_in_the_singular():
+    one = evolve(some_trials([1.0, 2.0, 3.0, 4.0]), instances=("a#1",) * 4)
+    assert counted(1, "trial is", "trials are") == "1 trial is"
+    assert counted(0, "trial") == "0 trials"
+    notes = evaluate("c45", one, folds=2, permutations=1).notes
+    assert any("1 instance:" in note for note in notes)
+    doubled = some_trials([1.25, 2.5, 3.125, 4.75, 1.25])
+    doubled = evolve(doubled, labels=(*doubled.labels[:4], "b"), content=("p", "q", "r", "s", "p"))
+    (note,) = without_copies(doubled).notes
+    assert "1 trial is left out" in note
+    assert "1 of them has another label" in note
 
 
 def test_trials_without_any_feature_have_no_rate():

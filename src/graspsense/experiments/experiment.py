@@ -21,7 +21,7 @@ from graspsense.core.components.registry import Resource, installed
 from graspsense.core.components.strict import InvalidValue, ValidationFailed, keys_of, plain, structured
 from graspsense.core.learn.copies import without_copies
 from graspsense.core.learn.model import worded
-from graspsense.core.values.errors import ConfigError, GraspsenseError, UnknownName, suggestion
+from graspsense.core.values.errors import ConfigError, GraspsenseError, UnknownName, counted, suggestion
 from graspsense.core.values.limits import CASES
 from graspsense.experiments.kinds import kind_of
 from graspsense.experiments.task import Task
@@ -454,7 +454,9 @@ class _Plan:
             self.complaints.append(f"{self.layer.where(('data',))}: {error}")
             return
         if trials is not None and folds > trials:
-            text = f"{folds} folds of {trials} trials: give at most as many folds as there are trials"
+            text = (
+                f"{folds} folds of {counted(trials, 'trial')}: give at most as many folds as there are trials"
+            )
             self.complaints.append(self.layer.complain(InvalidValue(("judge", "folds"), text)))
 
     def _keys(self, values: Mapping[str, Any], cls: type, table: str) -> Any:

@@ -10,7 +10,7 @@ from attrs import field, frozen
 
 from graspsense.core.components.caller import option
 from graspsense.core.learn.labelled import Target
-from graspsense.core.values.errors import ConfigError
+from graspsense.core.values.errors import ConfigError, counted
 from graspsense.evaluation.confusion import Confusion
 from graspsense.evaluation.intervals import RecognitionRate
 from graspsense.evaluation.over_seeds import MeanDifference, OverSeeds, mean_difference
@@ -259,6 +259,6 @@ def unreadable_lines(summary: Summary) -> list[str]:
         return []
     shown = "; ".join(summary.unreadable[:5])
     return [
-        f"{len(summary.unreadable)} results cannot be read and are not included: {shown}. The same experiment with "
-        f"{option('resume', python='resume=True')} computes them again"
+        f"not included, because they cannot be read: {counted(len(summary.unreadable), 'result')}, {shown}. The "
+        f"same experiment with {option('resume', python='resume=True')} computes them again"
     ]
