@@ -166,8 +166,9 @@ def test_folds_are_refused_before_the_first_grasp(run, monkeypatch):
 
 def test_options_in_python_are_a_list():
     for ask in (load_pipeline, resolve):
-        with pytest.raises(ConfigError, match="a list of texts"):
-            ask(options="run.seed=3")
+        for options in ("run.seed=3", {"run.seed": 3}, [("run.seed", 3)]):
+            with pytest.raises(ConfigError, match="a list of texts"):
+                ask(options=options)
 
 
 def test_an_error_in_python_names_arguments_and_not_options_of_commands(tmp_path):
@@ -176,6 +177,34 @@ def test_an_error_in_python_names_arguments_and_not_options_of_commands(tmp_path
         load_trials(str(tmp_path / "x.csv"))
     assert "label=COLUMN" in str(refused.value)
     assert "--" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        ["nonsense"],
+        ["controller.probing_forc_n=17"],
+        ["controller.probing_force_n=much"],
+        ["classifier.type=mlp", "classifier.model=none.json"],
+        ["classifier.type=none", "run.stop_when_sure=true"],
+    ],
+)
+def test_an_error_in_python_names_options_as_python_takes_them(options, run):
+    with pytest.raises(ConfigError) as refused:
+        load_pipeline(options=options).grasp()
+    assert "-o " not in str(refused.value)
+    assert "options=['" in str(refused.value)
+    code, _, err = run("run", *(word for option in options for word in ("-o", option)))
+    assert (code, "-o " in err, "options=[" in err) == (2, True, False)
+
+
+def test_arguments_of_an_evaluation_that_are_something_else_are_refused():
+    trials = some_trials([1.0, 2.0] * 6)
+    for arguments in ((trials, "c45"), ("c45", "x.csv")):
+        with pytest.raises(ConfigError, match="load_trials"):
+            evaluate(*arguments)
+    with pytest.raises(ConfigError, match="'state'"):
+        evaluate("c45", trials, target="size")
 
 
 def some_trials(values):

@@ -13,7 +13,7 @@ import numpy as np
 from attrs import frozen
 
 from graspsense.core.components.config import select_component
-from graspsense.core.learn.labelled import ControlFeatures, Labelled, Target, class_of
+from graspsense.core.learn.labelled import TARGETS, ControlFeatures, Labelled, Target, class_of
 from graspsense.core.values.errors import ConfigError, counted
 from graspsense.evaluation.confusion import confusion
 from graspsense.evaluation.crossval import ClassifierFactory, FitRefused, Groups, Pooled, cross_validate
@@ -64,9 +64,10 @@ def evaluate(
 
     `learner` is the name of a classifier, or what makes one; `classifier` is its name in the result, by default that
     of the learner. `target` selects what is recognised: the label as it is (`both`), the class, or the state within
-    each class. `permutations` is how often the labels are shuffled. Raises ConfigError if there is only one label, or
-    if there are too few trials.
+    each class. `permutations` is how often the labels are shuffled. Raises ConfigError if there is only one label, if
+    there are too few trials, or if an argument is something else.
     """
+    _check_arguments(labelled, target)
     if isinstance(learner, str):
         learner = select_component("classifier", learner)
     component = getattr(learner, "component", None)
@@ -105,6 +106,16 @@ def evaluate(
         sets=evaluator.sets(headline),
         reliability=evaluator.reliability(headline),
     )
+
+
+def _check_arguments(labelled: object, target: str) -> None:
+    if not isinstance(labelled, Labelled):
+        raise ConfigError(
+            f"evaluate: expected a classifier, then trials, found {labelled!r:.100} as the trials: "
+            "write evaluate('c45', load_trials('simulated'))"
+        )
+    if target not in TARGETS:
+        raise ConfigError(f"target: expected {', '.join(map(repr, TARGETS))}, found {target!r}")
 
 
 @frozen
