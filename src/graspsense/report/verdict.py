@@ -89,6 +89,10 @@ def _before_contact(evaluation: Evaluation) -> str:
         return f"Before contact {before} are recognised, too few to say what that means."
     if control.difference is not None and control.difference.interval is None:
         return f"Before contact {before} are recognised, on too few instances to say what that means."
+    if control.difference is not None and not control.difference.is_positive:
+        return (
+            f"Before contact {before} are recognised: whether the recording explains the rate cannot be told."
+        )
     return f"Before contact {before} are recognised, so the recording does not explain the rate."
 
 
