@@ -39,6 +39,7 @@ from graspsense.core.values.errors import (
     PluginUnavailable,
     UnknownName,
     WiringError,
+    listed,
     named,
 )
 from graspsense.core.values.features import (
@@ -388,6 +389,10 @@ def checkpoint_model(whole: Model, after_s: float, part: Model) -> Model:
 def _part_from_json(whole: Model, component: Component, config: Any, kept: StoredValues) -> Model:
     """Return the model of a checkpoint. Raises DataDamaged."""
     classifier = classifier_from(kept, component, config, whole.names, whole.units)
+    if others := sorted({*classifier.classes()} - {*whole.classifier.classes()}):
+        raise kept.refusal(
+            "model", f"it knows labels that the model of whole grasps does not: {listed(others)}"
+        )
     by_label = kept.table("by_label")
     part = evolve(
         whole,
