@@ -87,6 +87,9 @@ def run(capsys, monkeypatch, tmp_path):
         ("evaluate table.csv", "--label COLUMN"),
         ("evaluate nothere.csv", "no file of this name"),
         ("compare nothere.csv", "no file of this name"),
+        ("import nothere.csv --check", "no file of this name"),
+        ("replay csv:nothere.csv", "no file of this name"),
+        ("identify nothere.csv --class can --out can.toml", "no file of this name"),
         ("train nothere.csv --out model.json", "no file of this name"),
     ],
 )
