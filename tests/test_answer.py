@@ -11,7 +11,7 @@ from graspsense.experiments.summary import ConditionResult
 from graspsense.experiments.task_results import ClassifierResult
 
 
-def condition(name, *rates, n=100):
+def condition(name, *rates, n=100, simulated=True):
     """Return a case with these rates of its seeds."""
 
     def of(rate):
@@ -23,7 +23,7 @@ def condition(name, *rates, n=100):
         classifier="c45",
         target="both",
         by_seed={seed: of(rate) for seed, rate in enumerate(rates)},
-        simulated=True,
+        simulated=simulated,
     )
 
 
@@ -44,3 +44,22 @@ def test_an_answer_is_one_of_three_and_its_headline_agrees(weak, strong, told, a
     for text in (answer(summary), headline(summary)):
         assert "200 simulated grasps" in text
         assert "best" not in text
+
+
+def test_equal_rates_of_few_grasps_are_not_said_to_agree():
+    def told(*rates, n):
+        return answer(
+            SimpleNamespace(conditions=(condition("17 N", *rates, n=n), condition("20 N", *rates, n=n)))
+        )
+
+    assert "cannot be told" in told(0.5, n=4)
+    assert "cannot be told" in told(0.5, 1.0, n=4)
+    assert "cannot be told" not in told(0.5, 0.6, 0.7, n=2000)
+
+
+@pytest.mark.parametrize("rates", [(0.8, 1.0), (1.0, 0.8), (0.5,), (1.0, 1.0, 0.0)])
+def test_the_interval_of_recorded_trials_in_several_folds_is_around_their_mean(rates):
+    found = condition("17 N", *rates, n=20, simulated=False).rate
+    low, high = found.interval
+    assert low <= found.mean <= high
+    assert high - low > 0.1

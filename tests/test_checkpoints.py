@@ -24,7 +24,7 @@ from graspsense.core.learn.checkpoints import (
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.learn.model import load_model, train, write_model
 from graspsense.core.pipeline.anytime import Anytime, anytime_of
-from graspsense.core.values.errors import ConfigError
+from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.core.values.features import CheckpointPrediction, Features, Prediction, table_of
 from graspsense.core.values.signals import Outcome, Phase
 from graspsense.evaluation.checkpoints import SURE, WHOLE, checkpoint_models, early_recognition
@@ -260,6 +260,16 @@ def test_only_a_model_with_checkpoints_and_sets_can_stop_a_squeeze(model):
     with pytest.raises(ConfigError, match="no prediction sets"):
         anytime_of(evolve(model, checkpoints=unsure), curve(), settings)
     assert anytime_of(evolve(model, checkpoints=()), curve(), resolve("default")) is None
+
+
+def test_a_checkpoint_of_a_model_of_other_objects_is_refused(model, trials, learner, tmp_path):
+    others = evolve(trials, labels=tuple({"soft": "egg", "stiff": "toy"}[label] for label in trials.labels))
+    part, *_, whole = split_checkpoints(others, CHECKPOINTS)
+    of_others = train(learner.component, learner.config, whole.labelled, name="others")
+    mixed = evolve(model, checkpoints=checkpoint_models(of_others, learner, [part], 0))
+    write_model(tmp_path / "mixed.json", mixed)
+    with pytest.raises(DataDamaged, match="egg, toy"):
+        load_model(str(tmp_path / "mixed.json"), installed())
 
 
 @pytest.mark.parametrize("text", ["", "soon", "0", "-0.1", "0.2,0.1", "0.1,0.1", "nan", "inf"])

@@ -13,6 +13,7 @@ from attrs import asdict, evolve
 from hypothesis import given
 from hypothesis import strategies as st
 
+from graspsense.core.components.caller import command_line
 from graspsense.core.components.config import (
     Flag,
     Layer,
@@ -135,7 +136,7 @@ def write(tmp_path, monkeypatch):
 
 
 def complaint(*arguments, **keywords) -> str:
-    with pytest.raises(ConfigError) as caught:
+    with command_line(), pytest.raises(ConfigError) as caught:
         resolve(*arguments, **keywords)
     return str(caught.value)
 

@@ -162,7 +162,7 @@ def test_each_grasp_that_run_saves_is_another_one_unless_a_seed_is_given(tmp_pat
     assert run("--seed", "5")[0] == run("-o", "run.seed=5")[0] == 5
     trials = load_trials(f"store:{store}")
     assert len(trials) == 4
-    assert "1 trials" in copies_said(trials)[0]
+    assert "1 trial is left out" in copies_said(trials)[0]
 
 
 def test_a_damaged_recording_and_its_recovered_copy_are_one_trial(tmp_path, capsys):

@@ -10,7 +10,7 @@ from kept import keep
 
 from graspsense.core.values.errors import ConfigError
 from graspsense.experiments.executors.serial import Serial
-from graspsense.experiments.experiment import read_experiment
+from graspsense.experiments.experiment import _located, read_experiment
 from graspsense.experiments.results import Results
 from graspsense.experiments.run import run_experiment
 from graspsense.experiments.summary import summarise
@@ -119,6 +119,36 @@ def test_files_and_folders_are_known_by_their_content(tmp_path, scene, name):
     assert contents_of(params) == before
     scene.write_text("width_m = 0.07\n")
     assert contents_of(params)[name] != before[name]
+
+
+def test_files_that_a_file_names_count(tmp_path):
+    (tmp_path / "meshes").mkdir()
+    (tmp_path / "gripper.toml").write_text('model = "gripper.xml"\n')
+    (tmp_path / "gripper.xml").write_text(
+        "<mujoco><compiler meshdir='meshes'/><include file=\"part.xml\"/></mujoco>"
+    )
+    (tmp_path / "part.xml").write_text('<mujoco><mesh file="pad.stl"/><include file="gripper.xml"/></mujoco>')
+    mesh = tmp_path / "meshes" / "pad.stl"
+    mesh.write_text("1")
+    params = {"gripper": {"file": str(tmp_path / "gripper.toml")}}
+    for part in (mesh, tmp_path / "part.xml", tmp_path / "gripper.xml"):
+        before = contents_of(params)
+        assert contents_of(params) == before
+        part.write_text(part.read_text() + " ")
+        assert contents_of(params) != before
+
+
+@pytest.mark.parametrize(
+    "source", ["s", "s/store.sqlite", "store:s", "manifest:m.toml", "identified:m.toml,n.toml", "t.parquet"]
+)
+def test_paths_are_relative_to_the_folder_of_the_file_wherever_it_is_read(tmp_path, monkeypatch, source):
+    with Store.open(tmp_path / "s") as store:
+        grasps(store, range(4))
+    for name in ("m.toml", "n.toml", "t.parquet"):
+        (tmp_path / name).write_text("")
+    monkeypatch.chdir(tmp_path.parent)
+    located = _located({"data": {"source": source}}, tmp_path)["data"]["source"]
+    assert located.count(str(tmp_path)) == 1 + source.count(",")
 
 
 def test_files_that_a_manifest_describes_count_wherever_they_are(tmp_path):

@@ -14,6 +14,7 @@ from itertools import pairwise
 import kept
 import pytest
 import wayward
+from attrs import evolve
 from kept import keep
 
 from graspsense.cli.main import main
@@ -307,8 +308,6 @@ def test_the_page_of_a_store(tmp_path, capsys):
 
 
 def test_the_warnings_of_a_trial_are_on_its_page(tmp_path):
-    from attrs import evolve
-
     from graspsense.recording.recording_info import RecordingInfo
 
     with Store.open(tmp_path / "trials") as store:
@@ -421,6 +420,16 @@ def test_the_headline_of_an_evaluation_compares_with_guessing(rate, words):
 )
 def test_a_verdict_says_one_of_three_things(difference, words):
     assert words in verdict(evaluated(60, difference))
+
+
+def test_the_recording_explains_nothing_only_where_the_rate_is_shown_to_be_higher():
+    def told(low):
+        before = Measurement(what="w", rate=RecognitionRate(30, 60), difference=Difference(0.1, (low, 0.3)))
+        found = evaluated(60, Difference(0.3, (0.2, 0.4)))
+        return verdict(evolve(found, controls={**found.controls, "before_contact": before}))
+
+    assert "so the recording does not explain the rate" in told(0.05)
+    assert "whether the recording explains the rate cannot be told" in told(-0.1)
 
 
 def test_no_verdict_comes_from_a_control_of_two_trials():

@@ -111,7 +111,8 @@ MEASURE = """(() => {
   const outside = all("body *").filter((one) => shown(one) && !one.closest("svg, .wide, pre")
     && box(one).right > innerWidth + 0.5).map(words);
   const clipped = all("p, h1, h2, h3, dt, dd, li, figcaption, summary").filter((one) => shown(one)
-    && !one.closest(".wide") && one.scrollWidth > one.clientWidth + 1).map(words);
+    && !one.closest(".wide") && one.scrollWidth > one.clientWidth + 1)
+    .concat(all(".matrix tbody th").filter((one) => one.scrollWidth > one.clientWidth + 1)).map(words);
   const texts = all("svg text").filter(shown).map((one) => {
     const t = box(one), b = box(one.closest("svg"));
     const out = Math.max(b.left - t.left, t.right - b.right, b.top - t.top, t.bottom - b.bottom);

@@ -240,7 +240,7 @@ def test_a_store_is_trained_on_predicted_and_evaluated(folder, run, tmp_path):
     assert (
         found["headline"]["mean_absolute"] < 10.0 < found["controls"]["mean_only"]["error"]["mean_absolute"]
     )
-    assert "2 trials are left out: they have no fill" in found["notes"]
+    assert "2 trials left out: no fill" in found["notes"]
 
     model = tmp_path / "m.json"
     arguments = (

@@ -60,7 +60,7 @@ def test_a_relabelled_trial_has_its_new_label_everywhere_and_the_store_is_intact
     assert labels(store)[1] == (2, "can:empty_open", "can#3")
     assert store.trial(2).record.labels == {"label": "can:empty_open", "instance": "can#3"}
     assert labelled_store(str(store.folder)).labels == ("can:full_open", "can:empty_open", "toy")
-    assert any("labels of 1 trials were changed" in one for one in labelled_store(str(store.folder)).notes)
+    assert any("labels of 1 trial were changed" in one for one in labelled_store(str(store.folder)).notes)
     assert store.counts() == {("can:full_open", "can#2"): 1, ("can:empty_open", "can#3"): 1, ("toy", None): 1}
     assert verify_store(store.folder).problems == ()
     code, out, _ = run("trials", "list", store.folder)

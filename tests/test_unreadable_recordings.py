@@ -268,7 +268,7 @@ def test_of_a_store(tmp_path, capsys):
 
     found = load_trials(f"store:{folder}")
     assert len(found) == 3
-    assert any("3 trials are left out, because their rows are damaged" in note for note in found.notes)
+    assert any("3 trials left out as damaged" in note for note in found.notes)
 
     found = load_trials(f"store:{folder}", options=["features.force=left"])
     assert len(found) == 2

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from attrs import fields
+from attrs import evolve, fields
 from hypothesis import given
 from hypothesis import strategies as st
 from kept import keep
@@ -20,8 +20,9 @@ from graspsense.core.components.firstparty import EXAMPLES
 from graspsense.core.components.nearest_key import nearest_path
 from graspsense.core.components.strict import ValidationFailed, structured
 from graspsense.core.components.toml_kinds import KINDS, toml_kind
+from graspsense.core.learn.copies import without_copies
 from graspsense.core.learn.labelled import Labelled
-from graspsense.core.values.errors import ConfigError
+from graspsense.core.values.errors import ConfigError, counted
 from graspsense.core.values.features import FeatureTable
 from graspsense.experiments.experiment import Experiment
 from graspsense.sources.manifest.description import Manifest
@@ -32,6 +33,7 @@ FILES = {
     "pipe.toml": 'extends = "default"\n[controller]\nprobing_force_n = 15.0\n',
     "scene.toml": 'width_m = 0.06\n[[terms]]\ntype = "elastic"\nk1_n_m = 2000.0\n',
     "ex.toml": 'title = "x"\n[sweep]\n"controller.probing_force_n" = [17.0]\n',
+    "table.csv": "what,a\nx,1\ny,2\n",
     "man.toml": 'files = "{label}.csv"\ntime = "t"\ngap = "g"\n',
 }
 
@@ -82,7 +84,13 @@ def run(capsys, monkeypatch, tmp_path):
         ("predict simulated default", "predict default simulated"),
         ("run --gripper robotiq-2f85", "pip install -e ./examples/robotiq_2f85"),
         ("run -o features.type=grasp-curve", "pip install -e ./examples/grasp_curve"),
-        ("evaluate x.csv", "--label COLUMN"),
+        ("evaluate table.csv", "--label COLUMN"),
+        ("evaluate nothere.csv", "no file of this name"),
+        ("compare nothere.csv", "no file of this name"),
+        ("import nothere.csv --check", "no file of this name"),
+        ("replay csv:nothere.csv", "no file of this name"),
+        ("identify nothere.csv --class can --out can.toml", "no file of this name"),
+        ("train nothere.csv --out model.json", "no file of this name"),
     ],
 )
 def test_the_right_words_are_told(run, typed, meant):
@@ -161,8 +169,9 @@ def test_folds_are_refused_before_the_first_grasp(run, monkeypatch):
 
 def test_options_in_python_are_a_list():
     for ask in (load_pipeline, resolve):
-        with pytest.raises(ConfigError, match="a list of texts"):
-            ask(options="run.seed=3")
+        for options in ("run.seed=3", {"run.seed": 3}, [("run.seed", 3)]):
+            with pytest.raises(ConfigError, match="a list of texts"):
+                ask(options=options)
 
 
 def test_an_error_in_python_names_arguments_and_not_options_of_commands(tmp_path):
@@ -171,6 +180,34 @@ def test_an_error_in_python_names_arguments_and_not_options_of_commands(tmp_path
         load_trials(str(tmp_path / "x.csv"))
     assert "label=COLUMN" in str(refused.value)
     assert "--" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        ["nonsense"],
+        ["controller.probing_forc_n=17"],
+        ["controller.probing_force_n=much"],
+        ["classifier.type=mlp", "classifier.model=none.json"],
+        ["classifier.type=none", "run.stop_when_sure=true"],
+    ],
+)
+def test_an_error_in_python_names_options_as_python_takes_them(options, run):
+    with pytest.raises(ConfigError) as refused:
+        load_pipeline(options=options).grasp()
+    assert "-o " not in str(refused.value)
+    assert "options=['" in str(refused.value)
+    code, _, err = run("run", *(word for option in options for word in ("-o", option)))
+    assert (code, "-o " in err, "options=[" in err) == (2, True, False)
+
+
+def test_arguments_of_an_evaluation_that_are_something_else_are_refused():
+    trials = some_trials([1.0, 2.0] * 6)
+    for arguments in ((trials, "c45"), ("c45", "x.csv")):
+        with pytest.raises(ConfigError, match="load_trials"):
+            evaluate(*arguments)
+    with pytest.raises(ConfigError, match="'state'"):
+        evaluate("c45", trials, target="size")
 
 
 def some_trials(values):
@@ -183,6 +220,19 @@ def test_the_classifier_of_an_evaluation_is_named_once():
     found = evaluate("c45", some_trials([1.0, 2.0] * 6), folds=2, permutations=1)
     assert found.classifier.startswith("graspsense-c45/c45 ")
     assert found.headline.rate == 1.0
+
+
+def test_a_note_on_one_thing_is_in_the_singular():
+    one = evolve(some_trials([1.0, 2.0, 3.0, 4.0]), instances=("a#1",) * 4)
+    assert counted(1, "trial is", "trials are") == "1 trial is"
+    assert counted(0, "trial") == "0 trials"
+    notes = evaluate("c45", one, folds=2, permutations=1).notes
+    assert any("1 instance:" in note for note in notes)
+    doubled = some_trials([1.25, 2.5, 3.125, 4.75, 1.25])
+    doubled = evolve(doubled, labels=(*doubled.labels[:4], "b"), content=("p", "q", "r", "s", "p"))
+    (note,) = without_copies(doubled).notes
+    assert "1 trial is left out" in note
+    assert "1 of them has another label" in note
 
 
 def test_trials_without_any_feature_have_no_rate():

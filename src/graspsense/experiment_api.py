@@ -41,6 +41,7 @@ _TABLE: Final[Table] = {
             "percent",
             "span",
         ),
+        "core.values.errors": ("counted",),
     },
     "Pictures and sections of a report": {
         "report.grasp_curve": ("GraspCurve", "grasp_curve"),

@@ -39,6 +39,7 @@ from graspsense.experiments.findings import code as code
 from graspsense.experiments.findings import control_cells as control_cells
 from graspsense.experiments.findings import percent as percent
 from graspsense.experiments.findings import span as span
+from graspsense.core.values.errors import counted as counted
 
 # Pictures and sections of a report
 from graspsense.report.grasp_curve import GraspCurve as GraspCurve

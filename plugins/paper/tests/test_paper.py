@@ -377,7 +377,7 @@ def test_parts_are_done_as_if_alone_and_the_resolved_file_means_the_same_tasks(t
     checked = {one["id"]: one for one in found.values["claims"]}
     assert "above in 0 of 1" in checked["fig_6_force"]["number"]
     assert checked["fig_6_force"]["verdict"] == "cannot be told"  # one grasp shows nothing
-    assert checked["fig_6_force"]["n"] == "1 grasps"
+    assert checked["fig_6_force"]["n"] == "1 grasp"
     page = experiment_page(summary, results).html()
     assert "Fig. 5: force control on the block" in page
     assert "Table III" in page
@@ -415,6 +415,8 @@ def test_the_page_has_the_tables_of_this_version():
     header, rows_of_claims = rows_of_page("Claims of the paper")
     assert header == list(CLAIMS_HEADER)
     assert {row[2] for row in rows_of_claims} <= {"agrees", "differs", "cannot be told"}
+    controls = [tuple(row[:3]) for row in rows_of_page("Controls")[1]]
+    assert len(set(controls)) == len(controls)  # each of the grasps that its rates are of
 
 
 @pytest.mark.slow

@@ -11,6 +11,7 @@ from attrs import evolve, frozen
 
 from graspsense.cli.sources import is_csv, learner_of, trials_of
 from graspsense.cli.terminal import echo_as_it_is, echo_entry
+from graspsense.core.values.errors import counted
 
 if TYPE_CHECKING:
     import numpy as np
@@ -171,7 +172,7 @@ def _tables(
             tables[name], suited[component.qualified] = part, columns
         else:
             notes.append(
-                f"features {component.name} are left out: {having} of {len(part)} trials have one of them"
+                f"features {component.name} are left out: {having} of {counted(len(part), 'trial')} have one of them"
             )
     if not suited:
         raise ConfigError(f"no feature set suits the trials of {source}:\n" + "\n".join(notes))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from graspsense.cli.terminal import Style, echo, echo_entry, echo_table
+from graspsense.core.values.errors import counted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -63,7 +64,8 @@ def conditions_markdown(measured: Sequence[Conditions]) -> str:
     lines = ["# Condition of the features", "", "Written by `graspsense tradeoff condition`. Simulated.", ""]
     for one in measured:
         lines += [
-            f"Sensor {one.sensor}: {one.grasps} grasps of {', '.join(one.scenes)}, {one.parameters} parameters, each "
+            f"Sensor {one.sensor}: {counted(one.grasps, 'grasp')} of {', '.join(one.scenes)}, "
+            f"{counted(one.parameters, 'parameter')}, each "
             "larger by 1 ppm. Movements are relative to the value of the feature, or to 1 mm, 1 N, 50 ms, 1 mm/s or "
             "1 N/s if that is larger.",
             "",

@@ -14,6 +14,7 @@ from graspsense.cli.live import Live, LiveOptions, live_options, shown_live
 from graspsense.cli.options import force_option
 from graspsense.cli.output import echo_json
 from graspsense.cli.terminal import Style, echo, echo_entry, echo_table, talk
+from graspsense.core.values.errors import counted
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -216,7 +217,9 @@ def _plan(planned: Planned, results: Results, workers: int, as_json: bool) -> No
     kind = "simulated grasps" if effort.simulated else "trials"
     trials = "not known before the data set is read" if effort.trials is None else f"{effort.trials} {kind}"
     echo(planned.experiment.question or planned.experiment.title, Style.HEADING)
-    echo_entry("tasks", f"{effort.tasks}: {effort.cases} cases with {effort.seeds} seeds")
+    echo_entry(
+        "tasks", f"{effort.tasks}: {counted(effort.cases, 'case')} with {counted(effort.seeds, 'seed')}"
+    )
     names = [case.name for case in planned.cases if case.name]
     if names:
         more = f" and {len(names) - _MOST_NAMED} more" if len(names) > _MOST_NAMED else ""

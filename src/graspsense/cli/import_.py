@@ -13,6 +13,7 @@ from attrs import frozen
 from graspsense.cli.output import echo_json, file_to_write_as
 from graspsense.cli.sources import named_source
 from graspsense.cli.terminal import Style, echo, echo_as_it_is, echo_entry, echo_table
+from graspsense.core.values.errors import counted
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -249,15 +250,15 @@ def _import(
     else:
         outcomes = Counter(one["outcome"] for one in stored.kept)
         words = ", ".join(f"{count} {outcome}" for outcome, count in outcomes.items())
-        echo(f"{len(stored.kept)} trials imported into {save}: {words}", err=as_json)
+        echo(f"{counted(len(stored.kept), 'trial')} imported into {save}: {words}", err=as_json)
         for note in recordings[0].labelled.recording.notes[1:]:
             echo(f"  {note}", err=as_json)
     if stored.kept:
         echo(f"  {chosen.words}", err=as_json)
         _echo_notices(_summary(recordings), err=as_json)
     if stored.refused:
-        word = "recording" if len(stored.refused) == 1 else "recordings"
-        echo(f"  {len(stored.refused)} {word} left out: {stored.refused[0]}", Style.CAUTION, err=as_json)
+        refused = counted(len(stored.refused), "recording")
+        echo(f"  {refused} left out: {stored.refused[0]}", Style.CAUTION, err=as_json)
     if as_json:
         failed = [one.line for one in unreadable]
         echo_json(
@@ -312,8 +313,7 @@ def _store(
 
 def _echo_unreadable(unreadable: Sequence[UnreadableRecording]) -> None:
     """Print why each recording cannot be read, in one line each, and what to do."""
-    word = "recording" if len(unreadable) == 1 else "recordings"
-    echo(f"{len(unreadable)} {word} cannot be read:", Style.CAUTION, err=True)
+    echo(f"{counted(len(unreadable), 'recording')} cannot be read:", Style.CAUTION, err=True)
     for one in unreadable[:LISTED]:
         echo_as_it_is(f"  {one.line}", err=True)  # not wrapped, so that a program can take it line by line
     if len(unreadable) > LISTED:
@@ -414,4 +414,4 @@ def _span(values: Sequence[float]) -> str:
 
 def _echo_notices(summary: ImportSummary, *, err: bool) -> None:
     for notice, count in summary.notices:
-        echo(f"  {count} of {summary.grasps} grasps: {notice}", Style.CAUTION, indent=2, err=err)
+        echo(f"  {count} of {counted(summary.grasps, 'grasp')}: {notice}", Style.CAUTION, indent=2, err=err)

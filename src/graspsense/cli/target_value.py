@@ -10,6 +10,7 @@ import click
 from graspsense.cli.output import echo_json
 from graspsense.cli.sources import command_line, is_csv, trials_of
 from graspsense.cli.terminal import Style, echo, echo_as_it_is, echo_entry, echo_table, talk
+from graspsense.core.values.errors import counted
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -205,7 +206,8 @@ def _print_evaluation(found: RegressionEvaluation) -> None:
         "objects of which other grasps may have been used for training"
     )  # fmt: skip
     echo(
-        f"{found.estimator} predicts {found.target_value} of {found.headline.n} trials of {found.source} with a mean "
+        f"{found.estimator} predicts {found.target_value} of {counted(found.headline.n, 'trial')} of "
+        f"{found.source} with a mean "
         f"absolute error of {found.headline.words(found.unit)}, on {objects}.",
         Style.HEADING,
     )

@@ -21,6 +21,7 @@ from graspsense.cli.sources import (
     trials_of,
 )
 from graspsense.cli.terminal import echo, echo_as_it_is, echo_entry, talk
+from graspsense.core.values.errors import counted
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -252,7 +253,9 @@ def _say_trained(out: str, model: Model) -> None:
             echo_entry("unknown", f"{share} of the held-out trials are called unknown (false alarms)")
     for after_s, part in model.checkpoints:
         sets = "" if part.sets is None else f", sets {part.sets.in_words}"
-        echo_entry(f"{after_s:g} s", f"after the contact: {part.provenance['trials']} grasps{sets}")
+        echo_entry(
+            f"{after_s:g} s", f"after the contact: {counted(part.provenance['trials'], 'grasp')}{sets}"
+        )
 
 
 def _refuse_single_scene(source: str) -> None:

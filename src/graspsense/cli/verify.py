@@ -9,6 +9,7 @@ import click
 from graspsense.cli.output import echo_json
 from graspsense.cli.sources import named_store
 from graspsense.cli.terminal import Style, echo, echo_entry
+from graspsense.core.values.errors import counted
 
 EXIT_DAMAGED = 5
 EXIT_UNREAD = 2
@@ -39,7 +40,10 @@ def verify(source: str, as_json: bool) -> None:
             echo_entry("not read", str(one), Style.CAUTION)
         for one in found.unfinished:
             echo_entry("unfinished", str(one), Style.CAUTION)
-        counts = f"{found.trials} trials, {found.recordings} recordings, {len(found.problems)} damaged"
+        counts = (
+            f"{counted(found.trials, 'trial')}, {counted(found.recordings, 'recording')}, "
+            f"{len(found.problems)} damaged"
+        )
         counts += f", {len(found.unread)} not read" if found.unread else ""
         echo(counts, Style.BAD if found.problems else Style.CAUTION if found.unread else Style.GOOD)
         if found.unread:

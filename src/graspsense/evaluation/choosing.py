@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from attrs import frozen
 
-from graspsense.core.values.errors import FAILURES, ConfigError, named
+from graspsense.core.values.errors import FAILURES, ConfigError, counted, named
 from graspsense.evaluation.chosen import ChosenRate
 from graspsense.evaluation.crossval import ClassifierFactory, fit_and_predict, refuse_without_features
 from graspsense.evaluation.folds import INSTANCE_HELD_OUT
@@ -130,11 +130,14 @@ def _folds(trials: Labelled, seed: int) -> tuple[str, Folds]:
             f"every trial of {trials.source} has the label {trials.labels[0]!r}: there is nothing to choose by"
         )
     if len(trials) < FOLDS:
-        raise ConfigError(f"{len(trials)} trials are too few to choose by: record at least {FOLDS}")
+        raise ConfigError(
+            f"{counted(len(trials), 'trial is', 'trials are')} too few to choose by: record at least {FOLDS}"
+        )
     protocol, folds = next(iter(protocols_of(trials, FOLDS, seed).items()))
     if int(folds.max()) + 1 < LEAST_FOLDS:
         raise ConfigError(
-            f"{int(folds.max()) + 1} instances are too few to choose by: record at least {LEAST_FOLDS}"
+            f"{counted(int(folds.max()) + 1, 'instance is', 'instances are')} too few to choose by: record at "
+            f"least {LEAST_FOLDS}"
         )
     return protocol, folds
 

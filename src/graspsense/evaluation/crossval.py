@@ -11,7 +11,7 @@ from attrs import frozen
 
 from graspsense.core.learn.conformal import scores_of
 from graspsense.core.learn.novelty import novelty_of
-from graspsense.core.values.errors import ConfigError
+from graspsense.core.values.errors import ConfigError, counted
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -68,7 +68,7 @@ def refuse_without_features(table: FeatureTable) -> None:
     """Raise FitRefused if no trial has a feature."""
     if np.isnan(table.values).all():
         raise FitRefused(
-            f"no feature is defined in any of the {len(table)} trials: there is nothing to learn from"
+            f"no feature is defined in any of the {counted(len(table), 'trial')}: there is nothing to learn from"
         )
 
 
@@ -163,7 +163,8 @@ def fit_and_predict(
         classifier.fit(table.rows(training), known, seed)
     except ValueError as error:
         raise FitRefused(
-            f"the classifier refused {len(known)} training trials of {len(set(known))} labels: {error}"
+            f"the classifier refused {counted(len(known), 'training trial')} of "
+            f"{counted(len(set(known)), 'label')}: {error}"
         ) from error
     tested = table.rows(test)
     support = classifier.support(tested)

@@ -13,8 +13,8 @@ import numpy as np
 from attrs import frozen
 
 from graspsense.core.components.config import select_component
-from graspsense.core.learn.labelled import ControlFeatures, Labelled, Target, class_of
-from graspsense.core.values.errors import ConfigError
+from graspsense.core.learn.labelled import TARGETS, ControlFeatures, Labelled, Target, class_of
+from graspsense.core.values.errors import ConfigError, counted
 from graspsense.evaluation.confusion import confusion
 from graspsense.evaluation.crossval import ClassifierFactory, FitRefused, Groups, Pooled, cross_validate
 from graspsense.evaluation.doubt import reliability, set_coverage
@@ -64,9 +64,10 @@ def evaluate(
 
     `learner` is the name of a classifier, or what makes one; `classifier` is its name in the result, by default that
     of the learner. `target` selects what is recognised: the label as it is (`both`), the class, or the state within
-    each class. `permutations` is how often the labels are shuffled. Raises ConfigError if there is only one label, or
-    if there are too few trials.
+    each class. `permutations` is how often the labels are shuffled. Raises ConfigError if there is only one label, if
+    there are too few trials, or if an argument is something else.
     """
+    _check_arguments(labelled, target)
     if isinstance(learner, str):
         learner = select_component("classifier", learner)
     component = getattr(learner, "component", None)
@@ -105,6 +106,16 @@ def evaluate(
         sets=evaluator.sets(headline),
         reliability=evaluator.reliability(headline),
     )
+
+
+def _check_arguments(labelled: object, target: str) -> None:
+    if not isinstance(labelled, Labelled):
+        raise ConfigError(
+            f"evaluate: expected a classifier, then trials, found {labelled!r:.100} as the trials: "
+            "write evaluate('c45', load_trials('simulated'))"
+        )
+    if target not in TARGETS:
+        raise ConfigError(f"target: expected {', '.join(map(repr, TARGETS))}, found {target!r}")
 
 
 @frozen
@@ -297,8 +308,8 @@ class _Evaluator:
             count = len(set(self.trials.instances))
             if count < MIN_INSTANCES:
                 self.notes.append(
-                    f"{count} instances: with fewer than {MIN_INSTANCES}, rates and differences have no interval, and "
-                    "the controls give no warning"
+                    f"{counted(count, 'instance')}: with fewer than {MIN_INSTANCES}, rates and differences have "
+                    "no interval, and the controls give no warning"
                 )
 
     def _folds(self, assign: Callable[[Sequence[str], Any], Folds]) -> list[Folds]:
@@ -390,7 +401,7 @@ class _Evaluator:
         having: NDArray[np.bool_] = np.array(~np.isnan(control.table.values).all(axis=1))
         n, of = int(having.sum()), len(having)
         why = f": {control.missing}" if control.missing else ""
-        having_words = f"{n} of {of} trials have such features{why}"
+        having_words = f"{n} of {counted(of, 'trial')} have such features{why}"
         if n == 0:
             return Measurement(control.what, reason=having_words)
         groups, folds = _among(having, self.groups, headline.folds)
@@ -483,9 +494,9 @@ class _Evaluator:
             if self._difference(pooled.right(self.labels), majority_correct, rows).is_positive:
                 majority = float(np.mean([majority_correct[i] for i in rows]))
                 self.warnings.append(
-                    f"{percentage(control.rate.rate)} of {control.rate.n} trials are recognised from {when} "
-                    f"({control.what}); the most frequent label alone gives {percentage(majority)}. "
-                    "The recording itself reveals the labels"
+                    f"{percentage(control.rate.rate)} of {counted(control.rate.n, 'trial is', 'trials are')} "
+                    f"recognised from {when} ({control.what}); the most frequent label alone gives "
+                    f"{percentage(majority)}. The recording itself reveals the labels"
                 )
 
     def _warn_of_width(self, control: Measurement, headline: _Headline) -> None:
@@ -493,8 +504,8 @@ class _Evaluator:
         by = control.difference
         if control.rate is not None and by is not None and by.interval is not None and not by.is_positive:
             self.warnings.append(
-                f"the width alone reaches {percentage(control.rate.rate)} of {control.rate.n} trials, and the rate of "
-                f"{headline.protocol} is not shown to be higher (by {by.words}): the squeeze is not "
+                f"the width alone reaches {percentage(control.rate.rate)} of {counted(control.rate.n, 'trial')}, and "
+                f"the rate of {headline.protocol} is not shown to be higher (by {by.words}): the squeeze is not "
                 "shown to add anything"
             )
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from graspsense.core.components.caller import option
-from graspsense.core.values.errors import ConfigError
+from graspsense.core.values.errors import ConfigError, counted
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -88,8 +88,9 @@ def _by_label(labels: Sequence[str]) -> list[tuple[str, NDArray[np.int64]]]:
 def check_folds(n: int, k: int) -> None:
     """Raise ConfigError if `n` trials cannot be split into `k` folds."""
     if k < 2:
-        raise ConfigError(f"{k} fold{'' if k == 1 else 's'}: cross validation needs at least 2")
+        raise ConfigError(f"{counted(k, 'fold')}: cross validation needs at least 2")
     if n < k:
         raise ConfigError(
-            f"{n} trials cannot be split into {k} folds: give more trials, or fewer folds ({option('folds')})"
+            f"{counted(n, 'trial')} cannot be split into {k} folds: give more trials, or fewer folds "
+            f"({option('folds')})"
         )

@@ -18,6 +18,8 @@ from typing import Final
 
 from attrs import field, frozen
 
+from graspsense.core.values.errors import counted
+
 Z: Final = 1.959963984540054
 """97.5 % quantile of the standard normal distribution."""
 MIN_INSTANCES: Final = 6
@@ -69,7 +71,7 @@ class RecognitionRate:
         counts = f"{percentage(self.rate)} ({self.correct} of {self.n}; "
         if self.interval is None:
             return f"{counts}no interval: {self.no_interval})"
-        instances = "" if self.instances is None else f" over {self.instances} instances"
+        instances = "" if self.instances is None else f" over {counted(self.instances, 'instance')}"
         return f"{counts}95 %: {percentages(self.interval)}{instances})"
 
 
@@ -127,7 +129,7 @@ def rate_of(
 
 def too_few(instances: int) -> str:
     """Return the reason why a rate on this number of instances has no interval."""
-    return f"{instances} instance{'' if instances == 1 else 's'}, at least {MIN_INSTANCES} are needed"
+    return f"{counted(instances, 'instance')}, at least {MIN_INSTANCES} are needed"
 
 
 def clustered(right: Sequence[bool], instances: Sequence[str], comparisons: float = 1.0) -> Interval:
@@ -191,7 +193,7 @@ def mean_interval(
     if count < MIN_INSTANCES:
         if instances is not None:
             return None, too_few(count)
-        return None, f"{count} trial{'' if count == 1 else 's'}, at least {MIN_INSTANCES} are needed"
+        return None, f"{counted(count, 'trial')}, at least {MIN_INSTANCES} are needed"
     mean = math.fsum(values) / len(values)
     half = _t(count - 1) * math.sqrt(_variance_of_mean(values, units)[0])
     return (mean - half, mean + half), ""

@@ -22,15 +22,15 @@ def answer(summary: Summary) -> str:
     recognises = TARGETS[conditions[0].recognised]
     if len(conditions) == 1:
         return f"{_capitalised(best.name)} recognises {recognises} in {_rate(best)} of {sample}."
+    verdict = _verdict(conditions, best)
     if len({condition.rate.mean for condition in conditions}) == 1:
-        return (
-            f"All {len(conditions)} cases recognise {recognises} equally often: in {_rate(best)} of {sample}."
-        )
+        doubt = "" if verdict == "agrees" else " Whether a case is better cannot be told."
+        return f"All {len(conditions)} cases recognise {recognises} in {_rate(best)} of {sample}.{doubt}"
     told = {
         "differs": f"{_capitalised(best.name)} is better than {_worst(conditions).name}: it recognises",
         "agrees": f"All cases agree within {100 * MARGIN:g} points: {best.name} recognises",
         "cannot be told": f"Whether a case is better cannot be told. {_capitalised(best.name)} recognises",
-    }[_verdict(conditions, best)]
+    }[verdict]
     return f"{told} {recognises} in {_rate(best)} of {sample}. {_comparison(conditions, best)}"
 
 

@@ -13,7 +13,7 @@ from attrs import frozen
 
 from graspsense import __version__
 from graspsense.core.components.strict import plain
-from graspsense.core.values.errors import ConfigError, DataDamaged
+from graspsense.core.values.errors import ConfigError, DataDamaged, counted
 from graspsense.evaluation.intervals import Difference
 from graspsense.experiments.experiment import PIPELINE_TABLES, shown
 from graspsense.experiments.results import EXPERIMENT, RESULTS, Results
@@ -111,7 +111,7 @@ class ExperimentComparison:
         if more > 0:
             told.append(f"The table has {more} more.")
         count = len(self.settings)
-        differ = f"{count} setting{'' if count == 1 else 's'} differ{'s' if count == 1 else ''}"
+        differ = counted(count, "setting differs", "settings differ")
         told.append(f"{differ if count else 'No setting differs'}.")
         return " ".join(told)
 
@@ -331,7 +331,7 @@ def _difference(one: ConditionResult, other: ConditionResult, comparisons: int) 
     elif not same_trials:
         reason = "the trials differ"
     else:
-        reason = f"{len(common)} common seed{'' if len(common) == 1 else 's'}, two are needed"
+        reason = f"{counted(len(common), 'common seed')}, two are needed"
     value = one.rate.mean - other.rate.mean
     high, low = one.rate.interval, other.rate.interval
     if high is None or low is None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import math
-import os
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -21,12 +20,12 @@ from graspsense.core.components.registry import Resource, installed
 from graspsense.core.components.strict import InvalidValue, ValidationFailed, keys_of, plain, structured
 from graspsense.core.learn.copies import without_copies
 from graspsense.core.learn.model import worded
-from graspsense.core.values.errors import ConfigError, GraspsenseError, UnknownName, suggestion
+from graspsense.core.values.errors import ConfigError, GraspsenseError, UnknownName, counted, suggestion
 from graspsense.core.values.limits import CASES
 from graspsense.experiments.kinds import kind_of
 from graspsense.experiments.task import Task
 from graspsense.sources.identified import IDENTIFIED, identified_scenes
-from graspsense.sources.input_content import contents_of, input_names
+from graspsense.sources.input_content import contents_of, input_names, located_text
 from graspsense.sources.simulated import LARGEST_SEED, simulated_objects
 from graspsense.sources.simulated import number_of_trials as number_of_simulated_trials
 from graspsense.sources.trial_source import (
@@ -454,7 +453,9 @@ class _Plan:
             self.complaints.append(f"{self.layer.where(('data',))}: {error}")
             return
         if trials is not None and folds > trials:
-            text = f"{folds} folds of {trials} trials: give at most as many folds as there are trials"
+            text = (
+                f"{folds} folds of {counted(trials, 'trial')}: give at most as many folds as there are trials"
+            )
             self.complaints.append(self.layer.complain(InvalidValue(("judge", "folds"), text)))
 
     def _keys(self, values: Mapping[str, Any], cls: type, table: str) -> Any:
@@ -608,22 +609,12 @@ def _located(values: Mapping[str, Any], base: Path | None) -> dict[str, Any]:
     if base is None:
         return dict(values)
 
-    def path(text: Any) -> Any:
-        if not isinstance(text, str):
-            return text
-        if text.endswith((".toml", ".csv", ".tsv", ".txt", ".arff")) and os.path.exists(base / text):
-            return str((base / text).absolute())
-        name, colon, folder = text.partition(":")
-        if colon and folder and os.path.isdir(base / folder):
-            return f"{name}:{(base / folder).absolute()}"
-        return text
-
     def inside(value: Any) -> Any:
         if isinstance(value, Mapping):
             return {key: inside(one) for key, one in value.items()}
         if isinstance(value, list):
             return [inside(one) for one in value]
-        return path(value)
+        return located_text(value, base) if isinstance(value, str) else value
 
     located = {
         key: inside(one)

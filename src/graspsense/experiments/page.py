@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Final
 
 from graspsense.core.learn.model import worded
+from graspsense.core.values.errors import counted
 from graspsense.experiments.answer import answer, headline
 from graspsense.experiments.findings import MARKDOWN, Findings
 from graspsense.experiments.kinds import kind_of
@@ -118,7 +119,8 @@ def _beside(summary: Summary, best: ConditionResult | None) -> str:
     text = (
         "A gripper closes two fingers with force sensors on an object that it cannot see into. Each grasp gives a few "
         f"numbers ({features}), from which a classifier learns {TARGETS[best.recognised]}. There are "
-        f"{len(best.first.confusion.labels)} possible answers.{guessing} Each case has {best.rate.n} grasps, {origin}. "
+        f"{counted(len(best.first.confusion.labels), 'possible answer')}.{guessing} Each case has "
+        f"{counted(best.rate.n, 'grasp')}, {origin}. "
         f"Every grasp is classified by {protocol_words(best.protocol)}. A 95 % interval contains the true mean in "
         "95 of 100 such experiments."
     )
@@ -273,7 +275,10 @@ def _made_of(summary: Summary, results: Results) -> Section:
         ("command", str(made.get("command", ""))),
         ("begun", str(made.get("begun_at", ""))),
         ("trials", "none yet" if result is None else result.source),
-        ("cases, seeds", f"{len(summary.planned.cases)} cases, seeds {_ranges(summary.planned.seeds)}"),
+        (
+            "cases, seeds",
+            f"{counted(len(summary.planned.cases), 'case')}, seeds {_ranges(summary.planned.seeds)}",
+        ),
         ("computing time", f"{summary.seconds:.0f} s, all tasks together"),
         ("machine", f"{made.get('host', '?')}, {made.get('system', '?')}"),
         ("code", f"graspsense {made.get('graspsense', '?')}, commit {commit_text(made)}"),

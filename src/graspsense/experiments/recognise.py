@@ -14,7 +14,7 @@ from graspsense.core.components.registry import installed
 from graspsense.core.components.strict import structured
 from graspsense.core.learn.copies import apart_from, without_copies
 from graspsense.core.learn.labelled import class_of
-from graspsense.core.values.errors import ConfigError
+from graspsense.core.values.errors import ConfigError, counted
 from graspsense.evaluation.evaluate import evaluate
 from graspsense.evaluation.gathered_warnings import gathered_warnings
 from graspsense.experiments.task_results import (
@@ -195,7 +195,9 @@ def _on_other_trials(
         best = classifier.probabilities(tested.table).argmax(axis=1)
         true += tested.labels
         predicted += [labels[k] for k in best]
-    note = f"trained on {len(data)} trials of {data.source}, tested on {len(true)} of {test.source}"
+    note = (
+        f"trained on {counted(len(data), 'trial')} of {data.source}, tested on {len(true)} of {test.source}"
+    )
     notes = (note, *test.notes, *told)
     return ClassifierResult.of(name, target, OTHER_TRIALS, true, predicted, notes=notes, tree=tree)
 

@@ -21,6 +21,7 @@ import numpy as np
 from attrs import evolve, frozen
 from numpy.typing import NDArray
 
+from graspsense.core.components.caller import set_option
 from graspsense.core.components.config import SelectedComponent, Settings
 from graspsense.core.components.roles import BatchBackend, SimulationVariant
 from graspsense.core.values.errors import ConfigError
@@ -118,7 +119,9 @@ def sensed_trade(
     if not variants:
         raise ConfigError(f"gripper {settings.gripper.component.qualified} has no accuracy to trade for time")
     if settings.classifier is None:
-        raise ConfigError("recognition needs a classifier: choose one, as in -o classifier.type=c45")
+        raise ConfigError(
+            f"recognition needs a classifier: choose one, as in {set_option('classifier.type=c45')}"
+        )
     in_turn = sorted(variants, key=lambda one: one.role != "reference")
     group = Group(objects=tuple(objects), instances=instances, trials=1)
     training = _Plans([plan_trials(settings, (group,), seed) for seed in seeds])

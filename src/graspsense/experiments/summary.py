@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from functools import cached_property
 from typing import Any
 
-from attrs import field, frozen
+from attrs import evolve, field, frozen
 
 from graspsense.core.components.caller import option
 from graspsense.core.learn.labelled import Target
-from graspsense.core.values.errors import ConfigError
+from graspsense.core.values.errors import ConfigError, counted
 from graspsense.evaluation.confusion import Confusion
 from graspsense.evaluation.intervals import RecognitionRate
 from graspsense.evaluation.over_seeds import MeanDifference, OverSeeds, mean_difference
@@ -119,9 +119,15 @@ class ConditionResult:
 
     def _over_seeds(self, measured: list[RecognitionRate]) -> OverSeeds:
         rates = [one.rate for one in measured]
+        single = measured[0]
         if not self.simulated:
             rates = [sum(rates) / len(rates)]
-        return OverSeeds(tuple(rates), self.first.rate.n, measured[0] if len(rates) == 1 else None)
+            # The same trials in other folds: the ends of the intervals are averaged as the rates are.
+            intervals = [one.interval for one in measured if one.interval is not None]
+            if len(intervals) == len(measured):
+                low, high = (sum(ends) / len(ends) for ends in zip(*intervals, strict=True))
+                single = evolve(single, interval=(low, high))
+        return OverSeeds(tuple(rates), self.first.rate.n, single if len(rates) == 1 else None)
 
 
 @frozen(kw_only=True, eq=False)
@@ -259,6 +265,6 @@ def unreadable_lines(summary: Summary) -> list[str]:
         return []
     shown = "; ".join(summary.unreadable[:5])
     return [
-        f"{len(summary.unreadable)} results cannot be read and are not included: {shown}. The same experiment with "
-        f"{option('resume', python='resume=True')} computes them again"
+        f"not included, because they cannot be read: {counted(len(summary.unreadable), 'result')}, {shown}. The "
+        f"same experiment with {option('resume', python='resume=True')} computes them again"
     ]

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Final, TypeVar
 
 from graspsense.core.components.registry.plugins import STRICT_VARIABLE
-from graspsense.core.values.errors import ConfigError, DataDamaged, GraspsenseError, TooLarge, named
+from graspsense.core.values.errors import ConfigError, DataDamaged, GraspsenseError, TooLarge, counted, named
 from graspsense.recording.labelled_recording import UnreadableRecording
 from graspsense.recording.unpacked import limit_words
 
@@ -99,4 +99,6 @@ def note_on(unreadable: Sequence[UnreadableRecording], total: int) -> list[str]:
     if not unreadable:
         return []
     count = len(unreadable)
-    return [f"{count} of {total} recordings cannot be read and are left out. The first: {unreadable[0].line}"]
+    return [
+        f"{count} of {counted(total, 'recording')} cannot be read and are left out. The first: {unreadable[0].line}"
+    ]

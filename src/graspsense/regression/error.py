@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from attrs import frozen
 
+from graspsense.core.values.errors import counted
 from graspsense.evaluation.intervals import Difference, Interval, mean_interval
 
 
@@ -28,7 +29,9 @@ class RegressionError:
 
     def words(self, unit: str) -> str:
         """Return the mean absolute error as text, with its interval."""
-        of = f"{self.n} trials" + ("" if self.instances is None else f" of {self.instances} instances")
+        of = counted(self.n, "trial") + (
+            "" if self.instances is None else f" of {counted(self.instances, 'instance')}"
+        )
         if self.interval is None:
             return f"{self.mean_absolute:.4g} {unit}".rstrip() + f" ({of}; no interval: {self.no_interval})"
         low, high = self.interval

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from graspsense.core.values.errors import ConfigError, suggestion
+from graspsense.core.values.errors import ConfigError, counted, suggestion
 from graspsense.core.values.features import LARGEST_VALUE
 
 if TYPE_CHECKING:
@@ -87,7 +87,7 @@ class FittedRegression:
 
         check_estimator(name)
         if len(values) < 2:
-            raise ValueError(f"{len(values)} trials: an estimator needs at least two")
+            raise ValueError(f"{counted(len(values), 'trial')}: an estimator needs at least two")
         self._scaling = make_pipeline(
             SimpleImputer(strategy="median", keep_empty_features=True), StandardScaler()
         )

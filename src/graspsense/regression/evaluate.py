@@ -13,7 +13,7 @@ from attrs import frozen
 
 from graspsense.core.components.caller import option
 from graspsense.core.learn.conformal import COVERAGE, calibrated_threshold, units_needed
-from graspsense.core.values.errors import ConfigError
+from graspsense.core.values.errors import ConfigError, counted
 from graspsense.evaluation.folds import in_order, instance_held_out, stratified
 from graspsense.evaluation.gathered_warnings import gathered_warnings
 from graspsense.evaluation.intervals import MIN_INSTANCES, rate_of
@@ -65,8 +65,8 @@ def evaluate_regression(
     headline = evaluator.headline
     if evaluator.instances is not None and len(set(evaluator.instances)) < MIN_INSTANCES:
         notes.append(
-            f"{len(set(evaluator.instances))} instances: with fewer than {MIN_INSTANCES}, errors and differences have "
-            "no interval, and the controls give no warning"
+            f"{counted(len(set(evaluator.instances)), 'instance')}: with fewer than {MIN_INSTANCES}, errors and "
+            "differences have no interval, and the controls give no warning"
         )
     table = labelled.table
     return RegressionEvaluation(
@@ -329,7 +329,7 @@ class _Evaluator:
         having = np.array(~np.isnan(control.table.values).all(axis=1))
         n, of = int(having.sum()), len(having)
         why = f": {control.missing}" if control.missing else ""
-        words = f"{n} of {of} trials have such features{why}"
+        words = f"{n} of {counted(of, 'trial')} have such features{why}"
         folds = self.headline.folds[having]
         if n == 0 or len(np.unique(folds)) < 2:
             too_few = "; these are too few to learn from" if n else ""

@@ -23,7 +23,7 @@ from graspsense.core.learn.model_content import digest, model_bytes, parsed, sea
 from graspsense.core.learn.novelty import Novelty, novelty_of
 from graspsense.core.learn.stored_values import LARGEST_SEED, StoredValues
 from graspsense.core.learn.target_value import TargetValue
-from graspsense.core.values.errors import ConfigError, DataDamaged
+from graspsense.core.values.errors import ConfigError, DataDamaged, counted
 from graspsense.core.values.features import FeatureTable
 from graspsense.core.values.json_values import json_ready
 from graspsense.regression.estimators import ESTIMATORS, FittedRegression
@@ -70,8 +70,8 @@ class RegressionModel:
         """The estimator and its training data, in one line."""
         unit = f" [{self.target.unit}]" if self.target.unit else ""
         return (
-            f"{self.name}: {self.estimator} predicts {self.target.name}{unit}, trained on {len(self.table)} trials of "
-            f"{self.provenance.get('source', '?')}"
+            f"{self.name}: {self.estimator} predicts {self.target.name}{unit}, trained on "
+            f"{counted(len(self.table), 'trial')} of {self.provenance.get('source', '?')}"
         )
 
     @property

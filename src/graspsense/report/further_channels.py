@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from graspsense.core.values.channel import Channel, FastChannel
+from graspsense.core.values.errors import counted
 from graspsense.core.values.fingers import fingers_of
 from graspsense.core.values.trace import SampleTrace
 from graspsense.core.values.units import display_unit, without_underscores
@@ -120,7 +121,7 @@ def _figure(
             over = f", power summed over {', '.join(lines)}" if len(lines) > 1 else ""
             caption += f", and its spectrogram{over}: decibels relative to the maximum"
     if lost:
-        caption += f"; {lost} samples were lost"
+        caption += f"; lost: {counted(lost, 'sample')}"
     picture.height = height + 4.0
     return figure(picture.svg(words, trace.units["t"]), f"{caption}.")
 

@@ -11,7 +11,7 @@ from attrs import frozen
 
 from graspsense.core.components.config import select_component
 from graspsense.core.learn.copies import without_copies
-from graspsense.core.values.errors import ConfigError, DataDamaged
+from graspsense.core.values.errors import ConfigError, DataDamaged, counted
 from graspsense.evaluation.evaluate import evaluate
 from graspsense.recording.labelled_recording import UnreadableRecording
 from graspsense.recording.provenance import commit_text
@@ -185,7 +185,7 @@ def _newest_of_labels(curves: Sequence[GraspCurve]) -> list[GraspCurve]:
 
 def _answer(evaluation: Evaluation | None, total: int, problem: str) -> str:
     if evaluation is None:
-        grasps = "There is 1 grasp" if total == 1 else f"There are {total} grasps"
+        grasps = f"There {'is' if total == 1 else 'are'} {counted(total, 'grasp')}"
         return f"{grasps}, but no recognition rate: {problem}."
     return verdict(evaluation)
 
@@ -270,7 +270,7 @@ def _provenance(
         (str(one.id), one.made_at, one.label or "", one.instance or "", one.outcome, one.set_aside or "")
         for one in listed
     ]
-    newest = f"The newest {len(rows)} of {total} trials" if total > len(rows) else "All trials"
+    newest = f"The newest {len(rows)} of {counted(total, 'trial')}" if total > len(rows) else "All trials"
     header = ("trial", "made", "label", "instance", "outcome", "set aside")
     body = (
         facts(pairs)

@@ -10,6 +10,7 @@ from attrs import frozen
 
 from graspsense.core.components.registry import installed
 from graspsense.core.learn.labelled import class_of
+from graspsense.core.values.errors import counted
 from graspsense.core.values.units import display_unit, in_words, without_underscores
 from graspsense.report.grasp_curve import GraspCurve
 from graspsense.report.html import figure, folded, panels, table
@@ -92,7 +93,7 @@ def _traces(name: str, grasps: Sequence[GraspCurve], axes: _Axes) -> str:
                 named = f"{state} (trial {grasp.trial}), {unit}"
                 picture.line(points, INKS[k], width=1.4, dash=DASHES[k], name=named)
     peaks = _legend(picture, states, grasps)
-    words = f"Force and gap over time for {len(grasps)} grasps of {name}: {', '.join(peaks)}"
+    words = f"Force and gap over time for {counted(len(grasps), 'grasp')} of {name}: {', '.join(peaks)}"
     return figure(picture.svg(words, grasps[0].time_unit), f"{name}: one line per grasp.")
 
 
@@ -218,7 +219,7 @@ def _feature(
         for k, (label, values) in enumerate(of.items())
     ]
     medians = "; ".join(f"{row[0]} {row[3]}" for row in rows if row[3])
-    absent = f" Missing in {missing} of {len(column)} trials." if missing else ""
+    absent = f" Missing in {missing} of {counted(len(column), 'trial')}." if missing else ""
     words = f"{name} of every label. Medians{f' in {shown}' if shown else ''}: {medians}.{absent}"
     header = ("label", "trials", "1st quartile", "median", "3rd quartile")
     numbers = table(title, header, rows, 1)

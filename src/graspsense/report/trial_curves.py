@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from html import escape
 from typing import Final
 
+from graspsense.core.values.errors import counted
 from graspsense.report.grasp_curve import GraspCurve
 from graspsense.report.html import Section, figure, paragraph
 from graspsense.report.svg import DASHES, INKS, AxisScale, Picture, reaching
@@ -22,8 +23,8 @@ def trial_curves(curves: Sequence[GraspCurve]) -> Section:
     newest = [next(curve.trial for curve in curves if curve.label == label) for label in labels]
     chosen = newest[:FIRST_CHOSEN] if len(newest) > 1 else [curve.trial for curve in curves[:FIRST_CHOSEN]]
     text = paragraph(
-        f"Force over time of {len(curves)} trials, from shortly before the contact until the fingers open. Choose "
-        "trials to draw them over each other; a label has its dashes, and a trial its colour."
+        f"Force over time of {counted(len(curves), 'trial')}, from shortly before the contact until the fingers "
+        "open. Choose trials to draw them over each other; a label has its dashes, and a trial its colour."
     )
     small = "".join(
         _small(curve, k, labels.index(curve.label), curve.trial in chosen) for k, curve in enumerate(curves)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
+from graspsense.core.values.errors import counted
 from graspsense.evaluation.equivalence import MARGIN, verdict_on
 from graspsense.evaluation.intervals import percentage, percentages
 from graspsense.evaluation.results import Evaluation, Measurement
@@ -45,7 +46,9 @@ def in_hundred(rate: float) -> str:
 def _rate(evaluation: Evaluation) -> str:
     name = evaluation.classifier.partition(" ")[0].rpartition("/")[2]
     rate, source = evaluation.headline, evaluation.source
-    trials = f"{rate.n} {source}" if source == "simulated grasps" else f"{rate.n} trials of {source}"
+    trials = (
+        f"{rate.n} {source}" if source == "simulated grasps" else f"{counted(rate.n, 'trial')} of {source}"
+    )
     if evaluation.protocol == "instance_held_out":
         protocol = "objects of which no grasp was used for training"
     else:
@@ -86,6 +89,10 @@ def _before_contact(evaluation: Evaluation) -> str:
         return f"Before contact {before} are recognised, too few to say what that means."
     if control.difference is not None and control.difference.interval is None:
         return f"Before contact {before} are recognised, on too few instances to say what that means."
+    if control.difference is not None and not control.difference.is_positive:
+        return (
+            f"Before contact {before} are recognised: whether the recording explains the rate cannot be told."
+        )
     return f"Before contact {before} are recognised, so the recording does not explain the rate."
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Final
 
 from graspsense.core.learn.target_value import name_and_unit
-from graspsense.core.values.errors import DataDamaged, listed
+from graspsense.core.values.errors import DataDamaged, counted, listed
 from graspsense.core.values.limits import CELLS
 from graspsense.sources.csv_columns import CsvColumns
 from graspsense.sources.text_table import check_columns, check_lines, text_of
@@ -74,7 +74,7 @@ class ArffColumns(CsvColumns):
             else []
         )
         if 0 < len(having) < len(self):
-            notes.append(f"{len(self) - len(having)} trials left out: they have no {label}")
+            notes.append(f"{counted(len(self) - len(having), 'trial')} left out: no {label}")
             self.keep(having)
         return notes
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from attrs import evolve
 
-from graspsense.core.values.errors import DataDamaged
+from graspsense.core.values.errors import DataDamaged, counted
 from graspsense.core.values.label_text import is_missing_label
 from graspsense.sources.csv_columns import CsvColumns
 from graspsense.store.export_table import ABOUT, ABOUT_BEFORE, BEFORE, FIRST, VALUE
@@ -104,5 +104,5 @@ def _kept(rows: list[int], wanted: Sequence[bool], why: str, notes: list[str]) -
     """Return the rows that are wanted, with a note on the others."""
     kept = [i for i in rows if wanted[i]]
     if len(kept) < len(rows):
-        notes.append(f"{len(rows) - len(kept)} trials left out: {why}")
+        notes.append(f"{counted(len(rows) - len(kept), 'trial')} left out: {why}")
     return kept

@@ -18,7 +18,7 @@ from graspsense.core.components.caller import option
 from graspsense.core.files.csv_text import csv_text
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.learn.target_value import TargetValue
-from graspsense.core.values.errors import ConfigError, DataDamaged, listed
+from graspsense.core.values.errors import ConfigError, DataDamaged, counted, listed
 from graspsense.core.values.features import UNKNOWN, FeatureTable
 from graspsense.core.values.label_text import is_missing_label, label_text
 from graspsense.core.values.nominal import splits_of
@@ -114,7 +114,7 @@ def _target(columns: CsvColumns, value: str, export: ExportedTable | None, notes
     if not having:
         raise DataDamaged(f"{columns.path}: no line has a {value}")
     if len(having) < len(columns):
-        notes.append(f"{len(columns) - len(having)} trials left out: they have no {value}")
+        notes.append(f"{counted(len(columns) - len(having), 'trial')} left out: no {value}")
         columns.keep(having)
     return TargetValue(name=value, unit=columns.units[name], values=tuple(columns.numbers(name)))
 

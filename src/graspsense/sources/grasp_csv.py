@@ -15,6 +15,7 @@ from typing import Final
 from urllib.parse import parse_qsl, urlencode
 
 from graspsense.core.values.errors import ConfigError, DataDamaged, suggestion
+from graspsense.recording.readable import not_opened
 from graspsense.recording.replayable import Recording
 from graspsense.sources.exported_grasp_tables import header_of, refuse_table_of_store
 from graspsense.sources.grasp_columns import checked_recording
@@ -48,7 +49,12 @@ def read_squeeze(name: str) -> Recording:
         columns_of.setdefault(quantity, []).append(column)
     missing = [quantity for quantity in REQUIRED if quantity not in columns_of]
     if missing:
-        refuse_table_of_store(Path(file or name), header_of(Path(file or name).expanduser()))
+        path = Path(file or name).expanduser()
+        try:
+            path.stat()
+        except OSError as error:
+            raise not_opened(path, error) from error
+        refuse_table_of_store(Path(file or name), header_of(path))
         raise ConfigError(
             f"which column of {file or name} is {' and which '.join(missing)}? Write FILE.csv?time=COLUMN&gap=COLUMN"
             "&force=COLUMN, or give --time, --gap and --force to `import`. If a column is not in s, m or N, add a "

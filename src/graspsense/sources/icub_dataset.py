@@ -19,7 +19,7 @@ import numpy as np
 from graspsense.core.components.caller import option
 from graspsense.core.components.roles import FeatureSet
 from graspsense.core.learn.labelled import ControlFeatures, Labelled
-from graspsense.core.values.errors import ConfigError, DataDamaged
+from graspsense.core.values.errors import ConfigError, DataDamaged, counted
 from graspsense.core.values.features import FeatureTable, table_of
 from graspsense.core.values.signals import APPROACH
 from graspsense.core.values.trace import SI_UNITS, Trace, trace_of
@@ -74,13 +74,14 @@ def read_dataset(folder: str, features: FeatureSet[Any], *, unreliable: bool = F
     ]
     if left_out:
         notes.append(
-            f"{len(left_out)} grasps of {UNRELIABLE} left out: their author calls them unreliable "
+            f"{counted(len(left_out), 'grasp')} of {UNRELIABLE} left out: their author calls them unreliable "
             f"(include them with {option('unreliable', python='unreliable=True')})"
         )
     without = int(np.isnan(table.values).all(axis=1).sum())
     if without:
         notes.append(
-            f"{without} of {len(grasps)} grasps have no contact as the feature set needs it, and so no features"
+            f"{without} of {counted(len(grasps), 'grasp')} have no contact as the feature set needs it, and so "
+            "no features"
         )
     variants = {}
     if set(_SHIFTED_BY) <= set(table.names):

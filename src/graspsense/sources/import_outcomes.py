@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Final
 
+from graspsense.core.components.caller import set_option
 from graspsense.core.components.registry import installed
 from graspsense.core.pipeline.pipeline import grasp_with
 from graspsense.core.values.errors import ConfigError, GraspsenseError
@@ -49,8 +50,9 @@ def refuse_useless(
     raise ConfigError(
         f"{wide} of {tried} recordings end as too wide, soon after their beginning: both pads feel "
         f"contact_force_n = {contact:g} before the gap has closed by too_wide_m = {travel:g}. If the recordings "
-        "begin close to the object, add -o controller.too_wide_m=0. If the force without contact is larger than "
-        "this, add -o controller.contact_force_n=FORCE. Or leave both out, so that they follow from the recordings"
+        f"begin close to the object, add {set_option('controller.too_wide_m=0')}. If the force without contact is "
+        f"larger than this, add {set_option('controller.contact_force_n=FORCE')}. Or leave both out, so that they "
+        "follow from the recordings"
     )
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
 from importlib.util import find_spec
@@ -18,11 +19,12 @@ from graspsense.core.components.registry import installed
 from graspsense.core.grasp.calibration_files import calibration_folder
 from graspsense.core.values.errors import GraspsenseError
 from graspsense.core.values.json_values import json_text
+from graspsense.store.naming import STORE, as_source
 
 FRAMEWORK: Final = "graspsense"
 _OWN_PLUGINS: Final = "graspsense.plugins"
-_STORE: Final = "store"
 _CALIBRATION: Final = "calibration"
+_QUOTED: Final = re.compile(r"\"[^\"\n]{1,1000}\"|'[^'\n]{1,1000}'")
 
 
 def contents_of(params: Any) -> dict[str, str]:
@@ -68,7 +70,7 @@ def _content(text: str, codes: Mapping[str, tuple[str, str]]) -> str | None:
     if code is not None:
         return _hash_of_code(*code)
     kind, colon, places = text.partition(":")
-    if kind == _STORE and colon:
+    if text.startswith(STORE):
         return _hash_of_store(places)
     paths = [_path(place) for place in (places if colon else text).split(",")]
     if not all(os.path.isfile(path) or (colon and os.path.isdir(path)) for path in paths):
@@ -83,6 +85,20 @@ def _path(place: str) -> str:
     path = os.path.expanduser(place.strip())
     whole, mark, number = path.rpartition("#")
     return whole if mark and number.isdecimal() else path
+
+
+def located_text(text: str, base: Path) -> str:
+    """Return a text that names a file or a store, or files or a folder after a colon, with absolute paths."""
+    kind, colon, places = text.partition(":")
+    if not colon:
+        path = base / _path(text)
+        is_input = (path.is_file() and path.suffix) or as_source(str(path)).startswith(STORE)
+        return str(base.absolute() / text) if is_input else text
+    located = [
+        str(base.absolute() / place) if place and (base / _path(place)).exists() else place
+        for place in places.split(",")
+    ]
+    return f"{kind}:{','.join(located)}"
 
 
 def _codes() -> dict[str, tuple[str, str]]:
@@ -122,9 +138,9 @@ def _hash_of_store(folder: str) -> str:
 
 
 def _hash_of_files(path: str, kind: str) -> str:
-    """Return the hash of a file or a folder, and of the files that a manifest describes."""
+    """Return the hash of a file or a folder, and of the files that it names or, as a manifest, describes."""
     if kind != "manifest":
-        return _hash_of_tree(path)
+        return _hash([_hash_of_tree(path), *map(_hash_of_tree, sorted(_named_files(path, (), set())))])
     from graspsense.sources.manifest.reader import manifest_files
 
     try:
@@ -132,6 +148,26 @@ def _hash_of_files(path: str, kind: str) -> str:
     except GraspsenseError:
         files = []  # the task tells it
     return _hash(_hash_of_tree(str(file)) for file in (path, *files))
+
+
+def _named_files(path: str, folders: tuple[str, ...], found: set[str]) -> set[str]:
+    """Add the files that a TOML or XML file names, and those that these name: models, their parts and meshes.
+
+    They are in the folder of the file, in a folder that it names (meshdir), or in `folders`, those of what names it.
+    """
+    if not path.lower().endswith((".toml", ".xml")) or not os.path.isfile(path):
+        return found
+    try:
+        texts = {text[1:-1] for text in _QUOTED.findall(Path(path).read_text(encoding="utf-8"))}
+    except (OSError, UnicodeDecodeError):
+        return found  # the task tells it
+    folder = os.path.dirname(path)
+    folders += (folder, *(place for text in texts if os.path.isdir(place := os.path.join(folder, text))))
+    for place in sorted({os.path.join(one, text) for one in folders for text in texts} - found - {path}):
+        if os.path.isfile(place):
+            found.add(place)
+            _named_files(place, folders, found)
+    return found
 
 
 def _hash_of_tree(path: str) -> str:

@@ -16,7 +16,7 @@ from attrs import evolve
 from graspsense.core.components.roles import FeatureSet
 from graspsense.core.learn.checkpoints import with_checkpoints
 from graspsense.core.learn.labelled import Labelled, class_of
-from graspsense.core.values.errors import ComponentFailed, ConfigError, GraspsenseError, named
+from graspsense.core.values.errors import ComponentFailed, ConfigError, GraspsenseError, counted, named
 from graspsense.core.values.features import Features, FeatureTable, table_of
 from graspsense.core.values.signals import APPROACH
 from graspsense.core.values.trace import SI_UNITS, Trace, trace_of
@@ -67,7 +67,7 @@ def labelled_recordings(
         raise ConfigError(f"{kind}:{place} has no recording with a label")
     table = table_of(rows)
     notes = note_on(unreadable, len(facts) + len(unreadable) + unlabelled)
-    notes += [f"{unlabelled} recordings without a label are left out"] if unlabelled else []
+    notes += [f"{counted(unlabelled, 'recording')} left out: no label"] if unlabelled else []
     notes += [*_counted(one.notices for one in facts), *threshold_notes]
     units = {unit for one in facts for unit in one.recording.units.values()}
     if units:
@@ -179,4 +179,4 @@ def _counted(notices: Any) -> list[str]:
     for of_one in notices:
         for notice in of_one:
             counts[notice] = counts.get(notice, 0) + 1
-    return [f"{count} recordings: {notice}" for notice, count in counts.items()]
+    return [f"{counted(count, 'recording')}: {notice}" for notice, count in counts.items()]

@@ -25,7 +25,7 @@ from graspsense.core.learn.checkpoints import with_checkpoints
 from graspsense.core.learn.labelled import Labelled, class_of
 from graspsense.core.pipeline.wiring import check
 from graspsense.core.values.device import DeviceInfo
-from graspsense.core.values.errors import ComponentFailed, ConfigError, named
+from graspsense.core.values.errors import ComponentFailed, ConfigError, counted, named
 from graspsense.core.values.features import FeatureRows, Features
 from graspsense.core.values.limits import CLASSES
 from graspsense.recording.before_contact import (
@@ -271,7 +271,7 @@ def _doubt_note(doubt: str, labels: Sequence[str], total: int) -> str:
     """Return in how many grasps, and of which objects, the figures may be inaccurate."""
     names = sorted(set(labels))
     more = f" and {len(names) - NAMED} others" if len(names) > NAMED else ""
-    return f"{len(labels)} of {total} grasps ({', '.join(names[:NAMED])}{more}): {doubt}"
+    return f"{len(labels)} of {counted(total, 'grasp')} ({', '.join(names[:NAMED])}{more}): {doubt}"
 
 
 def _states_note(groups: Sequence[Group], labels: Sequence[str]) -> tuple[str, ...]:

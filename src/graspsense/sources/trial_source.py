@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 from attrs import evolve, field, fields_dict, frozen
 
-from graspsense.core.components.caller import option
 from graspsense.core.components.layers import read_toml
 from graspsense.core.components.strict import ValidationFailed, structured
 from graspsense.core.components.toml_kinds import KINDS, toml_kind
@@ -221,10 +220,6 @@ def groups_of(source: TrialSource) -> tuple[Group, ...]:
 def _csv(source: TrialSource) -> Labelled:
     from graspsense.sources.features_csv import read_labelled
 
-    if not source.label and source.value is None and not source.source.lower().endswith(".arff"):
-        raise ConfigError(
-            f"which column of {source.source} holds the label? Name it: {option('label', 'COLUMN')}"
-        )
     return read_labelled(
         Path(source.source),
         source.label,

@@ -21,7 +21,7 @@ from graspsense.core.components.config import Flag
 from graspsense.core.components.strict import plain
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.learn.target_value import TargetValue, values_of_labels
-from graspsense.core.values.errors import ConfigError, DataDamaged
+from graspsense.core.values.errors import ConfigError, DataDamaged, counted
 from graspsense.core.values.features import FeatureTable
 from graspsense.recording.controls import Controls, controls, without_constant_gap
 from graspsense.recording.provenance import recipe
@@ -134,7 +134,7 @@ def labelled_store(
         table=tables.features,
         labels=tuple(label or "" for label in rows.label),
         instances=None if None in rows.instance else tuple(str(one) for one in rows.instance),
-        no_instances=f"{rows.instance.count(None)} trials do not name the individual object (can:full_open#2)",
+        no_instances=f"{counted(rows.instance.count(None), 'trial')} without the individual object (can:full_open#2)",
         order=order,
         no_order=no_order,
         content=content,
@@ -260,9 +260,7 @@ def _intact(store: Store, rows: _Rows, notes: list[str]) -> _Rows:
     if damage is not None:
         if not intact:
             raise damage
-        notes.append(
-            f"{len(rows) - len(intact)} trials are left out, because their rows are damaged: {damage}"
-        )
+        notes.append(f"{counted(len(rows) - len(intact), 'trial')} left out as damaged: {damage}")
         return rows.picked(intact)
     return rows
 
@@ -274,10 +272,12 @@ def _with_value(store: Store, rows: _Rows, name: str, notes: list[str]) -> tuple
     unit, values = values_of_labels(name, labels, f"the store in {store.folder}")
     changed = sum(a != b for a, b in zip(labels, recorded, strict=True))
     if changed:
-        notes.append(f"numbers of {changed} trials were changed after recording: graspsense trials history")
+        notes.append(
+            f"numbers of {counted(changed, 'trial')} were changed after recording: graspsense trials history"
+        )
     having = [i for i, number in enumerate(values) if number == number]
     if len(having) < len(values):
-        notes.append(f"{len(values) - len(having)} trials are left out: they have no {name}")
+        notes.append(f"{counted(len(values) - len(having), 'trial')} left out: no {name}")
     target = TargetValue(name=name, unit=unit, values=tuple(values[i] for i in having))
     return rows.picked(having), target
 
@@ -305,8 +305,8 @@ def _tables_again(
     same = [i for i, trial in enumerate(trials) if trial.features.features == names]
     if len(same) < len(trials):
         notes.append(
-            f"{len(trials) - len(same)} trials are left out: their features have other names or units than those of "
-            "the newest trial"
+            f"{counted(len(trials) - len(same), 'trial')} left out: the features have other names or units than "
+            "those of the newest trial"
         )
     notes.append(f"the features were extracted again from the recordings, with {', '.join(changed)}")
     outcomes = Counter(
@@ -357,7 +357,7 @@ def _unused(store: Store) -> tuple[str, ...]:
         notes.append(f"trials of the store that are not used: {text}")
     if relabelled:
         notes.append(
-            f"the labels of {relabelled} trials were changed after recording: graspsense trials history"
+            f"labels of {counted(relabelled, 'trial')} were changed after recording: graspsense trials history"
         )
     return tuple(notes)
 
@@ -368,7 +368,7 @@ def _of_recording(store: Store, wanted: str, used: int) -> list[str]:
     notes = ["the features are those extracted when the trials were recorded"]
     if total != used:
         notes.append(
-            f"{total - used} trials are left out: their features differ from those of the newest trial"
+            f"{counted(total - used, 'trial')} left out: other features than those of the newest trial"
         )
     return notes
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from attrs import evolve, frozen
 
+from graspsense.core.components.caller import set_option
 from graspsense.core.components.config import NONE, Flag, Settings, default_paths, resolve, without_followers
 from graspsense.core.components.layers import Layer
 from graspsense.core.components.nearest_key import nearest_path
@@ -129,7 +130,7 @@ def _refuse_other_tables(options: Sequence[str]) -> None:
         table = option.partition(".")[0].strip()
         if table not in CHANGEABLE:
             raise ConfigError(
-                f"-o {option}: {_meant(option)}a stored grasp can be evaluated again with other keys of "
+                f"{set_option(option)}: {_meant(option)}a stored grasp can be evaluated again with other keys of "
                 f"{', '.join(f'[{one}]' for one in CHANGEABLE)} only; its gripper is the recording"
             )
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from typing import Final
 
+from graspsense.core.values.errors import counted
 from graspsense.core.values.written_numbers import plain_number
 
 RECORDED_AT: Final = "recorded_at"
@@ -37,7 +38,7 @@ def order_recorded(
     if len(known_times) < len(times):
         unknown = len(times) - len(known_times)
         return None, (
-            f"{unknown} of {len(times)} trials were imported without the time at which they were recorded "
+            f"{unknown} of {counted(len(times), 'trial')} were imported without the time at which they were recorded "
             f"({RECORDED_AT} of a manifest)"
         )
     return _positions(known_times), ""

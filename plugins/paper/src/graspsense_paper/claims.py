@@ -21,6 +21,7 @@ from graspsense.experiment_api import (
     OverSeeds,
     RecognitionResult,
     Summary,
+    counted,
     mean_difference,
     percent,
     span,
@@ -30,7 +31,7 @@ from graspsense_paper.basis import Basis, basis
 from graspsense_paper.cases import PROTOCOLS, condition_result, is_of, of_protocol
 from graspsense_paper.grasp_result import GraspRow, grasp_results
 from graspsense_paper.published import published
-from graspsense_paper.rows import of_class
+from graspsense_paper.rows import of_class, sample
 from graspsense_paper.verdict import UNTOLD, Verdict, every, within
 
 FORCE: Final = "controller.probing_force_n"
@@ -136,7 +137,7 @@ def _points(difference: MeanDifference) -> str:
 
 def _seeds(condition: ConditionResult) -> str:
     """Return the number of trials of a rate."""
-    return f"{len(condition.by_seed)} seeds of {condition.rate.n} grasps"
+    return sample(condition.rate)
 
 
 def _approach_velocity(summary: Summary) -> Claim | None:
@@ -228,7 +229,7 @@ def _easiest(summary: Summary) -> Claim | None:
         "comparisons)",
         basis=basis(summary, "table_3", "table_3"),
         verdict=every([within(gap.interval, low=COUNTS) for gap in gaps.values()]),
-        n=f"{len(odwalla.rates)} seeds of {odwalla.n} grasps of Odwalla",
+        n=f"{sample(odwalla)} of Odwalla",
         number=f"Odwalla minus {nearest}, the nearest: {_points(gaps[nearest])}",
     )
 
@@ -353,7 +354,7 @@ def _split(
 
 def _grasps(split: OverSeeds) -> str:
     """Return the number of grasps of a separation."""
-    return f"{len(split.rates)} seeds of {split.n} grasps"
+    return sample(split)
 
 
 AT_23_N: Final[tuple[str, Mapping[str, Any]]] = ("table_4", {FORCE: 23.0})
@@ -486,7 +487,7 @@ def _stiction(summary: Summary) -> Claim | None:
                 within(wilson(closed, len(above)), low=MANY_TIMES),
             ]
         ),
-        n=f"{len(below) + len(above)} grasps",
+        n=counted(len(below) + len(above), "grasp"),
         number=f"moved in {_share(moved, len(below))} below, in {_share(closed, len(above))} above",
     )
 
@@ -514,7 +515,7 @@ def _one_finger_first(summary: Summary) -> Claim | None:
                 within(wilson(steady, len(first)), low=MANY_TIMES) if first else UNTOLD,
             ]
         ),
-        n=f"{len(rows)} grasps",
+        n=counted(len(rows), "grasp"),
         number=f"one pad first in {_share(len(first), len(rows))} grasps{words}",
     )
 
@@ -567,7 +568,7 @@ def _pure_velocity(summary: Summary) -> Claim | None:
         "grasps",
         basis=basis(summary, "controllers", "pure_velocity"),
         verdict=every([within(wilson(k, len(rows)), low=MOST_GRASPS) for k in (raised, broken)]),
-        n=f"{len(rows)} grasps",
+        n=counted(len(rows), "grasp"),
         number=f"effort rises by {statistics.median(rises):.0f} N in the median, by more than {RISE_N:g} N in "
         f"{_share(raised, len(rows))}; broken eggs: {_share(broken, len(rows))}",
     )
@@ -585,7 +586,7 @@ def _egg(summary: Summary) -> Claim | None:
         rule="the share of broken eggs at 20 N and 10 mm/s is below 10 %",
         basis=basis(summary, "controllers", "egg"),
         verdict=within(wilson(broken, len(rows)), high=1.0 - MOST_GRASPS),
-        n=f"{len(rows)} grasps",
+        n=counted(len(rows), "grasp"),
         number=f"broken: {_share(broken, len(rows))}; median peak force {peak:.1f} N",
     )
 
@@ -601,7 +602,7 @@ def _egg_force(summary: Summary) -> Claim | None:
         rule="the share of broken eggs at 20 N is above 10 %",
         basis=basis(summary, "controllers", "egg"),
         verdict=within(wilson(broken, len(rows)), low=1.0 - MOST_GRASPS),
-        n=f"{len(rows)} grasps",
+        n=counted(len(rows), "grasp"),
         number=f"broken: {_share(broken, len(rows))}",
     )
 
@@ -636,7 +637,7 @@ def _fig_5(summary: Summary) -> Claim | None:
         rule="the share of grasps of the block with a true peak above twice the 23 N of the effort is above 90 %",
         basis=basis(summary, "fig_5", "fig_5"),
         verdict=within(wilson(high, len(hard)), low=MOST_GRASPS),
-        n=f"{len(hard)} grasps",
+        n=counted(len(hard), "grasp"),
         number=f"{_share(high, len(hard))}; median peaks: block {peaks[0]:.0f} N, toy {peaks[1]:.0f} N; "
         f"hybrid on the block {peaks[2]:.0f} N",
     )
@@ -661,7 +662,7 @@ def _fig_6_force(summary: Summary) -> Claim | None:
         rule="the share of grasps in which the pads measure more than 23 N is below 10 %",
         basis=basis(summary, "fig_5", "fig_6_force"),
         verdict=within(wilson(over, len(peaks)), high=1.0 - MOST_GRASPS),
-        n=f"{len(peaks)} grasps",
+        n=counted(len(peaks), "grasp"),
         number=f"above in {_share(over, len(peaks))}; greatest {max(peaks):.1f} N; the true peak is above in {true}",
     )
 
@@ -703,6 +704,6 @@ def _near(name: str, says: str, times: Sequence[float], wanted: tuple[float, flo
         rule=f"the share of grasps within {tolerance:g} s of {time:g} s is above 90 %",
         basis=on,
         verdict=within(wilson(near, len(times)), low=MOST_GRASPS),
-        n=f"{len(times)} grasps",
+        n=counted(len(times), "grasp"),
         number=f"{_share(near, len(times))}; median {statistics.median(times):.2f} s",
     )

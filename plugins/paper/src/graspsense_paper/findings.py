@@ -39,6 +39,7 @@ from graspsense_paper.rows import (
     RateComparison,
     people_beside_robot,
     rows,
+    sample,
 )
 from graspsense_paper.verdict import UNTOLD, Verdict, counted
 
@@ -162,7 +163,13 @@ def _controls_table(summary: Summary, held: Sequence[RateComparison]) -> FoundTa
         if condition is None or not condition.controls or one.repeats:
             continue
         key = (one.experiment, one.what.partition(", ")[2] if one.class_ else one.what)
-        line = (*key, PROTOCOLS[row.protocol], row.n, percent(condition.rate.mean), *control_cells(condition))
+        line = (
+            *key,
+            PROTOCOLS[row.protocol],
+            sample(condition.rate),
+            percent(condition.rate.mean),
+            *control_cells(condition),
+        )
         if line not in lines:
             lines.append(line)
     if not lines:

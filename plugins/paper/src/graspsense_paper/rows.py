@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from attrs import frozen
 
-from graspsense.experiment_api import ConditionResult, OverSeeds, Summary, percent, span, wilson
+from graspsense.experiment_api import ConditionResult, OverSeeds, Summary, counted, percent, span, wilson
 from graspsense_paper.basis import Basis, basis
 from graspsense_paper.cases import PROTOCOLS, Protocol, condition_result, of_protocol
 from graspsense_paper.published import Published, PublishedRate
@@ -16,6 +16,11 @@ from graspsense_paper.verdict import AGREES, DIFFERS, UNTOLD, Verdict, within
 
 COUNTS: Final = 0.10
 """A difference from the paper's rate from this on counts. Its own rates are known to some ten points."""
+
+
+def sample(rate: OverSeeds) -> str:
+    """Return how many seeds and grasps a rate is of."""
+    return f"{counted(len(rate.rates), 'seed')} of {counted(rate.n, 'grasp')}"
 
 
 @frozen(kw_only=True)
@@ -62,7 +67,7 @@ class RateComparison:
     @property
     def n(self) -> str:
         """The number of our trials."""
-        return f"{len(self.ours.rates)} seeds of {self.ours.n} grasps"
+        return sample(self.ours)
 
     @property
     def cells(self) -> tuple[str, ...]:

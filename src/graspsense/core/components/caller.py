@@ -28,3 +28,12 @@ def option(name: str, value: str = "", *, python: str = "") -> str:
     if _commands:
         return f"--{name.replace('_', '-')}{f' {value}' if value else ''}"
     return f"{python or name}{f'={value}' if value else ''}"
+
+
+def set_option(text: str) -> str:
+    """Return the setting `TABLE.KEY=VALUE` as the caller gives it: after -o, or in `options`.
+
+    >>> set_option("run.seed=3")
+    "options=['run.seed=3']"
+    """
+    return f"-o {text}" if _commands else f"options=[{text!r}]"

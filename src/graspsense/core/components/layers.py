@@ -11,6 +11,7 @@ from typing import Any
 
 from attrs import define, field, frozen
 
+from graspsense.core.components.caller import set_option
 from graspsense.core.components.registry import Plugins
 from graspsense.core.components.strict import InvalidValue, shown
 from graspsense.core.components.toml_kinds import KINDS, refuse_other_kind
@@ -216,21 +217,22 @@ def _nearby(missing: Traversable) -> str:
 def option_layers(options: Sequence[str]) -> tuple[list[Layer], list[str]]:
     """Return a layer for each option `a.b=VALUE`, and a complaint for each malformed one.
 
-    VALUE is a TOML value; any other text is a string. Raises ConfigError if the options are one text.
+    VALUE is a TOML value; any other text is a string. Raises ConfigError if the options are no list of texts.
     """
-    if isinstance(options, str):
-        raise ConfigError(
-            f"options: expected a list of texts, as in [{options!r}], found the text {options!r}"
-        )
+    if isinstance(options, str | Mapping) or not all(isinstance(one, str) for one in options):
+        example = options if isinstance(options, str) else "run.seed=3"
+        raise ConfigError(f"options: expected a list of texts, as in [{example!r}], found {options!r}")
     layers, complaints = [], []
     for option in options:
         key, equals, value = option.partition("=")
         parts = _key_parts(key)
         if not equals or not parts:
-            complaints.append(f"-o {option}: expected TABLE.KEY=VALUE, as in -o run.seed=3")
+            complaints.append(
+                f"{set_option(option)}: expected TABLE.KEY=VALUE, as in {set_option('run.seed=3')}"
+            )
             continue
         values = _nested(parts, _toml_value(value))
-        layers.append(Layer(label="-o", values=values, typed=f"-o {option}", final=True))
+        layers.append(Layer(label="-o", values=values, typed=set_option(option), final=True))
     return layers, complaints
 
 

@@ -18,6 +18,7 @@ from typing import Any, Final
 
 from attrs import frozen
 
+from graspsense.core.components.caller import set_option
 from graspsense.core.files.closed_paths import make_closed, why_open
 from graspsense.core.files.regular_file import first_bytes
 from graspsense.core.files.user_folders import NOWHERE, data_folder
@@ -151,7 +152,7 @@ def calibrations_of(folder: str | Path, serial: str, device: Mapping[str, Any]) 
             f"gripper.calibration is {str(folder)!r}, and there is no such folder. There are three choices:\n"
             "  correct its name\n"
             "  calibrate this device into it:  graspsense calibrate tare\n"
-            "  run without:                    -o gripper.calibration=none"
+            f"  run without:                    {set_option('gripper.calibration=none')}"
         )
     found: dict[str, Calibration] = {}
     for kind in KINDS:
@@ -174,7 +175,7 @@ def calibrations_of(folder: str | Path, serial: str, device: Mapping[str, Any]) 
             raise ConfigError(
                 f"{path} does not fit this device: {'; '.join(misfits)}. There are two choices:\n"
                 f"  calibrate this device:  graspsense calibrate {kind} --replace\n"
-                "  run without:            -o gripper.calibration=none"
+                f"  run without:            {set_option('gripper.calibration=none')}"
             )
         found[kind] = calibration
     return found
@@ -187,8 +188,9 @@ def _refuse_open(path: Path) -> None:
         raise ConfigError(
             f"the calibration {path} is not used, because another user could have changed it: {reason}. "
             "There are two choices:\n"
-            "  use a copy:             copy it to a folder of yours, named by -o gripper.calibration=FOLDER\n"
-            "  run without:            -o gripper.calibration=none"
+            f"  use a copy:             copy it to a folder of yours, named by "
+            f"{set_option('gripper.calibration=FOLDER')}\n"
+            f"  run without:            {set_option('gripper.calibration=none')}"
         )
 
 

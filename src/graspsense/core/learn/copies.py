@@ -17,7 +17,7 @@ import numpy as np
 from attrs import evolve
 
 from graspsense.core.learn.labelled import Labelled
-from graspsense.core.values.errors import ConfigError
+from graspsense.core.values.errors import ConfigError, counted
 from graspsense.core.values.nominal import with_codes
 
 if TYPE_CHECKING:
@@ -47,7 +47,8 @@ def without_copies(labelled: Labelled) -> Labelled:
     notes = list(labelled.notes)
     if by_chance:
         notes.append(
-            f"{by_chance} trials have exactly the features of another one. They count, because features that are "
+            f"{counted(by_chance, 'trial has', 'trials have')} exactly the features of another one. They count, "
+            "because features that are "
             "counted or rounded can be equal by chance: make sure that no trial is in the data twice"
         )
     kept = np.flatnonzero(original == np.arange(len(labelled)))
@@ -82,9 +83,7 @@ def apart_from(tested: Labelled, training: Labelled) -> Labelled:
         raise ConfigError(
             f"every trial of {tested.source} is a copy of a trial of {training.source}: test on others"
         )
-    note = (
-        f"{len(tested) - len(kept)} trials to test on are left out: they are copies of trials to learn from"
-    )
+    note = f"{counted(len(tested) - len(kept), 'trial')} to test on left out: copies of trials to learn from"
     return evolve(tested.rows(kept), notes=(*tested.notes, note))
 
 
@@ -92,12 +91,15 @@ def _left_out(labelled: Labelled, left_out: NDArray[np.int64], original: NDArray
     example = int(left_out[0])
     kept = int(original[example])
     note = (
-        f"{len(left_out)} trials are left out, because they are copies of others: a copy is not another trial "
+        f"{counted(len(left_out), 'trial is', 'trials are')} left out as copies of others: a copy is not another trial "
         f"(trial {example + 1} has the same recording or features as trial {kept + 1})"
     )
     other = sum(labelled.labels[i] != labelled.labels[original[i]] for i in left_out.tolist())
     if other:
-        note += f". {other} of them have another label than the trial that is kept: correct the labels"
+        note += (
+            f". {counted(other, 'of them has', 'of them have')} another label than the trial that is kept: "
+            "correct the labels"
+        )
     return note
 
 

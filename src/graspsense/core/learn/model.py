@@ -21,6 +21,7 @@ import numpy as np
 from attrs import evolve, frozen
 
 from graspsense import __version__
+from graspsense.core.components.caller import set_option
 from graspsense.core.components.entries import TABLE_OF_ROLE
 from graspsense.core.components.firstparty import MODELS
 from graspsense.core.components.setting import CHANGES_NO_RESULT, NAMES_INPUT, UNIT_OF_ENDING, settings_marked
@@ -38,6 +39,7 @@ from graspsense.core.values.errors import (
     PluginUnavailable,
     UnknownName,
     WiringError,
+    listed,
     named,
 )
 from graspsense.core.values.features import (
@@ -387,6 +389,10 @@ def checkpoint_model(whole: Model, after_s: float, part: Model) -> Model:
 def _part_from_json(whole: Model, component: Component, config: Any, kept: StoredValues) -> Model:
     """Return the model of a checkpoint. Raises DataDamaged."""
     classifier = classifier_from(kept, component, config, whole.names, whole.units)
+    if others := sorted({*classifier.classes()} - {*whole.classifier.classes()}):
+        raise kept.refusal(
+            "model", f"it knows labels that the model of whole grasps does not: {listed(others)}"
+        )
     by_label = kept.table("by_label")
     part = evolve(
         whole,
@@ -679,13 +685,14 @@ def model_for(settings: Settings, plugins: Plugins) -> Model | None:
         raise ConfigError(
             f"classifier {chosen.component.qualified} has no model (classifier.model is not given).\n"
             + _how_to_train(settings, "model.json")
-            + "\n  then use it: -o classifier.model=model.json     or do without: -o classifier.type=none"
+            + f"\n  then use it: {set_option('classifier.model=model.json')}     or do without: "
+            f"{set_option('classifier.type=none')}"
         )
     if name.endswith(".json") and not Path(name).expanduser().exists():
         raise ConfigError(
             f"there is no model {name} yet (classifier.model).\n"
             + _how_to_train(settings, name)
-            + "\n  or do without: -o classifier.type=none"
+            + f"\n  or do without: {set_option('classifier.type=none')}"
         )
     model = _kept_model(_text(name, plugins), name, plugins, chosen.component)
     given = settings.features.declared.features
@@ -700,7 +707,7 @@ def model_for(settings: Settings, plugins: Plugins) -> Model | None:
         raise WiringError(
             f"{misfit}. It could not answer: choose its features, features.type = "
             f"{_features_of(model)}; train a model of these features:\n{_how_to_train(settings, 'model.json')}\n"
-            "  or do without: -o classifier.type=none"
+            f"  or do without: {set_option('classifier.type=none')}"
         )
     return model
 

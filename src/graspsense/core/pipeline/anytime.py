@@ -14,6 +14,7 @@ from contextlib import suppress
 from math import inf
 from typing import TYPE_CHECKING, Any, Final
 
+from graspsense.core.components.caller import set_option
 from graspsense.core.grasp.runner import Tell
 from graspsense.core.learn.checkpoints import until_checkpoint
 from graspsense.core.values.errors import FAILURES, ConfigError, named
@@ -152,7 +153,8 @@ def anytime_of(model: Model | None, feature_set: FeatureSet[Any], settings: Sett
         raise ConfigError(
             f"run.stop_when_sure: {what}, so nothing is predicted before the grasp ends. Train a model with "
             "graspsense train ... --checkpoints 0.1,0.2,0.4 --out FILE.json, and name it: "
-            "-o classifier.model=FILE.json. Or let the grasp go on: -o run.stop_when_sure=false"
+            f"{set_option('classifier.model=FILE.json')}. Or let the grasp go on: "
+            f"{set_option('run.stop_when_sure=false')}"
         )
     if stops and not any(part.sets is not None and part.sets.thresholds for _, part in model.checkpoints):
         sets = model.checkpoints[0][1].sets
@@ -164,6 +166,6 @@ def anytime_of(model: Model | None, feature_set: FeatureSet[Any], settings: Sett
         raise ConfigError(
             f"run.stop_when_sure: the sets of model {model.name!r} were not measured under these settings, so nothing "
             f"is sure: {differences[0]}. Train a model with these settings, or let the grasp go on: "
-            "-o run.stop_when_sure=false"
+            f"{set_option('run.stop_when_sure=false')}"
         )
     return Anytime(model, feature_set, settings, stops=stops)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from graspsense.core.components.caller import set_option
 from graspsense.core.components.channels import declared_dtype, declared_shape
 from graspsense.core.components.config import SelectedComponent, Settings, select_component
 from graspsense.core.components.entries import Role
@@ -66,7 +67,7 @@ def _too_small(settings: Settings) -> Iterator[str]:
         if limit is not None and limit < can:
             yield (
                 f"run.{key} is {limit:g} {unit}, and {cannot} cannot keep that limit: its least {what} is {can:g} "
-                f"{unit}. If that is not too much for the object, set -o run.{key}={can:g}"
+                f"{unit}. If that is not too much for the object: {set_option(f'run.{key}={can:g}')}"
             )
 
 

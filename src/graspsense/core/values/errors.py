@@ -98,6 +98,15 @@ def suggestion(found: str, allowed: Iterable[str]) -> str:
     return f" Did you mean {near[0]!r}?" if near else ""
 
 
+def counted(count: int, single: str, several: str = "") -> str:
+    """Return a count with its noun; `several` is the noun for any number but 1, by default with an s.
+
+    >>> counted(1, "trial is", "trials are"), counted(3, "trial")
+    ('1 trial is', '3 trials')
+    """
+    return f"{count} {single if count == 1 else several or f'{single}s'}"
+
+
 def listed(names: Sequence[str]) -> str:
     """Return names with commas between them, at most `MOST_NAMED` of them, and how many more there are.
 

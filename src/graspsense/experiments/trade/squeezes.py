@@ -12,7 +12,7 @@ from attrs.validators import ge, le
 from graspsense.core.components.config import SelectedComponent
 from graspsense.core.components.strict import structured
 from graspsense.core.learn.labelled import Labelled, Target
-from graspsense.core.values.errors import ConfigError
+from graspsense.core.values.errors import ConfigError, counted
 from graspsense.evaluation.folds import INSTANCE_HELD_OUT, instance_held_out
 from graspsense.experiments.task_results import ClassifierResult, RecognitionResult, TrialValues
 from graspsense.experiments.trade.costs import CostSettings, mean_seconds
@@ -62,7 +62,7 @@ def squeezes(params: Mapping[str, Any], seed: int) -> RecognitionResult:
         for target in settings.targets:
             true, predicted = _combined_predictions(learner, data, target, settings.most, seed)
             for k, labels in predicted.items():
-                title = f"{k} squeeze{'s' if k > 1 else ''}{suffix}"
+                title = f"{counted(k, 'squeeze')}{suffix}"
                 results.append(
                     ClassifierResult.of(title, target, INSTANCE_HELD_OUT, true, labels, cost=k * one_s)
                 )

@@ -10,6 +10,7 @@ from typing import Final, Literal
 from attrs import frozen
 
 from graspsense.core.learn.labelled import class_of
+from graspsense.core.values.errors import counted
 from graspsense.evaluation.equivalence import verdict_on
 from graspsense.evaluation.over_seeds import MeanDifference
 from graspsense.experiments.findings import percent, span
@@ -72,7 +73,7 @@ class Advice:
     def text(self) -> str:
         """The recommendation in a sentence."""
         grasps, seeds = self.best.condition.rate.n, len(self.best.condition.by_seed)
-        to = f"To recognise {self.recognises}, from {grasps} grasps of each of {seeds} seeds"
+        to = f"To recognise {self.recognises}, from {counted(grasps, 'grasp')} of each of {counted(seeds, 'seed')}"
         best = f"{self.best.name} at {self.best.cost:.3g} {self.axis}"
         caution = f"; {self.caution}" if self.caution else ""
         if self.recommended is None:
