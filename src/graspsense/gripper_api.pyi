@@ -84,6 +84,10 @@ from graspsense.core.values.errors import TooLarge as TooLarge
 from graspsense.sources.manifest.message_numbers import MessageNumber as MessageNumber
 from graspsense.sources.manifest.message_numbers import message_columns as message_columns
 
+# A grasp that another program makes
+from graspsense.core.pipeline.anytime import anytime_of as anytime_of
+from graspsense.core.learn.model import model_for as model_for
+
 # Recordings as they are replayed
 from graspsense.recording.replayable import Recording as Recording
 from graspsense.core.values.errors import RecordingEnded as RecordingEnded
