@@ -150,7 +150,7 @@ def test_the_picture_of_the_confusion(run, csv, tmp_path):
             "`simulated`, or scenes of `graspsense identify` as identified:cup.toml,mug.toml",
         ),
         (["evaluate", "none.csv", "--label", "x"], 2, "none.csv cannot be read"),
-        (["evaluate", "none.csv"], 2, "which column of none.csv holds the label? Name it: --label COLUMN"),
+        (["evaluate", "none.csv"], 2, "none.csv cannot be read: there is no file of this name"),
         (["evaluate", "nosuch:x"], 2, "no data set named 'nosuch'. Known: icub"),
         (["evaluate", "icub:"], 2, "names no folder"),
         (["evaluate", "icub:nowhere"], 2, "there is no folder nowhere"),

@@ -125,7 +125,7 @@ def test_a_compressed_text_has_the_limits_of_a_text(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("lines", "end", "left", "note"),
     [
-        (spoiled(150, "1.500,48.5,NaN,NaN"), "\n", 199, r"1 samples without a number \(line 152\)"),
+        (spoiled(150, "1.500,48.5,NaN,NaN"), "\n", 199, r"1 sample without a number \(line 152\)"),
         (spoiled(150, "1.500,48.5,--,#DIV/0!"), "\n", 199, "line 152"),
         ([HEADER, *ROWS[:-1], ROWS[-1][:9]], "", 199, "line 201 is cut off"),
         ([HEADER, *ROWS[:-1], ROWS[-1][:-2]], "", 199, "line 201 is cut off"),

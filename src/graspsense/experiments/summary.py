@@ -265,6 +265,6 @@ def unreadable_lines(summary: Summary) -> list[str]:
         return []
     shown = "; ".join(summary.unreadable[:5])
     return [
-        f"not included, because they cannot be read: {counted(len(summary.unreadable), 'result')}, {shown}. The "
+        f"{counted(len(summary.unreadable), 'result')} cannot be read, and not included: {shown}. The "
         f"same experiment with {option('resume', python='resume=True')} computes them again"
     ]

@@ -121,7 +121,7 @@ def _figure(
             over = f", power summed over {', '.join(lines)}" if len(lines) > 1 else ""
             caption += f", and its spectrogram{over}: decibels relative to the maximum"
     if lost:
-        caption += f"; lost: {counted(lost, 'sample')}"
+        caption += f"; {counted(lost, 'sample was', 'samples were')} lost"
     picture.height = height + 4.0
     return figure(picture.svg(words, trace.units["t"]), f"{caption}.")
 

@@ -11,7 +11,7 @@ from attrs import evolve, field, frozen
 
 from graspsense.core.components.channels import cells_of, no_signals, signal_type
 from graspsense.core.values.channel import Channel, FastChannel, TactileArray
-from graspsense.core.values.errors import DataDamaged
+from graspsense.core.values.errors import DataDamaged, counted
 from graspsense.core.values.fingers import FingerForce, opposed_forces
 from graspsense.core.values.signals import NO_PADS, Frame, Image, Reading, Samples
 from graspsense.recording.replayable import Recording
@@ -137,7 +137,7 @@ def without_missing(columns: GraspColumns) -> GraspColumns:
 def only(columns: GraspColumns, kept: NDArray[np.bool_], what: str) -> GraspColumns:
     """Return the samples that are kept, with a note on the others, and a warning if they are many."""
     lost = int((~kept).sum())
-    words = f"{lost} samples {what} were dropped, of {len(kept)}"
+    words = f"{counted(lost, 'sample')} {what} {'was' if lost == 1 else 'were'} dropped, of {len(kept)}"
     large = lost > LARGE_LOSS * len(kept)
     rows = columns.rows(kept)
     return evolve(
