@@ -919,10 +919,10 @@ def _(reading):
 
 @mutant("sensor-backend", "squeezes-with-what-it-is-asked", "`least_force_n`")
 class Forceful(Hand):
-    """Squeezes with 30 N if it is to close at all, and does not say so."""
+    """Squeezes with 19 N if it is to close at all, and does not say so."""
 
     def apply(self, command):
-        super().apply(command._replace(value=30.0) if command.value > 0.0 else command)
+        super().apply(command._replace(value=19.0) if command.value > 0.0 else command)
 
 
 @mutant("sensor-backend", "what-it-delivers-is-kept", "of its")

@@ -127,8 +127,9 @@ def test_version_is_that_of_the_distribution():
         (
             ["plugins", "show", "replai"],
             "graspsense: no plugin or component named 'replai'. "
-            "Known: backprop, boosted, catch22, chitta, chitta-without-pads, curve, ebm, extra-trees, force, forest, "
-            "graspsense, hybrid, knn, mlp, quant, quantiles, replay, send-and-watch, svm, tree, union, velocity. "
+            "Known: backprop, boosted, catch22, chitta, chitta-without-pads, contact-image, curve, ebm, extra-trees, "
+            "force, forest, graspsense, hybrid, knn, mlp, quant, quantiles, replay, send-and-watch, svm, tree, union, "
+            "velocity. "
             "Did you mean 'replay'?\n",
         ),
     ],

@@ -370,7 +370,7 @@ It has: force_n, low_n, speed_m_s
   lab.toml:17: controller.force_n: 'force_n' must be >= 0.0: -1.0
   lab.toml:18: controller.speed_m_s: 'speed_m_s' must be > 0.0: 0.0
   -o features.type=nosuch: no feature set named 'nosuch'. Known: catch22, chitta, chitta-without-pads, \
-curve, none-at-all, quant, quantiles, union.
+contact-image, curve, none-at-all, quant, quantiles, union.
   lab.toml:22: run.seed: expected a whole number, found true (a boolean)"""
     )
 
@@ -442,8 +442,8 @@ def test_tables_that_are_missing_altogether_are_named(plugins, write):
 3 errors in the settings:
   gripper.type is not given: name a sensor backend. Known: hand, other, replay
   controller.type is not given: name a controller. Known: force, hybrid, law, send-and-watch, velocity
-  features.type is not given: name a feature set. Known: catch22, chitta, chitta-without-pads, curve, none-at-all, \
-quant, quantiles, union"""
+  features.type is not given: name a feature set. Known: catch22, chitta, chitta-without-pads, contact-image, curve, \
+none-at-all, quant, quantiles, union"""
     )
 
 

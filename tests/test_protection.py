@@ -608,9 +608,14 @@ def travelled(velocity, gap, seconds=1.0, dt=0.001):
     return None
 
 
-@pytest.mark.parametrize("said", [0.0, 0.01, -1.0])
+@pytest.mark.parametrize("said", [-0.001, 0.01, -1.0])
 def test_a_velocity_that_is_not_that_of_the_gap_ends_the_grasp(said):
     assert travelled(lambda t: said, lambda t: 0.09 - 0.01 * t).ends
+
+
+def test_a_velocity_that_is_0_from_the_beginning_is_not_measured():
+    assert travelled(lambda t: 0.0, lambda t: 0.09 - 0.01 * t) is None
+    assert travelled(lambda t: -0.01 if t < 0.2 else 0.0, lambda t: 0.09 - 0.01 * t).ends
 
 
 def test_a_gap_that_stands_still_while_the_fingers_move_ends_the_grasp():

@@ -40,8 +40,8 @@ from graspsense_franka_hand.protocol import (
     STOP,
     SUCCESS,
     HandRequest,
+    HandRequests,
     NotARequest,
-    Requests,
     request_bytes,
 )
 
@@ -247,7 +247,7 @@ REQUESTS = st.one_of(
 @given(st.lists(REQUESTS, max_size=5), st.integers(1, 20))
 def test_requests_in_any_pieces_are_taken(given_requests, size):
     data = b"".join(request_bytes(command, k, *values) for k, (command, *values) in enumerate(given_requests))
-    requests = Requests()
+    requests = HandRequests()
     found = [
         request for start in range(0, len(data), size) for request in requests.fed(data[start : start + size])
     ]
@@ -259,7 +259,7 @@ def test_requests_in_any_pieces_are_taken(given_requests, size):
 @given(st.binary(max_size=200))
 def test_any_bytes_are_requests_or_refused(data):
     with suppress(NotARequest):
-        for request in Requests().fed(data):
+        for request in HandRequests().fed(data):
             assert request.command <= STOP
 
 

@@ -33,7 +33,7 @@ class LibfrankaLink:
         if importlib.util.find_spec("pylibfranka") is None:
             raise PluginUnavailable(MISSING)
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "graspsense_franka_hand.hand_process", host],
+            [sys.executable, "-P", "-m", "graspsense_franka_hand.hand_process", host],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,

@@ -61,7 +61,7 @@ def request_bytes(command: int, number: int, *values: float) -> bytes:
 
 
 @final
-class Requests:
+class HandRequests:
     """Finds requests in a stream of bytes."""
 
     def __init__(self) -> None:

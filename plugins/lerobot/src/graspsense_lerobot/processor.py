@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from graspsense.plugin_api import PluginUnavailable
 from graspsense_lerobot.place import folder_and_options
-from graspsense_lerobot.running import Running, RunningGrasp
+from graspsense_lerobot.running import FollowedGrasp, Running
 
 ADDED: Final = tuple(f"graspsense.{name}" for name in Running._fields)
 """What the step adds to an observation, a number each."""
@@ -39,7 +39,7 @@ def processor_step() -> Any:
 
         def __init__(self, pipeline: str = "default", options: Sequence[str] = (), reading: str = "") -> None:
             self._given = {"pipeline": pipeline, "options": list(options), "reading": reading}
-            self.grasp = RunningGrasp(pipeline, options, folder_and_options(f"?{reading}")[1])
+            self.grasp = FollowedGrasp(pipeline, options, folder_and_options(f"?{reading}")[1])
 
         def observation(self, observation: dict[str, Any]) -> dict[str, Any]:
             """Return the observation with what is known of the grasp after it."""

@@ -10,7 +10,7 @@ from graspsense.plugin_api import setting
 
 
 @frozen(kw_only=True)
-class Jaw:
+class RobotMotor:
     """What the position of a gripper's motor means: the gap (m) at two positions, and linear between them."""
 
     open_position: float = field()
@@ -90,9 +90,9 @@ class LeRobotConfig:
         return self.position or f"{self.motor}.pos"
 
     @property
-    def jaw(self) -> Jaw:
+    def jaw(self) -> RobotMotor:
         """What the position means."""
-        return Jaw(
+        return RobotMotor(
             open_position=self.open_position,
             closed_position=self.closed_position,
             open_gap_m=self.open_gap_m,

@@ -48,7 +48,7 @@ class Running(NamedTuple):
 
 
 @final
-class RunningGrasp:
+class FollowedGrasp:
     """Follows the grasps in observations by the controller, the features and the model of a pipeline.
 
     The controller only tells the phases: what it commands goes nowhere. Raises ConfigError if the pipeline cannot be

@@ -86,10 +86,10 @@ class ForceServoConfig(FindContactConfig):
     force_n: float = setting(
         default=5.0, unit="N", above=0.0, plausible=(0.3, 200.0), meaning="Force of the weaker finger."
     )
-    closing_gain_m_s_n: float = setting(
+    closing_gain_m_s_per_newton: float = setting(
         default=0.0016, unit="m/s/N", above=0.0, meaning="Rate of closing per newton that is missing."
     )
-    opening_gain_m_s_n: float = setting(
+    opening_gain_m_s_per_newton: float = setting(
         default=0.0008, unit="m/s/N", minimum=0.0, meaning="Rate of opening per newton that is too much."
     )
     force_tolerance_n: float = setting(

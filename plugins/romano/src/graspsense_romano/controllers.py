@@ -324,7 +324,9 @@ class _Romano(Controller[ConfigT]):
             shock_m_s2=float(place.acceleration_m_s2),
             place_by=PLACE_BY.index(place.place_by),
         )
-        servo = Servo(float(force.opening_gain_m_s_n), float(force.closing_gain_m_s_n), FASTEST_M_S)
+        servo = Servo(
+            float(force.opening_gain_m_s_per_newton), float(force.closing_gain_m_s_per_newton), FASTEST_M_S
+        )
         position = PositionServo(
             float(config.stiffness_n_m),
             float(config.damping_n_s_m),

@@ -16,7 +16,7 @@ from graspsense.gripper_api import GraspsenseError
 from graspsense_franka_hand import protocol
 from graspsense_franka_hand.emulator.hand import TEMPERATURE_C, FrankaHand
 from graspsense_franka_hand.orders import RATE_HZ
-from graspsense_franka_hand.protocol import CONNECT, HandRequest, NotARequest, Requests
+from graspsense_franka_hand.protocol import CONNECT, HandRequest, HandRequests, NotARequest
 
 LOOK_S: Final = 0.005
 """How often the fingers move on."""
@@ -46,7 +46,7 @@ class HandServer:
         self._states = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._host: socket.socket | None = None
         self._state_port: tuple[str, int] | None = None
-        self._requests = Requests()
+        self._requests = HandRequests()
         self._due_s = 0.0
         self._hand_s = clock()
         self._later: list[tuple[float, int, Callable[[], object]]] = []
@@ -89,7 +89,7 @@ class HandServer:
             host.close()
             return
         host.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        self._host, self._requests = host, Requests()
+        self._host, self._requests = host, HandRequests()
 
     def _hear(self, host: socket.socket) -> None:
         data = b""

@@ -24,12 +24,17 @@ class GapSpeed:
         self._lasts_s = max(LASTS_S, 3.0 / rate_hz)
         self._gap_m = nan
         self._moved_m = self._said_m = self._differs_s = 0.0
+        self._is_measured = False
 
     def see(self, frame: Frame) -> Fault | None:
-        """Take the frame of a tick while the fingers close or hold; a gripper without gap or velocity shows nothing."""
+        """Take the frame of a tick while the fingers close or hold.
+
+        A gripper without gap or velocity shows nothing, nor does one whose velocity has been 0 so far.
+        """
         step_m, said_m = frame.gap_m - self._gap_m, frame.velocity_m_s * frame.dt_s
         self._gap_m = frame.gap_m
-        if step_m != step_m or said_m != said_m:
+        self._is_measured = self._is_measured or said_m != 0.0
+        if step_m != step_m or said_m != said_m or not self._is_measured:
             return None
         kept = exp(-frame.dt_s / MEMORY_S)
         self._moved_m = kept * self._moved_m + step_m
