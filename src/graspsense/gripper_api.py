@@ -9,6 +9,7 @@ from graspsense.core.components.lazy_names import LazyNames, Table
 _TABLE: Final[Table] = {
     "Finding devices and their faults": {
         "core.components.entries": ("FoundDevice", "Finding"),
+        "core.components.serial_converters": ("converter_findings", "found_converters", "port_failed"),
         "core.values.faults": ("StatusBit",),
         "core.values.errors": ("TareRefused", "GraspsenseError"),
     },

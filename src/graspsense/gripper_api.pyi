@@ -3,6 +3,9 @@
 # Finding devices and their faults
 from graspsense.core.components.entries import FoundDevice as FoundDevice
 from graspsense.core.components.entries import Finding as Finding
+from graspsense.core.components.serial_converters import converter_findings as converter_findings
+from graspsense.core.components.serial_converters import found_converters as found_converters
+from graspsense.core.components.serial_converters import port_failed as port_failed
 from graspsense.core.values.faults import StatusBit as StatusBit
 from graspsense.core.values.errors import TareRefused as TareRefused
 from graspsense.core.values.errors import GraspsenseError as GraspsenseError

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Sequence
 from typing import Final
 
-from graspsense.gripper_api import Finding, FoundDevice
+from graspsense.gripper_api import Finding, FoundDevice, converter_findings, found_converters, port_failed
 from graspsense_robotiq_2f.config import RobotiqConfig
 from graspsense_robotiq_2f.faults import STATUS_BITS, bit_of
 from graspsense_robotiq_2f.link import NoReply
@@ -15,40 +14,21 @@ from graspsense_robotiq_2f.ur_cap import opened_link
 
 CONVERTERS: Final = {(0x0403, 0x6001), (0x0403, 0x6015)}
 """USB numbers of the FTDI chips in RS-485 converters. Others have them too."""
-NO_PERMISSION: Final = (
-    "add your user to the group dialout (`sudo usermod -aG dialout $USER`), and log in again"
-)
 
 
 def found_devices() -> Sequence[FoundDevice]:
     """Return the converters, for `graspsense devices`. What hangs on them is not known before it is asked."""
     from serial.tools.list_ports import comports
 
-    found = []
-    for port in comports():
-        if (port.vid, port.pid) in CONVERTERS:
-            ready = os.access(port.device, os.R_OK | os.W_OK)
-            found.append(
-                FoundDevice(
-                    backend="robotiq",
-                    serial=port.serial_number or "",
-                    where=port.device,
-                    ready=ready,
-                    advice="an RS-485 converter, perhaps of a Robotiq gripper" if ready else NO_PERMISSION,
-                )
-            )
-    return found
+    return found_converters(
+        comports(), "robotiq", CONVERTERS, "an RS-485 converter, perhaps of a Robotiq gripper"
+    )
 
 
 def diagnose(config: object, timeout_s: float) -> Iterator[Finding]:
     """Return the findings about the gripper of these settings, by default about the converters. No finger moves."""
     if config is None:
-        found = found_devices()
-        if not found:
-            yield Finding("robotiq", "note", "no USB converter of a Robotiq gripper")
-        for device in found:
-            found_words = f"a converter at {device.where}"
-            yield Finding("robotiq", "ok" if device.ready else "problem", found_words, device.advice)
+        yield from converter_findings(found_devices(), "robotiq", "a Robotiq gripper")
     elif isinstance(config, RobotiqConfig):
         yield from _asked(config, timeout_s)
 
@@ -61,8 +41,7 @@ def _asked(config: RobotiqConfig, timeout_s: float) -> Iterator[Finding]:
     try:
         link = opened_link(config.port, config.address, min(config.reply_timeout_s, timeout_s))
     except (OSError, ValueError) as error:
-        advice = NO_PERMISSION if "permission" in str(error) else "look at gripper.port, power and cable"
-        yield Finding("robotiq", "problem", f"{config.port}: {error}", advice)
+        yield port_failed("robotiq", config.port, error)
         return
     try:
         status = status_of(link.status())

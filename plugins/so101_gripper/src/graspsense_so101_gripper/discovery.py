@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Final
 
-from graspsense.gripper_api import Finding, FoundDevice
+from graspsense.gripper_api import Finding, FoundDevice, converter_findings, found_converters, port_failed
 from graspsense.plugin_api import ConfigError, DataDamaged
 from graspsense_so101_gripper.arm_calibration import read_arm_calibration
 from graspsense_so101_gripper.bus import NoStatusPacket, ServoBus
@@ -20,9 +20,6 @@ from graspsense_so101_gripper.registers import FULL_LOAD, IDENTITY, STATE, VOLTS
 CONVERTERS: Final = {(0x1A86, 0x55D3), (0x1A86, 0x7523)}
 """USB numbers of the CH343 and CH340 chips on bus boards of such arms. Others have them too."""
 MOTORS: Final = range(1, 7)
-NO_PERMISSION: Final = (
-    "add your user to the group dialout (`sudo usermod -aG dialout $USER`), and log in again"
-)
 
 
 def serial_number(config: So101Config, port: str) -> str:
@@ -40,31 +37,13 @@ def found_devices() -> Sequence[FoundDevice]:
     """Return the converters, for `graspsense devices`. What hangs on them is not known before it is asked."""
     from serial.tools.list_ports import comports
 
-    found = []
-    for port in comports():
-        if (port.vid, port.pid) in CONVERTERS:
-            ready = os.access(port.device, os.R_OK | os.W_OK)
-            found.append(
-                FoundDevice(
-                    backend="so101",
-                    serial=port.serial_number or "",
-                    where=port.device,
-                    ready=ready,
-                    advice="a serial converter, perhaps of an SO-101 arm" if ready else NO_PERMISSION,
-                )
-            )
-    return found
+    return found_converters(comports(), "so101", CONVERTERS, "a serial converter, perhaps of an SO-101 arm")
 
 
 def diagnose(config: object, timeout_s: float) -> Iterator[Finding]:
     """Return the findings about the gripper of these settings, by default about the converters. Nothing moves."""
     if config is None:
-        found = found_devices()
-        if not found:
-            yield Finding("so101", "note", "no USB converter of an SO-101 arm")
-        for device in found:
-            found_words = f"a converter at {device.where}"
-            yield Finding("so101", "ok" if device.ready else "problem", found_words, device.advice)
+        yield from converter_findings(found_devices(), "so101", "an SO-101 arm")
     elif isinstance(config, So101Config):
         yield from _asked(config, timeout_s)
 
@@ -76,8 +55,7 @@ def _asked(config: So101Config, timeout_s: float) -> Iterator[Finding]:
     try:
         bus = ServoBus(config.port, min(config.reply_timeout_s, timeout_s))
     except OSError as error:
-        advice = NO_PERMISSION if "permission" in str(error) else "look at gripper.port, power and cable"
-        yield Finding("so101", "problem", f"{config.port}: {error}", advice)
+        yield port_failed("so101", config.port, error)
         return
     try:
         yield from _motor(bus, config)

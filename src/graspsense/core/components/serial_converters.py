@@ -1,0 +1,57 @@
+"""Search for grippers behind USB converters, whose numbers tell the chip and not what hangs on it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from typing import Final, Protocol
+
+from graspsense.core.components.entries import Finding, FoundDevice
+
+NO_PERMISSION: Final = (
+    "add your user to the group dialout (`sudo usermod -aG dialout $USER`), and log in again"
+)
+
+
+class SerialPort(Protocol):
+    """A serial port of this computer, as `serial.tools.list_ports.comports` of pyserial gives it."""
+
+    device: str
+    vid: int | None
+    pid: int | None
+    serial_number: str | None
+
+
+def found_converters(
+    ports: Iterable[SerialPort], backend: str, usb_numbers: Collection[tuple[int, int]], words: str
+) -> list[FoundDevice]:
+    """Return the ports with one of these USB numbers (vendor, product); `words` say what they may be."""
+    found = []
+    for port in ports:
+        if (port.vid, port.pid) in usb_numbers:
+            ready = os.access(port.device, os.R_OK | os.W_OK)
+            found.append(
+                FoundDevice(
+                    backend=backend,
+                    serial=port.serial_number or "",
+                    where=port.device,
+                    ready=ready,
+                    advice=words if ready else NO_PERMISSION,
+                )
+            )
+    return found
+
+
+def converter_findings(found: Sequence[FoundDevice], backend: str, gripper: str) -> Iterator[Finding]:
+    """Return the findings of `graspsense doctor` about these converters of a gripper."""
+    if not found:
+        yield Finding(backend, "note", f"no USB converter of {gripper}")
+    for device in found:
+        words = f"a converter at {device.where}"
+        yield Finding(backend, "ok" if device.ready else "problem", words, device.advice)
+
+
+def port_failed(backend: str, port: str, error: Exception) -> Finding:
+    """Return the finding about a port that cannot be opened."""
+    advice = NO_PERMISSION if "permission" in str(error) else "look at gripper.port, power and cable"
+    return Finding(backend, "problem", f"{port}: {error}", advice)
