@@ -7,6 +7,7 @@ import types
 
 import pytest
 
+from graspsense.core.components.config import select_component
 from graspsense.core.components.registry import IsolatedPlugins, canonical, installed
 from graspsense.core.components.roles import SensorBackend
 from graspsense.core.values.errors import PluginUnavailable, UnknownName
@@ -132,6 +133,11 @@ def test_text_for_an_unknown_name(site):
         "ModuleNotFoundError: No module named 'no_such_driver'\n"
         "  (graspsense plugins show graspsense-hid)"
     )
+
+
+def test_another_role_is_told_with_those_there_are():
+    with pytest.raises(UnknownName, match="'classifiers'.*feature-set, classifier"):
+        select_component("classifiers", "knn")
 
 
 @pytest.mark.parametrize("name", ["pr2", "graspsense-pr2-gripper/pr2"])

@@ -157,8 +157,10 @@ class Plugins:
     def find(self, role: Role, name: str) -> Component:
         """Return the component called `name` or `distribution/name`.
 
-        Raises UnknownName if there is none, or if several distributions provide the short name.
+        Raises UnknownName if there is none, for another role, or if several distributions provide the short name.
         """
+        if role not in TABLE_OF_ROLE:
+            raise UnknownName(f"no role {str(role)[:40]!r}: name one of {', '.join(TABLE_OF_ROLE)}")
         key = f"{TABLE_OF_ROLE[role]}.type"
         provided: dict[tuple[Role, str], Shipped | Example] = {**EXAMPLES, **SHIPPED}
         shipped = {short: by for (of_role, short), by in provided.items() if of_role == role}
