@@ -136,7 +136,7 @@ def test_text_for_an_unknown_name(site):
 
 
 def test_another_role_is_told_with_those_there_are():
-    with pytest.raises(UnknownName, match="'classifiers'.*feature-set, classifier"):
+    with pytest.raises(UnknownName, match=r"'classifiers'.*feature-set, classifier"):
         select_component("classifiers", "knn")
 
 
