@@ -13,11 +13,24 @@ from hypothesis import strategies as st
 
 from graspsense import load_pipeline
 from graspsense.gripper_api import EmulatedPort
-from graspsense.plugin_api import POSITION, Command, create
+from graspsense.plugin_api import POSITION, Command, ConfigError, create
 from graspsense.testing_api import parametrize_checks
 from graspsense_robotiq_2f.emulator import fingertips
-from graspsense_robotiq_2f.emulator.fingertips import COUNTS_PER_N, NOISE_COUNTS, EmulatedFingertips, Felt
-from graspsense_robotiq_2f.tactile import TactileFingertips, TactileStream, joined
+from graspsense_robotiq_2f.emulator.device import emulate
+from graspsense_robotiq_2f.emulator.fingertips import (
+    COUNTS_PER_N,
+    NOISE_COUNTS,
+    EmulatedFingertips,
+    Felt,
+    emulated_boards,
+)
+from graspsense_robotiq_2f.tactile import (
+    TactileBoard,
+    TactileFingertips,
+    TactileStream,
+    joined,
+    opened_boards,
+)
 from graspsense_robotiq_2f.tactile_protocol import (
     CELLS,
     DYNAMIC,
@@ -118,22 +131,175 @@ def port():
     port.close()
 
 
-def test_the_driver_reads_images_in_a_thread_with_their_age(port):
-    driver = TactileFingertips(port.where)
-    data = []
-    while sum(one.image is not None for one in data) < 5:
-        data.append(driver.newest(PATIENT_S))
-    driver.close()
-    images = [one.image for one in data if one.image is not None]
-    counters = [image.counter for image in images]
+def taken_images(driver, count):
+    """Return this many images with the samples that came with each."""
+    found = []
+    while len(found) < count:
+        driver.take(PATIENT_S)
+        if driver.image is not None:
+            found.append((driver.image, driver.signals(0.0)))
+    return found
+
+
+def assert_images_of_both(found, rests):
+    images = [image for image, _ in found]
+    counters, times = [image.counter for image in images], [image.host_s for image in images]
     assert counters == sorted(set(counters))
+    assert times == sorted(set(times))
     for image in images:
-        assert sum(image.left) - sum(REST[0]) == pytest.approx(2000, abs=NOISE_OF_SUM)
-        assert sum(image.right) - sum(REST[1]) == pytest.approx(4000, abs=NOISE_OF_SUM)
-    assert driver.stream.clock.latency_s() >= 0.0
-    assert driver.stream.damaged == 0
-    taken = [one.taken for one in data]
+        for cells, rest, counts in zip(image.cells, rests, (2000, 4000), strict=True):
+            assert sum(cells) - sum(rest) == pytest.approx(counts, abs=NOISE_OF_SUM)
+
+
+def test_the_driver_reads_images_in_a_thread_with_their_age(port):
+    driver = TactileFingertips(opened_boards([port.where]))
+    found = taken_images(driver, 5)
+    driver.close()
+    assert_images_of_both(found, REST)
+    report = driver.report()
+    assert report["tactile_channels"].split()[:3] == ["pads", "force_left", "force_right"]
+    assert report["tactile_latency_s"] >= 0.0
+    assert report["tactile_damaged"] == 0
+    taken = [signals[0].counter for _, signals in found]
     assert taken == sorted(set(taken))
+
+
+@pytest.fixture
+def ports():
+    """The ports of two boards."""
+    boards = emulated_boards(2, lambda: Felt(2.0, 4.0))
+    ports = [EmulatedPort("pty", board.heard, board.unasked, 0.001) for board in boards]
+    yield ports, boards
+    for port in ports:
+        port.close()
+
+
+def test_two_boards_give_one_image_and_each_its_clock(ports):
+    ports, boards = ports
+    driver = TactileFingertips(opened_boards([port.where for port in ports]))
+    found = taken_images(driver, 5)
+    driver.close()
+    assert_images_of_both(found, [board.rest[board.fingers[0]] for board in boards])
+    report = driver.report()
+    assert {key: value for key, value in report.items() if key.endswith("_channels")} == {
+        "tactile_left_channels": "force_left dynamic_left acceleration_left rotation_left",
+        "tactile_right_channels": "force_right dynamic_right acceleration_right rotation_right",
+        "pads_channels": "pads",
+    }
+    sides_s = max(report[f"tactile_{side}_uncertainty_s"] for side in ("left", "right"))
+    assert report["pads_uncertainty_s"] >= sides_s
+    assert report["tactile_damaged"] == 0
+
+
+def test_of_two_boards_that_are_not_both_there_none_is_kept(port):
+    with pytest.raises(OSError, match="nowhere"):
+        opened_boards([port.where, "/dev/nowhere"])
+    # The port is exclusive.
+    [board] = opened_boards([port.where])
+    board.close()
+
+
+class FedBoard:
+    """A board that sends what a test gives it."""
+
+    def __init__(self):
+        self.stream, self.silent_s, self.came = TactileStream(1), 0.0, None
+
+    def feed(self, host_s, device_s, number, *fields):
+        given = [
+            Field(TIMESTAMP, number, (round(device_s * 1e6),)),
+            *(Field(kind, number, v) for kind, v in fields),
+        ]
+        self.came = self.stream.fed(encoded(given), host_s)
+
+    def newest(self, timeout_s):
+        came, self.came = self.came, None
+        return came
+
+    def age_s(self):
+        return self.silent_s
+
+    def close(self):
+        pass
+
+
+def test_an_image_of_two_boards_has_the_time_of_the_older_half_and_tells_how_far_the_halves_are_apart():
+    left, right = boards = FedBoard(), FedBoard()
+    driver = TactileFingertips(boards)
+
+    def image(value):
+        return (PRESSURE, (value,) * CELLS), (DYNAMIC, (value,))
+
+    # Clocks that began at other times, and fingertips with other numbers.
+    left.feed(10.0, 3.0, 0, *image(1))
+    assert not driver.take(0.0)
+    assert driver.image is None, "no right half yet"
+    right.feed(10.004, 500.0, 1, *image(2))
+    driver.take(0.0)
+    assert driver.image is None, "no new left half"
+    left.feed(10.016, 3.016, 0, *image(3))
+    driver.take(0.0)
+    assert driver.image.host_s == pytest.approx(10.004)
+    assert [cells[0] for cells in driver.image.cells] == [3, 2]
+    dynamic_left, dynamic_right = driver.signals(10.0)[:2]
+    assert (dynamic_left.counter, dynamic_left.new, dynamic_left.values[0]) == (2, 1, (3,))
+    assert (dynamic_right.counter, dynamic_right.new) == (1, 0)
+    assert (dynamic_left.t_s, dynamic_right.t_s) == (pytest.approx(0.016), pytest.approx(0.004))
+    # The right half is the one before: a later image has a later time nevertheless.
+    left.feed(10.033, 3.033, 0, *image(4))
+    driver.take(0.0)
+    assert driver.image.host_s > 10.004
+    report = driver.report()
+    assert report["tactile_left_offset_s"] == pytest.approx(7.0)
+    assert report["tactile_right_offset_s"] == pytest.approx(-489.996)
+    assert report["pads_uncertainty_s"] >= 0.029
+    right.silent_s = 1.0
+    assert driver.age_s() == 1.0, "one that is silent is enough"
+
+
+def test_damaged_packets_of_both_boards_count():
+    boards = FedBoard(), FedBoard()
+    for board in boards:
+        board.stream.fed(packet(READ, b"\x00"), 1.0)
+    assert TactileFingertips(boards).report()["tactile_damaged"] == 2
+
+
+def test_a_gripper_and_two_boards_are_three_ports_and_a_trial_tells_how_far_their_times_can_be_apart():
+    options = ["gripper.port=emulated", "gripper.tactile_port=emulated,emulated", "features.type=chitta"]
+    trial = load_pipeline("robotiq", options=options).grasp()
+    assert trial.outcome.words == "steady", trial.reason
+    assert not trial.features.reasons
+    assert len(trial.trace.pad_t_s) > 10
+    for pair in (
+        ("gap", "force_left"),
+        ("force_left", "force_right"),
+        ("gap", "pads"),
+        ("gap", "dynamic_left"),
+    ):
+        assert 0.0 < trial.apart_s(*pair) < 1.0
+    assert trial.apart_s("gap", "effort") == trial.apart_s("dynamic_left", "rotation_left") == 0.0
+    assert {"tactile_left_drift", "tactile_right_drift"} <= set(trial.report)
+
+
+@pytest.mark.parametrize("where", ["a,b,c", ",", "a,", "emulated,/dev/ttyACM0"])
+def test_ports_that_cannot_be_are_refused(where):
+    with pytest.raises(ConfigError, match="tactile_port"):
+        create("sensor-backend", "robotiq", port="emulated", tactile_port=where)
+
+
+@pytest.mark.parametrize("where", ["emulated", "emulated,emulated"])
+def test_emulated_fingertips_have_a_port_for_each_board(where):
+    config = create("sensor-backend", "robotiq", port="emulated", tactile_port=where).config
+    gripper = emulate(config, "pty", 0)
+    gripper.tell("plug")
+    boards = opened_boards(gripper.tactile_where.split(","))
+    fingertips = TactileFingertips(boards)
+    assert len(boards) == where.count("emulated")
+    assert fingertips.take(PATIENT_S)
+    fingertips.close()
+    gripper.tell("unplug")
+    assert not gripper.tactile_where
+    gripper.close()
 
 
 def test_what_a_host_reads_late_is_not_lost():
@@ -160,7 +326,7 @@ def test_what_a_host_reads_late_is_not_lost():
 
 
 def test_fingertips_that_are_unplugged_are_told(port):
-    driver = TactileFingertips(port.where)
+    driver = TactileBoard(port.where, 2)
     assert driver.newest(PATIENT_S) is not None
     port.close()
     with pytest.raises(OSError, match=r"Input/output|device reports readiness|disconnected"):
@@ -173,8 +339,9 @@ def test_emulated_fingertips_need_an_emulated_gripper():
         create("sensor-backend", "robotiq", port="/dev/ttyUSB0", tactile_port="emulated")
 
 
-def test_the_forces_are_zero_after_a_tare_and_rise_on_contact():
-    gripper = create("sensor-backend", "robotiq", port="emulated", tactile_port="emulated")
+@pytest.mark.parametrize("where", ["emulated", "emulated,emulated"])
+def test_the_forces_are_zero_after_a_tare_and_rise_on_contact(where):
+    gripper = create("sensor-backend", "robotiq", port="emulated", tactile_port=where)
     info = gripper.open(1)
     images = {}
     while len(images) < info.tare_images:
@@ -194,8 +361,9 @@ def test_the_forces_are_zero_after_a_tare_and_rise_on_contact():
     assert min(frame.force_left_n, frame.force_right_n) > 3.0
 
 
-def test_each_packet_of_a_millisecond_is_a_sample_of_every_fast_channel():
-    gripper = create("sensor-backend", "robotiq", port="emulated", tactile_port="emulated")
+@pytest.mark.parametrize("where", ["emulated", "emulated,emulated"])
+def test_each_packet_of_a_millisecond_is_a_sample_of_every_fast_channel(where):
+    gripper = create("sensor-backend", "robotiq", port="emulated", tactile_port=where)
     gripper.open(1)
     readings = [gripper.read(1.0) for _ in range(200)]
     gripper.close()

@@ -12,7 +12,7 @@ from typing import Any, Final, final
 
 from attrs import evolve
 
-from graspsense.gripper_api import clock_report, no_pads, pad_force, tare
+from graspsense.gripper_api import no_pads, pad_force, tare
 from graspsense.plugin_api import (
     FORCE,
     NO_PADS,
@@ -33,7 +33,7 @@ from graspsense.plugin_api import (
     signal_type,
 )
 from graspsense_robotiq_2f.config import RobotiqConfig
-from graspsense_robotiq_2f.emulator.lock_step import LockStepFingertips, LockStepGripper
+from graspsense_robotiq_2f.emulator.lock_step import LockStepGripper
 from graspsense_robotiq_2f.faults import STATUS_BITS, bit_of
 from graspsense_robotiq_2f.link import ModbusLink, NoReply
 from graspsense_robotiq_2f.registers import (
@@ -45,7 +45,7 @@ from graspsense_robotiq_2f.registers import (
     byte_of,
     status_of,
 )
-from graspsense_robotiq_2f.tactile import CHANNELS, TactileData, TactileFingertips
+from graspsense_robotiq_2f.tactile import CHANNELS, Board, TactileFingertips, opened_boards
 from graspsense_robotiq_2f.tactile_protocol import CELLS, COLUMNS, ROWS
 from graspsense_robotiq_2f.ur_cap import PREFIX, UrCapLink, opened_link
 
@@ -95,10 +95,9 @@ class RobotiqBackend(SensorBackend[RobotiqConfig]):
         self.least_force_n = self._model.forces_n[0]
         self.least_step_m = self._model.step_m
         self._link: ModbusLink | UrCapLink | LockStepGripper | None = None
-        self._fingertips: TactileFingertips | LockStepFingertips | None = None
+        self._fingertips: TactileFingertips | None = None
         self._time: Any = time
         self._pads = NO_PADS
-        self._data = TactileData(None, ((),) * len(CHANNELS), 0, 0.0)
         self._zero = ((0.0,) * CELLS, (0.0,) * CELLS)
         self._asked = Request(active=True, go=False, position=0, speed=0, force=0)
         self._frames = self._retries = 0
@@ -248,44 +247,40 @@ class RobotiqBackend(SensorBackend[RobotiqConfig]):
                 model=config.model,
                 address=config.address,
                 newtons_per_ampere=config.newtons_per_ampere,
-                tactile_port="emulated" if config.tactile_port else "",
+                tactile_port=",".join("emulated" for _ in config.tactile_ports),
                 pad_counts_per_newton=config.pad_counts_per_newton,
             )
         return RobotiqBackend(config)
 
     def _open_fingertips(self) -> None:
-        where = self.config.tactile_port
-        if not where:
+        ports = self.config.tactile_ports
+        if not ports:
             return
         self._pads = no_pads(CELLS)
         self._zero = ((0.0,) * CELLS, (0.0,) * CELLS)
-        if where == "emulated":
+        boards: Sequence[Board]
+        if "emulated" in ports:
             assert isinstance(self._link, LockStepGripper)
-            self._fingertips = self._link.fingertips()
+            boards = self._link.boards()
         else:
-            self._fingertips = TactileFingertips(where)
-        data = self._fingertips.newest(ACTIVATION_S)
-        if data is None:
+            boards = opened_boards(ports)
+        self._fingertips = TactileFingertips(boards)
+        if not self._fingertips.take(ACTIVATION_S):
             raise NoReply(f"the fingertips at {self.config.tactile_port} send nothing")
-        self._data = data
 
     def _felt(self) -> tuple[tuple[float, float], Any]:
         """Take what the fingertips sent, and return the forces on the pads and the signals. Raises DeviceLost."""
         if self._fingertips is None:
             return (nan, nan), ()
         try:
-            data = self._fingertips.newest(0.0)
+            self._fingertips.take(0.0)
         except OSError as error:
             raise DeviceLost(f"the fingertips at {self.config.tactile_port} are gone: {error}") from error
-        image = None if data is None else data.image
+        image = self._fingertips.image
         if image is not None:
             # An image that was measured before the gripper was opened has its time.
-            self._pads = Pads(max(image.host_s - self._began_s, 0.0), image.counter, image.left, image.right)
-            stream = self._fingertips.stream
-            self._clock_report = {
-                **clock_report("tactile", stream.clock, ("pads", "force_left", "force_right")),
-                "tactile_damaged": stream.damaged,
-            }
+            self._pads = Pads(max(image.host_s - self._began_s, 0.0), image.counter, *image.cells)
+            self._clock_report = self._fingertips.report()
         if self._fingertips.age_s() > PADS_SILENT_S:
             raise DeviceLost(
                 f"the fingertips at {self.config.tactile_port} send nothing any more: look at their cable"
@@ -295,8 +290,7 @@ class RobotiqBackend(SensorBackend[RobotiqConfig]):
             pad_force(cells, zero, gain, 0) if self._pads.counter else 0.0
             for cells, zero in zip(self._pads[2:], self._zero, strict=True)
         )
-        self._data = self._data.nothing_new() if data is None else data
-        return (left, right), signal_type(self.channels)(*self._data.signals(self._began_s))
+        return (left, right), signal_type(self.channels)(*self._fingertips.signals(self._began_s))
 
     def _described(self) -> DeviceInfo:
         model, emulated = self._model, self.config.port == "emulated"

@@ -24,7 +24,8 @@ class RobotiqConfig:
     )
     tactile_port: str = setting(
         default="",
-        meaning="Serial port of TSF-85 fingertips; empty: none; emulated: those of the emulated gripper.",
+        meaning="Serial port of TSF-85 fingertips, or two ports (left,right); empty: none; emulated, or "
+        "emulated,emulated: those of the emulated gripper.",
     )
     pad_counts_per_newton: float = setting(
         default=1000.0,
@@ -63,10 +64,21 @@ class RobotiqConfig:
     )
     faults: SerialFaults = setting(factory=SerialFaults, meaning="Emulated only: faults of the gripper.")
 
+    @property
+    def tactile_ports(self) -> tuple[str, ...]:
+        """The ports of the fingertips: none, one, or that of the left one and that of the right one."""
+        return tuple(port.strip() for port in self.tactile_port.split(",")) if self.tactile_port else ()
+
     def __attrs_post_init__(self) -> None:
+        ports = self.tactile_ports
+        if len(ports) > 2 or "" in ports or ports.count("emulated") not in (0, len(ports)):
+            raise ValueError(
+                f"tactile_port is {self.tactile_port!r}: give one port, or two with a comma between, both emulated or "
+                "none"
+            )
         if self.port == "emulated":
             return
-        if self.tactile_port == "emulated":
+        if "emulated" in ports:
             raise ValueError(
                 f"tactile_port is emulated, but port is {self.port!r}: give the port of the fingertips, or set "
                 "gripper.port to emulated"

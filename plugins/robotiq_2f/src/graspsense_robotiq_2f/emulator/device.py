@@ -7,7 +7,7 @@ from typing import Final, final
 
 from graspsense.gripper_api import EmulatedPort, EmulatedSerial
 from graspsense_robotiq_2f.config import RobotiqConfig
-from graspsense_robotiq_2f.emulator.fingertips import EmulatedFingertips, Felt
+from graspsense_robotiq_2f.emulator.fingertips import Felt, emulated_boards
 from graspsense_robotiq_2f.emulator.hand import Hand
 from graspsense_robotiq_2f.emulator.modbus import answered
 from graspsense_robotiq_2f.emulator.ur_cap import answered as answered_by_ur_cap
@@ -25,7 +25,7 @@ def emulate(config: object, wire: str, seed: int) -> EmulatedGripper:
 
 @final
 class EmulatedGripper(EmulatedSerial):
-    """A hand behind a port, and fingertips behind one of their own. Unplugged, it keeps what it was asked."""
+    """A hand behind a port, and fingertips behind one or two of their own. Unplugged, it keeps what it was asked."""
 
     rate_hz = RATE_HZ
 
@@ -34,10 +34,8 @@ class EmulatedGripper(EmulatedSerial):
         self._config = config
         self._hand = Hand(config, seed)
         self._data = b""
-        self._fingertips = (
-            EmulatedFingertips(self._felt, seed=seed) if config.tactile_port == "emulated" else None
-        )
-        self._tactile_port: EmulatedPort | None = None
+        self._boards = emulated_boards(config.tactile_ports.count("emulated"), self._felt, seed=seed)
+        self._tactile_ports: list[EmulatedPort] = []
 
     @property
     def where(self) -> str:
@@ -48,7 +46,7 @@ class EmulatedGripper(EmulatedSerial):
     @property
     def tactile_where(self) -> str:
         """What `gripper.tactile_port` has to be, empty without fingertips or while it is unplugged."""
-        return "" if self._tactile_port is None else self._tactile_port.where
+        return ",".join(port.where for port in self._tactile_ports)
 
     @property
     def body_report(self) -> Mapping[str, float | int | str | bool]:
@@ -58,11 +56,13 @@ class EmulatedGripper(EmulatedSerial):
     def tell(self, word: str) -> None:
         """Execute one of `words`. Raises KeyError for any other."""
         super().tell(word)
-        if word == "plug" and self._tactile_port is None and (tips := self._fingertips) is not None:
-            self._tactile_port = EmulatedPort("pty", tips.heard, tips.unasked, TACTILE_TICK_S)
+        if word == "plug" and not self._tactile_ports:
+            self._tactile_ports = [
+                EmulatedPort("pty", board.heard, board.unasked, TACTILE_TICK_S) for board in self._boards
+            ]
         elif word == "unplug":
-            port, self._tactile_port = self._tactile_port, None
-            if port is not None:
+            ports, self._tactile_ports = self._tactile_ports, []
+            for port in ports:
                 port.close()
 
     def close(self) -> None:

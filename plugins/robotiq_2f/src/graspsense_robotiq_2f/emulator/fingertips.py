@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from random import Random
 from typing import Final, NamedTuple
 
@@ -53,11 +53,17 @@ class Felt(NamedTuple):
 
 
 class EmulatedFingertips:
-    """Two fingertips whose forces `felt` returns. `heard` and `unasked` are the two sides of a port."""
+    """A board with these fingertips, whose forces `felt` returns. `heard` and `unasked` are the sides of a port."""
 
     def __init__(
-        self, felt: Callable[[], Felt], monotonic: Callable[[], float] | None = None, seed: int = 0
+        self,
+        felt: Callable[[], Felt],
+        monotonic: Callable[[], float] | None = None,
+        seed: int = 0,
+        fingers: Sequence[int] = range(FINGERS),
     ) -> None:
+        self.fingers = fingers
+        """Which of the gripper's fingers it has; they are counted from 0 in its packets."""
         self._random = Random(seed)
         self.rest = tuple(
             tuple(self._random.randint(*REST_COUNTS) for _ in range(CELLS)) for _ in range(FINGERS)
@@ -103,15 +109,15 @@ class EmulatedFingertips:
             self._pressed_s = now_s + PRESSURE_S
             self._last = self._felt()
         fields = []
-        for finger in range(FINGERS):
+        for number, finger in enumerate(self.fingers):
             force_n, before_n = self._last[finger], before[finger]
-            fields.append(Field(TIMESTAMP, finger, (round(now_s * 1e6),)))
+            fields.append(Field(TIMESTAMP, number, (round(now_s * 1e6),)))
             if pressed:
-                fields.append(Field(PRESSURE, finger, self._cells(finger, force_n)))
+                fields.append(Field(PRESSURE, number, self._cells(finger, force_n)))
             change = round(min(max((force_n - before_n) * COUNTS_PER_N, -32768.0), 32767.0))
-            fields.append(Field(DYNAMIC, finger, (change,)))
-            fields.append(Field(ACCELERATION, finger, (0, 0, G_COUNTS)))
-            fields.append(Field(GYROSCOPE, finger, (0, 0, 0)))
+            fields.append(Field(DYNAMIC, number, (change,)))
+            fields.append(Field(ACCELERATION, number, (0, 0, G_COUNTS)))
+            fields.append(Field(GYROSCOPE, number, (0, 0, 0)))
         self.sent += 1
         return encoded(fields)
 
@@ -121,3 +127,11 @@ class EmulatedFingertips:
             min(max(round(rest + counts * share + self._random.gauss(0.0, NOISE_COUNTS)), 0), 0xFFFF)
             for rest, share in zip(self.rest[finger], _SHAPE, strict=True)
         )
+
+
+def emulated_boards(
+    count: int, felt: Callable[[], Felt], monotonic: Callable[[], float] | None = None, seed: int = 0
+) -> list[EmulatedFingertips]:
+    """Return this many boards: one with both fingertips, or two with one each, the left one first."""
+    split = [range(FINGERS)] if count == 1 else [range(finger, finger + 1) for finger in range(count)]
+    return [EmulatedFingertips(felt, monotonic, seed + fingers.start, fingers) for fingers in split]

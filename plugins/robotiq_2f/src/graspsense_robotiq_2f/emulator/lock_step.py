@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Final, final
 
 from graspsense_robotiq_2f.config import RobotiqConfig
-from graspsense_robotiq_2f.emulator.fingertips import EmulatedFingertips
+from graspsense_robotiq_2f.emulator.fingertips import EmulatedFingertips, emulated_boards
 from graspsense_robotiq_2f.emulator.hand import Hand
 from graspsense_robotiq_2f.link import NoReply
 from graspsense_robotiq_2f.registers import COUNT, INPUT, OUTPUT
@@ -26,7 +26,8 @@ class LockStepGripper:
         self._config = config
         self._hand = Hand(config, seed)
         self._now_s = 0.0
-        self._tips = EmulatedFingertips(lambda: self._hand.felt, self.monotonic, seed)
+        count = config.tactile_ports.count("emulated")
+        self._boards = emulated_boards(count, lambda: self._hand.felt, self.monotonic, seed)
 
     @property
     def body_report(self) -> Mapping[str, float | int | str | bool]:
@@ -69,10 +70,11 @@ class LockStepGripper:
         """Release the body."""
         self._hand.close()
 
-    def fingertips(self) -> LockStepFingertips:
-        """Return its fingertips, which begin to send."""
-        self._tips.heard(START_SENDING)
-        return LockStepFingertips(self, self._tips)
+    def boards(self) -> list[LockStepBoard]:
+        """Return the boards of its fingertips, which begin to send."""
+        for board in self._boards:
+            board.heard(START_SENDING)
+        return [LockStepBoard(self, board) for board in self._boards]
 
     def _check_plug(self) -> None:
         if self._now_s - self._hand.active_since_s >= self._config.faults.unplug_at_s:
@@ -85,26 +87,26 @@ class LockStepGripper:
 
 
 @final
-class LockStepFingertips:
-    """The fingertips of this gripper, as the driver reads those at a port."""
+class LockStepBoard:
+    """A board of this gripper, as the driver reads those at a port."""
 
-    def __init__(self, gripper: LockStepGripper, tips: EmulatedFingertips) -> None:
-        self._gripper, self._tips = gripper, tips
-        self.stream = TactileStream()
+    def __init__(self, gripper: LockStepGripper, board: EmulatedFingertips) -> None:
+        self._gripper, self._board = gripper, board
+        self.stream = TactileStream(len(board.fingers))
 
     def newest(self, timeout_s: float) -> TactileData | None:
         """Return what came since the last call, after a wait of up to this time. Raises OSError."""
         until_s = self._gripper.monotonic() + timeout_s
         while True:
             self._gripper.feel()
-            data = self.stream.fed(self._tips.unasked(), self._gripper.monotonic())
+            data = self.stream.fed(self._board.unasked(), self._gripper.monotonic())
             if data is not None or self._gripper.monotonic() >= until_s:
                 return data
             self._gripper.sleep(STEP_S)
 
     def age_s(self) -> float:
-        """Return the time (s) since something came: 0, since they never fail alone."""
+        """Return the time (s) since something came: 0, since it never fails alone."""
         return 0.0
 
     def close(self) -> None:
-        """Do nothing: they end with the gripper."""
+        """Do nothing: it ends with the gripper."""
