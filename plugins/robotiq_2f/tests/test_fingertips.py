@@ -257,6 +257,20 @@ def test_an_image_of_two_boards_has_the_time_of_the_older_half_and_tells_how_far
     assert driver.age_s() == 1.0, "one that is silent is enough"
 
 
+def test_what_else_than_its_only_fingertip_a_board_sends_is_not_taken():
+    stream = TactileStream(1)
+    for number, value in ((1, 7), (0, 9), (1, 8)):
+        data = stream.fed(
+            encoded([Field(DYNAMIC, number, (value,)), Field(PRESSURE, number, (value,) * CELLS)]), 1.0
+        )
+        if number == 0:
+            assert data is None
+        else:
+            assert data.image.cells == ((value,) * CELLS,)
+            assert data.rows[0] == ((value,),)
+    assert data.taken == 2
+
+
 def test_damaged_packets_of_both_boards_count():
     boards = FedBoard(), FedBoard()
     for board in boards:

@@ -115,7 +115,6 @@ class TactileStream:
             if fields is None:
                 self.damaged += 1
                 continue
-            self._taken += any(field.kind == DYNAMIC for field in fields)
             for kind, number, values in fields:
                 if self._lowest is None:
                     self._lowest = number
@@ -129,6 +128,7 @@ class TactileStream:
                     pressed = True
                 elif kind in _KINDS:
                     rows[kind, finger].append(tuple(map(float, values)))
+        self._taken += max(len(rows[DYNAMIC, finger]) for finger in range(self._fingers))
         image = None
         if pressed and len(self._cells) == self._fingers:
             self._images += 1
