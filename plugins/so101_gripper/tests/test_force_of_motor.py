@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import json
-from types import SimpleNamespace
 
 import pytest
 
 from graspsense.cli.main import main
-from graspsense.core.components import emulated_serial
 from graspsense.plugin_api import POSITION, Command, create
-from graspsense_so101_gripper import backend
 from graspsense_so101_gripper.config import So101Config
 from graspsense_so101_gripper.emulator.motor import CLOSED, GripperMotor
 from graspsense_so101_gripper.jaw import Jaw
 from graspsense_so101_gripper.registers import FULL_LOAD, STATE, MotorRequest
 
-PATIENT_S = 60.0
 LIMITS = [190, 300, 260, 420, 350, 500, 440, 320, 250, 380, 470, 330, 210, 290, 390, 460, 340, 240, 490, 310]
 OPEN_M, CLOSED_M = 0.064, 0.0
 """Wider than the block of the simulator by some mm."""
@@ -68,7 +64,7 @@ def calibrated(tmp_path, rows):
     return ended.value.code or 0
 
 
-def test_the_estimated_force_holds_the_measured_one_within_its_error(tmp_path, monkeypatch, capsys):
+def test_the_estimated_force_holds_the_measured_one_within_its_error(tmp_path, capsys):
     # Gears without a thing between the jaws need up to 13 % of the load.
     free = [("closing", 0.10 + 0.01 * i, 0.0) for i in range(4)]
     closing = [*free, *(("closing", *pair) for pair in closed_on_a_block(LIMITS))]
@@ -78,16 +74,8 @@ def test_the_estimated_force_holds_the_measured_one_within_its_error(tmp_path, m
     assert set(data) == {"closing", "opening"}
     assert data["closing"]["error_n"] > 0.0
 
-    now_s = 0.0
-
-    def sleep(seconds):
-        nonlocal now_s
-        now_s += seconds
-
-    monkeypatch.setattr(backend, "time", SimpleNamespace(monotonic=lambda: now_s, sleep=sleep))
-    monkeypatch.setattr(emulated_serial, "time", SimpleNamespace(monotonic=lambda: now_s))
     kept = str(tmp_path / "kept")
-    driver = create("sensor-backend", "so101", port="emulated", calibration=kept, reply_timeout_s=PATIENT_S)
+    driver = create("sensor-backend", "so101", port="emulated", calibration=kept)
     info = driver.open(1)
     assert list(info.calibration) == ["load-cell"]
 
@@ -100,10 +88,10 @@ def test_the_estimated_force_holds_the_measured_one_within_its_error(tmp_path, m
     inside = []
     for squeeze in range(12):
         goes(OPEN_M, 12.0, 3.0 if squeeze == 0 else 1.0)
-        zero_n = driver._emulated.state()["force_n"]
+        zero_n = driver._emulated.arm.details()["force_n"]
         # Between the forces of the calibration, and twice less than moves the jaw.
         reading = goes(CLOSED_M, 0.5 if squeeze > 9 else 2.5 + 0.12 * (squeeze * 3 % 10), 1.5)
-        true_n = driver._emulated.state()["force_n"] - zero_n
+        true_n = driver._emulated.arm.details()["force_n"] - zero_n
         inside.append(abs(reading.frame.effort_n - true_n) <= reading.signals.effort_error)
     driver.close()
     # Nine of ten, of twelve.

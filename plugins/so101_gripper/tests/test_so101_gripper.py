@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from graspsense import WiringError, load_pipeline
@@ -73,11 +74,10 @@ def driver_of(arm, **keys):
     )
 
 
-@pytest.mark.usefixtures("own_time")
 @parametrize_checks(
     "graspsense-so101-gripper",
-    keys={"port": "emulated", "reply_timeout_s": PATIENT_S},
-    unplugged={"faults": {"unplug_at_s": 0.5}, "reply_timeout_s": 1.0},
+    keys={"port": "emulated"},
+    unplugged={"faults": {"unplug_at_s": 0.5}},
     absent={"port": "/dev/nowhere"},
 )
 def test_conformance(check):
@@ -143,7 +143,6 @@ def test_it_closes_with_the_torque_limit_of_the_force_and_tells_load_current_and
     assert 0.005 < frame.gap_m < 0.08
 
 
-@pytest.mark.usefixtures("own_time")
 @pytest.mark.parametrize("at_s", [0.02, 0.5, 2.0])
 @pytest.mark.parametrize("fault", ["unplug", "silent"])
 def test_a_gripper_lost_in_a_grasp_ends_it_and_is_told(fault, at_s):
@@ -152,10 +151,36 @@ def test_a_gripper_lost_in_a_grasp_ends_it_and_is_told(fault, at_s):
         if fault == "unplug"
         else ["gripper.faults.mood=silent", f"gripper.faults.mood_at_s={at_s}"]
     )
-    options = ["gripper.port=emulated", "gripper.reply_timeout_s=0.5", *faults]
-    trial = load_pipeline("so101", options=options).grasp()
+    trial = load_pipeline("so101", options=["gripper.port=emulated", *faults]).grasp()
     assert trial.outcome.words == "device lost"
     assert "cable and power" in trial.reason
+
+
+def test_the_emulated_gripper_keeps_its_own_time_so_that_a_grasp_repeats_exactly():
+    first, again = (load_pipeline("so101", options=["gripper.port=emulated"]).grasp() for _ in range(2))
+    assert first.features.values == again.features.values
+    assert np.array_equal(first.trace.t_s, again.trace.t_s)
+    assert first.trace.t_s[-1] - first.trace.t_s[0] == pytest.approx((len(first.trace.t_s) - 1) / 100.0)
+
+
+@pytest.mark.parametrize(
+    ("mood", "late_s", "outcome"),
+    [
+        ("damaged", 0.3, "device lost"),
+        ("late", 0.3, "device lost"),
+        ("late", 0.005, "steady"),
+        ("repeated", 0.3, "steady"),
+    ],
+)
+def test_the_emulated_gripper_without_a_port_has_the_faults_of_the_line(mood, late_s, outcome):
+    options = [
+        "gripper.port=emulated",
+        f"gripper.faults.mood={mood}",
+        "gripper.faults.mood_at_s=0.5",
+        f"gripper.faults.late_s={late_s}",
+    ]
+    trial = load_pipeline("so101", options=options).grasp()
+    assert trial.outcome.words == outcome, trial.reason
 
 
 @pytest.mark.usefixtures("own_time")

@@ -211,7 +211,7 @@ def graspsense_experiments() -> Iterable[ExperimentEntry]:
         ("trade_speed", 0.0045),
         ("trade_squeezes", 0.0025),
         ("trade_time", 0.0363),
-        ("which_gripper", 0.362),
+        ("which_gripper", 0.326),
     ):
         resource = f"graspsense:experiments/shipped/{name}.toml"
         yield ExperimentEntry(name, resource, seconds_per_trial=seconds)

@@ -36,7 +36,7 @@ from graspsense_so101_gripper.arm_calibration import read_arm_calibration
 from graspsense_so101_gripper.bus import NoStatusPacket, ServoBus
 from graspsense_so101_gripper.config import So101Config
 from graspsense_so101_gripper.discovery import serial_number
-from graspsense_so101_gripper.emulator.arm import EmulatedArm
+from graspsense_so101_gripper.emulator.lock_step import LockStepBus
 from graspsense_so101_gripper.faults import STATUS_BITS
 from graspsense_so101_gripper.force import ForceOfMotor
 from graspsense_so101_gripper.identity import Unfit, jaw_of
@@ -99,7 +99,8 @@ class So101Backend(SensorBackend[So101Config]):
         self.least_step_m = config.jaw_length_m * RADIANS_A_STEP
         self.least_speed_m_s = self.least_step_m
         self._bus: ServoBus | None = None
-        self._emulated: EmulatedArm | None = None
+        self._emulated: LockStepBus | None = None
+        self._time: Any = time
         self._found: MotorRequest | None = None
         self._asked: MotorRequest | None = None
         self._frames = self._retries = 0
@@ -124,19 +125,16 @@ class So101Backend(SensorBackend[So101Config]):
         self.close()
         config = self.config
         arm = read_arm_calibration(Path(config.arm_calibration)) if config.arm_calibration else None
-        port = config.port
-        if port == "emulated":
-            self._emulated = EmulatedArm(config, "pty", seed)
-            self._emulated.tell("plug")
-            port = self._emulated.where
-        serial = serial_number(config, port)
+        serial = serial_number(config, config.port)
         numbers = {"jaw_length_m": config.jaw_length_m, "force_from": config.force_from}
         found = calibrations_of(config.calibration, serial, numbers)
         self._force = ForceOfMotor(config, found)
         self._frames = self._retries = 0
         self._exchange_s = 0.0
         try:
-            self._bus = ServoBus(port, config.reply_timeout_s)
+            self._emulated = LockStepBus(config, seed) if config.port == "emulated" else None
+            self._time = self._emulated or time
+            self._bus = ServoBus(config.port, config.reply_timeout_s, self._emulated)
             memory = self._tried(lambda bus: bus.read(config.motor, *IDENTITY))
             self._jaw = jaw_of(memory, config, arm)
             state = self._state()
@@ -148,24 +146,24 @@ class So101Backend(SensorBackend[So101Config]):
                 f"no gripper of an SO-101 arm at {config.port}, motor {config.motor}: {error}. Look at the arm's power "
                 "and cable, at gripper.port and gripper.motor; on Linux be in the group dialout"
             ) from error
-        self._began_s = self._last_s = self._due_s = time.monotonic()
+        self._began_s = self._last_s = self._due_s = self._time.monotonic()
         self._recent: deque[tuple[float, float]] = deque(maxlen=SLOPE_FRAMES)
         firmware = [REGISTERS[f"firmware_{part}_version"].number(memory) for part in ("major", "minor")]
         return self._described(serial, ".".join(map(str, firmware)), numbers, found)
 
     def read(self, timeout_s: float) -> Reading | None:
         """Wait for the next multiple of 10 ms, then read the motor. Raises DeviceLost."""
-        wait_s = self._due_s - time.monotonic()
+        wait_s = self._due_s - self._time.monotonic()
         if wait_s > timeout_s:
-            time.sleep(timeout_s)
+            self._time.sleep(timeout_s)
             return None
         if wait_s > 0.0:
-            time.sleep(wait_s)
+            self._time.sleep(wait_s)
         # On a grid of times, so that the duration of an exchange does not lower the rate; lost time is not made up.
-        self._due_s = max(self._due_s + 1.0 / RATE_HZ, time.monotonic())
-        asked_s = time.monotonic()
+        self._due_s = max(self._due_s + 1.0 / RATE_HZ, self._time.monotonic())
+        asked_s = self._time.monotonic()
         state = self._still_ours(self._kept(self._state))
-        now_s = time.monotonic()
+        now_s = self._time.monotonic()
         self._exchange_s = max(self._exchange_s, now_s - asked_s)
         t_s, dt_s, self._last_s = now_s - self._began_s, now_s - self._last_s, now_s
         self._position = state.position
@@ -215,16 +213,14 @@ class So101Backend(SensorBackend[So101Config]):
         if bus is not None:
             if self._found is not None:
                 self._give_back(bus, self._found)
+            if self._emulated is not None:
+                self._body_report = self._emulated.arm.body_report
             bus.close()
-        self._found = self._asked = None
-        emulated, self._emulated = self._emulated, None
-        if emulated is not None:
-            self._body_report = emulated.body_report
-            emulated.close()
+        self._found = self._asked = self._emulated = None
 
     def report(self) -> dict[str, float | int | str | bool]:
         """Return the number of frames, and of repeated exchanges, with what the emulated body knows."""
-        body = self._body_report if self._emulated is None else self._emulated.body_report
+        body = self._body_report if self._emulated is None else self._emulated.arm.body_report
         return {
             **body,
             "frames": self._frames,
@@ -313,7 +309,7 @@ class So101Backend(SensorBackend[So101Config]):
             name="emulated SO-101 gripper" if emulated else "SO-101 gripper",
             serial=serial,
             firmware=firmware,
-            clock="device",
+            clock="virtual" if emulated else "device",
             simulated=emulated,
             rate_hz=RATE_HZ,
             effort_limit_n=config.full_force_n * config.largest_load,

@@ -16,6 +16,8 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Any, Final, final
 
+from graspsense_so101_gripper.emulator.lock_step import LockStepBus
+
 BAUD: Final = 1_000_000
 LENGTHS: Final = 4
 """How many lengths a read has in turn."""
@@ -70,15 +72,15 @@ class SerialLine:
 
 @final
 class ServoBus:
-    """A bus at a serial port. Raises OSError if it cannot be opened, with the reason in words."""
+    """A bus at a serial port, or at this line. Raises OSError if it cannot be opened, with the reason in words."""
 
-    def __init__(self, port: str, timeout_s: float) -> None:
+    def __init__(self, port: str, timeout_s: float, line: LockStepBus | None = None) -> None:
         from scservo_sdk import PacketHandler
 
         self._requests = 0
         self._handler: Any = PacketHandler(0)
         try:
-            self._line = SerialLine(port, timeout_s)
+            self._line = line or SerialLine(port, timeout_s)
         except (OSError, ValueError) as error:
             raise OSError(_why_not(port)) from error
 

@@ -7,7 +7,7 @@ import time
 from abc import abstractmethod
 from collections.abc import Mapping
 from math import inf
-from typing import Final, Literal
+from typing import Final, Literal, NamedTuple
 
 from attrs import frozen
 
@@ -48,6 +48,13 @@ class SerialFaults:
     )
 
 
+class LateReply(NamedTuple):
+    """The bytes of a reply, and by how much (s) they come late."""
+
+    data: bytes
+    late_s: float
+
+
 class EmulatedSerial(EmulatedDevice):
     """A device behind an `EmulatedPort`, in the time (s) of the host since it was made. Unplugged, it keeps its power.
 
@@ -79,6 +86,21 @@ class EmulatedSerial(EmulatedDevice):
     @abstractmethod
     def details(self) -> Mapping[str, float | int | str | bool]:
         """Return what `state` tells besides the port."""
+
+    def reply(self, data: bytes, now_s: float) -> LateReply | None:
+        """Return what comes on the line after these bytes, with the faults of the line; None: the cable is pulled."""
+        if self.active_s(now_s) >= self._faults.unplug_at_s:
+            return None
+        reply = self.answer(data, now_s)
+        self._requests += bool(reply)
+        mood = self._mood_at(now_s)
+        if mood == "silent":
+            reply = b""
+        elif mood == "damaged" and reply:
+            reply = reply[:-3] + bytes([reply[-3] ^ 1]) + reply[-2:]
+        return LateReply(
+            reply * 2 if mood == "repeated" else reply, self._faults.late_s if mood == "late" else 0.0
+        )
 
     @property
     def where(self) -> str:
@@ -115,7 +137,7 @@ class EmulatedSerial(EmulatedDevice):
             return {
                 "port": self.where,
                 "plugged": self._port is not None,
-                "mood": self._mood_now(),
+                "mood": self._mood_at(self._now_s()),
                 "requests": self._requests,
                 **self.details(),
                 "failed": self._failed,
@@ -128,10 +150,10 @@ class EmulatedSerial(EmulatedDevice):
     def _now_s(self) -> float:
         return time.monotonic() - self._began_s
 
-    def _mood_now(self) -> str:
+    def _mood_at(self, now_s: float) -> str:
         if self._told:
             return self._told
-        return self._faults.mood if self.active_s(self._now_s()) >= self._faults.mood_at_s else "well"
+        return self._faults.mood if self.active_s(now_s) >= self._faults.mood_at_s else "well"
 
     def _moved_on(self) -> bytes:
         with self._lock:
@@ -147,21 +169,14 @@ class EmulatedSerial(EmulatedDevice):
 
     def _heard(self, data: bytes) -> bytes:
         with self._lock:
-            now_s = self._now_s()
-            if self.active_s(now_s) >= self._faults.unplug_at_s:
-                self.tell("unplug")
-                return b""
             try:
-                reply = self.answer(data, now_s)
+                reply = self.reply(data, self._now_s())
             except Exception as error:
                 self._fail(error)
                 return b""
-            self._requests += bool(reply)
-            mood = self._mood_now()
-        if mood == "silent":
+        if reply is None:
+            self.tell("unplug")
             return b""
-        if mood == "damaged" and reply:
-            return reply[:-3] + bytes([reply[-3] ^ 1]) + reply[-2:]
-        if mood == "late":
-            threading.Event().wait(self._faults.late_s)
-        return reply * 2 if mood == "repeated" else reply
+        if reply.late_s:
+            threading.Event().wait(reply.late_s)
+        return reply.data
