@@ -547,12 +547,15 @@ def test_a_force_that_is_none_does_not_lift_the_ceiling(asked):
 # ------------------------------------------------------------ a motor that reports what it was told, and gaps
 
 
-def felt(left, right, commands=(20.0,), seconds=0.5):
-    """Return the last fault of pads that feel these forces after these commands."""
+def felt(left, right, commands=(20.0,), seconds=0.5, velocity=0.0):
+    """Return the last fault of pads that feel these forces after these commands, at this velocity."""
     felt_force = FeltForce(1000.0, 24.39)
     for value in commands:
         felt_force.apply(Command(EFFORT, value, inf, inf))
-    faults = [felt_force.see(frame(0.001 * k, left=left, right=right)) for k in range(round(seconds * 1000))]
+    faults = [
+        felt_force.see(frame(0.001 * k, left=left, right=right, velocity=velocity))
+        for k in range(round(seconds * 1000))
+    ]
     return faults[-1]
 
 
@@ -561,6 +564,10 @@ def test_pads_that_both_feel_more_than_the_motor_was_told():
     assert felt(26.0, 60.0) is None
     assert not felt(28.0, 28.0).ends
     assert felt(34.0, 60.0).ends
+
+
+def test_fingers_that_are_being_braked_press_with_their_mass():
+    assert felt(100.0, 100.0, velocity=-0.01) is None
 
 
 def test_fingers_that_hold_by_themselves_press_on_with_the_largest_command():

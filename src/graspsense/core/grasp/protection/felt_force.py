@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import nan
+from typing import Final
 
 from graspsense.core.grasp.protection.effort_ceiling import asked_effort_n
 from graspsense.core.grasp.protection.motor import (
@@ -16,6 +17,9 @@ from graspsense.core.grasp.protection.motor import (
 )
 from graspsense.core.values.faults import Fault
 from graspsense.core.values.signals import Command, Frame
+
+RESTS_M_S: Final = 0.001
+"""Speed below which the fingers rest: while they are braked, their mass presses too."""
 
 
 class FeltForce:
@@ -37,10 +41,14 @@ class FeltForce:
             self._allowed_n = allowed_n
 
     def see(self, frame: Frame) -> Fault | None:
-        """Take the frame of a tick while the fingers close or hold, and return a force that no command explains."""
+        """Take the frame of a tick while the fingers close or hold, and return a force that no command explains.
+
+        Only fingers that rest are judged, so a gripper without a velocity is not.
+        """
         felt_n, allowed_n = min(frame.force_left_n, frame.force_right_n), self._allowed_n
-        more = felt_n > (1.0 + ALLOWED_SHARE) * allowed_n + ALLOWED_N
-        strong = felt_n > (1.0 + STRONG_SHARE) * allowed_n + STRONG_N
+        rests = abs(frame.velocity_m_s) < RESTS_M_S
+        more = rests and felt_n > (1.0 + ALLOWED_SHARE) * allowed_n + ALLOWED_N
+        strong = rests and felt_n > (1.0 + STRONG_SHARE) * allowed_n + STRONG_N
         self._more_s = lasting(self._more_s, more, frame.dt_s)
         self._strong_s = lasting(self._strong_s, strong, frame.dt_s)
         if self._more_s <= self._lasts_s:
