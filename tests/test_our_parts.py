@@ -29,7 +29,7 @@ def settings(name, folder):
             "unplugged": {"faults": {"unplug_at_s": 0.5}},
             "absent": {"transport": "hidraw", "serial": "not there"},
         }
-    if name == "graspsense-robotiq-2f/robotiq":
+    if name in ("graspsense-robotiq-2f/robotiq", "graspsense-so101-gripper/so101"):
         return {"keys": {"port": "emulated"}}
     if name == "graspsense-franka-hand/franka":
         return {"keys": {"host": "emulated", "calibration": "none"}}
@@ -38,8 +38,8 @@ def settings(name, folder):
 
 def components():
     ours = [one.qualified for one in installed().components() if one.distribution.startswith("graspsense")]
-    # Its own tests examine it, with a robot behind it.
-    return [name for name in ours if name != "graspsense-ros2/ros2"]
+    # Their own tests examine them, with a robot behind them.
+    return [name for name in ours if name not in ("graspsense-ros2/ros2", "graspsense-lerobot/lerobot")]
 
 
 @pytest.mark.slow

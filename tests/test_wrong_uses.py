@@ -151,7 +151,7 @@ def test_a_store_may_be_named_in_every_way(run, tmp_path, name):
         ("compare", named, "--folds", "2", "--classifiers", "c45,tree"),
         ("train", named, "--out", "model.json"),
         ("predict", "model.json", named),
-        ("export", named, "--to", "table.csv"),
+        ("export", named, "--to", "exported.csv"),
         ("report", named, "--folds", "2", "--out", "page"),
         ("recover", named),
     ):

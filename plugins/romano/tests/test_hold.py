@@ -81,11 +81,11 @@ def test_ctrl_c_lets_go():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "acceleration"), [("grab", False), ("pick-and-place", True)])
-def test_laws_give_the_same_grasp_compiled_and_plain(name, acceleration):
+@pytest.mark.parametrize("name", ["grab", "pick-and-place"])
+def test_laws_give_the_same_grasp_compiled_and_plain(name):
     law, runs = create("controller", name), []
     for compiled in ("always", "never"):
-        gripper = create("sensor-backend", "sim", acceleration=acceleration, compile=compiled)
+        gripper = create("sensor-backend", "sim", compile=compiled)
         runs.append(gripper.run_many(law, ["odwalla:full_open"], [1], workers=1, traces=True)[0])
     always, never = runs
     assert always.outcome == never.outcome

@@ -15,6 +15,15 @@ def grasp(on_event=None, *options):
     return load_pipeline("default", options=[*OPTIONS, *options]).grasp(on_event=on_event)
 
 
+def undisturbed(*options):
+    """Return a grasp in which no frame was lost, or the third one: a machine that is held up loses some."""
+    for _ in range(3):
+        trial = grasp(None, *options)
+        if trial.outcome == Outcome.STEADY or "lost:" not in trial.reason:
+            break
+    return trial
+
+
 def at_squeeze(act):
     """Return what acts in the squeeze, when the object is between the fingers."""
     return lambda event: act() if event.phase.name == "SQUEEZE" else None
@@ -25,7 +34,7 @@ def at_squeeze(act):
 def test_a_grasp_by_topics_and_action(robot, kind):
     sound = robot(kind)
 
-    trial = grasp(None, f"gripper.action_type={kind}")
+    trial = undisturbed(f"gripper.action_type={kind}")
 
     assert trial.outcome == Outcome.STEADY, trial.reason
     forces = trial.trace.force_left_n

@@ -14,7 +14,7 @@ from graspsense_ros2.message_types import decode
 from graspsense_ros2.sink import ARRAY, JOINT_STATE, NUMBER, TEXT, WRENCH, publish_grasps
 from graspsense_ros2.zenoh_node import ZenohNode
 
-PATIENCE_S = 30.0
+PATIENCE_S = 120.0
 CHANNELS = [
     {"name": "gap", "kind": "number"},
     {"name": "pads", "kind": "array", "rows": 2, "columns": 3, "components": 1},

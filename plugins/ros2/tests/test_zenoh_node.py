@@ -14,7 +14,7 @@ from graspsense_ros2.names import key_expression
 from graspsense_ros2.node import MOST_REQUESTS, ServiceFailed
 from graspsense_ros2.zenoh_node import ZenohNode
 
-PATIENCE_S = 30.0
+PATIENCE_S = 120.0
 TRIGGER = "std_srvs/srv/Trigger"
 REQUEST = encode(f"{TRIGGER}_Request", {})
 RESPONSE = encode(f"{TRIGGER}_Response", {"success": True})

@@ -92,10 +92,10 @@ def located_text(text: str, base: Path) -> str:
     kind, colon, places = text.partition(":")
     if not colon:
         path = base / _path(text)
-        is_input = (path.is_file() and path.suffix) or as_source(str(path)).startswith(STORE)
+        is_input = (os.path.isfile(path) and path.suffix) or as_source(str(path)).startswith(STORE)
         return str(base.absolute() / text) if is_input else text
     located = [
-        str(base.absolute() / place) if place and (base / _path(place)).exists() else place
+        str(base.absolute() / place) if place and os.path.exists(base / _path(place)) else place
         for place in places.split(",")
     ]
     return f"{kind}:{','.join(located)}"

@@ -30,4 +30,4 @@ def as_source(text: str) -> str:
     if text.startswith(STORE):
         return text
     folder = store_folder(folder)
-    return f"{STORE}{folder}{mark}{number}" if (Path(folder).expanduser() / FILE).is_file() else text
+    return f"{STORE}{folder}{mark}{number}" if os.path.isfile(Path(folder).expanduser() / FILE) else text
