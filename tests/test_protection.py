@@ -549,7 +549,7 @@ def test_a_force_that_is_none_does_not_lift_the_ceiling(asked):
 
 def felt(left, right, commands=(20.0,), seconds=0.5, velocity=0.0):
     """Return the last fault of pads that feel these forces after these commands, at this velocity."""
-    felt_force = FeltForce(1000.0, 24.39)
+    felt_force = FeltForce(1000.0, 24.39, 7.0)
     for value in commands:
         felt_force.apply(Command(EFFORT, value, inf, inf))
     faults = [
@@ -561,9 +561,9 @@ def felt(left, right, commands=(20.0,), seconds=0.5, velocity=0.0):
 
 def test_pads_that_both_feel_more_than_the_motor_was_told():
     # A quarter and 1.5 N more are told, a half and 3 N more end the grasp.
-    assert felt(26.0, 60.0) is None
-    assert not felt(28.0, 28.0).ends
-    assert felt(34.0, 60.0).ends
+    assert felt(33.0, 60.0) is None
+    assert not felt(35.0, 35.0).ends
+    assert felt(41.0, 60.0).ends
 
 
 def test_fingers_that_are_being_braked_press_with_their_mass():

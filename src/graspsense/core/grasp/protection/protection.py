@@ -80,7 +80,10 @@ class Protection:
         pads_hz = min(rates.get("force_left", 0.0), rates.get("force_right", 0.0))
         self._touch, self._drift = Touch(contact_n, run.first_effort_n, pads_hz), Drift(contact_n)
         self._stuck, self._balance = StuckForce(pads_hz), PadBalance()
-        self._felt, self._gap_speed = FeltForce(info.rate_hz, pads_hz), GapSpeed(info.rate_hz)
+        self._felt, self._gap_speed = (
+            FeltForce(info.rate_hz, pads_hz, info.friction_n),
+            GapSpeed(info.rate_hz),
+        )
         self._free_effort = FreeEffort(info.friction_n)
         self._fingertips = Fingertips()
         self._motor = Motor("effort" in rates, info.rate_hz)
