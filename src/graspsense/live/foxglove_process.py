@@ -227,7 +227,8 @@ class Gate:
             finally:
                 with self.grasp.lock:
                     self.grasp.viewers.discard(viewer)
-                viewer.server.stop()
+                # It waits until its connection has ended, which this loop has to see.
+                await asyncio.to_thread(viewer.server.stop)
 
     def _refusal(self, first: Sequence[str], headers: Message) -> Refusal | None:
         if len(first) != 3 or first[0] != "GET":
