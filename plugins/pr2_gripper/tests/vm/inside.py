@@ -303,8 +303,10 @@ def lost_in_a_grasp(way: Way, device: Emulator, what: str, trial: Trial, at: At)
     told_s = time.monotonic() - at.when_s
     released, took_s = device.let_go()
     words = f"{way.name}: {what} in {at.phase.name.lower()}, at {at.force_n:.1f} N on a pad"
+    # Where the emulated processor was held up at that moment, the watchdog of the board was faster.
+    let_go = trial.outcome is Outcome.ABORTED and "watchdog" in trial.reason
     check(
-        trial.outcome is Outcome.DEVICE_LOST,
+        trial.outcome is Outcome.DEVICE_LOST or let_go,
         f"{words}: {trial.outcome.words} after {told_s:.2f} s: {trial.reason}",
     )
     check(released, f"{words}: let go {took_s:.2f} s later")
