@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import socket
 import subprocess
 import sys
 import time
 from contextlib import nullcontext
+from threading import Thread
 
 import pytest
 
 from graspsense import load_pipeline
 from graspsense.plugin_api import POSITION, Command, DeviceLost, NoDevice, create
 from graspsense_franka_hand.config import FrankaConfig, FrankaFaults
-from graspsense_franka_hand.discovery import diagnose
+from graspsense_franka_hand.discovery import diagnose, found_devices
 from graspsense_franka_hand.emulator.device import EmulatedHand
+from graspsense_franka_hand.protocol import PORT
 
 pytest.importorskip("pylibfranka", reason="its wheels are for Linux on x86_64 and Python up to 3.12")
 
@@ -157,6 +160,38 @@ def test_doctor_tells_a_hand_from_none_and_lets_it_hold_on(emulated):
     assert hand.state()["pressing"]
     [finding] = diagnose(FrankaConfig(host="127.0.0.77"), PATIENT_S)
     assert finding.state == "problem"
+
+
+def test_a_hand_that_answers_is_listed_and_goes_on(emulated):
+    hand = emulated()
+    driver = _driver(hand)
+    PHASES["holding"](driver)
+    # The program that has it is not disturbed.
+    assert list(found_devices(PATIENT_S, hand.where)) == []
+    assert driver.read(PATIENT_S).frame.gap_m > 0.0
+    driver.close()
+    before = hand.state()
+    [found] = found_devices(PATIENT_S, hand.where)
+    assert (found.backend, found.where, found.ready) == ("franka", hand.where, True)
+    assert hand.state()["pressing"] == before["pressing"]
+
+
+def test_another_version_is_listed_as_not_ready_and_another_device_is_not(emulated):
+    hand = emulated(faults=FrankaFaults(mood="old"))
+    [found] = found_devices(PATIENT_S, hand.where)
+    assert not found.ready
+    assert "version" in found.advice
+    with socket.create_server(("127.0.0.77", PORT)) as other:
+
+        def answer():
+            with other.accept()[0] as host:
+                host.sendall(b"SSH-2.0-other")
+
+        answers = Thread(target=answer)
+        answers.start()
+        assert list(found_devices(PATIENT_S, "127.0.0.77")) == []
+        answers.join()
+    assert list(found_devices(1.0, "127.0.0.77")) == []
 
 
 HOLDS_ON = """

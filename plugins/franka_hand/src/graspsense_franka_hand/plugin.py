@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from graspsense.gripper_api import EmulatorEntry, Finding
+from graspsense.gripper_api import EmulatorEntry, Finding, FoundDevice
 from graspsense.plugin_api import FeatureSetEntry, PipelineEntry, SensorBackendEntry, hookimpl
 
 GRASPSENSE_API = (2, 0)
@@ -52,6 +52,14 @@ def graspsense_emulators() -> Iterable[EmulatorEntry]:
         options=("gripper.host=emulated",),
         needs='pip install "graspsense[franka]"',
     )
+
+
+@hookimpl
+def graspsense_probe_devices(timeout_s: float) -> Iterable[FoundDevice]:
+    """Return the hand at the default address; it is greeted, and does not move."""
+    from graspsense_franka_hand.discovery import found_devices
+
+    return found_devices(timeout_s)
 
 
 @hookimpl

@@ -54,6 +54,15 @@ def state(time_ms: int, width_m: float, widest_m: float, grasped: bool, temperat
     return _STATE.pack(time_ms & 0xFFFFFFFF, width_m, widest_m, grasped, temperature_c)
 
 
+def connection(data: bytes) -> tuple[int, int] | None:
+    """Return status and version of a reply to `CONNECT`; None if it is none. Raises struct.error if it is cut."""
+    command, _, length = HEADER.unpack_from(data)
+    if (command, length) != (CONNECT, HEADER.size + _CONNECTED.size):
+        return None
+    status, version = _CONNECTED.unpack_from(data, HEADER.size)
+    return status, version
+
+
 def request_bytes(command: int, number: int, *values: float) -> bytes:
     """Return a request as a host sends it."""
     data = REQUESTS[command].pack(*values)
