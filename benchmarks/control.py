@@ -7,13 +7,14 @@ handed to the wire: decode, count, convert, the hybrid controller's step, the gu
 an emulated grasp, recorded first and played back, so that neither the emulated board nor the simulator is in the
 figure. The reports are played back twice more by the clock, without and with the predictions of the default model at
 its checkpoints, in turn: *paced* is the time from when a report is due to its command, in the squeeze, and *predicting*
-the same in the ticks during which the thread beside the loop computes. Further times they are played back, in turn,
-without anything that shows them (*unseen*) and with each of the sinks: a live page (*live*) and Foxglove (*foxglove*)
-that a viewer receives, a file of Rerun (*rerun*), an observer of a plugin (*observer*). Of each, `median_p99` is the
-median of the 99th percentiles of the grasps, `added_p99` how much more that is than of *unseen*, and *handed_over* what
-the runner spends on the sink after the command of a tick. The wake-up is measured apart, against a board
-that runs by the clock in a thread of the same process: how long after the report with the shortest delay, in device
-time, a report was in the driver's hands.
+the same in the ticks during which the thread beside the loop computes. Further times they are played back with each of
+the sinks: a live page (*live*) and Foxglove (*foxglove*) that a viewer receives, a file of Rerun (*rerun*), an observer
+of a plugin (*observer*). Within each grasp the sink takes every other block of ticks, so that ticks with and without it
+meet the same machine. `added_p99` is how much more the 99th percentile of the tick is in the blocks that it takes, with
+a 95 % interval over pairs of blocks, once from when the report is in the process and once from when it is due
+(*due*); *handed_over* is what the runner spends on the sink after the command of a tick. The wake-up is measured apart,
+against a board that runs by the clock in a thread of the same process: how long after the report with the shortest
+delay, in device time, a report was in the driver's hands.
 """
 
 from __future__ import annotations
@@ -31,7 +32,6 @@ from contextlib import contextmanager
 from datetime import date
 from importlib.metadata import version
 from pathlib import Path
-from statistics import median
 from tempfile import TemporaryDirectory
 from typing import Any
 
@@ -56,6 +56,8 @@ from graspsense_pr2_gripper.protocol import decode_identity
 from graspsense_pr2_gripper.transports.interface import Transport, TransportGone
 
 SCHEDULERS = {os.SCHED_FIFO: "real-time (fifo)", os.SCHED_RR: "real-time (round robin)"}
+BLOCK, SETTLING = 100, 10
+"""Ticks of a block, and how many at its beginning are left out."""
 EMULATED = Pr2Config(transport="emulated", calibration="none")
 
 
@@ -85,8 +87,10 @@ class Playback(Transport):
     def __init__(self, reports: Sequence[bytes], feature: bytes, period_s: float = 0.0) -> None:
         self._reports, self._feature, self._next = reports, feature, 0
         self._period_ns = round(period_s * 1e9)
-        self._due_ns = self._read_ns = 0
+        self._due_ns = self._read_ns = self._there_ns = 0
         self.ticks_ns: list[int] = []
+        self.working_ns: list[int] = []
+        """The same from when the report was handed over."""
 
     def read(self, timeout_s: float) -> bytes:
         if timeout_s == 0.0:  # nothing else waits
@@ -95,17 +99,19 @@ class Playback(Transport):
             raise TransportGone("the recording is over")
         self._next += 1
         data = self._reports[self._next - 1]
-        self._read_ns = time.perf_counter_ns()
+        self._read_ns = self._there_ns = time.perf_counter_ns()
         if self._period_ns:
             # A report that is late delays the ones after it, as on the wire of a board that waits for its command.
             self._due_ns = max(self._due_ns + self._period_ns, self._read_ns - self._period_ns)
             time.sleep(max(self._due_ns - self._read_ns, 0) * 1e-9)
-            self._read_ns = self._due_ns
+            self._read_ns, self._there_ns = self._due_ns, time.perf_counter_ns()
         return data
 
     def write(self, report: bytes) -> None:
         if self._read_ns:
-            self.ticks_ns.append(time.perf_counter_ns() - self._read_ns)
+            now = time.perf_counter_ns()
+            self.ticks_ns.append(now - self._read_ns)
+            self.working_ns.append(now - self._there_ns)
             self._read_ns = 0
 
     def feature(self, report_id: int) -> bytes:
@@ -122,17 +128,25 @@ class RealTime(Pr2Backend):
         return evolve(super().open(seed), clock="device")
 
 
-class Timed:
-    """A sink that passes on ticks, and notes how long that takes."""
+class InTurn:
+    """A sink that passes on every other block of ticks, and notes which ticks and how long that takes."""
 
-    def __init__(self, inner: Sink) -> None:
-        self._inner = inner
+    def __init__(self, inner: Sink, wire: Playback, *, begins: bool) -> None:
+        self._inner, self._wire, self._taken, self.begins = inner, wire, 0, begins
         self.us: list[float] = []
+        self.blocks: list[range] = []
+        """The ticks after each whole block's first ones; the sink takes every other block."""
 
     def take(self, *tick: Any) -> None:
-        began = time.perf_counter_ns()
-        self._inner.take(*tick)
-        self.us.append((time.perf_counter_ns() - began) / 1e3)
+        self._taken += 1
+        # The sink's work for tick k is done before tick k + 1.
+        ticks = len(self._wire.ticks_ns)
+        if self._taken % BLOCK == 0:
+            self.blocks.append(range(ticks - BLOCK + SETTLING, ticks))
+        if (self._taken // BLOCK % 2 == 0) is self.begins:
+            began = time.perf_counter_ns()
+            self._inner.take(*tick)
+            self.us.append((time.perf_counter_ns() - began) / 1e3)
 
 
 VIEWER = """
@@ -257,26 +271,45 @@ def watched_feeds(folder: Path) -> Iterator[dict[str, LiveFeed]]:
 
 
 def watched_us(grasps: int, sent: Sequence[bytes], feature: bytes) -> dict[str, Any]:
-    """Return the times of the ticks of a squeeze, in turn alone and with each sink, and what the sinks take."""
+    """Return the times of the ticks with each sink and without it, and what the sinks take."""
     period_s = 1.0 / decode_identity(feature).report_rate_hz
-    found: dict[str, list[list[float]]] = {}
+    pairs: dict[str, dict[str, list[tuple[list[float], list[float]]]]] = {}
+    spent: dict[str, list[float]] = {}
     with TemporaryDirectory() as folder, watched_feeds(Path(folder)) as feeds:
-        timed = {name: Timed(feed) for name, feed in feeds.items()}
-        for _ in range(grasps):
-            for name in ("unseen", *timed):
+        for grasp in range(grasps):
+            for name, feed in feeds.items():
                 wire = Playback(sent, feature, period_s)
-                watched = Watched(None, wire)
-                played(wire, feature, watched, [timed[name]] if name in timed else ())
-                found.setdefault(name, []).append([wire.ticks_ns[k] / 1e3 for k in watched.squeeze])
+                sink = InTurn(feed, wire, begins=grasp % 2 == 1)
+                played(wire, feature, sinks=[sink])
+                for column, ns in {"": wire.working_ns, "_due": wire.ticks_ns}.items():
+                    blocks = [[ns[k] / 1e3 for k in block] for block in sink.blocks]
+                    found = pairs.setdefault(name, {}).setdefault(column, [])
+                    without, taken = (blocks[k::2] for k in (sink.begins, not sink.begins))
+                    found += zip(without, taken, strict=False)
+                spent.setdefault(name, []).extend(sink.us)
     result: dict[str, Any] = {}
-    p99 = {name: median(float(np.quantile(us, 0.99)) for us in runs) for name, runs in found.items()}
-    for name, runs in found.items():
-        result |= distribution(name, [us for run in runs for us in run])
-        result[f"{name}_median_p99_us"] = round(p99[name], 1)
-        if name in timed:
-            result[f"{name}_added_p99_us"] = round(p99[name] - p99["unseen"], 1)
-            result |= distribution(f"{name}_handed_over", timed[name].us)
+    for name, columns in pairs.items():
+        for column, blocks in columns.items():
+            added_us, interval = added_p99(blocks)
+            result[f"{name}{column}_added_p99_us"] = round(added_us, 1)
+            result[f"{name}{column}_added_p99_us_interval"] = [round(end, 1) for end in interval]
+            for said, which in {"without": 0, "with": 1}.items():
+                ticks_us = [us for pair in blocks for us in pair[which]]
+                result |= distribution(f"{name}{column}_{said}", ticks_us)
+        result |= distribution(f"{name}_handed_over", spent[name])
     return result
+
+
+def added_p99(pairs: Sequence[tuple[Sequence[float], Sequence[float]]]) -> tuple[float, list[float]]:
+    """Return how much greater the p99 of the second ones is (us), and its 95 % interval over pairs."""
+
+    def added(chosen: Iterable[int]) -> float:
+        without, with_sink = (np.concatenate([pairs[k][i] for k in chosen]) for i in (0, 1))
+        return float(np.quantile(with_sink, 0.99) - np.quantile(without, 0.99))
+
+    generator = np.random.default_rng(1)
+    draws = [added(generator.integers(len(pairs), size=len(pairs)).tolist()) for _ in range(1000)]
+    return added(range(len(pairs))), [float(end) for end in np.quantile(draws, [0.025, 0.975])]
 
 
 def wake_ups_us(seconds: float) -> list[float]:
