@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import select
+import subprocess
+import sys
 import threading
 from itertools import pairwise
 from types import SimpleNamespace
@@ -433,3 +436,9 @@ def test_a_grasp_in_which_one_finger_touches_first_is_not_taken_for_a_fault(seed
 )
 def test_conformance_with_fingertips(check):
     check.run()
+
+
+def test_the_command_emulates_fingertips_on_a_port_of_their_own():
+    command = [sys.executable, "-P", "-m", "graspsense", "emulate", "tsf85", "--json"]
+    state = json.loads(subprocess.run(command, input=b"quit\n", capture_output=True, check=True).stdout)
+    assert state["tactile_port"] not in ("", state["port"])

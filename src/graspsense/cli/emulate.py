@@ -68,7 +68,7 @@ def emulate(
             f"emulator {name} has no wire {wire!r}. Known: {', '.join(emulator.entry.wires)}."
             + suggestion(wire, emulator.entry.wires)
         )
-    backend = f"{emulator.distribution}/{emulator.name}"
+    backend = f"{emulator.distribution}/{emulator.entry.backend or emulator.name}"
     settings = settings_of(
         pipeline, backend, object_name, (*GRIPPER_ALONE, *emulator.entry.options, *options), seed, force
     )

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from attrs import evolve
+
 from graspsense.gripper_api import EmulatorEntry, Finding, FoundDevice
 from graspsense.plugin_api import PipelineEntry, SensorBackendEntry, hookimpl
 
@@ -33,14 +35,22 @@ def graspsense_pipelines() -> Iterable[PipelineEntry]:
 
 @hookimpl
 def graspsense_emulators() -> Iterable[EmulatorEntry]:
-    """Return the emulated gripper as a device of this machine."""
-    yield EmulatorEntry(
+    """Return the emulated gripper as a device of this machine, and the same with fingertips."""
+    gripper = EmulatorEntry(
         name="robotiq",
         target="graspsense_robotiq_2f.emulator.device:emulate",
         summary="a Robotiq gripper's registers, over a simulated gripper",
         wires=("pty", "socket", "ur"),
         options=("gripper.port=emulated",),
         needs='pip install "graspsense[robotiq]"',
+    )
+    yield gripper
+    yield evolve(
+        gripper,
+        name="tsf85",
+        summary="TSF-85 fingertips, on the same emulated gripper",
+        options=("gripper.port=emulated", "gripper.tactile_port=emulated"),
+        backend="robotiq",
     )
 
 

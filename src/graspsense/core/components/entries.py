@@ -264,12 +264,12 @@ class CommandEntry:
 class EmulatorEntry:
     """A device that software emulates on this machine: `graspsense emulate NAME`.
 
-    `name` is the sensor backend that drives the device. `target` is a function `emulate(config, wire, seed)` that
-    returns an `EmulatedDevice`; `config` is that of the backend in the pipeline that the user names.
+    `target` is a function `emulate(config, wire, seed)` that returns an `EmulatedDevice`; `config` is that of the
+    backend in the pipeline that the user names.
     """
 
     name: str = field(validator=IS_NAME)
-    """The sensor backend that drives the device."""
+    """The name that the user gives."""
     target: str = field(validator=_IS_TARGET)
     """The import string of the function `emulate(config, wire, seed)`."""
     summary: str = field(validator=instance_of(str))
@@ -280,6 +280,8 @@ class EmulatorEntry:
     """Settings that the user's options override, as in `("gripper.transport=emulated",)`."""
     needs: str = ""
     """What to install or do if the target cannot be imported."""
+    backend: str = ""
+    """The sensor backend that drives the device; empty: the one of the same name."""
 
 
 @frozen
