@@ -14,7 +14,13 @@ from attrs import define, field
 from graspsense.core.learn.target_value import name_and_unit
 from graspsense.core.values.errors import DataDamaged
 from graspsense.core.values.label_text import is_missing_label
-from graspsense.core.values.written_numbers import NotNumbers, columns_of_numbers, is_missing, is_number
+from graspsense.core.values.written_numbers import (
+    NotNumbers,
+    columns_of_numbers,
+    is_missing,
+    is_number,
+    rows_of_lists,
+)
 from graspsense.core.values.written_times import seconds_since_first
 from graspsense.sources.csv_columns import INDEX
 from graspsense.sources.manifest.patterns import regular_expression
@@ -96,6 +102,10 @@ def _columns(path: Path, part: _Part, table: TextTable, *, several: bool) -> Col
                 texts[name] = cells[
                     name
                 ]  # as numbers `none` and `NA` are missing, and as labels they are not
+            continue
+        lists = rows_of_lists(cells[name])
+        if lists is not None:
+            numbers[name] = lists
             continue
         texts[name] = cells[name]
         times = seconds_since_first(cells[name])
