@@ -160,9 +160,15 @@ def step(params: Params, state: State, reading: Reading) -> tuple[Command, State
 
 
 def detect(params: Params, state: State, reading: Reading) -> tuple[Command, State]:
-    """Tell the events of this reading, whatever the grasp does, and command nothing."""
+    """Tell the events of this reading, whatever the grasp does, and command nothing.
+
+    A grasp ends after the longest time until a thing is put down; events are told beyond it.
+    """
     signals = updated(params.filters, state.signals, reading)
-    now, before, stage = conditions(params.thresholds, signals), state.conditions, state.progress.stage
+    now, before = conditions(params.thresholds, signals), state.conditions
+    stage, since_s, t_s = state.progress.stage, state.progress.since_s, reading.frame.t_s
+    if state.signals.left.begun == 0:
+        since_s = t_s
     events = begun(before, now)
     present = signals.acceleration.present
     if placed(params.thresholds, now, present) and not placed(params.thresholds, before, present):
@@ -171,8 +177,9 @@ def detect(params: Params, state: State, reading: Reading) -> tuple[Command, Sta
         stage = KEEP
         if present == 0:
             events |= UNFELT_BIT
-    progress = Progress(APPROACH, RUNNING, stage, 0.0, 0.0, 0.0, 0.0, 0.0)
-    return Command(EFFORT, 0.0, inf, inf), State(APPROACH, RUNNING, events, progress, 0.0, signals, now)
+    outcome = NEVER_STEADY if t_s - since_s > params.plan.place_timeout_s else RUNNING
+    progress = Progress(APPROACH, outcome, stage, since_s, since_s, 0.0, 0.0, 0.0)
+    return Command(EFFORT, 0.0, inf, inf), State(APPROACH, outcome, events, progress, 0.0, signals, now)
 
 
 def ended(now: Progress, outcome: int) -> Progress:
