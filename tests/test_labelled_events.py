@@ -119,6 +119,7 @@ def test_a_time_of_onset_can_be_a_column_of_the_recording(tmp_path):
         (flags(), 'events = { slip = "slip [mm]" }', "'mm' is not one of time"),
         (flags(), 'events = { slip = "slid" }', "no column 'slid'"),
         (flags(), 'events = { "Slip, fast" = "slip" }', "small letters"),
+        (flags(), 'events = { "slip not known" = "slip" }', "small letters"),
     ],
 )
 def test_wrong_labels_are_refused_with_their_place(slips, events, says, tmp_path):
@@ -264,11 +265,16 @@ def test_one_group_alone_has_no_fitted_score():
 
 def boxes(folder, newtons=0.15):
     """Write two recordings of each of two things, with two slips in each."""
-    for label in ("box", "can"):
+    for label, level in (("box", 5.0), ("can", 6.0)):
         for order in (1, 2):
             begin = 1.0 + 0.3 * order
             kicks = (Kick(begin, newtons), Kick(begin + 2.0, newtons))
-            write(folder, f"{label}_{order}", force(*kicks), flags(*((k.at_s, k.at_s + 0.1) for k in kicks)))
+            write(
+                folder,
+                f"{label}_{order}",
+                force(*kicks, level=level),
+                flags(*((k.at_s, k.at_s + 0.1) for k in kicks)),
+            )
 
 
 def test_slips_of_a_force_are_found_and_what_cannot_be_told_is_said(tmp_path, capsys):
@@ -328,12 +334,29 @@ def test_wrong_uses_are_told(arguments, code, says, tmp_path, capsys):
     assert says in err
 
 
+def test_a_copy_of_a_recording_counts_once(tmp_path, capsys):
+    boxes(tmp_path)
+    (tmp_path / "can_3.csv").write_text((tmp_path / "can_1.csv").read_text())
+    found = scored(capsys, f"manifest:{manifest(tmp_path)}")
+    assert (found["recordings"], found["kinds"]["slip"]["given"]["labelled"]) == (4, 8)
+    assert any("same content" in note for note in found["notes"])
+
+
+def test_the_squeezes_of_a_file_get_the_labels_of_their_own_time(tmp_path):
+    held = ((T_S > 1.0) & (T_S < 2.5)) | ((T_S > 3.5) & (T_S < 5.0))
+    write(tmp_path, "box_1", 5.0 * held, flags((1.5, 1.6), (4.0, 4.2), (4.5, 4.6)))
+    path = manifest(tmp_path, more='split = "force"')
+    first, second = (one.recording.events["slip"] for one in readable_or_not("manifest", str(path)))
+    assert [event.t_s for event in first] == [1.5]
+    assert [(event.t_s, event.until_s) for event in second] == [(4.0, 4.2), (4.5, 4.6)]
+
+
 def test_recordings_without_labels_are_an_error_or_a_note(tmp_path, capsys):
     write(tmp_path, "box_1", force(), flags())
     code, _, err = run(capsys, "evaluate", f"manifest:{manifest(tmp_path, events='')}", "--events")
     assert code == 2
     assert "no event is labelled" in err
-    write(tmp_path, "box_2", force(), np.full(len(T_S), math.nan))
+    write(tmp_path, "box_2", force(level=6.0), np.full(len(T_S), math.nan))
     found = scored(capsys, f"manifest:{manifest(tmp_path)}")
     assert found["recordings"] == 1
     assert any("1 of 2 recordings left out" in note for note in found["notes"])

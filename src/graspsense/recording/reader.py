@@ -183,8 +183,11 @@ class RecordedGrasp:
             return tuple(event_from_json(one) for one in listed if one.get("source") == "controller")
 
     def labelled_events(self) -> dict[str, tuple[GraspEvent, ...]]:
-        """Return the events that others labelled in an imported recording, by their names."""
-        result = self.record().result
+        """Return the events that others labelled in an imported recording, by their names; of a damaged one, none."""
+        try:
+            result = self.record().result
+        except DataDamaged:
+            return {}
         details = {} if result is None else result.details
         names = str((details.get("report") or {}).get(LABELLED, ""))
         events = [event_from_json(one) for one in details.get("events") or () if one.get("source") == "label"]

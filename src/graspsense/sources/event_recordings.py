@@ -14,6 +14,7 @@ from graspsense.core.values.signals import CHANNELS, NO_GAP, Reading, Samples
 from graspsense.recording.labelled_recording import LabelledRecording, UnreadableRecording
 from graspsense.recording.readable import each_readable, error_of_all, note_on
 from graspsense.recording.reader import read_recorded
+from graspsense.recording.replayable import content_sha256
 from graspsense.sources.dataset_recordings import datasets_with_recordings, readable_or_not
 from graspsense.store.naming import STORE
 from graspsense.store.stored_grasps import StoredGrasp, stored_grasps
@@ -55,6 +56,9 @@ def event_recordings(source: str, only: str | None = None) -> EventRecordings:
     ]
     if unreadable and not found:
         raise error_of_all(unreadable)
+    several = {content_sha256(one.recording): one for one in reversed(found)}
+    copies = len(found) - len(several)
+    found = list(reversed(several.values()))
     labelled = [one for one in found if one.recording.events]
     if not labelled:
         raise ConfigError(
@@ -62,6 +66,8 @@ def event_recordings(source: str, only: str | None = None) -> EventRecordings:
             'In a manifest, events says where: events = { slip = "COLUMN" }'
         )
     notes = note_on(unreadable, len(read))
+    if copies:
+        notes.append(f"{counted(copies, 'recording')} left out: the same content as another one")
     if len(labelled) < len(found):
         notes.append(
             f"{len(found) - len(labelled)} of {len(found)} recordings left out: no event is labelled"

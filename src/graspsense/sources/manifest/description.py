@@ -14,6 +14,7 @@ from graspsense.core.components.layers import read_toml
 from graspsense.core.components.setting import setting
 from graspsense.core.components.strict import ValidationFailed, structured
 from graspsense.core.values.errors import ConfigError, listed
+from graspsense.core.values.events import NOT_KNOWN
 from graspsense.core.values.fingers import PREFIX, FingerForce
 from graspsense.core.values.limits import ENTRIES
 from graspsense.sources.manifest.expression import Expression, ExpressionError, parse
@@ -245,9 +246,12 @@ def _contradictions(keys: Manifest) -> list[tuple[tuple[str, ...], str]]:
     if not keys.force and not keys.left and not keys.right and not keys.fingers:
         found.append((("force",), "a grasp needs its force: force, left and right, or fingers"))
     found += [
-        (("events", name), "write small letters, digits, spaces, - and _, a letter first")
+        (
+            ("events", name),
+            f"write small letters, digits, spaces, - and _, a letter first, and not{NOT_KNOWN} at the end",
+        )
         for name in keys.events
-        if not _EVENT.fullmatch(name)
+        if not _EVENT.fullmatch(name) or name.endswith(NOT_KNOWN)
     ]
     unknown = [name for name in texts_of(keys.fast) if name not in keys.channels]
     if unknown:
