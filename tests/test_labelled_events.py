@@ -97,10 +97,18 @@ def test_times_come_from_a_list_on_the_clock_of_the_file(tmp_path):
     path.write_text('list = "all.csv"\ntime = "t"\nforce = "F"\nevents = { slip = "slips [s]" }\n')
     slipped, none = readable_or_not("manifest", str(path))
     assert [event.t_s for event in slipped.recording.events["slip"]] == pytest.approx([1.5, 2.5])
-    assert isinstance(
-        none, UnreadableRecording
-    )  # an empty cell is no field, so the recording is not labelled
-    assert "slips" in str(none.error)
+    assert none.recording.events == {"slip": ()}
+    path.write_text(path.read_text().replace("slips [s]", "slipped [s]"))
+    for one in readable_or_not("manifest", str(path)):
+        assert "no column 'slipped'" in str(one.error)
+
+
+def test_a_column_of_true_and_false_is_one_of_1_and_0_and_still_a_label(tmp_path):
+    write(tmp_path, "box_1", force(), (T_S > 3.0).tolist())
+    assert events_in(tmp_path)["slip"] == [(3.005, T_S[-1])]
+    path = manifest(tmp_path, more='split = "slip"\nlabel = "slipped{slip}"')
+    labels = [one.label for one in readable_or_not("manifest", str(path))]
+    assert labels == ["slippedFalse", "slippedTrue"]
 
 
 def test_a_time_of_onset_can_be_a_column_of_the_recording(tmp_path):
@@ -322,6 +330,8 @@ def test_an_acceleration_of_one_axis_is_told_and_its_threshold_can_be_set(tmp_pa
     [
         (("--events", "--png", "x.png"), 2, "--png"),
         (("--events", "--tolerance", "0"), 2, "tolerance"),
+        (("--events", "--tolerance", "nan"), 2, "nan is no time"),
+        (("--events", "--instance", "box"), 2, "--instance"),
         (("--events", "--only", "jar"), 2, "no event is labelled in 0 recordings of jar"),
         (("--events", "-o", "controller.type=grab"), 2, "no such channel"),
         (("--events", "-o", "features.type=curve"), 2, "[controller]"),

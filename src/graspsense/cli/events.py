@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 
 _FOR_LABELS: Final = (
     *("png", "report", "keep", "checkpoints", "classifier", "target", "target_value"),
-    *("features", "before", "objects", "pipeline", "gripper"),
+    *("label", "instance", "order", "features", "before", "unreliable"),
+    *("objects", "instances", "trials", "states_per_instance", "pipeline", "gripper"),
 )
 
 
@@ -33,6 +34,8 @@ def evaluate_events(
     for name in _FOR_LABELS:
         if context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE:
             raise click.UsageError(f"--{name.replace('_', '-')} has no meaning with --events", context)
+    if tolerance_s != tolerance_s:
+        raise click.BadParameter("nan is no time: give a number of seconds", param_hint="--tolerance")
     found = _evaluated(source, tolerance_s, folds, given)
     if as_json:
         echo_json(to_json(found))

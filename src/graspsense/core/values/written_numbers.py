@@ -96,6 +96,15 @@ def number_in(text: str) -> float | None:
     return None if isinstance(found, NotNumbers) or not math.isfinite(found[0]) else float(found[0])
 
 
+def truths(cells: Sequence[str]) -> Numbers | None:
+    """Return 1 for each true and 0 for each false, in any case, NaN where missing; None if a cell is another word."""
+    import numpy as np
+
+    values = [_LOGICAL.get(cell.capitalize(), math.nan if is_missing(cell) else None) for cell in cells]
+    known = None not in values and not all(map(is_missing, cells))
+    return np.array(values, dtype=np.float64) if known else None
+
+
 def rows_of_lists(cells: Sequence[str]) -> Numbers | None:
     """Return the numbers of cells that are lists, as Python and numpy print them; True is 1, False 0, and None missing.
 

@@ -76,6 +76,8 @@ def _at_times(
             f"{manifest.place}: events.{kind}: the unit {expression.unit!r} is not one of time. There are "
             f"{', '.join(TO_SI['time'])}; a column of 0 and 1 has none"
         )
+    if expression.column in table.blank and expression.column not in found:
+        return ()
     text = table.value(expression.column) if expression.column else None
     if text is None:
         column = found.computed(f"events.{kind}", lambda: expression.numbers(found, len(table)))

@@ -56,7 +56,7 @@ def tables_of(manifest: ReadManifest, file: NamedFile) -> list[ColumnTable]:
         raise ConfigError(file.problem)
     refuse_devices(file.path)
     read = _format(manifest, file.path)
-    tables = [table.with_fields(file.fields) for table in read(file.path)]
+    tables = [evolve(table.with_fields(file.fields), blank=file.blank) for table in read(file.path)]
     for name in texts_of(manifest.keys.beside):
         tables = _joined(manifest, tables, file.path.parent / name)
     if file.rows is not None:

@@ -20,6 +20,7 @@ from graspsense.core.values.written_numbers import (
     is_missing,
     is_number,
     rows_of_lists,
+    truths,
 )
 from graspsense.core.values.written_times import seconds_since_first
 from graspsense.sources.csv_columns import INDEX
@@ -95,6 +96,7 @@ def _columns(path: Path, part: _Part, table: TextTable, *, several: bool) -> Col
     numbers: dict[str, Numbers] = {}
     texts: dict[str, Sequence[str]] = {}
     not_numbers: dict[str, str] = {}
+    seconds: dict[str, str] = {}
     for name, found in columns_of_numbers(cells).items():
         if not isinstance(found, NotNumbers):
             numbers[name] = found
@@ -108,9 +110,12 @@ def _columns(path: Path, part: _Part, table: TextTable, *, several: bool) -> Col
             numbers[name] = lists
             continue
         texts[name] = cells[name]
-        times = seconds_since_first(cells[name])
+        times, logical = seconds_since_first(cells[name]), truths(cells[name])
         if times is not None:
             numbers[name] = times
+            seconds[name] = "s"
+        elif logical is not None:
+            numbers[name] = logical
         elif found.row or is_number(found.cell):
             not_numbers[name] = f"line {table.lines[found.row]} has {found.words}"
     units = {name: _unit_in(name) or unit for name, unit in zip(cells, table.units, strict=True)}
@@ -119,8 +124,7 @@ def _columns(path: Path, part: _Part, table: TextTable, *, several: bool) -> Col
         numbers=numbers,
         texts=texts,
         fields=part.fields,
-        units={name: unit for name, unit in units.items() if unit}
-        | dict.fromkeys(texts.keys() & numbers, "s"),
+        units={name: unit for name, unit in units.items() if unit} | seconds,
         lines=np.array(table.lines, dtype=np.int64),
         not_numbers=not_numbers,
         notes=table.notes,
