@@ -11,10 +11,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
-from attrs import evolve, field, frozen
+from attrs import field, frozen
 
 from graspsense.core.values.events import NOT_KNOWN
 from graspsense.evaluation.folds import instance_held_out
@@ -41,6 +41,16 @@ class LabelledEvents:
     def seconds(self) -> float:
         """The length of the recording."""
         return self.end_s - self.begin_s
+
+    def outcomes(self, name: str, told: Sequence[float], tolerance_s: float) -> Outcomes:
+        """Return what became of the labels of this name and of detections."""
+        return outcomes(self.labelled[name], self.labelled.get(name + NOT_KNOWN, ()), told, tolerance_s)
+
+    def moved(self, told: Sequence[float]) -> list[float]:
+        """Return detections moved by half of the recording; what leaves it at the end comes in at the begin."""
+        if not self.seconds:
+            return list(told)
+        return [self.begin_s + (at - self.begin_s + 0.5 * self.seconds) % self.seconds for at in told]
 
 
 @frozen(kw_only=True)
@@ -143,56 +153,47 @@ def evaluate_kind(
     `told` gives the detections in the recording of this number with thresholds times a factor; `factor` is what the
     thresholds have to be multiplied by for the unit of the forces.
     """
-    rows = [k for k, one in enumerate(recordings) if name in one.labelled]
-    groups = [recordings[k].group for k in rows]
+    rows = [(k, one) for k, one in enumerate(recordings) if name in one.labelled]
+    groups = [one.group for _, one in rows]
 
-    def found(by: float, k: int) -> Outcomes:
-        return _outcomes(recordings[k], name, told(k, by).get(name, ()), tolerance_s)
-
-    def result(bys: Sequence[float], **keys: Any) -> KindOfEvent:
-        """Return the result of thresholds times these factors, one for each row."""
-        every = [found(by, k) for by, k in zip(bys, rows, strict=True)]
+    def scores(factors: Sequence[float]) -> tuple[EventScore, EventScore, dict[str, tuple[int, int, int]]]:
+        """Return the score with these factors, one for each row, that of chance, and the numbers of each group."""
+        told_s = [told(k, by).get(name, ()) for (k, _), by in zip(rows, factors, strict=True)]
+        found = [one.outcomes(name, at, tolerance_s) for (_, one), at in zip(rows, told_s, strict=True)]
         moved = [
-            _outcomes(recordings[k], name, _moved(recordings[k], told(k, by).get(name, ())), tolerance_s)
-            for by, k in zip(bys, rows, strict=True)
+            one.outcomes(name, one.moved(at), tolerance_s) for (_, one), at in zip(rows, told_s, strict=True)
         ]
-        score, chance = (
-            _score(one, groups, [recordings[k].seconds for k in rows], seed) for one in (every, moved)
-        )
-        return KindOfEvent(
-            given=score, fitted=score, chance=chance, by_group=_by_group(every, groups), **keys
+        seconds = math.fsum(one.seconds for _, one in rows)
+        return (
+            _score(found, groups, seconds, seed),
+            _score(moved, groups, seconds, seed),
+            _by_group(found, groups),
         )
 
-    given = result([1.0] * len(rows))
-    if len(set(groups)) < 2 or not given.given.labelled:
-        why = (
-            f"all recordings are of {groups[0]}, so none can be held out"
-            if given.given.labelled
-            else "none is labelled"
-        )
-        return evolve(given, fitted=None, not_fitted=why)
-    tried = {step: [found(factor * step, k) for k in rows] for step in STEPS}
+    given, chance, by_group = scores([1.0] * len(rows))
+    why = "" if given.labelled else "none is labelled"
+    if len(set(groups)) < 2:
+        why = why or f"all recordings are of {groups[0]}, so none can be held out"
+    if why:
+        return KindOfEvent(given=given, fitted=None, chance=chance, not_fitted=why, by_group=by_group)
+    tried = {
+        step: [one.outcomes(name, told(k, factor * step).get(name, ()), tolerance_s) for k, one in rows]
+        for step in STEPS
+    }
     fold_of = instance_held_out(groups, groups, min(folds, len(set(groups))), seed).tolist()
-    best = {
-        fold: max(STEPS, key=lambda step: (_f1([o for o, f in zip(tried[step], fold_of, strict=True) if f != fold]),
-                                           -abs(math.log(step))))
-        for fold in sorted(set(fold_of))
-    }  # fmt: skip
-    fitted = result(
-        [factor * best[fold] for fold in fold_of], factors=tuple(factor * step for step in best.values())
+
+    def best(fold: int) -> float:
+        """Return the factor with the best F1 on the recordings of the other folds; of several, the one next to 1."""
+        others = [k for k, of in enumerate(fold_of) if of != fold]
+        return float(
+            max(STEPS, key=lambda step: (_f1([tried[step][k] for k in others]), -abs(math.log(step))))
+        )
+
+    chosen = {fold: factor * best(fold) for fold in sorted(set(fold_of))}
+    fitted, chance, by_group = scores([chosen[fold] for fold in fold_of])
+    return KindOfEvent(
+        given=given, fitted=fitted, chance=chance, factors=tuple(chosen.values()), by_group=by_group
     )
-    return evolve(fitted, given=given.given)
-
-
-def _outcomes(one: LabelledEvents, name: str, told: Sequence[float], tolerance_s: float) -> Outcomes:
-    return outcomes(one.labelled[name], one.labelled.get(name + NOT_KNOWN, ()), told, tolerance_s)
-
-
-def _moved(one: LabelledEvents, told: Sequence[float]) -> list[float]:
-    """Return detections moved by half of the recording; what leaves it at the end comes in at the begin."""
-    if not one.seconds:
-        return list(told)
-    return [one.begin_s + (at - one.begin_s + 0.5 * one.seconds) % one.seconds for at in told]
 
 
 def _f1(found: Sequence[Outcomes]) -> float:
@@ -201,9 +202,7 @@ def _f1(found: Sequence[Outcomes]) -> float:
     return 2.0 * hits / (2.0 * hits + wrong) if hits else 0.0
 
 
-def _score(
-    found: Sequence[Outcomes], groups: Sequence[str], seconds: Sequence[float], seed: int
-) -> EventScore:
+def _score(found: Sequence[Outcomes], groups: Sequence[str], seconds: float, seed: int) -> EventScore:
     hits = [len(one.delays_s) for one in found]
     delays = [(delay, group) for one, group in zip(found, groups, strict=True) for delay in one.delays_s]
     alarms = [one.false_alarms for one in found]
@@ -212,7 +211,7 @@ def _score(
         found=sum(hits),
         false_alarms=sum(alarms),
         repeated=sum(one.repeated for one in found),
-        seconds=math.fsum(seconds),
+        seconds=seconds,
         recall=_rate(hits, [one.missed for one in found], groups),
         precision=_rate(hits, alarms, groups),
         delay=_delay(delays, seed) if delays else None,
