@@ -152,6 +152,14 @@ def test_labels_and_times_beside_a_recording_and_cells_that_are_lists(tmp_path):
         events_in(tmp_path, events="events = { slip = \"'labels.slips'\" }", more=beside)
 
 
+def test_lists_in_cells_count_as_cells_of_the_table(tmp_path, monkeypatch):
+    monkeypatch.setenv("GRASPSENSE_MAX_CELLS", "5000")
+    rows = (f'{t:.3f},1.0,"[0, 0, 0, 0, 0]"' for t in T_S)
+    (tmp_path / "box_1.csv").write_text("\n".join(["t,F,slip", *rows]) + "\n")
+    with pytest.raises(DataDamaged, match="GRASPSENSE_MAX_CELLS"):
+        events_in(tmp_path, events='events = { slip = "slip[0]" }')
+
+
 def test_an_imported_trial_keeps_the_labels_among_its_events(tmp_path, capsys):
     write(tmp_path, "box_1", force(), flags((1.0, 1.5)))
     write(tmp_path, "box_2", force(Kick(2.0, 0.3)), flags())

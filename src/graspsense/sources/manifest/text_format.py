@@ -14,6 +14,7 @@ from attrs import define, field
 from graspsense.core.learn.target_value import name_and_unit
 from graspsense.core.values.errors import DataDamaged
 from graspsense.core.values.label_text import is_missing_label
+from graspsense.core.values.limits import CELLS
 from graspsense.core.values.written_numbers import (
     NotNumbers,
     columns_of_numbers,
@@ -105,7 +106,7 @@ def _columns(path: Path, part: _Part, table: TextTable, *, several: bool) -> Col
                     name
                 ]  # as numbers `none` and `NA` are missing, and as labels they are not
             continue
-        lists = rows_of_lists(cells[name])
+        lists = _lists(path, name, cells[name])
         if lists is not None:
             numbers[name] = lists
             continue
@@ -129,6 +130,15 @@ def _columns(path: Path, part: _Part, table: TextTable, *, several: bool) -> Col
         not_numbers=not_numbers,
         notes=table.notes,
     )
+
+
+def _lists(path: Path, name: str, cells: Sequence[str]) -> Numbers | None:
+    """Return the numbers of a column of lists, None if it is another one. Raises DataDamaged if they are too many."""
+    if not cells[0].startswith("["):
+        return None
+    if too_many := CELLS.exceeded(sum(len(cell.replace(",", " ").split()) for cell in cells)):
+        raise DataDamaged(f"{path}: the lists of column {name!r} have {too_many}")
+    return rows_of_lists(cells)
 
 
 def _is_word(cell: str) -> bool:
