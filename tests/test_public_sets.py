@@ -97,3 +97,46 @@ def test_a_slide_with_electrodes_and_a_fast_vibration_and_a_comma_at_the_end_of_
     signals = signals_of([reading.signals for reading in one.recording.readings])
     assert signals["vibration"].values[:, 0].tolist() == list(range(660))
     assert signals["electrodes"].cells.tolist() == [list(range(19))] * 30
+
+
+def test_slips_in_a_file_beside_those_of_two_fingers(tmp_path):
+    folder = tmp_path / "data_set" / "data_sample_2022-02-21-09-58-49"
+    folder.mkdir(parents=True)
+    names = [f"txl{k}_{axis}" for k in range(1, 17) for axis in "xyz"]
+    for finger in (1, 2):
+        rows = 38000.0 + np.outer(np.arange(90) >= 50, np.full(48, 10.0 * finger))
+        lines = [",".join(names), *(",".join(map(str, row)) for row in rows)]
+        (folder / f"xela_sensor{finger}.csv").write_text("\n".join(lines) + "\n")
+    slips = [f"{float(60 <= k < 70)},0.0" for k in range(90)]
+    (folder / "slip_label.csv").write_text("\n".join(["slip,fail", *slips]) + "\n")
+
+    (one,) = recordings(tmp_path, "uskin_slip")
+
+    # 16 cells of each finger rise by 10 or 20 counts.
+    assert forces(one)[-1].tolist() == [160.0, 320.0]
+    (slip,) = one.recording.events["slip"]
+    assert (slip.t_s, slip.until_s) == pytest.approx((60 / 59.8, 69 / 59.8))
+    assert (one.label, one.instance) == ("box", "2022-02-21-09-58-49")
+
+
+def test_shocks_of_a_fingertip_with_lists_in_its_cells(tmp_path):
+    folder = tmp_path / "Soup Can" / "soup_can_A-3-4-11"
+    folder.mkdir(parents=True)
+    rows = [",features,labels"]
+    for k in range(20):
+        # Acceleration and turn of the left fingertip, then of the right one; five samples of each in a row.
+        sample = [0.0, 3.0, 4.0 + k, *[0.0] * 9]
+        label = [k > 4, k > 9, False, False] if k < 15 else [None] * 4
+        rows.append(f'{k},"{sample * 5}","{label}"')
+    (folder / "features_and_labels.csv").write_text("\n".join(rows) + "\n")
+    times = [",time", *(f"{k},{0.7 + 0.2 * k}" for k in range(20))]
+    (folder / "times.csv").write_text("\n".join(times) + "\n")
+
+    (one,) = recordings(tmp_path, "fingertip_imu")
+
+    samples = signals_of([reading.signals for reading in one.recording.readings])["acceleration"]
+    assert samples.values[:5, 0].tolist() == [5.0] * 5
+    assert samples.values[-1, 0] == pytest.approx(np.hypot(3.0, 23.0))
+    spans = {name: [(e.t_s, e.until_s) for e in events] for name, events in one.recording.events.items()}
+    assert spans["acceleration"] == [pytest.approx((2.7, 3.5))]
+    assert spans["acceleration not known"] == [pytest.approx((3.7, 4.5))]

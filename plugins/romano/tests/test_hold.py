@@ -81,7 +81,7 @@ def test_ctrl_c_lets_go():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["grab", "pick-and-place"])
+@pytest.mark.parametrize("name", ["grab", "pick-and-place", "event-detector"])
 def test_laws_give_the_same_grasp_compiled_and_plain(name):
     law, runs = create("controller", name), []
     for compiled in ("always", "never"):

@@ -167,6 +167,38 @@ def test_a_thing_that_is_lost_ends_the_grasp():
     assert states[-1].outcome not in (RUNNING, STEADY)
 
 
+def detected(*readings):
+    """Return the time and the name of each event that the detector tells."""
+    law = create("controller", "event-detector")
+    state, told = law.init(), []
+    for one in readings:
+        command, state = law.step(law.params(), state, one)
+        assert (command.kind, command.value) == (EFFORT, 0.0)
+        told += [(one.frame.t_s, name) for k, name in enumerate(EVENTS) if state.events >> k & 1]
+    return told
+
+
+def test_the_detector_tells_contact_slip_and_what_it_cannot_tell_whatever_the_grasp_does():
+    def force_n(t_s):
+        return 0.0 if t_s < 1.0 else 5.0 + (0.15 if 4.0 <= t_s < 4.1 else 0.0)
+
+    told = detected(*(reading(k * 0.001, force_n(k * 0.001)) for k in range(6000)))
+    assert [name for t_s, name in told if 1.0 <= t_s <= 1.042][:3] == list(EVENTS[:3])
+    begin, end = [t_s for t_s, name in told if name == "slip" and t_s > 2.0]
+    assert (begin, end) == pytest.approx((4.02, 4.12), abs=0.025)  # the disturbance begins, and ends
+    assert [name for _, name in told].count(EVENTS[7]) == 1
+
+
+def test_the_detector_tells_placing_once_by_an_acceleration_of_one_or_three_axes():
+    for shock in ((30.0,), (0.0, 0.0, 30.0)):
+        still = tuple(0.0 for _ in shock)
+        samples = [Palm(Samples(k * 0.001, k, 1, (shock if k == 500 else still,))) for k in range(1000)]
+        told = detected(*(reading(k * 0.001, 5.0 + 0.15 * (k >= 480), one) for k, one in enumerate(samples)))
+        assert [name for _, name in told].count("acceleration") == 1
+        assert [round(t_s, 3) for t_s, name in told if name == "place"] == [0.5]
+        assert EVENTS[7] not in [name for _, name in told]
+
+
 @pytest.mark.parametrize("sends", ["effort", "velocity", "position"])
 @pytest.mark.parametrize("name", CONTROLLERS)
 def test_each_law_sends_each_kind(name, sends):

@@ -24,6 +24,7 @@ from graspsense.cli.terminal import Style, echo, echo_entry, echo_table, talk
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from graspsense.cli.progress import ProgressLine
     from graspsense.core.components.config import SelectedComponent
     from graspsense.core.learn.checkpoints import CheckpointTrials
     from graspsense.core.learn.labelled import Labelled
@@ -58,6 +59,19 @@ if TYPE_CHECKING:
 )
 @click.option("--overwrite", is_flag=True, help="Replace the file of --keep if it exists.")
 @checkpoints_option
+@click.option(
+    "--events",
+    is_flag=True,
+    help="Score what a controller tells of the labelled events: contact, slip, placing.",
+)
+@click.option(
+    "--tolerance",
+    type=click.FloatRange(0.0, 60.0, min_open=True),
+    default=0.25,
+    show_default=True,
+    metavar="SECONDS",
+    help="--events: longest time from the begin of an event to its detection, before or after.",
+)
 @classifier_option
 @source_options
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
@@ -75,11 +89,13 @@ def evaluate(
     **given: Any,
 ) -> None:
     """Measure and print."""
+    if given["events"]:
+        from graspsense.cli.events import evaluate_events
+
+        evaluate_events(source, given["tolerance"], folds, as_json, given)
+        return
     from graspsense.cli.progress import ProgressLine
-    from graspsense.core.components.strict import plain
     from graspsense.core.learn.checkpoints import checkpoints_of
-    from graspsense.evaluation.checkpoints import early_recognition
-    from graspsense.evaluation.evaluate import evaluate as measure
 
     check_outputs(keep, overwrite=overwrite, sources=[source])
     page = None if report is None else page_to_write(report)
@@ -97,16 +113,7 @@ def evaluate(
         labelled, parts = _parts(labelled, times, target)
         if keep:
             _keep(keep, labelled)
-        evaluation = measure(
-            learner,
-            labelled,
-            target=target,  # type: ignore[arg-type]
-            folds=folds,
-            seed=given["seed"],
-            settings={key: value for key, value in plain(learner.config).items() if key != "model"},
-            progress=progress,
-        )
-        early = early_recognition(learner, parts, folds=folds, seed=given["seed"]) if parts else None
+        evaluation, early = _measured(learner, labelled, parts, target, folds, given["seed"], progress)
     if png:
         _draw(evaluation, Path(png))
     if page is not None:
@@ -120,6 +127,31 @@ def evaluate(
         _print(evaluation)
         if early is not None:
             _print_early(early)
+
+
+def _measured(
+    learner: SelectedComponent,
+    labelled: Labelled,
+    parts: Sequence[CheckpointTrials],
+    target: str,
+    folds: int,
+    seed: int,
+    progress: ProgressLine,
+) -> tuple[Evaluation, EarlyRecognition | None]:
+    from graspsense.core.components.strict import plain
+    from graspsense.evaluation.checkpoints import early_recognition
+    from graspsense.evaluation.evaluate import evaluate as measure
+
+    evaluation = measure(
+        learner,
+        labelled,
+        target=target,  # type: ignore[arg-type]
+        folds=folds,
+        seed=seed,
+        settings={key: value for key, value in plain(learner.config).items() if key != "model"},
+        progress=progress,
+    )
+    return evaluation, early_recognition(learner, parts, folds=folds, seed=seed) if parts else None
 
 
 def _keep(keep: str, labelled: Labelled) -> None:

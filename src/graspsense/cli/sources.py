@@ -239,6 +239,11 @@ def learner_of(source: str, classifier: str | None, given: Mapping[str, Any]) ->
     return _alone("classifier", classifier or DEFAULT_CLASSIFIER, given, source)
 
 
+def detector_of(source: str, given: Mapping[str, Any]) -> SelectedComponent:
+    """Return the controller that tells the events, which the options can select and set."""
+    return _alone("controller", "event-detector", given, source)
+
+
 def command_line(without: Sequence[str], command: str = "") -> str:
     """Return the command that is running, or another one with its arguments, without some of its options."""
     context = click.get_current_context()
@@ -305,10 +310,13 @@ def _alone(table: str, name: str, given: Mapping[str, Any], source: str) -> Sele
     layers, complaints = option_layers(given["options"])
     merged = Merged()
     tables = ("classifier", *(CHANGEABLE if source.startswith(STORE) else ("features",)))
+    if table == "controller":
+        tables = (table,)
     for layer in layers:
         for key, values in layer.values.items():
             if key not in tables or not isinstance(values, dict):
-                known = " and ".join((", ".join(f"[{one}]" for one in tables[:-1]), f"[{tables[-1]}]"))
+                first = ", ".join(f"[{one}]" for one in tables[:-1])
+                known = f"{first} and [{tables[-1]}]" if first else f"[{tables[-1]}]"
                 near = nearest_path(".".join(map(str, typed_path(layer))), default_paths(tables))
                 meant = f" Did you mean {near!r}?" if near else ""
                 complaints.append(f"{layer.typed}: here only keys of {known} have a meaning.{meant}")

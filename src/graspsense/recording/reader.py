@@ -27,7 +27,7 @@ from graspsense.core.components.channels import (
 from graspsense.core.values.channel import Channel as DeclaredChannel
 from graspsense.core.values.channel import FastChannel, TactileArray
 from graspsense.core.values.errors import ConfigError, DataDamaged, TooLarge, named
-from graspsense.core.values.events import GraspEvent, event_from_json
+from graspsense.core.values.events import LABELLED, GraspEvent, event_from_json
 from graspsense.core.values.limits import CHANNEL_NUMBERS
 from graspsense.core.values.signals import Frame, Image, Pads, Phase, Reading, Samples, no_pads
 from graspsense.core.values.trace import SI_UNITS, Trace, trace_of
@@ -182,6 +182,19 @@ class RecordedGrasp:
             listed = self._events_as_told() if result is None else result.details.get("events", ())
             return tuple(event_from_json(one) for one in listed if one.get("source") == "controller")
 
+    def labelled_events(self) -> dict[str, tuple[GraspEvent, ...]]:
+        """Return the events that others labelled in an imported recording, by their names; of a damaged one, none."""
+        try:
+            result = self.record().result
+        except DataDamaged:
+            return {}
+        details = {} if result is None else result.details
+        names = str((details.get("report") or {}).get(LABELLED, ""))
+        events = [event_from_json(one) for one in details.get("events") or () if one.get("source") == "label"]
+        return {
+            name: tuple(event for event in events if event.what == name) for name in names.split(", ") if name
+        }
+
     def _events_as_told(self) -> list[Any]:
         """Return the events that were written when they happened."""
         names = [name for name in self.metadata if name.startswith(EVENT)]
@@ -294,6 +307,7 @@ class RecordedGrasp:
             has_release=known and bool((self.ticks["phase"] == Phase.RELEASE).any()),
             channels=self.channels,
             mounting=self.device.mounting,
+            events=self.labelled_events(),
         )
 
 

@@ -14,6 +14,7 @@ from graspsense.core.components.channels import dtype_of
 from graspsense.core.components.delivered import Delivered
 from graspsense.core.values.channel import FLOATS, Channel
 from graspsense.core.values.errors import DataDamaged
+from graspsense.core.values.events import GraspEvent
 from graspsense.core.values.mounting import Mounting
 from graspsense.core.values.signals import Frame, Image, Reading
 
@@ -42,6 +43,8 @@ class Recording:
     notices: tuple[str, ...] = ()
     mounting: Mapping[str, Mounting] = field(factory=dict)
     """Where the frames of tool and fingers were, if this is known."""
+    events: Mapping[str, tuple[GraspEvent, ...]] = field(factory=dict)
+    """The events that others labelled in it, by their names; one without events was looked for and did not happen."""
 
 
 def check_recording(recording: Recording) -> None:

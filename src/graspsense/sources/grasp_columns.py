@@ -12,8 +12,9 @@ from attrs import evolve, field, frozen
 from graspsense.core.components.channels import cells_of, no_signals, signal_type
 from graspsense.core.values.channel import Channel, FastChannel, TactileArray
 from graspsense.core.values.errors import DataDamaged, counted
+from graspsense.core.values.events import GraspEvent
 from graspsense.core.values.fingers import FingerForce, opposed_forces
-from graspsense.core.values.signals import NO_PADS, Frame, Image, Reading, Samples
+from graspsense.core.values.signals import NO_PADS, Frame, Image, Phase, Reading, Samples
 from graspsense.recording.replayable import Recording
 from graspsense.sources.fast_samples import sample_blocks
 
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
 
     Numbers = NDArray[np.float64]
 
+Spans = tuple[tuple[float, float], ...]
+"""Begin and end (s) of each of several events."""
 LARGE_LOSS: Final = 0.05
 """Share of the samples beyond which leaving them out is told as a warning, and not advised."""
 PLAUSIBLE: Final = {
@@ -71,6 +74,8 @@ class GraspColumns:
     """What looks wrong, found while the columns were read."""
     lines: NDArray[np.int64] | None = None
     """The line of each sample in a text file."""
+    events: Mapping[str, Spans] = field(factory=dict)
+    """The events that others labelled, by their names, on the clock of `t_s`; those outside of it are left out."""
 
     def __len__(self) -> int:
         """Return the number of samples."""
@@ -176,7 +181,21 @@ def checked_recording(columns: GraspColumns, *, rate_hz: float | None = None) ->
         units=_units(columns.units),
         notes=columns.notes,
         channels=channels,
+        events=_events(columns),
     )
+
+
+def _events(columns: GraspColumns) -> dict[str, tuple[GraspEvent, ...]]:
+    """Return the labelled events, as far as they are within the samples."""
+    first, last = columns.t_s[[0, -1]].tolist()
+    return {
+        name: tuple(
+            GraspEvent(max(begin, first), Phase.APPROACH, name, "label", until_s=min(end, last))
+            for begin, end in spans
+            if begin <= last and end >= first
+        )
+        for name, spans in columns.events.items()
+    }
 
 
 def _check_lengths(columns: GraspColumns) -> None:

@@ -82,7 +82,7 @@ def read_squeeze(name: str) -> Recording:
         },
         channels={},
         values={},
-        beside={},
+        value_files={},
     )
     return checked_recording(samples(described, tables[0]))
 

@@ -12,6 +12,7 @@ from attrs import evolve
 from graspsense.core.learn.labelled import class_of
 from graspsense.core.pipeline.pipeline import grasp_with
 from graspsense.core.values.errors import FAILURES
+from graspsense.core.values.events import LABELLED
 from graspsense.core.values.signals import Reading
 from graspsense.recording.atomic_file import SaveFailed
 from graspsense.recording.held_phases import with_phases_of
@@ -65,7 +66,7 @@ def import_recording(
     record = evolve(record, provenance={**record.provenance, **about})
     trial = grasp_with(settings, plugins, labels=labels)
     trace = with_phases_of(trace_of_recording(labelled.recording), trial.trace)
-    trial = evolve(trial, features=_features(settings, trace, trial))
+    trial = _with_labels(evolve(trial, features=_features(settings, trace, trial)), labelled.recording)
     record = record.with_device(trial.device).with_result(trial)
     path = store.new_recording(record.made_at)
     try:
@@ -84,6 +85,15 @@ def import_recording(
     number = store.add(record, recording)
     contents.add(sha256, number)
     return trial, number
+
+
+def _with_labels(trial: Trial, recording: Recording) -> Trial:
+    """Return the trial with the events that others labelled in its recording among its own, in the order of time."""
+    if not recording.events:
+        return trial
+    events = [*trial.events, *(event for one in recording.events.values() for event in one)]
+    report = {**trial.report, LABELLED: ", ".join(recording.events)}
+    return evolve(trial, events=tuple(sorted(events, key=lambda event: event.t_s)), report=report)
 
 
 def _features(settings: Settings, trace: Trace, trial: Trial) -> Features:

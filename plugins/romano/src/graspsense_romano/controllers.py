@@ -49,7 +49,7 @@ from graspsense_romano.events import (
 from graspsense_romano.laws import PositionServo, Servo, force_rate, grab_force, raised_force, servo_effort
 from graspsense_romano.signals import Filters, Signals, filters, no_signals, updated
 
-CHANNELS: Final = (
+CHANNELS: Final[tuple[Channel, ...]] = (
     Channel("gap", "m"),
     Channel("velocity", "m/s"),
     Channel("force_left", "N"),
@@ -159,6 +159,29 @@ def step(params: Params, state: State, reading: Reading) -> tuple[Command, State
     return command, State(progress.phase, progress.outcome, events, progress, wanted, signals, now)
 
 
+def detect(params: Params, state: State, reading: Reading) -> tuple[Command, State]:
+    """Tell the events of this reading, whatever the grasp does, and command nothing.
+
+    A grasp ends after the longest time until a thing is put down; events are told beyond it.
+    """
+    signals = updated(params.filters, state.signals, reading)
+    now, before = conditions(params.thresholds, signals), state.conditions
+    stage, since_s, t_s = state.progress.stage, state.progress.since_s, reading.frame.t_s
+    if state.signals.left.begun == 0:
+        since_s = t_s
+    events = begun(before, now)
+    present = signals.acceleration.present
+    if placed(params.thresholds, now, present) and not placed(params.thresholds, before, present):
+        events |= PLACE_BIT
+    if stage == NOT_BEGUN and state.signals.left.begun == 1 and signals.fresh == 1:
+        stage = KEEP
+        if present == 0:
+            events |= UNFELT_BIT
+    outcome = NEVER_STEADY if t_s - since_s > params.plan.place_timeout_s else RUNNING
+    progress = Progress(APPROACH, outcome, stage, since_s, since_s, 0.0, 0.0, 0.0)
+    return Command(EFFORT, 0.0, inf, inf), State(APPROACH, outcome, events, progress, 0.0, signals, now)
+
+
 def ended(now: Progress, outcome: int) -> Progress:
     """Return this progress with an outcome."""
     phase, _, stage, since, settling, contact_m, contact_n, target = now
@@ -258,9 +281,9 @@ ConfigT = TypeVar("ConfigT", bound=FindContactConfig)
 class _Romano(Controller[ConfigT]):
     """What the controllers of this package share; a subclass says what its law does after the contact."""
 
-    requires = CHANNELS
+    requires: ClassVar[tuple[Channel, ...]] = CHANNELS
     commands = ("effort",)
-    alternatives = ("velocity", "position")
+    alternatives: ClassVar[tuple[str, ...]] = ("velocity", "position")
     becomes: ClassVar[Mapping[str, str]] = {
         "velocity": "the rate of the gap that its force servo gives",
         "position": "the gap that its force servo gives, with the greatest force that is allowed",
@@ -270,15 +293,15 @@ class _Romano(Controller[ConfigT]):
     does: ClassVar[tuple[int, int, int, int]]
     """Whether it loads, takes the force from the contact, adds force on slip, and lets go when put down."""
 
-    def asked_force_n(self) -> float:
+    def asked_force_n(self) -> float | None:
         """Return the greatest force (N) that is asked for."""
         return float(self.config.force_limit_n)
 
-    def gentlest_force_n(self) -> float:
+    def gentlest_force_n(self) -> float | None:
         """Return the least force (N) of a grip."""
         return float(self.config.lightest_n)
 
-    def asked_speed_m_s(self) -> float:
+    def asked_speed_m_s(self) -> float | None:
         """Return the closing speed (m/s)."""
         return float(self.config.close_speed_m_s)
 
@@ -382,3 +405,17 @@ class PickAndPlace(_Romano[PlaceConfig]):
     """Grabs, holds what an arm lifts, adds force on slip, and opens when the thing is put down."""
 
     does = (1, 1, 1, 1)
+
+
+class EventDetector(_Romano[PlaceConfig]):
+    """Tells the events in what it reads, and commands nothing: for recordings of others."""
+
+    requires = (Channel("force_left", "N"), Channel("force_right", "N"))
+    alternatives = ()
+    step = staticmethod(detect)
+    does = (0, 0, 0, 0)
+
+    def asked_force_n(self) -> None:
+        """Return None: it asks for no force."""
+
+    gentlest_force_n = asked_speed_m_s = asked_force_n

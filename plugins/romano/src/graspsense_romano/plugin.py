@@ -20,6 +20,7 @@ def graspsense_controllers() -> Iterable[ControllerEntry]:
         ("grab", "Grab", "chooses the force from the contact, and adds to it whenever the thing slips"),
         ("release", "Release", "holds until the thing is put down, then opens"),
         ("pick-and-place", "PickAndPlace", "grabs, holds what an arm lifts, and opens when it is put down"),
+        ("event-detector", "EventDetector", "tells contact, slip and placing, and commands nothing"),
     ):
         yield ControllerEntry(name=name, target=f"graspsense_romano.controllers:{target}", summary=summary)
 

@@ -110,6 +110,7 @@ def felt(coefficients: Filters, before: Acceleration, samples: Samples) -> Accel
     present, x, y, z, norm = before.present, before.x, before.y, before.z, 0.0
     for k in range(samples.new):
         row = samples.values[k]
+        row = row if len(row) == 3 else (row[0], 0.0, 0.0)  # a sensor of one axis
         if row[0] + row[1] + row[2] == row[0] + row[1] + row[2]:
             band = coefficients.acceleration
             x, y, z = band_passed(band, x, row[0]), band_passed(band, y, row[1]), band_passed(band, z, row[2])

@@ -58,6 +58,7 @@ SHIPPED: Final[dict[tuple[Role, str], Shipped]] = {
     ("controller", "grab"): _ROMANO,
     ("controller", "release"): _ROMANO,
     ("controller", "pick-and-place"): _ROMANO,
+    ("controller", "event-detector"): _ROMANO,
 }
 """Components in other distributions of this project, for the hint if one is not installed."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
 from attrs import frozen
 
@@ -12,8 +12,12 @@ from graspsense.core.values.signals import Phase
 if TYPE_CHECKING:
     from graspsense.core.values.features import Prediction
 
-EventSource = Literal["runner", "controller", "model"]
+EventSource = Literal["runner", "controller", "model", "label"]
 """What an event of a grasp comes from."""
+LABELLED: Final = "labelled_events"
+"""Key in the report of a trial: the names of the events that were looked for in its recording, also without any."""
+NOT_KNOWN: Final = " not known"
+"""Behind the name of a labelled event: until then it is not known whether it goes on, or when it began."""
 
 
 @frozen
@@ -22,7 +26,8 @@ class GraspEvent:
 
     `source` is `runner` for a change of phase, an action of the guard or a sink that failed, and `controller` for an
     event that the controller told; `what` is then the name of the event, one of `Controller.events`. It is `model` for
-    a prediction while the grasp goes on, which `prediction` then has.
+    a prediction while the grasp goes on, which `prediction` then has. It is `label` for what others labelled in a
+    recording that they made: from `t_s` until `until_s`, which is `t_s` where only the begin is known.
     """
 
     t_s: float
@@ -30,6 +35,7 @@ class GraspEvent:
     what: str
     source: EventSource = "runner"
     prediction: Prediction | None = None
+    until_s: float | None = None
 
 
 def event_name(names: Sequence[str], number: int) -> str:
@@ -39,19 +45,23 @@ def event_name(names: Sequence[str], number: int) -> str:
 
 def event_as_json(event: GraspEvent) -> dict[str, Any]:
     """Return an event as JSON values."""
-    return {
+    values = {
         "t_s": event.t_s,
         "phase": event.phase.name.lower(),
         "what": event.what,
         "source": event.source,
     }
+    return values if event.until_s is None else {**values, "until_s": event.until_s}
 
 
 def event_from_json(value: Mapping[str, Any]) -> GraspEvent:
     """Return the event of `event_as_json`; without a source it is of the runner. Raises KeyError, ValueError."""
-    source: EventSource = "runner"
-    if value.get("source") == "controller":
-        source = "controller"
-    elif value.get("source") == "model":
-        source = "model"
-    return GraspEvent(float(value["t_s"]), Phase[str(value["phase"]).upper()], str(value["what"]), source)
+    source: EventSource = next((one for one in get_args(EventSource) if one == value.get("source")), "runner")
+    until = value.get("until_s")
+    return GraspEvent(
+        float(value["t_s"]),
+        Phase[str(value["phase"]).upper()],
+        str(value["what"]),
+        source,
+        until_s=None if until is None else float(until),
+    )

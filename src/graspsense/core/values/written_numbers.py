@@ -36,6 +36,7 @@ MISSING: Final = frozenset(
 """What stands for a missing number, in small letters."""
 _LONGEST_MISSING: Final = max(map(len, MISSING))
 
+_LOGICAL: Final = {"True": 1.0, "False": 0.0}
 _SIGN, _EXPONENT = "[-+\u2212]?", "(?:[eEdD][-+]?[0-9]+)?"
 _WITH_POINT: Final = re.compile(rf"{_SIGN}(?:(?P<whole>[0-9]+)(?:\.[0-9]*)?|\.[0-9]+){_EXPONENT}")
 _WITH_COMMA: Final = re.compile(rf"{_SIGN}[0-9]*,[0-9]+{_EXPONENT}")
@@ -93,6 +94,34 @@ def number_in(text: str) -> float | None:
         return None
     found = columns_of_numbers({"": [cell]})[""]
     return None if isinstance(found, NotNumbers) or not math.isfinite(found[0]) else float(found[0])
+
+
+def truths(cells: Sequence[str]) -> Numbers | None:
+    """Return 1 for each true and 0 for each false, in any case, NaN where missing; None if a cell is another word."""
+    import numpy as np
+
+    values = [_LOGICAL.get(cell.capitalize(), math.nan if is_missing(cell) else None) for cell in cells]
+    known = None not in values and not all(map(is_missing, cells))
+    return np.array(values, dtype=np.float64) if known else None
+
+
+def rows_of_lists(cells: Sequence[str]) -> Numbers | None:
+    """Return the numbers of cells that are lists, as Python and numpy print them; True is 1, False 0, and None missing.
+
+    None if a cell is no list of numbers, or has another length than the first one.
+    """
+    import numpy as np
+
+    rows: list[list[float | None]] = []
+    for cell in cells:
+        if not (cell.startswith("[") and cell.endswith("]")):
+            return None
+        words = cell[1:-1].replace(",", " ").split()
+        numbers = [_LOGICAL.get(word, math.nan if is_missing(word) else plain_number(word)) for word in words]
+        if None in numbers or not numbers or len(numbers) != len(rows[0] if rows else numbers):
+            return None
+        rows.append(numbers)
+    return np.array(rows, dtype=np.float64) if rows else None
 
 
 def columns_of_numbers(columns: Mapping[str, Sequence[str]]) -> dict[str, Numbers | NotNumbers]:

@@ -8,12 +8,13 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final, Literal
 
-from attrs import Attribute, frozen
+from attrs import Attribute, field, frozen
 
 from graspsense.core.components.layers import read_toml
 from graspsense.core.components.setting import setting
 from graspsense.core.components.strict import ValidationFailed, structured
 from graspsense.core.values.errors import ConfigError, listed
+from graspsense.core.values.events import NOT_KNOWN
 from graspsense.core.values.fingers import PREFIX, FingerForce
 from graspsense.core.values.limits import ENTRIES
 from graspsense.sources.manifest.expression import Expression, ExpressionError, parse
@@ -25,6 +26,7 @@ TIME: Final = "time"
 AXES: Final = ("grasp", TIME, "row", "column")
 """What an axis of an array of three dimensions can be."""
 QUANTITIES: Final = ("time", "gap", "force", "left", "right", "effort", "velocity")
+_EVENT: Final = re.compile(r"[a-z][a-z0-9 _-]{0,99}")
 _AMOUNT: Final = re.compile(r"(?P<number>\d+(?:\.\d+)?)\s*(?P<unit>samples?|s|ms)")
 
 
@@ -69,6 +71,10 @@ class Manifest:
     list: str = setting(
         default="",
         meaning="CSV file with a column `file`; each further column is a field of that row's grasp.",
+    )
+    beside: Text = setting(
+        default=(),
+        meaning="Files beside each file, with as many rows; `labels.csv` has the columns `'labels.NAME'`.",
     )
     start: str = setting(
         default="",
@@ -142,6 +148,10 @@ class Manifest:
         factory=dict,
         meaning="Properties of the grasp: an expression with its unit, or a file beside it with one number.",
     )
+    events: Mapping[str, str] = setting(
+        factory=dict,
+        meaning='Labelled events: a column of 0 and 1, `slip = "slips"`, or their times, `slip = "onset [s]"`.',
+    )
 
 
 @frozen(kw_only=True)
@@ -154,9 +164,10 @@ class ReadManifest:
     expressions: Mapping[str, tuple[Expression, ...]]
     channels: Mapping[str, Expression]
     values: Mapping[str, Expression]
+    events: Mapping[str, Expression] = field(factory=dict)
     fast: frozenset[str] = frozenset()
     """Names of the channels that are fast channels."""
-    beside: Mapping[str, str]
+    value_files: Mapping[str, str]
     """Values that are in a file beside the recording: name to the name of that file."""
 
 
@@ -183,13 +194,14 @@ def read_manifest(place: Path) -> ReadManifest:
         given = getattr(keys, name)
         for text in (given,) if isinstance(given, str) else given:
             found[name].append(parsed((name,), text))
-    beside = {
+    value_files = {
         name: text for name, text in keys.values.items() if re.fullmatch(r"[^'\"*/+()]+\.(npy|txt|csv)", text)
     }
     channels = {name: parsed(("channels", name), text) for name, text in keys.channels.items()}
     values = {
-        name: parsed(("values", name), text) for name, text in keys.values.items() if name not in beside
+        name: parsed(("values", name), text) for name, text in keys.values.items() if name not in value_files
     }
+    events = {name: parsed(("events", name), text) for name, text in keys.events.items()}
     for name, text in keys.fingers.items():
         found[f"{PREFIX}{name}"] = [parsed(("fingers", name), text)]
     problems += [
@@ -205,18 +217,20 @@ def read_manifest(place: Path) -> ReadManifest:
         expressions={name: tuple(parts) for name, parts in found.items()},
         channels=channels,  # type: ignore[arg-type]
         values=values,  # type: ignore[arg-type]
-        beside=beside,
-        fast=frozenset(_texts(keys.fast)),
+        events=events,  # type: ignore[arg-type]
+        value_files=value_files,
+        fast=frozenset(texts_of(keys.fast)),
     )
 
 
 def _too_many(keys: Manifest) -> list[tuple[tuple[str, ...], str]]:
     """Return which keys have more entries than are accepted, each with the reason."""
     entries = {
-        "files": _texts(keys.files),
-        **{name: getattr(keys, name) for name in ("channels", "values", "fingers")},
+        "files": texts_of(keys.files),
+        "beside": texts_of(keys.beside),
+        **{name: getattr(keys, name) for name in ("channels", "values", "fingers", "events")},
     }
-    entries |= {name: _texts(getattr(keys, name)) for name in QUANTITIES}
+    entries |= {name: texts_of(getattr(keys, name)) for name in QUANTITIES}
     return [((name,), why) for name, found in entries.items() if (why := ENTRIES.exceeded(len(found)))]
 
 
@@ -231,7 +245,15 @@ def _contradictions(keys: Manifest) -> list[tuple[tuple[str, ...], str]]:
         found.append((("force",), "force stands for both pads: give it alone, or left and right"))
     if not keys.force and not keys.left and not keys.right and not keys.fingers:
         found.append((("force",), "a grasp needs its force: force, left and right, or fingers"))
-    unknown = [name for name in _texts(keys.fast) if name not in keys.channels]
+    found += [
+        (
+            ("events", name),
+            f"write small letters, digits, spaces, - and _, a letter first, and not{NOT_KNOWN} at the end",
+        )
+        for name in keys.events
+        if not _EVENT.fullmatch(name) or name.endswith(NOT_KNOWN)
+    ]
+    unknown = [name for name in texts_of(keys.fast) if name not in keys.channels]
     if unknown:
         found.append((("fast",), f"{unknown[0]!r} is not among the channels: name it there with its columns"))
     elif keys.fast and keys.resample_hz:
@@ -299,10 +321,11 @@ def _finger_problems(keys: Manifest) -> Iterator[tuple[tuple[str, ...], str]]:
 
 
 def _patterns(keys: Manifest) -> tuple[str, ...]:
-    return _texts(keys.files)
+    return texts_of(keys.files)
 
 
-def _texts(value: Text) -> tuple[str, ...]:
+def texts_of(value: Text) -> tuple[str, ...]:
+    """Return the texts of a key that holds one or several."""
     return (value,) if isinstance(value, str) else value
 
 

@@ -103,7 +103,7 @@ def values_of(manifest: ReadManifest, file: NamedFile, table: ColumnTable) -> di
                 "first(...) or last(...)"
             )
         values[f"{name} [{expression.unit}]" if expression.unit else name] = float(column[0])
-    for name, beside in manifest.beside.items():
+    for name, beside in manifest.value_files.items():
         number = _number_beside(file.path.parent / _filled(manifest, f"values.{name}", beside, table))
         if number is not None:
             values[name] = number

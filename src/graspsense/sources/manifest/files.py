@@ -27,6 +27,8 @@ class NamedFile:
     path: Path
     name: str
     fields: dict[str, str]
+    blank: frozenset[str] = frozenset()
+    """The columns of a list that are empty in its row."""
     rows: tuple[int, int] | None = None
     problem: str = ""
 
@@ -107,7 +109,8 @@ def _listed(manifest: ReadManifest) -> Iterator[NamedFile]:
             rows = _rows(where, row)
         except ConfigError as error:
             problem = str(error)
-        yield NamedFile(path=path, name=name, fields=row, rows=rows, problem=problem)
+        blank = frozenset(columns.cells.keys() - row.keys() - {"file"})
+        yield NamedFile(path=path, name=name, fields=row, blank=blank, rows=rows, problem=problem)
 
 
 def _rows(where: str, row: dict[str, str]) -> tuple[int, int] | None:

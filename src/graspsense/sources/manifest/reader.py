@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from attrs import evolve
 
 from graspsense.core.values.errors import ConfigError, DataDamaged, listed
 from graspsense.core.values.limits import RECORDINGS
@@ -17,7 +18,7 @@ from graspsense.recording.readable import each_readable, refuse_devices
 from graspsense.recording.replayable import Recording
 from graspsense.sources.grasp_columns import GraspColumns, checked_recording
 from graspsense.sources.manifest.array_format import ARRAY_SUFFIXES, ArrayRules, read_arrays
-from graspsense.sources.manifest.description import ReadManifest, axes_of, read_manifest
+from graspsense.sources.manifest.description import ReadManifest, axes_of, read_manifest, texts_of
 from graspsense.sources.manifest.facts import instance_of, label_of, order_of, recorded_at_of, values_of
 from graspsense.sources.manifest.files import NamedFile, files_of
 from graspsense.sources.manifest.notices import notices_of
@@ -55,7 +56,9 @@ def tables_of(manifest: ReadManifest, file: NamedFile) -> list[ColumnTable]:
         raise ConfigError(file.problem)
     refuse_devices(file.path)
     read = _format(manifest, file.path)
-    tables = [table.with_fields(file.fields) for table in read(file.path)]
+    tables = [evolve(table.with_fields(file.fields), blank=file.blank) for table in read(file.path)]
+    for name in texts_of(manifest.keys.beside):
+        tables = _joined(manifest, tables, file.path.parent / name)
     if file.rows is not None:
         first, last = file.rows
         if last > len(tables[0]):
@@ -71,6 +74,32 @@ def tables_of(manifest: ReadManifest, file: NamedFile) -> list[ColumnTable]:
     if split and split != "force":
         return [part for table in tables for part in ([table] if table.damage else _by_column(table, split))]
     return tables
+
+
+def _joined(manifest: ReadManifest, tables: list[ColumnTable], path: Path) -> list[ColumnTable]:
+    """Return the table of a file with the columns of one beside it. Raises ConfigError, DataDamaged."""
+    refuse_devices(path)
+    others = _format(manifest, path)(path)
+    rows = [len(table) for table in (*tables, *others)]
+    if len(tables) != 1 or len(others) != 1 or rows[0] != rows[1]:
+        raise DataDamaged(
+            f"{tables[0].source} and {path} beside it have {listed(list(map(str, rows)))} rows: each needs one table, "
+            "with as many"
+        )
+    (table,), (other,) = tables, others
+
+    def named(columns: Mapping[str, Any]) -> dict[str, Any]:
+        return {f"{path.stem}.{name}": column for name, column in columns.items()}
+
+    return [
+        evolve(
+            table,
+            numbers={**table.numbers, **named(other.numbers)},
+            texts={**table.texts, **named(other.texts)},
+            units={**table.units, **named(other.units)},
+            shapes={**table.shapes, **named(other.shapes)},
+        )
+    ]
 
 
 def grasps_in(
@@ -157,7 +186,8 @@ def _bag(manifest: ReadManifest) -> Callable[[Path], list[ColumnTable]]:
     from graspsense.sources.manifest.ros_format import read_bag
 
     texts = [one.text for parts in manifest.expressions.values() for one in parts]
-    texts += [one.text for one in (*manifest.channels.values(), *manifest.values.values())]
+    further = (*manifest.channels.values(), *manifest.values.values(), *manifest.events.values())
+    texts += [one.text for one in further]
     topics = {match[1] for text in texts for match in re.finditer(r"['\"](/[^.'\"*?]+)\.", text)}
     return lambda path: read_bag(path, topics)
 

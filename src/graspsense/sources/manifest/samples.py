@@ -16,6 +16,7 @@ from graspsense.core.values.signals import CHANNELS, NO_GAP
 from graspsense.sources.grasp_columns import GraspColumns, finger_sides, without_missing
 from graspsense.sources.manifest.available import TO_SI, AvailableColumns
 from graspsense.sources.manifest.description import ReadManifest, hand_of, samples_of
+from graspsense.sources.manifest.events import labelled_events
 from graspsense.sources.manifest.expression import Expression
 from graspsense.sources.manifest.steps import without_duplicates
 from graspsense.sources.manifest.table import ColumnTable, Numbers
@@ -43,8 +44,12 @@ def samples(manifest: ReadManifest, table: ColumnTable) -> GraspColumns:
     if not len(table):
         raise DataDamaged(f"{table.source} has no rows")
     notes = [f"{len(table)} samples of {table.source}", *table.notes]
-    t_s, time_notes = _times(manifest, table, found)
+    t_s, origin_s, time_notes = _times(manifest, table, found)
     notes += time_notes
+    events = labelled_events(found, t_s, origin_s)
+    notes += [
+        f"labelled in the recording: {len(spans)} times {name}" for name, spans in events.items() if spans
+    ]
     scalars, arrays, units = _channels(manifest, table, found)
     zero = samples_of(keys.zero, t_s) if keys.zero else 0
     if zero:
@@ -89,6 +94,7 @@ def samples(manifest: ReadManifest, table: ColumnTable) -> GraspColumns:
         notes=tuple(notes),
         warnings=(*table.warnings, *_doubtful_units(manifest, found)),
         lines=table.lines,
+        events=events,
     )
     whole = without_missing(columns)
     return without_duplicates(whole) if keys.duplicates == "drop" else whole
@@ -181,21 +187,26 @@ def _has_time(manifest: ReadManifest, table: ColumnTable, found: AvailableColumn
 
 def _times(
     manifest: ReadManifest, table: ColumnTable, found: AvailableColumns
-) -> tuple[Numbers, tuple[str, ...]]:
-    """Return the time of each row (s), from 0 on, and what was chosen for it, in words. Raises ConfigError."""
+) -> tuple[Numbers, float, tuple[str, ...]]:
+    """Return the time of each row (s), what was subtracted from it, and what was chosen for it, in words.
+
+    Raises ConfigError.
+    """
     parts = manifest.expressions["time"]
     missing = not any(map(found.has, parts))
     given = None if missing and manifest.keys.rate_hz else found.value("time", parts, "time")
     if given is not None:
         unit = "" if found.unit(found.chosen(parts), "time") else _unit_since_1970(given[0])
         notes = (f"the time is in {unit} since 1970",) if unit else ()
-        return _from_start(given[0]) * TO_SI["time"].get(unit, 1.0), notes
+        factor, origin = TO_SI["time"].get(unit, 1.0), _origin(given[0])
+        return (given[0] - origin) * factor, origin * factor, notes
     if table.t_s is not None:
-        return _from_start(table.t_s), ()
+        origin = _origin(table.t_s)
+        return table.t_s - origin, origin, ()
     if manifest.keys.rate_hz:
-        return np.arange(len(table)) / manifest.keys.rate_hz, ()
+        return np.arange(len(table)) / manifest.keys.rate_hz, 0.0, ()
     if len(table) == 1:
-        return np.zeros(1), ()
+        return np.zeros(1), 0.0, ()
     columns = listed(tuple(table.numbers))
     raise ConfigError(
         f'{manifest.place}: {table.source} has no time: write time = "COLUMN [ms]", or rate_hz = 100 where there is no '
@@ -203,9 +214,9 @@ def _times(
     )
 
 
-def _from_start(t_s: Numbers) -> Numbers:
-    """Return times (s), counted from the first one where they are stamps of a clock such as seconds since 1970."""
-    return t_s - t_s[0] if abs(float(t_s[0])) > EARLIEST_STAMP_S else t_s
+def _origin(times: Numbers) -> float:
+    """Return the first of these times where they are stamps of a clock such as seconds since 1970, else 0."""
+    return float(times[0]) if abs(float(times[0])) > EARLIEST_STAMP_S else 0.0
 
 
 def _unit_since_1970(times: Numbers) -> str:

@@ -31,6 +31,8 @@ class ColumnTable:
     channel."""
     texts: Mapping[str, Sequence[str]] = field(factory=dict)
     fields: Mapping[str, str] = field(factory=dict)
+    blank: frozenset[str] = frozenset()
+    """The names of fields that are empty for this part in a list."""
     t_s: Numbers | None = None
     lines: NDArray[np.int64] | None = None
     """The line of each row in a text file."""

@@ -14,7 +14,15 @@ from attrs import define, field
 from graspsense.core.learn.target_value import name_and_unit
 from graspsense.core.values.errors import DataDamaged
 from graspsense.core.values.label_text import is_missing_label
-from graspsense.core.values.written_numbers import NotNumbers, columns_of_numbers, is_missing, is_number
+from graspsense.core.values.limits import CELLS
+from graspsense.core.values.written_numbers import (
+    NotNumbers,
+    columns_of_numbers,
+    is_missing,
+    is_number,
+    rows_of_lists,
+    truths,
+)
 from graspsense.core.values.written_times import seconds_since_first
 from graspsense.sources.csv_columns import INDEX
 from graspsense.sources.manifest.patterns import regular_expression
@@ -89,6 +97,7 @@ def _columns(path: Path, part: _Part, table: TextTable, *, several: bool) -> Col
     numbers: dict[str, Numbers] = {}
     texts: dict[str, Sequence[str]] = {}
     not_numbers: dict[str, str] = {}
+    seconds: dict[str, str] = {}
     for name, found in columns_of_numbers(cells).items():
         if not isinstance(found, NotNumbers):
             numbers[name] = found
@@ -97,10 +106,17 @@ def _columns(path: Path, part: _Part, table: TextTable, *, several: bool) -> Col
                     name
                 ]  # as numbers `none` and `NA` are missing, and as labels they are not
             continue
+        lists = _lists(path, name, cells[name])
+        if lists is not None:
+            numbers[name] = lists
+            continue
         texts[name] = cells[name]
-        times = seconds_since_first(cells[name])
+        times, logical = seconds_since_first(cells[name]), truths(cells[name])
         if times is not None:
             numbers[name] = times
+            seconds[name] = "s"
+        elif logical is not None:
+            numbers[name] = logical
         elif found.row or is_number(found.cell):
             not_numbers[name] = f"line {table.lines[found.row]} has {found.words}"
     units = {name: _unit_in(name) or unit for name, unit in zip(cells, table.units, strict=True)}
@@ -109,12 +125,20 @@ def _columns(path: Path, part: _Part, table: TextTable, *, several: bool) -> Col
         numbers=numbers,
         texts=texts,
         fields=part.fields,
-        units={name: unit for name, unit in units.items() if unit}
-        | dict.fromkeys(texts.keys() & numbers, "s"),
+        units={name: unit for name, unit in units.items() if unit} | seconds,
         lines=np.array(table.lines, dtype=np.int64),
         not_numbers=not_numbers,
         notes=table.notes,
     )
+
+
+def _lists(path: Path, name: str, cells: Sequence[str]) -> Numbers | None:
+    """Return the numbers of a column of lists, None if it is another one. Raises DataDamaged if they are too many."""
+    if not cells[0].startswith("["):
+        return None
+    if too_many := CELLS.exceeded(sum(len(cell.replace(",", " ").split()) for cell in cells)):
+        raise DataDamaged(f"{path}: the lists of column {name!r} have {too_many}")
+    return rows_of_lists(cells)
 
 
 def _is_word(cell: str) -> bool:

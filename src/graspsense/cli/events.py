@@ -1,0 +1,212 @@
+"""`evaluate --events`: how well a controller tells the events that others labelled in recordings."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+import click
+
+from graspsense.cli.output import echo_json
+from graspsense.cli.sources import detector_of
+from graspsense.cli.terminal import Style, echo, echo_entry, echo_table
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from graspsense.evaluation.events import EventScore, EventsEvaluation, LabelledEvents
+    from graspsense.evaluation.intervals import RecognitionRate
+    from graspsense.recording.replayable import Recording
+
+_FOR_LABELS: Final = (
+    *("png", "report", "keep", "checkpoints", "classifier", "target", "target_value"),
+    *("label", "instance", "order", "features", "before", "unreliable"),
+    *("objects", "instances", "trials", "states_per_instance", "pipeline", "gripper"),
+)
+
+
+def evaluate_events(
+    source: str, tolerance_s: float, folds: int, as_json: bool, given: Mapping[str, Any]
+) -> None:
+    """Score the events, and print how well each kind is told."""
+    from graspsense.evaluation.json_codec import to_json
+
+    context = click.get_current_context()
+    for name in _FOR_LABELS:
+        if context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE:
+            raise click.UsageError(f"--{name.replace('_', '-')} has no meaning with --events", context)
+    if tolerance_s != tolerance_s:
+        raise click.BadParameter("nan is no time: give a number of seconds", param_hint="--tolerance")
+    found = _evaluated(source, tolerance_s, folds, given)
+    if as_json:
+        echo_json(to_json(found))
+    else:
+        _print(found)
+
+
+def _evaluated(source: str, tolerance_s: float, folds: int, given: Mapping[str, Any]) -> EventsEvaluation:
+    from graspsense.cli.progress import ProgressLine
+    from graspsense.core.values.events import NOT_KNOWN
+    from graspsense.evaluation.events import STEPS, EventsEvaluation, evaluate_kind
+    from graspsense.sources.event_recordings import (
+        EventTeller,
+        check_detector,
+        event_recordings,
+        threshold_factor,
+    )
+
+    selected = detector_of(source, given)
+    controller: Any = selected.create()
+    known = type(controller).events
+    with ProgressLine() as progress:
+        read = event_recordings(source, given["only"])
+        recordings = tuple(one.recording for one in read.recordings)
+        check_detector(controller, recordings)
+        labelled = [_labelled(one, group) for one, group in zip(recordings, read.groups, strict=True)]
+        names = list(dict.fromkeys(n for one in labelled for n in one.labelled if not n.endswith(NOT_KNOWN)))
+        total = len(recordings) * (len(STEPS) + 1)
+        teller = EventTeller(controller, recordings, lambda done: progress("detecting events", done, total))
+        factor = threshold_factor(recordings)
+        kinds = {
+            name: evaluate_kind(
+                name,
+                labelled,
+                teller,
+                factor=factor,
+                tolerance_s=tolerance_s,
+                folds=folds,
+                seed=given["seed"],
+            )
+            for name in names
+            if name in known
+        }
+        told = [teller(k, 1.0) for k in range(len(recordings))]
+    others = {name: sum(len(one.get(name, ())) for one in told) for name in known if name not in kinds}
+    return EventsEvaluation(
+        source=source,
+        detector=selected.component.name,
+        tolerance_s=tolerance_s,
+        recordings=len(recordings),
+        held_out=read.held_out,
+        kinds=kinds,
+        not_told=tuple(name for name in names if name not in known),
+        not_labelled={name: count for name, count in others.items() if count},
+        notes=read.notes,
+    )
+
+
+def _labelled(one: Recording, group: str) -> LabelledEvents:
+    from graspsense.evaluation.events import LabelledEvents
+
+    return LabelledEvents(
+        labelled={
+            name: tuple(
+                (event.t_s, event.t_s if event.until_s is None else event.until_s) for event in events
+            )
+            for name, events in one.events.items()
+        },
+        begin_s=one.readings[0].frame.t_s,
+        end_s=one.readings[-1].frame.t_s,
+        group=group,
+    )
+
+
+def _print(found: EventsEvaluation) -> None:
+    scored = (f"{name}: {_in_words(one.fitted or one.given)}" for name, one in found.kinds.items())
+    words = "; ".join(scored) or "no event that is labelled can be scored"
+    echo(f"{found.detector} on {found.recordings} recordings of {found.source}. {words}", Style.HEADING)
+    echo()
+    echo_entry(
+        "rule",
+        f"an event is found by a detection at most {found.tolerance_s:g} s from its begin, and a detection finds one "
+        "event at most. Other detections while an event goes on do not count; all others are false",
+    )
+    for name in found.not_told:
+        echo_entry("not told", f"{name} is labelled, and {found.detector} has no such event", Style.CAUTION)
+    others = [f"{name} ({count} times)" for name, count in found.not_labelled.items()]
+    if others:
+        echo_entry("not judged", f"told as well, without labels to judge by: {', '.join(others)}")
+    for name, one in found.kinds.items():
+        if one.fitted is None:
+            echo_entry("not fitted", f"{name}: {one.not_fitted}", Style.CAUTION)
+        else:
+            low, high = (f"{end(one.factors):.3g}" for end in (min, max))
+            factors = low if low == high else f"{low} to {high}"
+            echo_entry(
+                "fitted",
+                f"{name}: all thresholds times {factors}, with each {found.held_out} held out as a whole",
+            )
+    for note in found.notes:
+        echo_entry("note", note)
+    if found.kinds:
+        _print_tables(found)
+
+
+def _print_tables(found: EventsEvaluation) -> None:
+    echo()
+    heads = (
+        "EVENT",
+        "THRESHOLDS",
+        "FOUND",
+        "RECALL",
+        "95 %",
+        "FALSE",
+        "PRECISION",
+        "95 %",
+        "DELAY, S",
+        "95 %",
+    )
+    rows = []
+    for name, one in found.kinds.items():
+        rows.append((name, "as set", *_row(one.given)))
+        if one.fitted is not None:
+            rows.append((name, "fitted", *_row(one.fitted)))
+        rows.append((name, "by chance", *_row(one.chance)))
+    echo_table(heads, rows)
+    echo(
+        "FALSE: false alarms, and their number a minute. DELAY: median (10 to 90 %), with the interval of the median."
+    )
+    echo("by chance: the same detections, moved by half of their recording")
+    scores = [score for one in found.kinds.values() for score in (one.fitted, one.given) if score is not None]
+    rates = [one for score in scores for one in (score.recall, score.precision) if one is not None]
+    reasons = dict.fromkeys(one.no_interval for one in rates if one.interval is None)
+    for reason in reasons:
+        echo(f"no interval: {reason}")
+    echo()
+    groups = [
+        (name, group, f"{hits} of {labelled}", str(alarms))
+        for name, one in found.kinds.items()
+        for group, (hits, labelled, alarms) in one.by_group.items()
+    ]
+    echo_table(("EVENT", found.held_out.upper(), "FOUND", "FALSE"), groups)
+
+
+def _row(score: EventScore) -> tuple[str, ...]:
+    per_minute = 60.0 * score.false_alarms / score.seconds if score.seconds else 0.0
+    delay, delays = score.delay, ("-", "-")
+    if delay is not None:
+        ends = "none" if delay.interval is None else f"{delay.interval[0]:.3f} to {delay.interval[1]:.3f}"
+        delays = (f"{delay.median_s:.3f} ({delay.low_s:.3f} to {delay.high_s:.3f})", ends)
+    return (
+        f"{score.found} of {score.labelled}",
+        *_cells(score.recall),
+        f"{score.false_alarms} ({per_minute:.2g})",
+        *_cells(score.precision),
+        *delays,
+    )
+
+
+def _cells(rate: RecognitionRate | None) -> tuple[str, str]:
+    from graspsense.evaluation.intervals import percentage, percentages
+
+    if rate is None:
+        return "-", "-"
+    return percentage(rate.rate), "none" if rate.interval is None else percentages(rate.interval)
+
+
+def _in_words(score: EventScore) -> str:
+    from graspsense.evaluation.intervals import percentage
+
+    recall, precision = (
+        "unknown" if rate is None else percentage(rate.rate) for rate in (score.recall, score.precision)
+    )
+    return f"recall {recall}, precision {precision}"

@@ -1,0 +1,175 @@
+"""Recordings in which others labelled events, and what a controller tells of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Any, Final
+
+from attrs import field, frozen
+
+from graspsense.core.learn.labelled import class_of
+from graspsense.core.values.errors import ConfigError, counted, listed
+from graspsense.core.values.signals import CHANNELS, NO_GAP, Reading, Samples
+from graspsense.recording.labelled_recording import LabelledRecording, UnreadableRecording
+from graspsense.recording.readable import each_readable, error_of_all, note_on
+from graspsense.recording.reader import read_recorded
+from graspsense.recording.replayable import content_sha256
+from graspsense.sources.dataset_recordings import datasets_with_recordings, readable_or_not
+from graspsense.store.naming import STORE
+from graspsense.store.stored_grasps import StoredGrasp, stored_grasps
+
+if TYPE_CHECKING:
+    from graspsense.core.components.roles import Controller
+    from graspsense.recording.replayable import Recording
+
+_FORCES: Final = ("force_left_n", "force_right_n", "edge_left_n", "edge_right_n")
+ACCELERATION: Final = "acceleration"
+
+
+@frozen(kw_only=True, eq=False)
+class EventRecordings:
+    """Recordings with labelled events, and the group of each, which is held out as a whole; `held_out` names them."""
+
+    recordings: tuple[LabelledRecording, ...]
+    groups: tuple[str, ...]
+    held_out: str
+    notes: tuple[str, ...]
+
+
+def event_recordings(source: str, only: str | None = None) -> EventRecordings:
+    """Return the recordings of a store (`store:DIR`) or of a data set (`manifest:FILE`) in which events are labelled.
+
+    `only` names a class. Notes count those without labels, those that cannot be read, and other units than N. Raises
+    ConfigError, DataDamaged.
+    """
+    kind, _, place = source.partition(":")
+    if kind != STORE.removesuffix(":") and (not place or kind not in datasets_with_recordings()):
+        known = ", ".join(f"{name}:PLACE" for name in ("store", *datasets_with_recordings()))
+        raise ConfigError(
+            f"--events needs recordings, and {source} has none. Sources with recordings are {known}"
+        )
+    read = list(_stored(place) if source.startswith(STORE) else readable_or_not(kind, place))
+    unreadable = [one for one in read if isinstance(one, UnreadableRecording)]
+    found = [
+        one for one in read if isinstance(one, LabelledRecording) and only in (None, class_of(one.label))
+    ]
+    if unreadable and not found:
+        raise error_of_all(unreadable)
+    several = {content_sha256(one.recording): one for one in reversed(found)}
+    copies = len(found) - len(several)
+    found = list(reversed(several.values()))
+    labelled = [one for one in found if one.recording.events]
+    if not labelled:
+        raise ConfigError(
+            f"{source}: no event is labelled in {counted(len(found), 'recording')}{f' of {only}' if only else ''}. "
+            'In a manifest, events says where: events = { slip = "COLUMN" }'
+        )
+    notes = note_on(unreadable, len(read))
+    if copies:
+        notes.append(f"{counted(copies, 'recording')} left out: the same content as another one")
+    if len(labelled) < len(found):
+        notes.append(
+            f"{len(found) - len(labelled)} of {len(found)} recordings left out: no event is labelled"
+        )
+    units = sorted(
+        {one.recording.units["force_left"] for one in labelled if "force_left" in one.recording.units}
+    )
+    if units:
+        notes.append(
+            f"the forces are in {', '.join(units)}, for which thresholds in N have no meaning: see the fitted ones"
+        )
+    objects = all(one.instance for one in labelled)
+    return EventRecordings(
+        recordings=tuple(labelled),
+        groups=tuple(f"{class_of(one.label)}#{one.instance}" if objects else one.label for one in labelled),
+        held_out="instance" if objects else "label",
+        notes=tuple(notes),
+    )
+
+
+def _stored(folder: str) -> Iterator[LabelledRecording | UnreadableRecording]:
+    for grasp in stored_grasps(folder):
+        yield from each_readable(f"trial {grasp.number}", lambda grasp=grasp: (_of_trial(grasp),))  # type: ignore[misc]
+
+
+def _of_trial(grasp: StoredGrasp) -> LabelledRecording:
+    return LabelledRecording(
+        recording=read_recorded(grasp.recording).recording(),
+        source=f"trial {grasp.number}",
+        label=grasp.label,
+        instance=grasp.instance.partition("#")[2],
+    )
+
+
+def check_detector(controller: Controller[Any], recordings: tuple[Recording, ...]) -> None:
+    """Raise ConfigError if a controller tells no events, or reads a channel that a recording does not have."""
+    law = type(controller)
+    if not law.events:
+        raise ConfigError(
+            f"{law.__name__} tells no events, so it cannot be scored: choose another controller.type"
+        )
+    for one in recordings:
+        own = {channel.name for channel in one.channels}
+        no_gap = ("gap", "velocity") if one.units.get("gap") == NO_GAP else ()
+        absent = [c.name for c in law.requires if c.name in no_gap or c.name not in (*CHANNELS, *own)]
+        if absent:
+            raise ConfigError(f"{law.__name__} reads {listed(absent)}, and {one.name} has no such channel")
+
+
+@frozen(eq=False)
+class EventTeller:
+    """What a controller tells of each recording, with all of its thresholds times a factor; each is computed once."""
+
+    controller: Controller[Any]
+    recordings: tuple[Recording, ...]
+    on_told: Callable[[int], None]
+    """Called with the number of recordings that have been gone through, each again for every factor."""
+    _known: dict[tuple[int, float], dict[str, list[float]]] = field(factory=dict, init=False)
+
+    def __call__(self, number: int, factor: float) -> dict[str, list[float]]:
+        """Return the times (s) of the events that are told, by their names."""
+        key = (number, factor)
+        if key not in self._known:
+            self._known[key] = _told(self.controller, self.recordings[number], factor)
+            self.on_told(len(self._known))
+        return self._known[key]
+
+
+def _told(controller: Controller[Any], recording: Recording, factor: float) -> dict[str, list[float]]:
+    step, params, state = type(controller).step, controller.params(), controller.init()
+    names, told = type(controller).events, dict[str, list[float]]()
+    for reading in recording.readings:
+        # To divide what is measured is to multiply all thresholds.
+        _, state = step(params, state, reading if factor == 1.0 else _divided(reading, factor))
+        if state.events:
+            for k, name in enumerate(names):
+                if state.events >> k & 1:
+                    told.setdefault(name, []).append(reading.frame.t_s)
+    return told
+
+
+def _divided(reading: Reading, by: float) -> Reading:
+    """Return a reading with its forces and its acceleration divided by a number."""
+    frame, pads, signals = reading
+    frame = frame._replace(**{name: getattr(frame, name) / by for name in _FORCES})
+    samples = getattr(signals, ACCELERATION, None)
+    if isinstance(samples, Samples):
+        values = tuple(tuple(value / by for value in row) for row in samples.values)
+        signals = signals._replace(**{ACCELERATION: samples._replace(values=values)})
+    return Reading(frame, pads, signals)
+
+
+def threshold_factor(recordings: tuple[Recording, ...]) -> float:
+    """Return what thresholds in N are multiplied by for the unit of these forces: 1 for N.
+
+    For another unit it is a power of ten, by which the median range of the force becomes about 10.
+    """
+    if not any("force_left" in one.units for one in recordings):
+        return 1.0
+    ranges = []
+    for one in recordings:
+        forces = [reading.frame.force_left_n for reading in one.readings]
+        ranges.append(max(forces) - min(forces))
+    middle = sorted(ranges)[len(ranges) // 2]
+    return float(10.0 ** (round(math.log10(middle)) - 1)) if middle > 0.0 else 1.0
