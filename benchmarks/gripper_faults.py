@@ -1,6 +1,6 @@
 """Inject faults in every phase of a grasp with an emulated PR2 gripper, and print what its fingers then did.
 
-    python benchmarks/gripper_faults.py [--write docs/pr2.md] [--json] [--short]
+    python benchmarks/gripper_faults.py [--write benchmarks/results/pr2.md] [--json] [--short]
     python benchmarks/gripper_faults.py --pushed [--short]
 
 The emulated board is treated as a real gripper, with the limits of a first closing. Each fault begins at five times:

@@ -6,7 +6,7 @@
     python plugins/identify/benchmarks/identify.py --true-terms [...] [--rows FILE] [--markdown FILE]
     python plugins/identify/benchmarks/identify.py --rows FILE --markdown FILE
     python plugins/identify/benchmarks/identify.py --true-steps 6 [--recordings 30] [--rows FILE] [--markdown FILE]
-    python plugins/identify/benchmarks/identify.py --transfer [--rows FILE] [--markdown docs/identify.md] [--png FILE]
+    python plugins/identify/benchmarks/identify.py --transfer [--rows FILE] [--markdown FILE] [--png FILE]
 
 Each scene below is grasped in simulation by the hybrid controller with a hold, with ideal sensors, with PR2 pads, and
 with pads at the 60 Hz of Robotiq's TSF-85 whose fingertips harden, once, three times and ten times. In each repeat,

@@ -400,12 +400,13 @@ def test_a_force_controller_hits_harder_than_the_hybrid_one_and_neither_counts_a
     assert row["hybrid"].closed_m == pytest.approx(0.086 - row["hybrid"].features["p_steady"], abs=2e-4)
 
 
-PAGE = (Path(__file__).parents[3] / "docs" / "paper.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[1] / "benchmarks" / "results" / "paper.md").read_text(encoding="utf-8")
+GUIDE = (Path(__file__).parents[3] / "docs" / "paper.md").read_text(encoding="utf-8")
 
 
-def rows_of_page(title):
-    """Return the cells of a table of docs/paper.md."""
-    section = PAGE.partition(f"\n## {title}\n")[2].partition("\n## ")[0]
+def rows_of_page(title, page=PAGE):
+    """Return the cells of a table of the page that the command writes."""
+    section = page.partition(f"\n## {title}\n")[2].partition("\n## ")[0]
     lines = [line.strip("| ").split(" | ") for line in section.splitlines() if line.startswith("| ")]
     return lines[0], lines[1:]
 
@@ -419,9 +420,18 @@ def test_the_page_has_the_tables_of_this_version():
     assert len(set(controls)) == len(controls)  # each of the grasps that its rates are of
 
 
+def test_the_guide_has_the_rates_and_verdicts_of_the_page():
+    rates = rows_of_page("Published rates beside ours")[1]
+    assert rows_of_page("Rates", GUIDE)[1] == [
+        [*every[:3], every[4], *(f"{row[6]}, {row[10]}" for row in (every, single))]
+        for every, single in zip(rates[::2], rates[1::2], strict=True)
+    ]
+    assert rows_of_page("Claims", GUIDE)[1] == [row[:3] for row in rows_of_page("Claims of the paper")[1]]
+
+
 @pytest.mark.slow
 def test_the_grasps_on_the_page_are_those_of_this_version(tmp_path):
-    """Docs/paper.md is out of date where these differ: run the command at its head again."""
+    """The page is out of date where these differ: run the command at its head again."""
     of_page = [row for row in rows_of_page("Grasps by case and object")[1] if row[0] == "one_finger_first"]
     planned = read_experiment("one_finger_first", [f"seeds={int(of_page[0][2])}"])
     results = Results(tmp_path)

@@ -1,7 +1,7 @@
 """The driver over hidapi, with a module in hidapi's place that behaves as the real one was seen to.
 
-What it does was observed on a Linux kernel with hidapi 0.15: see the table "What each library really does" in
-docs/pr2.md.
+What it does was observed on a Linux kernel with hidapi 0.15: see the table "Observed behaviour of the libraries"
+in benchmarks/results/pr2.md.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The driver over pyusb, with the real pyusb in front of functions that stand for libusb's.
 
-They behave as libusb was seen to on a Linux kernel with pyusb 1.3: see the table "What each library really does" in
-docs/pr2.md.
+They behave as libusb was seen to on a Linux kernel with pyusb 1.3: see the table "Observed behaviour of the libraries"
+in benchmarks/results/pr2.md.
 """
 
 from __future__ import annotations
