@@ -280,7 +280,7 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0)
     form = parser.add_mutually_exclusive_group()
     form.add_argument("--json", action="store_true")
-    form.add_argument("--table", action="store_true", help="Markdown, as in docs/simulator.md")
+    form.add_argument("--table", action="store_true", help="Markdown, as in benchmarks/results/simulator.md")
     parser.add_argument("--short", action="store_true", help="least work, only to show that it runs")
     given = parser.parse_args()
     if given.short:
