@@ -206,12 +206,12 @@ def _scene_of(path: Path) -> Scene:
     try:
         return structured(toml_values(text_of(path, LARGEST_BYTES, "scene file")), Scene, "a scene file")
     except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError(f"gripper.object: {path} cannot be read: {error}") from error
+        raise ConfigError(f"the scene {path} cannot be read: {error}") from error
     except TomlError as error:
-        raise ConfigError(f"gripper.object: {path}, line {error.line}: {error}") from error
+        raise ConfigError(f"the scene {path}, line {error.line}: {error}") from error
     except ValidationFailed as misfit:
         said = [f"{'.'.join(map(str, one.path)) or 'the file'}: {one.text}" for one in misfit.problems]
-        raise ConfigError(f"gripper.object: {path}\n  " + "\n  ".join(said)) from None
+        raise ConfigError(f"the scene {path}\n  " + "\n  ".join(said)) from None
 
 
 def _check_schedule(name: str, rows: Schedule) -> None:
@@ -411,7 +411,8 @@ class ArmMotion:
         self._finger = finger
         self._scene, self._contact_s = scene, float("inf")
         self._servos, self._shakers = (
-            [k for k in range(model.nu) if _actuator(model, k).startswith(f"{kind}/")] for kind in (ARM, SHAKE)
+            [k for k in range(model.nu) if _actuator(model, k).startswith(f"{kind}/")]
+            for kind in (ARM, SHAKE)
         )
         things = [k for k in range(model.nbody) if is_thing(model, k)]
         heaviest = model.body_mass[things] if things else np.zeros(0)
