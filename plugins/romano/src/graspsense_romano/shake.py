@@ -21,7 +21,7 @@ shake along the closing direction, the mass that the pads move.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 from attrs import frozen
@@ -143,6 +143,8 @@ def _add(name: str, found: float | str, values: dict[str, float], reasons: dict[
 
 def _signal(trace: Trace, name: str, begin_s: float, end_s: float) -> Signal | str:
     """Return a signal from one time to another, evenly spaced, or the reason why there is none."""
+    t_s: Any
+    values: Any
     if name == "pads":
         t_s, values = trace.t_s, (trace.force_left_n - trace.force_right_n)[:, np.newaxis]
     else:
@@ -153,7 +155,7 @@ def _signal(trace: Trace, name: str, begin_s: float, end_s: float) -> Signal | s
     within = (t_s > begin_s) & (t_s <= end_s) & np.isfinite(values).all(axis=1)
     t_s, values = t_s[within], values[within]
     # What is repeated between two images of the pads is not a sample.
-    new = np.flatnonzero(np.append(True, (np.diff(values, axis=0) != 0.0).any(axis=1))) if len(values) else []
+    new = np.append(len(values) > 0, (np.diff(values, axis=0) != 0.0).any(axis=1))[: len(values)]
     t_s, values = t_s[new], values[new]
     if len(t_s) < LEAST_SAMPLES or not t_s[-1] > t_s[0]:
         return f"{name}: fewer than {LEAST_SAMPLES} different samples there"
@@ -168,7 +170,7 @@ def density(signal: Signal, padded: int = 1) -> tuple[Floats, Floats]:
     window = np.hanning(n + 1)[:-1]
     spectrum = np.fft.rfft(signal.values * window[:, np.newaxis], n * padded, axis=0)
     found: Floats = 2.0 * (np.abs(spectrum) ** 2).sum(axis=1) / (signal.rate_hz * (window**2).sum())
-    return np.fft.rfftfreq(n * padded, 1.0 / signal.rate_hz), found
+    return np.arange(len(found)) * (signal.rate_hz / (n * padded)), found
 
 
 def rms(signal: Signal, low_hz: float, high_hz: float) -> float:
