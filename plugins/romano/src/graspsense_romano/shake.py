@@ -90,7 +90,7 @@ class Signal(NamedTuple):
 class ShakeFeatures(FeatureSet[ShakeConfig]):
     """Extracts bands, peaks and decays of acceleration and pads around a shake."""
 
-    requires = (Channel("force_left", "N"), Channel("force_right", "N"))
+    requires = (Channel("force_left", "N"), Channel("force_right", "N"), Channel("shake", "m"))
     features = _declared()
 
     def extract(self, trace: Trace) -> Features:
@@ -170,7 +170,8 @@ def density(signal: Signal, padded: int = 1) -> tuple[Floats, Floats]:
     window = np.hanning(n + 1)[:-1]
     spectrum = np.fft.rfft(signal.values * window[:, np.newaxis], n * padded, axis=0)
     found: Floats = 2.0 * (np.abs(spectrum) ** 2).sum(axis=1) / (signal.rate_hz * (window**2).sum())
-    return np.arange(len(found)) * (signal.rate_hz / (n * padded)), found
+    frequency: Floats = np.arange(len(found)) * (signal.rate_hz / (n * padded))
+    return frequency, found
 
 
 def rms(signal: Signal, low_hz: float, high_hz: float) -> float:
