@@ -170,8 +170,7 @@ def density(signal: Signal, padded: int = 1) -> tuple[Floats, Floats]:
     window = np.hanning(n + 1)[:-1]
     spectrum = np.fft.rfft(signal.values * window[:, np.newaxis], n * padded, axis=0)
     found: Floats = 2.0 * (np.abs(spectrum) ** 2).sum(axis=1) / (signal.rate_hz * (window**2).sum())
-    frequency: Floats = np.arange(len(found)) * (signal.rate_hz / (n * padded))
-    return frequency, found
+    return np.fft.rfftfreq(n * padded, 1.0 / signal.rate_hz).astype(np.float64), found
 
 
 def rms(signal: Signal, low_hz: float, high_hz: float) -> float:
