@@ -141,6 +141,7 @@ def test_pads_feel_how_heavy_a_bottle_is(felt):
 
 @pytest.mark.slow
 def test_a_model_of_shaken_bottles_tells_another_one(tmp_path):
+    """By its probabilities: after six grasps, another bottle may still count as unknown."""
     with pytest.raises(SystemExit) as ended:
         main(
             [
@@ -169,4 +170,5 @@ def test_a_model_of_shaken_bottles_tells_another_one(tmp_path):
         "shake", options=["classifier.type=knn", f"classifier.model={tmp_path / 'model.json'}"]
     )
     for label in ("flask_half:closed", "flask_empty:closed"):
-        assert pipeline.grasp(object=f"{label}#77", seed=77).prediction.label == label
+        told = pipeline.grasp(object=f"{label}#77", seed=77).prediction.probabilities
+        assert max(told, key=told.get) == label

@@ -113,9 +113,8 @@ class Scene:
 
     `arm` is the height (m) of the gripper over the time (s) since both fingers touched, `table_height` that of the
     table, which may rise while the thing is in the air, and `fill` the mass (kg) that was filled in by then. `shake`
-    moves the gripper to and fro. `mass_kg`
-    and `friction` replace those of the thing. `roughness_m` is the rms height of its surface, which cells on springs
-    feel.
+    moves the gripper to and fro. `mass_kg` and `friction` replace those of the thing. `roughness_m` is the rms height
+    of its surface, which cells on springs feel.
     """
 
     thing: str
@@ -444,7 +443,6 @@ class ArmMotion:
             return
         since_s = t_s - self._contact_s
         if since_s > self._end_s:
-            data.ctrl[self._shakers] = 0.0
             return
         self._height_m = float((self._centre(data) - self._start_m)[2])
         self._highest_m = max(self._highest_m, self._height_m)
