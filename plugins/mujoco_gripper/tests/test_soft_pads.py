@@ -118,7 +118,7 @@ def test_roughness_disturbs_cells_that_slide_and_no_others(tmp_path):
     assert np.std(sliding) > 5.0 * np.std(still)
 
 
-@pytest.mark.parametrize("name", ["tugged", "filled", "placed"])
+@pytest.mark.parametrize("name", ["tugged", "filled", "placed", "shaken"])
 def test_the_scenes_of_the_package_are_read(name):
     assert isinstance(read_scene(name).spec, mujoco.MjSpec)
 

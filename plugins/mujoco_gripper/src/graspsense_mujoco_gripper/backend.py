@@ -56,6 +56,7 @@ from graspsense_mujoco_gripper.scene import (
     is_thing,
     put_on_arm,
     read_scene,
+    scene_named,
     vary,
 )
 
@@ -107,14 +108,24 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
             channels.append(
                 FastChannel("acceleration", "m/s2", steps * rate, samples=steps, axes=("x", "y", "z"))
             )
+        if self._is_shaken():
+            channels.append(Channel("shake", "m", rate))
         return tuple(channels)
+
+    def _is_shaken(self) -> bool:
+        """Return whether the scene shakes the gripper; its displacement is then a channel."""
+        return scene_named(self.config.object.partition("#")[0], self.config.scene).shake is not None
 
     def _steps_of_a_tick(self) -> int:
         return ceil(1.0 / (self.config.rate_hz * self.config.timestep_s) - 1e-9)
 
     def objects(self) -> Sequence[ObjectKind]:
         """Return the things of the catalogue."""
-        return [ObjectKind(name=name, default=True) for name in catalogue()]
+        states: dict[str, list[str]] = {}
+        for name in catalogue():
+            kind, _, state = name.partition(":")
+            states.setdefault(kind, []).extend([state] if state else [])
+        return [ObjectKind(name=kind, states=tuple(of), default=True) for kind, of in states.items()]
 
     def with_object(self, name: str) -> MujocoGripper:
         """Return this gripper with another thing between its fingers."""
@@ -134,15 +145,14 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
     ) -> list[Grasped]:
         """Grasp each thing with its seed, in a process on each core."""
         for name in dict.fromkeys(scenes):
-            read_scene(name)
+            read_scene(name, self.config.scene)
+        makes_signals = any(self.with_object(name).makes_signals() for name in set(scenes))
+        return grasps(GraspingJob(self.config, controller, options, makes_signals), scenes, seeds)
+
+    def makes_signals(self) -> bool:
+        """Return whether there are channels that each tick has besides the frame and the cells."""
         gripper, _ = read_gripper(self.config.file)
-        return grasps(
-            GraspingJob(
-                self.config, controller, options, bool(gripper.channels) or gripper.accelerometer is not None
-            ),
-            scenes,
-            seeds,
-        )
+        return bool(gripper.channels) or gripper.accelerometer is not None or self._is_shaken()
 
     def see(self, viewer: Viewer) -> None:
         """Make pictures of the next grasp without a screen, or show it in MuJoCo's own viewer."""
@@ -162,13 +172,12 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
         self.close()
         config = self.config
         self._gripper, path = read_gripper(config.file)
-        scene = read_scene(config.object)
+        scene = read_scene(config.object, config.scene)
         self._thing, self._scene = scene.thing, scene.scene
         self._steps = self._steps_of_a_tick()
         timestep_s = 1.0 / (config.rate_hz * self._steps)
         spec = gripper_spec(path, self._gripper, timestep_s)
-        if scene.scene.arm:
-            put_on_arm(spec)
+        put_on_arm(spec, scene.scene)
         _integrate(spec, config.integrator, soft=scene.spec is not None and len(scene.spec.flexes) > 0)
         model = compiled(spec, str(path))
         width = None if scene.spec is None else width_m(compiled(scene.spec, config.object))
@@ -317,9 +326,10 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
         if self._cells is not None:
             pads = Pads(t_s, self._ticks, *self._cells.images(data))
         signals: Any = ()
-        if self._sensors or self._palm is not None:
+        if self._sensors or self._palm is not None or self._scene.shake is not None:
             palm = () if self._palm is None else (self._palm.samples(t_s),)
-            signals = self._signals(*(self._values[k] for k in self._sensors), *palm)
+            shake = () if self._scene.shake is None else (self._motion.shaken_m(data),)
+            signals = self._signals(*(self._values[k] for k in self._sensors), *palm, *shake)
         return Reading(frame, pads, signals)
 
     def _break_shell(self, data: mujoco.MjData) -> None:

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import lru_cache
 from importlib.resources import files
+from math import sqrt, tanh
 from pathlib import Path
 from typing import Final
 
 import mujoco
 from attrs import field, frozen
+from attrs.validators import ge, gt, le
 
 from graspsense.plugin_api import UnknownName
 from graspsense.simulator_api import structured, suggestion, toml_values
@@ -24,6 +26,77 @@ WALL_SHARE: Final = 0.1
 """Share of the mass in each wall."""
 TRAVEL_SHARE: Final = 0.4
 """Share of the width by which each wall can yield."""
+STIFF, SOFT = [0.99, 0.999, 0.0001, 0.5, 2.0], [0.9, 0.95, 0.001, 0.5, 2.0]
+"""MuJoCo's solimp of a contact whose own stiffness hardly counts, and its default."""
+WAVE: Final = 1.8412
+"""The first zero of the derivative of the Bessel function J1."""
+GRAVITY_M_S2: Final = 9.81
+
+
+@frozen(kw_only=True)
+class Contents:
+    """A liquid in an upright cylinder (SI units): `mass_kg` fills it, `fill` is the share of it that is there.
+
+    With a free surface, a part of the liquid moves as a mass on a spring and a damper in each horizontal direction,
+    and the rest is rigid. These are the figures of the first antisymmetric wave on a liquid of the mass m and the depth
+    h in a cylinder of radius R (H. N. Abramson (ed.), The Dynamic Behavior of Liquids in Moving Containers, NASA
+    SP-106, 1966):
+
+        w^2 = (x g / R) tanh(x h / R),    m1 = m 2 R tanh(x h / R) / (x (x^2 - 1) h),    x = 1.841
+
+    A cylinder that is full has no free surface: all is rigid. There are no other waves, no splashes, and no pressure on
+    the walls. The moving mass is at the height of the centre of the liquid, and stops at the walls.
+    """
+
+    mass_kg: float = field(validator=gt(0.0))
+    fill: float = field(validator=[gt(0.0), le(1.0)])
+    radius_m: float = field(validator=gt(0.0))
+    height_m: float = field(validator=gt(0.0))
+    damping: float = field(default=0.03, validator=ge(0.0))
+    """Damping ratio of the wave."""
+
+    @property
+    def wave_rad_s(self) -> float:
+        """The natural frequency of the wave."""
+        return sqrt(WAVE * GRAVITY_M_S2 / self.radius_m * self._depth)
+
+    @property
+    def wave_kg(self) -> float:
+        """The mass that moves in the wave."""
+        if self.fill >= 1.0:
+            return 0.0
+        liquid_kg, height_m = self.fill * self.mass_kg, self.fill * self.height_m
+        return liquid_kg * 2.0 * self.radius_m * self._depth / (WAVE * (WAVE**2 - 1.0) * height_m)
+
+    @property
+    def _depth(self) -> float:
+        return tanh(WAVE * self.fill * self.height_m / self.radius_m)
+
+    def add_to(self, core: mujoco.MjsBody) -> None:
+        """Add the liquid to the body of the container, whose middle is that of the cylinder."""
+        height_m, wave_kg = self.fill * self.height_m, self.wave_kg
+        place = [0.0, 0.0, 0.5 * (height_m - self.height_m)]
+        cylinder = {
+            "type": mujoco.mjtGeom.mjGEOM_CYLINDER,
+            "size": [self.radius_m, 0.5 * height_m, 0.0],
+            "contype": 0,
+            "conaffinity": 0,
+        }
+        core.add_geom(pos=place, mass=self.fill * self.mass_kg - wave_kg, **cylinder)
+        if not wave_kg:
+            return
+        body, rate = core.add_body(name=f"{core.name}_wave", pos=place), self.wave_rad_s
+        for name, axis in (("x", [1.0, 0.0, 0.0]), ("y", [0.0, 1.0, 0.0])):
+            body.add_joint(
+                name=f"{core.name}_wave_{name}",
+                type=mujoco.mjtJoint.mjJNT_SLIDE,
+                axis=axis,
+                range=[-self.radius_m, self.radius_m],
+                limited=mujoco.mjtLimited.mjLIMITED_TRUE,
+                stiffness=[wave_kg * rate**2, 0.0, 0.0],
+                damping=[2.0 * self.damping * wave_kg * rate, 0.0, 0.0],
+            )
+        body.add_geom(mass=wave_kg, **cylinder)
 
 
 @frozen(kw_only=True)
@@ -31,7 +104,8 @@ class Walls:
     """Two walls on springs and dampers: what both fingers feel together (SI units).
 
     `armature_kg` is an inertia of each wall that has no weight, so that the steps need not be short. Not set: with it,
-    a wall swings with 100 rad/s.
+    a wall swings with 100 rad/s. `contact_s` is the time constant of a softer contact with each wall: on pads of many
+    cells a light thing rattles with a stiff one.
     """
 
     width_m: float
@@ -40,6 +114,8 @@ class Walls:
     mass_kg: float
     friction: float = 0.5
     armature_kg: float | None = None
+    contact_s: float | None = None
+    contents: Contents | None = None
 
     def spec(self, name: str) -> mujoco.MjSpec:
         """Return the model, not compiled: each wall has twice the stiffness, as both yield in series."""
@@ -76,9 +152,11 @@ class Walls:
                 friction=[self.friction, 0.005, 0.0001],
                 condim=4,
                 priority=1,
-                solref=[0.001, 1.0],
-                solimp=[0.99, 0.999, 0.0001, 0.5, 2.0],
+                solref=[self.contact_s or 0.001, 1.0],
+                solimp=STIFF if self.contact_s is None else SOFT,
             )
+        if self.contents is not None:
+            self.contents.add_to(core)
         return spec
 
 
@@ -118,7 +196,7 @@ def thing_named(name: str, beside: Path = Path()) -> tuple[Thing, mujoco.MjSpec 
     if name not in catalogue():
         raise UnknownName(
             f"gripper.object: there is no thing {name!r}. Known: {', '.join(catalogue())}, none, the scenes tugged, "
-            "filled and placed, an MJCF file (.xml), "
+            "filled, placed and shaken, an MJCF file (.xml), "
             f"or a scene file (.toml).{suggestion(name, catalogue())}"
         )
     thing = catalogue()[name]

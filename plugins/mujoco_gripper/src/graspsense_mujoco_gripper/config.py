@@ -24,6 +24,12 @@ class MujocoConfig:
         meaning="A thing of the catalogue (block, egg, can, ...), none, the path of an MJCF file (.xml) with one, or "
         "a scene file (.toml).",
     )
+    scene: str = setting(
+        default="",
+        effect=NAMES_INPUT,
+        meaning="What happens to the thing: tugged, filled, placed, shaken, or a scene file (.toml), with `object` in "
+        "the place of its thing. Empty: what `object` says.",
+    )
     rate_hz: float = setting(
         default=1000.0,
         minimum=10.0,

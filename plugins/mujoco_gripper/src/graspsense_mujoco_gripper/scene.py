@@ -7,20 +7,27 @@ arm = [[0.3, 0.0], [0.8, 0.05]]              # seconds after both fingers touch,
 [cord]
 direction = [0.0, 0.0, -1.0]
 force = [[0.8, 0.0], [1.8, 5.0]]             # seconds after both fingers touch, force (N)
+
+[shake]
+amplitude_m = 0.008
+frequency_hz = 3.0
+start_s = 2.0                                # seconds after both fingers touch
+cycles = 3.0
 """
 
 from __future__ import annotations
 
 from importlib.resources import files
 from itertools import pairwise
-from math import isfinite
+from math import cos, isfinite, pi, sin
 from pathlib import Path
 from typing import Final
 from zlib import crc32
 
 import mujoco
 import numpy as np
-from attrs import field, frozen
+from attrs import evolve, field, frozen
+from attrs.validators import ge, gt, le
 from numpy.typing import NDArray
 
 from graspsense.plugin_api import ConfigError
@@ -33,7 +40,9 @@ Floats = NDArray[np.float64]
 PREFIX: Final = "thing/"
 """Before each name of the thing in the combined model."""
 ARM: Final = "arm"
-"""Before each name of a slide of the arm."""
+"""Before each name of an upright slide of the arm."""
+SHAKE: Final = "shake"
+"""Before each name of a slide along the direction of the shake."""
 TABLE: Final = "table"
 """The name of the body of the table, which has no joint: it is where it is put."""
 TABLE_BIT: Final = 8
@@ -44,7 +53,7 @@ ARM_KG: Final = 1000.0
 ARM_RAD_S: Final = 200.0
 """Natural frequency of the servo of the arm, critically damped."""
 SCENES: Final = Path(str(files("graspsense_mujoco_gripper") / "scenes"))
-SHIPPED_SCENES: Final = ("tugged", "filled", "placed")
+SHIPPED_SCENES: Final = ("tugged", "filled", "placed", "shaken")
 """The scene files of this package."""
 LARGEST_BYTES: Final = 64 * 1024
 MASS_SPREAD, FRICTION_SPREAD, STIFFNESS_SPREAD, SIZE_SPREAD = 0.1, 0.15, 0.1, 0.01
@@ -62,14 +71,40 @@ class Cord:
 
     def __attrs_post_init__(self) -> None:
         _check_schedule("force", self.force)
-        if len(self.direction) != 3 or not 0.0 < float(np.linalg.norm(self.direction)) < float("inf"):
-            raise ValueError("direction is a vector of three numbers, not all zero")
+        _unit(self.direction)
 
     def pull_n(self, t_s: float) -> Floats:
         """Return the force (N, in the world) at a time."""
-        direction = np.asarray(self.direction) / np.linalg.norm(self.direction)
-        pull: Floats = _value(self.force, t_s) * direction
-        return pull
+        return _value(self.force, t_s) * _unit(self.direction)
+
+
+@frozen(kw_only=True)
+class Shake:
+    """A shake of the gripper: a sine along a direction of the world, which grows and fades within a period each.
+
+    With n = (t - start_s) frequency_hz periods done, and m = min(n, cycles - n, 1), the gripper is displaced by
+    amplitude_m (1 - cos(pi m)) / 2 sin(2 pi n). Times are since both fingers touched.
+    """
+
+    amplitude_m: float = field(validator=[gt(0.0), le(0.1)])
+    frequency_hz: float = field(validator=[gt(0.0), le(20.0)])
+    start_s: float = field(validator=[ge(0.0), le(600.0)])
+    cycles: float = field(default=3.0, validator=[ge(2.0), le(1000.0)])
+    direction: tuple[float, ...] = (1.0, 0.0, 0.0)
+
+    def __attrs_post_init__(self) -> None:
+        _unit(self.direction)
+
+    @property
+    def end_s(self) -> float:
+        """When it ends."""
+        return self.start_s + self.cycles / self.frequency_hz
+
+    def place_m(self, t_s: float) -> float:
+        """Return the displacement at a time."""
+        periods = (t_s - self.start_s) * self.frequency_hz
+        share = min(max(min(periods, self.cycles - periods), 0.0), 1.0)
+        return self.amplitude_m * 0.5 * (1.0 - cos(pi * share)) * sin(2.0 * pi * periods)
 
 
 @frozen(kw_only=True)
@@ -77,9 +112,9 @@ class Scene:
     """What the gripper grasps, and what happens to it. Without a table the thing has no weight.
 
     `arm` is the height (m) of the gripper over the time (s) since both fingers touched, `table_height` that of the
-    table, which may rise while the thing is in the air, and `fill` the mass (kg) that was filled in by then. `mass_kg`
-    and `friction` replace those of the thing. `roughness_m` is the rms height of its surface, which cells on springs
-    feel.
+    table, which may rise while the thing is in the air, and `fill` the mass (kg) that was filled in by then. `shake`
+    moves the gripper to and fro. `mass_kg` and `friction` replace those of the thing. `roughness_m` is the rms height
+    of its surface, which cells on springs feel.
     """
 
     thing: str
@@ -89,6 +124,7 @@ class Scene:
     arm: Schedule = ()
     fill: Schedule = ()
     cord: Cord | None = None
+    shake: Shake | None = None
     mass_kg: float | None = field(default=None)
     friction: float | None = field(default=None)
     roughness_m: float = field(default=0.0)
@@ -111,7 +147,8 @@ class Scene:
     @property
     def needs_friction(self) -> bool:
         """Whether the friction of the thing decides what happens."""
-        return self.table or bool(self.arm or self.fill) or self.cord is not None or self.friction is not None
+        disturbed = self.arm or self.fill or self.cord or self.shake
+        return self.table or bool(disturbed) or self.friction is not None
 
 
 @frozen(eq=False)
@@ -124,18 +161,36 @@ class SceneModel:
     instance: str
 
 
-def read_scene(name: str) -> SceneModel:
+def scene_named(name: str, around: str = "") -> Scene:
+    """Return the scene of a name: a scene file, or a thing alone; with `around`, that scene with this thing in it.
+
+    Raises ConfigError.
+    """
+    path = SCENES / f"{name}.toml" if name in SHIPPED_SCENES else Path(name).expanduser()
+    is_scene = path.suffix == ".toml"
+    if not around:
+        return _scene_of(path) if is_scene else Scene(thing=name)
+    if is_scene:
+        raise ConfigError(
+            f"gripper.object names the scene {name}, and gripper.scene the scene {around}: name a thing as the object"
+        )
+    scene = scene_named(around)
+    if scene.thing == around:
+        raise ConfigError(
+            f"gripper.scene: there is no scene {around!r}. Known: {', '.join(SHIPPED_SCENES)}, or a scene file (.toml)"
+        )
+    return evolve(scene, thing=name, walls=None)
+
+
+def read_scene(name: str, around: str = "") -> SceneModel:
     """Return the scene of this name: a thing of the catalogue, an MJCF file, or a scene file (TOML).
 
-    What follows `#` names an instance. Raises UnknownName, ConfigError.
+    What follows `#` names an instance, which is the same in all states of a thing (`flask_full:open#3`). With
+    `around`, the thing is in that scene. Raises UnknownName, ConfigError.
     """
     name, number, instance = name.partition("#")
-    scene, beside = Scene(thing=name), Path()
-    if name in SHIPPED_SCENES:
-        scene = _scene_of(SCENES / f"{name}.toml")
-    elif name.endswith(".toml"):
-        beside = Path(name).expanduser().parent
-        scene = _scene_of(Path(name).expanduser())
+    scene = scene_named(name, around)
+    beside = Path(name).expanduser().parent if name.endswith(".toml") else Path()
     if scene.walls is not None:
         thing, spec = Thing(walls=scene.walls), scene.walls.spec(scene.thing)
     else:
@@ -143,19 +198,19 @@ def read_scene(name: str) -> SceneModel:
         if found is None:
             return SceneModel(scene, thing, None, "")
         spec = found
-    return SceneModel(scene, thing, spec, f"{name}#{instance}" if number else "")
+    return SceneModel(scene, thing, spec, f"{name.partition(':')[0]}#{instance}" if number else "")
 
 
 def _scene_of(path: Path) -> Scene:
     try:
         return structured(toml_values(text_of(path, LARGEST_BYTES, "scene file")), Scene, "a scene file")
     except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError(f"gripper.object: {path} cannot be read: {error}") from error
+        raise ConfigError(f"the scene {path} cannot be read: {error}") from error
     except TomlError as error:
-        raise ConfigError(f"gripper.object: {path}, line {error.line}: {error}") from error
+        raise ConfigError(f"the scene {path}, line {error.line}: {error}") from error
     except ValidationFailed as misfit:
         said = [f"{'.'.join(map(str, one.path)) or 'the file'}: {one.text}" for one in misfit.problems]
-        raise ConfigError(f"gripper.object: {path}\n  " + "\n  ".join(said)) from None
+        raise ConfigError(f"the scene {path}\n  " + "\n  ".join(said)) from None
 
 
 def _check_schedule(name: str, rows: Schedule) -> None:
@@ -168,17 +223,31 @@ def _check_schedule(name: str, rows: Schedule) -> None:
         raise ValueError(f"the times of {name} rise from pair to pair")
 
 
+def _unit(direction: tuple[float, ...]) -> Floats:
+    """Return a direction with the length 1. Raises ValueError."""
+    if len(direction) != 3 or not 0.0 < float(np.linalg.norm(direction)) < float("inf"):
+        raise ValueError("direction is a vector of three numbers, not all zero")
+    unit: Floats = np.asarray(direction) / np.linalg.norm(direction)
+    return unit
+
+
 def _value(rows: Schedule, t_s: float) -> float:
     """Return the value at a time: straight between the pairs, the nearest one before and after them."""
     times, values = zip(*rows, strict=True)
     return float(np.interp(t_s, times, values))
 
 
-def put_on_arm(spec: mujoco.MjSpec) -> None:
-    """Put each body of the gripper that is fixed to the world on an upright slide with a servo.
+def put_on_arm(spec: mujoco.MjSpec, scene: Scene) -> None:
+    """Put each body of the gripper that is fixed to the world on slides with a servo, if the scene moves it.
 
-    Raises ConfigError where one has joints of its own.
+    There is an upright one for `arm`, and one along the direction of `shake`. Raises ConfigError where a body has
+    joints of its own.
     """
+    slides = [(ARM, np.array([0.0, 0.0, 1.0]))] if scene.arm else []
+    if scene.shake is not None:
+        slides.append((SHAKE, _unit(scene.shake.direction)))
+    if not slides:
+        return
     whole = compiled(spec, "the gripper")
     for body in spec.worldbody.bodies:
         if body.joints:
@@ -187,18 +256,19 @@ def put_on_arm(spec: mujoco.MjSpec) -> None:
             )
         back, axis = np.zeros(4), np.zeros(3)
         mujoco.mju_negQuat(back, whole.body_quat[body.id])
-        mujoco.mju_rotVecQuat(axis, np.array([0.0, 0.0, 1.0]), back)
-        name = f"{ARM}/{body.id}"
-        body.add_joint(
-            name=name,
-            type=mujoco.mjtJoint.mjJNT_SLIDE,
-            axis=axis,
-            armature=ARM_KG,
-            damping=[2.0 * ARM_KG * ARM_RAD_S, 0.0, 0.0],
-            limited=mujoco.mjtLimited.mjLIMITED_FALSE,
-        )
-        servo = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
-        servo.set_to_position(kp=ARM_KG * ARM_RAD_S**2)
+        for kind, direction in slides:
+            mujoco.mju_rotVecQuat(axis, direction, back)
+            name = f"{kind}/{body.id}"
+            body.add_joint(
+                name=name,
+                type=mujoco.mjtJoint.mjJNT_SLIDE,
+                axis=axis,
+                armature=ARM_KG,
+                damping=[2.0 * ARM_KG * ARM_RAD_S, 0.0, 0.0],
+                limited=mujoco.mjtLimited.mjLIMITED_FALSE,
+            )
+            servo = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+            servo.set_to_position(kp=ARM_KG * ARM_RAD_S**2)
     for body in spec.bodies:
         body.gravcomp = 1.0
 
@@ -339,20 +409,24 @@ class ArmMotion:
         """`finger` is a geom of a finger, with which the height of the thing is compared."""
         self._finger = finger
         self._scene, self._contact_s = scene, float("inf")
-        self._servos = [k for k in range(model.nu) if _actuator(model, k).startswith(f"{ARM}/")]
+        self._servos, self._shakers = (
+            [k for k in range(model.nu) if _actuator(model, k).startswith(f"{kind}/")]
+            for kind in (ARM, SHAKE)
+        )
         things = [k for k in range(model.nbody) if is_thing(model, k)]
         heaviest = model.body_mass[things] if things else np.zeros(0)
         self._body = things[0] if things else -1
         self._bodies, self._masses = things, heaviest
         self.moves = bool(things) and (
-            scene.cord is not None or bool(scene.arm or scene.table_height or scene.fill)
+            scene.cord is not None or bool(scene.arm or scene.table_height or scene.fill or scene.shake)
         )
         cord = () if scene.cord is None else scene.cord.force
         schedules = (scene.arm, scene.table_height, scene.fill, cord)
         self._model = model
         self._empty_kg = float(model.body_mass[self._body]) if things else 0.0
         self._table_m = _table_height(model)
-        self._end_s = max((rows[-1][0] for rows in schedules if rows), default=0.0)
+        ends_s = [rows[-1][0] for rows in schedules if rows]
+        self._end_s = max([*ends_s, 0.0 if scene.shake is None else scene.shake.end_s])
         self._start_m: Floats = np.zeros(3)
         self._above_finger_m = 0.0
         self._highest_m, self._height_m, self._slip_m = 0.0, 0.0, 0.0
@@ -376,12 +450,18 @@ class ArmMotion:
         self._slip_m = max(self._slip_m, self._above_finger_m - above_m)
         if self._servos:
             data.ctrl[self._servos] = _value(self._scene.arm, since_s)
+        if self._scene.shake is not None:
+            data.ctrl[self._shakers] = self._scene.shake.place_m(since_s)
         if self._scene.cord is not None:
             data.xfrc_applied[self._body, :3] = self._scene.cord.pull_n(since_s)
         if self._scene.table_height:
             data.mocap_pos[0, 2] = self._table_m + _value(self._scene.table_height, since_s)
         if self._scene.fill:
             self._fill(_value(self._scene.fill, since_s))
+
+    def shaken_m(self, data: mujoco.MjData) -> float:
+        """Return how far the shake has displaced the gripper."""
+        return float(data.actuator_length[self._shakers[0]])
 
     def _fill(self, filled_kg: float) -> None:
         """Give the thing this mass more, spread over its first body as its own."""

@@ -1,11 +1,11 @@
-"""What this distribution brings to graspsense: control laws by touch, and experiments with them."""
+"""What this distribution brings to graspsense: control laws by touch, features of a shake, and experiments."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
 from graspsense.experiment_api import ExperimentEntry, ExperimentKindEntry
-from graspsense.plugin_api import ControllerEntry, PipelineEntry, hookimpl
+from graspsense.plugin_api import ControllerEntry, FeatureSetEntry, PipelineEntry, hookimpl
 
 GRASPSENSE_API = (2, 0)
 
@@ -26,11 +26,22 @@ def graspsense_controllers() -> Iterable[ControllerEntry]:
 
 
 @hookimpl
+def graspsense_feature_sets() -> Iterable[FeatureSetEntry]:
+    """Return the features of a shake."""
+    yield FeatureSetEntry(
+        name="shake",
+        target="graspsense_romano.shake:ShakeFeatures",
+        summary="Bands, peaks and decays of acceleration and pads while a held thing is shaken, and after that",
+    )
+
+
+@hookimpl
 def graspsense_pipelines() -> Iterable[PipelineEntry]:
     """Return the pipelines of a simulated gripper with soft pads."""
     for name, summary in (
         ("hold", "holds a simulated block with the least force that does not slip"),
         ("place", "picks a simulated block up and puts it down, by touch"),
+        ("shake", "holds a simulated bottle and shakes it, to feel what is in it"),
     ):
         yield PipelineEntry(name=name, resource=f"graspsense_romano:pipelines/{name}.toml", summary=summary)
 
@@ -51,6 +62,9 @@ def graspsense_experiment_kinds() -> Iterable[ExperimentKindEntry]:
 
 @hookimpl
 def graspsense_experiments() -> Iterable[ExperimentEntry]:
-    """Return the experiments on grab, slip and placing."""
+    """Return the experiments on grab, slip, placing, and what is in a thing."""
     for name in ("romano_grab", "romano_slip", "romano_place"):
         yield ExperimentEntry(name, f"graspsense_romano:experiments/{name}.toml", seconds_per_trial=15.0)
+    yield ExperimentEntry(
+        "contents_shake", "graspsense_romano:experiments/contents_shake.toml", seconds_per_trial=5.0
+    )

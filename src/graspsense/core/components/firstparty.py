@@ -51,6 +51,7 @@ SHIPPED: Final[dict[tuple[Role, str], Shipped]] = {
     ("sensor-backend", "ros2"): _ROS2,
     ("sensor-backend", "so101"): _SO101,
     ("feature-set", "width-and-time"): _FRANKA,
+    ("feature-set", "shake"): _ROMANO,
     ("classifier", "c45"): _C45,
     ("controller", "find-contact"): _ROMANO,
     ("controller", "force-servo"): _ROMANO,
@@ -96,7 +97,7 @@ EXPERIMENTS: Final[dict[str, Shipped]] = dict.fromkeys(
         *("why_force", "worn_bottles"),
     ),
     _PAPER,
-) | dict.fromkeys(("romano_grab", "romano_place", "romano_slip"), _ROMANO)
+) | dict.fromkeys(("contents_shake", "romano_grab", "romano_place", "romano_slip"), _ROMANO)
 """Experiments in other distributions of this project."""
 
 EXPERIMENT_KINDS: Final[dict[str, Shipped]] = dict.fromkeys(("grasp", "paper", "table"), _PAPER) | {
