@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from itertools import repeat
 from math import ceil, inf, nan
 from pathlib import Path
 from typing import Any, Final, Unpack, final
@@ -12,6 +14,7 @@ import numpy as np
 from attrs import evolve
 
 from graspsense.plugin_api import (
+    APPROACH,
     EFFORT,
     NO_PADS,
     POSITION,
@@ -29,13 +32,26 @@ from graspsense.plugin_api import (
     TactileArray,
     signal_type,
 )
-from graspsense.simulator_api import BatchBackend, BatchOptions, Grasped, SimulationVariant, Viewer
+from graspsense.simulator_api import (
+    BatchBackend,
+    BatchOptions,
+    FreeRun,
+    Grasped,
+    NotCompilable,
+    RunConfig,
+    SimulationVariant,
+    TickParams,
+    TickState,
+    Viewer,
+    first_call,
+)
 from graspsense_mujoco_gripper.batch import GraspingJob, grasps
 from graspsense_mujoco_gripper.camera import Camera, Window, free_camera, offscreen, require_screen
 from graspsense_mujoco_gripper.catalogue import catalogue
 from graspsense_mujoco_gripper.config import MujocoConfig
 from graspsense_mujoco_gripper.draft import Draft, drafted
 from graspsense_mujoco_gripper.drive import ActuatorDrive, Travel, instability, test_move
+from graspsense_mujoco_gripper.engine import contacts_of
 from graspsense_mujoco_gripper.gripper_file import read_gripper
 from graspsense_mujoco_gripper.measurement import (
     ForceGauge,
@@ -57,6 +73,15 @@ from graspsense_mujoco_gripper.scene import (
     put_on_arm,
     read_scene,
     vary,
+)
+from graspsense_mujoco_gripper.ticks import (
+    COLUMNS,
+    MOST_TICKS,
+    Forces,
+    Moved,
+    Rig,
+    Ticked,
+    compiled_ticks,
 )
 
 INTEGRATORS: Final = ("Euler", "implicitfast", "implicit", "RK4", "discrete")
@@ -84,6 +109,8 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
     _viewer: Viewer | None = None
     _camera: Camera | None = None
     _window: Window | None = None
+    _compiles = False
+    _run_ticks: Callable[..., Any] | None = None
 
     @property
     def channels(self) -> tuple[Channel, ...]:
@@ -143,6 +170,17 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
             scenes,
             seeds,
         )
+
+    def compile(self) -> None:
+        """Run the ticks of the next grasps compiled where that is possible: it pays for many grasps."""
+        self._compiles = True
+
+    def expect(self, controller: Controller[Any], run: RunConfig) -> None:
+        """Take the law that is compiled with the ticks."""
+        del run
+        if self._compiles:
+            with suppress(NotCompilable):
+                self._run_ticks = compiled_ticks(type(controller).step)
 
     def see(self, viewer: Viewer) -> None:
         """Make pictures of the next grasp without a screen, or show it in MuJoCo's own viewer."""
@@ -230,7 +268,8 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
                 Palm(model, data, self._gripper.accelerometer, generator),
                 [1] * self._steps,
             )
-        self._noises: Iterator[float] = iter(())
+        self._noises: list[float] = []
+        self._drawn = 0
         self._tick_s, self._timestep_s = 1.0 / self.config.rate_hz, model.opt.timestep
         self._warnings, self._values = plain(data.warning.number), plain(data.sensordata)
         self._gap_m, self._rate_m_s = self._measured_gap_m(), 0.0
@@ -238,6 +277,33 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
         self._command = Command(EFFORT, 0.0, inf, inf)
         self._ticks, self._swings, self._broken, self._greatest_n = 0, 0, False, 0.0
         self._measured_m = self._rounded(self._gap_m)
+        self._stepped = False
+        self._rig = None if self._run_ticks is None else self._compiled_rig(data)
+
+    def _compiled_rig(self, data: mujoco.MjData) -> Rig | None:
+        """Return what compiled ticks take; None where more takes part in a tick than they know."""
+        forces, more = self._forces, (self._cells, self._palm, self._rough, self._viewer)
+        by_contacts = isinstance(forces, ForceGauge) and forces.only_contacts
+        if not by_contacts or any(more) or self._sensors or self._motion.moves:
+            return None
+        gap = GapGauge(self._model, self._gripper.gap).terms(data, self._travel.axis)
+        return Rig(
+            model=self._model._address,
+            data=data._address,
+            kept=np.array(self._kept),
+            timestep_s=self._timestep_s,
+            tick_s=self._tick_s,
+            gap=gap.in_arrays(),
+            gap_step_m=self.config.gap_step_m,
+            forces=Forces(contacts_of(data), np.array(forces.roles), self._travel.axis, np.zeros(6)),
+            drive=self._drive.law.in_arrays(),
+            warnings=data.warning.number,
+            shell=np.array(self._shell, np.int64),
+            equalities=data.eq_active,
+            breaks_at_n=self._thing.breaks_at_n if self._shell else inf,
+            swing_n=SWING * self._drive.effort_limit_n,
+            table=np.empty((COLUMNS, MOST_TICKS)),
+        )
 
     def _check_start(self, data: mujoco.MjData) -> None:
         """Raise ConfigError where the thing is in the fingers at the start."""
@@ -273,7 +339,23 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
     def read(self, timeout_s: float) -> Reading | None:
         """Step the model by one tick and measure. Raises DeviceLost where MuJoCo warns that the state is bad."""
         del timeout_s
-        data, model, drive, timestep_s = self._opened(), self._model, self._drive, self._timestep_s
+        data = self._opened()
+        if self._stepped:
+            self._stepped = False
+        else:
+            self._step(data)
+        if any(self._warnings) and (problem := instability(data)):
+            raise DeviceLost(f"the simulation became unstable: {problem}. Use a smaller gripper.timestep_s")
+        self._ticks += 1
+        if self._rough is not None:
+            self._rough.set()
+        if self._viewer is not None:
+            self._show(self._viewer, data, self._ticks / self.config.rate_hz)
+        return self._reading(data)
+
+    def _step(self, data: mujoco.MjData) -> None:
+        """Make the steps of a tick."""
+        model, drive, timestep_s = self._model, self._drive, self._timestep_s
         for steps in self._kept:
             kept_s = steps * timestep_s
             drive.set_controls(self._command, self._gap_m, self._rate_m_s, kept_s)
@@ -284,14 +366,35 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
                 self._palm.measure(self._rate_m_s)
             if self._shell and not self._broken:
                 self._break_shell(data)
-        if any(self._warnings) and (problem := instability(data)):
-            raise DeviceLost(f"the simulation became unstable: {problem}. Use a smaller gripper.timestep_s")
-        self._ticks += 1
-        if self._rough is not None:
-            self._rough.set()
-        if self._viewer is not None:
-            self._show(self._viewer, data, self._ticks / self.config.rate_hz)
-        return self._reading(data)
+
+    def free_ticks(self, params: TickParams, state: TickState, frame: Frame, most: int) -> FreeRun | None:
+        """Run ticks of this phase at once, if code was compiled for it."""
+        rig = self._rig
+        if rig is None or self._run_ticks is None or any(self._warnings):
+            return None
+        drive, most, errors = self._drive, min(most, MOST_TICKS), np.empty(0)
+        if self.config.force_noise_n:
+            self._draw(2 * most)
+            errors = np.array(self._noises[: 2 * most])
+        moved = Moved(self._gap_m, self._rate_m_s, drive.target_m, drive.effort_n, self._broken)
+        ticked = Ticked(self._ticks, self._measured_m, self._greatest_n, self._swings, self._command)
+        try:
+            with first_call():
+                run = self._run_ticks(rig, params, state, moved, ticked, errors, most)
+        except NotCompilable:
+            self._rig = None
+            return None
+        n, self._stepped, state, moved, ticked = run
+        self._gap_m, self._rate_m_s, drive.target_m, drive.effort_n, self._broken = moved
+        self._ticks, self._measured_m, self._greatest_n, self._swings, self._command = ticked
+        self._drawn = 2 * n
+        if state.phase < APPROACH:
+            return FreeRun(n, [], [], state)
+        t, gap, velocity, efforts, left, right, kinds, values, *limits = rig.table[:, :n].tolist()
+        unknown = repeat(nan)
+        columns = t, repeat(rig.tick_s), gap, velocity, efforts, left, right, unknown, unknown, repeat(0)
+        frames = list(map(Frame._make, zip(*columns, strict=False)))
+        return FreeRun(n, frames, values, state, map(Command, map(int, kinds), values, *limits))
 
     def _show(self, viewer: Viewer, data: mujoco.MjData, t_s: float) -> None:
         if self._camera is not None and t_s >= self._next_picture_s:
@@ -328,11 +431,17 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
             data.eq_active[self._shell] = 0
 
     def _noise(self) -> float:
-        """Return the next error of a force (N); many are drawn at once."""
-        for error_n in self._noises:
-            return error_n
-        self._noises = iter(self._generator.normal(0.0, self.config.force_noise_n, MANY).tolist())
-        return next(self._noises)
+        """Return the next error of a force (N)."""
+        if self._drawn >= len(self._noises):
+            self._draw(1)
+        self._drawn += 1
+        return self._noises[self._drawn - 1]
+
+    def _draw(self, count: int) -> None:
+        """Draw errors until there are so many that were not used."""
+        self._noises, self._drawn = self._noises[self._drawn :], 0
+        while len(self._noises) < count:
+            self._noises += self._generator.normal(0.0, self.config.force_noise_n, MANY).tolist()
 
     def _rounded(self, gap_m: float) -> float:
         step = self.config.gap_step_m

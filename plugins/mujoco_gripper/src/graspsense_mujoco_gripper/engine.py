@@ -1,0 +1,93 @@
+"""MuJoCo's functions and memory, as compiled code reaches them: by name in its library, and by address."""
+
+from __future__ import annotations
+
+import ctypes
+from functools import cache
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import mujoco
+import numpy as np
+from mujoco.introspect.ast_nodes import ArrayType, PointerType
+from mujoco.introspect.structs import STRUCTS
+
+NUMBERS: Final[dict[str, Any]] = {
+    "int": ctypes.c_int,
+    "mjtNum": ctypes.c_double,
+    "mjtBool": ctypes.c_bool,
+    "mjtSize": ctypes.c_int64,
+    "size_t": ctypes.c_size_t,
+    "uint64_t": ctypes.c_uint64,
+    "uintptr_t": ctypes.c_size_t,
+}
+
+
+@cache
+def structure(name: str) -> type[ctypes.Structure]:
+    """Return the layout of a structure of MuJoCo, which its package declares."""
+    fields = [(field.name, _type_of(field.type)) for field in STRUCTS[name].fields]
+    return type(name, (ctypes.Structure,), {"_fields_": fields})
+
+
+def _type_of(declared: Any) -> Any:
+    if isinstance(declared, PointerType):
+        return ctypes.c_void_p
+    if isinstance(declared, ArrayType):
+        element = _type_of(declared.inner_type)
+        for extent in reversed(declared.extents):
+            element *= extent
+        return element
+    return NUMBERS.get(declared.name) or structure(declared.name)
+
+
+class Contacts(NamedTuple):
+    """The contacts in the memory of a model; each step writes them anew, from the same place on."""
+
+    count: Any
+    """(1,)"""
+    geoms: Any
+    """(most, 2)"""
+    frames: Any
+    """(most, 9)"""
+
+
+def contacts_of(data: mujoco.MjData) -> Contacts:
+    """Return the contacts. Raises ValueError where the memory is not as MuJoCo's package declares it."""
+    contact, place = structure("mjContact"), structure("mjData")
+    known: Any = place.from_address(data._address)
+    size = ctypes.sizeof(contact)
+    most = data.narena // size
+    whole = (ctypes.c_char * (most * size)).from_address(known.arena)
+
+    def column(name: str, kind: type[np.generic], width: int) -> Any:
+        start, strides = getattr(contact, name).offset, (size, np.dtype(kind).itemsize)
+        return np.ndarray((most, width), kind, whole, start, strides)
+
+    count = np.ctypeslib.as_array((ctypes.c_int * 1).from_address(data._address + place.ncon.offset))
+    found = Contacts(count, column("geom", np.int32, 2), column("frame", np.float64, 9))
+    declared = known.narena, known.ncon, known.nefc, known.time, known.qpos
+    if declared != (data.narena, data.ncon, data.nefc, data.time, data.qpos.ctypes.data):
+        raise ValueError("the memory of MuJoCo is not as its package declares it")
+    return found
+
+
+@cache
+def functions() -> dict[str, Any]:
+    """Return the functions of MuJoCo that compiled code calls. Raises ImportError without numba."""
+    from llvmlite.binding import load_library_permanently
+    from numba import types
+
+    # The library that Python's module has loaded is found again.
+    (library,) = Path(mujoco.__file__).parent.glob("*mujoco*." + ("dylib" if False else "so*"))
+    load_library_permanently(str(library))
+    address, number = types.intp, types.float64
+    return {
+        "mj_step": types.ExternalFunction("mj_step", types.void(address, address)),
+        "mj_contactForce": types.ExternalFunction(
+            "mj_contactForce", types.void(address, address, types.int32, address)
+        ),
+        "mj_geomDistance": types.ExternalFunction(
+            "mj_geomDistance", number(address, address, types.int32, types.int32, number, address)
+        ),
+    }
