@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from contextlib import suppress
-from itertools import repeat
 from math import ceil, inf, nan
 from pathlib import Path
 from typing import Any, Final, Unpack, final
@@ -35,6 +33,7 @@ from graspsense.plugin_api import (
 from graspsense.simulator_api import (
     BatchBackend,
     BatchOptions,
+    FrameTable,
     FreeRun,
     Grasped,
     NotCompilable,
@@ -50,9 +49,9 @@ from graspsense_mujoco_gripper.camera import Camera, Window, free_camera, offscr
 from graspsense_mujoco_gripper.catalogue import catalogue
 from graspsense_mujoco_gripper.config import MujocoConfig
 from graspsense_mujoco_gripper.draft import Draft, drafted
-from graspsense_mujoco_gripper.drive import ActuatorDrive, Travel, instability, test_move
+from graspsense_mujoco_gripper.drive import ActuatorDrive, Travel, instability
 from graspsense_mujoco_gripper.engine import contacts_of
-from graspsense_mujoco_gripper.gripper_file import read_gripper
+from graspsense_mujoco_gripper.gripper_file import GripperFile, read_gripper
 from graspsense_mujoco_gripper.measurement import (
     ForceGauge,
     GapGauge,
@@ -61,22 +60,19 @@ from graspsense_mujoco_gripper.measurement import (
     cells_of,
     geoms_of,
     plain,
-    width_m,
 )
-from graspsense_mujoco_gripper.model import OBJ, compiled, gripper_spec, identifier
+from graspsense_mujoco_gripper.model import OBJ, identifier
+from graspsense_mujoco_gripper.prepared import Batch, prepare
 from graspsense_mujoco_gripper.roughness import Roughness
 from graspsense_mujoco_gripper.scene import (
     PREFIX,
     ArmMotion,
-    add_thing,
     is_thing,
-    put_on_arm,
     read_scene,
-    vary,
 )
 from graspsense_mujoco_gripper.ticks import (
-    COLUMNS,
     MOST_TICKS,
+    Buffers,
     Forces,
     Moved,
     Rig,
@@ -94,6 +90,7 @@ DEEPEST_M: Final = 1e-3
 """A thing that begins deeper in a finger is refused."""
 TOUCH_N: Final = 0.1
 """Force on both fingers from which on the motion of the scene begins: less may be the palm that swings."""
+NO_ERRORS: Final = np.empty(0)
 MANY: Final = 256
 """Errors of the forces that are drawn at once."""
 SWING, MOST_SWINGS = 0.1, 20
@@ -109,14 +106,16 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
     _viewer: Viewer | None = None
     _camera: Camera | None = None
     _window: Window | None = None
-    _compiles = False
+    _batch: Batch | None = None
     _run_ticks: Callable[..., Any] | None = None
 
     @property
     def channels(self) -> tuple[Channel, ...]:
         """Gap, velocity, effort and forces; cells and further sensors as the gripper file names them."""
+        return self._channels_of(read_gripper(self.config.file)[0])
+
+    def _channels_of(self, gripper: GripperFile) -> tuple[Channel, ...]:
         rate = self.config.rate_hz
-        gripper, _ = read_gripper(self.config.file)
         frame = [
             ("gap", "m"),
             ("velocity", "m/s"),
@@ -171,16 +170,15 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
             seeds,
         )
 
-    def compile(self) -> None:
-        """Run the ticks of the next grasps compiled where that is possible: it pays for many grasps."""
-        self._compiles = True
+    def join(self, batch: Batch) -> None:
+        """Take part in a batch: with what its grasps share, and compiled where that is possible and saves time."""
+        self._batch = batch
 
     def expect(self, controller: Controller[Any], run: RunConfig) -> None:
         """Take the law that is compiled with the ticks."""
         del run
-        if self._compiles:
-            with suppress(NotCompilable):
-                self._run_ticks = compiled_ticks(type(controller).step)
+        if self._batch is not None:
+            self._run_ticks = compiled_ticks(type(controller).step, self._batch.grasps)
 
     def see(self, viewer: Viewer) -> None:
         """Make pictures of the next grasp without a screen, or show it in MuJoCo's own viewer."""
@@ -199,25 +197,13 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
         """Build the model with the thing between the open fingers. Raises ConfigError, UnknownName."""
         self.close()
         config = self.config
-        self._gripper, path = read_gripper(config.file)
-        scene = read_scene(config.object)
-        self._thing, self._scene = scene.thing, scene.scene
         self._steps = self._steps_of_a_tick()
         timestep_s = 1.0 / (config.rate_hz * self._steps)
-        spec = gripper_spec(path, self._gripper, timestep_s)
-        if scene.scene.arm:
-            put_on_arm(spec)
-        _integrate(spec, config.integrator, soft=scene.spec is not None and len(scene.spec.flexes) > 0)
-        model = compiled(spec, str(path))
-        width = None if scene.spec is None else width_m(compiled(scene.spec, config.object))
-        travel = test_move(model, self._gripper, width)
+        prepared = self._batch.prepared(config, timestep_s) if self._batch else prepare(config, timestep_s)
+        self._gripper, travel = prepared.gripper, prepared.travel
+        self._thing, self._scene = prepared.scene.thing, prepared.scene.scene
         generator = np.random.default_rng(seed)
-        if scene.spec is not None:
-            place = travel.place
-            if config.spread:
-                place = place + vary(scene, generator) * travel.axis
-            add_thing(spec, scene, place, travel.axis)
-            model = compiled(spec, f"the gripper with {config.object}")
+        model = prepared.with_thing(generator)
         self._begin(model, travel, generator)
         if self._viewer is not None and self._viewer.frames_hz > 0.0:
             self._camera = Camera(model, travel.place, travel.axis, travel.open_m)
@@ -248,7 +234,7 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
             int(model.sensor_adr[identifier(model, OBJ.mjOBJ_SENSOR, one.sensor, "sensor")])
             for one in self._gripper.channels.values()
         ]
-        self._signals: Any = signal_type(self.channels)
+        self._signals: Any = signal_type(self._channels_of(self._gripper))
         self._shell = [
             identifier(model, OBJ.mjOBJ_EQUALITY, PREFIX + name, "equality") for name in self._thing.shell
         ]
@@ -268,8 +254,7 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
                 Palm(model, data, self._gripper.accelerometer, generator),
                 [1] * self._steps,
             )
-        self._noises: list[float] = []
-        self._drawn = 0
+        self._errors, self._drawn = NO_ERRORS, 0
         self._tick_s, self._timestep_s = 1.0 / self.config.rate_hz, model.opt.timestep
         self._warnings, self._values = plain(data.warning.number), plain(data.sensordata)
         self._gap_m, self._rate_m_s = self._measured_gap_m(), 0.0
@@ -302,7 +287,6 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
             equalities=data.eq_active,
             breaks_at_n=self._thing.breaks_at_n if self._shell else inf,
             swing_n=SWING * self._drive.effort_limit_n,
-            table=np.empty((COLUMNS, MOST_TICKS)),
         )
 
     def _check_start(self, data: mujoco.MjData) -> None:
@@ -327,6 +311,7 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
             simulated=True,
             harmless=True,
             rate_hz=self.config.rate_hz,
+            channels=self._channels_of(self._gripper),
             effort_limit_n=limit,
             speed_limit_m_s=self._gripper.speed_limit_m_s,
             opening=Command(POSITION, self._travel.open_m, limit, OPENING_M_S),
@@ -372,15 +357,16 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
         rig = self._rig
         if rig is None or self._run_ticks is None or any(self._warnings):
             return None
-        drive, most, errors = self._drive, min(most, MOST_TICKS), np.empty(0)
+        drive, most, errors = self._drive, min(most, MOST_TICKS), NO_ERRORS
         if self.config.force_noise_n:
             self._draw(2 * most)
-            errors = np.array(self._noises[: 2 * most])
+            errors = self._errors
+        buffers = Buffers(errors, np.empty((most, len(Frame._fields))), np.empty((4, most)))
         moved = Moved(self._gap_m, self._rate_m_s, drive.target_m, drive.effort_n, self._broken)
         ticked = Ticked(self._ticks, self._measured_m, self._greatest_n, self._swings, self._command)
         try:
             with first_call():
-                run = self._run_ticks(rig, params, state, moved, ticked, errors, most)
+                run = self._run_ticks(rig, params, state, moved, ticked, buffers, most)
         except NotCompilable:
             self._rig = None
             return None
@@ -390,11 +376,9 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
         self._drawn = 2 * n
         if state.phase < APPROACH:
             return FreeRun(n, [], [], state)
-        t, gap, velocity, efforts, left, right, kinds, values, *limits = rig.table[:, :n].tolist()
-        unknown = repeat(nan)
-        columns = t, repeat(rig.tick_s), gap, velocity, efforts, left, right, unknown, unknown, repeat(0)
-        frames = list(map(Frame._make, zip(*columns, strict=False)))
-        return FreeRun(n, frames, values, state, map(Command, map(int, kinds), values, *limits))
+        kinds, values, *limits = buffers.sent[:, :n].tolist()
+        sent = map(Command, map(int, kinds), values, *limits)
+        return FreeRun(n, FrameTable(buffers.rows[:n]), values, state, sent)
 
     def _show(self, viewer: Viewer, data: mujoco.MjData, t_s: float) -> None:
         if self._camera is not None and t_s >= self._next_picture_s:
@@ -432,16 +416,19 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
 
     def _noise(self) -> float:
         """Return the next error of a force (N)."""
-        if self._drawn >= len(self._noises):
+        if self._drawn >= len(self._errors):
             self._draw(1)
         self._drawn += 1
-        return self._noises[self._drawn - 1]
+        return float(self._errors[self._drawn - 1])
 
     def _draw(self, count: int) -> None:
         """Draw errors until there are so many that were not used."""
-        self._noises, self._drawn = self._noises[self._drawn :], 0
-        while len(self._noises) < count:
-            self._noises += self._generator.normal(0.0, self.config.force_noise_n, MANY).tolist()
+        left = [self._errors[self._drawn :]]
+        missing = count - len(left[0])
+        left += [
+            self._generator.normal(0.0, self.config.force_noise_n, MANY) for _ in range(0, missing, MANY)
+        ]
+        self._errors, self._drawn = np.concatenate(left), 0
 
     def _rounded(self, gap_m: float) -> float:
         step = self.config.gap_step_m
@@ -510,11 +497,3 @@ def _step_variant(integrator: str, timestep_s: float) -> SimulationVariant:
         },
         role="reference" if is_reference else "curve",
     )
-
-
-def _integrate(spec: mujoco.MjSpec, integrator: str, *, soft: bool) -> None:
-    """Set the integrator; MuJoCo's implicit ones, which grippers name, do not integrate soft bodies."""
-    if integrator == "model" and soft:
-        integrator = "discrete"
-    if integrator != "model":
-        spec.option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{integrator.upper()}")

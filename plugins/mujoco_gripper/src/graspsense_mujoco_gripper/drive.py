@@ -67,11 +67,10 @@ class Travel:
         """Return the length of each transmission at a gap."""
         return np.array([np.interp(gap_m, self.gap_m, row) for row in self.length])
 
-    def slopes(self, gap_m: float) -> Floats:
-        """Return the change of each length with the gap (1, or rad/m)."""
-        k = min(max(int(self.gap_m.searchsorted(gap_m)), 1), len(self.gap_m) - 1)
-        slopes: Floats = (self.length[:, k] - self.length[:, k - 1]) / (self.gap_m[k] - self.gap_m[k - 1])
-        return slopes
+    def slopes(self) -> Floats:
+        """Return the change of each length with the gap (1, or rad/m) below each of the gaps, a row each."""
+        rises = (np.diff(self.length) / np.diff(self.gap_m)).T
+        return np.vstack([rises[:1], rises])
 
 
 def test_move(model: mujoco.MjModel, gripper: GripperFile, width_m: float | None) -> Travel:
@@ -364,7 +363,7 @@ class ActuatorDrive:
             actuators=actuators,
             gaps_m=travel.gap_m.tolist(),
             lengths=travel.length.T.tolist(),
-            slopes=[travel.slopes(gap_m).tolist() for gap_m in travel.gap_m.tolist()],
+            slopes=travel.slopes().tolist(),
             mass_kg=float(travel.mass_kg),
             servo_rad_s=servo_rad_s,
             effort_limit_n=float(self.effort_limit_n),
@@ -385,9 +384,7 @@ class ActuatorDrive:
 
     def set_controls(self, command: Command, gap_m: float, rate_m_s: float, dt_s: float) -> None:
         """Set the controls for the next `dt_s` under a command."""
-        self.effort_n, self.target_m = set_controls(
-            self.law, command, gap_m, rate_m_s, dt_s, self.target_m
-        )
+        self.effort_n, self.target_m = set_controls(self.law, command, gap_m, rate_m_s, dt_s, self.target_m)
 
 
 def _greatest(travel: Travel, actuators: list[list[float]]) -> float:
@@ -395,7 +392,7 @@ def _greatest(travel: Travel, actuators: list[list[float]]) -> float:
     gap_m = float(np.mean(travel.gap_m))
     effort_n = 0.0
     for slope, length, (gain, b0, b1, _, least, most, least_n, most_n) in zip(
-        travel.slopes(gap_m), travel.lengths(gap_m), actuators, strict=True
+        travel.slopes()[int(travel.gap_m.searchsorted(gap_m))], travel.lengths(gap_m), actuators, strict=True
     ):
         ends = sorted(gain * control + b0 + b1 * length for control in (least, most))
         low, high = (min(max(end, least_n), most_n) for end in ends)

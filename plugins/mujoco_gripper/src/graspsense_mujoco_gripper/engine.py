@@ -78,8 +78,9 @@ def functions() -> dict[str, Any]:
     from llvmlite.binding import load_library_permanently
     from numba import types
 
-    # The library that Python's module has loaded is found again.
-    (library,) = Path(mujoco.__file__).parent.glob("*mujoco*." + ("dylib" if False else "so*"))
+    folder = Path(mujoco.__file__).parent
+    # Python's module has loaded it already.
+    (library,) = (one for one in folder.iterdir() if one.name.startswith(("libmujoco.", "mujoco.dll")))
     load_library_permanently(str(library))
     address, number = types.intp, types.float64
     return {

@@ -20,6 +20,7 @@ from graspsense.simulator_api import (
     bind,
     compile_function,
     events_of,
+    is_on_disk,
     tick,
 )
 from graspsense_mujoco_gripper.drive import DriveLaw, set_controls
@@ -27,10 +28,10 @@ from graspsense_mujoco_gripper.engine import Contacts, functions
 from graspsense_mujoco_gripper.measurement import FARTHEST_M, GapTerms, signs_of
 
 OPTIONS = CompileOptions(install="graspsense-mujoco-gripper[fast]")
-MOST_TICKS = 512
+WORTH_LOADING, WORTH_COMPILING = 16, 64
+"""Grasps of a process from which loading compiled code, and compiling it, takes less time than it saves."""
+MOST_TICKS = 2048
 """Ticks that are run at once; between two of these runs a user can interrupt the grasp."""
-COLUMNS = 10
-"""Time, gap, velocity, effort and forces of the frame; kind, value and limits of the command."""
 
 
 class Forces(NamedTuple):
@@ -62,8 +63,17 @@ class Rig(NamedTuple):
     breaks_at_n: float
     """`inf`: nothing breaks."""
     swing_n: float
-    table: Any
-    """(10, most) The ticks that are run at once."""
+
+
+class Buffers(NamedTuple):
+    """The memory of ticks that are run at once."""
+
+    errors: Any
+    """(2 most,) The errors of the forces; empty: none."""
+    rows: Any
+    """(most, 10) The frames."""
+    sent: Any
+    """(4, most) Kind, value and limits of the commands."""
 
 
 class Moved(NamedTuple):
@@ -91,18 +101,17 @@ def _unbound(*arguments: Any) -> Any:
 
 
 mj_step: Callable[..., None] = _unbound
-mj_contactForce: Callable[..., None] = _unbound
-mj_geomDistance: Callable[..., float] = _unbound
+contact_force: Callable[..., None] = _unbound
+geom_distance: Callable[..., float] = _unbound
 control: Callable[[TickParams, TickState, Reading], tuple[Command, TickState]] = _unbound
 
 
 def ticks_at_once(
-    rig: Rig, params: TickParams, state: TickState, moved: Moved, ticked: Ticked, errors: Any, most: int
+    rig: Rig, params: TickParams, state: TickState, moved: Moved, ticked: Ticked, buffers: Buffers, most: int
 ) -> tuple[int, bool, TickState, Moved, Ticked]:
     """Run up to `most` ticks, until one changes more than the runner leaves to the gripper.
 
-    Return their number, whether MuJoCo has made the steps of one more, and the states then. `errors` are those of the
-    forces, two for each tick.
+    Return their number, whether MuJoCo has made the steps of one more, and the states then.
     """
     n = 0
     while n < most:
@@ -110,7 +119,7 @@ def ticks_at_once(
         for warning in rig.warnings:
             if warning != 0:
                 return n, True, state, moved, ticked
-        frame, greatest_n = _measure(rig, moved, ticked, errors, n)
+        frame, greatest_n = _measure(rig, moved, ticked, buffers.errors, n)
         command, after = control(params, state, Reading(frame, Pads(0.0, 0, (), ()), ()))
         if after.phase != state.phase or after.done == 1 or after.events != 0:
             return n, True, state, moved, ticked
@@ -120,7 +129,7 @@ def ticks_at_once(
         if command.kind == EFFORT and command.value * before.value < 0.0:
             swings += 1 if min(abs(command.value), abs(before.value)) > rig.swing_n else 0
         ticked = Ticked(ticked.ticks + 1, frame.gap_m, greatest_n, swings, command)
-        _record(rig.table, n, frame, command)
+        _record(buffers.rows, buffers.sent, n, frame, command)
         n += 1
     return n, False, state, moved, ticked
 
@@ -147,7 +156,7 @@ def _move(rig: Rig, moved: Moved, command: Command) -> Moved:
 def _gap_m(rig: Rig) -> float:
     gap = rig.gap
     if len(gap.geoms) > 0:
-        return mj_geomDistance(rig.model, rig.data, gap.geoms[0], gap.geoms[1], FARTHEST_M, 0)
+        return geom_distance(rig.model, rig.data, gap.geoms[0], gap.geoms[1], FARTHEST_M, 0)
     total: float = gap.offset_m
     for k in range(len(gap.places)):
         total += gap.weights[k] * gap.values[gap.places[k]]
@@ -160,7 +169,7 @@ def _forces_n(rig: Rig) -> tuple[float, float]:
     for k in range(count[0]):
         on_left, on_right = signs_of(roles[geoms[k, 0]], roles[geoms[k, 1]])
         if on_left != 0.0 or on_right != 0.0:
-            mj_contactForce(rig.model, rig.data, k, wrench.ctypes.data)
+            contact_force(rig.model, rig.data, k, wrench.ctypes.data)
             along = 0.0
             for row in range(3):
                 start = 3 * row
@@ -185,16 +194,13 @@ def _measure(rig: Rig, moved: Moved, ticked: Ticked, errors: Any, n: int) -> tup
     return Frame(t_s, rig.tick_s, gap_m, velocity, moved.effort_n, left, right, nan, nan, 0), greatest_n
 
 
-def _record(table: Any, n: int, frame: Frame, command: Command) -> None:
-    table[0, n], table[1, n], table[2, n], table[3, n] = (
-        frame.t_s,
-        frame.gap_m,
-        frame.velocity_m_s,
-        frame.effort_n,
-    )
-    table[4, n], table[5, n] = frame.force_left_n, frame.force_right_n
-    table[6, n], table[7, n] = float(command.kind), command.value
-    table[8, n], table[9, n] = command.effort_limit_n, command.speed_limit_m_s
+def _record(rows: Any, sent: Any, n: int, frame: Frame, command: Command) -> None:
+    rows[n, 0], rows[n, 1], rows[n, 2] = frame.t_s, frame.dt_s, frame.gap_m
+    rows[n, 3], rows[n, 4] = frame.velocity_m_s, frame.effort_n
+    rows[n, 5], rows[n, 6] = frame.force_left_n, frame.force_right_n
+    rows[n, 7], rows[n, 8], rows[n, 9] = frame.edge_left_n, frame.edge_right_n, 0.0
+    sent[0, n], sent[1, n] = float(command.kind), command.value
+    sent[2, n], sent[3, n] = command.effort_limit_n, command.speed_limit_m_s
 
 
 def _first_not_below(numbers: Any, number: float) -> int:
@@ -209,27 +215,38 @@ def _first_not_below(numbers: Any, number: float) -> int:
     return low
 
 
+def compiled_ticks(step: Callable[..., Any], grasps: int) -> Callable[..., Any] | None:
+    """Return `ticks_at_once` for a controller with this step, compiled.
+
+    None where it cannot be compiled, or takes more time than it saves with so many grasps.
+    """
+    return None if grasps < WORTH_LOADING else _compiled(step, grasps >= WORTH_COMPILING)
+
+
 @lru_cache(maxsize=16)
-def compiled_ticks(step: Callable[..., Any]) -> Callable[..., Any]:
-    """Return `ticks_at_once` for a controller with this step, compiled. Raises NotCompilable."""
+def _compiled(step: Callable[..., Any], anew: bool) -> Callable[..., Any] | None:
+    """Return `ticks_at_once` compiled; None also where that was not done before, and is not to be done `anew`."""
     try:
-        known = functions()
-    except (ImportError, ValueError) as error:
-        raise NotCompilable(f'numba is not installed: pip install "{OPTIONS.install}"') from error
-    drive = bind(set_controls, bisect_left=_first_not_below)
-    distance, force = known["mj_geomDistance"], known["mj_contactForce"]
-    forces_n = bind(_forces_n, mj_contactForce=force)
+        whole = _composed(step)
+        return compile_function(whole, OPTIONS) if anew or is_on_disk(whole, OPTIONS) else None
+    except (NotCompilable, ImportError, ValueError):
+        return None
+
+
+def _composed(step: Callable[..., Any]) -> Callable[..., Any]:
+    """Return `ticks_at_once` for a controller with this step. Raises ImportError without numba."""
+    known = functions()
+    forces_n = bind(_forces_n, contact_force=known["mj_contactForce"])
     move = bind(
         _move,
-        set_controls=drive,
+        set_controls=bind(set_controls, bisect_left=_first_not_below),
         mj_step=known["mj_step"],
-        _gap_m=bind(_gap_m, mj_geomDistance=distance),
+        _gap_m=bind(_gap_m, geom_distance=known["mj_geomDistance"]),
         _forces_n=forces_n,
     )
-    whole = bind(
+    return bind(
         ticks_at_once,
         _move=move,
         _measure=bind(_measure, _forces_n=forces_n),
         control=bind(tick, step=step, events_told=events_of(step)),
     )
-    return compile_function(whole, OPTIONS)

@@ -10,7 +10,7 @@ instead, which give the same commands and states for less (see `graspsense.core.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from math import inf, nan
 from typing import Any, NamedTuple
 
@@ -204,7 +204,7 @@ class FreeRun(NamedTuple):
     """Ticks of a phase that a backend has run at once."""
 
     n_ticks: int
-    frames: list[Frame]
+    frames: Sequence[Frame]
     """The frame of each tick, if they are of a phase that is recorded (from the approach on); otherwise none."""
     commands: list[float]
     """The value that was commanded after each of these frames."""
