@@ -9,9 +9,10 @@ import pytest
 from attrs import evolve, fields
 
 from graspsense.core.grasp.runner import run_grasp
-from graspsense.plugin_api import Command, Trace, create
+from graspsense.gripper_api import Outcome
+from graspsense.plugin_api import Trace, create
 from graspsense.simulator_api import RunConfig, run_uninterrupted
-from graspsense_mujoco_gripper import ticks
+from graspsense_mujoco_gripper import prepared, ticks
 from graspsense_mujoco_gripper.backend import MujocoGripper
 from graspsense_mujoco_gripper.config import MujocoConfig
 from graspsense_mujoco_gripper.prepared import Batch
@@ -74,18 +75,25 @@ def test_the_shell_of_an_egg_breaks_in_compiled_ticks():
     assert done.report["broken"]
 
 
-def test_a_warning_of_mujoco_ends_compiled_ticks_as_it_ends_the_interpreter(monkeypatch):
-    opened = MujocoGripper._begin
+def test_a_warning_of_mujoco_ends_compiled_ticks_as_it_ends_the_interpreter(tmp_path, monkeypatch):
+    # A part on a spring that pushes it away: from 1e-30 m its distance grows to a bad one within the grasp.
+    wild = tmp_path / "wild.xml"
+    wild.write_text(
+        '<mujoco><worldbody><body name="wild" gravcomp="1"><freejoint/><geom type="box" size="0.02 0.02 0.02" '
+        'mass="0.1"/><body><joint name="j" type="slide" stiffness="-100"/><geom size="0.001" mass="1e-3" '
+        'contype="0" conaffinity="0"/></body></body></worldbody></mujoco>'
+    )
+    begin = MujocoGripper._begin
 
-    def light(gripper, model, *arguments):
-        # So light a thing is thrown out of the model within some steps.
-        model.opt.gravity[:] = 0.0, 0.0, 1e9
-        opened(gripper, model, *arguments)
+    def begun(gripper, *arguments):
+        begin(gripper, *arguments)
+        gripper._data.qpos[-1] = 1e-30
 
-    monkeypatch.setattr(MujocoGripper, "_begin", light)
-    plain, _ = grasp(FAST, grasps=1)
-    compiled, _ = grasp(FAST)
-    assert "unstable" in plain.reason
+    monkeypatch.setattr(MujocoGripper, "_begin", begun)
+    plain, _ = grasp(FAST, grasps=1, object=str(wild))
+    compiled, at_once = grasp(FAST, object=str(wild))
+    assert plain.outcome == Outcome.DEVICE_LOST
+    assert at_once > 100
     assert told(compiled) == told(plain)
 
 
@@ -116,22 +124,37 @@ def test_a_controller_that_cannot_be_compiled_runs_in_the_interpreter():
 STEP = type(FAST).step
 
 
-def test_a_limit_that_changes_from_tick_to_tick_is_recorded_for_sinks():
-    commands = []
+def test_sinks_see_the_frames_and_commands_of_compiled_ticks():
+    seen = []
 
     class Sink:
         def take(self, reading, phase, command):
-            commands.append(command)
+            seen[-1].append((repr(reading), phase, repr(command)))
 
-    seen = []
     for grasps in (1, MANY):
         gripper = MujocoGripper(MujocoConfig())
         gripper.join(Batch(grasps, {}))
+        seen.append([])
         run_grasp(gripper, FAST, RUN, sinks=[Sink()])
-        seen.append(list(commands))
-        commands.clear()
     assert seen[0] == seen[1]
-    assert all(type(command) is Command and type(command.kind) is int for command in seen[1])
+
+
+def test_a_batch_prepares_each_thing_once_and_grasps_as_one_by_one(monkeypatch):
+    things, seeds = ["block", "can", "block", "can#1", "can"], [1, 2, 3, 1, 3]
+    options = {"run": RUN, "traces": True, "workers": 1}
+    alone = [
+        MujocoGripper(MujocoConfig()).run_many(FAST, [thing], [seed], **options)[0]
+        for thing, seed in zip(things, seeds, strict=True)
+    ]
+    prepare, made = prepared.prepare, []
+    monkeypatch.setattr(prepared, "prepare", lambda *given: made.append(given[0].object) or prepare(*given))
+    monkeypatch.setattr(ticks, "WORTH_LOADING", len(things))
+    monkeypatch.setattr(ticks, "WORTH_COMPILING", len(things))
+    batch = MujocoGripper(MujocoConfig()).run_many(FAST, things, seeds, **options)
+    assert made == ["block", "can", "can#1"]
+    for one, other in zip(batch, alone, strict=True):
+        assert one.report == other.report
+        assert one.trace.force_left_n.tobytes() == other.trace.force_left_n.tobytes()
 
 
 def test_few_grasps_are_not_compiled():

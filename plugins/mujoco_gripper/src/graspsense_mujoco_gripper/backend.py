@@ -268,8 +268,9 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
     def _compiled_rig(self, data: mujoco.MjData) -> Rig | None:
         """Return what compiled ticks take; None where more takes part in a tick than they know."""
         forces, more = self._forces, (self._cells, self._palm, self._rough, self._viewer)
-        by_contacts = isinstance(forces, ForceGauge) and forces.only_contacts
-        if not by_contacts or any(more) or self._sensors or self._motion.moves:
+        if not isinstance(forces, ForceGauge) or not forces.only_contacts:
+            return None
+        if any(more) or self._sensors or self._motion.moves:
             return None
         gap = GapGauge(self._model, self._gripper.gap).terms(data, self._travel.axis)
         return Rig(

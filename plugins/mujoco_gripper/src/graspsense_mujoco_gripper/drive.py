@@ -259,7 +259,7 @@ class DriveLaw(NamedTuple):
 
     def in_arrays(self) -> DriveLaw:
         """Return the same law for compiled code; the memory remains that of the model."""
-        return DriveLaw(*[value if isinstance(value, float) else np.asarray(value) for value in self])
+        return DriveLaw._make(value if isinstance(value, float) else np.asarray(value) for value in self)
 
 
 def set_controls(

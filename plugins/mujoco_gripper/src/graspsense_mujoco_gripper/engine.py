@@ -9,8 +9,6 @@ from typing import Any, Final, NamedTuple
 
 import mujoco
 import numpy as np
-from mujoco.introspect.ast_nodes import ArrayType, PointerType
-from mujoco.introspect.structs import STRUCTS
 
 NUMBERS: Final[dict[str, Any]] = {
     "int": ctypes.c_int,
@@ -26,19 +24,22 @@ NUMBERS: Final[dict[str, Any]] = {
 @cache
 def structure(name: str) -> type[ctypes.Structure]:
     """Return the layout of a structure of MuJoCo, which its package declares."""
+    # Not all that a single grasp needs.
+    from mujoco.introspect.structs import STRUCTS
+
     fields = [(field.name, _type_of(field.type)) for field in STRUCTS[name].fields]
     return type(name, (ctypes.Structure,), {"_fields_": fields})
 
 
 def _type_of(declared: Any) -> Any:
-    if isinstance(declared, PointerType):
-        return ctypes.c_void_p
-    if isinstance(declared, ArrayType):
+    if hasattr(declared, "extents"):
         element = _type_of(declared.inner_type)
         for extent in reversed(declared.extents):
             element *= extent
         return element
-    return NUMBERS.get(declared.name) or structure(declared.name)
+    name = getattr(declared, "name", "")
+    # A pointer has no name.
+    return NUMBERS.get(name) or (structure(name) if name else ctypes.c_void_p)
 
 
 class Contacts(NamedTuple):

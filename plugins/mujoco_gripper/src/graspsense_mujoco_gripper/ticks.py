@@ -28,7 +28,7 @@ from graspsense_mujoco_gripper.engine import Contacts, functions
 from graspsense_mujoco_gripper.measurement import FARTHEST_M, GapTerms, signs_of
 
 OPTIONS = CompileOptions(install="graspsense-mujoco-gripper[fast]")
-WORTH_LOADING, WORTH_COMPILING = 16, 64
+WORTH_LOADING, WORTH_COMPILING = 16, 100
 """Grasps of a process from which loading compiled code, and compiling it, takes less time than it saves."""
 MOST_TICKS = 2048
 """Ticks that are run at once; between two of these runs a user can interrupt the grasp."""

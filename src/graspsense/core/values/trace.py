@@ -156,11 +156,11 @@ class FrameTable(Sequence[Frame]):
     def __len__(self) -> int:
         return len(self.rows)
 
-    def __getitem__(self, k: Any) -> Any:
+    def __getitem__(self, k: int | slice) -> Any:
         if isinstance(k, slice):
             return FrameTable(self.rows[k])
         *numbers, status = self.rows[k].tolist()
-        return Frame(*numbers, int(status))
+        return Frame._make([*numbers, int(status)])
 
 
 @define(eq=False)
