@@ -40,9 +40,9 @@ from graspsense_mujoco_gripper.prepared import Batch
 
 TWO_FINGERS = str(Path(__file__).parents[3] / "examples" / "mujoco" / "robotiq_140.toml")
 CASES = [
-    ("rigid", "block", "parallel", "", 200),
-    ("springs", "can", "parallel", "", 200),
-    ("rigid", "block", "Robotiq 2F-140", TWO_FINGERS, 200),
+    ("rigid", "block", "parallel", "", 64),
+    ("springs", "can", "parallel", "", 64),
+    ("rigid", "block", "Robotiq 2F-140", TWO_FINGERS, 64),
     ("soft body", "sponge", "parallel", "", 32),
 ]
 """Kind, thing, gripper, its file, and the grasps of a batch."""

@@ -72,10 +72,10 @@ from graspsense_mujoco_gripper.scene import (
 )
 from graspsense_mujoco_gripper.ticks import (
     MOST_TICKS,
-    Buffers,
     Forces,
     Moved,
-    Rig,
+    SteppedModel,
+    TickBuffers,
     Ticked,
     compiled_ticks,
 )
@@ -265,7 +265,7 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
         self._stepped = False
         self._rig = None if self._run_ticks is None else self._compiled_rig(data)
 
-    def _compiled_rig(self, data: mujoco.MjData) -> Rig | None:
+    def _compiled_rig(self, data: mujoco.MjData) -> SteppedModel | None:
         """Return what compiled ticks take; None where more takes part in a tick than they know."""
         forces, more = self._forces, (self._cells, self._palm, self._rough, self._viewer)
         if not isinstance(forces, ForceGauge) or not forces.only_contacts:
@@ -273,7 +273,7 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
         if any(more) or self._sensors or self._motion.moves:
             return None
         gap = GapGauge(self._model, self._gripper.gap).terms(data, self._travel.axis)
-        return Rig(
+        return SteppedModel(
             model=self._model._address,
             data=data._address,
             kept=np.array(self._kept),
@@ -362,7 +362,7 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
         if self.config.force_noise_n:
             self._draw(2 * most)
             errors = self._errors
-        buffers = Buffers(errors, np.empty((most, len(Frame._fields))), np.empty((4, most)))
+        buffers = TickBuffers(errors, np.empty((most, len(Frame._fields))), np.empty((4, most)))
         moved = Moved(self._gap_m, self._rate_m_s, drive.target_m, drive.effort_n, self._broken)
         ticked = Ticked(self._ticks, self._measured_m, self._greatest_n, self._swings, self._command)
         try:

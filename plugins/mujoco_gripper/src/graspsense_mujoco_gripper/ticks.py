@@ -43,7 +43,7 @@ class Forces(NamedTuple):
     wrench: Any
 
 
-class Rig(NamedTuple):
+class SteppedModel(NamedTuple):
     """What stays the same in a grasp: addresses, memory of the model, and settings."""
 
     model: int
@@ -65,7 +65,7 @@ class Rig(NamedTuple):
     swing_n: float
 
 
-class Buffers(NamedTuple):
+class TickBuffers(NamedTuple):
     """The memory of ticks that are run at once."""
 
     errors: Any
@@ -107,7 +107,13 @@ control: Callable[[TickParams, TickState, Reading], tuple[Command, TickState]] =
 
 
 def ticks_at_once(
-    rig: Rig, params: TickParams, state: TickState, moved: Moved, ticked: Ticked, buffers: Buffers, most: int
+    rig: SteppedModel,
+    params: TickParams,
+    state: TickState,
+    moved: Moved,
+    ticked: Ticked,
+    buffers: TickBuffers,
+    most: int,
 ) -> tuple[int, bool, TickState, Moved, Ticked]:
     """Run up to `most` ticks, until one changes more than the runner leaves to the gripper.
 
@@ -121,9 +127,8 @@ def ticks_at_once(
                 return n, True, state, moved, ticked
         frame, greatest_n = _measure(rig, moved, ticked, buffers.errors, n)
         command, after = control(params, state, Reading(frame, Pads(0.0, 0, (), ()), ()))
-        if after.phase != state.phase or after.done == 1 or after.events != 0:
-            return n, True, state, moved, ticked
-        if after.guard.acted != state.guard.acted or after.guard.contact_seen != state.guard.contact_seen:
+        acts = after.guard.stopped == 1 or (after.guard.acted != 0 and state.guard.acted == 0)
+        if after.phase != state.phase or after.done == 1 or after.events != 0 or acts:
             return n, True, state, moved, ticked
         state, swings, before = after, ticked.swings, ticked.command
         if command.kind == EFFORT and command.value * before.value < 0.0:
@@ -134,7 +139,7 @@ def ticks_at_once(
     return n, False, state, moved, ticked
 
 
-def _move(rig: Rig, moved: Moved, command: Command) -> Moved:
+def _move(rig: SteppedModel, moved: Moved, command: Command) -> Moved:
     """Make the steps of a tick, as `MujocoGripper` does."""
     gap_m, rate_m_s, target_m, effort_n, broken = moved
     for steps in rig.kept:
@@ -153,7 +158,7 @@ def _move(rig: Rig, moved: Moved, command: Command) -> Moved:
     return Moved(gap_m, rate_m_s, target_m, effort_n, broken)
 
 
-def _gap_m(rig: Rig) -> float:
+def _gap_m(rig: SteppedModel) -> float:
     gap = rig.gap
     if len(gap.geoms) > 0:
         return geom_distance(rig.model, rig.data, gap.geoms[0], gap.geoms[1], FARTHEST_M, 0)
@@ -163,7 +168,7 @@ def _gap_m(rig: Rig) -> float:
     return total
 
 
-def _forces_n(rig: Rig) -> tuple[float, float]:
+def _forces_n(rig: SteppedModel) -> tuple[float, float]:
     (count, geoms, frames), roles, axis, wrench = rig.forces
     left = right = 0.0
     for k in range(count[0]):
@@ -180,7 +185,7 @@ def _forces_n(rig: Rig) -> tuple[float, float]:
     return left, right
 
 
-def _measure(rig: Rig, moved: Moved, ticked: Ticked, errors: Any, n: int) -> tuple[Frame, float]:
+def _measure(rig: SteppedModel, moved: Moved, ticked: Ticked, errors: Any, n: int) -> tuple[Frame, float]:
     """Return the frame of a tick, and the greatest force so far."""
     left, right = _forces_n(rig)
     greatest_n = max(ticked.greatest_n, left, right)

@@ -506,7 +506,7 @@ class _Grasp:
                 self.late += frame.dt_s > late_s
                 if losses is not None:
                     losses.see(reading)
-                self._count(phase, self._acted(state) > acted)
+                self._count(phase, 1, self._acted(state) > acted)
             try:
                 apply(command)
             finally:
@@ -554,12 +554,11 @@ class _Grasp:
         free = self.backend.free_ticks(self.params, self.state, before.frame, most)
         if free is None:
             return 0
-        self.state = free.state
+        limited, self.state = free.state.guard.acted - self.state.guard.acted, free.state
         if free.frames:
             self.last = free.frames[-1]
             self.recorder.extend(free.frames, phase, free.commands)
-        if phase in (SQUEEZE, HOLD):
-            self.squeezed += free.n_ticks
+            self._count(phase, free.n_ticks, limited)
         if self.sinks:
             sent = free.sent or (Command(EFFORT, effort_n, inf, inf) for effort_n in free.commands)
             for frame, command in zip(free.frames, sent, strict=True):
@@ -611,11 +610,11 @@ class _Grasp:
             self._event(frame.t_s, Phase(self.state.phase), "guard: a command was limited")
         return now
 
-    def _count(self, phase: int, limited: bool) -> None:
-        """Count a command, and whether guard or protection limited it."""
+    def _count(self, phase: int, commands: int, limited: int) -> None:
+        """Count commands, and how many of them guard or protection limited."""
         self.guarded += limited
         if phase in (SQUEEZE, HOLD):
-            self.squeezed += 1
+            self.squeezed += commands
             self.squeezed_guarded += limited
 
     def warnings(self) -> tuple[str, ...]:
