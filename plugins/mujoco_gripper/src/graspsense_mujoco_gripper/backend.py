@@ -90,6 +90,8 @@ DEEPEST_M: Final = 1e-3
 """A thing that begins deeper in a finger is refused."""
 TOUCH_N: Final = 0.1
 """Force on both fingers from which on the motion of the scene begins: less may be the palm that swings."""
+AMPLE: Final = 16
+"""Compiled ticks leave this share of the memory for contacts to them, and steps with more to the interpreter."""
 NO_ERRORS: Final = np.empty(0)
 MANY: Final = 256
 """Errors of the forces that are drawn at once."""
@@ -270,7 +272,8 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
         forces, more = self._forces, (self._cells, self._palm, self._rough, self._viewer)
         if not isinstance(forces, ForceGauge) or not forces.only_contacts:
             return None
-        if any(more) or self._sensors or self._motion.moves:
+        contacts = contacts_of(data)
+        if contacts is None or any(more) or self._sensors or self._motion.moves:
             return None
         gap = GapGauge(self._model, self._gripper.gap).terms(data, self._travel.axis)
         return SteppedModel(
@@ -281,9 +284,10 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
             tick_s=self._tick_s,
             gap=gap.in_arrays(),
             gap_step_m=self.config.gap_step_m,
-            forces=Forces(contacts_of(data), np.array(forces.roles), self._travel.axis, np.zeros(6)),
+            forces=Forces(contacts, np.array(forces.roles), self._travel.axis, np.zeros(6)),
             drive=self._drive.law.in_arrays(),
             warnings=data.warning.number,
+            most_bytes=data.narena // AMPLE,
             shell=np.array(self._shell, np.int64),
             equalities=data.eq_active,
             breaks_at_n=self._thing.breaks_at_n if self._shell else inf,
@@ -358,6 +362,8 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
         rig = self._rig
         if rig is None or self._run_ticks is None or any(self._warnings):
             return None
+        if rig.forces.contacts.used_bytes[0] > rig.most_bytes:
+            return None
         drive, most, errors = self._drive, min(most, MOST_TICKS), NO_ERRORS
         if self.config.force_noise_n:
             self._draw(2 * most)
@@ -369,7 +375,9 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
             with first_call():
                 run = self._run_ticks(rig, params, state, moved, ticked, buffers, most)
         except NotCompilable:
-            self._rig = None
+            self._run_ticks = None
+            if self._batch is not None:
+                self._batch.grasps = 1
             return None
         n, self._stepped, state, moved, ticked = run
         self._gap_m, self._rate_m_s, drive.target_m, drive.effort_n, self._broken = moved

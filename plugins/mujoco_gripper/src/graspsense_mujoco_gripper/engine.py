@@ -51,12 +51,20 @@ class Contacts(NamedTuple):
     """(most, 2)"""
     frames: Any
     """(most, 9)"""
+    used_bytes: Any
+    """(1,) The most memory for contacts and solver that a step has taken."""
 
 
-def contacts_of(data: mujoco.MjData) -> Contacts:
-    """Return the contacts. Raises ValueError where the memory is not as MuJoCo's package declares it."""
-    contact, place = structure("mjContact"), structure("mjData")
-    known: Any = place.from_address(data._address)
+def contacts_of(data: mujoco.MjData) -> Contacts | None:
+    """Return the contacts; None where the memory is not as MuJoCo's package declares it."""
+    try:
+        contact, layout = structure("mjContact"), structure("mjData")
+    except (ImportError, KeyError):
+        return None
+    known: Any = layout.from_address(data._address)
+    declared = known.narena, known.maxuse_arena, known.ncon, known.nefc, known.qpos
+    if declared != (data.narena, data.maxuse_arena, data.ncon, data.nefc, data.qpos.ctypes.data):
+        return None
     size = ctypes.sizeof(contact)
     most = data.narena // size
     whole = (ctypes.c_char * (most * size)).from_address(known.arena)
@@ -65,12 +73,16 @@ def contacts_of(data: mujoco.MjData) -> Contacts:
         start, strides = getattr(contact, name).offset, (size, np.dtype(kind).itemsize)
         return np.ndarray((most, width), kind, whole, start, strides)
 
-    count = np.ctypeslib.as_array((ctypes.c_int * 1).from_address(data._address + place.ncon.offset))
-    found = Contacts(count, column("geom", np.int32, 2), column("frame", np.float64, 9))
-    declared = known.narena, known.ncon, known.nefc, known.time, known.qpos
-    if declared != (data.narena, data.ncon, data.nefc, data.time, data.qpos.ctypes.data):
-        raise ValueError("the memory of MuJoCo is not as its package declares it")
-    return found
+    def number(name: str, kind: Any) -> Any:
+        address = data._address + getattr(layout, name).offset
+        return np.ctypeslib.as_array((kind * 1).from_address(address))
+
+    return Contacts(
+        number("ncon", ctypes.c_int),
+        column("geom", np.int32, 2),
+        column("frame", np.float64, 9),
+        number("maxuse_arena", ctypes.c_int64),
+    )
 
 
 @cache

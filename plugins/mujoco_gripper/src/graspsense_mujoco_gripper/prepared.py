@@ -6,7 +6,7 @@ from typing import Final
 
 import mujoco
 import numpy as np
-from attrs import evolve, frozen
+from attrs import define, evolve, frozen
 
 from graspsense_mujoco_gripper.config import MujocoConfig
 from graspsense_mujoco_gripper.drive import Travel, test_move
@@ -42,20 +42,22 @@ class Prepared:
         return compiled(spec, f"the gripper with {self.config.object}")
 
 
-@frozen(eq=False)
+@define(eq=False)
 class Batch:
-    """What the grasps of a process share: their number, and what the first one of each thing prepares."""
+    """What the grasps of a process share: what the first one of each thing prepares."""
 
     grasps: int
+    """Their number; 1 where the controller turned out not to be compilable."""
     known: dict[MujocoConfig, Prepared]
 
     def prepared(self, config: MujocoConfig, timestep_s: float) -> Prepared:
         """Return what the grasps with these settings have in common. Raises ConfigError, UnknownName."""
-        if config not in self.known:
+        known = self.known.get(config)
+        if known is None:
             if len(self.known) >= MOST_KNOWN:
                 self.known.clear()
-            self.known[config] = prepare(config, timestep_s)
-        return self.known[config]
+            known = self.known[config] = prepare(config, timestep_s)
+        return known
 
 
 def prepare(config: MujocoConfig, timestep_s: float) -> Prepared:

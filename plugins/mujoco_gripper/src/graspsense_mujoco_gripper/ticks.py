@@ -57,6 +57,8 @@ class SteppedModel(NamedTuple):
     forces: Forces
     drive: DriveLaw
     warnings: Any
+    most_bytes: int
+    """Where the contacts take more memory, MuJoCo may end the process, unless Python calls it."""
     shell: Any
     """The equalities that hold a shell together."""
     equalities: Any
@@ -122,9 +124,11 @@ def ticks_at_once(
     n = 0
     while n < most:
         moved = _move(rig, moved, ticked.command)
+        bad = rig.forces.contacts.used_bytes[0] > rig.most_bytes
         for warning in rig.warnings:
-            if warning != 0:
-                return n, True, state, moved, ticked
+            bad = bad or warning != 0
+        if bad:
+            return n, True, state, moved, ticked
         frame, greatest_n = _measure(rig, moved, ticked, buffers.errors, n)
         command, after = control(params, state, Reading(frame, Pads(0.0, 0, (), ()), ()))
         acts = after.guard.stopped == 1 or (after.guard.acted != 0 and state.guard.acted == 0)
@@ -169,7 +173,7 @@ def _gap_m(rig: SteppedModel) -> float:
 
 
 def _forces_n(rig: SteppedModel) -> tuple[float, float]:
-    (count, geoms, frames), roles, axis, wrench = rig.forces
+    (count, geoms, frames, _), roles, axis, wrench = rig.forces
     left = right = 0.0
     for k in range(count[0]):
         on_left, on_right = signs_of(roles[geoms[k, 0]], roles[geoms[k, 1]])
@@ -234,7 +238,7 @@ def _compiled(step: Callable[..., Any], anew: bool) -> Callable[..., Any] | None
     try:
         whole = _composed(step)
         return compile_function(whole, OPTIONS) if anew or is_on_disk(whole, OPTIONS) else None
-    except (NotCompilable, ImportError, ValueError):
+    except (NotCompilable, ImportError, ValueError, RuntimeError):
         return None
 
 
