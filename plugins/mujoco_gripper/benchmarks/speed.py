@@ -18,8 +18,9 @@ Processor times of 2026-11-27, on two cores that other work shared:
 | rigid (block) | Robotiq 2F-140 | 227% | 5% | -21% |
 | soft body (sponge) | parallel | 61% | -5% | -38% |
 
-These are uncertain to 5 %. The aim is at most 30 % for one of many. A grasp of the block takes 32 ms: 25 ms in 2,100 ticks with two `mj_step` each,
-2.5 ms for its model, 1 ms in the ticks of the interpreter at changes of the phase, and the rest for the trace.
+These are uncertain to 5 %. The aim is at most 30 % for one of many. A grasp of the block takes 32 ms: 25 ms in 2,100
+ticks with two `mj_step` each, 2.5 ms for its model, 1 ms in the ticks of the interpreter at changes of the phase, and
+the rest for the trace.
 Compiling takes 6.4 s, loading what was compiled before 0.6 s; a grasp saves 0.06 s.
 """
 
