@@ -71,6 +71,7 @@ _TABLE: Final[Table] = {
         ),
         "core.grasp.runner": ("tick_params", "ended_by_itself", "overdue", "seconds_at_most"),
         "core.values.events": ("event_name",),
+        "core.values.trace": ("FrameTable",),
     },
     "Compiling a function with all that it calls": {
         "core.compiling.call_graph": ("NotCompilable", "fingerprint"),

@@ -72,6 +72,7 @@ from graspsense.core.grasp.runner import ended_by_itself as ended_by_itself
 from graspsense.core.grasp.runner import overdue as overdue
 from graspsense.core.grasp.runner import seconds_at_most as seconds_at_most
 from graspsense.core.values.events import event_name as event_name
+from graspsense.core.values.trace import FrameTable as FrameTable
 
 # Compiling a function with all that it calls
 from graspsense.core.compiling.call_graph import NotCompilable as NotCompilable

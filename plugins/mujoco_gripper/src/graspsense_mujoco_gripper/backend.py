@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Sequence
 from math import ceil, inf, nan
 from pathlib import Path
 from typing import Any, Final, Unpack, final
@@ -12,6 +12,7 @@ import numpy as np
 from attrs import evolve
 
 from graspsense.plugin_api import (
+    APPROACH,
     EFFORT,
     NO_PADS,
     POSITION,
@@ -29,14 +30,28 @@ from graspsense.plugin_api import (
     TactileArray,
     signal_type,
 )
-from graspsense.simulator_api import BatchBackend, BatchOptions, Grasped, SimulationVariant, Viewer
+from graspsense.simulator_api import (
+    BatchBackend,
+    BatchOptions,
+    FrameTable,
+    FreeRun,
+    Grasped,
+    NotCompilable,
+    RunConfig,
+    SimulationVariant,
+    TickParams,
+    TickState,
+    Viewer,
+    first_call,
+)
 from graspsense_mujoco_gripper.batch import GraspingJob, grasps
 from graspsense_mujoco_gripper.camera import Camera, Window, free_camera, offscreen, require_screen
 from graspsense_mujoco_gripper.catalogue import catalogue
 from graspsense_mujoco_gripper.config import MujocoConfig
 from graspsense_mujoco_gripper.draft import Draft, drafted
-from graspsense_mujoco_gripper.drive import ActuatorDrive, Travel, instability, test_move
-from graspsense_mujoco_gripper.gripper_file import read_gripper
+from graspsense_mujoco_gripper.drive import ActuatorDrive, Travel, instability
+from graspsense_mujoco_gripper.engine import contacts_of
+from graspsense_mujoco_gripper.gripper_file import GripperFile, read_gripper
 from graspsense_mujoco_gripper.measurement import (
     ForceGauge,
     GapGauge,
@@ -45,19 +60,25 @@ from graspsense_mujoco_gripper.measurement import (
     cells_of,
     geoms_of,
     plain,
-    width_m,
 )
-from graspsense_mujoco_gripper.model import OBJ, compiled, gripper_spec, identifier
+from graspsense_mujoco_gripper.model import OBJ, identifier
+from graspsense_mujoco_gripper.prepared import Batch, prepare
 from graspsense_mujoco_gripper.roughness import Roughness
 from graspsense_mujoco_gripper.scene import (
     PREFIX,
     ArmMotion,
-    add_thing,
     is_thing,
-    put_on_arm,
     read_scene,
     scene_named,
-    vary,
+)
+from graspsense_mujoco_gripper.ticks import (
+    MOST_TICKS,
+    Forces,
+    Moved,
+    SteppedModel,
+    TickBuffers,
+    Ticked,
+    compiled_ticks,
 )
 
 INTEGRATORS: Final = ("Euler", "implicitfast", "implicit", "RK4", "discrete")
@@ -70,6 +91,9 @@ DEEPEST_M: Final = 1e-3
 """A thing that begins deeper in a finger is refused."""
 TOUCH_N: Final = 0.1
 """Force on both fingers from which on the motion of the scene begins: less may be the palm that swings."""
+AMPLE: Final = 16
+"""Compiled ticks leave this share of the memory for contacts to them, and steps with more to the interpreter."""
+NO_ERRORS: Final = np.empty(0)
 MANY: Final = 256
 """Errors of the forces that are drawn at once."""
 SWING, MOST_SWINGS = 0.1, 20
@@ -85,12 +109,16 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
     _viewer: Viewer | None = None
     _camera: Camera | None = None
     _window: Window | None = None
+    _batch: Batch | None = None
+    _run_ticks: Callable[..., Any] | None = None
 
     @property
     def channels(self) -> tuple[Channel, ...]:
         """Gap, velocity, effort and forces; cells and further sensors as the gripper file names them."""
+        return self._channels_of(read_gripper(self.config.file)[0])
+
+    def _channels_of(self, gripper: GripperFile) -> tuple[Channel, ...]:
         rate = self.config.rate_hz
-        gripper, _ = read_gripper(self.config.file)
         frame = [
             ("gap", "m"),
             ("velocity", "m/s"),
@@ -154,6 +182,16 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
         gripper, _ = read_gripper(self.config.file)
         return bool(gripper.channels) or gripper.accelerometer is not None or self._is_shaken()
 
+    def join(self, batch: Batch) -> None:
+        """Take part in a batch: with what its grasps share, and compiled where that is possible and saves time."""
+        self._batch = batch
+
+    def expect(self, controller: Controller[Any], run: RunConfig) -> None:
+        """Take the law that is compiled with the ticks."""
+        del run
+        if self._batch is not None:
+            self._run_ticks = compiled_ticks(type(controller).step, self._batch.grasps)
+
     def see(self, viewer: Viewer) -> None:
         """Make pictures of the next grasp without a screen, or show it in MuJoCo's own viewer."""
         if viewer.frames_hz > 0.0:
@@ -171,24 +209,13 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
         """Build the model with the thing between the open fingers. Raises ConfigError, UnknownName."""
         self.close()
         config = self.config
-        self._gripper, path = read_gripper(config.file)
-        scene = read_scene(config.object, config.scene)
-        self._thing, self._scene = scene.thing, scene.scene
         self._steps = self._steps_of_a_tick()
         timestep_s = 1.0 / (config.rate_hz * self._steps)
-        spec = gripper_spec(path, self._gripper, timestep_s)
-        put_on_arm(spec, scene.scene)
-        _integrate(spec, config.integrator, soft=scene.spec is not None and len(scene.spec.flexes) > 0)
-        model = compiled(spec, str(path))
-        width = None if scene.spec is None else width_m(compiled(scene.spec, config.object))
-        travel = test_move(model, self._gripper, width)
+        prepared = self._batch.prepared(config, timestep_s) if self._batch else prepare(config, timestep_s)
+        self._gripper, travel = prepared.gripper, prepared.travel
+        self._thing, self._scene = prepared.scene.thing, prepared.scene.scene
         generator = np.random.default_rng(seed)
-        if scene.spec is not None:
-            place = travel.place
-            if config.spread:
-                place = place + vary(scene, generator) * travel.axis
-            add_thing(spec, scene, place, travel.axis)
-            model = compiled(spec, f"the gripper with {config.object}")
+        model = prepared.with_thing(generator)
         self._begin(model, travel, generator)
         if self._viewer is not None and self._viewer.frames_hz > 0.0:
             self._camera = Camera(model, travel.place, travel.axis, travel.open_m)
@@ -219,7 +246,7 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
             int(model.sensor_adr[identifier(model, OBJ.mjOBJ_SENSOR, one.sensor, "sensor")])
             for one in self._gripper.channels.values()
         ]
-        self._signals: Any = signal_type(self.channels)
+        self._signals: Any = signal_type(self._channels_of(self._gripper))
         self._shell = [
             identifier(model, OBJ.mjOBJ_EQUALITY, PREFIX + name, "equality") for name in self._thing.shell
         ]
@@ -239,7 +266,7 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
                 Palm(model, data, self._gripper.accelerometer, generator),
                 [1] * self._steps,
             )
-        self._noises: Iterator[float] = iter(())
+        self._errors, self._drawn = NO_ERRORS, 0
         self._tick_s, self._timestep_s = 1.0 / self.config.rate_hz, model.opt.timestep
         self._warnings, self._values = plain(data.warning.number), plain(data.sensordata)
         self._gap_m, self._rate_m_s = self._measured_gap_m(), 0.0
@@ -247,6 +274,36 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
         self._command = Command(EFFORT, 0.0, inf, inf)
         self._ticks, self._swings, self._broken, self._greatest_n = 0, 0, False, 0.0
         self._measured_m = self._rounded(self._gap_m)
+        self._stepped = False
+        self._rig = None if self._run_ticks is None else self._compiled_rig(data)
+
+    def _compiled_rig(self, data: mujoco.MjData) -> SteppedModel | None:
+        """Return what compiled ticks take; None where more takes part in a tick than they know."""
+        forces = self._forces
+        more = self._cells, self._palm, self._rough, self._viewer, self._sensors, self._scene.shake
+        if not isinstance(forces, ForceGauge) or not forces.only_contacts:
+            return None
+        contacts = contacts_of(data)
+        if contacts is None or any(more) or self._motion.moves:
+            return None
+        gap = GapGauge(self._model, self._gripper.gap).terms(data, self._travel.axis)
+        return SteppedModel(
+            model=self._model._address,
+            data=data._address,
+            kept=np.array(self._kept),
+            timestep_s=self._timestep_s,
+            tick_s=self._tick_s,
+            gap=gap.in_arrays(),
+            gap_step_m=self.config.gap_step_m,
+            forces=Forces(contacts, np.array(forces.roles), self._travel.axis, np.zeros(6)),
+            drive=self._drive.law.in_arrays(),
+            warnings=data.warning.number,
+            most_bytes=data.narena // AMPLE,
+            shell=np.array(self._shell, np.int64),
+            equalities=data.eq_active,
+            breaks_at_n=self._thing.breaks_at_n if self._shell else inf,
+            swing_n=SWING * self._drive.effort_limit_n,
+        )
 
     def _check_start(self, data: mujoco.MjData) -> None:
         """Raise ConfigError where the thing is in the fingers at the start."""
@@ -270,6 +327,7 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
             simulated=True,
             harmless=True,
             rate_hz=self.config.rate_hz,
+            channels=self._channels_of(self._gripper),
             effort_limit_n=limit,
             speed_limit_m_s=self._gripper.speed_limit_m_s,
             opening=Command(POSITION, self._travel.open_m, limit, OPENING_M_S),
@@ -282,7 +340,23 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
     def read(self, timeout_s: float) -> Reading | None:
         """Step the model by one tick and measure. Raises DeviceLost where MuJoCo warns that the state is bad."""
         del timeout_s
-        data, model, drive, timestep_s = self._opened(), self._model, self._drive, self._timestep_s
+        data = self._opened()
+        if self._stepped:
+            self._stepped = False
+        else:
+            self._step(data)
+        if any(self._warnings) and (problem := instability(data)):
+            raise DeviceLost(f"the simulation became unstable: {problem}. Use a smaller gripper.timestep_s")
+        self._ticks += 1
+        if self._rough is not None:
+            self._rough.set()
+        if self._viewer is not None:
+            self._show(self._viewer, data, self._ticks / self.config.rate_hz)
+        return self._reading(data)
+
+    def _step(self, data: mujoco.MjData) -> None:
+        """Make the steps of a tick."""
+        model, drive, timestep_s = self._model, self._drive, self._timestep_s
         for steps in self._kept:
             kept_s = steps * timestep_s
             drive.set_controls(self._command, self._gap_m, self._rate_m_s, kept_s)
@@ -293,14 +367,38 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
                 self._palm.measure(self._rate_m_s)
             if self._shell and not self._broken:
                 self._break_shell(data)
-        if any(self._warnings) and (problem := instability(data)):
-            raise DeviceLost(f"the simulation became unstable: {problem}. Use a smaller gripper.timestep_s")
-        self._ticks += 1
-        if self._rough is not None:
-            self._rough.set()
-        if self._viewer is not None:
-            self._show(self._viewer, data, self._ticks / self.config.rate_hz)
-        return self._reading(data)
+
+    def free_ticks(self, params: TickParams, state: TickState, frame: Frame, most: int) -> FreeRun | None:
+        """Run ticks of this phase at once, if code was compiled for it."""
+        rig = self._rig
+        if rig is None or self._run_ticks is None or any(self._warnings):
+            return None
+        if rig.forces.contacts.used_bytes[0] > rig.most_bytes:
+            return None
+        drive, most, errors = self._drive, min(most, MOST_TICKS), NO_ERRORS
+        if self.config.force_noise_n:
+            self._draw(2 * most)
+            errors = self._errors
+        buffers = TickBuffers(errors, np.empty((most, len(Frame._fields))), np.empty((4, most)))
+        moved = Moved(self._gap_m, self._rate_m_s, drive.target_m, drive.effort_n, self._broken)
+        ticked = Ticked(self._ticks, self._measured_m, self._greatest_n, self._swings, self._command)
+        try:
+            with first_call():
+                run = self._run_ticks(rig, params, state, moved, ticked, buffers, most)
+        except NotCompilable:
+            self._run_ticks = None
+            if self._batch is not None:
+                self._batch.grasps = 1
+            return None
+        n, self._stepped, state, moved, ticked = run
+        self._gap_m, self._rate_m_s, drive.target_m, drive.effort_n, self._broken = moved
+        self._ticks, self._measured_m, self._greatest_n, self._swings, self._command = ticked
+        self._drawn = 2 * n
+        if state.phase < APPROACH:
+            return FreeRun(n, [], [], state)
+        kinds, values, *limits = buffers.sent[:, :n].tolist()
+        sent = map(Command, map(int, kinds), values, *limits)
+        return FreeRun(n, FrameTable(buffers.rows[:n]), values, state, sent)
 
     def _show(self, viewer: Viewer, data: mujoco.MjData, t_s: float) -> None:
         if self._camera is not None and t_s >= self._next_picture_s:
@@ -338,11 +436,20 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
             data.eq_active[self._shell] = 0
 
     def _noise(self) -> float:
-        """Return the next error of a force (N); many are drawn at once."""
-        for error_n in self._noises:
-            return error_n
-        self._noises = iter(self._generator.normal(0.0, self.config.force_noise_n, MANY).tolist())
-        return next(self._noises)
+        """Return the next error of a force (N)."""
+        if self._drawn >= len(self._errors):
+            self._draw(1)
+        self._drawn += 1
+        return float(self._errors[self._drawn - 1])
+
+    def _draw(self, count: int) -> None:
+        """Draw errors until there are so many that were not used."""
+        left = [self._errors[self._drawn :]]
+        missing = count - len(left[0])
+        left += [
+            self._generator.normal(0.0, self.config.force_noise_n, MANY) for _ in range(0, missing, MANY)
+        ]
+        self._errors, self._drawn = np.concatenate(left), 0
 
     def _rounded(self, gap_m: float) -> float:
         step = self.config.gap_step_m
@@ -411,11 +518,3 @@ def _step_variant(integrator: str, timestep_s: float) -> SimulationVariant:
         },
         role="reference" if is_reference else "curve",
     )
-
-
-def _integrate(spec: mujoco.MjSpec, integrator: str, *, soft: bool) -> None:
-    """Set the integrator; MuJoCo's implicit ones, which grippers name, do not integrate soft bodies."""
-    if integrator == "model" and soft:
-        integrator = "discrete"
-    if integrator != "model":
-        spec.option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{integrator.upper()}")

@@ -20,12 +20,13 @@ from queue import SimpleQueue
 from typing import IO, Any, Final
 
 import numpy as np
-from attrs import asdict, evolve, fields, frozen
+from attrs import asdict, evolve, field, fields, frozen
 
 from graspsense.gripper_api import Outcome, Phase
 from graspsense.plugin_api import ConfigError, Controller, GraspEvent, Trace, UnknownName, create
 from graspsense.simulator_api import BatchOptions, Grasped, RunConfig, recipe_of, run_uninterrupted
 from graspsense_mujoco_gripper.config import MujocoConfig
+from graspsense_mujoco_gripper.prepared import Batch
 
 WORTH_A_PROCESS: Final = 4
 """Grasps that take about as long as the start of a process."""
@@ -45,13 +46,17 @@ class GraspingJob:
     options: BatchOptions
     makes_signals: bool
     """Whether the gripper has further channels, which are not handed over."""
+    batch: Batch = field(factory=lambda: Batch(1, {}))
+    """What the grasps of this process share."""
 
     def grasp(self, thing: str, seed: int) -> Grasped:
         """Run one grasp here."""
         from graspsense_mujoco_gripper.backend import MujocoGripper
 
         run = evolve(self.options.get("run") or RunConfig(), seed=int(seed))
-        done = run_uninterrupted(MujocoGripper(evolve(self.config, object=thing)), self.controller, run)
+        gripper = MujocoGripper(evolve(self.config, object=thing))
+        gripper.join(self.batch)
+        done = run_uninterrupted(gripper, self.controller, run)
         return self._grasped(done.outcome, done.reason, done.trace, done.report)
 
     def _grasped(self, outcome: Outcome, reason: str, trace: Trace, report: dict[str, Any] | Any) -> Grasped:
@@ -80,6 +85,7 @@ class GraspingJob:
                     "config": asdict(self.config),
                     "controller": [name, values],
                     "run": asdict(self.options.get("run") or RunConfig()),
+                    "grasps": self.batch.grasps,
                 }
             )
         except (ConfigError, UnknownName, TypeError, ValueError) as error:
@@ -112,6 +118,7 @@ def grasps(job: GraspingJob, things: Sequence[str], seeds: Sequence[int]) -> lis
         raise ValueError(f"{len(things)} scenes and {len(seeds)} seeds: give one seed a scene")
     wanted = job.options.get("workers") or os.cpu_count() or 1
     workers = max(1, min(wanted, len(things) // WORTH_A_PROCESS))
+    job = evolve(job, batch=Batch(len(things) // workers, {}))
     progress = job.options.get("progress")
     with _processes(job, workers) as free:
 
@@ -194,6 +201,7 @@ def main() -> None:
         create("controller", name, **values),
         {"run": RunConfig(**greeting["run"]), "traces": True},
         makes_signals=False,
+        batch=Batch(greeting["grasps"], {}),
     )
     for line in asked:
         columns = io.BytesIO()

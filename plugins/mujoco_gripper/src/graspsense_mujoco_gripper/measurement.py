@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Set
 from math import hypot
-from typing import Any
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -20,11 +20,28 @@ FARTHEST_M = 10.0
 """Beyond this distance two geoms are not measured."""
 SIDES, NOTHING = (-1.0, 1.0), (0.0, 0.0)
 """The closing direction points from the left finger to the right one."""
+LEFT, RIGHT, THING, ALL = 1, 2, 4, 7
+"""The roles of a geom: part of a finger, or of a thing."""
 
 
 def plain(values: NDArray[Any]) -> Any:
     """Return a view of an array, row by row, whose numbers are read and set in a fraction of the time of numpy."""
     return memoryview(values.reshape(-1))  # type: ignore[arg-type]
+
+
+class GapTerms(NamedTuple):
+    """The gap: the distance of two geoms, or else an offset and a weighted sum of values of the model."""
+
+    geoms: Any
+    values: Any
+    places: Any
+    weights: Any
+    offset_m: float
+
+    def in_arrays(self) -> GapTerms:
+        """Return the same for compiled code; `values` remain those of the model."""
+        places = np.array(self.geoms, np.int64), np.asarray(self.values), np.array(self.places, np.int64)
+        return GapTerms(*places, np.array(self.weights, np.float64), float(self.offset_m))
 
 
 class GapGauge:
@@ -53,18 +70,8 @@ class GapGauge:
             model, (left, right) = self._model, self._ids
             return lambda: float(mujoco.mj_geomDistance(model, data, left, right, FARTHEST_M, None))
         # Sums of a few numbers take less time in the interpreter than in numpy.
-        if self._faces:
-            values, offset_m = plain(data.site_xpos), 0.0
-            terms = [
-                (3 * site + k, sign * float(axis[k]) / len(sites))
-                for sign, sites in zip((-1.0, 1.0), self._faces, strict=True)
-                for site in sites
-                for k in range(3)
-                if axis[k] != 0.0
-            ]
-        else:
-            values, offset_m = plain(data.qpos), self._gap.offset_m
-            terms = [(self._ids[0], self._gap.scale)]
+        _, values, places, weights, offset_m = self.terms(data, axis)
+        terms = list(zip(places, weights, strict=True))
 
         def gap_m() -> float:
             total: float = offset_m
@@ -73,6 +80,22 @@ class GapGauge:
             return total
 
         return gap_m
+
+    def terms(self, data: mujoco.MjData, axis: Floats) -> GapTerms:
+        """Return what the gap follows from."""
+        if self._faces:
+            terms = [
+                (3 * site + k, sign * float(axis[k]) / len(sites))
+                for sign, sites in zip((-1.0, 1.0), self._faces, strict=True)
+                for site in sites
+                for k in range(3)
+                if axis[k] != 0.0
+            ]
+            places, weights = map(list, zip(*terms, strict=True))
+            return GapTerms([], plain(data.site_xpos), places, weights, 0.0)
+        if self._gap.geoms:
+            return GapTerms(self._ids, plain(data.qpos), [], [], 0.0)
+        return GapTerms([], plain(data.qpos), self._ids, [self._gap.scale], self._gap.offset_m)
 
 
 class ForceGauge:
@@ -90,10 +113,15 @@ class ForceGauge:
         axis: Floats,
     ) -> None:
         self._model, self._data, self._axis = model, data, axis
-        self._fingers = tuple(geoms_of(model, finger) for finger in fingers)
-        self._things = things
+        # The last one is that of soft bodies, whose contacts have the geom -1.
+        self.roles = [0] * (model.ngeom + 1)
+        for role, geoms in zip(
+            (LEFT, RIGHT, THING), (*(geoms_of(model, finger) for finger in fingers), things), strict=True
+        ):
+            for geom in geoms:
+                self.roles[geom] |= role
         self._sensors = [self._sensor(finger, side) for finger, side in zip(fingers, SIDES, strict=True)]
-        self._by_contacts = None in self._sensors
+        self._by_contacts, self.only_contacts = None in self._sensors, self._sensors == [None, None]
         self._factors: dict[tuple[int, int], tuple[float, float]] = {}
         self._wrench = np.zeros(6)
         self._force = plain(self._wrench)
@@ -123,33 +151,51 @@ class ForceGauge:
 
     def _sums(self) -> tuple[float, float]:
         """Return the sums of the forces at the contacts of each finger."""
-        model, data, factors, force = self._model, self._data, self._factors, self._force
+        model, data, factors, roles, force = self._model, self._data, self._factors, self.roles, self._force
         contacts, rows = data.contact, None
         left = right = 0.0
-        for k, (one, other) in enumerate(contacts.geom.tolist()):
-            pair = factors.get((one, other))
-            if pair is None:
-                pair = factors[one, other] = self._factors_of(one, other)
-            if pair == NOTHING:
+        for k, pair in enumerate(contacts.geom.tolist()):
+            key = tuple(pair)
+            signs = factors.get(key)
+            if signs is None:
+                signs = factors[key] = signs_of(roles[key[0]], roles[key[1]])
+            if signs == NOTHING:
                 continue
             if rows is None:
-                rows = (contacts.frame.reshape(-1, 3) @ self._axis).tolist()
+                rows = self._along_axis(contacts.frame)
             mujoco.mj_contactForce(model, data, k, self._wrench)
-            # The first row of a frame is the normal, from the first geom to the second; the force acts on the second.
             along = rows[3 * k] * force[0] + rows[3 * k + 1] * force[1] + rows[3 * k + 2] * force[2]
-            left += pair[0] * along
-            right += pair[1] * along
+            left += signs[0] * along
+            right += signs[1] * along
         return left, right
 
-    def _factors_of(self, one: int, other: int) -> tuple[float, float]:
-        """Return the sign of the force of a contact of two geoms on the left and the right finger; 0: none."""
-        factors = []
-        for k, side in enumerate(SIDES):
-            own, touched = self._fingers[k], self._things | self._fingers[1 - k]
-            second = other in own and one in touched
-            counts = second or (one in own and other in touched)
-            factors.append(side * (1.0 if second else -1.0) if counts else 0.0)
-        return factors[0], factors[1]
+    def _along_axis(self, frames: Floats) -> list[float]:
+        """Return the component along the closing direction of each row of the frames of the contacts."""
+        axis, rows = self._axis, frames.reshape(-1, 3)
+        # Added in the order of compiled code, which the product of numpy does not keep.
+        total = rows[:, 0] * axis[0]
+        for j in (1, 2):
+            if axis[j] != 0.0:
+                total = total + rows[:, j] * axis[j]
+        return total.tolist()  # type: ignore[no-any-return]
+
+
+def signs_of(first: int, second: int) -> tuple[float, float]:
+    """Return the sign of the force of a contact on the left and on the right finger; 0: none.
+
+    `first` and `second` are the roles of its geoms. The first row of the frame of a contact is the normal, from the
+    first geom to the second; the force acts on the second.
+    """
+    left = right = 0.0
+    if second & LEFT and first & (ALL - LEFT):
+        left = -1.0
+    elif first & LEFT and second & (ALL - LEFT):
+        left = 1.0
+    if second & RIGHT and first & (ALL - RIGHT):
+        right = 1.0
+    elif first & RIGHT and second & (ALL - RIGHT):
+        right = -1.0
+    return left, right
 
 
 class SpringCells:

@@ -302,11 +302,10 @@ def add_thing(spec: mujoco.MjSpec, model: SceneModel, place: Floats, axis: Float
     if scene.friction is not None:
         _scale_friction(child, scene.friction, absolute=True)
     try:
-        whole = child.compile()
         if scene.mass_kg is not None:
-            _scale_mass(child, scene.mass_kg / float(np.sum(whole.body_mass)))
-        lowest_m = _lowest(whole)
+            _scale_mass(child, scene.mass_kg / float(np.sum(child.compile().body_mass)))
         if scene.table:
+            lowest_m = _lowest(child.compile())
             _set_bits(child)
             half = TABLE_HALF_M[2]
             position = [float(place[0]), float(place[1]), float(place[2]) + lowest_m - half]

@@ -193,10 +193,11 @@ class SensorBackend(ABC, Generic[ConfigT]):
         """
 
     def free_ticks(self, params: TickParams, state: TickState, frame: Frame, most: int) -> FreeRun | None:
-        """Run up to `most` ticks of free motion at once after the command that was applied last; None to run none.
+        """Run up to `most` ticks at once after the command that was applied last; None to run none.
 
-        A simulator may do so while no force changes and no cell image arrives (see `free_motion.FreeMotion`), with the
-        controller of `expect`. `state` is that after the tick of `frame`. The results are those of `read` and `apply`.
+        A simulator may do so, with the controller of `expect`, until the phase changes, the controller tells an event,
+        the guard acts for the first time or stops the grasp, or a cell image arrives. `state` is that after the tick of
+        `frame`. The results are those of `read` and `apply`. `free_motion.FreeMotion` is for ticks without a force.
         """
         del params, state, frame, most
         return None

@@ -10,7 +10,7 @@ instead, which give the same commands and states for less (see `graspsense.core.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from math import inf, nan
 from typing import Any, NamedTuple
 
@@ -201,15 +201,17 @@ FreeState = tuple[Any, RestState]
 
 
 class FreeRun(NamedTuple):
-    """Ticks of free motion that a backend has run at once."""
+    """Ticks of a phase that a backend has run at once."""
 
     n_ticks: int
-    frames: list[Frame]
+    frames: Sequence[Frame]
     """The frame of each tick, if they are of a phase that is recorded (from the approach on); otherwise none."""
     commands: list[float]
-    """The effort (N) that was commanded after each of these frames."""
+    """The value that was commanded after each of these frames."""
     state: TickState
     """The state after the last of them."""
+    sent: Iterable[Command] | None = None
+    """These commands; None for efforts without limits."""
 
 
 def _never_free(params: Any, law: Any, frame: Frame) -> tuple[Any, FreeLimits]:

@@ -506,7 +506,7 @@ class _Grasp:
                 self.late += frame.dt_s > late_s
                 if losses is not None:
                     losses.see(reading)
-                self._count(phase, self._acted(state) > acted)
+                self._count(phase, 1, self._acted(state) > acted)
             try:
                 apply(command)
             finally:
@@ -521,7 +521,7 @@ class _Grasp:
                 state = self._watched(self.watcher, frame, state)
             if state.done or watcher.stopped or self._fault() is not None:
                 return
-            if leaps and same_phase and phase != SQUEEZE and phase != HOLD:
+            if leaps and same_phase and (self.watcher is None or phase not in (SQUEEZE, HOLD)):
                 n_ticks += self._leap(phase, reading, int(most_ticks - n_ticks))
                 state = self.state
         raise _Overdue(overdue(run))
@@ -542,25 +542,27 @@ class _Grasp:
         return inf if self.info.opening is None else ceil(seconds_at_most(self.run) * self.info.rate_hz)
 
     def _leaps(self) -> bool:
-        """Return whether the gripper is asked for ticks of free motion at once; watchers need only the squeeze."""
+        """Return whether the gripper is asked for ticks at once; watchers need only the squeeze."""
         offers = type(self.backend).free_ticks is not SensorBackend.free_ticks
         return offers and self.info.harmless and self.info.clock == "virtual"
 
     def _leap(self, phase: int, before: Reading, most: int) -> int:
-        """Let the gripper run ticks of free motion at once, record and show them, and return their number.
+        """Let the gripper run ticks of this phase at once, record and show them, and return their number.
 
         The cell image of all of them is that of the reading before.
         """
         free = self.backend.free_ticks(self.params, self.state, before.frame, most)
         if free is None:
             return 0
-        self.state = free.state
+        limited, self.state = free.state.guard.acted - self.state.guard.acted, free.state
         if free.frames:
             self.last = free.frames[-1]
             self.recorder.extend(free.frames, phase, free.commands)
+            self._count(phase, free.n_ticks, limited)
         if self.sinks:
-            for frame, effort_n in zip(free.frames, free.commands, strict=True):
-                self._show(Reading(frame, before.pads), phase, Command(EFFORT, effort_n, inf, inf))
+            sent = free.sent or (Command(EFFORT, effort_n, inf, inf) for effort_n in free.commands)
+            for frame, command in zip(free.frames, sent, strict=True):
+                self._show(Reading(frame, before.pads), phase, command)
         return free.n_ticks
 
     def _show(self, reading: Reading, phase: int, command: Command) -> None:
@@ -608,11 +610,11 @@ class _Grasp:
             self._event(frame.t_s, Phase(self.state.phase), "guard: a command was limited")
         return now
 
-    def _count(self, phase: int, limited: bool) -> None:
-        """Count a command, and whether guard or protection limited it."""
+    def _count(self, phase: int, commands: int, limited: int) -> None:
+        """Count commands, and how many of them guard or protection limited."""
         self.guarded += limited
         if phase in (SQUEEZE, HOLD):
-            self.squeezed += 1
+            self.squeezed += commands
             self.squeezed_guarded += limited
 
     def warnings(self) -> tuple[str, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import chain
 from typing import TYPE_CHECKING, Any, Final
 
@@ -147,6 +147,22 @@ class Trace:
         return evolve(self, **cut, signals=signals, events=events)
 
 
+class FrameTable(Sequence[Frame]):
+    """Frames as the rows of an array (n, fields of a frame), which become frames where they are looked at."""
+
+    def __init__(self, rows: Floats) -> None:
+        self.rows = rows
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __getitem__(self, k: int | slice) -> Any:
+        if isinstance(k, slice):
+            return FrameTable(self.rows[k])
+        *numbers, status = self.rows[k].tolist()
+        return Frame._make([*numbers, int(status)])
+
+
 @define(eq=False)
 class TraceRecorder:
     """Collects the ticks of a running grasp; `trace()` returns those collected so far.
@@ -155,12 +171,15 @@ class TraceRecorder:
     """
 
     units: Mapping[str, str] = field(factory=lambda: dict(SI_UNITS))
-    frames: list[Frame] = field(factory=list, init=False)
+    frames: list[Frame | None] = field(factory=list, init=False)
+    """The frame of each tick; None for one that came in a table."""
     phases: list[int] = field(factory=list, init=False)
     commands: list[float] = field(factory=list, init=False)
     images: list[Pads] = field(factory=list, init=False)
     signals: list[Any] = field(factory=list, init=False)
     events: list[GraspEvent] = field(factory=list, init=False)
+    _tables: list[tuple[int, FrameTable]] = field(factory=list, init=False)
+    """The tables, each with the number of its first tick."""
     _blocks: tuple[Floats, ...] = field(default=(), init=False)
     """The frames that were converted to numbers before, in whole blocks."""
     pads: Pads = field(default=NO_PADS, init=False)
@@ -198,7 +217,11 @@ class TraceRecorder:
 
     def extend(self, frames: Sequence[Frame], phase: int, commands: Sequence[float]) -> None:
         """Add ticks of one phase without a new cell image, of a gripper without further channels."""
-        self.frames.extend(frames)
+        if isinstance(frames, FrameTable):
+            self._tables.append((len(self.frames), frames))
+            self.frames.extend([None] * len(frames))
+        else:
+            self.frames.extend(frames)
         self.phases.extend([phase] * len(frames))
         self.commands.extend(commands)
 
@@ -216,17 +239,29 @@ class TraceRecorder:
         A thread may call it while ticks are added: the lists only grow. Blocks of frames are converted once.
         """
         blocks = self._blocks
-        missing = self.frames[len(blocks) * BLOCK : n - n % BLOCK]
-        self._blocks = blocks = (*blocks, *_blocks_of(missing))
+        self._blocks = blocks = (*blocks, *self._between(len(blocks) * BLOCK, n - n % BLOCK))
         whole = blocks[: n // BLOCK]
         return _trace_from(
-            [*whole, *_blocks_of(self.frames[len(whole) * BLOCK : n])],
+            [*whole, *self._between(len(whole) * BLOCK, n)],
             self.phases[:n],
             self.commands[:n],
             self.images[:m],
             self.units,
             self.signals[:n],
         )
+
+    def _between(self, start: int, stop: int) -> Iterator[Floats]:
+        """Return the numbers of the frames from `start` to before `stop`, in arrays of at most `BLOCK` rows."""
+        for begin in range(start, stop, BLOCK):
+            end = min(begin + BLOCK, stop)
+            parts: list[Floats] = []
+            for first, table in self._tables:
+                if first < end and first + len(table) > begin:
+                    parts += _blocks_of(self.frames[begin:first])
+                    parts.append(table.rows[max(begin - first, 0) : end - first])
+                    begin = min(first + len(table), end)
+            parts += _blocks_of(self.frames[begin:end])
+            yield parts[0] if len(parts) == 1 else np.concatenate(parts)
 
 
 def trace_of(
@@ -244,7 +279,7 @@ def trace_of(
     return _trace_from(_blocks_of(frames), phases, commands, images, units, signals)
 
 
-def _blocks_of(frames: Sequence[Frame]) -> list[Floats]:
+def _blocks_of(frames: Sequence[Any]) -> list[Floats]:
     """Return the numbers of the frames, a row each, in arrays of at most `BLOCK` rows."""
     width = len(_FRAME_COLUMNS)
     blocks = []

@@ -10,6 +10,8 @@ from attrs import evolve
 
 from graspsense.gripper_api import no_pads, tare
 from graspsense.plugin_api import (
+    HOLD,
+    SQUEEZE,
     Channel,
     Command,
     Controller,
@@ -196,7 +198,8 @@ class SimBackend(BatchBackend[SimConfig]):
         effort = self._effort_n
         contact = self._state.contact
         pressed = contact.left.force_n > 0.0 or right_of(contact.left, contact.right).force_n > 0.0
-        if self._free_ticks is None or self._explains or pressed or effort is None:
+        squeezes = state.phase in (SQUEEZE, HOLD)
+        if self._free_ticks is None or self._explains or pressed or squeezes or effort is None:
             return None
         self._move_on(effort)
         self._moved_on = True
