@@ -363,8 +363,8 @@ def _echo_unreadable(unreadable: Sequence[UnreadableRecording]) -> None:
     if len(unreadable) > LISTED:
         echo(f"and {len(unreadable) - LISTED} more; --json lists all", indent=2, err=True)
     echo(
-        "Correct these files, or leave them out of `files` in the manifest. The same command then imports only what "
-        "the store does not have.",
+        "Correct these, or leave them out (of `files` in a manifest). The same command then imports only what the "
+        "store does not have.",
         err=True,
     )
 
