@@ -56,10 +56,10 @@ def recordings(place: str) -> Iterator[LabelledRecording | UnreadableRecording]:
             yield from each_readable(f"episode {episode.index}", partial(_of_episode, understood, episode))
 
 
-def numbered_parts(place: str, folder: Path) -> Iterator[tuple[int, float, float] | None]:
-    """Yield the episode and the times (s) of each recording of a place, read from this folder; None for a damaged one.
+def numbered_parts(place: str, folder: Path) -> Iterator[tuple[int, GraspColumns] | None]:
+    """Yield the episode and the frames of each recording of a place, read from this folder; None for a damaged one.
 
-    The place gives the options. Raises ConfigError, DataDamaged.
+    The times are those of the episode. The place gives the options. Raises ConfigError, DataDamaged.
     """
     understood = understand(read_folder(folder), folder_and_options(place)[1])
     for episode in understood.folder.episodes():
@@ -70,7 +70,7 @@ def numbered_parts(place: str, folder: Path) -> Iterator[tuple[int, float, float
             if isinstance(part, UnreadableRecording):
                 yield None
             else:
-                yield episode.index, float(part.t_s[0]), float(part.t_s[-1])
+                yield episode.index, part
 
 
 @np.errstate(all="ignore")  # what is infinite is refused by `checked_recording`
