@@ -100,6 +100,25 @@ def test_three_forces_a_cell_give_pressure_and_shear():
     assert (f["shear_first"], f["shear_second"]) == pytest.approx((0.2 * total, -0.1 * total))
 
 
+def test_several_arrays_have_the_features_of_each_with_its_name_in_front():
+    images = [np.zeros(ROWS * COLUMNS), bump(4.0, 6.0, 1.0, 1.0, 0.0).ravel()]
+    trace = grasp(images)
+    both = evolve(
+        trace,
+        signals={**trace.signals, "thumb": evolve(trace.signals["tactile"], cells=np.array(images) * 2)},
+    )
+    layout = {"rows": ROWS, "columns": COLUMNS}
+    features = create("feature-set", "contact-image", array="tactile, thumb", **layout)
+    one = create("feature-set", "contact-image", array="tactile", **layout).extract(both)
+    f = features.extract(both)
+
+    assert [channel.name for channel in features.requires] == ["tactile", "thumb"]
+    assert set(f.names) == {feature.name for feature in features.features}
+    assert f["tactile_total"] == one["total"]
+    assert f["thumb_total"] == pytest.approx(2.0 * one["total"])
+    assert f["thumb_centre_row"] == pytest.approx(one["centre_row"])
+
+
 def test_a_camera_counts_how_much_its_colours_change_in_either_direction():
     empty = np.full((ROWS, COLUMNS, 3), 100, np.uint8)
     touched = empty.copy()

@@ -244,6 +244,15 @@ def test_an_episode_whose_file_cannot_be_read_leaves_the_others(tmp_path, damage
     assert kinds == [UnreadableRecording, LabelledRecording, LabelledRecording, LabelledRecording]
 
 
+def test_a_file_that_was_cloned_without_its_content_names_git_lfs(tmp_path):
+    folder = write_set(tmp_path / "set", 3)
+    (folder / "data/chunk-000/file-000.parquet").write_text(
+        "version https://git-lfs.github.com/spec/v1\nsize 9\n"
+    )
+    with pytest.raises(DataDamaged, match="git lfs pull"):
+        _refusal(folder)
+
+
 @pytest.mark.parametrize("times", [[5, 4], [np.nan, np.nan]])
 def test_times_that_do_not_increase_name_the_option_that_mends_them(tmp_path, times):
     folder = write_set(tmp_path / "set", 3, [episode()])

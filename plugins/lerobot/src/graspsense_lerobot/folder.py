@@ -35,6 +35,8 @@ VIDEO_PATHS: Final = {
     2: "videos/chunk-{episode_chunk:03d}/{video_key}/episode_{episode_index:06d}.mp4",
     3: "videos/{video_key}/chunk-{chunk_index:03d}/file-{file_index:03d}.mp4",
 }
+LFS: Final = b"version https://git-lfs"
+"""What a file begins with that was cloned without its content."""
 _FIELD: Final = re.compile(r"\{(?P<name>[a-z_]+)(?::0?(?P<width>[0-9])d)?\}")
 
 
@@ -121,6 +123,11 @@ class Folder:
         file = self.place / path
         if not file.is_file():
             raise DataDamaged(f"{self.place}: {path} is missing")
+        with file.open("rb") as opened:
+            if opened.read(len(LFS)) == LFS:
+                raise DataDamaged(
+                    f"{self.place}: {path} is a pointer of Git LFS, not its content: git lfs pull"
+                )
         return read_parquet(file, wanted)[0]
 
     @cached_property

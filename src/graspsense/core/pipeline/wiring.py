@@ -166,7 +166,11 @@ def _misfits_of(user: _User, given: Mapping[str, Channel], provider: str, hint: 
 
 def _arrays(user: _User, wanted: Channel, given: Mapping[str, Channel]) -> str:
     """Return the options that choose an array that there is, for a component whose settings name its array."""
-    named = [key for key, value in asdict(user.config).items() if value == wanted.name]
+    named = [
+        key
+        for key, value in asdict(user.config).items()
+        if wanted.name in map(str.strip, str(value).split(","))
+    ]
     words = ""
     for one in given.values():
         if named and isinstance(one, TactileArray):

@@ -80,7 +80,9 @@ class ContactImageConfig:
     """The array as the gripper declares it, and which cells count."""
 
     array: str = setting(
-        default=FINGERTIPS, meaning="Name of the channel; pads: both fingertips, with features for each."
+        default=FINGERTIPS,
+        meaning="Name of the channel, or of several with commas between; pads: both fingertips. Of several, the name "
+        "of each feature begins with that of its array.",
     )
     unit: str = setting(default="counts", meaning="Its unit.")
     rows: int = setting(default=7, minimum=1, meaning="Its rows.")
@@ -175,10 +177,10 @@ class ContactImageFeatures(FeatureSet[ContactImageConfig]):
         if own.array == FINGERTIPS:
             return (Channel(FINGERTIPS, own.unit),)
         rows, columns, components = own.rows, own.columns, own.components
-        array = TactileArray(
-            own.array, own.unit, rows=rows, columns=columns, components=components, dtype=own.dtype
+        return tuple(
+            TactileArray(name, own.unit, rows=rows, columns=columns, components=components, dtype=own.dtype)
+            for name in self._arrays
         )
-        return (array,)
 
     @property
     def features(self) -> tuple[Feature, ...]:  # type: ignore[override]
@@ -206,8 +208,15 @@ class ContactImageFeatures(FeatureSet[ContactImageConfig]):
         return self.result(values, reasons)
 
     @property
+    def _arrays(self) -> tuple[str, ...]:
+        return tuple(name.strip() for name in self.config.array.split(","))
+
+    @property
     def _sides(self) -> tuple[str, ...]:
-        return SIDES if self.config.array == FINGERTIPS else ("",)
+        """What the names of the features of each array, or fingertip, begin with."""
+        if self.config.array == FINGERTIPS:
+            return SIDES
+        return tuple(f"{name}_" for name in self._arrays) if len(self._arrays) > 1 else ("",)
 
     @property
     def _grid(self) -> tuple[int, int]:
@@ -223,7 +232,7 @@ class ContactImageFeatures(FeatureSet[ContactImageConfig]):
 
     def _images(self, trace: Trace, side: str) -> ContactImages | str:
         """Return the images from the squeeze to the release; the reason, where there is none to compare."""
-        own, name = self.config, self.config.array
+        own, name = self.config, side.removesuffix("_") if len(self._arrays) > 1 else self.config.array
         if name == FINGERTIPS:
             t_s, cells, components = trace.pad_t_s, trace.pad_left, 1
             cells = cells if side == SIDES[0] else trace.pad_right
