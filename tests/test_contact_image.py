@@ -78,7 +78,7 @@ def test_a_turned_ellipse_has_its_place_its_axes_and_its_angle():
     # The image in the release, which is twice as strong, does not count.
     assert f["total"] == pytest.approx(float(np.sum(pressed)))
     assert f["largest"] == pytest.approx(float(np.max(pressed)))
-    assert f["shift_row"] == pytest.approx(0.0, abs=1e-9)
+    assert f["shift_row_50"] == pytest.approx(0.0, abs=1e-9)
     assert f.reasons["shear_first"] == f.reasons["shear_second"]
 
 
@@ -86,7 +86,19 @@ def test_the_centre_shifts_from_where_half_of_the_total_is_reached():
     images = [np.zeros((ROWS, COLUMNS)), 0.6 * bump(4.0, 6.0, 1.0, 1.0, 0.0), bump(5.0, 9.0, 1.0, 1.0, 0.0)]
     f = extract([image.ravel() for image in images])
 
-    assert (f["shift_row"], f["shift_column"]) == pytest.approx((1.0, 3.0), abs=0.01)
+    assert (f["shift_row_50"], f["shift_column_50"]) == pytest.approx((1.0, 3.0), abs=0.01)
+
+
+def test_the_contact_grows_from_where_a_quarter_and_three_quarters_of_the_total_are_reached():
+    wide = bump(5.5, 8.0, 2.0, 1.0, 0.0)
+    narrow = bump(5.5, 7.0, 1.0, 0.5, 0.0)
+    share = float(np.sum(wide) / np.sum(narrow))
+    images = [np.zeros((ROWS, COLUMNS)), 0.3 * share * narrow, 0.8 * wide, wide]
+    f = extract([image.ravel() for image in images])
+
+    assert (f["growth_long_25"], f["growth_short_25"]) == pytest.approx((1.0, 0.5), abs=0.05)
+    assert f["shift_column_25"] == pytest.approx(1.0, abs=0.01)
+    assert [f[f"growth_long_{share}"] for share in (50, 75)] == pytest.approx([0.0, 0.0], abs=1e-9)
 
 
 def test_three_forces_a_cell_give_pressure_and_shear():
@@ -151,7 +163,7 @@ def test_a_recording_without_phases_begins_with_its_zero():
     ("images", "missing"),
     [
         ([np.zeros(ROWS * COLUMNS)], {"total", "area"}),
-        ([np.zeros(ROWS * COLUMNS)] * 2, {"area", "centre_row", "angle", "shift_row"}),
+        ([np.zeros(ROWS * COLUMNS)] * 2, {"area", "centre_row", "angle", "shift_row_50"}),
         ([np.zeros(ROWS * COLUMNS), -np.ones(ROWS * COLUMNS)], {"area", "centre_row"}),
         ([np.zeros(ROWS * COLUMNS), np.eye(1, ROWS * COLUMNS, 20)[0]], {"angle"}),
     ],
