@@ -16,6 +16,7 @@ from graspsense.cli.main import cli
 from graspsense.core.values.errors import ConfigError, DataDamaged, GraspsenseError, TooLarge
 from graspsense.recording.labelled_recording import LabelledRecording, UnreadableRecording
 from graspsense.store.store import Store
+from graspsense.store.stored_grasps import stored_grasps
 from graspsense_lerobot.names import meaning_of
 from graspsense_lerobot.reader import recordings
 
@@ -157,6 +158,19 @@ def test_the_load_of_the_motor_is_the_force_where_nothing_feels(tmp_path):
     one = read(write_set(tmp_path / "set", 3, [state], NAMES[:3]))[0]
     assert one.recording.units["force_left"] == "%"
     assert column(one, "force_left_n").max() == pytest.approx(50.0)
+
+
+def test_a_load_in_newtons_is_the_effort_too(tmp_path):
+    folder = write_set(tmp_path / "set", 3, [episode()[:, :3]], NAMES[:3])
+    one = read(f"{folder}?gap_m_per_unit=0.001&force_n_per_unit=0.2")[0]
+    assert column(one, "effort_n").max() == pytest.approx(10.0)
+    done = CliRunner().invoke(
+        cli,
+        ["import", f"lerobot:{folder}?gap_m_per_unit=0.001&force_n_per_unit=0.2", "--save", str(tmp_path / "s"),
+         "-o", "features.type=chitta-without-pads", "-o", "features.contact_effort_n=1"],
+    )  # fmt: skip
+    assert done.exit_code == 0, done.output
+    assert stored_grasps(str(tmp_path / "s"))[0].features["p_first"] > 0.0
 
 
 def test_nothing_that_feels_is_an_error_that_names_the_option(tmp_path):

@@ -142,6 +142,14 @@ def test_simulated_trials_are_written(tmp_path):
     names = said["features"]["observation.state"]["names"]
     assert {"gripper.pos", "left.force", "right.force"} <= set(names)
     assert np.isfinite(np.stack(rows["observation.state"])).all()
+    efforts = [
+        reading.frame.effort_n
+        for one in recordings(str(tmp_path / "out"))
+        for reading in one.recording.readings
+    ]
+    assert max(efforts) == pytest.approx(
+        float(np.stack(rows["observation.state"])[:, names.index("gripper.effort")].max())
+    )
     assert "synthetic" in (tmp_path / "out/README.md").read_text()
     assert ":" in pd.read_parquet(tmp_path / "out/meta/tasks.parquet").index[0]
 

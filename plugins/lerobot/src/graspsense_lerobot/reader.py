@@ -172,7 +172,8 @@ def _columns(understood: Understood, episode: Episode) -> GraspColumns:
         gap_m=understood.metres_per_unit * (gap - options.gap_zero),
         left_n=newtons * sides[0],
         right_n=newtons * (np.mean(sides[1:], axis=0) if len(sides) > 1 else sides[0]),
-        scalars={channel_name(name): numbers[name] for name in meaning.effort},
+        effort_n=_effort(understood, numbers),
+        scalars={channel_name(name): numbers[name] for name in meaning.effort if named.get(name) != "N"},
         arrays=arrays,
         shapes=shapes,
         units={"gap": understood.gap_unit, "force": unit, **units},
@@ -197,6 +198,18 @@ def _check_times(columns: GraspColumns, understood: Understood) -> None:
             f"increase. With ?fps={understood.folder.fps:g} it follows from the numbers of the frames, and "
             "?repeated=drop leaves out frames with the time of the one before"
         )
+
+
+def _effort(understood: Understood, numbers: Mapping[str, Numbers]) -> Numbers | None:
+    """Return the effort (N): what the metadata says is in newtons, or the load that an option converts to the force."""
+    units, efforts = units_of(understood.folder), understood.meaning.effort
+    for name in efforts:
+        if units.get(name) == "N":
+            return numbers[name]
+    newtons = understood.options.force_n_per_unit
+    if newtons is not None and understood.forces and understood.forces[0] in efforts:
+        return newtons * np.abs(numbers[understood.forces[0]])
+    return None
 
 
 def _cells(cells: CellArray, numbers: Mapping[str, Numbers]) -> tuple[Numbers, tuple[int, ...]]:
