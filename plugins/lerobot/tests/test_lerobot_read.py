@@ -145,9 +145,16 @@ def test_missing_frames_are_told_and_divide_the_episode(tmp_path):
     assert [len(one.recording.readings) for one in read(f"{folder}?gaps=cut")] == [88, 84]
 
 
-def test_frames_without_a_number_are_told_and_left_out(tmp_path):
+def test_a_gripper_from_0_to_1_is_told(tmp_path):
     state = episode()
-    state[10, 1] = np.nan
+    state[:, 1] /= 100.0
+    assert read(write_set(tmp_path / "set", 3, [state]))[0].recording.units["gap"] == "share"
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_frames_without_a_number_are_told_and_left_out(tmp_path, value):
+    state = episode()
+    state[10, 1] = value
     one = read(write_set(tmp_path / "set", 3, [state]))[0]
     assert len(one.recording.readings) == 89
     assert any("without a number" in notice for notice in one.notices)

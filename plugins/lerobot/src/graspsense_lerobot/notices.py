@@ -72,7 +72,7 @@ def notices_of(understood: Understood, episode: Episode) -> Iterator[str]:
             f"{int(repeated.sum())} of {len(times)} frames repeat the one before, as of a sensor slower than the "
             "frames: ?repeated=drop leaves them out"
         )
-    missing = int(sum(np.isnan(values).any(axis=-1).sum() if values.ndim > 1 else np.isnan(values).sum()
+    missing = int(sum((~np.isfinite(values)).any(axis=-1).sum() if values.ndim > 1 else (~np.isfinite(values)).sum()
                       for key, values in episode.table.numbers.items() if key.startswith("obs")))  # fmt: skip
     if missing:
         yield f"{missing} frames have an observation without a number: left out where gap or force is missing"

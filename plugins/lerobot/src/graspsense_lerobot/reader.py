@@ -83,10 +83,8 @@ def frames_of(understood: Understood, episode: Episode) -> list[GraspColumns]:
     try:
         return [squeeze for part in parts for squeeze in squeezes(part)]
     except DataDamaged as error:
-        raise DataDamaged(
-            f"{error}. Understood was: {'; '.join(understood.notes)}. ?gap=NAME&force=NAME behind the folder chooses "
-            "others"
-        ) from error
+        chosen = "; ".join(one for one in understood.notes if one.startswith(("gap:", "force:", "further")))
+        raise DataDamaged(f"{error} ({chosen}; ?gap=NAME&force=NAME chooses others)") from error
 
 
 def label_of_task(task: str) -> str:

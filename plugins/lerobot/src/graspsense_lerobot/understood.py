@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 METRES: Final = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 """The units of a gap that need no option."""
+GUESSES: Final = (("share", -0.05, 1.05), ("rad", -7.0, 7.0), ("%", -10.0, 110.0))
+"""What a gap is taken as whose numbers are within these, where nothing names its unit."""
 _OF_STATE: Final = ("velocity", "effort", "load", "current", "torque", "force")
 
 
@@ -105,7 +107,7 @@ def numbers_of_feature(folder: Folder, feature: DataColumn, episode: Episode) ->
             f"{folder.place}: {episode.table.source} has no column of {width} numbers {feature.key}, which "
             "meta/info.json declares"
         )
-    rows: Numbers = values.reshape(len(values), -1)
+    rows: Numbers = np.where(np.isfinite(values), values, np.nan).reshape(len(values), -1)
     if rows.shape[1] != width:
         raise DataDamaged(
             f"{folder.place}: {feature.key} in {episode.table.source} has {rows.shape[1]} numbers a frame, and "
@@ -180,8 +182,8 @@ def _unit_of_gap(folder: Folder, gap: str, options: PlaceOptions) -> tuple[float
     low, high = float(known.min()), float(known.max())
     if not named and low >= -0.01 and high <= 0.25:
         return 1.0, "", [f"{gap} goes from {low:g} to {high:g}: taken as metres"]
-    guess = "rad" if low >= -7.0 and high <= 7.0 else "%" if low >= -10.0 and high <= 110.0 else "counts"
-    unit = named or guess
+    guesses = (unit for unit, least, most in GUESSES if least <= low and high <= most)
+    unit = named or next(guesses, "counts")
     return (
         1.0,
         unit,
