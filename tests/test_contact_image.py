@@ -78,7 +78,7 @@ def test_a_turned_ellipse_has_its_place_its_axes_and_its_angle():
     # The image in the release, which is twice as strong, does not count.
     assert f["total"] == pytest.approx(float(np.sum(pressed)))
     assert f["largest"] == pytest.approx(float(np.max(pressed)))
-    assert f["shift_row"] == pytest.approx(0.0, abs=1e-9)
+    assert f["shift_row_50"] == pytest.approx(0.0, abs=1e-9)
     assert f.reasons["shear_first"] == f.reasons["shear_second"]
 
 
@@ -86,7 +86,19 @@ def test_the_centre_shifts_from_where_half_of_the_total_is_reached():
     images = [np.zeros((ROWS, COLUMNS)), 0.6 * bump(4.0, 6.0, 1.0, 1.0, 0.0), bump(5.0, 9.0, 1.0, 1.0, 0.0)]
     f = extract([image.ravel() for image in images])
 
-    assert (f["shift_row"], f["shift_column"]) == pytest.approx((1.0, 3.0), abs=0.01)
+    assert (f["shift_row_50"], f["shift_column_50"]) == pytest.approx((1.0, 3.0), abs=0.01)
+
+
+def test_the_contact_grows_from_where_a_quarter_and_three_quarters_of_the_total_are_reached():
+    wide = bump(5.5, 8.0, 2.0, 1.0, 0.0)
+    narrow = bump(5.5, 7.0, 1.0, 0.5, 0.0)
+    share = float(np.sum(wide) / np.sum(narrow))
+    images = [np.zeros((ROWS, COLUMNS)), 0.3 * share * narrow, 0.8 * wide, wide]
+    f = extract([image.ravel() for image in images])
+
+    assert (f["growth_long_25"], f["growth_short_25"]) == pytest.approx((1.0, 0.5), abs=0.05)
+    assert f["shift_column_25"] == pytest.approx(1.0, abs=0.01)
+    assert [f[f"growth_long_{share}"] for share in (50, 75)] == pytest.approx([0.0, 0.0], abs=1e-9)
 
 
 def test_three_forces_a_cell_give_pressure_and_shear():
@@ -98,6 +110,25 @@ def test_three_forces_a_cell_give_pressure_and_shear():
     total = float(np.sum(pressed))
     assert f["total"] == pytest.approx(total)
     assert (f["shear_first"], f["shear_second"]) == pytest.approx((0.2 * total, -0.1 * total))
+
+
+def test_several_arrays_have_the_features_of_each_with_its_name_in_front():
+    images = [np.zeros(ROWS * COLUMNS), bump(4.0, 6.0, 1.0, 1.0, 0.0).ravel()]
+    trace = grasp(images)
+    both = evolve(
+        trace,
+        signals={**trace.signals, "thumb": evolve(trace.signals["tactile"], cells=np.array(images) * 2)},
+    )
+    layout = {"rows": ROWS, "columns": COLUMNS}
+    features = create("feature-set", "contact-image", array="tactile, thumb", **layout)
+    one = create("feature-set", "contact-image", array="tactile", **layout).extract(both)
+    f = features.extract(both)
+
+    assert [channel.name for channel in features.requires] == ["tactile", "thumb"]
+    assert set(f.names) == {feature.name for feature in features.features}
+    assert f["tactile_total"] == one["total"]
+    assert f["thumb_total"] == pytest.approx(2.0 * one["total"])
+    assert f["thumb_centre_row"] == pytest.approx(one["centre_row"])
 
 
 def test_a_camera_counts_how_much_its_colours_change_in_either_direction():
@@ -132,7 +163,7 @@ def test_a_recording_without_phases_begins_with_its_zero():
     ("images", "missing"),
     [
         ([np.zeros(ROWS * COLUMNS)], {"total", "area"}),
-        ([np.zeros(ROWS * COLUMNS)] * 2, {"area", "centre_row", "angle", "shift_row"}),
+        ([np.zeros(ROWS * COLUMNS)] * 2, {"area", "centre_row", "angle", "shift_row_50"}),
         ([np.zeros(ROWS * COLUMNS), -np.ones(ROWS * COLUMNS)], {"area", "centre_row"}),
         ([np.zeros(ROWS * COLUMNS), np.eye(1, ROWS * COLUMNS, 20)[0]], {"angle"}),
     ],

@@ -16,6 +16,7 @@ from graspsense.cli.main import cli
 from graspsense.core.values.errors import ConfigError, DataDamaged, GraspsenseError, TooLarge
 from graspsense.recording.labelled_recording import LabelledRecording, UnreadableRecording
 from graspsense.store.store import Store
+from graspsense.store.stored_grasps import stored_grasps
 from graspsense_lerobot.names import meaning_of
 from graspsense_lerobot.reader import recordings
 
@@ -144,9 +145,16 @@ def test_missing_frames_are_told_and_divide_the_episode(tmp_path):
     assert [len(one.recording.readings) for one in read(f"{folder}?gaps=cut")] == [88, 84]
 
 
-def test_frames_without_a_number_are_told_and_left_out(tmp_path):
+def test_a_gripper_from_0_to_1_is_told(tmp_path):
     state = episode()
-    state[10, 1] = np.nan
+    state[:, 1] /= 100.0
+    assert read(write_set(tmp_path / "set", 3, [state]))[0].recording.units["gap"] == "share"
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_frames_without_a_number_are_told_and_left_out(tmp_path, value):
+    state = episode()
+    state[10, 1] = value
     one = read(write_set(tmp_path / "set", 3, [state]))[0]
     assert len(one.recording.readings) == 89
     assert any("without a number" in notice for notice in one.notices)
@@ -157,6 +165,19 @@ def test_the_load_of_the_motor_is_the_force_where_nothing_feels(tmp_path):
     one = read(write_set(tmp_path / "set", 3, [state], NAMES[:3]))[0]
     assert one.recording.units["force_left"] == "%"
     assert column(one, "force_left_n").max() == pytest.approx(50.0)
+
+
+def test_a_load_in_newtons_is_the_effort_too(tmp_path):
+    folder = write_set(tmp_path / "set", 3, [episode()[:, :3]], NAMES[:3])
+    one = read(f"{folder}?gap_m_per_unit=0.001&force_n_per_unit=0.2")[0]
+    assert column(one, "effort_n").max() == pytest.approx(10.0)
+    done = CliRunner().invoke(
+        cli,
+        ["import", f"lerobot:{folder}?gap_m_per_unit=0.001&force_n_per_unit=0.2", "--save", str(tmp_path / "s"),
+         "-o", "features.type=chitta-without-pads", "-o", "features.contact_effort_n=1"],
+    )  # fmt: skip
+    assert done.exit_code == 0, done.output
+    assert stored_grasps(str(tmp_path / "s"))[0].features["p_first"] > 0.0
 
 
 def test_nothing_that_feels_is_an_error_that_names_the_option(tmp_path):
@@ -172,6 +193,112 @@ def test_names_of_arrays_with_rows_and_columns():
     (array,) = meaning.arrays
     assert (array.name, array.rows, array.columns, array.axes) == ("thumb", 3, 5, "z")
     assert meaning.gap == ("gripper_width",)
+
+
+STYLES = {
+    "left_taxel_3_fx": lambda finger, cell, axis: f"{('left', 'right')[finger]}_taxel_{cell}_f{axis}",
+    "Finger0.P3.FX": lambda finger, cell, axis: f"Finger{finger}.P{cell}.F{axis.upper()}",
+    "f0.p03.x": lambda finger, cell, axis: f"f{finger}.p{cell:02d}.{axis}",
+    "f0.fx.p03": lambda finger, cell, axis: f"f{finger}.f{axis}.p{cell:02d}",
+    "thumb0.cell_3.force_x": lambda finger, cell, axis: f"thumb{finger}.cell_{cell}.force_{axis}",
+    "tactile.finger0.3.x": lambda finger, cell, axis: f"tactile.finger{finger}.{cell}.{axis}",
+    "finger_0.row_1.col_1.x": lambda finger, cell, axis: (
+        f"finger_{finger}.row_{cell // 2}.col_{cell % 2}.{axis}"
+    ),
+}
+
+
+@pytest.mark.parametrize("style", STYLES)
+def test_cells_are_known_in_other_styles_of_names(style):
+    names = [STYLES[style](finger, cell, axis) for finger in range(2) for cell in range(4) for axis in "xyz"]
+    arrays = meaning_of(["gripper.pos", *names]).arrays
+    assert [(one.rows * one.columns, one.axes) for one in arrays] == [(4, "xyz"), (4, "xyz")]
+    assert arrays[1].normal == tuple(names[14::3])
+
+
+def test_numbered_joints_are_no_cells():
+    names = [f"left_joint_{k}" for k in range(7)] + [f"finger_{k}" for k in range(5)]
+    assert meaning_of(names).arrays == ()
+
+
+def test_numbers_that_sound_like_touch_and_are_not_understood_are_told(tmp_path):
+    names = [*NAMES[:3], "touch of thumb", *NAMES[4:]]
+    found = read(write_set(tmp_path / "set", 3, names=names))
+    assert any("touch of thumb" in notice for notice in found[0].notices)
+    assert any("not used: shoulder.pos" in note for note in found[0].recording.notes)
+
+
+@pytest.mark.parametrize("names", [{"motors": NAMES[:9], "cells": NAMES[9:]}, [NAMES], {"axes": [NAMES]}])
+def test_names_in_lists_of_lists_are_those_of_the_numbers(tmp_path, names):
+    folder = write_set(tmp_path / "set", 3)
+    about = json.loads((folder / "meta/info.json").read_text())
+    about["features"]["observation.state"]["names"] = names
+    damage_info(folder, features=about["features"])
+    assert [one.name for one in read(folder)[0].recording.channels] == ["gripper_load", "f0", "f1"]
+
+
+def test_of_two_arms_the_load_is_that_of_the_chosen_gripper(tmp_path):
+    whole = episode()[:, :3]
+    still = np.column_stack([whole[:, 0], np.full(len(whole), 100.0), np.zeros(len(whole))])
+    names = [f"{arm}_{name}" for arm in ("left", "right") for name in NAMES[:3]]
+    folder = write_set(tmp_path / "set", 3, [np.hstack([still, whole])], names)
+    (refused,) = recordings(str(folder))
+    assert isinstance(refused, UnreadableRecording)
+    assert "right_gripper.pos" in str(refused.error)
+    one = read(f"{folder}?gap=right_gripper.pos")[0]
+    assert column(one, "force_left_n").max() == pytest.approx(50.0)
+    assert [channel.name for channel in one.recording.channels] == ["right_gripper_load"]
+
+
+def test_the_unit_in_the_name_of_a_gap_needs_no_option(tmp_path):
+    names = [NAMES[0], "gripper_width_mm", *NAMES[2:]]
+    one = read(write_set(tmp_path / "set", 3, names=names))[0]
+    assert "gap" not in one.recording.units
+    assert column(one, "gap_m").max() == pytest.approx(0.1, rel=1e-3)
+
+
+@pytest.mark.parametrize("damage", [Path.unlink, lambda path: path.write_bytes(path.read_bytes()[:500])])
+def test_an_episode_whose_file_cannot_be_read_leaves_the_others(tmp_path, damage):
+    folder = write_set(tmp_path / "set", 2)
+    damage(folder / "data/chunk-000/episode_000000.parquet")
+    kinds = [type(one) for one in recordings(str(folder))]
+    assert kinds == [UnreadableRecording, LabelledRecording, LabelledRecording, LabelledRecording]
+
+
+def test_a_file_that_was_cloned_without_its_content_names_git_lfs(tmp_path):
+    folder = write_set(tmp_path / "set", 3)
+    (folder / "data/chunk-000/file-000.parquet").write_text(
+        "version https://git-lfs.github.com/spec/v1\nsize 9\n"
+    )
+    with pytest.raises(DataDamaged, match="git lfs pull"):
+        _refusal(folder)
+
+
+@pytest.mark.parametrize("times", [[5, 4], [np.nan, np.nan]])
+def test_times_that_do_not_increase_name_the_option_that_mends_them(tmp_path, times):
+    folder = write_set(tmp_path / "set", 3, [episode()])
+    data = folder / "data/chunk-000/file-000.parquet"
+    table = pq.read_table(data)
+    stamps = table["timestamp"].to_numpy().copy()
+    stamps[4:6] = times
+    place = table.column_names.index("timestamp")
+    pq.write_table(table.set_column(place, "timestamp", pa.array(stamps)), data)
+    (refused,) = recordings(str(folder))
+    assert "fps=30" in str(refused.error)
+    assert len(read(f"{folder}?fps=30")[0].recording.readings) == 90
+
+
+def test_a_finger_that_is_not_connected_leaves_the_force_to_the_other(tmp_path):
+    state = episode()
+    state[:, 15:] = np.nan
+    one = read(write_set(tmp_path / "set", 3, [state]))[0]
+    assert column(one, "force_right_n").max() == pytest.approx(24.0, rel=1e-5)
+    assert any("without a number" in notice for notice in one.notices)
+
+
+def test_a_video_that_is_missing_is_told(tmp_path):
+    folder = write_set(tmp_path / "set", 3, [episode()])
+    assert any("missing" in line for line in read(folder)[0].recording.notes if "video" in line)
 
 
 def test_cells_that_are_not_all_there_are_no_array():
@@ -258,7 +385,7 @@ def test_a_task_that_is_not_described_is_an_error(tmp_path):
     folder = write_set(tmp_path / "set", 2)
     write_lines(folder / "meta/tasks.jsonl", [{"task_index": 5, "task": "x"}])
     with pytest.raises(DataDamaged, match="task_index 0"):
-        list(recordings(str(folder)))
+        _refusal(folder)
 
 
 def test_more_numbers_than_the_memory_should_hold_are_not_read(tmp_path):
@@ -268,7 +395,7 @@ def test_more_numbers_than_the_memory_should_hold_are_not_read(tmp_path):
     table = pa.table(dict.fromkeys(("timestamp", "frame_index", "episode_index", "index"), values))
     pq.write_table(table, folder / "data/chunk-000/file-000.parquet")
     with pytest.raises(TooLarge):
-        list(recordings(str(folder)))
+        _refusal(folder)
 
 
 @pytest.mark.parametrize(

@@ -20,9 +20,9 @@ from graspsense_lerobot.reader import recordings
 SAMPLES = Path(__file__).parents[3] / "samples" / "trials"
 
 
-def run(*words: object) -> str:
+def run(*words: object, exits: int = 0) -> str:
     done = CliRunner().invoke(cli, list(map(str, words)), catch_exceptions=False)
-    assert done.exit_code == 0, done.output
+    assert done.exit_code == exits, done.output
     return done.output
 
 
@@ -142,6 +142,14 @@ def test_simulated_trials_are_written(tmp_path):
     names = said["features"]["observation.state"]["names"]
     assert {"gripper.pos", "left.force", "right.force"} <= set(names)
     assert np.isfinite(np.stack(rows["observation.state"])).all()
+    efforts = [
+        reading.frame.effort_n
+        for one in recordings(str(tmp_path / "out"))
+        for reading in one.recording.readings
+    ]
+    assert max(efforts) == pytest.approx(
+        float(np.stack(rows["observation.state"])[:, names.index("gripper.effort")].max())
+    )
     assert "synthetic" in (tmp_path / "out/README.md").read_text()
     assert ":" in pd.read_parquet(tmp_path / "out/meta/tasks.parquet").index[0]
 
@@ -265,3 +273,36 @@ def test_an_annotation_takes_the_place_of_an_earlier_one(annotated, tmp_path):
     run("export", tmp_path / "s2", "--to", f"lerobot:{tmp_path / 'second'}?annotate={copy}")
     assert all_frames(tmp_path / "second").equals(all_frames(copy))
     assert info(tmp_path / "second") == info(copy)
+
+
+def test_the_trials_of_another_data_set_annotate_nothing(annotated, tmp_path):
+    version, *_ = annotated
+    other = write_set(tmp_path / "other", version, [episode(), episode(2, peak=3.5), episode()[:, ::1] * 0.9])
+    with pytest.raises(ConfigError, match="data sets differ"):
+        run("export", tmp_path / "s", "--to", f"lerobot:{tmp_path / 'wrong'}?annotate={other}")
+    assert not (tmp_path / "wrong").exists()
+
+
+def test_a_copy_within_the_original_is_refused(annotated, tmp_path):
+    _, original, _ = annotated
+    before = contents(original)
+    with pytest.raises(ConfigError, match="not changed"):
+        run("export", tmp_path / "s", "--to", f"lerobot:{original / 'copy'}?annotate={original}")
+    assert contents(original) == before
+
+
+def test_a_damaged_file_is_copied_and_counted(tmp_path):
+    original = write_set(tmp_path / "set", 2)
+    damaged = original / "data/chunk-000/episode_000000.parquet"
+    damaged.write_bytes(damaged.read_bytes()[:500])
+    run("import", f"lerobot:{original}?gap_m_per_unit=0.001", "--save", tmp_path / "s", exits=5)
+    said = run("export", tmp_path / "s", "--to", f"lerobot:{tmp_path / 'copy'}?annotate={original}")
+    assert "cannot be read and are as they were: 1" in said
+    assert (tmp_path / "copy/data/chunk-000/episode_000000.parquet").read_bytes() == damaged.read_bytes()
+
+
+def test_frames_of_the_same_rate_are_written_once_each(tmp_path):
+    run("import", f"lerobot:{write_set(tmp_path / 'set', 3)}?gap_m_per_unit=0.001", "--save", tmp_path / "s")
+    run("export", tmp_path / "s", "--to", f"lerobot:{tmp_path / 'out'}")
+    state = np.stack(frames(tmp_path / "out")["observation.state"])
+    assert (np.diff(state, axis=0) != 0.0).any(axis=1).all()

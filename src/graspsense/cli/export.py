@@ -86,3 +86,5 @@ def echo_written(target: str, written: Mapping[str, Any], as_json: bool) -> None
     echo(f"{target}: {', '.join(f'{written[key]} {key}' for key in counts if key in written)}")
     if written.get("set_aside"):
         echo(f"note: trials that are set aside and left out: {written['set_aside']}")
+    if written.get("unreadable"):
+        echo(f"note: files that cannot be read and are as they were: {written['unreadable']}")

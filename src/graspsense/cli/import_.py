@@ -124,6 +124,7 @@ def import_(
         raise
     if not recordings:
         raise ConfigError(f"{', '.join(sources)}: no recordings")
+    recordings = chosen.fitting(recordings, unreadable)
     chosen.fit(recordings)
     if save is None or check:
         _show(recordings, unreadable, chosen, Path(plot or PICTURE), as_json)
@@ -145,7 +146,6 @@ class _Chosen:
 
     def __init__(self, pipeline: str, options: Sequence[str]) -> None:
         from graspsense.core.components.config import ImplausibleSettings
-        from graspsense.core.pipeline.wiring import check
 
         self._pipeline, self._options = pipeline, tuple(options)
         self._added: tuple[str, ...] = ()
@@ -158,7 +158,26 @@ class _Chosen:
         except ImplausibleSettings as doubt:  # unless the recordings are in other units
             self._doubt, self._any_unit = doubt, True
             self._settings = self._resolved("csv:the first recording")
-        check(self._settings)
+        self._leave_out_misfitting_model()
+
+    def _leave_out_misfitting_model(self) -> None:
+        """Import without predictions where other features are chosen than the model of the pipeline takes.
+
+        Raises WiringError for a model that the user has chosen.
+        """
+        from graspsense.core.components.registry import installed
+        from graspsense.core.learn.model import model_for
+        from graspsense.core.values.errors import WiringError
+
+        self._unpredicted = ""
+        try:
+            model_for(self._settings, installed())
+        except WiringError:
+            if any(option.startswith("classifier.") for option in self._options):
+                raise
+            self._options = (*self._options, "classifier.type=none")
+            self._settings = self._resolved("csv:the first recording")
+            self._unpredicted = "; no predictions, because the model of the pipeline takes other features"
 
     @contextmanager
     def doubted(self) -> Iterator[None]:
@@ -177,6 +196,30 @@ class _Chosen:
         if self._doubt is not None:  # whose own advice, --force, names a column here
             raise ConfigError(str(self._doubt))
 
+    def fitting(
+        self, recordings: Sequence[ImportedRecording], unreadable: list[UnreadableRecording]
+    ) -> list[ImportedRecording]:
+        """Return the recordings with the channels that controller and features need; `unreadable` gets the others.
+
+        Raises WiringError if there is none.
+        """
+        from graspsense.core.pipeline.wiring import check_recording
+        from graspsense.core.values.errors import WiringError
+        from graspsense.recording.labelled_recording import UnreadableRecording
+        from graspsense.recording.readable import error_of_all
+        from graspsense.recording.replayable import recorded_channels
+
+        users, fitting = (self._settings.controller, self._settings.features), []
+        for one in recordings:
+            try:
+                check_recording(recorded_channels(one.labelled.recording), one.labelled.source, *users)
+                fitting.append(one)
+            except WiringError as error:
+                unreadable.append(UnreadableRecording(source=one.labelled.source, error=error))
+        if not fitting:
+            raise error_of_all(unreadable)
+        return fitting
+
     def fit(self, recordings: Sequence[ImportedRecording]) -> None:
         """Choose the thresholds that are not given. Raises ConfigError for implausible ones in SI units."""
         from graspsense.sources.noise_thresholds import THRESHOLDS, thresholds_for
@@ -193,6 +236,7 @@ class _Chosen:
         found = thresholds_for([one.labelled.recording for one in recordings], timeouts, given)
         open_keys = {key for key in found.settings if key.partition(".")[2] in is_open}
         self.words = found.words if open_keys or not found.settings else "thresholds: those that are given"
+        self.words += self._unpredicted
         self._added = tuple(f"{key}={found.settings[key]!r}" for key in sorted(open_keys))
 
     def settings(self, recording: ImportedRecording) -> Settings:
@@ -319,8 +363,8 @@ def _echo_unreadable(unreadable: Sequence[UnreadableRecording]) -> None:
     if len(unreadable) > LISTED:
         echo(f"and {len(unreadable) - LISTED} more; --json lists all", indent=2, err=True)
     echo(
-        "Correct these files, or leave them out of `files` in the manifest. The same command then imports only what "
-        "the store does not have.",
+        "Correct these, or leave them out (of `files` in a manifest). The same command then imports only what the "
+        "store does not have.",
         err=True,
     )
 

@@ -16,9 +16,11 @@ from graspsense.core.values.channel import FLOATS, Channel
 from graspsense.core.values.errors import DataDamaged
 from graspsense.core.values.events import GraspEvent
 from graspsense.core.values.mounting import Mounting
-from graspsense.core.values.signals import Frame, Image, Reading
+from graspsense.core.values.signals import CHANNELS, Frame, Image, Reading
 
 _FRAME: Final = struct.Struct(f"<{len(Frame._fields)}d")
+ALWAYS: Final = frozenset({"gap", "velocity", "force_left", "force_right"})
+"""The channels of a frame that every recording has, by which a control law follows it."""
 REPLAY_NOTE: Final = "a recording cannot react: the controller's commands have no effect on it"
 
 
@@ -59,6 +61,40 @@ def check_recording(recording: Recording) -> None:
         raise DataDamaged(f"{recording.name}: the time of a frame is not a number")
     if not 0.0 < recording.rate_hz < math.inf:
         raise DataDamaged(f"{recording.name}: its rate is {recording.rate_hz} frames a unit of time")
+
+
+def recorded_channels(recording: Recording) -> tuple[Channel, ...]:
+    """Return the channels that a recording has: gap, velocity and both forces, and of the others those with a value."""
+    own = {channel.name: channel for channel in recording.channels}
+    frames = [
+        own.pop(name, Channel(name, unit, _rate_hz(recording, name)))
+        for name, unit in CHANNELS.items()
+        if name in own or _has(recording, name)
+    ]
+    return (*frames, *own.values())
+
+
+def _has(recording: Recording, name: str) -> bool:
+    """Return whether a recording has a value of this channel of a frame."""
+    if name in ALWAYS:
+        return True
+    if name == "pads":
+        return any(reading.pads.counter for reading in recording.readings)
+    place = Frame._fields.index(f"{name}_n")
+    return not all(math.isnan(reading.frame[place]) for reading in recording.readings)
+
+
+def _rate_hz(recording: Recording, channel: str) -> float:
+    """Return the rate at which a recording has this channel of a frame; 0 if its times are not in seconds."""
+    if recording.units.get("t", "s") != "s":
+        return 0.0
+    if channel != "pads":
+        return recording.rate_hz
+    images = {
+        reading.pads.counter: reading.pads.t_s for reading in recording.readings if reading.pads.counter
+    }
+    seconds = max(images.values()) - min(images.values()) if images else 0.0
+    return (len(images) - 1) / seconds if seconds > 0.0 else 0.0
 
 
 def content_sha256(recording: Recording) -> str:

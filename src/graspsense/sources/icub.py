@@ -85,9 +85,13 @@ def read_recording(name: str) -> Recording:
     Raises ConfigError if the file cannot be read, DataDamaged if it is not a valid grasp.
     """
     path = _locate(name)
-    grasp = read_grasp(path)
+    return recording_of(read_grasp(path), path.name)
+
+
+def recording_of(grasp: IcubGrasp, file: str) -> Recording:
+    """Return a grasp of this file as a recording."""
     return Recording(
-        name=f"iCub hand, {path.name}",
+        name=f"iCub hand, {file}",
         readings=relative_readings(grasp),
         rate_hz=1.0,
         units=UNITS,

@@ -19,13 +19,13 @@ import numpy as np
 from graspsense.core.components.caller import option
 from graspsense.core.components.roles import FeatureSet
 from graspsense.core.learn.labelled import ControlFeatures, Labelled
-from graspsense.core.values.errors import ConfigError, DataDamaged, counted
+from graspsense.core.pipeline.wiring import check_recording
+from graspsense.core.values.errors import ConfigError, counted
 from graspsense.core.values.features import FeatureTable, table_of
-from graspsense.core.values.signals import APPROACH
-from graspsense.core.values.trace import SI_UNITS, Trace, trace_of
 from graspsense.recording.controls import controls
 from graspsense.recording.labelled_recording import LabelledRecording, UnreadableRecording
 from graspsense.recording.readable import each_readable, error_of_all, note_on
+from graspsense.recording.replayable import recorded_channels
 from graspsense.sources.icub import (
     DATA_FOLDER,
     FINGER_FLEXION,
@@ -34,12 +34,12 @@ from graspsense.sources.icub import (
     FORCE_N_PER_COUNT,
     GAP_M_PER_DEG,
     THUMB_FLEXION,
-    UNITS,
     IcubGrasp,
     read_grasp,
     read_recording,
-    relative_readings,
+    recording_of,
 )
+from graspsense.sources.labelled_recordings import trace_of_recording
 
 UNRELIABLE: Final = "full_coke"
 """The class whose data the author of the data set calls unreliable in its README."""
@@ -65,7 +65,9 @@ def read_dataset(folder: str, features: FeatureSet[Any], *, unreliable: bool = F
     paths, grasps, unreadable = _readable(paths)
     if not grasps:
         raise error_of_all(unreadable)
-    table = table_of([features.extract(_trace(grasp)) for grasp in grasps])
+    recordings = [recording_of(grasp, path.name) for (path, *_), grasp in zip(paths, grasps, strict=True)]
+    check_recording(recorded_channels(recordings[0]), f"icub:{folder}", features)
+    table = table_of([features.extract(trace_of_recording(one)) for one in recordings])
     notes = [
         "the data of the iCub hand have no time stamps: times are frame numbers (delta_t is in frames)",
         "metres and newtons are nominal, and relative to the first frame (docs/icub.md)",
@@ -152,14 +154,6 @@ def _grasps(folder: str) -> list[tuple[Path, str, int]]:
     if not found:
         raise ConfigError(f"{place} contains no file of the iCub Grasp Dataset (CLASS_NUMBER.txt)")
     return sorted(found, key=lambda one: (one[1], one[2]))
-
-
-def _trace(grasp: IcubGrasp) -> Trace:
-    frames = [reading.frame for reading in relative_readings(grasp)]
-    if not frames:
-        raise DataDamaged("a grasp without frames")
-    n = len(frames)
-    return trace_of(frames, [APPROACH] * n, [0.0] * n, [], {**SI_UNITS, **UNITS})
 
 
 def _absolute(table: FeatureTable, grasps: list[IcubGrasp]) -> FeatureTable:

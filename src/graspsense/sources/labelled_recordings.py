@@ -16,6 +16,7 @@ from attrs import evolve
 from graspsense.core.components.roles import FeatureSet
 from graspsense.core.learn.checkpoints import with_checkpoints
 from graspsense.core.learn.labelled import Labelled, class_of
+from graspsense.core.pipeline.wiring import check_recording
 from graspsense.core.values.errors import ComponentFailed, ConfigError, GraspsenseError, counted, named
 from graspsense.core.values.features import Features, FeatureTable, table_of
 from graspsense.core.values.signals import APPROACH
@@ -24,7 +25,7 @@ from graspsense.recording.before_contact import before_contact
 from graspsense.recording.controls import Controls, controls, without_constant_gap
 from graspsense.recording.labelled_recording import LabelledRecording, UnreadableRecording
 from graspsense.recording.readable import each_readable, error_of_all, note_on
-from graspsense.recording.replayable import Recording
+from graspsense.recording.replayable import Recording, recorded_channels
 from graspsense.recording.same_grasp import curve_bytes, grasp_numbers
 from graspsense.sources.dataset_recordings import readable_or_not
 from graspsense.sources.noise_thresholds import THRESHOLDS, thresholds_for
@@ -54,7 +55,7 @@ def labelled_recordings(
         elif not one.label:
             unlabelled += 1
         else:
-            for found in each_readable(one.source, partial(_features_of, one.recording, features)):
+            for found in each_readable(one.source, partial(_features_of, one, features)):
                 if isinstance(found, UnreadableRecording):
                     unreadable.append(found)
                     continue
@@ -106,9 +107,10 @@ def _fitted(features: FeatureSet[Any], recordings: Sequence[Recording]) -> tuple
     return (type(features)(evolve(config, **chosen)), [found.words]) if chosen else (features, [])
 
 
-def _features_of(recording: Recording, features: FeatureSet[Any]) -> tuple[tuple[Features, Features]]:
-    """Return the features of a recording, and those from before contact."""
-    trace = trace_of_recording(recording)
+def _features_of(one: LabelledRecording, features: FeatureSet[Any]) -> tuple[tuple[Features, Features]]:
+    """Return the features of a recording, and those from before contact. Raises WiringError if it lacks a channel."""
+    check_recording(recorded_channels(one.recording), one.source, features)
+    trace = trace_of_recording(one.recording)
     try:
         extracted = features.extract(trace)
     except (GraspsenseError, MemoryError):

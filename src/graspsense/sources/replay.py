@@ -19,7 +19,7 @@ from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import DeviceLost, GraspsenseError, RecordingEnded, suggestion
 from graspsense.core.values.signals import CHANNELS, EFFORT, Command, Pads, Reading
 from graspsense.recording.readable import readable
-from graspsense.recording.replayable import Recording, check_recording
+from graspsense.recording.replayable import Recording, check_recording, recorded_channels
 from graspsense.sources.dataset_recordings import (
     datasets_with_recordings,
     handed_recording,
@@ -134,19 +134,6 @@ class ReplayConfig:
     )
 
 
-def _rate_hz(recording: Recording, channel: str) -> float:
-    """Return the rate at which a recording has this channel of a frame; 0 if its times are not in seconds."""
-    if recording.units.get("t", "s") != "s":
-        return 0.0
-    if channel != "pads":
-        return recording.rate_hz
-    images = {
-        reading.pads.counter: reading.pads.t_s for reading in recording.readings if reading.pads.counter
-    }
-    seconds = max(images.values()) - min(images.values()) if images else 0.0
-    return (len(images) - 1) / seconds if seconds > 0.0 else 0.0
-
-
 @final
 class ReplayBackend(SensorBackend[ReplayConfig]):
     """Gives the frames of a recording, one a read; commands have no effect on what has happened."""
@@ -160,12 +147,9 @@ class ReplayBackend(SensorBackend[ReplayConfig]):
 
     @property
     def channels(self) -> tuple[Channel, ...]:
-        """All channels of a frame, and those that the recording holds beside them. The recording is read for this."""
+        """The channels that the recording has, which is read for this; those of a frame if it cannot be read."""
         with suppress(GraspsenseError):  # `open` reports it
-            recording = self._read()
-            own = {channel.name: channel for channel in recording.channels}
-            frame = (Channel(name, unit, _rate_hz(recording, name)) for name, unit in CHANNELS.items())
-            return (*(own.pop(channel.name, channel) for channel in frame), *own.values())
+            return recorded_channels(self._read())
         return tuple(Channel(name, unit) for name, unit in CHANNELS.items())
 
     def open(self, seed: int) -> DeviceInfo:

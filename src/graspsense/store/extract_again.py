@@ -19,7 +19,7 @@ from graspsense.core.components.layers import Layer
 from graspsense.core.components.nearest_key import nearest_path
 from graspsense.core.grasp.runner import run_uninterrupted
 from graspsense.core.learn.checkpoints import with_checkpoints
-from graspsense.core.pipeline.wiring import check
+from graspsense.core.pipeline.wiring import check_recording
 from graspsense.core.values.errors import ComponentFailed, ConfigError, DataDamaged, named
 from graspsense.recording.before_contact import before_contact, contact_force_of
 from graspsense.recording.held_phases import with_phases_of
@@ -99,7 +99,7 @@ def extract_again(
                 found[number] = _extracted(resolved[text], recording, trial, checkpoints_s)
                 settings = resolved[text]
         except (ConfigError, DataDamaged) as error:
-            if isinstance(error, ConfigError):
+            if isinstance(error, ConfigError) and text not in resolved:
                 refused[text] = error
             unreadable.append(UnreadableRecording(source=recording, error=error))
         if progress is not None:
@@ -141,15 +141,13 @@ def _resolved(
     values = {**without_followers(own), "classifier": {"type": NONE}}
     replay = (Flag("STORE", "gripper.type", "replay"), Flag("STORE", "gripper.recording", recording))
     # The settings of the recording have been accepted when it was made.
-    settings = resolve(
+    return resolve(
         "default",
         experiment=Layer.of(values, "the recording"),
         options=options,
         flags=(*flags, *replay),
         force=True,
     )
-    check(settings)
-    return settings
 
 
 def _extracted(
@@ -157,6 +155,7 @@ def _extracted(
 ) -> ExtractedAgain:
     gripper = settings.gripper
     backend = gripper.component.create(evolve(gripper.config, recording=recording))
+    check_recording(backend.channels, recording, settings.controller, settings.features)
     grasp = run_uninterrupted(backend, settings.controller.create(), settings.run)
     trace = grasp.trace
     if trial.record.origin == "import":

@@ -18,7 +18,7 @@ from attrs import frozen
 from pyarrow import parquet
 
 from graspsense.gripper_api import StoredGrasp
-from graspsense.plugin_api import ConfigError, DataDamaged
+from graspsense.plugin_api import ConfigError, DataDamaged, GraspColumns
 from graspsense_lerobot.columns import statistics
 from graspsense_lerobot.folder import INFO, json_lines, read_folder
 from graspsense_lerobot.reader import numbered_parts
@@ -50,18 +50,25 @@ class Placed:
 def annotate(grasps: Sequence[StoredGrasp], original: Path, copy: Path) -> dict[str, int]:
     """Write an annotated copy of the data set into an empty folder, and return how many trials and frames it has.
 
-    Raises ConfigError if the trials are not of this data set, DataDamaged.
+    A data file that cannot be read is copied as it is, and counted. Raises ConfigError if the trials are not of this
+    data set or the copy is in it, DataDamaged.
     """
+    if copy.resolve().is_relative_to(original.resolve()):
+        raise ConfigError(f"{original} is not changed: name a folder for the copy that is not in it")
     folder = read_folder(original)
     placed = _placed(grasps, original)
     events, classes = told_events(grasps), predicted_classes(grasps)
     shutil.copytree(original, copy, dirs_exist_ok=True)
     every: dict[str, list[Any]] = {name: [] for name in COLUMNS}
+    unreadable = 0
     for path in sorted((copy / "data").rglob("*.parquet")):
-        _annotate_file(path, placed, (events, classes), every)
+        columns = _annotate_file(path, placed, (events, classes))
+        unreadable += not columns
+        for name, values in columns.items():
+            every[name] += values
     found = {name: np.concatenate(values) for name, values in every.items() if values}
     if not found:
-        raise DataDamaged(f"{original} has no Parquet file in its folder data")
+        raise DataDamaged(f"{original} has no Parquet file in its folder data that can be read")
     _annotate_episodes(copy, folder.version, placed)
     declared = {name: {"dtype": "int64", "shape": [1], "names": None} for name in COLUMNS}
     write_json(copy / INFO, {**folder.info, "features": {**folder.info["features"], **declared}})
@@ -72,7 +79,8 @@ def annotate(grasps: Sequence[StoredGrasp], original: Path, copy: Path) -> dict[
     if stats.is_file():
         known = json.loads(stats.read_text("utf-8"))
         write_json(stats, {**known, **{name: statistics(values) for name, values in found.items()}})
-    return {"trials": len(grasps), "frames": len(found[COLUMNS[0]])}
+    counts = {"trials": len(grasps), "frames": len(found[COLUMNS[0]])}
+    return {**counts, "unreadable": unreadable} if unreadable else counts
 
 
 def _placed(grasps: Sequence[StoredGrasp], original: Path) -> dict[int, list[Placed]]:
@@ -92,35 +100,56 @@ def _placed(grasps: Sequence[StoredGrasp], original: Path) -> dict[int, list[Pla
             raise ConfigError(
                 f"trial {grasp.number} is recording {number + 1} of another data set: {original} has {len(parts)}"
             )
-        episode, start_s, end_s = part
+        episode, columns = part
+        if not _same(grasp, columns):
+            raise ConfigError(
+                f"trial {grasp.number} has another gap than {columns.source} of {original}: the data sets differ"
+            )
+        start_s, end_s = float(columns.t_s[0]), float(columns.t_s[-1])
         found.setdefault(episode, []).append(Placed(grasp, start_s, end_s))
     return found
 
 
+def _same(grasp: StoredGrasp, columns: GraspColumns) -> bool:
+    """Return whether a trial has the gap of this squeeze of the data set."""
+    known = np.isfinite(columns.gap_m)
+    t_s, gap, trace = columns.t_s[known] - columns.t_s[0], columns.gap_m[known], grasp.trace()
+    if not known.any() or len(trace) > len(columns):
+        return False
+    return bool(
+        np.allclose(
+            np.interp(trace.t_s, t_s, gap), trace.gap_m, rtol=0.0, atol=1e-6 * float(np.ptp(gap)) + 1e-12
+        )
+    )
+
+
 def _annotate_file(
-    path: Path,
-    placed: Mapping[int, Sequence[Placed]],
-    meanings: tuple[Sequence[str], Sequence[str]],
-    every: dict[str, list[Any]],
-) -> None:
-    """Add the columns to a data file, one group of rows after the other. Raises DataDamaged."""
+    path: Path, placed: Mapping[int, Sequence[Placed]], meanings: tuple[Sequence[str], Sequence[str]]
+) -> dict[str, list[Any]]:
+    """Add the columns to a data file, one group of rows after the other, and return them; none if it is damaged."""
     part = path.with_suffix(".part")
+    found: dict[str, list[Any]] = {name: [] for name in COLUMNS}
     writer = None
-    with parquet.ParquetFile(path) as file:
-        for k in range(file.num_row_groups):
-            table = file.read_row_group(k)
-            if not {"episode_index", "timestamp"} <= set(table.column_names):
-                raise DataDamaged(f"{path.name} has no columns episode_index and timestamp")
-            for name, values in _numbers(table, placed, meanings).items():
-                table = _with_column(table, name, values)
-                every[name].append(values)
-            # What another library says of the columns does not name the new ones.
-            table = table.replace_schema_metadata(None)
-            writer = writer or parquet.ParquetWriter(part, table.schema)
-            writer.write_table(table)
+    try:
+        with parquet.ParquetFile(path) as file:
+            for k in range(file.num_row_groups):
+                table = file.read_row_group(k)
+                for name, values in _numbers(table, placed, meanings).items():
+                    table = _with_column(table, name, values)
+                    found[name].append(values)
+                # What another library says of the columns does not name the new ones.
+                table = table.replace_schema_metadata(None)
+                writer = writer or parquet.ParquetWriter(part, table.schema)
+                writer.write_table(table)
+    except (pyarrow.ArrowException, KeyError, OSError) as error:
+        if isinstance(error, OSError) and error.errno is not None:
+            raise  # of the disk
+        part.unlink(missing_ok=True)
+        return {}
     if writer is not None:
         writer.close()
         part.replace(path)
+    return found
 
 
 def _numbers(

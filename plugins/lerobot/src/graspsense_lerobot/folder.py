@@ -9,15 +9,20 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path, PurePosixPath
 from typing import Any, Final
 
 import numpy as np
 from attrs import frozen
 
-from graspsense.gripper_api import ColumnTable, TooLarge, read_parquet
-from graspsense.plugin_api import ConfigError, DataDamaged
+from graspsense.gripper_api import ColumnTable, GraspsenseError, TooLarge, read_parquet
+from graspsense.plugin_api import (
+    ConfigError,
+    DataDamaged,
+    UnreadableRecording,
+    each_readable,
+)
 
 INFO: Final = "meta/info.json"
 DESCRIPTION_BYTES: Final = 64 * 2**20
@@ -30,6 +35,8 @@ VIDEO_PATHS: Final = {
     2: "videos/chunk-{episode_chunk:03d}/{video_key}/episode_{episode_index:06d}.mp4",
     3: "videos/{video_key}/chunk-{chunk_index:03d}/file-{file_index:03d}.mp4",
 }
+LFS: Final = b"version https://git-lfs"
+"""What a file begins with that was cloned without its content."""
 _FIELD: Final = re.compile(r"\{(?P<name>[a-z_]+)(?::0?(?P<width>[0-9])d)?\}")
 
 
@@ -80,8 +87,8 @@ class Folder:
             raise DataDamaged(f"{self.place}/meta/tasks.parquet needs the columns task and task_index")
         return dict(zip(map(int, table.numbers["task_index"]), texts, strict=True))
 
-    def episodes(self) -> Iterator[Episode]:
-        """Yield every episode, in order. Raises DataDamaged."""
+    def episodes(self) -> Iterator[Episode | UnreadableRecording]:
+        """Yield every episode, in order, and of one that cannot be read the reason. Raises DataDamaged."""
         rows = sorted(self._episode_rows(), key=lambda row: _whole(row, "episode_index", "meta/episodes"))
         claimed = self.info.get("total_episodes")
         if not rows:
@@ -90,18 +97,37 @@ class Folder:
             raise DataDamaged(
                 f"{self.place}: {INFO} says {claimed} episodes, and meta/episodes describes {len(rows)}"
             )
-        held: tuple[str, ColumnTable] | None = None
+        held: dict[str, ColumnTable | GraspsenseError] = {}
         for row in rows:
-            path = self._data_path(row)
-            if held is None or held[0] != path:
-                held = path, self.parquet(path, self._wanted)
-            yield self._episode(row, path, held[1])
+            name = f"episode {_whole(row, 'episode_index', 'meta/episodes')}"
+            yield from each_readable(name, partial(self._read_episode, row, held))
+
+    def _read_episode(
+        self, row: Mapping[str, Any], held: dict[str, ColumnTable | GraspsenseError]
+    ) -> tuple[Episode]:
+        """Return an episode; `held` is what the data file that was read last gave."""
+        path = self._data_path(row)
+        if path not in held:
+            held.clear()
+            try:
+                held[path] = self.parquet(path, self._wanted)
+            except GraspsenseError as error:
+                held[path] = error
+        table = held[path]
+        if isinstance(table, GraspsenseError):
+            raise table
+        return (self._episode(row, path, table),)
 
     def parquet(self, path: str, wanted: Sequence[str] | None = None) -> ColumnTable:
         """Return these columns of a Parquet file of the folder, or all. Raises DataDamaged, TooLarge."""
         file = self.place / path
         if not file.is_file():
             raise DataDamaged(f"{self.place}: {path} is missing")
+        with file.open("rb") as opened:
+            if opened.read(len(LFS)) == LFS:
+                raise DataDamaged(
+                    f"{self.place}: {path} is a pointer of Git LFS, not its content: git lfs pull"
+                )
         return read_parquet(file, wanted)[0]
 
     @cached_property
@@ -261,10 +287,7 @@ def _feature(place: Path, key: str, value: Any) -> DataColumn:
     shape = value.get("shape") if isinstance(value, dict) else None
     if not isinstance(shape, list) or not all(isinstance(one, int) and 0 < one < 10**7 for one in shape):
         raise DataDamaged(f"{place}/{INFO}: the feature {key[:80]!r} has no shape of whole numbers")
-    names = value.get("names")
-    while isinstance(names, dict) and names:  # {"motors": [...]}, of earlier versions
-        names = next(iter(names.values())) if len(names) == 1 else list(names)
-    given = tuple(map(str, names)) if isinstance(names, list) else ()
+    given = _flat(value.get("names"))
     about = value.get("info")
     units = about.get("units") if isinstance(about, dict) else None
     return DataColumn(
@@ -274,6 +297,21 @@ def _feature(place: Path, key: str, value: Any) -> DataColumn:
         names=given,
         units=tuple(map(str, units)) if isinstance(units, list) and len(units) == len(given) else (),
     )
+
+
+def _flat(names: Any) -> tuple[str, ...]:
+    """Return names that are in a list, in lists of a list, or in the lists of a table by the kind of motor."""
+    if isinstance(names, dict):
+        names = (
+            list(names.values())
+            if all(isinstance(one, list | dict) for one in names.values())
+            else list(names)
+        )
+    if isinstance(names, list):
+        return tuple(
+            name for one in names for name in (_flat(one) if isinstance(one, list | dict) else (str(one),))
+        )
+    return ()
 
 
 def _json(place: Path, name: str) -> Any:

@@ -9,22 +9,30 @@ from typing import Final
 from attrs import field, frozen
 
 AXES: Final = "xyz"
+_AXIS: Final = r"(?:f|force)?_?(?P<{}>[xyz])"
 CELL: Final = re.compile(
     r"(?P<finger>[A-Za-z][\w.-]{0,60}?)[._]"
-    r"(?:r(?:ow)?(?P<row>\d{1,4})[._]?c(?:ol)?(?P<column>\d{1,4})|(?:p|t|taxel|cell|pad|point)_?(?P<cell>\d{1,5}))"
-    r"(?:[._]f?(?P<axis>[xyz]))?"
+    rf"(?:{_AXIS.format('before')}[._])?"
+    r"(?:r(?:ow)?_?(?P<row>\d{1,4})[._]?c(?:ol)?_?(?P<column>\d{1,4})"
+    r"|(?P<kind>(?:p|t|taxel|cell|pad|point|sensor)_?)?(?P<cell>\d{1,5}))"
+    rf"(?:[._]{_AXIS.format('after')})?(?:[._]n)?",
+    re.IGNORECASE,
 )
 """`f0.p00.fx`: finger, cell and axis; also `left_taxel_3`, and `thumb.r02c05` with row and column."""
+TOUCH: Final = re.compile("tactile|taxel|touch|skin", re.IGNORECASE)
+"""What is in a name of touch: a bare number behind it is that of a cell, and elsewhere that of a joint."""
 GAP: Final = re.compile(
-    r"(?:.*[._])?(?:gripper|gap|jaw)(?:[._](?:pos|position|width|opening|gap))?(?:[._]0)?"
+    r"(?P<arm>.*?)(?<![a-z0-9])(?:gripper|gap|jaw)"
+    r"(?:[._](?:q?pos|position|width|opening|openness|gap|state|distance|joint))?(?:[._]0)?(?:[._](?P<unit>mm|cm|m|rad|deg))?"
 )
 EFFORT: Final = tuple(
-    re.compile(rf"(?:.*[._])?(?:gripper|jaw)[._]{word}")
+    re.compile(rf"(?:.*[._])?(?:gripper|jaw)[._](?:\w+[._])?{word}(?:[._]n)?")
     for word in ("force", "effort", "torque", "load", "current")
 )
 """What the motor of the gripper tells of its load, the best first."""
+_SIDE: Final = r"f\d+|left|right|thumb|index|finger_?\d+|(?:left|right)_finger"
 FORCE: Final = re.compile(
-    r"(?:.*[._])?(?P<finger>f\d+|left|right|thumb|index|finger_?\d+)[._](?:force|pressure)(?:[._]n)?"
+    rf"(?:.*[._])?(?:(?:{_SIDE})[._](?:force|pressure|fz)|(?:force|pressure)[._](?:{_SIDE}))(?:[._]n)?"
 )
 
 
@@ -58,24 +66,45 @@ class Meaning:
     others: tuple[str, ...] = field(default=())
 
 
-def meaning_of(names: Iterable[str]) -> Meaning:
-    """Return what these names mean; those of several candidates come first that tell more."""
+def meaning_of(names: Iterable[str], gap: str = "", force: str = "") -> Meaning:
+    """Return what these names mean; those of several candidates come first that tell more.
+
+    `gap` and `force` (names with commas between) take the place of what is found. Of several arms, forces and arrays
+    are those of the arm of the gap.
+    """
     every = list(names)
-    arrays = _arrays(every)
+    grippers = {name: match["arm"] for name in every if (match := GAP.fullmatch(name.lower()))}
+    chosen = tuple(dict.fromkeys((*((gap,) if gap else ()), *grippers)))
+    arm = grippers.get(chosen[0], "") if chosen else ""
+    # A gripper without a name in front of it is the only one.
+    foreign = tuple(one for one in grippers.values() if one != arm) if arm and all(grippers.values()) else ()
+    own = [name for name in every if not name.lower().startswith(foreign)]
+    arrays = _arrays(own)
     cells = {name for one in arrays for name in one.numbers}
-    scalars = [name for name in every if name not in cells]
-    lower = {name: name.lower() for name in scalars}
-    gap = tuple(name for name in scalars if GAP.fullmatch(lower[name]))
-    effort = tuple(name for pattern in EFFORT for name in scalars if pattern.fullmatch(lower[name]))
-    forces = tuple(name for name in scalars if FORCE.fullmatch(lower[name]) and name not in effort)
-    known = {*gap, *effort, *forces}
+    lower = {name: name.lower() for name in own if name not in cells and name not in grippers}
+    given = tuple(name.strip() for name in force.split(",") if name.strip())
+    effort = tuple(
+        dict.fromkeys(name for pattern in EFFORT for name in lower if pattern.fullmatch(lower[name]))
+    )
+    forces = given or tuple(name for name in lower if FORCE.fullmatch(lower[name]) and name not in effort)
+    known = {*chosen, *effort, *forces, *cells}
     return Meaning(
-        gap=gap,
+        gap=chosen,
         effort=effort,
         forces=forces,
         arrays=arrays,
-        others=tuple(name for name in scalars if name not in known),
+        others=tuple(name for name in every if name not in known),
     )
+
+
+def unit_of_name(gap: str) -> str:
+    """Return the unit at the end of the name of a gap; empty if there is none.
+
+    >>> unit_of_name("gripper_width_mm"), unit_of_name("gripper.pos")
+    ('mm', '')
+    """
+    match = GAP.fullmatch(gap.lower())
+    return (match["unit"] or "") if match else ""
 
 
 def channel_name(text: str) -> str:
@@ -95,8 +124,9 @@ def _arrays(names: Sequence[str]) -> tuple[CellArray, ...]:
     found: dict[str, dict[tuple[int, int, str], str]] = {}
     for name in names:
         match = CELL.fullmatch(name)
-        if match:
-            place = (int(match["row"] or 0), int(match["cell"] or match["column"]), match["axis"] or "")
+        if match and (match["row"] or match["kind"] or TOUCH.search(match["finger"])):
+            axis = (match["after"] or match["before"] or "").lower()
+            place = (int(match["row"] or 0), int(match["cell"] or match["column"]), axis)
             found.setdefault(match["finger"], {})[place] = name
     arrays = (_array(finger, cells) for finger, cells in found.items())
     return tuple(one for one in arrays if one is not None)

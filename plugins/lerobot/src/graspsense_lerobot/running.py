@@ -29,7 +29,7 @@ from graspsense_lerobot.place import PlaceOptions
 
 EVENTS: Final = ("nothing", "contact", "rest", "end")
 """What the numbers of events mean."""
-KNOWN: Final = ("gap", "velocity", "effort", "force_left", "force_right")
+KNOWN: Final = ("gap", "velocity", "force_left", "force_right")
 WIDEST_M: Final = 0.5
 
 
@@ -173,11 +173,9 @@ class FollowedGrasp:
 
     def _understood(self, numbers: Mapping[str, float]) -> Meaning:
         """Return the names of gap and forces, as the reader of data sets finds them. Raises ConfigError."""
-        found = meaning_of(numbers)
-        gap = (self._given.gap,) if self._given.gap else found.gap[:1]
-        forces = tuple(name for name in self._given.force.split(",") if name) or found.forces
-        if not forces and not found.arrays:
-            forces = found.effort[:1]
+        found = meaning_of(numbers, self._given.gap, self._given.force)
+        gap = found.gap[:1]
+        forces = found.forces or (() if found.arrays else found.effort[:1])
         lacking = [name for name in (*gap, *forces) if name not in numbers]
         if not gap or lacking or not (forces or found.arrays):
             raise ConfigError(

@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 
 FPS: Final = 30
 """Frames per second that are written unless the user gives others."""
+JITTER: Final = 0.01
+"""Share of a frame by which a measurement may be later and still be of it: times of data sets have 24 bits."""
 FILE_BYTES: Final = 100 * 2**20
 """Size of the numbers of a data file beyond which the next one begins, as LeRobot has it."""
 LARGEST_ARRAY: Final = 4096
@@ -217,17 +219,18 @@ def _write(folder: Path, grasps: Sequence[StoredGrasp], plan: Plan) -> int:
 def _columns(grasp: StoredGrasp, trace: Trace, plan: Plan, episode: int, start: int) -> list[Column]:
     """Return the columns of an episode, the frames of which are from its first tick to its last."""
     first, last = float(trace.t_s[0]), float(trace.t_s[-1])
-    n = max(int((last - first) * plan.fps + 1e-6) + 1, 2)
+    n = max(int((last - first) * plan.fps + JITTER) + 1, 2)
     frame = np.arange(n)
     times = first + frame / plan.fps
-    tick = np.clip(np.searchsorted(trace.t_s, times + 1e-9, side="right") - 1, 0, len(trace) - 1)
+    late = times + JITTER / plan.fps
+    tick = np.clip(np.searchsorted(trace.t_s, late, side="right") - 1, 0, len(trace) - 1)
     known = _state(trace)
     state = np.column_stack([_filled(known[name][0])[tick] for name in plan.state])
     position = state[:, plan.state.index("gripper.pos")] if "gripper.pos" in plan.state else state[:, 0]
     action = trace.command[tick] if plan.commanded else np.append(position[1:], position[-1])
     columns = [
         Column("observation.state", state.astype(np.float32), plan.state, plan.units),
-        *(_array_column(one, trace, times) for one in plan.arrays),
+        *(_array_column(one, trace, late) for one in plan.arrays),
         Column(
             "action", action.astype(np.float32), ("gripper.command" if plan.commanded else "gripper.pos",)
         ),
@@ -252,7 +255,7 @@ def _filled(values: Any) -> Any:
 
 def _array_column(array: TactileArray, trace: Trace, times: Any) -> Column:
     images = trace.signals[array.name]
-    place = np.clip(np.searchsorted(images.t_s, times + 1e-9, side="right") - 1, 0, len(images.t_s) - 1)
+    place = np.clip(np.searchsorted(images.t_s, times, side="right") - 1, 0, len(images.t_s) - 1)
     cells = np.nan_to_num(images.cells.reshape(len(images.t_s), -1)[place]).astype(np.float32)
     return Column(
         f"observation.tactile.{array.name}", cells, cell_names(array), (array.unit,) * array.numbers

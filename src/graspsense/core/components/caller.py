@@ -30,10 +30,10 @@ def option(name: str, value: str = "", *, python: str = "") -> str:
     return f"{python or name}{f'={value}' if value else ''}"
 
 
-def set_option(text: str) -> str:
-    """Return the setting `TABLE.KEY=VALUE` as the caller gives it: after -o, or in `options`.
+def set_option(*texts: str) -> str:
+    """Return settings `TABLE.KEY=VALUE` as the caller gives them: each after -o, or in `options`.
 
     >>> set_option("run.seed=3")
     "options=['run.seed=3']"
     """
-    return f"-o {text}" if _commands else f"options=[{text!r}]"
+    return " ".join(f"-o {text}" for text in texts) if _commands else f"options={list(texts)}"

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
+
+from attrs import asdict, frozen
 
 from graspsense.core.components.caller import set_option
 from graspsense.core.components.channels import declared_dtype, declared_shape
 from graspsense.core.components.config import SelectedComponent, Settings, select_component
 from graspsense.core.components.entries import Role
 from graspsense.core.components.registry import Component, installed
+from graspsense.core.components.roles import FeatureSet
 from graspsense.core.values.channel import FLOATS, Channel, FastChannel, TactileArray
 from graspsense.core.values.errors import GraspsenseError, PluginUnavailable, WiringError
 from graspsense.core.values.fingers import FingerForce
@@ -30,6 +34,19 @@ def check(settings: Settings) -> None:
         )
     if too_small := [*_too_small(settings)]:
         raise WiringError("\n  ".join(["the gripper cannot do as little as is asked:", *too_small]))
+
+
+def check_recording(
+    channels: Iterable[Channel], source: str, *users: SelectedComponent | FeatureSet[Any]
+) -> None:
+    """Check that a recording with these channels has those that controller and features need.
+
+    Raises WiringError that names each one that it lacks, and the arrays that it has with the options that choose them.
+    """
+    given = {channel.name: channel for channel in channels}
+    misfits = [one for user in users for one in _misfits_of(_user(user), given, "this recording")]
+    if misfits:
+        raise WiringError(f"{source}: {'; '.join(misfits)}")
 
 
 def _too_small(settings: Settings) -> Iterator[str]:
@@ -101,24 +118,73 @@ def _misfits(
     yield from _command_misfits(gripper, controller)
 
 
+@frozen
+class _User:
+    """A component that needs channels."""
+
+    name: str
+    table: str
+    role: Role
+    requires: tuple[Channel, ...]
+    config: Any
+
+
+def _user(part: SelectedComponent | FeatureSet[Any]) -> _User:
+    if isinstance(part, FeatureSet):
+        requires = getattr(part, "requires", ())  # a set whose entry declares them has none of its own
+        return _User(f"features {type(part).__name__}", "features", "feature-set", requires, part.config)
+    one = part.component
+    return _User(_named(one), one.table, one.role, part.declared.requires, part.config)
+
+
 def _channel_misfits(gripper: SelectedComponent, user: SelectedComponent) -> Iterator[str]:
-    given: dict[str, Channel] = {channel.name: channel for channel in gripper.declared.channels}
+    given = {channel.name: channel for channel in gripper.declared.channels}
     provider, choose = _named(gripper.component), _choose(gripper.component, user.component)
+    hint = ""
     if gripper.component.channels_vary():
         choose += f", or other settings of [{gripper.component.table}]: its channels depend on them"
-    for wanted in user.declared.requires:
-        needs = f"{_named(user.component)} needs the channel {_described(wanted)}"
-        have = given.get(wanted.name)
+        hint = " with these settings"
+    for misfit in _misfits_of(_user(user), given, provider, hint):
+        yield f"{misfit}. {choose}"
+
+
+def _misfits_of(user: _User, given: Mapping[str, Channel], provider: str, hint: str = "") -> Iterator[str]:
+    for wanted in user.requires:
+        needs, have = f"{user.name} needs the channel {_described(wanted)}", given.get(wanted.name)
         if have is None:
-            lacks = f"which {provider} does not have{_settings_hint(gripper)} (it has: {', '.join(given) or 'none'})"
-            yield f"{needs}, {lacks}. {choose}"
+            there = f"(it has: {', '.join(given) or 'none'})"
+            yield f"{needs}, which {provider} does not have{hint} {there}{_arrays(user, wanted, given)}"
         elif have.unit != wanted.unit:
-            yield f"{needs}, but {provider} gives it in {have.unit}. {choose}"
-        elif not _fits(wanted, have, user.component.role):
-            yield f"{needs} as {_layout(wanted)}, but {provider} gives it as {_layout(have)}. {choose}"
+            yield f"{needs}, but {provider} gives it in {have.unit}{_arrays(user, wanted, given)}"
+        elif not _fits(wanted, have, user.role):
+            layouts = f"as {_layout(wanted)}, but {provider} gives it as {_layout(have)}"
+            yield f"{needs} {layouts}{_arrays(user, wanted, given)}"
         elif have.rate_hz < wanted.rate_hz:
             rate = f"at {have.rate_hz:g} Hz" if have.rate_hz else "at no promised rate"
-            yield f"{needs}, but {provider} gives it {rate}. {choose}"
+            yield f"{needs}, but {provider} gives it {rate}"
+
+
+def _arrays(user: _User, wanted: Channel, given: Mapping[str, Channel]) -> str:
+    """Return the options that choose an array that there is, for a component whose settings name its array."""
+    named = [
+        key
+        for key, value in asdict(user.config).items()
+        if wanted.name in map(str.strip, str(value).split(","))
+    ]
+    words = ""
+    for one in given.values():
+        if named and isinstance(one, TactileArray):
+            layout = {
+                named[0]: one.name, "unit": one.unit, "rows": one.rows or 1, "columns": one.columns or one.cells,
+                "components": one.components, "dtype": one.dtype,
+            }  # fmt: skip
+            changed = [
+                f"{user.table}.{key}={value}"
+                for key, value in layout.items()
+                if getattr(user.config, key, value) != value
+            ]
+            words += f". For its array {one.name}: {set_option(*changed)}"
+    return words
 
 
 def _fits(wanted: Channel, have: Channel, role: Role) -> bool:
@@ -142,10 +208,6 @@ def _layout(channel: Channel) -> str:
     if isinstance(channel, FastChannel):
         return f"{channel.samples} samples a tick of {', '.join(channel.axes)}"
     return "one number a tick"
-
-
-def _settings_hint(gripper: SelectedComponent) -> str:
-    return " with these settings" if gripper.component.channels_vary() else ""
 
 
 def sent_kinds(controller: SelectedComponent) -> tuple[str, ...]:

@@ -11,7 +11,8 @@ elsewhere:
     centre         (m_i, m_j) = sum of w (i, j) / sum of w
     axes           square roots of the eigenvalues of S = sum of w (i - m_i, j - m_j)(i - m_i, j - m_j)' / sum of w
     angle          atan2(S_ij, S_jj - lambda_min), from the direction of the columns to that of the rows: the first axis
-    shift          centre of the grasp less the centre of the first image that has half of its total
+    shift          centre of the grasp less that of the first image with 25, 50 or 75 % of its total
+    growth         axes of the grasp less those of the first image with this share
     shear          sums of the changes of the first and the second number of each cell, of an array with three
 
 These are the moments of an image (M.-K. Hu, "Visual pattern recognition by moment invariants", IRE Transactions on
@@ -50,6 +51,14 @@ FINGERTIPS: Final = "pads"
 SIDES: Final = ("left_", "right_")
 """What the names of their features begin with."""
 OF_ARRAY: Final = "unit of the array"
+PERCENT: Final = (25, 50, 75)
+"""Shares of the largest total from whose first image on the contact shifts and grows."""
+_COURSE: Final = {
+    "shift_row": "rows by which the centre moved",
+    "shift_column": "columns by which it moved",
+    "growth_long": "cells by which the first axis grew",
+    "growth_short": "cells by which the second axis grew",
+}
 _PRESSED: Final = "a cell whose value rises"
 _THREE: Final = "an array with three forces a cell"
 QUANTITIES: Final = (
@@ -61,16 +70,17 @@ QUANTITIES: Final = (
     ("long_axis", "1", "standard deviation along the first axis, in cells", _PRESSED),
     ("short_axis", "1", "standard deviation across it, in cells", _PRESSED),
     ("angle", "rad", "angle of the first axis from the direction of a row", "two axes that differ"),
-    ("shift_row", "1", "rows by which the centre moved since half of the total", _PRESSED),
-    ("shift_column", "1", "columns by which it moved", _PRESSED),
+    *(
+        (f"{what}_{percent}", "1", f"{meaning} since {percent} % of the total", _PRESSED)
+        for percent in PERCENT
+        for what, meaning in _COURSE.items()
+    ),
     ("shear_first", OF_ARRAY, "sum of the changes of the first force of each cell", _THREE),
     ("shear_second", OF_ARRAY, "sum of the changes of the second force", _THREE),
 )
 """Name, unit, meaning and what it needs."""
 FORCES: Final = 3
 """Number of components of a cell that measures shear."""
-BEGUN: Final = 0.5
-"""Share of the largest total from which on the contact has a centre to shift from."""
 ROUND: Final = 1e-9
 """Two axes whose squares differ by less than this share have no direction."""
 
@@ -80,7 +90,9 @@ class ContactImageConfig:
     """The array as the gripper declares it, and which cells count."""
 
     array: str = setting(
-        default=FINGERTIPS, meaning="Name of the channel; pads: both fingertips, with features for each."
+        default=FINGERTIPS,
+        meaning="Name of the channel, or of several with commas between; pads: both fingertips. Of several, the name "
+        "of each feature begins with that of its array.",
     )
     unit: str = setting(default="counts", meaning="Its unit.")
     rows: int = setting(default=7, minimum=1, meaning="Its rows.")
@@ -175,10 +187,10 @@ class ContactImageFeatures(FeatureSet[ContactImageConfig]):
         if own.array == FINGERTIPS:
             return (Channel(FINGERTIPS, own.unit),)
         rows, columns, components = own.rows, own.columns, own.components
-        array = TactileArray(
-            own.array, own.unit, rows=rows, columns=columns, components=components, dtype=own.dtype
+        return tuple(
+            TactileArray(name, own.unit, rows=rows, columns=columns, components=components, dtype=own.dtype)
+            for name in self._arrays
         )
-        return (array,)
 
     @property
     def features(self) -> tuple[Feature, ...]:  # type: ignore[override]
@@ -206,8 +218,15 @@ class ContactImageFeatures(FeatureSet[ContactImageConfig]):
         return self.result(values, reasons)
 
     @property
+    def _arrays(self) -> tuple[str, ...]:
+        return tuple(name.strip() for name in self.config.array.split(","))
+
+    @property
     def _sides(self) -> tuple[str, ...]:
-        return SIDES if self.config.array == FINGERTIPS else ("",)
+        """What the names of the features of each array, or fingertip, begin with."""
+        if self.config.array == FINGERTIPS:
+            return SIDES
+        return tuple(f"{name}_" for name in self._arrays) if len(self._arrays) > 1 else ("",)
 
     @property
     def _grid(self) -> tuple[int, int]:
@@ -223,7 +242,7 @@ class ContactImageFeatures(FeatureSet[ContactImageConfig]):
 
     def _images(self, trace: Trace, side: str) -> ContactImages | str:
         """Return the images from the squeeze to the release; the reason, where there is none to compare."""
-        own, name = self.config, self.config.array
+        own, name = self.config, side.removesuffix("_") if len(self._arrays) > 1 else self.config.array
         if name == FINGERTIPS:
             t_s, cells, components = trace.pad_t_s, trace.pad_left, 1
             cells = cells if side == SIDES[0] else trace.pad_right
@@ -247,27 +266,32 @@ class ContactImageFeatures(FeatureSet[ContactImageConfig]):
         """Return the quantities that these images show."""
         zero, share = images.zero(), self.config.least_share
         totals = np.array([np.sum(self._pressed(images.change(i, zero))) for i in images.places()])
-        peak, begun = int(np.argmax(totals)), int(np.argmax(totals >= BEGUN * np.max(totals)))
+        peak = int(np.argmax(totals))
         change = images.change(images.before + peak, zero)
         pressed = self._pressed(change)
         values = {"total": float(totals[peak]), "largest": float(np.max(pressed))}
         if self._has_shear:
             values["shear_first"], values["shear_second"], _ = np.sum(change, axis=(0, 1)).tolist()
         contact = moments(pressed, share)
-        earlier = moments(self._pressed(images.change(images.before + begun, zero)), share)
         if contact is None:
             return values
         values["area"] = contact.area
-        if pressed.shape == self._grid and earlier is not None:
+        if pressed.shape == self._grid:
             values |= {
                 "centre_row": contact.centre[0],
                 "centre_column": contact.centre[1],
                 "long_axis": contact.axes[0],
                 "short_axis": contact.axes[1],
                 "angle": contact.angle,
-                "shift_row": contact.centre[0] - earlier.centre[0],
-                "shift_column": contact.centre[1] - earlier.centre[1],
             }
+            for percent in PERCENT:
+                begun = images.before + int(np.argmax(totals >= 0.01 * percent * totals[peak]))
+                earlier = moments(self._pressed(images.change(begun, zero)), share)
+                if earlier is not None:
+                    now, then = (*contact.centre, *contact.axes), (*earlier.centre, *earlier.axes)
+                    values |= {
+                        f"{what}_{percent}": a - b for what, a, b in zip(_COURSE, now, then, strict=True)
+                    }
         return values
 
     def _pressed(self, change: Floats) -> Floats:
@@ -282,4 +306,6 @@ class ContactImageFeatures(FeatureSet[ContactImageConfig]):
             return "no cell is pressed"
         if "centre_row" not in known:
             return f"the array has not features.rows x features.columns = {self._grid[0]} x {self._grid[1]} cells"
+        if name.rpartition("_")[2].isdigit():
+            return "no cell is pressed in its image with this share of the total"
         return "the contact is round" if name == "angle" else "its numbers are too large"

@@ -61,14 +61,10 @@ class UnionFeatures(FeatureSet[UnionConfig]):
 
     @property
     def requires(self) -> tuple[Channel, ...]:  # type: ignore[override]
-        """The channels of all sets, each with the largest rate that a set needs."""
-        channels: dict[str, Channel] = {}
-        for part in self._parts.values():
-            for channel in part.requires:
-                known = channels.get(channel.name)
-                if known is None or channel.rate_hz > known.rate_hz:
-                    channels[channel.name] = channel
-        return tuple(channels.values())
+        """The channels that all sets need, with the largest rate; a set that lacks others has no features."""
+        parts = [{channel.name: channel for channel in part.requires} for part in self._parts.values()]
+        common = [name for name in parts[0] if all(name in part for part in parts)]
+        return tuple(max((part[name] for part in parts), key=lambda one: one.rate_hz) for name in common)
 
     @property
     def features(self) -> tuple[Feature, ...]:  # type: ignore[override]

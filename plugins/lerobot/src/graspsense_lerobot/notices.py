@@ -1,0 +1,110 @@
+"""What looks wrong with the frames of an episode, each with the option that mends it, and when its grasp begins."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from graspsense.plugin_api import GraspColumns
+from graspsense_lerobot.folder import Episode
+from graspsense_lerobot.names import TOUCH
+from graspsense_lerobot.understood import Understood, some, times_of
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+OTHER_RATE: Final = 0.02
+"""Share by which the time between frames may differ from that of `fps` before it is told."""
+LONG_STEP: Final = 1.5
+"""Frames that a step of time has to last to be a gap."""
+MANY_REPEATED: Final = 0.2
+"""Share of the frames from which on repeated ones are told."""
+TOUCHED: Final = 0.2
+"""Share of the range of the force above which an object is touched, as for the squeezes of a manifest."""
+
+
+def repeated_frames(understood: Understood, episode: Episode) -> NDArray[np.bool_]:
+    """Return which frames are equal to the one before in all observations, or have its time."""
+    rows = np.column_stack(
+        [
+            values.reshape(len(values), -1)
+            for key, values in episode.table.numbers.items()
+            if key.startswith("obs")
+        ]
+    )
+    same = np.concatenate(([False], (rows[1:] == rows[:-1]).all(axis=1)))
+    times = times_of(understood, episode)
+    return same | np.concatenate(([False], np.diff(times) == 0.0))
+
+
+def notices_of(understood: Understood, episode: Episode) -> Iterator[str]:
+    """Yield what looks wrong with the frames of an episode, with the option that mends it."""
+    times, options = times_of(understood, episode), understood.options
+    fps = options.fps or understood.folder.fps
+    if understood.gap_unit:
+        yield understood.notes[0]
+    unread = [name for name in understood.meaning.others if TOUCH.search(name)]
+    if unread:
+        yield (
+            f"{len(unread)} numbers sound like touch and are not used: {some(unread)}. Names such as f0.p00.fx "
+            "(finger, cell, axis) are understood"
+        )
+    steps = np.diff(times)
+    if len(steps) and not options.fps:
+        step_s = float(np.median(steps))
+        if step_s > 0.0 and abs(step_s * fps - 1.0) > OTHER_RATE:
+            yield (
+                f"the frames are {step_s:.4g} s apart, and fps = {fps:g} says {1 / fps:.4g} s. If the times are wrong: "
+                f"?fps={fps:g}"
+            )
+            fps = 1.0 / step_s
+    long = steps > LONG_STEP / fps
+    if long.any():
+        yield (
+            f"{int(long.sum())} gaps between frames, the longest of {float(steps.max()):.3g} s: ?gaps=cut divides the "
+            "episode there"
+        )
+    repeated = repeated_frames(understood, episode)
+    if options.repeated == "keep" and repeated.sum() > MANY_REPEATED * len(times):
+        yield (
+            f"{int(repeated.sum())} of {len(times)} frames repeat the one before, as of a sensor slower than the "
+            "frames: ?repeated=drop leaves them out"
+        )
+    missing = int(sum((~np.isfinite(values)).any(axis=-1).sum() if values.ndim > 1 else (~np.isfinite(values)).sum()
+                      for key, values in episode.table.numbers.items() if key.startswith("obs")))  # fmt: skip
+    if missing:
+        yield f"{missing} frames have an observation without a number: left out where gap or force is missing"
+
+
+def moments_of(columns: GraspColumns) -> str:
+    """Return when the gripper begins to close and when it touches, in words."""
+    known = np.isfinite(columns.force_n) & np.isfinite(columns.gap_m)
+    if not known.any():
+        return "no contact is found in the force"
+    columns = columns.rows(known)
+    force, gap = columns.force_n, columns.gap_m
+    low = float(np.nanmin(force))
+    touched = force > low + TOUCHED * (float(np.nanmax(force)) - low)
+    if not touched.any():
+        return "no contact is found in the force"
+    contact = int(touched.argmax())
+    widest = float(np.nanmax(gap[: contact + 1]))
+    near = np.flatnonzero(gap[: contact + 1] >= widest - 0.02 * float(np.ptp(gap)))
+    closing = int(near[-1]) if len(near) else 0
+    return (
+        f"closing from {columns.t_s[closing]:.3f} s of the episode, contact at {columns.t_s[contact]:.3f} s"
+    )
+
+
+def notices_of_sign(columns: GraspColumns) -> tuple[str, ...]:
+    """Return a notice if the gap grows while the force rises."""
+    force = np.nan_to_num(columns.force_n)
+    peak = int(force.argmax())
+    span = float(np.ptp(columns.gap_m))
+    if span > 0.0 and columns.gap_m[peak] > columns.gap_m[0] + 0.3 * span:
+        return (
+            "the number of the gap grows while the force rises: if it is closed there, ?gap_m_per_unit=-0.001",
+        )
+    return ()

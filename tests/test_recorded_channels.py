@@ -1,0 +1,137 @@
+"""What features need is compared with what each recording has, by every command that reads recordings."""
+
+from __future__ import annotations
+
+import ast
+import re
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from graspsense.cli.main import cli
+from graspsense.core.values.errors import WiringError
+from graspsense.plugin_api import create
+from graspsense.store.store import Store
+
+CHOSEN = ("features.array=palm", "features.rows=2", "features.columns=3", "features.unit=N")
+
+
+def manifest(folder, name, palm=True):
+    """A manifest of six squeezes of two things, with a palm of 2 x 3 cells or without one."""
+    (folder / name).mkdir()
+    for k in range(6):
+        t = np.arange(80) / 40.0
+        gap = 60.0 - 30.0 * np.clip(t, 0.0, 1.0)
+        force = (3.0 + 0.1 * k) * np.clip(t - 0.7, 0.0, 0.5) + 0.01 * np.sin(9.0 * t + k)
+        cells = force[:, None] * np.roll([1.0, 2.0, 1.0, 0.0, 0.0, 0.0], 3 * (k % 2))
+        np.savetxt(
+            folder / name / f"{'ab'[k % 2]}_{k}.csv",
+            np.column_stack([t, gap, force, cells]),
+            delimiter=",",
+            header="t,gap,force," + ",".join(f"c{i}" for i in range(6)),
+            comments="",
+        )
+    lines = ['files = "{label}_*.csv"', 'time = "t"', 'gap = "gap [mm]"', 'force = "force"']
+    lines += ["channels = { palm = \"'c?' [N]\" }"] if palm else []
+    (folder / name / "set.toml").write_text("\n".join(lines) + "\n")
+    return str(folder / name / "set.toml")
+
+
+def ran(*args):
+    done = CliRunner().invoke(cli, [str(one) for one in args])
+    error = done.exception
+    assert error is None or isinstance(error, SystemExit | Exception)
+    return done, str(error) if error is not None and not isinstance(error, SystemExit) else ""
+
+
+def options(*given):
+    return [word for one in given for word in ("-o", one)]
+
+
+def proposed(words):
+    """The options in a message."""
+    return options(*ast.literal_eval(re.search(r"For its array palm: options=(\[.*?\])", words)[1]))
+
+
+def labels_in(store):
+    with Store.read(store) as opened:
+        return [one.source for one in opened.page(limit=100)]
+
+
+@pytest.mark.parametrize("command", ["import", "check", "evaluate", "train", "compare"])
+def test_an_array_that_the_features_do_not_name_is_told_with_the_options_that_choose_it(tmp_path, command):
+    source = manifest(tmp_path, "set")
+    arguments = {
+        "import": ["import", source, "--save", tmp_path / "s"],
+        "check": ["import", source, "--check", "--plot", tmp_path / "p.png"],
+        "evaluate": ["evaluate", f"manifest:{source}", "--folds", 3],
+        "train": ["train", f"manifest:{source}", "--out", tmp_path / "m.json"],
+        "compare": ["compare", f"manifest:{source}", "--folds", 3, "--classifiers", "c45,tree"],
+    }[command]
+    which = [] if command == "compare" else options("features.type=contact-image")
+    sets = ["--feature-sets", "contact-image"] if command == "compare" else []
+    refused, words = ran(*arguments, *which, *sets)
+
+    assert refused.exit_code
+    assert "'pads'" in words
+    assert "palm" in words
+    done, words = ran(*arguments, *which, *sets, *proposed(words))
+    assert done.exit_code == 0, done.output + words
+
+
+def test_recordings_that_have_the_array_are_imported_and_the_others_told(tmp_path):
+    whole, without = manifest(tmp_path, "whole"), manifest(tmp_path, "without", palm=False)
+    done, words = ran(
+        "import", whole, without, "--save", tmp_path / "s", *options("features.type=contact-image", *CHOSEN)
+    )
+
+    assert done.exit_code == 5, done.output + words
+    with Store.read(tmp_path / "s") as store:
+        assert len(store.page(limit=100)) == 6
+    assert done.output.count("'palm'") == 6
+
+
+@pytest.mark.parametrize("command", ["features", "evaluate", "train"])
+def test_trials_of_a_store_that_lack_the_array_are_left_out_and_told(tmp_path, command):
+    for name, palm in (("without", False), ("whole", True)):
+        done, words = ran("import", manifest(tmp_path, name, palm=palm), "--save", tmp_path / "s")
+        assert done.exit_code == 0, done.output + words
+    more = {"features": [], "evaluate": ["--folds", 3], "train": ["--out", tmp_path / "m.json"]}[command]
+    given = options("features.type=contact-image", *CHOSEN)
+    done, words = ran(command, tmp_path / "s", *more, *given, *([] if command == "train" else ["--json"]))
+
+    assert done.exit_code == 0, done.output + words
+    if command != "train":
+        assert "6 of 12 recordings" in done.output
+        assert "palm" in done.output
+
+
+def test_a_replay_says_which_channels_the_recording_has(tmp_path):
+    source = manifest(tmp_path, "set")
+    backend = create("sensor-backend", "replay", recording=f"manifest:{source}#1")
+
+    assert [one.name for one in backend.channels] == ["gap", "velocity", "force_left", "force_right", "palm"]
+    refused, words = ran("replay", f"manifest:{source}#1", *options("features.type=chitta-without-pads"))
+    assert refused.exit_code == WiringError.exit_code or "effort" in words
+    assert "'effort'" in words
+
+
+def test_other_features_than_those_of_the_model_are_imported_without_a_prediction(tmp_path):
+    source = manifest(tmp_path, "set")
+    done, words = ran("import", source, "--save", tmp_path / "s", *options("features.type=curve"))
+
+    assert done.exit_code == 0, done.output + words
+    assert "no predictions" in done.output
+    own, words = ran(
+        "import", source, "--save", tmp_path / "t", *options("features.type=curve", "classifier.type=c45")
+    )
+    assert own.exit_code
+    assert "classifier" in words + own.output
+
+
+def test_a_union_needs_what_all_of_its_sets_need():
+    union = create("feature-set", "union", sets=("chitta", "contact-image"))
+    assert union.requires == ()
+    union = create("feature-set", "union", sets=("chitta", "chitta-without-pads"))
+    assert [one.name for one in union.requires] == ["gap"]
