@@ -37,7 +37,8 @@ from graspsense.simulator_api import NotCompilable, RunConfig, bind
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant.state import PlantState
 from graspsense_sim_gripper.run.accuracy.model import Reduction
-from graspsense_sim_gripper.run.accuracy.propose import NOT_VERIFIED, grip_of, propose
+from graspsense_sim_gripper.run.accuracy.probe import grip_of
+from graspsense_sim_gripper.run.accuracy.propose import NOT_VERIFIED, propose
 from graspsense_sim_gripper.run.accuracy.select import select
 from graspsense_sim_gripper.run.batch.job import FinishedGrasp, Job, grasp_plain
 from graspsense_sim_gripper.run.batch.threads import run_many

@@ -13,7 +13,8 @@ from click.testing import CliRunner
 from graspsense.cli.main import cli
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.accuracy.levels import PLAIN
-from graspsense_sim_gripper.run.accuracy.propose import grip_of, propose
+from graspsense_sim_gripper.run.accuracy.probe import grip_of
+from graspsense_sim_gripper.run.accuracy.propose import propose
 from graspsense_sim_gripper.run.build import instantiate, problem_of
 from graspsense_sim_gripper.scene.library import find
 from graspsense_sim_gripper.scene.spec import ObjectSpec
@@ -31,12 +32,6 @@ def decided(*terms, config=CONFIG):
     spec = ObjectSpec(name="made up", width_m=0.05, terms=terms)
     model = proposed(config, spec)
     return {one.subject: one for one in model.decisions}, model
-
-
-def test_a_contact_that_is_damped_faster_than_the_tick_is_stiff():
-    rigid = evolve(CONFIG, pad_stiffness_n_m=math.inf)
-    assert not decided(SHELL, config=rigid)[1].is_stiff
-    assert decided(SHELL, ("loss", {"damping_n_s_m": 1e6}), config=rigid)[1].is_stiff
 
 
 def test_a_contact_too_stiff_for_the_tick_is_said_to_be():

@@ -44,7 +44,7 @@ from graspsense_sim_gripper.plant.sensing import (
     with_listed_cells,
 )
 from graspsense_sim_gripper.plant.state import PlantReadings, PlantState, is_finite, right_of
-from graspsense_sim_gripper.run.accuracy.propose import FORCE_N, SPEED_M_S
+from graspsense_sim_gripper.run.accuracy.probe import FORCE_N, SPEED_M_S
 from graspsense_sim_gripper.run.accuracy.select import select
 from graspsense_sim_gripper.run.binding import bind_reachable
 from graspsense_sim_gripper.run.build import EFFORT_LIMIT_N, build, device_info, instantiate

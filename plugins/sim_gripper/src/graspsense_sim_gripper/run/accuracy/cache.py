@@ -34,7 +34,7 @@ from graspsense_sim_gripper.run.accuracy.levels import Level
 from graspsense_sim_gripper.run.accuracy.model import Reduction, StepDecision, Verification
 from graspsense_sim_gripper.run.problem import ControllerStep, GraspController, Problem
 from graspsense_sim_gripper.scene.terms.registry import active_laws
-from graspsense_sim_gripper.scene.terms.term import OnSum, WorkingPoint
+from graspsense_sim_gripper.scene.terms.term import OnSum
 from graspsense_sim_gripper.solve.scheme import Steps
 
 MAX_IN_MEMORY: Final = 512
@@ -218,7 +218,6 @@ def stored(model: Reduction) -> dict[str, Json]:
     """Return a model as values that JSON can represent."""
     values = asdict(model, recurse=True, filter=lambda attribute, _: attribute.init)
     tuples = {
-        "point": model.point._asdict(),
         "steps": model.steps._asdict(),
         "level": model.level._asdict(),
     }
@@ -231,7 +230,6 @@ def restored(values: dict[str, Json]) -> Reduction:
     return Reduction(
         **{
             **values,
-            "point": WorkingPoint(**values["point"]),
             "steps": Steps(**values["steps"]),
             "decisions": tuple(StepDecision(**decision) for decision in values["decisions"]),
             "unresolved": tuple(values["unresolved"]),

@@ -34,7 +34,7 @@ class Level(NamedTuple):
     step_tol: float
     """The accuracy for which the steps are selected; `step_tolerance` of it is the tolerance of one step."""
     min_steps: int = 1
-    """Smallest number of steps per tick."""
+    """Smallest number of steps per tick once the object is touched."""
     plain: int = 0
     """1: each tick is one Verlet step but for events, and its error is not estimated. Where the effort does not change,
     a step may last several ticks, and its error is then estimated."""
@@ -93,5 +93,7 @@ def steps_for(level: Level, dt_s: float) -> Steps:
     """Return the step control of a level, for ticks of `dt_s` seconds."""
     if level.plain == 1:
         return Steps(math.inf, dt_s, growth=PLAIN_GROWTH, macro_tolerance=MACRO_SHARE * level.step_tol)
-    longest_s = dt_s / level.min_steps if level.min_steps > 1 else math.inf
-    return Steps(step_tolerance(level.step_tol), longest_s, growth=step_growth(level.step_tol))
+    # Without contact the motion is smooth, and long steps suffice.
+    touched_s = dt_s / level.min_steps if level.min_steps > 1 else math.inf
+    growth = step_growth(level.step_tol)
+    return Steps(step_tolerance(level.step_tol), growth=growth, longest_touched_s=touched_s)

@@ -8,7 +8,6 @@ from attrs import asdict, field, frozen
 
 from graspsense_sim_gripper.run.accuracy.levels import Level, balance_rtol
 from graspsense_sim_gripper.scene.terms.switchable import switched_off
-from graspsense_sim_gripper.scene.terms.term import WorkingPoint
 from graspsense_sim_gripper.solve.scheme import PlantParams, Steps
 
 QUANTITIES: Final = ("peak", "trace", "features")
@@ -17,7 +16,7 @@ FORCE_MARGIN: Final = 1.5
 """Steps without control of their error are valid for peak forces up to the expected force times this factor."""
 
 
-@frozen(kw_only=True)
+@frozen
 class StepDecision:
     """A decision on the steps of a grasp, and the number that it follows from, as a row of a report."""
 
@@ -48,15 +47,15 @@ class Reduction:
 
     accuracy: float
     """The accuracy that was asked for (`gripper.accuracy`)."""
-    point: WorkingPoint
-    """The compression, speed, duration and force for which the steps were selected."""
+    force_n: float
+    """The peak force that is expected, or the largest of the trial grasps."""
+    speed_m_s: float
+    """The speed of the gap at the contact that is expected."""
     steps: Steps
     decisions: tuple[StepDecision, ...]
     """How the steps are controlled, and what they may not resolve."""
     frequency: float
     """The natural frequency of the stiffest contact times the tick."""
-    is_stiff: bool
-    """Whether the motion is damped so strongly that its speed relaxes within a tick."""
     unresolved: tuple[str, ...]
     """Those of `QUANTITIES` that the steps cannot resolve, so that no trial grasp can verify them."""
     left_out: tuple[int, ...]
@@ -84,7 +83,7 @@ class Reduction:
     @property
     def max_force_n(self) -> float:
         """The largest peak force (N) for which the steps are valid if their error is not controlled."""
-        return FORCE_MARGIN * self.point.force_n
+        return FORCE_MARGIN * self.force_n
 
     def valid_for(self, peak_n: float) -> bool:
         """Return whether the steps are valid for a grasp with this peak force (N).
@@ -106,8 +105,8 @@ class Reduction:
         return {
             "accuracy": self.accuracy,
             "level": self.level._asdict(),
-            "expected_force_n": self.point.force_n,
-            "expected_speed_m_s": self.point.speed_m_s,
+            "expected_force_n": self.force_n,
+            "expected_speed_m_s": self.speed_m_s,
             "verified": None if self.verification is None else asdict(self.verification),
             "decisions": [asdict(decision) for decision in self.decisions],
         }

@@ -17,9 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graspsense.plugin_api import Features, FeatureSet
-from graspsense.simulator_api import CHANNELS, NotCompilable, compiled_extraction
+from graspsense.simulator_api import CHANNELS
 from graspsense_sim_gripper.run.accuracy.error import UNIT_SCALES
-from graspsense_sim_gripper.run.compiled.extraction import compiled_measure
 from graspsense_sim_gripper.run.loop import COLUMNS, EVENT_SHIFT
 from graspsense_sim_gripper.run.recorded_trace import recorded_trace
 
@@ -42,29 +41,27 @@ class OwnFeatures(NamedTuple):
 
 
 def own_features(
-    feature_set: FeatureSet[Any],
-    table: NDArray[np.float64],
-    phases: NDArray[np.float64],
-    *,
-    compiled: bool = False,
+    feature_set: FeatureSet[Any], table: NDArray[np.float64], phases: NDArray[np.float64]
 ) -> OwnFeatures | None:
     """Return the features of a grasp that ideal sensors read; None if the set needs further channels, or fails.
 
-    `table`, shape (columns, n), and `phases`, shape (n,), are those of `loop.Buffers`. `compiled`: use the compiled
-    form of the set where it has one.
+    `table`, shape (columns, n), and `phases`, shape (n,), are those of `loop.Buffers`.
     """
     # The entry of a set may declare the channels instead of its class.
     required = {channel.name for channel in getattr(feature_set, "requires", ())}
     if not required <= READ:
         return None
-    numbers = phases.astype(np.int64) & ((1 << EVENT_SHIFT) - 1)
-    extract = _from_columns if compiled else _from_trace
+    numbers, none = phases.astype(np.int64) & ((1 << EVENT_SHIFT) - 1), np.zeros(0)
+
+    def extracted(columns: NDArray[np.float64]) -> Features:
+        return feature_set.extract(recorded_trace((), columns, numbers.copy(), none, none))
+
     try:
-        features = extract(feature_set, table, numbers)
+        features = extracted(table)
     except Exception:
         # A set that fails on every grasp is reported where the grasp itself is extracted from.
         return None
-    return OwnFeatures(features, lambda: extract(feature_set, _half_a_tick_later(table), numbers))
+    return OwnFeatures(features, lambda: extracted(_half_a_tick_later(table)))
 
 
 def _half_a_tick_later(table: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -73,27 +70,6 @@ def _half_a_tick_later(table: NDArray[np.float64]) -> NDArray[np.float64]:
     later[list(HELD)] = table[list(HELD)]
     later[0] = table[0] + 0.5 * (table[0, 1] - table[0, 0] if table.shape[1] > 1 else 0.0)
     return later
-
-
-def _from_columns(
-    feature_set: FeatureSet[Any], table: NDArray[np.float64], phases: NDArray[np.int64]
-) -> Features:
-    form = compiled_extraction(feature_set.extract)
-    if form is None:
-        return _from_trace(feature_set, table, phases)
-    try:
-        measured = compiled_measure(form)(form.params, table, phases, table.shape[1])
-    except NotCompilable:
-        return _from_trace(feature_set, table, phases)
-    features: Features = form.result(measured)
-    return features
-
-
-def _from_trace(
-    feature_set: FeatureSet[Any], table: NDArray[np.float64], phases: NDArray[np.int64]
-) -> Features:
-    none = np.zeros(0)
-    return feature_set.extract(recorded_trace((), table, phases.copy(), none, none))
 
 
 def beyond(grasp: OwnFeatures | None, expected: OwnFeatures | None, accuracy: float) -> tuple[str, ...]:

@@ -1,7 +1,7 @@
 """Proposing the steps of a level, and what they cannot resolve.
 
-The object is compressed along two prescribed paths (see `probe`). Decisions depend only on computed forces and rates,
-not on the kinds of the terms, so a term that a plugin contributes is treated like any other.
+Decisions depend only on computed forces and rates, not on the kinds of the terms, so a term that a plugin contributes
+is treated like any other.
 """
 
 from __future__ import annotations
@@ -10,35 +10,25 @@ import math
 from collections.abc import Sequence
 from typing import Final
 
-from attrs import evolve
-
-from graspsense.gripper_api import gap_and_rate, revolutions_at
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant.contact import ObjectModel
-from graspsense_sim_gripper.plant.drive import Drive
 from graspsense_sim_gripper.run.accuracy.levels import (
     CONTROLLED,
-    PLAIN,
     LevelScale,
     step_growth,
     step_tolerance,
     steps_for,
 )
 from graspsense_sim_gripper.run.accuracy.model import QUANTITIES, Reduction, StepDecision
-from graspsense_sim_gripper.run.accuracy.probe import Grip, damping, stiffness
-from graspsense_sim_gripper.run.problem import GraspSetup, Problem
-from graspsense_sim_gripper.scene.spec import TermParams
+from graspsense_sim_gripper.run.accuracy.probe import FORCE_N, SPEED_M_S, Grip, nominal
+from graspsense_sim_gripper.run.problem import Problem
 from graspsense_sim_gripper.scene.terms.registry import find_term
-from graspsense_sim_gripper.scene.terms.switchable import Switchable, switched_off
-from graspsense_sim_gripper.scene.terms.term import NO_STATE, Term, WorkingPoint, no_rates
+from graspsense_sim_gripper.scene.terms.switchable import Switchable
+from graspsense_sim_gripper.scene.terms.term import NO_STATE, WorkingPoint, no_rates
 from graspsense_sim_gripper.solve.scheme import Steps
 
-FORCE_N: Final = 20.0
-SPEED_M_S: Final = 0.01
-"""The gripping force and the closing speed that are assumed without other information: those of the paper (Chitta,
-Piccoli and Sturm, ICRA 2010)."""
 USUAL_POINT: Final = WorkingPoint(1e-3, SPEED_M_S, 1.0, FORCE_N)
-"""The working point that the rates of terms are given for where nothing is selected."""
+"""The working point that the rates of terms are given for."""
 REFERENCE_ACCURACY: Final = 1e-3
 """The steps of a reference begin with the tolerance for this accuracy, or for a finer one that is requested."""
 CONVERGED: Final = 1e-7
@@ -59,127 +49,54 @@ PERIOD_RAD: Final = 2.0 * math.pi
 too, and agree."""
 
 
-def grip_of(problem: Problem, force_n: float | None = None, speed_m_s: float | None = None) -> Grip:
-    """Return the nominal object with its probe paths, for this gripping force (N) and this speed at the contact (m/s).
+def propose(problem: Problem, grip: Grip | None, scale: LevelScale = CONTROLLED[0]) -> Reduction:
+    """Return the steps of a level, without a trial grasp; `grip` None: the object is not examined.
 
-    `expected_force_n` and `expected_speed_m_s` of the settings take precedence over the arguments. Without either, the
-    values of the paper are used. Raises TypeError if there is no object.
+    Raises TypeError if there is no object.
     """
-    config, setup = problem.model_config, _nominal(problem)
-    drive = setup.plant.drive
-    return Grip(
-        setup.plant.object,
-        setup.kinds,
-        config.expected_force_n or force_n or FORCE_N,
-        config.expected_speed_m_s or speed_m_s or SPEED_M_S,
-        _mass_kg(drive, min(max(setup.plant.object.width_m, 0.0), config.open_gap_m)),
-    )
-
-
-def propose(problem: Problem, grip: Grip, scale: LevelScale = CONTROLLED[0]) -> Reduction:
-    """Return the steps of a level, without a trial grasp. Raises TypeError if there is no object."""
-    config, drive, dt_s = problem.model_config, _nominal(problem).plant.drive, _nominal(problem).dt_s
+    config, setup = problem.model_config, nominal(problem)
+    kinds, model, dt_s = setup.kinds, setup.plant.object, setup.dt_s
     level = scale.at(config.accuracy)
     angle = min(math.sqrt(SWING_SHARE * level.step_tol), MAX_SWING_RAD)
-    swings = _frequencies(grip.kinds, grip.model, grip.point)
-    too_fast = {i: per_s for i, per_s in swings.items() if per_s * dt_s > MOST_SWING_STEPS * angle}
-    within_tick = any(per_s * dt_s > PERIOD_RAD for per_s in swings.values())
-    model = grip.model._replace(terms=switched_off(grip.model.terms, tuple(too_fast)))
-    damping_rate = (drive.friction.damping_n_s_m + damping(grip, model, dt_s)) / grip.mass_kg
-    stiffnesses = stiffness(grip, dt_s)
-    frequency = max(math.sqrt(max(stiffnesses[0], 0.0) / grip.mass_kg), *too_fast.values(), 0.0) * dt_s
-    resolved = max(stiffnesses) <= 1.05 * STIFFEST_N_M and frequency <= 1.05
+    swings = _frequencies(kinds, model)
+    too_fast: dict[int, float] = {}
+    if grip is not None:
+        too_fast = {i: per_s for i, per_s in swings.items() if per_s * dt_s > MOST_SWING_STEPS * angle}
     steps = _with_settings(steps_for(level, dt_s), config)
     fastest = max((per_s for i, per_s in swings.items() if i not in too_fast), default=0.0)
     if fastest > 0.0:
-        steps = steps._replace(longest_touched_s=angle / fastest)
+        touched_s = max(angle / fastest, dt_s / MOST_SWING_STEPS)
+        steps = steps._replace(longest_touched_s=min(steps.longest_touched_s, touched_s))
+    unresolved: tuple[str, ...] = ()
+    frequency, contact = 0.0, "not examined"
+    if grip is not None:
+        natural = math.sqrt(max(grip.stiffness_n_m, 0.0) / grip.mass_kg)
+        frequency = max(natural, *too_fast.values(), 0.0) * dt_s
+        stiffest = max(grip.stiffness_n_m, grip.touch_n_m)
+        bounces = not (stiffest <= 1.05 * STIFFEST_N_M and frequency <= 1.05)
+        within_tick = any(per_s * dt_s > PERIOD_RAD for per_s in swings.values())
+        unresolved = QUANTITIES if within_tick else QUANTITIES[1:] if bounces else ()
+        contact = NOT_VERIFIED if bounces else "trace resolved"
+    decisions = [
+        ("steps", _in_words(steps, dt_s), "accuracy of the steps", level.step_tol),
+        ("contact", contact, "natural frequency times tick", frequency),
+        *(
+            (kinds[i], "left out: its oscillation is not resolved", "angle in a tick (rad)", per_s * dt_s)
+            for i, per_s in too_fast.items()
+        ),
+    ]
     return Reduction(
         accuracy=config.accuracy,
-        point=grip.point,
+        force_n=FORCE_N if grip is None else grip.force_n,
+        speed_m_s=SPEED_M_S if grip is None else grip.speed_m_s,
         steps=steps,
-        decisions=(
-            StepDecision(
-                subject="steps",
-                decision=_in_words(steps, dt_s),
-                what="damping rate times tick",
-                number=damping_rate * dt_s,
-            ),
-            StepDecision(
-                subject="contact",
-                decision="trace resolved" if resolved else NOT_VERIFIED,
-                what="natural frequency times tick",
-                number=frequency,
-            ),
-            *(
-                StepDecision(
-                    subject=grip.kinds[i],
-                    decision="left out: its oscillation is not resolved",
-                    what="angle in a tick (rad)",
-                    number=per_s * dt_s,
-                )
-                for i, per_s in too_fast.items()
-            ),
-        ),
+        decisions=tuple(StepDecision(*decision) for decision in decisions),
         frequency=frequency,
-        is_stiff=damping_rate * dt_s > 1.0,
-        unresolved=QUANTITIES if within_tick else () if resolved else QUANTITIES[1:],
+        unresolved=unresolved,
         left_out=tuple(too_fast),
-        oscillates=_any_oscillates(grip.kinds, model.terms, grip.point),
+        oscillates=any(map(_oscillates, kinds, model.terms)),
         level=level,
     )
-
-
-def fixed(problem: Problem) -> Reduction:
-    """Return the steps that follow from the accuracy, or from `step_s`, without examining the object.
-
-    Raises TypeError if there is no object.
-    """
-    config, setup = problem.model_config, _nominal(problem)
-    level = CONTROLLED[0].at(config.accuracy)
-    steps = _with_settings(steps_for(level, setup.dt_s), config)
-    swings = _frequencies(setup.kinds, setup.plant.object, USUAL_POINT)
-    fastest = max(swings.values(), default=0.0)
-    if fastest > 0.0:
-        angle = min(math.sqrt(SWING_SHARE * level.step_tol), MAX_SWING_RAD)
-        steps = steps._replace(longest_touched_s=max(angle / fastest, setup.dt_s / MOST_SWING_STEPS))
-    what = "given by the settings"
-    return Reduction(
-        accuracy=config.accuracy,
-        point=USUAL_POINT,
-        steps=steps,
-        decisions=(
-            StepDecision(subject="steps", decision=_in_words(steps, setup.dt_s), what=what, number=0.0),
-            StepDecision(subject="contact", decision="not examined", what=what, number=0.0),
-        ),
-        frequency=0.0,
-        is_stiff=False,
-        unresolved=(),
-        left_out=(),
-        oscillates=_any_oscillates(setup.kinds, setup.plant.object.terms, USUAL_POINT),
-        level=level,
-    )
-
-
-def plain(problem: Problem) -> Reduction:
-    """Return a step per tick, without examining the object.
-
-    Raises TypeError if there is no object.
-    """
-    level, dt_s = PLAIN.at(problem.model_config.accuracy), _nominal(problem).dt_s
-    steps = _with_settings(steps_for(level, dt_s), problem.model_config)
-    return evolve(fixed(problem), steps=steps, level=level)
-
-
-def _mass_kg(drive: Drive, gap_m: float) -> float:
-    """Return the mass (kg) that moves with the gap: the rotor's inertia through the linkage, J (2 pi)^2 / g^2."""
-    _, jacobian = gap_and_rate(drive.link, revolutions_at(drive.link, gap_m))
-    return drive.inertia / (jacobian * jacobian)
-
-
-def _nominal(problem: Problem) -> GraspSetup:
-    if problem.nominal is None:
-        raise TypeError("where there is no object there is no model to reduce")
-    return problem.nominal
 
 
 def _in_words(steps: Steps, dt_s: float) -> str:
@@ -205,28 +122,23 @@ def _with_settings(steps: Steps, config: SimConfig) -> Steps:
     return steps
 
 
-def _any_oscillates(kinds: Sequence[str], terms: Sequence[Switchable], point: WorkingPoint) -> bool:
-    """Return whether an active term has a state that oscillates, or a state without declared rates."""
-    return any(
-        term.active == 1 and _oscillates(find_term(kind)[1], term.params, point)
-        for kind, term in zip(kinds, terms, strict=True)
-    )
+def _oscillates(kind: str, term: Switchable) -> bool:
+    """Return whether a term is active and has a state that oscillates, or a state without declared rates."""
+    law = find_term(kind)[1]
+    if law.rates is no_rates:
+        return term.active == 1 and bool(law.at_rest != NO_STATE)
+    return term.active == 1 and any(rate.what == "swings" for rate in law.rates(term.params, USUAL_POINT))
 
 
-def _oscillates(term: Term, params: TermParams, point: WorkingPoint) -> bool:
-    if term.rates is no_rates:
-        return bool(term.at_rest != NO_STATE)
-    return any(rate.what == "swings" for rate in term.rates(params, point))
-
-
-def _frequencies(kinds: Sequence[str], model: ObjectModel, point: WorkingPoint) -> dict[int, float]:
+def _frequencies(kinds: Sequence[str], model: ObjectModel) -> dict[int, float]:
     """Return the angular frequency (rad/s) of each term by its index, 0 if it does not oscillate.
 
     A term that divides its steps by itself is left out.
     """
     swings = {}
     for i, kind in enumerate(kinds):
-        term, params = find_term(kind)[1], model.terms[i].params
+        term = find_term(kind)[1]
         if not term.divides_steps:
-            swings[i] = max((r.per_s for r in term.rates(params, point) if r.what == "swings"), default=0.0)
+            rates = term.rates(model.terms[i].params, USUAL_POINT)
+            swings[i] = max((rate.per_s for rate in rates if rate.what == "swings"), default=0.0)
     return swings

@@ -1,9 +1,8 @@
 """Selecting the steps of the grasps of an object: the first level whose trial grasp is accurate enough.
 
-The first trial grasp has a step per tick. It gives the speed at the contact and the peak force, for which steps are
-proposed; a second one, in finer steps, corrects them where it has others. The steps of each level are then tried in a
-trial grasp, and compared with a trial grasp in finer ones. A step per tick is tried first, since it costs least; then
-steps whose error is controlled, for the accuracy, a tenth and a hundredth of it.
+Trial grasps with a step per tick and with finer steps give the peak force and the speed at the contact. Then the steps
+of one level after another are compared with finer ones: first a step per tick, since it costs least, then steps whose
+error is controlled, for the accuracy, a tenth and a hundredth of it.
 
 Steps that pass are tried twice more, with a controller that reads slightly larger and slightly smaller values of force
 and travel. This finds a threshold that is met so closely that an error of this size makes the grasp continue a tick
@@ -24,12 +23,12 @@ from attrs import evolve
 from graspsense.plugin_api import ConfigError
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.accuracy.cache import ReductionCache
-from graspsense_sim_gripper.run.accuracy.error import deviation
+from graspsense_sim_gripper.run.accuracy.error import GraspRecord, deviation
 from graspsense_sim_gripper.run.accuracy.levels import CONTROLLED, PLAIN, REFERENCE_SCALES, LevelScale
 from graspsense_sim_gripper.run.accuracy.model import QUANTITIES, Reduction, StepDecision, Verification
 from graspsense_sim_gripper.run.accuracy.own_features import NOT_READ
-from graspsense_sim_gripper.run.accuracy.probe import Grip
-from graspsense_sim_gripper.run.accuracy.propose import fixed, grip_of, plain, propose
+from graspsense_sim_gripper.run.accuracy.probe import Grip, grip_of
+from graspsense_sim_gripper.run.accuracy.propose import propose
 from graspsense_sim_gripper.run.accuracy.verify import (
     MOST_WORK,
     Sensitivity,
@@ -39,7 +38,7 @@ from graspsense_sim_gripper.run.accuracy.verify import (
     without_term,
 )
 from graspsense_sim_gripper.run.problem import GraspController, Problem
-from graspsense_sim_gripper.run.term_failure import raised_in_term
+from graspsense_sim_gripper.run.term_failure import TermFailed, raised_in_term
 from graspsense_sim_gripper.scene.spec import ObjectSpec
 from graspsense_sim_gripper.scene.terms.term import LAW_ERRORS
 
@@ -61,7 +60,7 @@ that shorter steps do not give is one that depends on ticks."""
 
 _SELECTED: Final = ReductionCache()
 _UNKNOWN: Final = (None, None)
-"""What `_gripped` returns for a trial grasp that fails; `grip_of` then has the values of the paper."""
+"""What `_felt` returns for a trial grasp that fails; `grip_of` then has the values of the paper."""
 
 
 def select(
@@ -85,32 +84,20 @@ def select(
     object.
     """
     if problem.config.fidelity == "fixed":
-        return fixed(problem)
+        return propose(problem, None)
     key = _SELECTED.key(problem, controller)
     reduction = _SELECTED.get(key)
     if reduction is None:
-        reduction = select_anew(problem, controller, compiled=compiled, padding=padding)
+        trial = trial_grasps(problem, controller, compiled=compiled, padding=padding)
+        try:
+            reduction = _select_within_limit(problem, trial)
+        except LAW_ERRORS as error:
+            reason = raised_in_term(error, trial.setup.kinds)
+            if not reason:
+                raise
+            raise ConfigError(f"{_scene_in_words(problem)}: {reason}") from error
         _SELECTED.put(key, reduction)
     return reduction
-
-
-def select_anew(
-    problem: Problem,
-    controller: GraspController,
-    *,
-    compiled: bool = False,
-    padding: tuple[str, ...] | None = None,
-) -> Reduction:
-    """Return the model as `select` does, without the cache. Raises as it does."""
-    try:
-        return _select_within_limit(
-            problem, trial_grasps(problem, controller, compiled=compiled, padding=padding)
-        )
-    except LAW_ERRORS as error:
-        reason = raised_in_term(error, problem.nominal.kinds if problem.nominal else ())
-        if not reason:
-            raise
-        raise ConfigError(f"{_scene_in_words(problem)}: {reason}") from error
 
 
 def _select_within_limit(problem: Problem, trial: TrialGrasps) -> Reduction:
@@ -131,40 +118,42 @@ def _select_within_limit(problem: Problem, trial: TrialGrasps) -> Reduction:
 def _select(problem: Problem, trial: TrialGrasps) -> Reduction:
     """Return the model as `select` does, without the cache."""
     config = problem.model_config
-    if config.has_forced_steps or config.fidelity == "reference":
-        return propose(problem, grip_of(problem))
-    scale = _reference_scale(config, CONTROLLED[0])
-    expected = _gripped(trial, plain(problem))
-    grip = grip_of(problem, *expected)
-    reference = propose(problem, grip, scale)
-    if reference.unresolved:
-        expected, grip = _UNKNOWN, grip_of(problem)
-        reference = propose(problem, grip, scale)
-    if reference.unresolved:
-        return propose(problem, grip)
-    found = _gripped(trial, reference)
+    usual = grip_of(problem)
+    unverified = propose(problem, usual)
+    prescribed = config.has_forced_steps or config.fidelity == "reference"
+    if prescribed or unverified.unresolved == QUANTITIES:
+        return unverified
+    grip = grip_of(problem, *_felt(trial, propose(problem, usual, PLAIN)))
+    if propose(problem, grip).unresolved:
+        # A step per tick may be unstable, and what is felt in it then means nothing.
+        grip = usual
+    unverified = propose(problem, grip)
+    if unverified.unresolved:
+        return unverified
+    finer = propose(problem, grip, _reference_scale(config, CONTROLLED[0]))
+    found = _felt(trial, finer, decides=True)
     if found == _UNKNOWN:
-        return propose(problem, grip)
-    if found != expected:
-        grip = grip_of(problem, *found)
-        reference = propose(problem, grip, scale)
-        if reference.unresolved:
-            return propose(problem, grip)
-    return _best(problem, grip, trial)
+        return unverified
+    grip = grip_of(problem, *found)
+    unverified = propose(problem, grip)
+    return unverified if unverified.unresolved else _best(problem, grip, trial)
 
 
-def _gripped(trial: TrialGrasps, reduction: Reduction) -> tuple[float | None, float | None]:
+def _felt(
+    trial: TrialGrasps, reduction: Reduction, *, decides: bool = False
+) -> tuple[float | None, float | None]:
     """Return the peak force and the speed at the contact of a trial grasp in these steps, to two digits.
 
     They suffice: similar grasps then get the same proposals. `_UNKNOWN` if the grasp fails; a controller that raises
-    does so in the grasp of the run as well, and is reported there. Raises TooMuchWork, and what a term raises.
+    does so in the grasp of the run as well, and is reported there. Raises TooMuchWork, and what a term raises if this
+    grasp `decides`.
     """
     try:
         grasp = trial.record(reduction)
     except TooMuchWork:
         raise
     except Exception as error:
-        if isinstance(error, LAW_ERRORS) and raised_in_term(error, trial.setup.kinds):
+        if decides and isinstance(error, LAW_ERRORS) and raised_in_term(error, trial.setup.kinds):
             raise
         return _UNKNOWN
     force_n, speed_m_s = (float(f"{value:.1e}") for value in (grasp.peak_n, grasp.contact_speed_m_s()))
@@ -189,15 +178,13 @@ def _accepted(problem: Problem, grip: Grip, trial: TrialGrasps) -> Iterator[Redu
     config = problem.model_config
     least, quantity, grasps, n_accepted = math.inf, "", 1, 0
     near_threshold: Sensitivity | None = None
-    # A step per tick would not be stable with dampers that are faster than the tick.
-    scales = CONTROLLED if propose(problem, grip).is_stiff else (PLAIN, *CONTROLLED)
-    for scale in scales:
+    for scale in (PLAIN, *CONTROLLED):
         if near_threshold and scale.at(config.accuracy).step_tol >= near_threshold.step_tol:
             continue
         reduction = propose(problem, grip, scale)
         full = propose(problem, grip, _reference_scale(config, scale))
         expected = trial.record(full)
-        error, of = deviation(trial.record(reduction), expected)
+        error, of = _off(trial, reduction, expected)
         grasps += 1
         if error > _accepted_share(config) * config.accuracy:
             if error < least:
@@ -226,6 +213,14 @@ def _accepted(problem: Problem, grip: Grip, trial: TrialGrasps) -> Iterator[Redu
             yield evolve(reduction, verification=evolve(verification, grasps=grasps))
     if n_accepted == 0:
         yield _with_finer_steps(problem, grip, trial, near_threshold, _Miss(least, quantity))
+
+
+def _off(trial: TrialGrasps, reduction: Reduction, expected: GraspRecord) -> tuple[float, str]:
+    """Return how far a grasp in these steps is from the expected one, as `deviation` does; inf if it fails."""
+    try:
+        return deviation(trial.record(reduction), expected)
+    except (TermFailed, *LAW_ERRORS):
+        return math.inf, "outcome"
 
 
 def _is_confirmed(
@@ -274,7 +269,7 @@ def _accepted_for_instances(
     `full` is the model to compare with, and `verification` the result for the nominal object. The expected force of the
     returned model is the largest peak force of all these grasps.
     """
-    force_n = reduction.point.force_n
+    force_n = reduction.force_n
     for setup in problem.examples():
         trial = trial.of(setup)
         try:
@@ -290,7 +285,7 @@ def _accepted_for_instances(
             verification = evolve(verification, error=error, quantity=quantity)
         verification = evolve(verification, grasps=verification.grasps + 1, features=tuple(features))
         force_n = max(force_n, grasp.peak_n)
-    return evolve(reduction, verification=verification, point=reduction.point._replace(force_n=force_n))
+    return evolve(reduction, verification=verification, force_n=force_n)
 
 
 def _reference_scale(config: SimConfig, scale: LevelScale) -> LevelScale:
@@ -311,7 +306,7 @@ def _culprit(problem: Problem, grip: Grip, trial: TrialGrasps) -> str:
     pair = [propose(problem, grip, s) for s in (scale, _reference_scale(problem.model_config, scale))]
     fine, finer = pair
     errors = {}
-    for i, kind in enumerate(grip.kinds):
+    for i, kind in enumerate(trial.setup.kinds):
         without = trial.of(without_term(trial.setup, i))
         errors[kind] = deviation(*(without.record(steps) for steps in pair))[0]
     with_all, _ = deviation(trial.record(fine), trial.record(finer))

@@ -1,7 +1,6 @@
 """Trial grasps of the nominal object, in the steps of one level after another.
 
 A trial grasp uses ideal sensors and the controller of the run. It begins with open fingers and ends with the release.
-The approach is simulated once for each set of steps.
 """
 
 from __future__ import annotations
@@ -9,7 +8,6 @@ from __future__ import annotations
 import logging
 import math
 import time
-from collections.abc import Callable
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -32,6 +30,7 @@ from graspsense_sim_gripper.plant.state import Motion, PlantState
 from graspsense_sim_gripper.run.accuracy.error import SCALES, UNIT_SCALES, GraspRecord, deviation
 from graspsense_sim_gripper.run.accuracy.model import Reduction
 from graspsense_sim_gripper.run.accuracy.own_features import OwnFeatures, beyond, own_features
+from graspsense_sim_gripper.run.accuracy.probe import nominal
 from graspsense_sim_gripper.run.compiled.compose import composition, grasp_loop
 from graspsense_sim_gripper.run.compiled.loop_code import CompiledLoops
 from graspsense_sim_gripper.run.compiled.padding import padded
@@ -50,22 +49,14 @@ from graspsense_sim_gripper.run.loop import (
 from graspsense_sim_gripper.run.problem import GraspController, GraspSetup, Problem
 from graspsense_sim_gripper.run.term_failure import TermFailed, not_finite_in_tick
 from graspsense_sim_gripper.scene.terms.switchable import switched_off
-from graspsense_sim_gripper.solve.scheme import Steps
 
 _LOG: Final = logging.getLogger(__name__)
 MAX_SECONDS: Final = 40.0
-"""Longest simulated time of an approach, and of the grasp after it."""
+"""Longest simulated time of a grasp. One that does not end within it is repeated near the object."""
 NEAR_M: Final = 3e-3
-"""An approach longer than `MAX_SECONDS` is repeated from this distance to the object."""
-MIN_CLOSING_M_S: Final = 0.01
-"""The remaining time of an approach is estimated with this closing speed, or with a higher present one."""
+"""Distance of the fingers to the object there."""
 MAX_HOLD_S: Final = 0.3
 """A longer hold is shortened to this in a trial grasp."""
-CLOSED_AT_ONCE: Final = 0.9
-"""Share of the distance to the object that the fingers close in at their present speed before it is checked again; a
-quarter of it where they touched the object meanwhile."""
-LEAST_TICKS: Final = 32
-"""An approach ends where fewer ticks than this are left: repeating them costs less than a further check."""
 CAPACITY: Final = 1024
 """Largest number of ticks in a buffer; after each buffer the work is counted."""
 MOST_WORK: Final = 1_000_000
@@ -103,16 +94,6 @@ class Sensitivity(NamedTuple):
     """Whether the error of the forces is as large as the difference of the two models."""
 
 
-class _Stage(NamedTuple):
-    """A trial grasp in progress: its state, and what was recorded."""
-
-    progress: SimulationState
-    rows: tuple[Any, ...]
-    """Arrays of shape (len(COLUMNS) + 1, n) in the order of time: the columns, and the phases as the last row."""
-    from_open: bool
-    """Whether it began with the fingers open."""
-
-
 @define(eq=False)
 class TrialGrasps:
     """Trial grasps of one object under one controller, each simulated once.
@@ -133,13 +114,11 @@ class TrialGrasps:
     """The kinds of terms in compiled code, see `compiled.padding`; None: those of a batch."""
     features: FeatureSet[Any] | None = None
     """The feature set of the pipeline; None: only the features of the paper are compared."""
-    only_near: bool = False
-    """Whether they begin `NEAR_M` from the object, with no approach that is simulated apart."""
+    near: bool = False
+    """Whether they begin `NEAR_M` from the object, not with the fingers open."""
     _records: dict[Any, GraspRecord] = field(factory=dict, init=False)
     _features: dict[Any, OwnFeatures | None] = field(factory=dict, init=False)
     """The features of the pipeline in the grasps of `_records`."""
-    _starts: dict[Steps | None, _Stage] = field(factory=dict, init=False)
-    """The grasp shortly before the first contact, by the steps of the approach; one for all where `only_near`."""
     _loops: CompiledLoops = field(init=False)
     work: int = field(default=0, init=False)
     """Ticks and steps of all trial grasps so far."""
@@ -203,119 +182,60 @@ class TrialGrasps:
 
     def _grasp(self, reduction: Reduction, force_n: float, travel: float) -> GraspRecord:
         """Simulate what `record` returns. Raises NotCompilable."""
-        setup = evolve(self.setup, plant=reduction.applied_to(self.setup.plant))
-        steps = None if self.only_near else _approach_steps(setup)
-        if steps not in self._starts:
-            self._starts[steps] = self._approach(setup)
-        start = self._starts[steps]
-        bias = Bias(force_n, travel, setup.plant.object.width_m)
-        setup = evolve(setup, sensor=setup.sensor._replace(bias=bias))
-        until = start.progress.loop.ticks + self._max_ticks()
-        end = self._runner(setup, start.from_open)(setup.plant.steps, start, until)
-        rows = np.concatenate(end.rows, axis=1)
+        bias = Bias(force_n, travel, self.setup.plant.object.width_m)
+        setup = evolve(
+            self.setup,
+            plant=reduction.applied_to(self.setup.plant),
+            sensor=self.setup.sensor._replace(bias=bias),
+        )
+        end, rows = self._run(setup)
+        if not self.near and not has_ended(end.controller):
+            self.near = True
+            end, rows = self._run(setup)
         if self.features is not None and force_n == 0.0:
-            self._features[reduction.steps] = own_features(
-                self.features, rows[:-1], rows[-1], compiled=self.compiled
-            )
+            self._features[reduction.steps] = own_features(self.features, rows[:-1], rows[-1])
         return _record(end, rows, bias, setup.dt_s)
 
     def of(self, setup: GraspSetup) -> TrialGrasps:
         """Return trial grasps of another instance of the object, which begin near it and go on counting the work."""
-        other = evolve(self, setup=setup, only_near=True)
+        other = evolve(self, setup=setup, near=True)
         other.work, other._loops = self.work, self._loops
         return other
 
-    def _max_ticks(self) -> int:
-        return math.ceil(min(MAX_SECONDS, seconds_at_most(self.controller.run)) / self.setup.dt_s)
-
-    def _approach(self, setup: GraspSetup) -> _Stage:
-        """Return the grasp shortly before the first contact; it begins near the object if it would take too long."""
-        if self.only_near:
-            return self._begun_near(setup)
-        stage, came_near = self._closed_in(setup, self._begun(setup.state, setup, from_open=True))
-        if not came_near and not has_ended(stage.progress.controller):
-            stage, _ = self._closed_in(setup, self._begun_near(setup))
-        return stage
-
-    def _begun_near(self, setup: GraspSetup) -> _Stage:
-        """Return a grasp that begins `NEAR_M` from the object."""
-        state, link = setup.state, setup.plant.drive.link
-        near = revolutions_at(link, min(state.motion.gap_m, _reach_m(setup) + NEAR_M))
-        state = state._replace(motion=Motion(near, state.motion.speed_rev_s, *gap_and_rate(link, near)))
-        return self._begun(state, setup, from_open=False)
-
-    def _begun(self, state: PlantState, setup: GraspSetup, *, from_open: bool) -> _Stage:
+    def _run(self, setup: GraspSetup) -> tuple[SimulationState, NDArray[np.float64]]:
+        """Return the end of a grasp, and its rows: the columns, and last the phases. Raises NotCompilable."""
+        most = math.ceil(min(MAX_SECONDS, seconds_at_most(self.controller.run)) / setup.dt_s)
+        made = padded(setup, self.padding) if self.compiled else setup
+        composed = composition(made.kinds, made.plant)
+        loop = self._loops.of(composed) if self.compiled else grasp_loop(composed, self.controller.step)
+        params = GraspParams(
+            made.plant,
+            made.sensor,
+            self.params_near if self.near else self.params,
+            setup.dt_s,
+            most,
+            macro_steps=uses_macro_steps(made.plant.steps),
+        )
+        plant = _near(made) if self.near else made.state
         controller = first_state(self.controller.controller.init())
-        progress = SimulationState(NOT_STARTED, state, setup.sensor_state, controller)
-        return _Stage(progress, (), from_open)
-
-    def _closed_in(self, setup: GraspSetup, stage: _Stage) -> tuple[_Stage, bool]:
-        """Return the grasp shortly before the first contact, or at its end, and whether it reached the contact."""
-        steps, reach = _approach_steps(setup), _reach_m(setup)
-        run, share = self._runner(setup, stage.from_open), CLOSED_AT_ONCE
-        while not has_ended(stage.progress.controller) and stage.progress.loop.ticks < self._max_ticks():
-            motion = stage.progress.plant.motion
-            closing = max(-motion.speed_rev_s * motion.jacobian_m_rev, MIN_CLOSING_M_S)
-            ticks = share * (motion.gap_m - reach) / (closing * setup.dt_s)
-            if ticks < LEAST_TICKS:
-                return stage, True
-            after = run(steps, stage, stage.progress.loop.ticks + min(int(ticks), CAPACITY))
-            if after.progress.plant.contact.touched == 1:
-                share *= 0.25
-            else:
-                stage = after
-        return stage, False
-
-    def _runner(self, setup: GraspSetup, from_open: bool) -> Callable[[Steps, _Stage, int], _Stage]:
-        """Return a function `run(steps, stage, until)` that continues a grasp of this model up to the tick `until`."""
-        on_arrays, loop, made = self._loop(setup)
-        buffers = _ideal_buffers(on_arrays)
-        params = self.params if from_open else self.params_near
-
-        def run(steps: Steps, stage: _Stage, until: int) -> _Stage:
-            progress, rows, _ = stage
-            if progress.plant.contact.touched == 0:
-                # The stage may come from another composition: the untouched object in the terms of this one.
-                fresh = made.state.contact
-                contact = progress.plant.contact._replace(left=fresh.left, right=fresh.right)
-                progress = progress._replace(plant=progress.plant._replace(contact=contact))
-            plant = made.plant._replace(steps=steps)
-            grasp_params = GraspParams(
-                plant,
-                made.sensor,
-                params,
-                setup.dt_s,
-                until,
-                macro_steps=uses_macro_steps(steps),
-            )
-            while not has_ended(progress.controller) and progress.loop.ticks < until:
-                n_rows = min(until - progress.loop.ticks, CAPACITY) + ROWS_AT_ONCE
-                table = np.zeros((len(COLUMNS), n_rows))
-                phases = np.zeros(table.shape[1], np.int64)
-                recorded = (table, phases) if on_arrays else (table.tolist(), phases.tolist())
-                progress = progress._replace(loop=progress.loop._replace(recorded=0))
-                start, written = progress, Buffers(*buffers, *recorded)
-                progress = loop(grasp_params, start, written)
-                if progress.loop.failed == 1:
-                    before = before_failure(loop, grasp_params, start, written, progress.loop.ticks)
-                    raise TermFailed(
-                        not_finite_in_tick(
-                            made.kinds,
-                            made.plant._replace(steps=steps),
-                            before,
-                            progress.loop.effort_n,
-                            setup.dt_s,
-                        )
-                    )
-                n = progress.loop.recorded
-                rows = (
-                    *rows,
-                    np.vstack((np.asarray(written.columns)[:, :n], np.asarray(written.phases)[:n])),
+        at = SimulationState(NOT_STARTED, plant, made.sensor_state, controller)
+        pads, rows = _ideal_buffers(self.compiled), []
+        while not has_ended(at.controller) and at.loop.ticks < most:
+            table: Any = np.zeros((len(COLUMNS), CAPACITY + ROWS_AT_ONCE))
+            phases: Any = np.zeros(CAPACITY + ROWS_AT_ONCE, np.int64)
+            if not self.compiled:
+                table, phases = table.tolist(), phases.tolist()
+            start, written = at._replace(loop=at.loop._replace(recorded=0)), Buffers(*pads, table, phases)
+            at = loop(params, start, written)
+            if at.loop.failed == 1:
+                before = before_failure(loop, params, start, written, at.loop.ticks)
+                raise TermFailed(
+                    not_finite_in_tick(made.kinds, made.plant, before, at.loop.effort_n, setup.dt_s)
                 )
-                self._count(start, progress)
-            return _Stage(progress, rows, from_open)
-
-        return run
+            n = at.loop.recorded
+            rows.append(np.vstack((np.asarray(table)[:, :n], np.asarray(phases)[:n])))
+            self._count(start, at)
+        return at, np.concatenate(rows, axis=1)
 
     def _count(self, before: SimulationState, after: SimulationState) -> None:
         """Count the work between two states. Raises TooMuchWork."""
@@ -331,27 +251,16 @@ class TrialGrasps:
             )
             self._reported_s = time.monotonic()
 
-    def _loop(self, setup: GraspSetup) -> tuple[bool, Callable[..., SimulationState], GraspSetup]:
-        """Return whether the loop is compiled, the loop, and its setup. Raises NotCompilable."""
-        on_arrays = self.compiled
-        made = padded(setup, self.padding) if on_arrays else setup
-        composed = composition(made.kinds, made.plant)
-        if not on_arrays:
-            return False, grasp_loop(composed, self.controller.step), made
-        return True, self._loops.of(composed), made
-
 
 def trial_grasps(
     problem: Problem, controller: GraspController, *, compiled: bool, padding: tuple[str, ...] | None
 ) -> TrialGrasps:
     """Return the trial grasps of a problem. Raises TypeError if there is no object."""
-    if problem.nominal is None:
-        raise TypeError("where there is no object there is nothing to grasp")
     law, run = controller.controller, evolve(controller.run, hold_s=min(controller.run.hold_s, MAX_HOLD_S))
     near = evolve(problem.device, opening=None)
     return TrialGrasps(
         config=evolve(problem.model_config, spread=False),
-        setup=problem.nominal,
+        setup=nominal(problem),
         controller=controller,
         params=tick_params(problem.device, law, run),
         params_near=tick_params(near, law, run),
@@ -361,14 +270,13 @@ def trial_grasps(
     )
 
 
-def _reach_m(setup: GraspSetup) -> float:
-    """Return the gap (m) at which the nearer finger touches the object."""
-    return setup.plant.object.width_m + 2.0 * abs(setup.state.contact.offset_m)
-
-
-def _approach_steps(setup: GraspSetup) -> Steps:
-    """Return the steps up to the contact: without contact the motion is smooth, and long ones suffice."""
-    return setup.plant.steps._replace(longest_s=math.inf)
+def _near(setup: GraspSetup) -> PlantState:
+    """Return the plant with the fingers at rest, `NEAR_M` from the object."""
+    state, link = setup.state, setup.plant.drive.link
+    # The gap at which the nearer finger touches the object.
+    reach_m = setup.plant.object.width_m + 2.0 * abs(state.contact.offset_m)
+    near = revolutions_at(link, min(state.motion.gap_m, reach_m + NEAR_M))
+    return state._replace(motion=Motion(near, 0.0, *gap_and_rate(link, near)))
 
 
 def _ideal_buffers(on_arrays: bool) -> tuple[PadBuffers, Any]:
@@ -380,9 +288,9 @@ def _ideal_buffers(on_arrays: bool) -> tuple[PadBuffers, Any]:
     return PadBuffers(left, right, noise.tolist(), images.tolist()), [0.0]
 
 
-def _record(end: _Stage, columns: NDArray[np.float64], bias: Bias, dt_s: float) -> GraspRecord:
+def _record(end: SimulationState, columns: NDArray[np.float64], bias: Bias, dt_s: float) -> GraspRecord:
     """Return the record of a grasp with these rows, from which the errors of the readings are subtracted."""
-    progress, phases = end.progress, np.mod(columns[-1], 1 << EVENT_SHIFT)
+    phases = np.mod(columns[-1], 1 << EVENT_SHIFT)
     gap_m, left_n, right_n = (
         columns[COLUMNS.index(name)] for name in ("gap_m", "force_left_n", "force_right_n")
     )
@@ -392,7 +300,7 @@ def _record(end: _Stage, columns: NDArray[np.float64], bias: Bias, dt_s: float) 
     if bias.force_n != 0.0:
         left_n, right_n = (np.where(force != 0.0, force - bias.force_n, 0.0) for force in (left_n, right_n))
     return GraspRecord(
-        outcome=int(progress.controller.law.outcome) if progress.controller.guard.stopped == 0 else -1,
+        outcome=int(end.controller.law.outcome) if end.controller.guard.stopped == 0 else -1,
         dt_s=dt_s,
         gap_m=gap_m,
         speed_m_s=columns[COLUMNS.index("velocity_m_s")],
@@ -400,7 +308,7 @@ def _record(end: _Stage, columns: NDArray[np.float64], bias: Bias, dt_s: float) 
         right_n=right_n,
         n_rows=int(np.sum(phases <= HOLD)),
         hold_from=int(np.sum(phases < HOLD)),
-        peak_n=progress.plant.peak_n,
+        peak_n=end.plant.peak_n,
     )
 
 
