@@ -8,8 +8,7 @@ import pytest
 
 from graspsense_sim_gripper.run.nested import (
     TupleType,
-    append_numbers,
-    appender,
+    append,
     count_numbers,
     first_place,
     structure,
@@ -35,7 +34,7 @@ PATTERN = Outer(Inner(0, 0.0), (Inner(0, 0.0),), (), False)
 
 def numbers_of(values):
     found = []
-    append_numbers(found, values)
+    append(values, found, [])
     return array("d", found)
 
 
@@ -64,7 +63,7 @@ def test_places_count_the_numbers_and_leave_out_arrays():
     weights = np.zeros(3)
     values = (Inner(3, 0.1), (weights, 2.0), Outer(Inner(0, 0.0), (), (), False))
     numbers, arrays = [], []
-    appender(values)(values, numbers, arrays)
+    append(values, numbers, arrays)
     places = with_places(values)
 
     assert numbers == [3, 0.1, 2.0, 0, 0.0, False]

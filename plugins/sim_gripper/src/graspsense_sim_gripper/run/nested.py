@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, MutableSequence, Sequence
-from itertools import groupby
-from operator import itemgetter
+from collections.abc import Iterator, MutableSequence, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,29 +14,29 @@ from numpy.typing import NDArray
 class TupleType:
     """The types of nested tuples of numbers, from which such tuples are made of their numbers."""
 
+    pattern: Any
+    """Nested tuples of these types, or a number."""
     count: int
     """Number of numbers."""
-    _others: tuple[tuple[int, type], ...]
-    """The place and the type of each number that is no float."""
-    _make: Callable[[list[Any]], Any]
 
     @classmethod
     def of(cls, pattern: Any) -> TupleType:
         """Return the type of these nested tuples; `pattern` may also be a number."""
-        leaves: list[Any] = []
-        append_numbers(leaves, pattern)
-        others = tuple((i, type(leaf)) for i, leaf in enumerate(leaves) if type(leaf) is not float)
-        make = _maker(pattern, 0) if isinstance(pattern, tuple) else itemgetter(0)
-        return cls(len(leaves), others, make)
+        return cls(pattern, count_numbers(pattern))
 
     def filled(self, numbers: Sequence[float] | NDArray[np.float64]) -> Any:
         """Return these numbers as nested tuples. Raises ValueError if there are more or fewer than in the type."""
         if len(numbers) != self.count:
             raise ValueError(f"{len(numbers)} numbers for nested tuples of {self.count}")
-        leaves = numbers.tolist() if isinstance(numbers, np.ndarray) else list(numbers)
-        for i, kind in self._others:
-            leaves[i] = kind(leaves[i])
-        return self._make(leaves)
+        return _filled(self.pattern, iter(numbers.tolist() if isinstance(numbers, np.ndarray) else numbers))
+
+
+def _filled(pattern: Any, numbers: Iterator[float]) -> Any:
+    """Return the next numbers as nested tuples of the types of `pattern`."""
+    if isinstance(pattern, tuple):
+        # `tuple.__new__` makes named tuples in half of the time of their constructors.
+        return tuple.__new__(type(pattern), [_filled(part, numbers) for part in pattern])
+    return type(pattern)(next(numbers))
 
 
 @define(eq=False)
@@ -62,79 +60,11 @@ class Stored:
         return self.type.filled(self.numbers)
 
 
-def _maker(pattern: tuple[Any, ...], begin: int) -> Callable[[list[Any]], Any]:
-    """Return what makes a tuple of the type of `pattern` of the numbers from `begin` on, in a list of numbers."""
-    # `tuple.__new__` makes named tuples in half of the time of their constructors.
-    new, kind, makers = tuple.__new__, type(pattern), []
-    at = begin
-    for is_tuple, parts in groupby(pattern, lambda part: isinstance(part, tuple)):
-        for part in parts if is_tuple else [tuple(parts)]:
-            end = at + count_numbers(part)
-            makers.append((at, end, _maker(part, at) if is_tuple else None))
-            at = end
-    if at == begin:
-        # A tuple without numbers is always the same.
-        return lambda numbers: pattern
-    if all(make is None for _, _, make in makers):
-        return lambda numbers: new(kind, numbers[begin:at])
-
-    def made(numbers: list[Any]) -> Any:
-        fields: list[Any] = []
-        for first, last, make in makers:
-            if make is None:
-                fields += numbers[first:last]
-            else:
-                fields.append(make(numbers))
-        return new(kind, fields)
-
-    return made
-
-
 def structure(values: Any) -> Any:
     """Return nested types, which are equal for nested tuples of equal types."""
     if isinstance(values, tuple):
         return (type(values), *map(structure, values))
     return (values.dtype.str, values.ndim) if isinstance(values, np.ndarray) else type(values)
-
-
-Append = Callable[[Any, MutableSequence[float], list[NDArray[Any]]], None]
-"""`append(values, numbers, arrays)` appends the numbers and the arrays in nested tuples, in order."""
-
-
-def appender(pattern: tuple[Any, ...]) -> Append:
-    """Return what appends the numbers and the arrays of nested tuples of the same types as `pattern`."""
-    parts: list[tuple[int, int, Append | None]] = []
-    begin = 0
-    for kind, group in groupby(pattern, _kind):
-        for part in group if kind is not float else [tuple(group)]:
-            end = begin + (len(part) if kind is float else 1)
-            parts.append(
-                (begin, end, None if kind is float else appender(part) if kind is tuple else _append_array)
-            )
-            begin = end
-    if len(parts) == 1 and parts[0][2] is None:
-        return _append_all
-
-    def append(values: Any, numbers: MutableSequence[float], arrays: list[NDArray[Any]]) -> None:
-        for first, last, one in parts:
-            if one is None:
-                numbers.extend(values[first:last])
-            else:
-                one(values[first], numbers, arrays)
-
-    return append
-
-
-def _kind(part: Any) -> type:
-    return tuple if isinstance(part, tuple) else np.ndarray if isinstance(part, np.ndarray) else float
-
-
-def _append_all(values: Any, numbers: MutableSequence[float], arrays: list[NDArray[Any]]) -> None:
-    numbers.extend(values)
-
-
-def _append_array(values: Any, numbers: MutableSequence[float], arrays: list[NDArray[Any]]) -> None:
-    arrays.append(values)
 
 
 def like(pattern: Any, values: Any) -> Any:
@@ -173,16 +103,15 @@ def first_place(places: Any) -> int:
     return int(places)
 
 
-def append_numbers(to: MutableSequence[float], values: Any) -> None:
-    """Append the numbers in nested tuples without arrays, in order; `values` may also be a number."""
-    if not isinstance(values, tuple):
-        to.append(values)
-        return
-    for value in values:
-        if isinstance(value, tuple):
-            append_numbers(to, value)
-        else:
-            to.append(value)
+def append(values: Any, numbers: MutableSequence[float], arrays: list[NDArray[Any]]) -> None:
+    """Append the numbers and the arrays in nested tuples, in order; `values` may also be a number."""
+    if isinstance(values, tuple):
+        for value in values:
+            append(value, numbers, arrays)
+    elif isinstance(values, np.ndarray):
+        arrays.append(values)
+    else:
+        numbers.append(values)
 
 
 def count_numbers(values: Any) -> int:

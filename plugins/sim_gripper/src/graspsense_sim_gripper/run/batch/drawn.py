@@ -39,7 +39,7 @@ from graspsense_sim_gripper.run.drawing import (
     scene_numbers,
 )
 from graspsense_sim_gripper.run.loop import GraspParams, SimulationState
-from graspsense_sim_gripper.run.nested import appender, with_places
+from graspsense_sim_gripper.run.nested import append, with_places
 from graspsense_sim_gripper.run.problem import GraspSetup, Problem
 from graspsense_sim_gripper.scene.instance import deepest_dent, draws_of_number
 from graspsense_sim_gripper.scene.random_numbers import IN_COMPILED_CODE, Word, key_of
@@ -131,7 +131,7 @@ class StartLayout(NamedTuple):
         left, right = (PadCells(np.zeros(0), np.zeros(0)) for _ in range(2))
         arrays: list[NDArray[Any]] = []
         told_apart = params._replace(sensor=params.sensor._replace(left=left, right=right))
-        appender(told_apart)(told_apart, [], arrays)
+        append(told_apart, [], arrays)
 
         def place(wanted: Any) -> int:
             return next(i for i, array in enumerate(arrays) if array is wanted)

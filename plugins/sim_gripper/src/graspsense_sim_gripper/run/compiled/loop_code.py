@@ -22,11 +22,10 @@ from graspsense_sim_gripper.run.compiled.jit import COMPILING, OPTIONS, compile_
 from graspsense_sim_gripper.run.drawing import draw_image_noise
 from graspsense_sim_gripper.run.loop import Buffers, Ending, GraspParams, LoopEnd, SimulationState, ending
 from graspsense_sim_gripper.run.nested import (
-    Append,
     Pattern,
     Stored,
     TupleType,
-    appender,
+    append,
     count_numbers,
     structure,
 )
@@ -125,8 +124,6 @@ class LoopTypes(NamedTuple):
     plant: TupleType
     before_plant: int
     """Number of numbers of the state before those of the plant."""
-    append: Append
-    """Appends the numbers and the arrays of parameters and state."""
     n_numbers: int
     """Number of numbers of both."""
 
@@ -140,9 +137,7 @@ class LoopTypes(NamedTuple):
             if len(_TYPES) >= MOST_TYPES:
                 _TYPES.clear()
             types = TupleType.of(state), TupleType.of(state.plant)
-            known = cls(
-                Pattern(begun), *types, count_numbers(state.loop), appender(begun), count_numbers(begun)
-            )
+            known = cls(Pattern(begun), *types, count_numbers(state.loop), count_numbers(begun))
             _TYPES[key] = known
         return known
 
@@ -159,7 +154,7 @@ def loop_start(params: GraspParams, state: SimulationState, types: LoopTypes | N
     """
     numbers, arrays, types = array("d"), list[NDArray[Any]](), types or LoopTypes.of(params, state)
     try:
-        types.append((params, state), numbers, arrays)
+        append((params, state), numbers, arrays)
     except TypeError as error:
         raise NotCompilable(f"the parameters or the state of a grasp are not all numbers: {error}") from error
     if len(numbers) != types.n_numbers:
