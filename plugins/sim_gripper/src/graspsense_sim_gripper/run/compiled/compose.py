@@ -67,8 +67,6 @@ def _no_terms(
 
 
 first: Law = _no_terms
-second: Law = _no_terms
-third: Law = _no_terms
 rest: Law = _no_terms
 
 
@@ -79,31 +77,12 @@ def _sum_of_1(
     return force, (state,)
 
 
-def _sum_of_2(
-    params: TermsParams, states: TermsStates, d0: float, d1: float, h: float, v1: float
-) -> tuple[float, TermsStates]:
-    force1, state1 = first(params[0], states[0], d0, d1, h, v1)
-    force2, state2 = second(params[1], states[1], d0, d1, h, v1)
-    return force1 + force2, (state1, state2)
-
-
-def _sum_of_3(
-    params: TermsParams, states: TermsStates, d0: float, d1: float, h: float, v1: float
-) -> tuple[float, TermsStates]:
-    force1, state1 = first(params[0], states[0], d0, d1, h, v1)
-    force2, state2 = second(params[1], states[1], d0, d1, h, v1)
-    force3, state3 = third(params[2], states[2], d0, d1, h, v1)
-    return force1 + (force2 + force3), (state1, state2, state3)
-
-
 def _sum_of_more(
     params: TermsParams, states: TermsStates, d0: float, d1: float, h: float, v1: float
 ) -> tuple[float, TermsStates]:
-    force1, state1 = first(params[0], states[0], d0, d1, h, v1)
-    force2, state2 = second(params[1], states[1], d0, d1, h, v1)
-    force3, state3 = third(params[2], states[2], d0, d1, h, v1)
-    force, others = rest(params[3:], states[3:], d0, d1, h, v1)
-    return force1 + (force2 + (force3 + force)), (state1, state2, state3, *others)
+    force, state = first(params[0], states[0], d0, d1, h, v1)
+    total, others = rest(params[1:], states[1:], d0, d1, h, v1)
+    return force + total, (state, *others)
 
 
 summands: Law = _no_terms
@@ -135,11 +114,7 @@ def _summed(laws: Sequence[Any]) -> Law:
         return _no_terms
     if len(laws) == 1:
         return bind(_sum_of_1, first=laws[0])
-    if len(laws) == 2:
-        return bind(_sum_of_2, first=laws[0], second=laws[1])
-    if len(laws) == 3:
-        return bind(_sum_of_3, first=laws[0], second=laws[1], third=laws[2])
-    return bind(_sum_of_more, first=laws[0], second=laws[1], third=laws[2], rest=_summed(laws[3:]))
+    return bind(_sum_of_more, first=laws[0], rest=_summed(laws[1:]))
 
 
 def sum_of_active(laws: Sequence[Law | OnSum]) -> Law:
