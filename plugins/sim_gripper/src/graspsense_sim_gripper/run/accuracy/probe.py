@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import isfinite
 from typing import Final, NamedTuple
 
 from graspsense.gripper_api import gap_and_rate, revolutions_at
@@ -58,7 +59,9 @@ def grip_of(problem: Problem, force_n: float | None = None, speed_m_s: float | N
             press(model, contact, closure * share, 0.0, setup.dt_s)[0].force_n
             for share in (1.0, 1.0 + FURTHER)
         )
-        largest = max(largest, (further - rests) / (FURTHER * closure))
+        rise = (further - rests) / (FURTHER * closure)
+        if isfinite(rise):  # a law without a finite force ends the grasp, with its own reason
+            largest = max(largest, rise)
         before, closure = closure, GROWTH * closure
     touch, _ = press(model, untouched, FIRST_M, 0.0, 0.0)
     _, jacobian = gap_and_rate(
