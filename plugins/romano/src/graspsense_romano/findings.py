@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from statistics import mean
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from statistics import NormalDist, mean
 from typing import Final
+
+import numpy as np
 
 from graspsense.experiment_api import Findings, FoundTable, Summary, span, wilson
 from graspsense_romano.touch import TouchRow
@@ -12,9 +14,15 @@ from graspsense_romano.touch import TouchRow
 SLIPPED_M: Final = 1e-3
 STILL_M: Final = 3e-4
 """A thing slipped if it came down by 1 mm in the fingers, and did not if it stayed within 0.3 mm."""
-SLIP_THRESHOLDS_N: Final = (0.01, 0.02, 0.03, 0.048, 0.1, 0.2)
+SLIP_THRESHOLDS_N: Final = (0.01, 0.02, 0.03, 0.048, 0.1, 0.15)
 SHOCK_THRESHOLDS_M_S2: Final = (1.0, 2.0, 3.25, 5.0, 8.0)
-PUBLISHED: Final = {0.048: "0.048 (published)", 2.0: "2 (published, gentle)", 5.0: "5 (published, fast)"}
+SIDE_THRESHOLDS_N: Final = (0.05, 0.1, 0.2, 0.5, 1.0)
+PUBLISHED: Final = {
+    0.048: "0.048 (published)",
+    0.2: "0.2 (published)",
+    2.0: "2 (published, gentle)",
+    5.0: "5 (published, fast)",
+}
 HELD: Final = ("steady", "running")
 
 
@@ -25,22 +33,10 @@ def findings(summary: Summary) -> Findings:
         if isinstance(result, TouchRow):
             cases.setdefault(case, []).append(result)
     rows = [row for found in cases.values() for row in found]
-    tables = [_cases(cases)]
-    still = [r.slip_high_n for r in rows if r.slip_high_n is not None and r.slip_m < STILL_M]
-    slipped = [r.slip_high_n for r in rows if r.slip_high_n is not None and r.slip_m > SLIPPED_M]
-    if still and slipped:
-        note = f"{len(slipped)} grasps slipped by more than 1 mm, {len(still)} by less than 0.3 mm."
-        tables.append(
-            _trade(
-                "slip", "Slip told by the high band of the pads, N", note, SLIP_THRESHOLDS_N, slipped, still
-            )
-        )
-    before = [r.shock_before_m_s2 for r in rows if r.shock_before_m_s2 is not None]
-    at = [r.shock_at_m_s2 for r in rows if r.shock_at_m_s2 is not None]
-    if before and at:
-        note = f"{len(at)} grasps at the table, {len(before)} on the way to it."
-        title = "Placing told by the acceleration band, m/s2"
-        tables.append(_trade("place", title, note, SHOCK_THRESHOLDS_M_S2, at, before))
+    tables = [_cases(cases), *_ranges(rows)]
+    for name, title, thresholds, hits, alarms in _scores(rows):
+        if hits and alarms:
+            tables.append(_trade(name, title, thresholds, hits, alarms))
     kept = sum(row.outcome in HELD for row in rows)
     answer = (
         f"Simulated by MuJoCo: {kept} of {len(rows)} grasps ended as planned, {sum(r.broken for r in rows)} things "
@@ -92,15 +88,79 @@ def _interval(hits: int, n: int) -> str:
     return span(wilson(hits, n))
 
 
+def _scores(
+    rows: Sequence[TouchRow],
+) -> Iterator[tuple[str, str, tuple[float, ...], list[float], list[float]]]:
+    """Yield for each event its name, a title, thresholds, and what was measured with and without it."""
+
+    def known(key: str, chosen: Iterable[TouchRow]) -> list[float]:
+        return [value for row in chosen if (value := getattr(row, key)) is not None]
+
+    still, slipped = [r for r in rows if r.slip_m < STILL_M], [r for r in rows if r.slip_m > SLIPPED_M]
+    for key, low in (("slip_high_n", "0.18 N (published)"), ("slip_wide_n", "1 N (the pipeline hold)")):
+        title = f"Slip told by the high band of the pads, N, while the low band is below {low}"
+        yield key, title, SLIP_THRESHOLDS_N, known(key, slipped), known(key, still)
+    title = "Placing told by the acceleration band, m/s2"
+    at, before = known("shock_at_m_s2", rows), known("shock_before_m_s2", rows)
+    yield "place", title, SHOCK_THRESHOLDS_M_S2, at, before
+    on_finger, on_thing = ([r for r in rows if r.bump_at == at] for at in ("finger", "thing"))
+    alarms = known("edge_before_n", rows) + known("edge_at_n", on_thing)
+    title = "Side impact on a finger told by the high band of its edges, N; bumps into the thing count as false alarms"
+    yield "side", title, SIDE_THRESHOLDS_N, known("edge_at_n", on_finger), alarms
+    title = "Bumps into finger or thing told by the acceleration band, m/s2: to placing they are false alarms"
+    yield "bump", title, SHOCK_THRESHOLDS_M_S2, known("bump_m_s2", rows), known("still_m_s2", rows)
+
+
+def _ranges(rows: Sequence[TouchRow]) -> Iterator[FoundTable]:
+    """Yield for each law what became of things of each weight and friction, where there are several of both."""
+    masses, frictions = (sorted({getattr(row, key) for row in rows}) for key in ("mass_kg", "friction"))
+    if len(masses) < 2 or len(frictions) < 2:
+        return
+    for law in dict.fromkeys(row.law for row in rows):
+        table = []
+        for mass_kg in masses:
+            found = [
+                [r for r in rows if (r.law, r.mass_kg, r.friction) == (law, mass_kg, f)] for f in frictions
+            ]
+            table.append((f"{mass_kg:g} kg", *("; ".join(map(_fate, cell)) for cell in found)))
+        yield FoundTable(
+            id=f"range-{law}",
+            title=f"Weight and friction: {law}",
+            header=("mass", *(f"friction {one:g}" for one in frictions)),
+            rows=tuple(table),
+            note="Held: the greatest force, and how far it slipped. Lost: the greatest force; at the limit, if all of "
+            "the force limit was asked for. In brackets the force that friction needs.",
+        )
+
+
+def _fate(row: TouchRow) -> str:
+    """Return in a few words what became of a thing."""
+    needed = "" if row.needed_n is None else f" ({row.needed_n:.2g} N)"
+    force = "?" if row.greatest_n is None else f"{row.greatest_n:.1f} N"
+    if row.outcome in HELD:
+        return f"held, {force}, {row.slip_m * 1e3:.1f} mm{needed}"
+    return f"{row.outcome}, {force}{', at the limit' if row.limited else ''}{needed}"
+
+
+def area(positive: Sequence[float], negative: Sequence[float]) -> tuple[float, float, float]:
+    """Return the area under the ROC curve with its 95 % interval.
+
+    The interval is that of R. G. Newcombe, Statistics in Medicine 25 (2006) 559, method 5.
+    """
+    higher, lower = np.array(positive)[:, None], np.array(negative)
+    share = float((higher > lower).mean() + 0.5 * (higher == lower).mean())
+    m, n = len(positive), len(negative)
+    each, theta = 0.5 * (m + n) - 1.0, np.linspace(0.0, 1.0, 10_001)
+    spread = 1.0 + each * (1.0 - theta) / (2.0 - theta) + each * theta / (1.0 + theta)
+    error = np.sqrt(theta * (1.0 - theta) * spread / (m * n))
+    inside = theta[np.abs(theta - share) <= NormalDist().inv_cdf(0.975) * error + 5e-5]
+    return share, float(inside[0]), float(inside[-1])
+
+
 def _trade(
-    name: str,
-    title: str,
-    note: str,
-    thresholds: Sequence[float],
-    positive: Sequence[float],
-    negative: Sequence[float],
+    name: str, title: str, thresholds: Sequence[float], positive: Sequence[float], negative: Sequence[float]
 ) -> FoundTable:
-    """Return sensitivity and false alarms of each threshold."""
+    """Return sensitivity and false alarms of each threshold, with the area under the ROC curve."""
     table = []
     for threshold in thresholds:
         hits, alarms = (sum(value > threshold for value in values) for values in (positive, negative))
@@ -111,5 +171,12 @@ def _trade(
                 f"{alarms} of {len(negative)} ({_interval(alarms, len(negative))} %)",
             )
         )
-    header = ("threshold", "told (sensitivity)", "false alarms")
-    return FoundTable(id=name, title=title, header=header, rows=tuple(table), note=note, numbers=1)
+    share, least, most = area(positive, negative)
+    return FoundTable(
+        id=name,
+        title=title,
+        header=("threshold", "told (sensitivity)", "false alarms"),
+        rows=tuple(table),
+        note=f"Area under the ROC curve: {share:.3f} ({least:.3f} to {most:.3f}).",
+        numbers=1,
+    )

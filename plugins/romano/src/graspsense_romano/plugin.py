@@ -43,7 +43,7 @@ def graspsense_experiment_kinds() -> Iterable[ExperimentKindEntry]:
         keys="graspsense_romano.touch:TouchSettings",
         result="graspsense_romano.touch:TouchRow",
         findings="graspsense_romano.findings:findings",
-        seconds_per_trial=15.0,
+        seconds_per_trial=5.0,
         summary="grasps a thing of a MuJoCo scene, lifts it, tugs at it or fills it, puts it down",
     )
 
@@ -51,5 +51,5 @@ def graspsense_experiment_kinds() -> Iterable[ExperimentKindEntry]:
 @hookimpl
 def graspsense_experiments() -> Iterable[ExperimentEntry]:
     """Return the experiments on grab, slip and placing."""
-    for name in ("romano_grab", "romano_slip", "romano_place"):
-        yield ExperimentEntry(name, f"graspsense_romano:experiments/{name}.toml", seconds_per_trial=15.0)
+    for name in ("romano_grab", "romano_slip", "romano_place", "romano_side", "romano_range"):
+        yield ExperimentEntry(name, f"graspsense_romano:experiments/{name}.toml", seconds_per_trial=5.0)

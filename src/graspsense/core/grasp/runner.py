@@ -253,7 +253,11 @@ def run_grasp(
     return Grasp(
         trace=grasp.recorder.trace(),
         outcome=outcome,
-        reason="; ".join(filter(None, (reason, grasp.lost(), *grasp.failed_sinks))),
+        reason="; ".join(
+            filter(
+                None, (reason or _reason_of(controller, grasp.state.law), grasp.lost(), *grasp.failed_sinks)
+            )
+        ),
         device=info,
         report={**report, **losses},
         counts={"ticks": len(frames), "late": grasp.late, "guarded": grasp.guarded, **losses},
@@ -271,6 +275,14 @@ def _report_of(backend: SensorBackend[Any]) -> dict[str, Any]:
         return dict(backend.report())
     except FAILURES as error:
         return {"report_failed": named(error)}
+
+
+def _reason_of(controller: Controller[Any], state: Any) -> str:
+    """Return what a controller says of the end of its grasp, or that it failed to."""
+    try:
+        return str(controller.reason(state))
+    except FAILURES as error:
+        return f"reason failed: {named(error)}"
 
 
 def run_uninterrupted(
