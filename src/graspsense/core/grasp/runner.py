@@ -253,11 +253,7 @@ def run_grasp(
     return Grasp(
         trace=grasp.recorder.trace(),
         outcome=outcome,
-        reason="; ".join(
-            filter(
-                None, (reason or _reason_of(controller, grasp.state.law), grasp.lost(), *grasp.failed_sinks)
-            )
-        ),
+        reason=grasp.why(reason),
         device=info,
         report={**report, **losses},
         counts={"ticks": len(frames), "late": grasp.late, "guarded": grasp.guarded, **losses},
@@ -275,14 +271,6 @@ def _report_of(backend: SensorBackend[Any]) -> dict[str, Any]:
         return dict(backend.report())
     except FAILURES as error:
         return {"report_failed": named(error)}
-
-
-def _reason_of(controller: Controller[Any], state: Any) -> str:
-    """Return what a controller says of the end of its grasp, or that it failed to."""
-    try:
-        return str(controller.reason(state))
-    except FAILURES as error:
-        return f"reason failed: {named(error)}"
 
 
 def run_uninterrupted(
@@ -403,7 +391,7 @@ class _Grasp:
         self.watcher: Watcher | None = None
         self.stop_reason = ""
         self.sinks, self.interrupts, self.interrupted = list(sinks), interrupts, False
-        self.step = type(controller).step
+        self.controller, self.step = controller, type(controller).step
         self.event_names = type(controller).events
         self.params = tick_params(info, controller, run)
         self.protection = None if info.harmless else Protection(info, controller, run, self._fault_seen)
@@ -474,9 +462,14 @@ class _Grasp:
         """Return the time (s) from the first frame to the last, by the clock of the gripper."""
         return 0.0 if self.last is None or self.first_t_s is None else self.last.t_s - self.first_t_s
 
-    def lost(self) -> str:
-        """Return what was lost on the way from the gripper, in words; empty if nothing was."""
-        return "" if self.losses is None else lost_in_words(self.losses.lost)
+    def why(self, reason: str) -> str:
+        """Return this reason, or what the controller says of the end, with what was lost and which sinks failed."""
+        try:
+            reason = reason or str(self.controller.reason(self.state.law))
+        except FAILURES as error:
+            reason = f"reason failed: {named(error)}"
+        lost = "" if self.losses is None else lost_in_words(self.losses.lost)
+        return "; ".join(filter(None, (reason, lost, *self.failed_sinks)))
 
     def _loop(self) -> None:
         read, apply, run = self.backend.read, self.backend.apply, self.run
