@@ -677,36 +677,48 @@ class _Grasp:
         self._event(t_s, Phase(phase), what, "model", prediction)
 
     def _let_go(self, opens: bool) -> None:
-        """Open the fingers, then relax. A failure of one step must not prevent the next.
+        """Open the fingers, then relax, and tell how they were left. A failure of one step must not prevent the next.
 
         With `opens` false, because the fingers are open or frames no longer come, it only relaxes.
         """
-        info, run = self.info, self.run
+        left = "let go, not opened"
         try:
-            if opens and info.opening is not None and self.state.phase >= APPROACH and self.last is not None:
-                still, began_s = RestState(self.last.t_s, self.last.gap_m), self.last.t_s
-                give_up = time.perf_counter() + run.opening_timeout_s
-                fresh = GuardState(1, 0, 0)
-                # After a second Ctrl-C, only relax.
-                while time.perf_counter() < give_up and self.interrupts.count < 2:
-                    command, fresh = guard(self.params.guard, fresh, self.last, info.opening)
-                    self.backend.apply(command)
-                    reading = self.backend.read(frame_timeout_s(run, info))
-                    if reading is None:
-                        break
-                    if self.protection is not None and self.protection.opens_wrongly(reading, command):
-                        break
-                    self.last = reading.frame
-                    frame = self.last
-                    still = update_rest(still, frame.t_s, frame.gap_m, OPEN_SPEED_M_S, OPEN_WINDOW_S)
-                    if at_rest(still, frame.t_s, OPEN_WINDOW_S) or (
-                        frame.t_s - began_s > run.opening_timeout_s
-                    ):
-                        break
+            if (
+                opens
+                and self.info.opening is not None
+                and self.state.phase >= APPROACH
+                and self.last is not None
+            ):
+                left = self._opened(self.info.opening, self.last)
         except (KeyboardInterrupt, *FAILURES):
             pass
         with suppress(KeyboardInterrupt, *FAILURES):
-            self.backend.apply(info.relaxed)
+            self.backend.apply(self.info.relaxed)
+        if self.info.opening is not None and not self.state.done and self.last is not None:
+            self._event(self.last.t_s, Phase(self.state.phase), left)
+
+    def _opened(self, opening: Command, last: Frame) -> str:
+        """Open the fingers, and return in words whether they came to rest."""
+        info, run = self.info, self.run
+        still, began_s = RestState(last.t_s, last.gap_m), last.t_s
+        give_up = time.perf_counter() + run.opening_timeout_s
+        fresh = GuardState(1, 0, 0)
+        # After a second Ctrl-C, only relax.
+        while time.perf_counter() < give_up and self.interrupts.count < 2:
+            command, fresh = guard(self.params.guard, fresh, last, opening)
+            self.backend.apply(command)
+            reading = self.backend.read(frame_timeout_s(run, info))
+            if reading is None:
+                break
+            if self.protection is not None and self.protection.opens_wrongly(reading, command):
+                break
+            self.last = last = reading.frame
+            still = update_rest(still, last.t_s, last.gap_m, OPEN_SPEED_M_S, OPEN_WINDOW_S)
+            if at_rest(still, last.t_s, OPEN_WINDOW_S):
+                return f"opened to {last.gap_m * 1e3:.1f} mm"
+            if last.t_s - began_s > run.opening_timeout_s:
+                break
+        return f"let go at {last.gap_m * 1e3:.1f} mm, not known to be open"
 
     def _recording_ended(self) -> tuple[Outcome, str]:
         if self.state.law.outcome != RUNNING:
