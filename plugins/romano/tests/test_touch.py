@@ -35,7 +35,7 @@ def test_a_table_that_would_reach_the_thing_is_refused():
 
 
 def test_a_trade_counts_what_is_above_each_threshold():
-    table = _trade("place", "title", SHOCK_THRESHOLDS_M_S2, [1.5, 4.0, 9.0], [0.5, 2.5])
+    (table,) = _trade("place", "title", SHOCK_THRESHOLDS_M_S2, [1.5, 4.0, 9.0], [0.5, 2.5])
     told = {row[0]: (row[1][:6], row[2][:6]) for row in table.rows}
     assert told["1"] == ("3 of 3", "1 of 2")
     assert told["3.25"] == ("2 of 3", "0 of 2")

@@ -17,12 +17,7 @@ STILL_M: Final = 3e-4
 SLIP_THRESHOLDS_N: Final = (0.01, 0.02, 0.03, 0.048, 0.1, 0.15)
 SHOCK_THRESHOLDS_M_S2: Final = (1.0, 2.0, 3.25, 5.0, 8.0)
 SIDE_THRESHOLDS_N: Final = (0.05, 0.1, 0.2, 0.5, 1.0)
-PUBLISHED: Final = {
-    0.048: "0.048 (published)",
-    0.2: "0.2 (published)",
-    2.0: "2 (published, gentle)",
-    5.0: "5 (published, fast)",
-}
+PUBLISHED: Final = {0.048: "published", 0.2: "published", 2.0: "published, gentle", 5.0: "published, fast"}
 HELD: Final = ("steady", "running")
 
 
@@ -33,10 +28,7 @@ def findings(summary: Summary) -> Findings:
         if isinstance(result, TouchRow):
             cases.setdefault(case, []).append(result)
     rows = [row for found in cases.values() for row in found]
-    tables = [_cases(cases), *_ranges(rows)]
-    for name, title, thresholds, hits, alarms in _scores(rows):
-        if hits and alarms:
-            tables.append(_trade(name, title, thresholds, hits, alarms))
+    tables = [_cases(cases), *_ranges(rows), *_scores(rows)]
     kept = sum(row.outcome in HELD for row in rows)
     answer = (
         f"Simulated by MuJoCo: {kept} of {len(rows)} grasps ended as planned, {sum(r.broken for r in rows)} things "
@@ -88,27 +80,25 @@ def _interval(hits: int, n: int) -> str:
     return span(wilson(hits, n))
 
 
-def _scores(
-    rows: Sequence[TouchRow],
-) -> Iterator[tuple[str, str, tuple[float, ...], list[float], list[float]]]:
-    """Yield for each event its name, a title, thresholds, and what was measured with and without it."""
+def _scores(rows: Sequence[TouchRow]) -> Iterator[FoundTable]:
+    """Yield a table for each event that was measured, with and without it."""
 
     def known(key: str, chosen: Iterable[TouchRow]) -> list[float]:
         return [value for row in chosen if (value := getattr(row, key)) is not None]
 
     still, slipped = [r for r in rows if r.slip_m < STILL_M], [r for r in rows if r.slip_m > SLIPPED_M]
-    for key, low in (("slip_high_n", "0.18 N (published)"), ("slip_wide_n", "1 N (the pipeline hold)")):
-        title = f"Slip told by the high band of the pads, N, while the low band is below {low}"
-        yield key, title, SLIP_THRESHOLDS_N, known(key, slipped), known(key, still)
-    title = "Placing told by the acceleration band, m/s2"
-    at, before = known("shock_at_m_s2", rows), known("shock_before_m_s2", rows)
-    yield "place", title, SHOCK_THRESHOLDS_M_S2, at, before
-    on_finger, on_thing = ([r for r in rows if r.bump_at == at] for at in ("finger", "thing"))
-    alarms = known("edge_before_n", rows) + known("edge_at_n", on_thing)
-    title = "Side impact on a finger told by the high band of its edges, N; bumps into the thing count as false alarms"
-    yield "side", title, SIDE_THRESHOLDS_N, known("edge_at_n", on_finger), alarms
-    title = "Bumps into finger or thing told by the acceleration band, m/s2: to placing they are false alarms"
-    yield "bump", title, SHOCK_THRESHOLDS_M_S2, known("bump_m_s2", rows), known("still_m_s2", rows)
+    bumped = {at: [r for r in rows if r.bump_at == at] for at in ("finger", "thing")}
+    for key, low in (("slip_high_n", "0.18 N (published)"), ("slip_wide_n", "1 N (pipeline hold)")):
+        title = f"Slip by more than 1 mm told from less than 0.3 mm by the high band, N; low band below {low}"
+        yield from _trade(key, title, SLIP_THRESHOLDS_N, known(key, slipped), known(key, still))
+    title, at = "Placing told by the acceleration band, m/s2", known("shock_at_m_s2", rows)
+    yield from _trade("place", title, SHOCK_THRESHOLDS_M_S2, at, known("shock_before_m_s2", rows))
+    title = "Bumps into a finger told from bumps into the thing by the high band of the edges, N"
+    others = known("edge_before_n", rows) + known("edge_at_n", bumped["thing"])
+    yield from _trade("side", title, SIDE_THRESHOLDS_N, known("edge_at_n", bumped["finger"]), others)
+    title = "Bumps into finger or thing told by the acceleration band, m/s2: false alarms of placing"
+    at, before = known("bump_m_s2", rows), known("still_m_s2", rows)
+    yield from _trade("bump", title, SHOCK_THRESHOLDS_M_S2, at, before)
 
 
 def _ranges(rows: Sequence[TouchRow]) -> Iterator[FoundTable]:
@@ -116,21 +106,18 @@ def _ranges(rows: Sequence[TouchRow]) -> Iterator[FoundTable]:
     masses, frictions = (sorted({getattr(row, key) for row in rows}) for key in ("mass_kg", "friction"))
     if len(masses) < 2 or len(frictions) < 2:
         return
+    note = (
+        "Held: the greatest force, and how far it slipped. Lost: the greatest force; at the limit, if all of the force "
+        "limit was asked for. In brackets the force that friction needs."
+    )
+    header = ("mass", *(f"friction {one:g}" for one in frictions))
     for law in dict.fromkeys(row.law for row in rows):
-        table = []
-        for mass_kg in masses:
-            found = [
-                [r for r in rows if (r.law, r.mass_kg, r.friction) == (law, mass_kg, f)] for f in frictions
-            ]
-            table.append((f"{mass_kg:g} kg", *("; ".join(map(_fate, cell)) for cell in found)))
-        yield FoundTable(
-            id=f"range-{law}",
-            title=f"Weight and friction: {law}",
-            header=("mass", *(f"friction {one:g}" for one in frictions)),
-            rows=tuple(table),
-            note="Held: the greatest force, and how far it slipped. Lost: the greatest force; at the limit, if all of "
-            "the force limit was asked for. In brackets the force that friction needs.",
-        )
+        fates = {(row.mass_kg, row.friction): _fate(row) for row in rows if row.law == law}
+        table = [
+            (f"{mass_kg:g} kg", *(fates.get((mass_kg, one), "") for one in frictions)) for mass_kg in masses
+        ]
+        title = f"Weight and friction: {law}"
+        yield FoundTable(id=f"range-{law}", title=title, header=header, rows=tuple(table), note=note)
 
 
 def _fate(row: TouchRow) -> str:
@@ -159,24 +146,21 @@ def area(positive: Sequence[float], negative: Sequence[float]) -> tuple[float, f
 
 def _trade(
     name: str, title: str, thresholds: Sequence[float], positive: Sequence[float], negative: Sequence[float]
-) -> FoundTable:
-    """Return sensitivity and false alarms of each threshold, with the area under the ROC curve."""
+) -> Iterator[FoundTable]:
+    """Yield sensitivity and false alarms of each threshold, with the area under the ROC curve, if both are known."""
+    if not (positive and negative):
+        return
     table = []
     for threshold in thresholds:
         hits, alarms = (sum(value > threshold for value in values) for values in (positive, negative))
         table.append(
             (
-                PUBLISHED.get(threshold, f"{threshold:g}"),
+                f"{threshold:g} ({PUBLISHED[threshold]})" if threshold in PUBLISHED else f"{threshold:g}",
                 f"{hits} of {len(positive)} ({_interval(hits, len(positive))} %)",
                 f"{alarms} of {len(negative)} ({_interval(alarms, len(negative))} %)",
             )
         )
     share, least, most = area(positive, negative)
-    return FoundTable(
-        id=name,
-        title=title,
-        header=("threshold", "told (sensitivity)", "false alarms"),
-        rows=tuple(table),
-        note=f"Area under the ROC curve: {share:.3f} ({least:.3f} to {most:.3f}).",
-        numbers=1,
-    )
+    note = f"Area under the ROC curve: {share:.3f} ({least:.3f} to {most:.3f})."
+    header = ("threshold", "told (sensitivity)", "false alarms")
+    yield FoundTable(id=name, title=title, header=header, rows=tuple(table), note=note, numbers=1)

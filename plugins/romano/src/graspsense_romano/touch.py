@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import isfinite
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
@@ -71,8 +70,7 @@ class TouchSettings:
     table_rise_m: float = field(default=0.0, validator=ge(0.0))
     """How far the table has risen by then."""
     bump_at: str = field(default="", validator=in_(("", "finger", "thing")))
-    """What a ball bumps into from the side."""
-    bump_kg: float = field(default=0.1, validator=gt(0.0))
+    """What a ball of 0.1 kg bumps into from the side."""
     bump_m_s: float = field(default=0.3, validator=gt(0.0))
     bump_touch_s: float = field(default=0.05, validator=gt(0.0))
     """How long the ball touches."""
@@ -90,12 +88,6 @@ class TouchSettings:
     def bumped_s(self) -> float:
         """When the ball of a bump is thrown."""
         return self.disturbed_s + SETTLED_S
-
-    @property
-    def needed_n(self) -> float:
-        """The force of each finger that friction needs at the end."""
-        pulled_n = (self.mass_kg + self.fill_kg) * 9.81 + self.tug_n
-        return pulled_n / (2.0 * self.friction) if self.friction else float("inf")
 
     @property
     def down_s(self) -> float:
@@ -121,12 +113,7 @@ class TouchSettings:
         if self.tug_n:
             lines.append(f"cord = {{ force = [[{begun_s}, 0.0], [{end_s}, {self.tug_n}]] }}")
         if self.bump_at:
-            lines += [
-                "[bump]",
-                f'at = "{self.bump_at}"',
-                f"t_s = {self.bumped_s}",
-                f"mass_kg = {self.bump_kg}",
-            ]
+            lines += ["[bump]", f'at = "{self.bump_at}"', f"t_s = {self.bumped_s}"]
             lines += [f"speed_m_s = {self.bump_m_s}", f"touch_s = {self.bump_touch_s}"]
         if self.stiffness_n_m:
             lines += ["[walls]", "width_m = 0.04", f"stiffness_n_m = {self.stiffness_n_m}"]
@@ -202,7 +189,7 @@ def touch(params: Mapping[str, Any], seed: int) -> TouchRow:
             workers=1,
         )[0]
     report, found = grasped.report, dict(grasped.extracted)
-    law = settings.controller.component.name
+    law, pulled_n = settings.controller.component.name, (scene.mass_kg + scene.fill_kg) * 9.81 + scene.tug_n
     if law != "force-servo":
         found |= {"slip_high_n": None, "slip_wide_n": None}
     return TouchRow(
@@ -210,7 +197,7 @@ def touch(params: Mapping[str, Any], seed: int) -> TouchRow:
         law=law,
         mass_kg=scene.mass_kg,
         friction=scene.friction,
-        needed_n=scene.needed_n if isfinite(scene.needed_n) else None,
+        needed_n=pulled_n / (2.0 * scene.friction) if scene.friction else None,
         bump_at=scene.bump_at,
         broken=bool(report.get("broken", False)),
         lifted_m=float(report.get("highest_m", 0.0)),
@@ -281,12 +268,8 @@ def measured(trace: Trace, scene: TouchSettings) -> dict[str, Any]:
         row["placed_s"] = next((t - down_s for t, what, _ in told if what == "place"), None)
     if scene.bump_at:
         edges = np.array([max(one.edge_left.high_n, one.edge_right.high_n) for one in signals])
-        bump_s = since_s + scene.bumped_s
-        at = (
-            held
-            & (t_s > bump_s)
-            & (t_s < bump_s + BALL_M / scene.bump_m_s + scene.bump_touch_s + AROUND_S[1])
-        )
+        bump_s, lasts_s = since_s + scene.bumped_s, BALL_M / scene.bump_m_s + scene.bump_touch_s + AROUND_S[1]
+        at = held & (t_s > bump_s) & (t_s < bump_s + lasts_s)
         before = held & (t_s <= bump_s)
         row["edge_before_n"], row["edge_at_n"] = _greatest(edges, before), _greatest(edges, at)
         still = before & (t_s > from_s)
