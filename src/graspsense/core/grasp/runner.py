@@ -444,7 +444,7 @@ class _Grasp:
             self.interrupts.deferred = True
             # A lost gripper may still receive commands, so it is commanded to relax.
             fault = self._fault()
-            self._let_go(opens=not (lost or self.state.done or (fault is not None and fault.relaxes)))
+            self._let_go(lost, opens=not (self.state.done or (fault is not None and fault.relaxes)))
         if ending is None and fault is not None:
             ending = fault.outcome, fault.told
         if ending is None:
@@ -676,19 +676,15 @@ class _Grasp:
         """Log a prediction that was made while the grasp goes on."""
         self._event(t_s, Phase(phase), what, "model", prediction)
 
-    def _let_go(self, opens: bool) -> None:
+    def _let_go(self, lost: bool, *, opens: bool) -> None:
         """Open the fingers, then relax, and tell how they were left. A failure of one step must not prevent the next.
 
-        With `opens` false, because the fingers are open or frames no longer come, it only relaxes.
+        With `opens` false, because the fingers are open, or if frames no longer come, it only relaxes.
         """
-        left = "let go, not opened"
+        left = "not opened: the gripper does not answer" if lost else "let go, not opened"
+        opens = opens and not lost and self.state.phase >= APPROACH
         try:
-            if (
-                opens
-                and self.info.opening is not None
-                and self.state.phase >= APPROACH
-                and self.last is not None
-            ):
+            if opens and self.info.opening is not None and self.last is not None:
                 left = self._opened(self.info.opening, self.last)
         except (KeyboardInterrupt, *FAILURES):
             pass
