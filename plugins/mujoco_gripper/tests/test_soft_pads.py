@@ -197,7 +197,12 @@ def test_a_finger_without_an_edge_sensor_is_not_bumped_into(tmp_path):
 
 @pytest.mark.parametrize(
     ("line", "said"),
-    [("speed_m_s = 0.0", "speed_m_s"), ("mass_kg = nan", "mass_kg"), ('at = "table"', "finger")],
+    [
+        ("speed_m_s = 0.0", "speed_m_s"),
+        ("mass_kg = nan", "mass_kg"),
+        ("touch_s = 0.2", "touch_s"),
+        ('at = "table"', "finger"),
+    ],
 )
 def test_a_bump_that_cannot_be_says_why(tmp_path, line, said):
     with pytest.raises(ConfigError, match=said):

@@ -107,11 +107,11 @@ def test_the_corners_of_weight_and_friction_are_held_or_lost_with_a_reason(tmp_p
 
 @pytest.mark.slow
 def test_a_finger_that_is_bumped_tells_a_side_impact(tmp_path):
-    settings = TouchSettings(bump_at="finger", bump_m_s=1.0, bump_touch_s=0.2)
+    settings = TouchSettings(bump_at="finger", bump_kg=0.4, bump_m_s=0.15, bump_touch_s=0.2)
     trial = grasped(tmp_path, settings, "run.hold_s=4")
     found = measured(trial.trace, settings)
     assert found["edge_at_n"] > 0.2 > found["edge_before_n"]
     told = [event.t_s for event in trial.trace.events if event.what == "side impact"]
     contact = next(event.t_s for event in trial.trace.events if event.what == "both in contact")
     assert told
-    assert min(told) - contact == pytest.approx(settings.bumped_s + 0.04 / 1.0, abs=0.1)
+    assert min(told) - contact == pytest.approx(settings.bumped_s + 0.04 / 0.15, abs=0.1)

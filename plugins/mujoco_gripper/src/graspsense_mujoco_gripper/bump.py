@@ -39,6 +39,13 @@ class Bump:
     speed_m_s: float = field(default=0.2, validator=ABOVE_ZERO)
     touch_s: float = field(default=0.05, validator=ABOVE_ZERO)
 
+    def __attrs_post_init__(self) -> None:
+        if self.speed_m_s * self.touch_s / pi > RADIUS_M:
+            raise ValueError(
+                f"touch_s is so long that the ball would pass through: at {self.speed_m_s:g} m/s give at most "
+                f"{pi * RADIUS_M / self.speed_m_s:.2g} s"
+            )
+
 
 def add_ball(spec: mujoco.MjSpec, bump: Bump, place: Floats, axis: Floats) -> None:
     """Add the ball, far away beside this place."""

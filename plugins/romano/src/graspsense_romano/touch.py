@@ -70,7 +70,8 @@ class TouchSettings:
     table_rise_m: float = field(default=0.0, validator=ge(0.0))
     """How far the table has risen by then."""
     bump_at: str = field(default="", validator=in_(("", "finger", "thing")))
-    """What a ball of 0.1 kg bumps into from the side."""
+    """What a ball bumps into from the side."""
+    bump_kg: float = field(default=0.1, validator=gt(0.0))
     bump_m_s: float = field(default=0.3, validator=gt(0.0))
     bump_touch_s: float = field(default=0.05, validator=gt(0.0))
     """How long the ball touches."""
@@ -114,7 +115,11 @@ class TouchSettings:
             lines.append(f"cord = {{ force = [[{begun_s}, 0.0], [{end_s}, {self.tug_n}]] }}")
         if self.bump_at:
             lines += ["[bump]", f'at = "{self.bump_at}"', f"t_s = {self.bumped_s}"]
-            lines += [f"speed_m_s = {self.bump_m_s}", f"touch_s = {self.bump_touch_s}"]
+            lines += [
+                f"mass_kg = {self.bump_kg}",
+                f"speed_m_s = {self.bump_m_s}",
+                f"touch_s = {self.bump_touch_s}",
+            ]
         if self.stiffness_n_m:
             lines += ["[walls]", "width_m = 0.04", f"stiffness_n_m = {self.stiffness_n_m}"]
             lines += ["damping_n_s_m = 20.0", f"mass_kg = {self.mass_kg}", f"friction = {self.friction}"]
