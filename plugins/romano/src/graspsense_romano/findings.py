@@ -28,7 +28,8 @@ def findings(summary: Summary) -> Findings:
         if isinstance(result, TouchRow):
             cases.setdefault(case, []).append(result)
     rows = [row for found in cases.values() for row in found]
-    tables = [_cases(cases), *_ranges(rows), *_scores(rows)]
+    # Where weight and friction are swept, things slip in the lift, which is not scored.
+    tables = [_cases(cases), *(tuple(_ranges(rows)) or _scores(rows))]
     kept = sum(row.outcome in HELD for row in rows)
     answer = (
         f"Simulated by MuJoCo: {kept} of {len(rows)} grasps ended as planned, {sum(r.broken for r in rows)} things "
@@ -122,7 +123,7 @@ def _ranges(rows: Sequence[TouchRow]) -> Iterator[FoundTable]:
 
 def _fate(row: TouchRow) -> str:
     """Return in a few words what became of a thing."""
-    needed = "" if row.needed_n is None else f" ({row.needed_n:.2g} N)"
+    needed = "" if row.needed_n is None else f" ({row.needed_n:.3g} N)"
     force = "?" if row.greatest_n is None else f"{row.greatest_n:.1f} N"
     if row.outcome in HELD:
         return f"held, {force}, {row.slip_m * 1e3:.1f} mm{needed}"
