@@ -165,3 +165,45 @@ def test_a_trace_has_the_acceleration_and_the_cells():
     ).grasp(object="block")
     assert trial.trace.signals["acceleration"].values.shape[1] == 3
     assert trial.trace.pad_left.shape[1] == 15
+
+
+def bumped(tmp_path, *lines):
+    """Close on a block that a scene bumps; return the forces on both edges over time."""
+    backend = opened(scene(tmp_path, "[bump]", "t_s = 0.2", *lines))
+    edges = []
+    for _ in range(2200):
+        frame = squeezed(backend, 0.0395, 1).frame
+        edges.append((frame.edge_left_n, frame.edge_right_n))
+    return np.array(edges)
+
+
+def test_a_bump_gives_the_edge_of_the_finger_the_momentum_of_the_ball(tmp_path):
+    left, right = bumped(tmp_path, "mass_kg = 0.02", "speed_m_s = 0.5", "touch_s = 0.03").T
+    # A rigid finger would return exp(-0.1 pi) = 73 % of the speed; one on a wrist that yields returns less.
+    assert 1.0 < left.sum() * 1e-3 / (0.02 * 0.5) < 1.75
+    assert np.flatnonzero(left).size == pytest.approx(30, abs=5)
+    assert not right.any()
+
+
+def test_edges_do_not_feel_a_bump_into_the_thing(tmp_path):
+    assert not bumped(tmp_path, 'at = "thing"', "speed_m_s = 0.5").any()
+
+
+def test_a_finger_without_an_edge_sensor_is_not_bumped_into(tmp_path):
+    path = scene(tmp_path, "[bump]", "t_s = 0.2")
+    with pytest.raises(ConfigError, match="edge"):
+        create("sensor-backend", "mujoco", object=str(path)).open(0)
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("speed_m_s = 0.0", "speed_m_s"),
+        ("mass_kg = nan", "mass_kg"),
+        ("touch_s = 0.2", "touch_s"),
+        ('at = "table"', "finger"),
+    ],
+)
+def test_a_bump_that_cannot_be_says_why(tmp_path, line, said):
+    with pytest.raises(ConfigError, match=said):
+        read_scene(str(scene(tmp_path, "[bump]", "t_s = 0.2", line)))

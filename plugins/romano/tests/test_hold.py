@@ -39,6 +39,11 @@ def test_conformance(check):
         (["-o", "controller.force_n=-1"], "force_n"),
         (["-o", "controller.sends=effect"], "effort"),
         (["--object", "tuged"], "tugged"),
+        (["-o", "controller.force_n=30"], "force_limit_n"),
+        (["-o", "controller.force_n=0.5"], "lightest_n"),
+        (["-o", "controller.type=grab", "-o", "controller.lightest_n=30"], "force_limit_n"),
+        (["--seconds", "3", "-o", "run.hold_s=9"], "run.hold_s"),
+        (["--gripper", "sim"], "controller.sends=effort"),
     ],
 )
 def test_bad_input_is_a_wrong_use(arguments, said, capsys):
@@ -46,9 +51,31 @@ def test_bad_input_is_a_wrong_use(arguments, said, capsys):
     assert said in capsys.readouterr().err
 
 
-def test_a_gripper_that_is_lost_ends_it(capsys):
+def test_a_gripper_that_is_lost_ends_it_and_was_not_opened(capsys):
     assert hold("--seconds", "30", *PR2, "-o", "gripper.faults.unplug_at_s=2") == 4
-    assert "device lost" in capsys.readouterr().out
+    out, err = capsys.readouterr()
+    assert "device lost" in out
+    assert "not opened" in err
+
+
+@pytest.mark.slow
+def test_a_gripper_without_pads_says_that_no_force_is_measured(capsys):
+    assert hold("--pipeline", "robotiq", "-o", "gripper.port=emulated", "--seconds", "1") == 0
+    out, err = capsys.readouterr()
+    assert "steady" in out
+    assert "no pads" in err
+    assert "nan" not in err
+    assert "release" in err
+
+
+@pytest.mark.slow
+def test_a_thing_that_the_force_limit_cannot_hold_says_so(capsys):
+    """3 N and the weight of 0.15 kg need 5.6 N at a friction of 0.4."""
+    assert hold("--seconds", "5", "-o", "controller.force_limit_n=4") == 0
+    out, err = capsys.readouterr()
+    assert "force limit reached" in err
+    assert "slipped" in out
+    assert "too heavy" in out
 
 
 @pytest.mark.slow
@@ -67,17 +94,20 @@ def test_a_tugged_block_is_held_with_more_force_from_the_first_slip_on(capsys):
 
 
 @pytest.mark.slow
-def test_ctrl_c_lets_go():
+@pytest.mark.parametrize("when", ["contact", "holds"])
+def test_ctrl_c_opens_the_fingers(when):
     running = subprocess.Popen(
         [*COMMAND, "--seconds", "600", *PR2], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
     for line in running.stderr:
-        if line.rstrip().endswith("holds"):
+        if line.rstrip().endswith(when):
             running.send_signal(signal.SIGINT)
             break
-    out, _ = running.communicate(timeout=120)
+    out, err = running.communicate(timeout=120)
     assert running.returncode == 4
     assert "interrupted" in out
+    (opened,) = [line for line in err.splitlines() if "opened to" in line]
+    assert float(opened.split()[-2]) > 80.0
 
 
 @pytest.mark.slow

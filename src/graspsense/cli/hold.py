@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import inf
+from math import inf, nan
 from typing import TYPE_CHECKING, Final
 
 import click
@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 PIPELINE: Final = "hold"
 LONGEST_S: Final = 3500.0
+LETTING_GO: Final = ("release", "opened", "let go", "not opened")
+"""How the events of the runner begin that tell what becomes of the fingers at the end."""
 TO_GRASP_S: Final = 60.0
 """Time that is allowed for the grasp itself."""
 
@@ -46,6 +48,8 @@ def hold(
     from graspsense.cli.run import finish, grasped, print_trial
     from graspsense.core.pipeline.wiring import check
 
+    if any(option.partition("=")[0].strip() == "run.hold_s" for option in options):
+        raise click.UsageError("--seconds sets run.hold_s: leave out -o run.hold_s")
     if seconds != seconds:
         raise click.BadParameter("nan is no time: give a number of seconds", param_hint="--seconds")
     lasting = (f"run.hold_s={seconds}", f"run.grasp_timeout_s={max(seconds + TO_GRASP_S, 300.0)}")
@@ -75,16 +79,19 @@ class HoldRows:
 
         del command
         frame = reading.frame
-        self._force_n = min(frame.force_left_n, frame.force_right_n)
+        forces = [force_n for force_n in (frame.force_left_n, frame.force_right_n) if force_n == force_n]
+        self._force_n = min(forces, default=nan)
         if phase == HOLD:
             self._greatest_n = max(self._greatest_n, self._force_n)
             if frame.t_s - self._t_s >= 1.0:
                 self._row(frame.t_s, "holds")
 
     def event(self, event: GraspEvent) -> None:
-        """Print an event of the controller; a slip each time, and others once for each second."""
+        """Print how the fingers open, and an event of the controller; a slip each time, others once for each second."""
         from graspsense.core.values.signals import HOLD
 
+        if event.source == "runner" and event.what.startswith(LETTING_GO):
+            self._row(event.t_s, event.what)
         if event.source != "controller":
             return
         slip = event.what == "slip"
@@ -94,8 +101,11 @@ class HoldRows:
 
     def _row(self, t_s: float, what: str) -> None:
         self._t_s, self._shown = t_s, what
-        talk(f"{t_s:8.3f} s  {self._force_n:6.2f} N  {what}")
+        force = " no pads" if self._force_n != self._force_n else f"{self._force_n:6.2f} N"
+        talk(f"{t_s:8.3f} s  {force}  {what}")
 
     def summary(self) -> str:
         """Return the number of slips, and the greatest force while it was held."""
+        if self._force_n != self._force_n:
+            return "no slip is told and no force measured: this gripper has no pads"
         return f"slips: {self._slips}; greatest force while holding: {self._greatest_n:.2f} N"

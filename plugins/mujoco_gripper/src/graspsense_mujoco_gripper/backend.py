@@ -130,6 +130,8 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
         if gripper.left.rows:
             left = gripper.left
             channels.append(TactileArray("pads", "N", rate, rows=left.rows, columns=left.columns))
+        if gripper.left.edge:
+            channels += [Channel("edge_left", "N", rate), Channel("edge_right", "N", rate)]
         channels += [Channel(name, one.unit, rate) for name, one in gripper.channels.items()]
         if gripper.accelerometer is not None:
             steps = self._steps_of_a_tick()
@@ -246,12 +248,19 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
             int(model.sensor_adr[identifier(model, OBJ.mjOBJ_SENSOR, one.sensor, "sensor")])
             for one in self._gripper.channels.values()
         ]
+        self._edges = [
+            int(model.sensor_adr[identifier(model, OBJ.mjOBJ_SENSOR, one.edge, "sensor")])
+            for one in fingers
+            if one.edge
+        ]
         self._signals: Any = signal_type(self._channels_of(self._gripper))
         self._shell = [
             identifier(model, OBJ.mjOBJ_EQUALITY, PREFIX + name, "equality") for name in self._thing.shell
         ]
         self._drive = ActuatorDrive(model, data, self._gripper, travel)
-        self._motion = ArmMotion(model, self._scene, min(geoms_of(model, self._gripper.left)))
+        self._motion = ArmMotion(
+            model, self._scene, min(geoms_of(model, self._gripper.left)), self._gripper.left.edge
+        )
         self._data = data
         self._check_start(data)
         self._kept = kept_steps(self._steps, self._drive.longest_s / model.opt.timestep)
@@ -280,7 +289,15 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
     def _compiled_rig(self, data: mujoco.MjData) -> SteppedModel | None:
         """Return what compiled ticks take; None where more takes part in a tick than they know."""
         forces = self._forces
-        more = self._cells, self._palm, self._rough, self._viewer, self._sensors, self._scene.shake
+        more = (
+            self._cells,
+            self._palm,
+            self._rough,
+            self._viewer,
+            self._sensors,
+            self._edges,
+            self._scene.shake,
+        )
         if not isinstance(forces, ForceGauge) or not forces.only_contacts:
             return None
         contacts = contacts_of(data)
@@ -417,9 +434,13 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
         t_s = self._ticks * tick_s
         if self._motion.moves:
             self._motion.set(data, t_s, touched=min(left, right) > TOUCH_N)
+        edge_left, edge_right = (self._values[k] for k in self._edges) if self._edges else (nan, nan)
         if self.config.force_noise_n:
             left, right = left + self._noise(), right + self._noise()
-        frame = Frame(t_s, tick_s, measured_m, velocity, self._drive.effort_n, left, right, nan, nan, 0)
+            if self._edges:
+                edge_left, edge_right = edge_left + self._noise(), edge_right + self._noise()
+        effort_n = self._drive.effort_n
+        frame = Frame(t_s, tick_s, measured_m, velocity, effort_n, left, right, edge_left, edge_right, 0)
         pads = NO_PADS
         if self._cells is not None:
             pads = Pads(t_s, self._ticks, *self._cells.images(data))

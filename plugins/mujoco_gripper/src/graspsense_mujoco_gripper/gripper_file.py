@@ -88,7 +88,8 @@ class Finger:
     Without `sensor` the force is the sum of the contact forces on these geoms along the closing direction; with it, the
     value of a touch sensor, or of a force sensor along that direction. `array` names a tactile sensor with `rows` times
     `columns` cells (the plugin `mujoco.sensor.touch_grid`). `cells` names instead the joints of as many cells, row by
-    row, each a slide on a spring: the force of a cell is that of its spring, the force on the finger their sum.
+    row, each a slide on a spring: the force of a cell is that of its spring, the force on the finger their sum. `edge`
+    names a touch sensor of the sides of the finger.
     """
 
     geoms: tuple[str, ...] = ()
@@ -98,6 +99,7 @@ class Finger:
     cells: tuple[str, ...] = ()
     rows: int = 0
     columns: int = 0
+    edge: str = ""
 
     def __attrs_post_init__(self) -> None:
         if not self.geoms and not self.bodies:
@@ -183,8 +185,9 @@ class GripperFile:
             )
         if self.left.rows * self.left.columns != self.right.rows * self.right.columns:
             raise ValueError("the arrays of both fingers have the same number of cells")
-        if bool(self.left.cells) != bool(self.right.cells):
-            raise ValueError("both fingers have cells on springs, or neither")
+        for name in ("cells", "edge"):
+            if bool(getattr(self.left, name)) != bool(getattr(self.right, name)):
+                raise ValueError(f"both fingers have {name}, or neither")
         if self.accelerometer is not None and "acceleration" in self.channels:
             raise ValueError(
                 "acceleration is the channel of the accelerometer: give another name in channels"

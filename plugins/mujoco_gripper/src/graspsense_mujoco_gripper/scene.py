@@ -32,6 +32,7 @@ from numpy.typing import NDArray
 
 from graspsense.plugin_api import ConfigError
 from graspsense.simulator_api import TomlError, ValidationFailed, structured, toml_values
+from graspsense_mujoco_gripper.bump import Bump, Bumper, add_ball
 from graspsense_mujoco_gripper.catalogue import Thing, Walls, thing_named
 from graspsense_mujoco_gripper.gripper_file import text_of
 from graspsense_mujoco_gripper.model import compiled
@@ -59,6 +60,8 @@ LARGEST_BYTES: Final = 64 * 1024
 MASS_SPREAD, FRICTION_SPREAD, STIFFNESS_SPREAD, SIZE_SPREAD = 0.1, 0.15, 0.1, 0.01
 """Standard deviations of the logarithms of what instances and seeds draw."""
 PLACE_SPREAD_M = 0.001
+AFTER_BUMP_S: Final = 0.5
+"""For so long after a bump it is watched how far the thing comes down."""
 Schedule = tuple[tuple[float, ...], ...]
 
 
@@ -113,8 +116,8 @@ class Scene:
 
     `arm` is the height (m) of the gripper over the time (s) since both fingers touched, `table_height` that of the
     table, which may rise while the thing is in the air, and `fill` the mass (kg) that was filled in by then. `shake`
-    moves the gripper to and fro. `mass_kg` and `friction` replace those of the thing. `roughness_m` is the rms height
-    of its surface, which cells on springs feel.
+    moves the gripper to and fro, and `bump` is a ball that comes from the side. `mass_kg` and `friction` replace those
+    of the thing. `roughness_m` is the rms height of its surface, which cells on springs feel.
     """
 
     thing: str
@@ -125,6 +128,7 @@ class Scene:
     fill: Schedule = ()
     cord: Cord | None = None
     shake: Shake | None = None
+    bump: Bump | None = None
     mass_kg: float | None = field(default=None)
     friction: float | None = field(default=None)
     roughness_m: float = field(default=0.0)
@@ -147,7 +151,7 @@ class Scene:
     @property
     def needs_friction(self) -> bool:
         """Whether the friction of the thing decides what happens."""
-        disturbed = self.arm or self.fill or self.cord or self.shake
+        disturbed = self.arm or self.fill or self.cord or self.shake or self.bump
         return self.table or bool(disturbed) or self.friction is not None
 
 
@@ -321,6 +325,8 @@ def add_thing(spec: mujoco.MjSpec, model: SceneModel, place: Floats, axis: Float
             )
         frame = spec.worldbody.add_frame(pos=place, quat=turned(axis))
         spec.attach(child, frame=frame, prefix=PREFIX)
+        if scene.bump is not None:
+            add_ball(spec, scene.bump, place, axis)
     except ValueError as error:
         raise ConfigError(f"MuJoCo refuses to attach {scene.thing} to the gripper: {error}") from error
 
@@ -404,8 +410,8 @@ def _scale_size(child: mujoco.MjSpec, factor: float) -> None:
 class ArmMotion:
     """Moves the arm and pulls the cord, by the time since both fingers touched."""
 
-    def __init__(self, model: mujoco.MjModel, scene: Scene, finger: int) -> None:
-        """`finger` is a geom of a finger, with which the height of the thing is compared."""
+    def __init__(self, model: mujoco.MjModel, scene: Scene, finger: int, edge: str) -> None:
+        """`finger` is a geom of a finger, with which the height of the thing is compared; `edge` its edge sensor."""
         self._finger = finger
         self._scene, self._contact_s = scene, float("inf")
         self._servos, self._shakers = (
@@ -417,8 +423,10 @@ class ArmMotion:
         self._body = things[0] if things else -1
         self._bodies, self._masses = things, heaviest
         self.moves = bool(things) and (
-            scene.cord is not None or bool(scene.arm or scene.table_height or scene.fill or scene.shake)
+            bool(scene.cord or scene.bump or scene.shake)
+            or bool(scene.arm or scene.table_height or scene.fill)
         )
+        self._bumper = Bumper(model, scene.bump, edge, self._body) if things and scene.bump else None
         cord = () if scene.cord is None else scene.cord.force
         schedules = (scene.arm, scene.table_height, scene.fill, cord)
         self._model = model
@@ -426,6 +434,8 @@ class ArmMotion:
         self._table_m = _table_height(model)
         ends_s = [rows[-1][0] for rows in schedules if rows]
         self._end_s = max([*ends_s, 0.0 if scene.shake is None else scene.shake.end_s])
+        if scene.bump is not None:
+            self._end_s = max(self._end_s, scene.bump.t_s + AFTER_BUMP_S)
         self._start_m: Floats = np.zeros(3)
         self._above_finger_m = 0.0
         self._highest_m, self._height_m, self._slip_m = 0.0, 0.0, 0.0
@@ -437,7 +447,7 @@ class ArmMotion:
         if touched and not isfinite(self._contact_s):
             self._contact_s = t_s
             self._start_m = self._centre(data)
-            self._above_finger_m = self._start_m[2] - data.geom_xpos[self._finger, 2]
+            self._above_finger_m = float(self._start_m[2] - data.geom_xpos[self._finger, 2])
         if not isfinite(self._contact_s):
             return
         since_s = t_s - self._contact_s
@@ -453,6 +463,8 @@ class ArmMotion:
             data.ctrl[self._shakers] = self._scene.shake.place_m(since_s)
         if self._scene.cord is not None:
             data.xfrc_applied[self._body, :3] = self._scene.cord.pull_n(since_s)
+        if self._bumper is not None:
+            self._bumper.set(data, since_s)
         if self._scene.table_height:
             data.mocap_pos[0, 2] = self._table_m + _value(self._scene.table_height, since_s)
         if self._scene.fill:

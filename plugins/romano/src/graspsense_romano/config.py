@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Final, Literal
+from typing import ClassVar, Final, Literal
 
 from attrs import frozen
 
@@ -78,10 +78,21 @@ class FindContactConfig:
         meaning="Position servo: friction of the drive that is fed forward.",
     )
 
+    def __attrs_post_init__(self) -> None:
+        force_n = self.force_n if isinstance(self, ForceServoConfig) and self.asks_force else self.lightest_n
+        if not self.lightest_n <= force_n <= self.force_limit_n:
+            raise ValueError(
+                f"the force is {force_n:g} N: it is from lightest_n ({self.lightest_n:g} N) to force_limit_n "
+                f"({self.force_limit_n:g} N)"
+            )
+
 
 @frozen(kw_only=True, slots=False)
 class ForceServoConfig(FindContactConfig):
     """Settings of the force servo."""
+
+    asks_force: ClassVar[bool] = True
+    """Whether `force_n` has an effect."""
 
     force_n: float = setting(
         default=5.0, unit="N", above=0.0, plausible=(0.3, 200.0), meaning="Force of the weaker finger."
@@ -143,6 +154,8 @@ class SlipServoConfig(ForceServoConfig):
 class GrabConfig(SlipServoConfig):
     """Settings of grab, whose force follows from the contact; `force_n` has no effect."""
 
+    asks_force: ClassVar[bool] = False
+
     hardness: float = setting(
         default=0.03, unit="m/s", above=0.0, meaning="Force of the grip, for a contact force of 1 N at 1 m/s."
     )
@@ -184,6 +197,8 @@ class PlaceConfig(GrabConfig):
 @frozen(kw_only=True, slots=False)
 class ReleaseConfig(PlaceConfig):
     """Settings of release."""
+
+    asks_force: ClassVar[bool] = True
 
     force_n: float = setting(
         default=5.0,

@@ -63,7 +63,7 @@ CONTACT_S: Final = 0.05
 """Time for which the gap of the contact is kept, and its greatest force taken."""
 CLOSE, TOUCH, LOAD, KEEP = range(4)
 """Stages: close until both pads touch, stay there, reach the force, hold."""
-SLIP_BIT, PLACE_BIT, UNFELT_BIT = 8, 16, 128
+SLIP_BIT, PLACE_BIT, UNFELT_BIT, LIMIT_BIT = 8, 16, 128, 256
 
 
 class HoldingPlan(NamedTuple):
@@ -150,6 +150,8 @@ def step(params: Params, state: State, reading: Reading) -> tuple[Command, State
     events = begun(state.conditions, now)
     if before.stage != KEEP:
         events &= ~SLIP_BIT
+    if progress.target_n >= params.plan.limit_n > before.target_n:
+        events |= LIMIT_BIT
     if params.plan.places == 1:
         if progress.stage == KEEP and before.stage == LOAD and signals.acceleration.present == 0:
             events |= UNFELT_BIT
@@ -363,6 +365,15 @@ class _Romano(Controller[ConfigT]):
         """Return the state before the first tick."""
         progress = Progress(APPROACH, RUNNING, NOT_BEGUN, 0.0, 0.0, 0.0, 0.0, 0.0)
         return State(APPROACH, RUNNING, 0, progress, 0.0, no_signals(), NOTHING)
+
+    def reason(self, state: Any) -> str:
+        """Return with which force a thing was lost, and whether the force limit cannot hold it."""
+        asked_n, limit_n = state.progress.target_n, float(self.config.force_limit_n)
+        if state.outcome != SLIPPED:
+            return ""
+        if asked_n >= limit_n:
+            return f"too heavy or too smooth for {limit_n:g} N (controller.force_limit_n)"
+        return f"lost at {asked_n:.1f} N, before controller.force_limit_n ({limit_n:g} N) was reached"
 
 
 FASTEST_M_S: Final = 0.5

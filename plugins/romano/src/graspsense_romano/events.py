@@ -15,6 +15,7 @@ EVENTS: Final = (
     "side impact",
     "acceleration",
     "no acceleration is measured: placing is told by force alone",
+    "force limit reached",
 )
 """The events that every law of this package tells, in the order of their bits."""
 

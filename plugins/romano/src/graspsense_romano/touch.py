@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 from attrs import evolve, field, frozen
-from attrs.validators import ge, gt, le
+from attrs.validators import ge, gt, in_, le
+from numpy.typing import NDArray
 
 from graspsense.experiment_api import settings_from, structured
 from graspsense.plugin_api import HOLD, NO_PADS, ConfigError, Frame, Reading, Samples
@@ -19,10 +20,14 @@ from graspsense_romano.signals import Signals, filters, no_signals, updated
 if TYPE_CHECKING:
     from graspsense.plugin_api import Trace
 
-LIFT_S: Final = (2.0, 2.5)
+LIFT_S: Final = 2.0
 """When the arm lifts, after both fingers touched."""
-DISTURBED_S: Final = 3.0
-"""When the tug, the filling or the way down begins."""
+SETTLED_S: Final = 0.5
+"""Time from the end of the lift until the tug, the filling or the way down begins, and from then until a bump."""
+PUBLISHED_LOW_N, WIDE_LOW_N = 0.18, 1.0
+"""Low band below which a slip is told: the published one, and that of the pipeline `hold`."""
+BALL_M: Final = 0.05
+"""The ball of a bump comes from this far away at most."""
 LAST_S: Final = 0.15
 AROUND_S: Final = (-0.05, 0.3)
 """What counts as being put down, around the time at which the arm is as high as the table."""
@@ -55,6 +60,7 @@ class TouchSettings:
     friction: float = field(default=0.5, validator=ge(0.0))
     roughness_m: float = field(default=4e-5, validator=[ge(0.0), le(1e-3)])
     lift_m: float = field(default=0.05, validator=ge(0.0))
+    lift_s: float = field(default=0.5, validator=gt(0.0))
     tug_n: float = field(default=0.0, validator=ge(0.0))
     fill_kg: float = field(default=0.0, validator=ge(0.0))
     ramp_s: float = field(default=2.0, validator=gt(0.0))
@@ -63,33 +69,57 @@ class TouchSettings:
     """Speed at which the arm goes down again."""
     table_rise_m: float = field(default=0.0, validator=ge(0.0))
     """How far the table has risen by then."""
+    bump_at: str = field(default="", validator=in_(("", "finger", "thing")))
+    """What a ball bumps into from the side."""
+    bump_kg: float = field(default=0.1, validator=gt(0.0))
+    bump_m_s: float = field(default=0.3, validator=gt(0.0))
+    bump_touch_s: float = field(default=0.05, validator=gt(0.0))
+    """How long the ball touches."""
 
     def __attrs_post_init__(self) -> None:
         if self.lower_m_s and self.table_rise_m >= self.lift_m:
             raise ValueError("table_rise_m is below lift_m: the table must not reach the thing in the air")
 
     @property
+    def disturbed_s(self) -> float:
+        """When the tug, the filling or the way down begins, after both fingers touched."""
+        return LIFT_S + self.lift_s + SETTLED_S
+
+    @property
+    def bumped_s(self) -> float:
+        """When the ball of a bump is thrown."""
+        return self.disturbed_s + SETTLED_S
+
+    @property
     def down_s(self) -> float:
         """When the thing is as high as the table again, after both fingers touched; NaN without a way down."""
         if not self.lower_m_s:
             return float("nan")
-        return DISTURBED_S + 0.5 * STARTING_S + (self.lift_m - self.table_rise_m) / self.lower_m_s
+        return self.disturbed_s + 0.5 * STARTING_S + (self.lift_m - self.table_rise_m) / self.lower_m_s
 
     def toml(self) -> str:
         """Return the scene file."""
         lines = [f'thing = "{self.thing}"', "table = true", f"friction = {self.friction}"]
         lines += [f"mass_kg = {self.mass_kg}", f"roughness_m = {self.roughness_m}"]
-        arm = _moved(LIFT_S[0], 0.0, self.lift_m, self.lift_m / (LIFT_S[1] - LIFT_S[0]))
+        arm = _moved(LIFT_S, 0.0, self.lift_m, self.lift_m / self.lift_s)
+        begun_s = self.disturbed_s
         if self.lower_m_s:
-            arm += _moved(DISTURBED_S, self.lift_m, 0.0, self.lower_m_s)
+            arm += _moved(begun_s, self.lift_m, 0.0, self.lower_m_s)
         lines.append(f"arm = {arm}")
-        end_s = DISTURBED_S + self.ramp_s
+        end_s = begun_s + self.ramp_s
         if self.fill_kg:
-            lines.append(f"fill = [[{DISTURBED_S}, 0.0], [{end_s}, {self.fill_kg}]]")
+            lines.append(f"fill = [[{begun_s}, 0.0], [{end_s}, {self.fill_kg}]]")
         if self.table_rise_m:
-            lines.append(f"table_height = [[{LIFT_S[1]}, 0.0], [{DISTURBED_S}, {self.table_rise_m}]]")
+            lines.append(f"table_height = [[{LIFT_S + self.lift_s}, 0.0], [{begun_s}, {self.table_rise_m}]]")
         if self.tug_n:
-            lines.append(f"cord = {{ force = [[{DISTURBED_S}, 0.0], [{end_s}, {self.tug_n}]] }}")
+            lines.append(f"cord = {{ force = [[{begun_s}, 0.0], [{end_s}, {self.tug_n}]] }}")
+        if self.bump_at:
+            lines += ["[bump]", f'at = "{self.bump_at}"', f"t_s = {self.bumped_s}"]
+            lines += [
+                f"mass_kg = {self.bump_kg}",
+                f"speed_m_s = {self.bump_m_s}",
+                f"touch_s = {self.bump_touch_s}",
+            ]
         if self.stiffness_n_m:
             lines += ["[walls]", "width_m = 0.04", f"stiffness_n_m = {self.stiffness_n_m}"]
             lines += ["damping_n_s_m = 20.0", f"mass_kg = {self.mass_kg}", f"friction = {self.friction}"]
@@ -101,6 +131,13 @@ class TouchRow:
     """How one grasp went. Forces are of the weaker finger; a quantity that is not defined is None."""
 
     outcome: str
+    law: str = ""
+    mass_kg: float = 0.0
+    friction: float = 0.0
+    needed_n: float | None = None
+    """The force that friction needs for the weight and what is added to it."""
+    limited: bool = False
+    """Whether the law asked for all of its force limit."""
     broken: bool = False
     lifted_m: float = 0.0
     slip_m: float = 0.0
@@ -114,15 +151,26 @@ class TouchRow:
     """How far the gap closed from the contact on."""
     slips: int = 0
     slip_high_n: float | None = None
-    """The greatest high band of a pad after the lift, where no force is added: the least threshold that tells no slip.
+    """The greatest high band of a pad after the lift, while its low band is below 0.18 N, where no force is added.
 
-    The last 0.15 s are left out, in which a thing that is lost falls."""
+    That is the least threshold that tells no slip. The last 0.15 s are left out: a thing that is lost falls then."""
+    slip_wide_n: float | None = None
+    """The same, while the low band is below 1 N."""
     shock_before_m_s2: float | None = None
     """The greatest acceleration band on the way down, before the table."""
     shock_at_m_s2: float | None = None
     """The greatest acceleration band when the thing meets the table, if it is not let go by then."""
     placed_s: float | None = None
     """When the law let go, from the time at which the thing is as high as the table."""
+    bump_at: str = ""
+    edge_before_n: float | None = None
+    """The greatest high band of an edge while the thing is held, before the bump."""
+    edge_at_n: float | None = None
+    """The same in the bump."""
+    still_m_s2: float | None = None
+    """The greatest acceleration band from 0.5 s after the lift on, before the bump."""
+    bump_m_s2: float | None = None
+    """The same in the bump."""
     source: str = "grasps simulated by MuJoCo"
     simulated: bool = True
 
@@ -146,10 +194,16 @@ def touch(params: Mapping[str, Any], seed: int) -> TouchRow:
             workers=1,
         )[0]
     report, found = grasped.report, dict(grasped.extracted)
-    if settings.controller.component.name != "force-servo":
-        found.pop("slip_high_n", None)
+    law, pulled_n = settings.controller.component.name, (scene.mass_kg + scene.fill_kg) * 9.81 + scene.tug_n
+    if law != "force-servo":
+        found |= {"slip_high_n": None, "slip_wide_n": None}
     return TouchRow(
         outcome=grasped.outcome.name.lower(),
+        law=law,
+        mass_kg=scene.mass_kg,
+        friction=scene.friction,
+        needed_n=pulled_n / (2.0 * scene.friction) if scene.friction else None,
+        bump_at=scene.bump_at,
         broken=bool(report.get("broken", False)),
         lifted_m=float(report.get("highest_m", 0.0)),
         slip_m=float(report.get("slip_m", 0.0)),
@@ -172,7 +226,8 @@ def followed(trace: Trace) -> list[Signals]:
             signals = _Fast(Samples(float(trace.t_s[k]), int(begun), len(rows), rows))
         frame = Frame(
             float(trace.t_s[k]), float(dt_s[k]), float(trace.gap_m[k]), float(trace.velocity_m_s[k]), nan,
-            float(trace.force_left_n[k]), float(trace.force_right_n[k]), nan, nan, 0,
+            float(trace.force_left_n[k]), float(trace.force_right_n[k]),
+            float(trace.edge_left_n[k]), float(trace.edge_right_n[k]), 0,
         )  # fmt: skip
         now = updated(coefficients, now, Reading(frame, NO_PADS, signals))
         found.append(now)
@@ -191,31 +246,47 @@ def measured(trace: Trace, scene: TouchSettings) -> dict[str, Any]:
     contacts = [t_s for t_s, what, _ in told if what == "both in contact"]
     if not contacts:
         return {}
-    signals, t_s, since_s = followed(trace), trace.t_s, contacts[0]
+    t_s, since_s = trace.t_s, contacts[0]
     weaker = np.minimum(trace.force_left_n, trace.force_right_n)
     first = int(np.searchsorted(t_s, since_s))
     row: dict[str, Any] = {
         "contact_n": float(weaker[first : np.searchsorted(t_s, since_s + 0.05) + 1].max()),
         "slips": sum(what == "slip" for _, what, _ in told),
+        "limited": any(what == "force limit reached" for _, what, _ in told),
     }
-    held = np.flatnonzero(trace.phase == HOLD)
-    if not len(held):
+    held = trace.phase == HOLD
+    if not held.any():
         return row
-    row["grip_n"], row["greatest_n"] = float(weaker[held[0]]), float(weaker[held].max())
+    row["grip_n"], row["greatest_n"] = float(weaker[held][0]), float(weaker[held].max())
     row["deformed_m"] = float(trace.gap_m[first] - trace.gap_m[held].min())
-    disturbed = held[(t_s[held] > since_s + DISTURBED_S - 0.2) & (t_s[held] < t_s[held[-1]] - LAST_S)]
-    high = [max(abs(signals[k].left.high_n), abs(signals[k].right.high_n)) for k in disturbed]
-    row["slip_high_n"] = max(high, default=None)
+    signals, from_s = followed(trace), since_s + scene.disturbed_s
+    kept = held & (t_s > from_s - 0.2) & (t_s < t_s[held][-1] - LAST_S)
+    for key, low_n in (("slip_high_n", PUBLISHED_LOW_N), ("slip_wide_n", WIDE_LOW_N)):
+        row[key] = _greatest(np.array([_disturbance(one, low_n) for one in signals]), kept)
+    shocks = np.array([one.acceleration.norm_m_s2 for one in signals])
     down_s = since_s + scene.down_s
     if down_s == down_s:
-        shocks = np.array([one.acceleration.norm_m_s2 for one in signals])
-        begun, at = (
-            t_s > since_s + DISTURBED_S - 0.1,
-            (t_s > down_s + AROUND_S[0]) & (t_s < down_s + AROUND_S[1]),
-        )
-        before = begun & (t_s <= down_s + AROUND_S[0]) & (trace.phase == HOLD)
-        row["shock_before_m_s2"] = float(shocks[before].max()) if before.any() else None
-        kept = at.any() and bool((trace.phase[at] == HOLD).all())
-        row["shock_at_m_s2"] = float(shocks[at].max()) if kept else None
+        at = (t_s > down_s + AROUND_S[0]) & (t_s < down_s + AROUND_S[1])
+        before = held & (t_s > from_s - 0.1) & (t_s <= down_s + AROUND_S[0])
+        row["shock_before_m_s2"] = _greatest(shocks, before)
+        row["shock_at_m_s2"] = _greatest(shocks, at) if held[at].all() else None
         row["placed_s"] = next((t - down_s for t, what, _ in told if what == "place"), None)
+    if scene.bump_at:
+        edges = np.array([max(one.edge_left.high_n, one.edge_right.high_n) for one in signals])
+        bump_s, lasts_s = since_s + scene.bumped_s, BALL_M / scene.bump_m_s + scene.bump_touch_s + AROUND_S[1]
+        at = held & (t_s > bump_s) & (t_s < bump_s + lasts_s)
+        before = held & (t_s <= bump_s)
+        row["edge_before_n"], row["edge_at_n"] = _greatest(edges, before), _greatest(edges, at)
+        still = before & (t_s > from_s)
+        row["still_m_s2"], row["bump_m_s2"] = _greatest(shocks, still), _greatest(shocks, at)
     return row
+
+
+def _greatest(values: NDArray[np.float64], where: NDArray[np.bool_]) -> float | None:
+    return float(values[where].max()) if where.any() else None
+
+
+def _disturbance(signals: Signals, low_n: float) -> float:
+    """Return the high band (N) of the pads whose low band is below this force (N)."""
+    pads = (signals.left, signals.right)
+    return max((abs(one.high_n) for one in pads if abs(one.low.y1) < low_n), default=0.0)

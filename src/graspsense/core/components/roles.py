@@ -446,6 +446,11 @@ class Controller(ABC, Generic[ConfigT]):
     def init(self) -> ControllerState:
         """Return the state before the first tick."""
 
+    def reason(self, state: Any) -> str:
+        """Return why a grasp ended as it did, where the outcome of its last state does not say it."""
+        del state
+        return ""
+
 
 class FeatureSet(ABC, Generic[ConfigT]):
     """Extracts features from a trace. The class declares what it `requires`, and its `features`.

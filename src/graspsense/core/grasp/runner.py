@@ -253,7 +253,7 @@ def run_grasp(
     return Grasp(
         trace=grasp.recorder.trace(),
         outcome=outcome,
-        reason="; ".join(filter(None, (reason, grasp.lost(), *grasp.failed_sinks))),
+        reason=grasp.why(reason),
         device=info,
         report={**report, **losses},
         counts={"ticks": len(frames), "late": grasp.late, "guarded": grasp.guarded, **losses},
@@ -391,7 +391,7 @@ class _Grasp:
         self.watcher: Watcher | None = None
         self.stop_reason = ""
         self.sinks, self.interrupts, self.interrupted = list(sinks), interrupts, False
-        self.step = type(controller).step
+        self.controller, self.step = controller, type(controller).step
         self.event_names = type(controller).events
         self.params = tick_params(info, controller, run)
         self.protection = None if info.harmless else Protection(info, controller, run, self._fault_seen)
@@ -444,7 +444,7 @@ class _Grasp:
             self.interrupts.deferred = True
             # A lost gripper may still receive commands, so it is commanded to relax.
             fault = self._fault()
-            self._let_go(opens=not (lost or self.state.done or (fault is not None and fault.relaxes)))
+            self._let_go(lost, opens=not (self.state.done or (fault is not None and fault.relaxes)))
         if ending is None and fault is not None:
             ending = fault.outcome, fault.told
         if ending is None:
@@ -462,9 +462,14 @@ class _Grasp:
         """Return the time (s) from the first frame to the last, by the clock of the gripper."""
         return 0.0 if self.last is None or self.first_t_s is None else self.last.t_s - self.first_t_s
 
-    def lost(self) -> str:
-        """Return what was lost on the way from the gripper, in words; empty if nothing was."""
-        return "" if self.losses is None else lost_in_words(self.losses.lost)
+    def why(self, reason: str) -> str:
+        """Return this reason, or what the controller says of the end, with what was lost and which sinks failed."""
+        try:
+            reason = reason or str(self.controller.reason(self.state.law))
+        except FAILURES as error:
+            reason = f"reason failed: {named(error)}"
+        lost = "" if self.losses is None else lost_in_words(self.losses.lost)
+        return "; ".join(filter(None, (reason, lost, *self.failed_sinks)))
 
     def _loop(self) -> None:
         read, apply, run = self.backend.read, self.backend.apply, self.run
@@ -673,37 +678,45 @@ class _Grasp:
         """Log a prediction that was made while the grasp goes on."""
         self._event(t_s, Phase(phase), what, "model", prediction)
 
-    def _let_go(self, opens: bool) -> None:
-        """Open the fingers, then relax. A failure of one step must not prevent the next.
+    def _let_go(self, lost: bool, *, opens: bool) -> None:
+        """Open the fingers, then relax, and tell how they were left. A failure of one step must not prevent the next.
 
-        With `opens` false, because the fingers are open or frames no longer come, it only relaxes.
+        With `opens` false, because the fingers are open, or if frames no longer come, it only relaxes.
         """
-        info, run = self.info, self.run
+        left = "not opened: the gripper does not answer" if lost else "let go, not opened"
+        opens = opens and not lost and self.state.phase >= APPROACH
         try:
-            if opens and info.opening is not None and self.state.phase >= APPROACH and self.last is not None:
-                still, began_s = RestState(self.last.t_s, self.last.gap_m), self.last.t_s
-                give_up = time.perf_counter() + run.opening_timeout_s
-                fresh = GuardState(1, 0, 0)
-                # After a second Ctrl-C, only relax.
-                while time.perf_counter() < give_up and self.interrupts.count < 2:
-                    command, fresh = guard(self.params.guard, fresh, self.last, info.opening)
-                    self.backend.apply(command)
-                    reading = self.backend.read(frame_timeout_s(run, info))
-                    if reading is None:
-                        break
-                    if self.protection is not None and self.protection.opens_wrongly(reading, command):
-                        break
-                    self.last = reading.frame
-                    frame = self.last
-                    still = update_rest(still, frame.t_s, frame.gap_m, OPEN_SPEED_M_S, OPEN_WINDOW_S)
-                    if at_rest(still, frame.t_s, OPEN_WINDOW_S) or (
-                        frame.t_s - began_s > run.opening_timeout_s
-                    ):
-                        break
+            if opens and self.info.opening is not None and self.last is not None:
+                left = self._opened(self.info.opening, self.last)
         except (KeyboardInterrupt, *FAILURES):
             pass
         with suppress(KeyboardInterrupt, *FAILURES):
-            self.backend.apply(info.relaxed)
+            self.backend.apply(self.info.relaxed)
+        if self.info.opening is not None and not self.state.done and self.last is not None:
+            self._event(self.last.t_s, Phase(self.state.phase), left)
+
+    def _opened(self, opening: Command, last: Frame) -> str:
+        """Open the fingers, and return in words whether they came to rest."""
+        info, run = self.info, self.run
+        still, began_s = RestState(last.t_s, last.gap_m), last.t_s
+        give_up = time.perf_counter() + run.opening_timeout_s
+        fresh = GuardState(1, 0, 0)
+        # After a second Ctrl-C, only relax.
+        while time.perf_counter() < give_up and self.interrupts.count < 2:
+            command, fresh = guard(self.params.guard, fresh, last, opening)
+            self.backend.apply(command)
+            reading = self.backend.read(frame_timeout_s(run, info))
+            if reading is None:
+                break
+            if self.protection is not None and self.protection.opens_wrongly(reading, command):
+                break
+            self.last = last = reading.frame
+            still = update_rest(still, last.t_s, last.gap_m, OPEN_SPEED_M_S, OPEN_WINDOW_S)
+            if at_rest(still, last.t_s, OPEN_WINDOW_S):
+                return f"opened to {last.gap_m * 1e3:.1f} mm"
+            if last.t_s - began_s > run.opening_timeout_s:
+                break
+        return f"let go at {last.gap_m * 1e3:.1f} mm, not known to be open"
 
     def _recording_ended(self) -> tuple[Outcome, str]:
         if self.state.law.outcome != RUNNING:

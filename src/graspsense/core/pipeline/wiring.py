@@ -222,9 +222,16 @@ def _command_misfits(gripper: SelectedComponent, controller: SelectedComponent) 
     for kind in sent_kinds(controller):
         if kind not in accepted:
             kinds = ", ".join(accepted) or "none"
+            law = controller.declared
+            fits = (
+                [one for one in (*law.commands, *law.alternatives) if one in accepted]
+                if law.alternatives
+                else []
+            )
+            instead = f"Try -o controller.sends={fits[0]}. " if fits else ""
             yield (
                 f"{_named(controller.component)} commands {kind}, which {_named(gripper.component)} does not take "
-                f"(it takes: {kinds}). {_choose(gripper.component, controller.component)}"
+                f"(it takes: {kinds}). {instead}{_choose(gripper.component, controller.component)}"
             )
 
 
