@@ -8,20 +8,13 @@ import sys
 
 import numpy as np
 import pytest
+from commands import graspsense
 
-from graspsense.cli.main import main
 from graspsense.plugin_api import create
 from graspsense.testing_api import parametrize_checks
 
 COMMAND = [sys.executable, "-m", "graspsense", "hold"]
 PR2 = ["--gripper", "pr2", "-o", "gripper.transport=emulated", "-o", "controller.sends=effort"]
-
-
-def hold(*arguments):
-    """Return the exit code of the command."""
-    with pytest.raises(SystemExit) as ended:
-        main(["hold", *arguments])
-    return ended.value.code
 
 
 @pytest.mark.slow
@@ -41,20 +34,22 @@ def test_conformance(check):
         (["--object", "tuged"], "tugged"),
     ],
 )
-def test_bad_input_is_a_wrong_use(arguments, said, capsys):
-    assert hold(*arguments) == 2
-    assert said in capsys.readouterr().err
+def test_bad_input_is_a_wrong_use(arguments, said):
+    done = graspsense("hold", *arguments)
+    assert done.returncode == 2
+    assert said in done.stderr
 
 
-def test_a_gripper_that_is_lost_ends_it(capsys):
-    assert hold("--seconds", "30", *PR2, "-o", "gripper.faults.unplug_at_s=2") == 4
-    assert "device lost" in capsys.readouterr().out
+def test_a_gripper_that_is_lost_ends_it():
+    done = graspsense("hold", "--seconds", "30", *PR2, "-o", "gripper.faults.unplug_at_s=2")
+    assert done.returncode == 4
+    assert "device lost" in done.stdout
 
 
 @pytest.mark.slow
-def test_a_tugged_block_is_held_with_more_force_from_the_first_slip_on(capsys):
-    assert hold("--seconds", "5") == 0
-    out, err = capsys.readouterr()
+def test_a_tugged_block_is_held_with_more_force_from_the_first_slip_on():
+    code, out, err = graspsense("hold", "--seconds", "5")
+    assert code == 0
     told = [line.split() for line in err.splitlines() if line.endswith(("slip", "holds"))]
     slips = [float(t) for t, _, _, _, what in told if what == "slip"]
     forces = {float(t): float(force) for t, _, force, _, what in told if what == "holds"}
