@@ -257,8 +257,9 @@ def test_too_many_labels_and_features_of_trials_of_any_source_are_refused(monkey
     assert len(trials(300, 1).classes) == 300
 
 
-def test_a_table_with_thousands_of_features_is_refused(tmp_path):
-    path = table(tmp_path / "table.csv", ["a", "b"] * 4, features=5001)
+def test_a_table_with_more_features_than_the_limit_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setenv(limits.FEATURES.variable, "50")
+    path = table(tmp_path / "table.csv", ["a", "b"] * 4, features=51)
     done = graspsense("evaluate", path, "--label", "label", "--classifier", "ebm")
     assert done.returncode == 2
     assert limits.FEATURES.variable in done.stderr

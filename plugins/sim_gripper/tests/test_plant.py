@@ -526,10 +526,11 @@ def pressed_again(steps):
     return result, state.contact.left.compression_m
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "steps",
     [
-        pytest.param(a_step_per_tick(), id="a step per tick", marks=pytest.mark.slow),
+        pytest.param(a_step_per_tick(), id="a step per tick"),
         pytest.param(Steps(inf, TICK, growth=inf), id="fixed"),
         pytest.param(Steps(3e-4, growth=1.1), id="by their error"),
     ],
