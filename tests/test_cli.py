@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import subprocess
@@ -12,9 +11,10 @@ from importlib import import_module
 
 import click
 import pytest
+from commands import graspsense
 
 from graspsense import __version__
-from graspsense.cli.main import COMMANDS, main
+from graspsense.cli.main import COMMANDS
 from graspsense.core.components.entries import CommandEntry, FoundDevice
 from graspsense.core.components.registry import IsolatedPlugins
 from graspsense.core.components.registry import plugins as loader
@@ -25,28 +25,12 @@ REPLAY = ["--gripper", "replay", "-o", "gripper.recording=icub:some/file.txt", "
 """What is here without any other distribution; the default pipeline's classifier is not."""
 
 
-class Ran:
-    def __init__(self, code: int, out: str, err: str) -> None:
-        self.code, self.out, self.err = code, out, err
-
-    @property
-    def json(self):
-        return json.loads(self.out)
-
-
 @pytest.fixture
-def run(capsys, monkeypatch):
+def run(monkeypatch):
     monkeypatch.delenv("GRASPSENSE_TRACEBACK", raising=False)
-
-    def run(*arguments: str) -> Ran:
-        with pytest.raises(SystemExit) as ended:
-            main(arguments)
-        out, err = capsys.readouterr()
-        return Ran(ended.value.code, out, err)
-
     # By the patch, not as a context: a test that patches it again is then undone in the right order.
     monkeypatch.setattr(loader, "_current", IsolatedPlugins())
-    return run
+    return graspsense
 
 
 def adding(name: str, command: click.Command):
@@ -84,12 +68,12 @@ def test_the_table_names_commands_that_are_there():
 def test_help_lists_the_commands(run):
     for arguments in ([], ["--help"], ["-h"]):
         ran = run(*arguments)
-        assert (ran.code, ran.err) == (0, "")
-        assert re.findall(r"^  (\w+)  +\w", ran.out, re.MULTILINE) == list(COMMANDS)
+        assert (ran.returncode, ran.stderr) == (0, "")
+        assert re.findall(r"^  (\w+)  +\w", ran.stdout, re.MULTILINE) == list(COMMANDS)
 
 
 def test_version(run):
-    assert run("--version").out == f"graspsense, version {__version__}\n"
+    assert run("--version").stdout == f"graspsense, version {__version__}\n"
 
 
 def test_version_is_that_of_the_distribution():
@@ -137,15 +121,15 @@ def test_version_is_that_of_the_distribution():
 def test_a_mistake_is_told_on_stderr_with_code_2(run, arguments, said):
     ran = run(*arguments)
 
-    assert (ran.code, ran.out, ran.err) == (2, "", said)
+    assert (ran.returncode, ran.stdout, ran.stderr) == (2, "", said)
 
 
 def test_with_json_an_error_is_an_object_on_stdout_too(run):
     ran = run("config", "show", *REPLAY, "-o", "controller.ramp_s=-1", "--json")
 
     message = "-o controller.ramp_s=-1: 'ramp_s' must be >= 0.0: -1.0"
-    assert ran.code == 2
-    assert ran.err == f"graspsense: {message}\n"
+    assert ran.returncode == 2
+    assert ran.stderr == f"graspsense: {message}\n"
     assert ran.json == {"error": {"kind": "ConfigError", "message": message, "exit_code": 2}}
 
 
@@ -169,7 +153,7 @@ def test_every_error_has_its_code_and_no_traceback(run, error, code, said):
 
     ran = run("fail")
 
-    assert (ran.code, ran.out, ran.err) == (code, "", said)
+    assert (ran.returncode, ran.stdout, ran.stderr) == (code, "", said)
 
 
 def test_an_internal_error_names_the_plugin_and_the_place(run, site, monkeypatch):
@@ -194,9 +178,9 @@ def test_an_internal_error_names_the_plugin_and_the_place(run, site, monkeypatch
 
     ran = run("fault")
 
-    assert ran.code == 70
-    assert "of the plugin lab-faulty: " in ran.err
-    assert "lab_faulty_plugin.py:13 in fault" in " ".join(ran.err.split())
+    assert ran.returncode == 70
+    assert "of the plugin lab-faulty: " in ran.stderr
+    assert "lab_faulty_plugin.py:13 in fault" in " ".join(ran.stderr.split())
 
 
 def test_the_traceback_is_there_on_demand(run, monkeypatch):
@@ -205,9 +189,9 @@ def test_the_traceback_is_there_on_demand(run, monkeypatch):
 
     ran = run("fail", "--json")
 
-    assert ran.code == 70
-    assert ran.err.startswith("Traceback (most recent call last):")
-    assert "raise error" in ran.err
+    assert ran.returncode == 70
+    assert ran.stderr.startswith("Traceback (most recent call last):")
+    assert "raise error" in ran.stderr
     assert ran.json["error"] == {"kind": "KeyError", "message": "KeyError: 'gap'", "exit_code": 70}
 
 
@@ -219,8 +203,8 @@ def test_with_strict_plugins_the_broken_one_is_named(run, site, monkeypatch):
 
     ran = run("plugins", "list")
 
-    assert ran.code == 70
-    assert ran.err.startswith(
+    assert ran.returncode == 70
+    assert ran.stderr.startswith(
         "graspsense: internal error: ModuleNotFoundError: No module named 'no_such_driver'\n"
         "  while loading main of lab-broken 0.2\n"
     )
@@ -235,17 +219,17 @@ class TestCommandsOfPlugins:
 
         loader.installed().add(adding("say", say), "lab-a")
 
-        assert run("say", "hello").out == "hello\n"
-        assert run("lab-a/say", "hello").out == "hello\n"
-        assert "Did you mean 'say'?" in run("sya").err
+        assert run("say", "hello").stdout == "hello\n"
+        assert run("lab-a/say", "hello").stdout == "hello\n"
+        assert "Did you mean 'say'?" in run("sya").stderr
 
     def test_one_that_is_no_command_says_so(self, run):
         loader.installed().add(adding("say", print), "lab-a")
 
         ran = run("say")
 
-        assert ran.code == 2
-        assert ran.err == (
+        assert ran.returncode == 2
+        assert ran.stderr == (
             "graspsense: command 'say' of lab-a 0.1 cannot be used here: command_say:command is not a click command\n"
         )
 
@@ -255,8 +239,8 @@ class TestCommandsOfPlugins:
 
         ran = run("say")
 
-        assert ran.code == 2
-        assert ran.err == "graspsense: command 'say' is provided by lab-a and lab-b; write \"lab-a/say\"\n"
+        assert ran.returncode == 2
+        assert ran.stderr == "graspsense: command 'say' is provided by lab-a and lab-b; write \"lab-a/say\"\n"
 
 
 class TestPluginsList:
@@ -287,7 +271,7 @@ class TestPluginsList:
         monkeypatch.setattr(loader, "_current", site.discover(GRASPSENSE_DISABLED_PLUGINS="lab-off"))
 
         rows = {row["distribution"]: row for row in run("plugins", "list", "--json").json}
-        table = run("plugins", "list").out
+        table = run("plugins", "list").stdout
 
         broken = rows["lab-broken"]
         assert (broken["role"], broken["name"], broken["version"]) == (None, "main", "3.1")
@@ -303,9 +287,9 @@ class TestPluginsList:
         )
 
         shown = run("plugins", "show", "lab-broken")
-        assert shown.code == 0
-        assert "state        broken: ModuleNotFoundError" in shown.out
-        assert "import no_such_driver" in shown.out
+        assert shown.returncode == 0
+        assert "state        broken: ModuleNotFoundError" in shown.stdout
+        assert "import no_such_driver" in shown.stdout
         (status,) = run("plugins", "show", "lab-broken", "--json").json["plugins"]
         assert status["state"] == "broken"
 
@@ -314,15 +298,15 @@ class TestPluginsShow:
     def test_a_component_with_its_keys(self, run):
         ran = run("plugins", "show", "hybrid")
 
-        assert "controller graspsense/hybrid" in ran.out
-        assert "requires     gap in m, velocity in m/s, force_left in N, force_right in N\n" in ran.out
-        assert "    loop: 'open' | 'closed'; default \"open\"\n" in ran.out
+        assert "controller graspsense/hybrid" in ran.stdout
+        assert "requires     gap in m, velocity in m/s, force_left in N, force_right in N\n" in ran.stdout
+        assert "    loop: 'open' | 'closed'; default \"open\"\n" in ran.stdout
         assert (
             "    closing_speed_m_s: float; m/s; above 0; plausible 0.0001 to 0.2 m/s; default 0.01\n"
             "        Closing speed of the gap.\n"
-        ) in ran.out
-        assert "recording: str; must be given" in run("plugins", "show", "graspsense/replay").out
-        assert "p_first in m: gap at the first contact" in run("plugins", "show", "chitta").out
+        ) in ran.stdout
+        assert "recording: str; must be given" in run("plugins", "show", "graspsense/replay").stdout
+        assert "p_first in m: gap at the first contact" in run("plugins", "show", "chitta").stdout
 
     def test_json(self, run):
         (component,) = run("plugins", "show", "hybrid", "--json").json["components"]
@@ -355,17 +339,17 @@ class TestPluginsShow:
 
         ran = run("plugins", "show", "odd")
 
-        assert ran.code == 0
-        assert "not usable here: classifier 'odd' of lab-odd 0.2" in ran.out
-        assert "needs: pip install lab" in ran.out
+        assert ran.returncode == 0
+        assert "not usable here: classifier 'odd' of lab-odd 0.2" in ran.stdout
+        assert "needs: pip install lab" in ran.stdout
 
 
 class TestConfig:
     def test_show_prints_a_file_that_shows_the_same(self, run, tmp_path):
         first = run("config", "show", *REPLAY, "--seed", "3")
-        assert (first.code, first.err) == (0, "")
+        assert (first.returncode, first.stderr) == (0, "")
         file = tmp_path / "again.toml"
-        file.write_text(first.out)
+        file.write_text(first.stdout)
 
         again = run("config", "show", str(file), "--json").json
         asked = run("config", "show", *REPLAY, "--seed", "3", "--json").json
@@ -374,12 +358,13 @@ class TestConfig:
         assert asked["origins"]["run.seed"] == "--seed"
         assert asked["origins"]["controller.probing_force_n"].startswith("pipeline graspsense/default:")
         assert asked["origins"]["controller.ramp_s"] == "default"
-        assert "seed = 3                                  # --seed\n" in first.out
+        assert "seed = 3                                  # --seed\n" in first.stdout
 
     def test_show_takes_the_pipeline_either_way(self, run):
-        assert run("config", "show", "default", *REPLAY).out == run("config", "show", *REPLAY).out
+        assert run("config", "show", "default", *REPLAY).stdout == run("config", "show", *REPLAY).stdout
         assert (
-            run("config", "show", "--pipeline", "default", *REPLAY).out == run("config", "show", *REPLAY).out
+            run("config", "show", "--pipeline", "default", *REPLAY).stdout
+            == run("config", "show", *REPLAY).stdout
         )
 
     def test_json_has_no_infinity(self, run):
@@ -389,8 +374,8 @@ class TestConfig:
 
     def test_validate_says_yes_and_names_the_components(self, run):
         ran = run("config", "validate", *REPLAY)
-        assert (ran.code, ran.err) == (0, "")
-        assert ran.out == (
+        assert (ran.returncode, ran.stderr) == (0, "")
+        assert ran.stdout == (
             "default is valid: graspsense/replay 0.1.0, graspsense/hybrid 0.1.0, graspsense/chitta 0.1.0\n"
         )
         assert run("config", "validate", *REPLAY, "--json").json["valid"] is True
@@ -413,16 +398,16 @@ class TestConfig:
 
         ran = run("config", "validate", "--gripper", "deaf", "-o", "classifier.type=none", "--json")
 
-        assert ran.code == 2
+        assert ran.returncode == 2
         assert ran.json["error"]["kind"] == "WiringError"
-        assert "gripper lab-deaf/deaf does not have (it has: none)" in ran.err
+        assert "gripper lab-deaf/deaf does not have (it has: none)" in ran.stderr
 
 
 class TestDevices:
     def test_nobody_looks(self, run):
         ran = run("devices")
-        assert (ran.code, ran.err) == (0, "")
-        assert ran.out == "no installed plugin looks for devices (graspsense plugins list)\n"
+        assert (ran.returncode, ran.stderr) == (0, "")
+        assert ran.stdout == "no installed plugin looks for devices (graspsense plugins list)\n"
 
     def test_found_and_failed(self, run):
         class Looking:
@@ -444,9 +429,9 @@ class TestDevices:
         loader.installed().add(Looking(), "lab-b")
 
         ran = run("devices", "--timeout", "0.5")
-        assert ran.code == 0
-        assert ran.err == "lab-a could not look for its devices: OSError: no bus\n"
-        assert ran.out == (
+        assert ran.returncode == 0
+        assert ran.stderr == "lab-a could not look for its devices: OSError: no bus\n"
+        assert ran.stdout == (
             "GRIPPER  SERIAL  WHERE  STATE      ADVICE\nhand     42      bus 1  not ready  add a udev rule\n"
         )
         found = run("devices", "--timeout", "0.5", "--json").json
@@ -463,8 +448,8 @@ class TestDevices:
         assert found["failed"] == {"lab-a": "OSError: no bus"}
 
     def test_a_timeout_is_positive(self, run):
-        assert run("devices", "--timeout", "0").code == 2
-        assert run("devices", "--timeout", "nan").code == 2
+        assert run("devices", "--timeout", "0").returncode == 2
+        assert run("devices", "--timeout", "nan").returncode == 2
 
 
 class TestCompletion:
@@ -472,8 +457,8 @@ class TestCompletion:
     def test_the_script_calls_us_back(self, run, shell):
         ran = run("completion", shell)
 
-        assert ran.code == 0
-        assert f"_GRASPSENSE_COMPLETE={shell}_complete" in ran.out
+        assert ran.returncode == 0
+        assert f"_GRASPSENSE_COMPLETE={shell}_complete" in ran.stdout
 
     @pytest.mark.parametrize(
         ("words", "offered"),
@@ -489,7 +474,7 @@ class TestCompletion:
         monkeypatch.setenv("COMP_WORDS", words)
         monkeypatch.setenv("COMP_CWORD", str(len(words.split(" ")) - 1))
 
-        lines = run().out.split()
+        lines = run().stdout.split()
 
         assert [line.partition(",")[2] for line in lines] == offered
 

@@ -1,14 +1,13 @@
 """`graspsense collect` with an operator whose answers are written down."""
 
-import io
 import json
 import subprocess
 import sys
 from collections import Counter
 
 import pytest
+from commands import graspsense
 
-from graspsense.cli.main import main
 from graspsense.core.values.errors import ConfigError
 from graspsense.store.collecting import Collection, Wanted
 from graspsense.store.store import Store
@@ -16,31 +15,9 @@ from graspsense.store.store import Store
 PLAIN = ["-o", "classifier.type=none"]
 
 
-class Done:
-    def __init__(self, returncode, out, err):
-        self.returncode, self.stdout, self.stderr = returncode, out, err
-
-
-@pytest.fixture
-def graspsense(capsys, monkeypatch):
-    """Return a function that runs the command line with answers on what stands in for a terminal."""
-
-    def graspsense(*arguments, answers=""):
-        monkeypatch.setattr(sys, "stdin", io.StringIO(answers))
-        with pytest.raises(SystemExit) as ended:
-            main(arguments)
-        return Done(ended.value.code, *capsys.readouterr())
-
-    return graspsense
-
-
-@pytest.fixture
-def collect(graspsense):
-    def collect(folder, answers, labels="can:full_open,block", each=2, more=()):
-        command = ["collect", "--labels", labels, "--each", str(each), "--save", str(folder), *PLAIN, *more]
-        return graspsense(*command, "--json", answers=answers)
-
-    return collect
+def collect(folder, answers, labels="can:full_open,block", each=2, more=()):
+    command = ["collect", "--labels", labels, "--each", str(each), "--save", folder, *PLAIN, *more]
+    return graspsense(*command, "--json", answers=answers)
 
 
 def trials_in(folder):
@@ -49,7 +26,7 @@ def trials_in(folder):
 
 
 @pytest.mark.slow
-def test_it_prompts_counts_undoes_retakes_and_stops_when_everything_is_there(collect, tmp_path):
+def test_it_prompts_counts_undoes_retakes_and_stops_when_everything_is_there(tmp_path):
     done = collect(tmp_path / "t", "\nu\n\n\n?\nr\n\n\n")
     assert done.returncode == 0, done.stderr
     result = json.loads(done.stdout)
@@ -67,7 +44,7 @@ def test_it_prompts_counts_undoes_retakes_and_stops_when_everything_is_there(col
     assert "next: block  (1 of 2)" in done.stderr
 
 
-def test_a_fault_that_ends_no_grasp_is_told_with_each_trial(collect, tmp_path):
+def test_a_fault_that_ends_no_grasp_is_told_with_each_trial(tmp_path):
     frozen = ["--gripper", "pr2", "-o", "gripper.transport=emulated", "-o", "gripper.faults.freeze_cell=15"]
     done = collect(tmp_path / "t", "\n", labels="block", each=1, more=frozen)
     assert done.returncode == 0, done.stderr
@@ -79,7 +56,7 @@ def test_a_fault_that_ends_no_grasp_is_told_with_each_trial(collect, tmp_path):
 
 
 @pytest.mark.slow
-def test_classes_come_in_rounds_so_that_none_is_recorded_in_one_go(collect, tmp_path):
+def test_classes_come_in_rounds_so_that_none_is_recorded_in_one_go(tmp_path):
     collect(tmp_path / "t", "\n" * 9, labels="block,toy,can:full_open", each=3)
     labels = [label for _, label, _ in trials_in(tmp_path / "t")]
     for k in (0, 3, 6):
@@ -87,7 +64,7 @@ def test_classes_come_in_rounds_so_that_none_is_recorded_in_one_go(collect, tmp_
 
 
 @pytest.mark.slow
-def test_it_goes_on_where_it_was_with_new_draws(collect, tmp_path):
+def test_it_goes_on_where_it_was_with_new_draws(tmp_path):
     first = json.loads(collect(tmp_path / "t", "\n\nq\n").stdout)
     assert not first["complete"]
     second = json.loads(collect(tmp_path / "t", "\n\n\n\n").stdout)
@@ -101,7 +78,7 @@ def test_it_goes_on_where_it_was_with_new_draws(collect, tmp_path):
 
 
 @pytest.mark.slow
-def test_other_settings_are_refused_unless_told(collect, tmp_path):
+def test_other_settings_are_refused_unless_told(tmp_path):
     collect(tmp_path / "t", "\n")
     other = ["-o", "controller.probing_force_n=12"]
     done = collect(tmp_path / "t", "\n", more=other)
@@ -114,7 +91,7 @@ def test_other_settings_are_refused_unless_told(collect, tmp_path):
     assert len(trials_in(tmp_path / "t")) == 2
 
 
-def test_another_classifier_is_no_other_setting(collect, graspsense, tmp_path):
+def test_another_classifier_is_no_other_setting(tmp_path):
     collect(tmp_path / "t", "\n")
     command = ["collect", "--labels", "block,can:full_open", "--save", str(tmp_path / "t"), "-o"]
     done = graspsense(*command, "classifier.type=knn", answers="q\n")
@@ -193,7 +170,7 @@ def test_it_takes_its_answers_from_a_pipe(tmp_path):
     assert trials_in(tmp_path / "trials") == [(1, "block", None)]
 
 
-def test_a_label_that_the_simulator_does_not_know_is_told(collect, tmp_path):
+def test_a_label_that_the_simulator_does_not_know_is_told(tmp_path):
     done = collect(tmp_path / "t", "\n", labels="jar:full")
     assert done.returncode == 2
     assert "jar" in done.stderr
@@ -203,13 +180,13 @@ def test_a_label_that_the_simulator_does_not_know_is_told(collect, tmp_path):
     ("labels", "says"),
     [("", "nothing to collect"), ("block,block", "named twice"), ("a b", "is not a label")],
 )
-def test_labels_that_make_no_sense_are_told(collect, tmp_path, labels, says):
+def test_labels_that_make_no_sense_are_told(tmp_path, labels, says):
     done = collect(tmp_path / "t", "", labels=labels)
     assert done.returncode == 2
     assert says in done.stderr
 
 
-def test_nothing_there_counts_since_it_is_an_answer_of_the_gripper(collect, tmp_path):
+def test_nothing_there_counts_since_it_is_an_answer_of_the_gripper(tmp_path):
     done = collect(tmp_path / "t", "\n", labels="none", each=1)
     assert json.loads(done.stdout)["counts"] == {"none": 1}
 
@@ -242,7 +219,7 @@ def test_the_first_trials_are_collected_for_a_model_that_does_not_exist_yet(
     assert "note" not in graspsense("config", "validate", "mine.toml").stdout
 
 
-def test_the_advice_on_a_missing_model_fits_the_gripper(graspsense, tmp_path):
+def test_the_advice_on_a_missing_model_fits_the_gripper(tmp_path):
     real = graspsense(
         "run", "--gripper", "pr2", "-o", "classifier.type=knn", "-o", "classifier.model=mine.json"
     )
@@ -266,7 +243,7 @@ def held(folder):
 
 
 @pytest.mark.slow
-def test_an_emulated_pr2_grasps_what_the_label_says(collect, tmp_path):
+def test_an_emulated_pr2_grasps_what_the_label_says(tmp_path):
     done = collect(tmp_path / "t", "\n\n", each=1, more=EMULATED)
 
     assert done.returncode == 0, done.stderr
@@ -276,7 +253,7 @@ def test_an_emulated_pr2_grasps_what_the_label_says(collect, tmp_path):
     ]
 
 
-def test_a_label_of_an_individual_object_selects_this_object_on_an_emulated_pr2(collect, tmp_path):
+def test_a_label_of_an_individual_object_selects_this_object_on_an_emulated_pr2(tmp_path):
     done = collect(tmp_path / "t", "\n", labels="can:full_open#2", each=1, more=EMULATED)
 
     assert done.returncode == 0, done.stderr
@@ -285,7 +262,7 @@ def test_a_label_of_an_individual_object_selects_this_object_on_an_emulated_pr2(
 
 @pytest.mark.parametrize("gripper", [(), EMULATED], ids=["sim", "pr2"])
 @pytest.mark.parametrize("told", [("--object", "toy"), ("-o", "gripper.object=toy")], ids=["flag", "option"])
-def test_an_object_that_contradicts_a_label_is_refused(collect, tmp_path, gripper, told):
+def test_an_object_that_contradicts_a_label_is_refused(tmp_path, gripper, told):
     done = collect(tmp_path / "t", "\n", labels="block", more=(*gripper, *told))
 
     assert done.returncode == 2
@@ -293,7 +270,7 @@ def test_an_object_that_contradicts_a_label_is_refused(collect, tmp_path, grippe
     assert not (tmp_path / "t").exists()
 
 
-def test_an_object_from_a_file_can_have_any_label(collect, tmp_path):
+def test_an_object_from_a_file_can_have_any_label(tmp_path):
     scene = tmp_path / "mine.toml"
     scene.write_text('width_m = 0.05\n[[terms]]\ntype = "elastic"\nk1_n_m = 5000.0\n')
 
@@ -323,7 +300,7 @@ def test_a_gripper_that_cannot_be_told_takes_the_word_of_the_operator(tmp_path):
 SAVED = ("run", "--label", "block", "-o", "classifier.type=none", "--save")
 
 
-def test_run_into_a_store_with_other_settings_is_refused_before_the_grasp(graspsense, tmp_path):
+def test_run_into_a_store_with_other_settings_is_refused_before_the_grasp(tmp_path):
     folder = str(tmp_path / "t")
     assert graspsense(*SAVED, folder).returncode == 0
 
@@ -343,7 +320,7 @@ def test_run_into_a_store_with_other_settings_is_refused_before_the_grasp(grasps
 
 
 @pytest.mark.slow
-def test_what_is_grasped_and_what_changes_no_result_may_differ(graspsense, collect, tmp_path):
+def test_what_is_grasped_and_what_changes_no_result_may_differ(tmp_path):
     folder = str(tmp_path / "t")
     assert graspsense(*SAVED, folder).returncode == 0
 
@@ -353,7 +330,7 @@ def test_what_is_grasped_and_what_changes_no_result_may_differ(graspsense, colle
     assert collect(folder, "q\n").returncode == 0
 
 
-def test_collecting_into_a_store_of_runs_with_other_settings_is_refused(graspsense, collect, tmp_path):
+def test_collecting_into_a_store_of_runs_with_other_settings_is_refused(tmp_path):
     folder = str(tmp_path / "t")
     assert graspsense(*SAVED, folder).returncode == 0
 
@@ -378,7 +355,7 @@ def test_a_setting_that_is_newer_than_the_trial_had_its_default(tmp_path):
 
 
 @pytest.mark.parametrize("label", ["my can:full", "can:full open", "can#2 b"])
-def test_a_label_with_a_space_is_refused_with_the_reason(graspsense, tmp_path, label):
+def test_a_label_with_a_space_is_refused_with_the_reason(tmp_path, label):
     folder = str(tmp_path / "my store")
     for done in (
         graspsense("run", "--label", label, "--save", folder),
@@ -391,7 +368,7 @@ def test_a_label_with_a_space_is_refused_with_the_reason(graspsense, tmp_path, l
 
 
 @pytest.mark.slow
-def test_a_store_and_files_with_spaces_in_their_names_work_everywhere(graspsense, tmp_path, monkeypatch):
+def test_a_store_and_files_with_spaces_in_their_names_work_everywhere(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "my lab.toml").write_text('extends = "default"\n[classifier]\ntype = "none"\n')
     pipeline, store = ("--pipeline", "my lab.toml"), "my trials"
@@ -428,9 +405,7 @@ def test_a_store_and_files_with_spaces_in_their_names_work_everywhere(graspsense
 
 
 @pytest.mark.parametrize("label", ["nonsense:full", "can", "can:full_opn"])
-def test_an_object_that_the_gripper_does_not_know_is_refused_before_the_store_exists(
-    collect, tmp_path, label
-):
+def test_an_object_that_the_gripper_does_not_know_is_refused_before_the_store_exists(tmp_path, label):
     done = collect(tmp_path / "t", "\n\n", labels=f"block,{label}")
     assert done.returncode == 2
     assert f"object {label.partition(':')[0]!r}" in done.stderr or "no object named 'nonsense'" in done.stderr

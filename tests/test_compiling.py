@@ -321,6 +321,7 @@ def test_an_edited_helper_or_constant_of_another_module_is_noticed(tmp_path):
     assert run(main, tmp_path, **cache) == ["21.0 0"]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("_numba")
 def test_code_of_a_version_with_other_types_is_made_anew(tmp_path):
     """The code of the function stays the same, but the type of its argument has another name."""

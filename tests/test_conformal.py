@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 from attrs import evolve
+from commands import printed
 from test_evaluate import judged, labelled, learner
 
 from graspsense.core.components.registry import installed
@@ -344,25 +345,15 @@ def csv_file(tmp_path):
     return str(tmp_path / "t.csv")
 
 
-def called(capsys, *arguments):
-    from graspsense.cli.main import main
-
-    with pytest.raises(SystemExit) as ended:
-        main(arguments)
-    out, err = capsys.readouterr()
-    assert not ended.value.code, err
-    return out
-
-
 @pytest.mark.slow
-def test_the_commands_print_and_keep_the_sets(csv_file, tmp_path, capsys, monkeypatch):
+def test_the_commands_print_and_keep_the_sets(csv_file, tmp_path, monkeypatch):
     monkeypatch.setenv("COLUMNS", "300")
     model, given = str(tmp_path / "m.json"), ("--label", "label", "--instance", "bottle")
 
-    trained = called(capsys, "train", csv_file, *given, "--classifier", "knn", "--out", model)
-    listed = called(capsys, "predict", model, csv_file, *given)
-    asked = json.loads(called(capsys, "predict", model, csv_file, *given, "--json"))
-    measured = called(capsys, "evaluate", csv_file, *given, "--classifier", "knn")
+    trained = printed("train", csv_file, *given, "--classifier", "knn", "--out", model)
+    listed = printed("predict", model, csv_file, *given)
+    asked = json.loads(printed("predict", model, csv_file, *given, "--json"))
+    measured = printed("evaluate", csv_file, *given, "--classifier", "knn")
 
     assert "90 % for 2 of 2 labels (12 instances or more of each)" in trained
     assert "of the held-out trials are called unknown (false alarms)" in trained

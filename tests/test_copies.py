@@ -6,10 +6,10 @@ import json
 
 import numpy as np
 import pytest
+from commands import graspsense, printed
 from hypothesis import given
 from hypothesis import strategies as st
 
-from graspsense.cli.main import main
 from graspsense.core.learn.copies import apart_from, without_copies
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.values.errors import ConfigError
@@ -29,12 +29,6 @@ def labelled(values, labels=None, content=None):
         labels=tuple(labels or ["a", "b"] * (len(values) // 2) + ["a"] * (len(values) % 2)),
         content=content,
     )
-
-
-def command(words):
-    with pytest.raises(SystemExit) as ended:
-        main(words)
-    return ended.value.code
 
 
 def measured(trials=40, features=3, seed=0):
@@ -138,23 +132,25 @@ def table_of_noise(path, copies):
     return str(path)
 
 
-def test_doubling_the_lines_of_a_table_changes_no_rate(tmp_path, capsys):
+def test_doubling_the_lines_of_a_table_changes_no_rate(tmp_path):
     found = []
     for copies in (1, 2):
         path = table_of_noise(tmp_path / f"{copies}.csv", copies)
-        assert command(["evaluate", path, "--label", "object", "--json"]) == 0
-        found.append(json.loads(capsys.readouterr().out))
+        done = graspsense("evaluate", path, "--label", "object", "--json")
+        assert done.returncode == 0
+        found.append(json.loads(done.stdout))
     assert found[0]["headline"] == found[1]["headline"]
     assert any("copies" in note for note in found[1]["notes"])
 
 
-def test_each_grasp_that_run_saves_is_another_one_unless_a_seed_is_given(tmp_path, capsys):
+def test_each_grasp_that_run_saves_is_another_one_unless_a_seed_is_given(tmp_path):
     store = str(tmp_path / "s")
 
     def run(*words):
-        assert command(["run", "--save", store, "--label", "can:empty_open", "--json", *words]) == 0
-        said = capsys.readouterr()
-        return json.loads(said.out)["seed"], said.err
+        plain = ("-o", "classifier.type=none", "--label", "can:empty_open", "--json")
+        done = graspsense("run", "--save", store, *plain, *words)
+        assert done.returncode == 0
+        return done.json["seed"], done.stderr
 
     drawn = [run() for _ in range(3)]
     assert len({seed for seed, _ in drawn}) == 3
@@ -165,14 +161,14 @@ def test_each_grasp_that_run_saves_is_another_one_unless_a_seed_is_given(tmp_pat
     assert "1 trial is left out" in copies_said(trials)[0]
 
 
-def test_a_damaged_recording_and_its_recovered_copy_are_one_trial(tmp_path, capsys):
+def test_a_damaged_recording_and_its_recovered_copy_are_one_trial(tmp_path):
     folder = tmp_path / "s"
     for seed, label in enumerate(["can:empty_open", "odwalla:full_open"]):
-        assert command(["run", "--save", str(folder), "--label", label, "--seed", str(seed)]) == 0
+        printed("run", "--save", folder, "--label", label, "--seed", seed, "-o", "classifier.type=none")
     recording = sorted((folder / "recordings").glob("*.mcap"))[0]
     recording.write_bytes(recording.read_bytes()[:-200])
     copy = recover_file(recording, tmp_path / "copy.mcap").recording
-    assert command(["import", str(copy), "--label", "can:empty_open", "--save", str(folder)]) == 0
+    printed("import", copy, "--label", "can:empty_open", "--save", folder)
     trials = load_trials(f"store:{folder}")
     assert len(trials) == 2
     assert copies_said(trials)

@@ -7,11 +7,11 @@ import math
 
 import numpy as np
 import pytest
+from commands import graspsense
 from hypothesis import given
 from hypothesis import strategies as st
 from kept import keep
 
-from graspsense.cli.main import main
 from graspsense.core.files.csv_text import csv_text, text_of_cell
 from graspsense.core.learn.labelled import Labelled
 from graspsense.core.values.features import FeatureTable
@@ -90,12 +90,6 @@ def test_a_table_of_features_is_harmless_and_is_read_back_as_it_was(tmp_path):
     assert (back.table.values == labelled(labels).table.values).all()
 
 
-def exit_code(*arguments):
-    with pytest.raises(SystemExit) as ended:
-        main(arguments)
-    return ended.value.code
-
-
 @pytest.fixture
 def store(tmp_path):
     """Return a store with hostile labels, as an import of others' files can make one."""
@@ -113,7 +107,7 @@ def store(tmp_path):
 
 def test_an_exported_store_is_harmless_and_evaluates_as_the_store(store, tmp_path):
     out = tmp_path / "table.csv"
-    assert exit_code("export", str(store), "--to", str(out)) == 0
+    assert graspsense("export", str(store), "--to", str(out)).returncode == 0
     cells = cells_of(out.read_text())
     assert not any(map(runs, cells))
     assert "'=1+cmd|'/c calc'!A0#1" in cells
@@ -128,7 +122,7 @@ def test_a_label_forges_no_line_of_an_arff_file(tmp_path):
         for label in ("can\n1.0,2.0,forged", "a\r\n@data", "plain"):
             keep(store, label)
     out = tmp_path / "table.arff"
-    assert exit_code("export", str(tmp_path / "t"), "--to", str(out)) == 0
+    assert graspsense("export", str(tmp_path / "t"), "--to", str(out)).returncode == 0
     data = out.read_bytes().split(b"@data\n")[-1].splitlines()
     assert len(data) == 3
     assert all(line.count(b",") >= 2 for line in data)

@@ -94,13 +94,6 @@ def resealed(path, change):
     path.write_text(json.dumps({**content, "sha256": digest(content)}))
 
 
-def test_a_damaged_model_is_refused_or_answers(tmp_path):
-    files = [tmp_path / f"{name}.json" for name in KINDS]
-    for name, file in zip(KINDS, files, strict=True):
-        write_model(file, trained(name))
-    assert read_damaged(1, 3, 8, *files) == len(KINDS) * 3 * 8
-
-
 SOME = pytest.param((2, 40, 8), 300, marks=pytest.mark.slow, id="some")
 EVERY = pytest.param((0, 0, 0), 1000, marks=pytest.mark.long, id="every")
 
@@ -112,7 +105,7 @@ def test_damages_of_a_model_are_refused_or_answer(tmp_path, name, damages, least
     assert read_damaged(*damages, tmp_path / "m.json") >= least
 
 
-@pytest.mark.parametrize(("damages", "least"), [pytest.param((3, 20, 4), 60, id="few"), SOME, EVERY])
+@pytest.mark.parametrize(("damages", "least"), [pytest.param((3, 10, 3), 30, id="few"), SOME, EVERY])
 def test_damages_of_the_weights_of_a_network_are_refused_or_answer(tmp_path, damages, least):
     write_model(tmp_path / "m.json", trained("mlp", kept_as="weights"))
     assert read_damaged(*damages, tmp_path / "m.json") >= least

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 import wayward
+from commands import graspsense
 from hypothesis import given
 from hypothesis import strategies as st
 
-from graspsense.cli.main import main
 from graspsense.core.components.registry import IsolatedPlugins
 from graspsense.core.values.errors import ConfigError, UnknownName
 from graspsense.evaluation.over_seeds import OverSeeds, mean_difference
@@ -54,17 +54,6 @@ def file(tmp_path):
     return path
 
 
-@pytest.fixture
-def run(capsys):
-    def run(*arguments):
-        with pytest.raises(SystemExit) as ended:
-            main([str(one) for one in arguments])
-        out, err = capsys.readouterr()
-        return ended.value.code or 0, out, err
-
-    return run
-
-
 def results_in(folder):
     """Return what came of each task, without where and when."""
     found = {}
@@ -74,8 +63,8 @@ def results_in(folder):
     return found
 
 
-def test_an_experiment_is_a_file_and_ends_in_a_page(run, file, tmp_path):
-    code, out, _ = run("experiment", file, "--out", tmp_path / "out", "--executor", "serial", "--json")
+def test_an_experiment_is_a_file_and_ends_in_a_page(file, tmp_path):
+    code, out, _ = graspsense("experiment", file, "--out", tmp_path / "out", "--executor", "serial", "--json")
     found = json.loads(out)
 
     assert code == 0
@@ -176,16 +165,14 @@ def test_a_result_that_the_disk_has_counts_as_done_whenever_the_run_was_interrup
 
 
 @pytest.mark.parametrize("executor", ["serial", pytest.param("processes", marks=pytest.mark.slow)])
-def test_a_full_disk_ends_a_run_with_an_account_and_what_is_done_stays(
-    run, file, tmp_path, mounted, executor
-):
+def test_a_full_disk_ends_a_run_with_an_account_and_what_is_done_stays(file, tmp_path, mounted, executor):
     command = ("experiment", file, "--executor", executor, "--workers", 1)
-    run(*command, "--out", tmp_path / "whole")
+    graspsense(*command, "--out", tmp_path / "whole")
     files = len(list((tmp_path / "whole").rglob("*"))) + 2
     # Two of the four results, and no page: a disk that has run out of files is as full as one out of bytes.
     out = mounted(f"size=4m,nr_inodes={files - 3}") / "out"
 
-    code, told, err = run(*command, "--out", out)
+    code, told, err = graspsense(*command, "--out", out)
     assert code == 1
     assert "4 tasks: 2 done now, 2 not done" in told
     assert "stopped: " in told
@@ -196,22 +183,22 @@ def test_a_full_disk_ends_a_run_with_an_account_and_what_is_done_stays(
     assert len(kept) == 2
     assert not list(out.rglob("*.part"))
 
-    code, told, err = run(*command, "--out", out, "--resume")
+    code, told, err = graspsense(*command, "--out", out, "--resume")
     assert (code, told) == (2, "")
     assert "cannot be written: No space left on device" in err
     assert results_in(out) == kept
 
     mounted(f"size=4m,nr_inodes={files}", remount=True)
-    code, told, _ = run(*command, "--out", out, "--resume")
+    code, told, _ = graspsense(*command, "--out", out, "--resume")
     assert code == 0
     assert "2 done now, 2 kept from before" in told
     assert results_in(out) == results_in(tmp_path / "whole")
 
 
 @pytest.mark.slow
-def test_a_task_that_fails_is_a_result_with_a_reason(run, file, tmp_path):
+def test_a_task_that_fails_is_a_result_with_a_reason(file, tmp_path):
     file.write_text(EXPERIMENT.replace('"judge.folds" = [2, 4]', '"judge.targets" = [["both"], ["state"]]'))
-    code, out, _ = run("experiment", file, "--out", tmp_path / "out", "--executor", "serial")
+    code, out, _ = graspsense("experiment", file, "--out", tmp_path / "out", "--executor", "serial")
 
     assert code == 1
     assert "4 tasks: 2 done now, 2 failed" in out
@@ -422,14 +409,14 @@ def test_an_experiment_is_not_a_part_of_itself(tmp_path):
         read_experiment(str(tmp_path / "a.toml"))
 
 
-def test_an_experiment_does_not_write_into_a_store(run, file, tmp_path):
+def test_an_experiment_does_not_write_into_a_store(file, tmp_path):
     Store.open(tmp_path / "trials").close()
-    code, _, err = run("experiment", file, "--out", tmp_path / "trials", "--executor", "serial")
+    code, _, err = graspsense("experiment", file, "--out", tmp_path / "trials", "--executor", "serial")
 
     assert code == 2
     assert "is a store of trials" in err
     assert not (tmp_path / "trials" / "report.html").exists()
-    assert run("experiment", file, "--out", tmp_path / "trials", "--dry-run")[::2] == (2, err)
+    assert graspsense("experiment", file, "--out", tmp_path / "trials", "--dry-run")[::2] == (2, err)
 
 
 def test_a_slip_in_the_number_of_seeds_is_refused_at_once(file):
@@ -448,8 +435,8 @@ def test_more_folds_than_trials_are_refused_before_any_task(file, tmp_path):
 
 
 @pytest.mark.slow
-def test_what_there_is(run):
-    code, out, _ = run("experiment", "--json")
+def test_what_there_is():
+    code, out, _ = graspsense("experiment", "--json")
 
     assert code == 0
     assert {one["name"] for one in json.loads(out)} == set(shipped())
@@ -507,11 +494,11 @@ def compared(weak, strong):
 
 
 @pytest.mark.slow
-def test_experiments_are_compared_on_one_page(compared, run, tmp_path):
+def test_experiments_are_compared_on_one_page(compared, tmp_path):
     page = tmp_path / "page.html"
     folders = [compared / name for name in ("weak", "strong", "more")]
-    code, out, _ = run("experiment", "compare", *folders, "--out", page)
-    _, told, _ = run("experiment", "compare", *folders, "--out", page, "--json")
+    code, out, _ = graspsense("experiment", "compare", *folders, "--out", page)
+    _, told, _ = graspsense("experiment", "compare", *folders, "--out", page, "--json")
     found = json.loads(told)
 
     assert code == 0
@@ -536,10 +523,10 @@ def test_experiments_are_compared_on_one_page(compared, run, tmp_path):
     assert "closing_speed_m_s" not in text
 
 
-def test_each_case_is_compared_with_that_of_the_same_name(file, run, tmp_path):
-    run("experiment", file, "--out", tmp_path / "a", "--executor", "serial")
-    run("experiment", file, "--out", tmp_path / "b", "--executor", "serial", "-o", "seeds=1")
-    _, told, _ = run(
+def test_each_case_is_compared_with_that_of_the_same_name(file, tmp_path):
+    graspsense("experiment", file, "--out", tmp_path / "a", "--executor", "serial")
+    graspsense("experiment", file, "--out", tmp_path / "b", "--executor", "serial", "-o", "seeds=1")
+    _, told, _ = graspsense(
         "experiment", "compare", tmp_path / "a", tmp_path / "b", "--out", tmp_path / "c.html", "--json"
     )
     found = json.loads(told)
@@ -555,12 +542,12 @@ def test_each_case_is_compared_with_that_of_the_same_name(file, run, tmp_path):
         assert one["verdict"] == "not shown to differ"
 
 
-def test_a_report_of_results_with_other_settings_says_what_happened_and_what_to_do(strong, run, tmp_path):
+def test_a_report_of_results_with_other_settings_says_what_happened_and_what_to_do(strong, tmp_path):
     changed = tmp_path / "changed"
     subprocess.run(["cp", "-r", strong, changed], check=True)
     text = (changed / "experiment.toml").read_text()
     (changed / "experiment.toml").write_text(text.replace("trials = 2", "trials = 1"))
-    code, _, err = run("report", changed)
+    code, _, err = graspsense("report", changed)
 
     assert code == 2
     assert "has results, but none for the settings that it has now" in err
@@ -568,7 +555,7 @@ def test_a_report_of_results_with_other_settings_says_what_happened_and_what_to_
     assert not (changed / "report.html").exists()
 
 
-def test_what_cannot_be_compared_is_refused_in_one_line(weak, strong, run, tmp_path):
+def test_what_cannot_be_compared_is_refused_in_one_line(weak, strong, tmp_path):
     page = tmp_path / "c.html"
     old, changed = tmp_path / "old", tmp_path / "changed"
     for copy in (old, changed):
@@ -587,7 +574,7 @@ def test_what_cannot_be_compared_is_refused_in_one_line(weak, strong, run, tmp_p
         ([weak, old], "no_such_key"),
         ([weak, changed], "its results do not belong to its settings here. Run it again: run strong"),
     ):
-        code, _, err = run("experiment", "compare", *arguments, "--out", page)
+        code, _, err = graspsense("experiment", "compare", *arguments, "--out", page)
         assert code == 2, arguments
         assert reason in err
         assert "Traceback" not in err

@@ -8,10 +8,10 @@ import tomllib
 import numpy as np
 import pytest
 from attrs import evolve
+from commands import graspsense, printed
 from kept import ended, frame, keep, pads, write_recording
 from scipy.io import arff
 
-from graspsense.cli.main import main
 from graspsense.core.components.config import select_component
 from graspsense.core.values.errors import ConfigError, PluginUnavailable
 from graspsense.evaluation.evaluate import evaluate
@@ -37,19 +37,13 @@ def folder(tmp_path):
     return tmp_path / "trials"
 
 
-@pytest.fixture
-def export(capsys):
-    def export(source, target):
-        with pytest.raises(SystemExit) as ended:
-            main(["export", str(source), "--to", str(target)])
-        _, err = capsys.readouterr()
-        assert "Traceback" not in err
-        return ended.value.code, err
-
-    return export
+def export(source, target):
+    code, _, err = graspsense("export", source, "--to", target)
+    assert "Traceback" not in err
+    return code, err
 
 
-def test_the_table_as_csv(folder, export, tmp_path):
+def test_the_table_as_csv(folder, tmp_path):
     assert export(folder, tmp_path / "t.csv")[0] == 0
     with (tmp_path / "t.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
@@ -58,7 +52,7 @@ def test_the_table_as_csv(folder, export, tmp_path):
     assert (rows[1]["f_steady [N]"], rows[2]["label"], rows[3]["outcome"]) == ("", "", "aborted")
 
 
-def test_a_csv_of_ours_is_a_table_to_learn_from(folder, export, tmp_path):
+def test_a_csv_of_ours_is_a_table_to_learn_from(folder, tmp_path):
     with Store.open(folder) as store:
         set_aside(store, [3], "no label")
     export(folder, tmp_path / "t.csv")
@@ -69,7 +63,7 @@ def test_a_csv_of_ours_is_a_table_to_learn_from(folder, export, tmp_path):
     assert found.table.units == ("m",)
 
 
-def test_an_exported_csv_comes_back_as_the_trials_of_the_store(folder, export, tmp_path):
+def test_an_exported_csv_comes_back_as_the_trials_of_the_store(folder, tmp_path):
     export(folder, tmp_path / "t.csv")
     found, stored = read_labelled(tmp_path / "t.csv", "label"), labelled_store(str(folder))
 
@@ -80,7 +74,7 @@ def test_an_exported_csv_comes_back_as_the_trials_of_the_store(folder, export, t
     assert found.provenance["simulated"] == stored.provenance["simulated"]
 
 
-def test_an_empty_column_of_an_export_is_not_a_feature(tmp_path, export):
+def test_an_empty_column_of_an_export_is_not_a_feature(tmp_path):
     with Store.open(tmp_path / "trials") as store:
         for k in range(4):
             keep(store, ("can:full", "can:empty")[k % 2], None, values=(0.05 + 0.01 * (k % 2), None))
@@ -91,7 +85,7 @@ def test_an_empty_column_of_an_export_is_not_a_feature(tmp_path, export):
     assert found.instances is None
 
 
-def test_the_table_as_arff_is_read_by_scipy(folder, export, tmp_path):
+def test_the_table_as_arff_is_read_by_scipy(folder, tmp_path):
     with Store.open(folder) as store:
         set_aside(store, [3], "no label")
     assert export(folder, tmp_path / "t.arff")[0] == 0
@@ -102,7 +96,7 @@ def test_the_table_as_arff_is_read_by_scipy(folder, export, tmp_path):
     assert data["label"][0] == b"can:full_open"
 
 
-def test_the_table_as_npz(folder, export, tmp_path):
+def test_the_table_as_npz(folder, tmp_path):
     assert export(folder, tmp_path / "t.npz")[0] == 0
     with np.load(tmp_path / "t.npz", allow_pickle=False) as found:
         assert found["features"].tolist() == ["p_first", "f_steady"]
@@ -111,7 +105,7 @@ def test_the_table_as_npz(folder, export, tmp_path):
         assert found["label"].tolist() == ["can:full_open", "can:it's open", "", "can:full_open"]
 
 
-def test_one_grasp_tick_by_tick(folder, export, tmp_path):
+def test_one_grasp_tick_by_tick(folder, tmp_path):
     for ending in ("csv", "npz", "mcap", "toml"):
         assert export(f"{folder}#1", tmp_path / f"one.{ending}")[0] == 0
     with (tmp_path / "one.csv").open(newline="") as file:
@@ -133,7 +127,7 @@ def test_one_grasp_tick_by_tick(folder, export, tmp_path):
     assert export(recording, tmp_path / "again.npz")[0] == 0
 
 
-def test_nothing_is_ever_overwritten(folder, export, tmp_path):
+def test_nothing_is_ever_overwritten(folder, tmp_path):
     (tmp_path / "t.csv").write_text("mine")
     code, err = export(folder, tmp_path / "t.csv")
     assert (code, (tmp_path / "t.csv").read_text()) == (2, "mine")
@@ -143,7 +137,7 @@ def test_nothing_is_ever_overwritten(folder, export, tmp_path):
 @pytest.mark.parametrize(
     ("source", "target"), [("", "t.xlsx"), ("", "t.mcap"), ("#1", "t.arff"), ("#9", "t.csv")]
 )
-def test_what_cannot_be_written_is_told(folder, export, tmp_path, source, target):
+def test_what_cannot_be_written_is_told(folder, tmp_path, source, target):
     code, err = export(f"{folder}{source}", tmp_path / target)
     assert code == 2
     assert "can be written as" in err or "has no trial 9" in err
@@ -158,7 +152,7 @@ def test_without_pyarrow_parquet_says_what_to_install(folder, tmp_path, monkeypa
         write_parquet(tmp_path / "t.parquet", trial_table(folder))
 
 
-def test_parquet_is_read_by_pyarrow(folder, export, tmp_path):
+def test_parquet_is_read_by_pyarrow(folder, tmp_path):
     parquet = pytest.importorskip("pyarrow.parquet", reason="needs the extra parquet")
     assert export(folder, tmp_path / "t.parquet")[0] == 0
     table = parquet.read_table(tmp_path / "t.parquet")
@@ -208,7 +202,7 @@ def a_store_of_everything(folder):
         keep(store, "can:full", "can#1", ticks=9, complete=False)
 
 
-def test_evaluate_gives_the_same_figures_for_a_store_and_its_export(export, tmp_path):
+def test_evaluate_gives_the_same_figures_for_a_store_and_its_export(tmp_path):
     folder = tmp_path / "trials"
     a_store_of_everything(folder)
     assert export(folder, tmp_path / "t.csv")[0] == 0
@@ -225,7 +219,7 @@ def test_evaluate_gives_the_same_figures_for_a_store_and_its_export(export, tmp_
     assert found == stored
 
 
-def test_an_export_of_an_earlier_version_still_opens(folder, export, tmp_path):
+def test_an_export_of_an_earlier_version_still_opens(folder, tmp_path):
     export(folder, tmp_path / "t.csv")
     with (tmp_path / "t.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
@@ -241,46 +235,37 @@ def test_an_export_of_an_earlier_version_still_opens(folder, export, tmp_path):
 
 
 @pytest.mark.parametrize("ending", ["csv", "npz", "parquet"])
-def test_the_table_of_a_store_is_no_grasp_to_import(folder, tmp_path, capsys, ending):
+def test_the_table_of_a_store_is_no_grasp_to_import(folder, tmp_path, ending):
     if ending == "parquet":
         pytest.importorskip("pyarrow.parquet", reason="needs the extra parquet")
-    for command in (
-        ["export", str(folder), "--to", str(tmp_path / f"t.{ending}")],
-        ["import", str(tmp_path / f"t.{ending}"), "--save", str(tmp_path / "other")],
-    ):
-        with pytest.raises(SystemExit) as ended:
-            main(command)
-    assert ended.value.code == 2
-    err = capsys.readouterr().err
+    export(folder, tmp_path / f"t.{ending}")
+    code, _, err = graspsense("import", tmp_path / f"t.{ending}", "--save", tmp_path / "other")
+    assert code == 2
     assert f"t.{ending} is the table of a store, with one row for each grasp" in err
     assert f"graspsense export DIR#12 --to FILE.{ending}" in err
 
 
-def test_the_table_of_a_store_is_learned_from_as_the_message_says(folder, export, tmp_path, capsys):
+def test_the_table_of_a_store_is_learned_from_as_the_message_says(folder, tmp_path):
     assert export(folder, tmp_path / "t.csv")[0] == 0
-    with pytest.raises(SystemExit):
-        main(["import", str(tmp_path / "t.csv"), "--save", str(tmp_path / "other")])
-    command = capsys.readouterr().err.partition("graspsense train ")[2].partition(". ")[0]
+    refused = graspsense("import", tmp_path / "t.csv", "--save", tmp_path / "other")
+    command = refused.stderr.partition("graspsense train ")[2].partition(". ")[0]
     model = tmp_path / "model.json"
     words = {"FILE.csv": str(tmp_path / "t.csv"), "MODEL.json": str(model)}
-    with pytest.raises(SystemExit) as ended:
-        main(["train", *(words.get(word, word) for word in command.split())])
-    assert ended.value.code == 0
+    printed("train", *(words.get(word, word) for word in command.split()))
     assert model.exists()
 
 
 @pytest.mark.parametrize("command", ["train", "evaluate"])
-def test_a_table_of_arrays_is_refused_as_trials(folder, export, tmp_path, capsys, command):
+def test_a_table_of_arrays_is_refused_as_trials(folder, tmp_path, command):
     table = tmp_path / "t.npz"
     assert export(folder, table)[0] == 0
-    with pytest.raises(SystemExit) as ended:
-        main([command, str(table), *(["--out", str(tmp_path / "m.json")] if command == "train" else [])])
-    assert ended.value.code == 2
-    assert "name the store as store:DIR, or a table of it as FILE.csv" in capsys.readouterr().err
+    done = graspsense(command, table, *(["--out", tmp_path / "m.json"] if command == "train" else []))
+    assert done.returncode == 2
+    assert "name the store as store:DIR, or a table of it as FILE.csv" in done.stderr
 
 
 @pytest.mark.parametrize("ending", ["npz", "parquet", "NPZ", "PARQUET"])
-def test_an_exported_grasp_is_imported_without_a_kind_before_its_name(folder, export, tmp_path, ending):
+def test_an_exported_grasp_is_imported_without_a_kind_before_its_name(folder, tmp_path, ending):
     if ending.lower() == "parquet":
         pytest.importorskip("pyarrow.parquet", reason="needs the extra parquet")
     assert export(f"{folder}#1", tmp_path / f"one.{ending.lower()}")[0] == 0

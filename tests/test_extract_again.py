@@ -6,9 +6,9 @@ import json
 import re
 
 import pytest
+from commands import graspsense
 from kept import frame, keep
 
-from graspsense.cli.main import main
 from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.sources.features_csv import read_labelled
 from graspsense.store.dataset import labelled_store, read_dataset
@@ -22,17 +22,6 @@ def folder(tmp_path):
         for k in range(6):
             keep(store, ("can:full", "can:empty")[k % 2], f"can#{k}", grasp=k)
     return str(tmp_path / "trials")
-
-
-@pytest.fixture
-def run(capsys):
-    def command(*arguments):
-        with pytest.raises(SystemExit) as ended:
-            main(list(map(str, arguments)))
-        out, err = capsys.readouterr()
-        return ended.value.code, out, err
-
-    return command
 
 
 def gap_at(force_n):
@@ -106,10 +95,10 @@ def test_a_lost_recording_is_told(folder):
         labelled_store(folder, ["features.force=left"])
 
 
-def test_the_command_compares_and_keeps(folder, run, tmp_path):
+def test_the_command_compares_and_keeps(folder, tmp_path):
     kept = tmp_path / "again.csv"
     arguments = ("features", f"store:{folder}", "-o", "controller.contact_force_n=2", "--keep", kept)
-    code, out, err = run(*arguments, "--json")
+    code, out, err = graspsense(*arguments, "--json")
     assert code == 0, err
     told = json.loads(out)
     # The left pad reaches 1.19 N at most.
@@ -124,27 +113,29 @@ def test_the_command_compares_and_keeps(folder, run, tmp_path):
         }
     ]
     assert kept.read_text().startswith("label,instance,order,p_first [m]")
-    code, _, err = run(*arguments)
+    code, _, err = graspsense(*arguments)
     assert (code, "already exists" in err) == (2, True)
-    code, out, _ = run(*arguments[:4], "--overwrite", "--keep", kept, "-o", "controller.contact_force_n=0.2")
+    code, out, _ = graspsense(
+        *arguments[:4], "--overwrite", "--keep", kept, "-o", "controller.contact_force_n=0.2"
+    )
     assert code == 0
     assert "6 of 6" in out
     assert read_labelled(kept, "label").table.columns(["p_first"]).values[0, 0] == gap_at(0.2)
 
 
-def test_a_store_is_asked_for(folder, run, tmp_path):
-    code, _, err = run("features", tmp_path / "none", "-o", "features.force=left")
+def test_a_store_is_asked_for(folder, tmp_path):
+    code, _, err = graspsense("features", tmp_path / "none", "-o", "features.force=left")
     assert (code, "there is no store" in err) == (2, True)
-    assert run("features", folder, "-o", "features.force=left")[0] == 0
+    assert graspsense("features", folder, "-o", "features.force=left")[0] == 0
 
 
-def test_train_uses_the_features_of_its_options(folder, run, tmp_path):
+def test_train_uses_the_features_of_its_options(folder, tmp_path):
     out = tmp_path / "m.json"
     options = ("-o", "features.contact_force_n=0.2", "-o", "classifier.min_leaf=1", "--classifier", "tree")
-    code, _, err = run("train", f"store:{folder}", "--out", out, *options)
+    code, _, err = graspsense("train", f"store:{folder}", "--out", out, *options)
     assert code == 0, err
     assert json.loads(out.read_text())["provenance"]["settings"]["features"]["contact_force_n"] == 0.2
-    code, _, err = run(
+    code, _, err = graspsense(
         "train", f"store:{folder}", "--out", out, "--overwrite", "-o", "gripper.object=can:full"
     )
     assert code == 2

@@ -9,10 +9,10 @@ import warnings
 import numpy as np
 import pytest
 from attrs import evolve
+from commands import graspsense
 from test_classifiers import NAMES, UNITS, trials
 from test_damaged_models import KINDS, labelled, trained
 
-from graspsense.cli.main import main
 from graspsense.core.learn.target_value import TargetValue
 from graspsense.core.values.errors import DataDamaged
 from graspsense.core.values.features import UNKNOWN, Features, FeatureTable
@@ -72,8 +72,8 @@ def test_features_of_any_usual_size_are_learned(name, factor):
 
 
 @pytest.fixture
-def tables(tmp_path, capsys):
-    """A table to learn from, tables with one extreme cell, and a command line."""
+def table(tmp_path):
+    """A table to learn from, tables with one extreme cell."""
     rng = np.random.default_rng(0)
     rows = [f"{'ab'[i % 2]},{i % 2 + 0.1 * rng.normal():.4f},{rng.normal():.4f}" for i in range(24)]
 
@@ -85,34 +85,27 @@ def tables(tmp_path, capsys):
         path.write_text("\n".join(lines) + "\n")
         return path
 
-    def run(*arguments):
-        with pytest.raises(SystemExit) as ended:
-            main([str(argument) for argument in arguments])
-        out, err = capsys.readouterr()
-        return ended.value.code or 0, out, err
-
-    return table, run
+    return table
 
 
 @pytest.mark.filterwarnings("error::RuntimeWarning")
 @pytest.mark.parametrize("name", ["c45", pytest.param("svm", marks=pytest.mark.slow)])
-def test_commands_answer_or_name_the_column(tables, tmp_path, name):
-    table, run = tables
+def test_commands_answer_or_name_the_column(table, tmp_path, name):
     model = tmp_path / "m.json"
     train = ("train", "--label", "what", "--classifier", name, "--overwrite", "--out", model)
     for cell in ("1e308", "-1e308", "inf", "1e400", "-inf"):
         for command in (train, ("evaluate", "--label", "what", "--classifier", name)):
-            code, _, err = run(*command, table(cell))
+            code, _, err = graspsense(*command, table(cell))
             assert code == 5
             assert "width" in err
-    assert run(*train, table("5e-324"))[0] == 0
+    assert graspsense(*train, table("5e-324"))[0] == 0
     for cell in ("1e308", "-1e308"):
-        code, out, _ = run("predict", model, table(cell), "--json")
+        code, out, _ = graspsense("predict", model, table(cell), "--json")
         assert code == 0
         said = json.loads(out)["predictions"][6]
         assert said["label"] == UNKNOWN
         assert sum(said["probabilities"].values()) == pytest.approx(1.0)
-    assert run("predict", model, table("inf"))[0] == 5
+    assert graspsense("predict", model, table("inf"))[0] == 5
 
 
 @pytest.mark.filterwarnings("error::RuntimeWarning")

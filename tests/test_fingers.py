@@ -287,6 +287,7 @@ def test_features_may_require_the_force_of_a_finger(grasped):
     assert settings.features.create().extract(trial.trace).values == (trial.trace.force_left_n.max(),)
 
 
+@pytest.mark.slow
 def test_a_hand_with_three_fingers_conforms(grasped):
     _, _, _, plugins = grasped
     report = Examined((Subject(component=plugins.find("sensor-backend", "jaws")),)).report()

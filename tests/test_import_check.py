@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from commands import graspsense
 from scipy.io import savemat
 
-from graspsense.cli.main import main
 from graspsense.sources.channel_facts import channel_facts
 from graspsense.sources.manifest.reader import read_recordings
 
@@ -18,13 +18,6 @@ N = 300
 T_S = np.arange(N) * 0.01
 GAP_MM = np.where(T_S < 1.0, 60.0 - 10.0 * T_S, 50.0)
 FORCE_N = np.where((T_S > 1.0) & (T_S < 1.5) | (T_S > 2.0) & (T_S < 2.5), 8.0, 0.1 * (T_S % 0.02 > 0.01))
-
-
-def run(capsys, *arguments):
-    with pytest.raises(SystemExit) as ended:
-        main([str(one) for one in arguments])
-    out, err = capsys.readouterr()
-    return ended.value.code, out, err
 
 
 def table(path, columns):
@@ -41,13 +34,13 @@ def test_the_facts_of_a_channel_are_those_of_its_samples():
     assert (facts.longest_gap_s, facts.age_s) == (pytest.approx(0.5), pytest.approx(1.2))
 
 
-def test_check_on_a_table_tells_each_channel_and_draws_its_squeezes(tmp_path, capsys):
+def test_check_on_a_table_tells_each_channel_and_draws_its_squeezes(tmp_path):
     pytest.importorskip("matplotlib", reason="needs the extra plot")
     table(
         tmp_path / "jar.csv", {"t (ms)": T_S * 1e3, "pos (mm)": GAP_MM, "F (N)": FORCE_N, "still": np.ones(N)}
     )
-    code, out, err = run(
-        capsys, "import", tmp_path / "jar.csv", "--check", "--json", "--plot", tmp_path / "x.png"
+    code, out, err = graspsense(
+        "import", tmp_path / "jar.csv", "--check", "--json", "--plot", tmp_path / "x.png"
     )
     assert code == 0, err
     (found,) = json.loads(out)
@@ -59,12 +52,12 @@ def test_check_on_a_table_tells_each_channel_and_draws_its_squeezes(tmp_path, ca
     assert len(found["squeezes"]) == 2
     assert found["squeezes"][0] == pytest.approx([1.01, 1.49])
     assert (tmp_path / "x.png").stat().st_size > 5000
-    code, out, _ = run(capsys, "import", tmp_path / "jar.csv", "--check", "--plot", tmp_path / "x.png")
+    code, out, _ = graspsense("import", tmp_path / "jar.csv", "--check", "--plot", tmp_path / "x.png")
     assert code == 0
     assert all(word in out for word in ("Resolution", "Age, s", "2 in F (N)", "t (ms)' [ms]"))
 
 
-def test_check_on_a_bag_shows_a_topic_that_died(tmp_path, capsys):
+def test_check_on_a_bag_shows_a_topic_that_died(tmp_path):
     pytest.importorskip("rosbags", reason="needs the extra ros")
     from rosbags.rosbag1 import Writer
     from rosbags.typesys import Stores, get_typestore
@@ -81,8 +74,8 @@ def test_check_on_a_bag_shows_a_topic_that_died(tmp_path, capsys):
                 if k % every == 0 and (name == "/hand/gap" or t_s < 1.2):
                     message = store.serialize_ros1(store.types[kind](float(value)), kind)
                     writer.write(topics[name], 10**18 + round(t_s * 1e9), message)
-    code, out, err = run(
-        capsys, "import", tmp_path / "jar.bag", "--check", "--json", "--plot", tmp_path / "x.png"
+    code, out, err = graspsense(
+        "import", tmp_path / "jar.bag", "--check", "--json", "--plot", tmp_path / "x.png"
     )
     assert code == 0, err
     by_name = {one["name"]: one for one in json.loads(out)[0]["channels"]}
@@ -91,13 +84,13 @@ def test_check_on_a_bag_shows_a_topic_that_died(tmp_path, capsys):
     assert by_name["/hand/force.data"]["age_s"] > 1.5
 
 
-def test_check_of_a_manifest_tells_each_channel(tmp_path, capsys):
+def test_check_of_a_manifest_tells_each_channel(tmp_path):
     table(tmp_path / "jar_1.csv", {"t": T_S, "pos": GAP_MM, "F": FORCE_N})
     (tmp_path / "m.toml").write_text(
         'files = "{label}_{order:d}.csv"\ntime = "t"\ngap = "pos [mm]"\nforce = "F"\n'
     )
-    code, out, err = run(
-        capsys, "import", tmp_path / "m.toml", "--check", "--json", "--plot", tmp_path / "x.png"
+    code, out, err = graspsense(
+        "import", tmp_path / "m.toml", "--check", "--json", "--plot", tmp_path / "x.png"
     )
     assert code == 0, err
     by_name = {one["name"]: one for one in json.loads(out)["measured"]}
@@ -259,13 +252,11 @@ RIGHT = {
 
 
 @pytest.mark.parametrize("make", RIGHT, ids=lambda make: make.__name__)
-def test_at_least_half_of_a_suggested_manifest_is_right_and_nothing_is_wrong_in_silence(
-    make, tmp_path, capsys
-):
+def test_at_least_half_of_a_suggested_manifest_is_right_and_nothing_is_wrong_in_silence(make, tmp_path):
     folder = tmp_path / "set"
     make(folder)
     place = folder / "m.toml"
-    code, out, err = run(capsys, "import", folder, "--suggest", place)
+    code, out, err = graspsense("import", folder, "--suggest", place)
     assert code == 0, err
     text = place.read_text()
     assert text.strip() in out
@@ -282,7 +273,7 @@ def test_at_least_half_of_a_suggested_manifest_is_right_and_nothing_is_wrong_in_
     assert not [one.error for one in found if hasattr(one, "error")]
 
 
-def test_what_the_file_states_is_not_questioned(tmp_path, capsys):
+def test_what_the_file_states_is_not_questioned(tmp_path):
     for name in ("jar_1", "jar_2", "can_1"):
         table(
             tmp_path / f"{name}.csv",
@@ -290,7 +281,7 @@ def test_what_the_file_states_is_not_questioned(tmp_path, capsys):
         )
     (tmp_path / "README.txt").write_text("a text")
     place = tmp_path / "described.toml"
-    code, _, err = run(capsys, "import", tmp_path, "--suggest", place)
+    code, _, err = graspsense("import", tmp_path, "--suggest", place)
     assert code == 0, err
     lines = [line for line in place.read_text().splitlines() if not line.startswith("#")]
     assert [line for line in lines if "check" in line] == [lines[0]]  # the names of files state nothing
@@ -302,22 +293,22 @@ def test_what_the_file_states_is_not_questioned(tmp_path, capsys):
     ]
 
 
-def test_a_manifest_is_not_written_over_another_one(tmp_path, capsys):
+def test_a_manifest_is_not_written_over_another_one(tmp_path):
     table(tmp_path / "jar_1.csv", {"t": T_S, "pos": GAP_MM, "F": FORCE_N})
     (tmp_path / "m.toml").write_text("mine")
-    assert run(capsys, "import", tmp_path, "--suggest", tmp_path / "m.toml")[0] == 2
+    assert graspsense("import", tmp_path, "--suggest", tmp_path / "m.toml")[0] == 2
     assert (tmp_path / "m.toml").read_text() == "mine"
-    assert run(capsys, "import", tmp_path / "jar_1.csv", "--suggest", tmp_path / "n.toml")[0] == 2
+    assert graspsense("import", tmp_path / "jar_1.csv", "--suggest", tmp_path / "n.toml")[0] == 2
     (tmp_path / "empty").mkdir()
-    assert run(capsys, "import", tmp_path / "empty", "--suggest", tmp_path / "n.toml")[0] == 2
+    assert graspsense("import", tmp_path / "empty", "--suggest", tmp_path / "n.toml")[0] == 2
     assert not (tmp_path / "n.toml").exists()
 
 
-def test_check_draws_a_grasp_whose_object_is_not_known(tmp_path, capsys):
+def test_check_draws_a_grasp_whose_object_is_not_known(tmp_path):
     pytest.importorskip("matplotlib", reason="needs the extra plot")
     shutil.copytree(SAMPLES / "trials", tmp_path / "trials")
-    code, _, err = run(capsys, "export", f"{tmp_path / 'trials'}#1", "--to", tmp_path / "x.npz")
+    code, _, err = graspsense("export", f"{tmp_path / 'trials'}#1", "--to", tmp_path / "x.npz")
     assert code == 0, err
-    code, _, err = run(capsys, "import", f"npz:{tmp_path / 'x.npz'}", "--check", "--plot", tmp_path / "x.png")
+    code, _, err = graspsense("import", f"npz:{tmp_path / 'x.npz'}", "--check", "--plot", tmp_path / "x.png")
     assert code == 0, err
     assert (tmp_path / "x.png").stat().st_size > 5000

@@ -5,9 +5,9 @@ import re
 import sys
 
 import pytest
+from commands import graspsense
 from grippers import bottle, squeezing
 
-from graspsense.cli.main import main
 from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.core.values.signals import Phase
 from graspsense.recording.reader import read_recorded
@@ -120,14 +120,7 @@ def test_a_line_that_is_no_squeeze_is_told_with_its_number(squeeze, line, says):
         read_squeeze(name_of(squeeze))
 
 
-def run(capsys, *arguments):
-    with pytest.raises(SystemExit) as ended:
-        main([str(one) for one in arguments])
-    out, err = capsys.readouterr()
-    return ended.value.code, out, err
-
-
-def test_it_is_kept_whole_with_its_label_and_its_features_worked_out_by_hand(squeeze, tmp_path, capsys):
+def test_it_is_kept_whole_with_its_label_and_its_features_worked_out_by_hand(squeeze, tmp_path):
     columns = [
         "--time",
         "stamp ms*0.001",
@@ -139,8 +132,7 @@ def test_it_is_kept_whole_with_its_label_and_its_features_worked_out_by_hand(squ
         "F right",
     ]
     store = tmp_path / "store"
-    code, out, err = run(
-        capsys, "import", squeeze, "--save", store, *columns, "--label", "jar:full#3", "-o",
+    code, out, err = graspsense("import", squeeze, "--save", store, *columns, "--label", "jar:full#3", "-o",
         "classifier.type=none", "--json",
     )  # fmt: skip
     assert code == 0, err
@@ -165,11 +157,11 @@ def test_it_is_kept_whole_with_its_label_and_its_features_worked_out_by_hand(squ
     # Its phases are those of the controller, so that a page draws it from the contact on, as any other trial.
     first_squeeze = recorded.trace().phase.tolist().index(Phase.SQUEEZE)
     assert recorded.trace().t_s[first_squeeze] == pytest.approx(6.0, abs=0.1)
-    code, out, err = run(capsys, "replay", f"{store}#1", "--json")
+    code, out, err = graspsense("replay", f"{store}#1", "--json")
     assert code == 0, err
     assert json.loads(out)["features"] == features
     # The page has the same phases, and its axis begins at the contact, not at the first line of the file.
-    code, _, err = run(capsys, "report", store, "--out", tmp_path / "page")
+    code, _, err = graspsense("report", store, "--out", tmp_path / "page")
     assert code == 0, err
     page = (tmp_path / "page" / "report.html").read_text()
     approach, squeeze = map(float, re.search(r"approach for ([\d.]+), squeeze for ([\d.]+)", page).groups())
@@ -178,8 +170,8 @@ def test_it_is_kept_whole_with_its_label_and_its_features_worked_out_by_hand(squ
     assert "seconds since both pads touched" in page
 
 
-def test_options_of_a_csv_with_another_kind_are_refused(tmp_path, capsys):
-    code, _, err = run(capsys, "import", "icub:x.txt", "--save", tmp_path / "s", "--gap", "g")
+def test_options_of_a_csv_with_another_kind_are_refused(tmp_path):
+    code, _, err = graspsense("import", "icub:x.txt", "--save", tmp_path / "s", "--gap", "g")
     assert code == 2
     assert "--gap is for a CSV" in err
     assert "Traceback" not in err

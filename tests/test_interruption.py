@@ -9,10 +9,10 @@ import sys
 
 import pytest
 from attrs import evolve
+from commands import graspsense, printed
 from grippers import Scripted, bottle, squeezing
 
 from graspsense import GraspInterrupted, load_pipeline
-from graspsense.cli.main import main
 from graspsense.core.components.config import resolve
 from graspsense.core.components.registry import installed
 from graspsense.core.components.run_config import RunConfig
@@ -57,7 +57,7 @@ class Signalled(Scripted):
 
 
 @pytest.fixture
-def signalled(monkeypatch):
+def signalled():
     """Return settings of a gripper that is interrupted, and the class of this gripper."""
     number = signal.SIGINT
 
@@ -199,45 +199,34 @@ def interrupting(monkeypatch, after):
     return begun
 
 
-def exit_code(*arguments):
-    with pytest.raises(SystemExit) as ended:
-        main(arguments)
-    return ended.value.code
-
-
 @pytest.fixture
 def recordings(tmp_path):
     """Return the folder of a store with three trials, and CSV files of the same grasps."""
     store = tmp_path / "t"
     for seed in ("1", "2", "3"):
-        assert exit_code("run", "--label", "block", "--seed", seed, "-o", "classifier.type=none", "--save",
-                         str(store)) == 0  # fmt: skip
-        assert exit_code("export", f"{store}#{seed}", "--to", str(tmp_path / f"{seed}.csv")) == 0
+        printed("run", "--label", "block", "--seed", seed, "-o", "classifier.type=none", "--save", store)
+        printed("export", f"{store}#{seed}", "--to", tmp_path / f"{seed}.csv")
     return store
 
 
 @pytest.mark.parametrize("after", [3, 4])
-def test_ctrl_c_in_an_import_stores_no_aborted_grasp_and_is_told(
-    recordings, tmp_path, monkeypatch, capsys, after
-):
+def test_ctrl_c_in_an_import_stores_no_aborted_grasp_and_is_told(recordings, tmp_path, monkeypatch, after):
     """Each recording is tried before it is imported: the second one is opened for the third and fourth time."""
     begun = interrupting(monkeypatch, after=after)
-    files = [str(tmp_path / f"{k}.csv") for k in (1, 2, 3)]
-    codes = [
-        exit_code("import", file, "--label", "block", "--save", str(tmp_path / "i")) for file in files[:2]
-    ]
-    assert codes == [0, 130]
+    files = [str(tmp_path / f"{k}.csv") for k in (1, 2)]
+    importing = [graspsense("import", file, "--label", "block", "--save", tmp_path / "i") for file in files]
+    assert [done.returncode for done in importing] == [0, 130]
     assert len(begun) == after
     with Store.read(tmp_path / "i") as store:
         assert [one.outcome for one in store.page()] == ["steady"]
-    assert "interrupted" in capsys.readouterr().err
+    assert "interrupted" in importing[1].stderr
 
 
 def test_ctrl_c_in_features_writes_no_table_of_aborted_grasps(recordings, tmp_path, monkeypatch):
     begun = interrupting(monkeypatch, after=2)
     out = tmp_path / "features.csv"
     options = ("-o", "controller.contact_force_n=0.1", "--keep", str(out))
-    assert exit_code("features", f"store:{recordings}", *options) == 130
+    assert graspsense("features", f"store:{recordings}", *options).returncode == 130
     assert len(begun) == 2
     assert not out.exists()
 
@@ -323,15 +312,13 @@ def test_two_operators_on_a_store_undo_and_repeat_only_what_each_has_grasped(tmp
 
 
 @pytest.mark.slow
-def test_a_second_session_leaves_the_trials_of_an_earlier_one_alone(tmp_path, monkeypatch, capsys):
-    import io
-
+def test_a_second_session_leaves_the_trials_of_an_earlier_one_alone(tmp_path):
     folder = str(tmp_path / "t")
-    for answers in ("\nq\n", "u\nr\nq\n"):
-        monkeypatch.setattr(sys, "stdin", io.StringIO(answers))
-        command = ("collect", "--labels", "block", "--save", folder, "-o", "classifier.type=none")
-        assert exit_code(*command) == 0
-    assert capsys.readouterr().err.count("no trial to undo") == 2
+    command = ("collect", "--labels", "block", "--save", folder, "-o", "classifier.type=none")
+    assert graspsense(*command, answers="\nq\n").returncode == 0
+    done = graspsense(*command, answers="u\nr\nq\n")
+    assert done.returncode == 0
+    assert done.stderr.count("no trial to undo") == 2
     with Store.read(folder) as store:
         assert [one.set_aside for one in store.page(set_aside=None)] == [None]
 

@@ -7,8 +7,8 @@ from collections import deque
 from math import nan
 
 import pytest
+from commands import graspsense, printed
 
-from graspsense.cli.main import main
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.calibrating import CalibrationFailed
 from graspsense.core.grasp.latency import latency_findings, measured_latency
@@ -107,19 +107,11 @@ def test_without_a_block_or_enough_force_it_is_said_why_there_is_none():
         measured_latency(gripper, gripper.accepts, gripper.info(), RunConfig(first_effort_n=4.0), 1)
 
 
-def test_doctor_measures_any_gripper_and_needs_its_name(capsys):
-    with pytest.raises(SystemExit) as ended:
-        main(["doctor", "--gripper", "sim", "--latency", "2", "--json"])
-    assert not ended.value.code
-    [diagnosis] = [
-        one
-        for one in json.loads(capsys.readouterr().out)["diagnoses"]
-        if one["distribution"] == "graspsense-sim-gripper/sim"
-    ]
+def test_doctor_measures_any_gripper_and_needs_its_name():
+    told = json.loads(printed("doctor", "--gripper", "sim", "--latency", "2", "--json"))
+    [diagnosis] = [one for one in told["diagnoses"] if one["distribution"] == "graspsense-sim-gripper/sim"]
     motion, force = diagnosis["findings"]
     # The simulated fingers need some ms to get going against their friction.
     assert 0.001 < motion["numbers"]["median_s"] < 0.1
     assert force["subject"] == "command to first force"
-    with pytest.raises(SystemExit) as ended:
-        main(["doctor", "--latency"])
-    assert ended.value.code == 2
+    assert graspsense("doctor", "--latency").returncode == 2

@@ -6,19 +6,7 @@ import json
 
 import numpy as np
 import pytest
-
-from graspsense.cli.main import main
-
-
-@pytest.fixture
-def run(capsys):
-    def run(*arguments):
-        with pytest.raises(SystemExit) as ended:
-            main([str(one) for one in arguments])
-        out, err = capsys.readouterr()
-        return ended.value.code or 0, out, err
-
-    return run
+from commands import graspsense
 
 
 @pytest.fixture
@@ -36,8 +24,8 @@ def csv(tmp_path):
 
 
 @pytest.mark.slow
-def test_an_honest_rate_of_ones_own_csv_in_one_command(run, csv):
-    code, out, _ = run("evaluate", csv, "--label", "what", "--instance", "thing")
+def test_an_honest_rate_of_ones_own_csv_in_one_command(csv):
+    code, out, _ = graspsense("evaluate", csv, "--label", "what", "--instance", "thing")
 
     assert code == 0
     assert "\nrate        9" in out
@@ -56,8 +44,8 @@ def test_an_honest_rate_of_ones_own_csv_in_one_command(run, csv):
 
 
 @pytest.mark.slow
-def test_its_json(run, csv):
-    code, out, _ = run(
+def test_its_json(csv):
+    code, out, _ = graspsense(
         "evaluate", csv, "--label", "what", "--json", "--classifier", "knn", "-o", "classifier.neighbours=3"
     )
     found = json.loads(out)
@@ -72,15 +60,15 @@ def test_its_json(run, csv):
 
 
 @pytest.mark.slow
-def test_states_of_one_class(run, csv):
-    _, out, _ = run("evaluate", csv, "--label", "what", "--json", "--target", "state", "--only", "can")
+def test_states_of_one_class(csv):
+    _, out, _ = graspsense("evaluate", csv, "--label", "what", "--json", "--target", "state", "--only", "can")
 
     assert json.loads(out)["confusion"]["labels"] == ["can:empty", "can:full"]
 
 
-def test_train_then_predict(run, csv, tmp_path):
+def test_train_then_predict(csv, tmp_path):
     model = tmp_path / "mine.json"
-    code, out, _ = run("train", csv, "--label", "what", "--instance", "thing", "--out", model)
+    code, out, _ = graspsense("train", csv, "--label", "what", "--instance", "thing", "--out", model)
     assert code == 0
     assert "labels      can:empty, can:full, jar:empty, jar:full" in out
     assert f"how good    graspsense evaluate {csv} --label what --instance thing" in out
@@ -90,7 +78,7 @@ def test_train_then_predict(run, csv, tmp_path):
 
     new = tmp_path / "new.csv"
     new.write_text("f_steady,p_first,comment\n9.1,0.0661,a\n4.2,0.0549,b\n9.0,0.0300,c\n,0.066,d\n")
-    code, out, _ = run("predict", model, new, "--json")
+    code, out, _ = graspsense("predict", model, new, "--json")
     found = json.loads(out)
     assert code == 0
     assert [one["label"] for one in found["predictions"]][:3] == ["can:full", "jar:empty", "unknown"]
@@ -98,31 +86,36 @@ def test_train_then_predict(run, csv, tmp_path):
     assert found["rate"] is None
     assert any("f_steady is missing" in one["words"] for one in found["predictions"][3]["because"])
 
-    code, out, _ = run("predict", model, csv, "--label", "what")
+    code, out, _ = graspsense("predict", model, csv, "--label", "what")
     assert code == 0
     assert "unknown counts as wrong" in out
 
 
-def test_a_model_of_states_or_classes(run, csv, tmp_path):
+def test_a_model_of_states_or_classes(csv, tmp_path):
     model = tmp_path / "states.json"
-    code, _, err = run("train", csv, "--label", "what", "--out", model, "--target", "state")
+    code, _, err = graspsense("train", csv, "--label", "what", "--out", model, "--target", "state")
     assert code == 2
     assert "select it with --only: can, jar" in err
-    assert run("train", csv, "--label", "what", "--out", model, "--target", "state", "--only", "jar")[0] == 0
+    assert (
+        graspsense("train", csv, "--label", "what", "--out", model, "--target", "state", "--only", "jar")[0]
+        == 0
+    )
     assert json.loads(model.read_text())["target"] == "state"
     again = ("train", csv, "--label", "what", "--out", model, "--target", "class", "--json")
-    assert run(*again, "--overwrite")[0] == 0
-    found = json.loads(run("predict", model, csv, "--label", "what", "--json")[1])
+    assert graspsense(*again, "--overwrite")[0] == 0
+    found = json.loads(graspsense("predict", model, csv, "--label", "what", "--json")[1])
     assert found["rate"]["rate"] > 0.9
 
 
 @pytest.mark.slow
-def test_features_are_kept(run, csv, tmp_path):
+def test_features_are_kept(csv, tmp_path):
     kept = tmp_path / "kept.csv"
-    run("evaluate", csv, "--label", "what", "--instance", "thing", "--keep", kept)
-    first = json.loads(run("evaluate", csv, "--label", "what", "--instance", "thing", "--json")[1])
+    graspsense("evaluate", csv, "--label", "what", "--instance", "thing", "--keep", kept)
+    first = json.loads(graspsense("evaluate", csv, "--label", "what", "--instance", "thing", "--json")[1])
     again = json.loads(
-        run("evaluate", kept, "--label", "label", "--instance", "instance", "--order", "order", "--json")[1]
+        graspsense(
+            "evaluate", kept, "--label", "label", "--instance", "instance", "--order", "order", "--json"
+        )[1]
     )
 
     assert again["confusion"] == first["confusion"]
@@ -130,10 +123,10 @@ def test_features_are_kept(run, csv, tmp_path):
 
 
 @pytest.mark.slow
-def test_the_picture_of_the_confusion(run, csv, tmp_path):
+def test_the_picture_of_the_confusion(csv, tmp_path):
     pytest.importorskip("matplotlib", reason="needs matplotlib, the extra `plot`")
     picture = tmp_path / "confusion.png"
-    code, _, err = run("evaluate", csv, "--label", "what", "--png", picture)
+    code, _, err = graspsense("evaluate", csv, "--label", "what", "--png", picture)
 
     assert code == 0
     assert f"drawn in {picture}" in err
@@ -196,29 +189,29 @@ def test_the_picture_of_the_confusion(run, csv, tmp_path):
         (["predict", "nosuch", "x.csv"], 2, "no model named 'nosuch'"),
     ],
 )
-def test_mistakes(run, monkeypatch, tmp_path, arguments, code, said):
+def test_mistakes(monkeypatch, tmp_path, arguments, code, said):
     monkeypatch.chdir(tmp_path)
-    ended, _, err = run(*arguments)
+    ended, _, err = graspsense(*arguments)
 
     assert ended == code
     assert said in err
     assert "Traceback" not in err
 
 
-def test_other_columns_than_the_model_takes(run, csv, tmp_path):
+def test_other_columns_than_the_model_takes(csv, tmp_path):
     model = tmp_path / "mine.json"
-    run("train", csv, "--label", "what", "--features", "p_first,f_steady", "--out", model)
+    graspsense("train", csv, "--label", "what", "--features", "p_first,f_steady", "--out", model)
     other = tmp_path / "other.csv"
     other.write_text("p_first [mm],f_steady [N]\n66,9\n")
-    code, _, err = run("predict", model, other)
+    code, _, err = graspsense("predict", model, other)
 
     assert code == 2
     assert "takes p_first in m; here it is in mm" in err
 
 
 @pytest.mark.slow
-def test_simulated_trials_small_and_whole(run):
-    code, out, _ = run(
+def test_simulated_trials_small_and_whole():
+    code, out, _ = graspsense(
         "evaluate",
         "simulated",
         "--objects",
@@ -241,8 +234,8 @@ def test_simulated_trials_small_and_whole(run):
     assert "each instance is grasped in all of its states" in found["notes"]
 
 
-def test_simulated_trials_with_each_instance_in_one_state_only(run, tmp_path):
-    code, out, _ = run(
+def test_simulated_trials_with_each_instance_in_one_state_only(tmp_path):
+    code, out, _ = graspsense(
         *("evaluate", "simulated", "--objects", "can:full_open,can:empty_open", "--instances", "4"),
         *(
             "--trials",
@@ -275,21 +268,23 @@ def opened(monkeypatch):
 
 
 @pytest.mark.parametrize("command", ["train", "evaluate"])
-def test_simulated_trials_never_open_a_real_gripper(run, tmp_path, opened, command):
+def test_simulated_trials_never_open_a_real_gripper(tmp_path, opened, command):
     out = ("--out", tmp_path / "m.json") if command == "train" else ()
-    code, _, err = run(command, "simulated", "--gripper", "pr2", "--instances", "1", "--trials", "1", *out)
+    code, _, err = graspsense(
+        command, "simulated", "--gripper", "pr2", "--instances", "1", "--trials", "1", *out
+    )
 
     assert code == 2
     assert "graspsense-pr2-gripper/pr2 declares no objects that it can simulate, so it was not opened" in err
     assert opened == []
 
 
-def test_a_feature_set_that_raises_on_simulated_grasps_is_named(run, monkeypatch):
+def test_a_feature_set_that_raises_on_simulated_grasps_is_named(monkeypatch):
     from graspsense.plugins.features.chitta import ChittaFeatures
 
     monkeypatch.setattr(ChittaFeatures, "extract", lambda self, trace: 1 / 0)
     objects = "can:full_open,can:empty_open"
-    code, _, err = run(
+    code, _, err = graspsense(
         *("evaluate", "simulated", "--objects", objects, "--instances", "1", "--trials", "2", "--folds", "2")
     )
 
@@ -301,27 +296,27 @@ def test_a_feature_set_that_raises_on_simulated_grasps_is_named(run, monkeypatch
     assert "internal error" not in err
 
 
-def test_train_replaces_no_file_unless_told(run, csv, tmp_path):
+def test_train_replaces_no_file_unless_told(csv, tmp_path):
     model, kept = tmp_path / "model.json", tmp_path / "kept.csv"
     command = ("train", csv, "--label", "what", "--out", model, "--keep", kept)
-    assert run(*command)[0] == 0
+    assert graspsense(*command)[0] == 0
     before = model.read_bytes(), kept.read_bytes()
 
-    code, _, err = run(*command, "--classifier", "knn")
+    code, _, err = graspsense(*command, "--classifier", "knn")
     assert code == 2
     assert f"{model} already exists: name another file, or add --overwrite to replace it" in err
     model.rename(tmp_path / "other.json")
-    assert f"{kept} already exists" in run(*command)[2]
+    assert f"{kept} already exists" in graspsense(*command)[2]
     (tmp_path / "other.json").rename(model)
     assert (model.read_bytes(), kept.read_bytes()) == before
 
-    assert run(*command, "--classifier", "knn", "--overwrite")[0] == 0
+    assert graspsense(*command, "--classifier", "knn", "--overwrite")[0] == 0
     assert model.read_bytes() != before[0]
 
 
 @pytest.mark.parametrize("option", ["--out", "--keep"])
 @pytest.mark.parametrize("disk", ["ro", "full"])
-def test_train_finds_out_before_the_grasps_that_it_cannot_write(run, mounted, tmp_path, option, disk):
+def test_train_finds_out_before_the_grasps_that_it_cannot_write(mounted, tmp_path, option, disk):
     place = mounted("size=64k")
     if disk == "ro":
         mounted("ro", remount=True)
@@ -331,7 +326,7 @@ def test_train_finds_out_before_the_grasps_that_it_cannot_write(run, mounted, tm
     files = {"--out": tmp_path / "m.json", "--keep": tmp_path / "k.csv"}
     files[option] = place / files[option].name
 
-    code, _, err = run(
+    code, _, err = graspsense(
         "train", "simulated", "--instances", "1000000", *(one for pair in files.items() for one in pair)
     )
 

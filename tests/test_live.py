@@ -6,7 +6,6 @@ import json
 import os
 import signal
 import socket
-import subprocess
 import sys
 import time
 from contextlib import ExitStack
@@ -16,6 +15,7 @@ from urllib.request import Request, urlopen
 import click
 import pytest
 from click.testing import CliRunner
+from commands import graspsense
 from live_grasp import COMMAND, device, port_of, reading
 
 from graspsense.cli.live import _host_and_port
@@ -214,11 +214,6 @@ def test_a_name_that_leads_to_this_machine_is_refused(feed):
     assert refusal.value.code == 403
 
 
-def graspsense(*arguments):
-    command = [sys.executable, "-m", "graspsense", *arguments]
-    return subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
-
-
 def test_a_port_that_is_taken_is_an_error_before_the_grasp(tmp_path):
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
@@ -263,6 +258,7 @@ def test_a_package_that_is_missing_is_named_before_the_grasp(monkeypatch, option
     assert f"graspsense[{option}]" in str(done.exception)
 
 
+@pytest.mark.slow
 def test_a_trial_is_stored_as_without_a_page(tmp_path):
     pytest.importorskip("foxglove")
     pytest.importorskip("rerun")

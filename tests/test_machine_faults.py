@@ -10,9 +10,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
+from commands import graspsense
 from kept import keep, write_recording
 
-from graspsense.cli.main import main
 from graspsense.core.grasp.calibration_files import (
     Calibration,
     calibrations_of,
@@ -34,12 +34,6 @@ UNREADABLE = Path("/proc/self/mem")
 needs_proc = pytest.mark.skipif(not UNREADABLE.exists(), reason="needs /proc, for a file whose reading fails")
 
 
-def exit_code(*arguments):
-    with pytest.raises(SystemExit) as ended:
-        main(arguments)
-    return ended.value.code
-
-
 @pytest.fixture
 def failing(tmp_path):
     """Return a store whose first recording is on a disk that fails."""
@@ -55,13 +49,14 @@ def failing(tmp_path):
 
 
 @needs_proc
-def test_verify_tells_a_disk_that_fails_from_damage(failing, capsys):
+def test_verify_tells_a_disk_that_fails_from_damage(failing):
     found = verify_store(failing)
     assert found.problems == ()
     assert [line.partition(":")[0] for line in found.unread] == ["trial 1"]
     assert not found.as_json()["intact"]
-    assert exit_code("verify", str(failing)) == 2
-    said = capsys.readouterr().out
+    done = graspsense("verify", str(failing))
+    assert done.returncode == 2
+    said = done.stdout
     assert "not read" in said
     assert "the disk could not be read" in said
     assert "0 damaged" in said
@@ -71,10 +66,11 @@ def test_verify_tells_a_disk_that_fails_from_damage(failing, capsys):
 @pytest.mark.parametrize(
     "command", [("replay", "{}#1"), ("export", "{}#1", "--to", "{}.csv"), ("verify", "{}/recordings/{name}")]
 )
-def test_a_recording_on_a_disk_that_fails_is_neither_lost_nor_damaged(failing, command, capsys):
+def test_a_recording_on_a_disk_that_fails_is_neither_lost_nor_damaged(failing, command):
     (name,) = [path.name for path in (failing / "recordings").iterdir() if path.is_symlink()]
-    assert exit_code(*[word.format(failing, name=name) for word in command]) == 2
-    said = capsys.readouterr().err
+    done = graspsense(*[word.format(failing, name=name) for word in command])
+    assert done.returncode == 2
+    said = done.stderr
     assert os.strerror(errno.EIO) in said
     assert "lost" not in said
     assert "damaged" not in said
@@ -108,7 +104,7 @@ def malformed(folder):
     path.write_bytes(data)
 
 
-def test_recover_says_that_the_database_is_malformed_and_touches_nothing(tmp_path, capsys):
+def test_recover_says_that_the_database_is_malformed_and_touches_nothing(tmp_path):
     with Store.open(tmp_path / "t") as store:
         for _ in range(3):
             keep(store)
@@ -117,13 +113,13 @@ def test_recover_says_that_the_database_is_malformed_and_touches_nothing(tmp_pat
     part = unfinished.with_name(unfinished.name + ".part")
     codes = set()
     for page in malformed(tmp_path / "t"):
-        codes.add(exit_code("recover", str(tmp_path / "t")))
-        said = capsys.readouterr().err
+        code, _, said = graspsense("recover", str(tmp_path / "t"))
+        codes.add(code)
         assert "damaged" in said, page
         assert "internal error" not in said
         assert part.exists()
     assert codes == {5}
-    assert exit_code("recover", str(tmp_path / "t")) == 0
+    assert graspsense("recover", str(tmp_path / "t")).returncode == 0
     assert not part.exists()
 
 
@@ -217,9 +213,11 @@ def test_a_calibration_folder_below_the_home_is_found(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-def test_a_mistyped_folder_of_calibrations_refuses_the_grasp(tmp_path, capsys):
+def test_a_mistyped_folder_of_calibrations_refuses_the_grasp(tmp_path):
     emulated = ("run", "--gripper", "pr2", "-o", "gripper.transport=emulated", "-o", "classifier.type=none")
-    assert exit_code(*emulated, "-o", f"gripper.calibration={tmp_path}/mistyped") == 2
-    assert "no such folder" in capsys.readouterr().err
-    assert exit_code(*emulated, "-o", f"gripper.calibration={tmp_path}") == 0
-    assert "uncalibrated" in capsys.readouterr().out
+    done = graspsense(*emulated, "-o", f"gripper.calibration={tmp_path}/mistyped")
+    assert done.returncode == 2
+    assert "no such folder" in done.stderr
+    done = graspsense(*emulated, "-o", f"gripper.calibration={tmp_path}")
+    assert done.returncode == 0
+    assert "uncalibrated" in done.stdout

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from commands import printed
 
 from graspsense.core.components.registry import installed
 from graspsense.core.learn.labelled import Labelled
@@ -54,24 +55,15 @@ def test_a_table_without_a_feature_of_the_model_is_refused(rows):
         model.answers(labelled.table.columns(["p_first", "dp_dt"]))
 
 
-def test_predict_answers_many_without_reasons_and_says_so(rows, tmp_path, capsys):
-    from graspsense.cli.main import main
-
+def test_predict_answers_many_without_reasons_and_says_so(rows, tmp_path):
     lines = ["label,p_first [m],f_steady [N],dp_dt [m/s]"]
     for k, row in enumerate(np.tile(rows, (5, 1)).tolist()):
         lines.append(",".join([("a", "b", "c")[k % 240 // 80], *("" if v != v else repr(v) for v in row)]))
     (tmp_path / "t.csv").write_text("\n".join(lines))
     source, model = str(tmp_path / "t.csv"), str(tmp_path / "m.json")
 
-    def run(*arguments):
-        with pytest.raises(SystemExit) as ended:
-            main(arguments)
-        out, err = capsys.readouterr()
-        assert ended.value.code == 0, err
-        return out
-
-    run("train", source, "--label", "label", "--classifier", "tree", "--out", model)
-    found = json.loads(run("predict", model, source, "--label", "label", "--json"))
+    printed("train", source, "--label", "label", "--classifier", "tree", "--out", model)
+    found = json.loads(printed("predict", model, source, "--label", "label", "--json"))
     assert found["n"] == len(found["predictions"]) == 1200
     assert any("the predictions have no reasons" in note for note in found["notes"])
     right = sum(one["label"] == one["truth"] for one in found["predictions"])

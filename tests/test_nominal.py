@@ -6,10 +6,10 @@ import json
 
 import numpy as np
 import pytest
+from commands import graspsense
 from hypothesis import given
 from hypothesis import strategies as st
 
-from graspsense.cli.main import main
 from graspsense.core.components.config import select_component
 from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.core.values.features import FeatureTable
@@ -46,12 +46,6 @@ overcast,81,75,FALSE,yes
 """
 
 
-def command(words):
-    with pytest.raises(SystemExit) as ended:
-        main(list(map(str, words)))
-    return ended.value.code
-
-
 @pytest.fixture
 def weather(tmp_path):
     path = tmp_path / "weather.arff"
@@ -73,7 +67,10 @@ def shapes(folder, seed=0, trials=60):
     return path
 
 
-@pytest.mark.parametrize("classifier", ["c45", "ebm", "forest", "knn", "svm", "tree", "boosted"])
+@pytest.mark.parametrize(
+    "classifier",
+    ["c45", pytest.param("ebm", marks=pytest.mark.slow), "forest", "knn", "svm", "tree", "boosted"],
+)
 def test_a_text_reaches_every_classifier(tmp_path, classifier):
     trials = read_labelled(shapes(tmp_path), "what")
     assert trials.table.names == ("colour=blue", "colour=green", "colour=red", "weight")
@@ -113,16 +110,16 @@ def test_c45_grows_the_published_tree_of_the_weather_data(weather):
     assert "windy = TRUE" in because
 
 
-def test_a_model_of_nominal_features_predicts_from_other_tables(weather, tmp_path, capsys):
+def test_a_model_of_nominal_features_predicts_from_other_tables(weather, tmp_path):
     model = tmp_path / "m.json"
-    assert command(["train", weather, "--out", model]) == 0
+    assert graspsense("train", weather, "--out", model).returncode == 0
     other = tmp_path / "other.csv"
     other.write_text(
         "windy,humidity,outlook,temperature\nTRUE,70,overcast,60\nFALSE,90,sunny,80\nTRUE,80,foggy,70\n"
     )
-    capsys.readouterr()
-    assert command(["predict", model, other, "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)["predictions"]
+    done = graspsense("predict", model, other, "--json")
+    assert done.returncode == 0
+    found = json.loads(done.stdout)["predictions"]
     assert [one["label"] for one in found[:2]] == ["yes", "no"]
     # A value that the training did not have is as a missing one.
     assert any("outlook is missing" in reason["words"] for reason in found[2]["because"])

@@ -1,4 +1,4 @@
-"""Our own components conform, the PR2's in emulation; so do our distributions as they are installed."""
+"""Our components conform, the PR2's in emulation, and so do our distributions; some have tests of their own for it."""
 
 from __future__ import annotations
 
@@ -29,17 +29,19 @@ def settings(name, folder):
             "unplugged": {"faults": {"unplug_at_s": 0.5}},
             "absent": {"transport": "hidraw", "serial": "not there"},
         }
-    if name in ("graspsense-robotiq-2f/robotiq", "graspsense-so101-gripper/so101"):
-        return {"keys": {"port": "emulated"}}
-    if name == "graspsense-franka-hand/franka":
-        return {"keys": {"host": "emulated", "calibration": "none"}}
     return {}
 
 
+EXAMINED_BY_THEMSELVES = {
+    f"graspsense-{name}"
+    for name in ("franka-hand", "lerobot", "mujoco-gripper", "robotiq-2f", "romano", "ros2", "so101-gripper")
+}
+"""Distributions whose own tests run every check."""
+
+
 def components():
-    ours = [one.qualified for one in installed().components() if one.distribution.startswith("graspsense")]
-    # Their own tests examine them, with a robot behind them.
-    return [name for name in ours if name not in ("graspsense-ros2/ros2", "graspsense-lerobot/lerobot")]
+    ours = [one for one in installed().components() if one.distribution.startswith("graspsense")]
+    return [one.qualified for one in ours if one.distribution not in EXAMINED_BY_THEMSELVES]
 
 
 @pytest.mark.slow

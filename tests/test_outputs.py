@@ -5,15 +5,9 @@ import os
 import shutil
 
 import pytest
+from commands import graspsense
 
-from graspsense.cli.main import main
 from graspsense.experiments.results import Results
-
-
-def run(*arguments):
-    with pytest.raises(SystemExit) as ended:
-        main([str(one) for one in arguments])
-    return ended.value.code
 
 
 @pytest.fixture
@@ -28,41 +22,44 @@ EVALUATE = ("--label", "kind", "--folds", "2", "--classifier", "knn")
 TRAIN = ("--label", "kind", "--classifier", "knn")
 
 
-def test_evaluate_replaces_no_file_without_being_asked(table, tmp_path, capsys):
+def test_evaluate_replaces_no_file_without_being_asked(table, tmp_path):
     kept = tmp_path / "kept.csv"
     kept.write_text("precious")
-    assert run("evaluate", table, *EVALUATE, "--keep", kept) == 2
-    assert "--overwrite" in capsys.readouterr().err
+    done = graspsense("evaluate", table, *EVALUATE, "--keep", kept)
+    assert done.returncode == 2
+    assert "--overwrite" in done.stderr
     assert kept.read_text() == "precious"
-    assert run("evaluate", table, *EVALUATE, "--keep", kept, "--overwrite") == 0
+    assert graspsense("evaluate", table, *EVALUATE, "--keep", kept, "--overwrite").returncode == 0
     assert kept.read_text().startswith("label,")
 
 
 @pytest.mark.parametrize("command", ["evaluate", "train"])
-def test_no_command_replaces_its_own_source(table, tmp_path, command, capsys, monkeypatch):
+def test_no_command_replaces_its_own_source(table, tmp_path, command, monkeypatch):
     before = table.read_text()
     monkeypatch.chdir(tmp_path)
     more = EVALUATE if command == "evaluate" else (*TRAIN, "--out", tmp_path / "m.json")
     (tmp_path / "link.csv").symlink_to(table)
     for name in (table, "mine.csv", tmp_path / "sub" / ".." / "mine.csv", "link.csv"):
         (tmp_path / "sub").mkdir(exist_ok=True)
-        assert run(command, table, *more, "--keep", name, "--overwrite") == 2
-        assert "what is read" in capsys.readouterr().err
+        done = graspsense(command, table, *more, "--keep", name, "--overwrite")
+        assert done.returncode == 2
+        assert "what is read" in done.stderr
     assert table.read_text() == before
     assert not (tmp_path / "m.json").exists()
 
 
-def test_two_outputs_are_two_files(table, tmp_path, capsys, monkeypatch):
+def test_two_outputs_are_two_files(table, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    assert run("train", table, *TRAIN, "--out", "m.json", "--keep", tmp_path / "m.json") == 2
-    assert "the same file" in capsys.readouterr().err
+    done = graspsense("train", table, *TRAIN, "--out", "m.json", "--keep", tmp_path / "m.json")
+    assert done.returncode == 2
+    assert "the same file" in done.stderr
     assert not (tmp_path / "m.json").exists()
-    assert run("train", table, *TRAIN, "--out", "m.json", "--keep", "k.csv") == 0
+    assert graspsense("train", table, *TRAIN, "--out", "m.json", "--keep", "k.csv").returncode == 0
     assert json.loads((tmp_path / "m.json").read_text())["format"]
 
 
 @pytest.mark.parametrize("option", ["--keep", "--out"])
-def test_a_pipe_or_a_device_is_not_replaced(table, tmp_path, option, capsys):
+def test_a_pipe_or_a_device_is_not_replaced(table, tmp_path, option):
     pipe = tmp_path / "pipe.json"
     os.mkfifo(pipe)
     for name in (pipe, "/dev/full"):
@@ -70,38 +67,42 @@ def test_a_pipe_or_a_device_is_not_replaced(table, tmp_path, option, capsys):
             continue
         outputs = {"--out": tmp_path / "m.json", "--keep": tmp_path / "k.csv", option: name}
         more = [word for pair in outputs.items() for word in pair]
-        assert run("train", table, *TRAIN, *more, "--overwrite") == 2
-        assert "pipe or a device" in capsys.readouterr().err
+        done = graspsense("train", table, *TRAIN, *more, "--overwrite")
+        assert done.returncode == 2
+        assert "pipe or a device" in done.stderr
     assert pipe.is_fifo()
 
 
 @pytest.mark.parametrize("command", ["evaluate", "compare", "train"])
-def test_a_negative_seed_is_refused(table, tmp_path, command, capsys):
+def test_a_negative_seed_is_refused(table, tmp_path, command):
     more = {
         "train": ("--out", tmp_path / "m.json"),
         "evaluate": ("--folds", "2"),
         "compare": ("--classifiers", "knn"),
     }
-    assert run(command, table, "--label", "kind", *more[command], "--seed", "-1") == 2
-    assert "--seed" in capsys.readouterr().err
+    done = graspsense(command, table, "--label", "kind", *more[command], "--seed", "-1")
+    assert done.returncode == 2
+    assert "--seed" in done.stderr
 
 
 @pytest.mark.parametrize("name", [".", "..", "/", "sub", "pipe.png"])
-def test_a_picture_that_is_no_file_is_refused_before_the_grasp(tmp_path, monkeypatch, name, capsys):
+def test_a_picture_that_is_no_file_is_refused_before_the_grasp(tmp_path, monkeypatch, name):
     pytest.importorskip("matplotlib", reason="drawing needs the extra `plot`")
     monkeypatch.chdir(tmp_path)
     (tmp_path / "sub").mkdir()
     os.mkfifo(tmp_path / "pipe.png")
-    assert run("run", "--plot", name) == 2
-    said = capsys.readouterr().err
+    done = graspsense("run", "--plot", name)
+    assert done.returncode == 2
+    said = done.stderr
     assert "picture" in said
     assert "approach" not in said
 
 
-def test_a_matrix_is_drawn_into_pictures_only(table, capsys):
+def test_a_matrix_is_drawn_into_pictures_only(table):
     before = table.read_text()
-    assert run("evaluate", table, *EVALUATE, "--png", table) == 2
-    assert ".png" in capsys.readouterr().err
+    done = graspsense("evaluate", table, *EVALUATE, "--png", table)
+    assert done.returncode == 2
+    assert ".png" in done.stderr
     assert table.read_text() == before
 
 
@@ -112,7 +113,12 @@ def experiment(table, tmp_path):
         'title = "mine"\nseeds = [0, 1, 2, 3]\n[judge]\nfolds = 2\n[data]\n'
         f'source = "{table}"\nlabel = "kind"\n'
     )
-    assert run("experiment", tmp_path / "mine.toml", "--executor", "serial", "--out", tmp_path / "out") == 0
+    assert (
+        graspsense(
+            "experiment", tmp_path / "mine.toml", "--executor", "serial", "--out", tmp_path / "out"
+        ).returncode
+        == 0
+    )
     shutil.copytree(tmp_path / "out", tmp_path / "whole")
     first, second, *_ = sorted((tmp_path / "out" / "results").glob("*.json"))
     first.write_text("{")
@@ -121,18 +127,19 @@ def experiment(table, tmp_path):
     return tmp_path / "out"
 
 
-def test_a_result_that_cannot_be_read_is_told(experiment, tmp_path, capsys, monkeypatch):
+def test_a_result_that_cannot_be_read_is_told(experiment, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     first, second, *_ = sorted((experiment / "results").glob("*.json"))
-    capsys.readouterr()
-    assert run("report", experiment) == 0
-    said = "".join(capsys.readouterr())
+    done = graspsense("report", experiment)
+    assert done.returncode == 0
+    said = done.stdout + done.stderr
     assert "2 results cannot be read" in said
     assert first.name in said
     assert second.name in said
     assert "2 results cannot be read" in (experiment / "report.html").read_text()
-    assert run("experiment", "compare", experiment, tmp_path / "whole") == 0
-    said = capsys.readouterr().out
+    done = graspsense("experiment", "compare", experiment, tmp_path / "whole")
+    assert done.returncode == 0
+    said = done.stdout
     assert "2 results cannot be read" in " ".join(said.split())
     assert "2 results cannot be read" in (tmp_path / "comparison.html").read_text()
 

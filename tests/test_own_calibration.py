@@ -6,9 +6,9 @@ import sys
 
 import pytest
 from attrs import evolve, frozen
+from commands import graspsense
 from parts import CHANNELS_OF_HAND, Hand, HandConfig, channels
 
-from graspsense.cli.main import main
 from graspsense.core.components.registry import IsolatedPlugins
 from graspsense.gripper_api import (
     calibrations_of,
@@ -58,13 +58,13 @@ class Plugin:
 
 
 @pytest.fixture
-def calibrate(monkeypatch, capsys):
+def calibrate(monkeypatch):
     monkeypatch.setitem(sys.modules, __name__, HERE)
 
     def calibrate(gripper, *arguments):
-        with IsolatedPlugins(Plugin()), pytest.raises(SystemExit) as ended:
-            main(["calibrate", *arguments, "--gripper", gripper, "-o", "classifier.type=none"])
-        return ended.value.code, capsys.readouterr().err
+        with IsolatedPlugins(Plugin()):
+            done = graspsense("calibrate", *arguments, "--gripper", gripper, "-o", "classifier.type=none")
+        return done.returncode, done.stderr
 
     return calibrate
 

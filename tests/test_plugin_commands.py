@@ -9,9 +9,9 @@ import sys
 
 import parts
 import pytest
+from commands import graspsense
 from mutants import MUTANTS
 
-from graspsense.cli.main import main
 from graspsense.core.components.registry import IsolatedPlugins
 from graspsense.plugin_api import hookimpl
 from graspsense.scaffold.make import make
@@ -33,20 +33,9 @@ class Lab:
         return [one for one in self.entries if hasattr(one, "accepts")]
 
 
-@pytest.fixture
-def graspsense(capsys):
-    def call(*arguments):
-        with pytest.raises(SystemExit) as ended:
-            main(["plugins", *arguments])
-        said = capsys.readouterr()
-        return ended.value.code, said.out, said.err
-
-    return call
-
-
-def test_a_part_that_conforms(graspsense):
+def test_a_part_that_conforms():
     with IsolatedPlugins(Lab(parts.ENTRIES["feature-set"])):
-        code, out, err = graspsense("check", "peak")
+        code, out, err = graspsense("plugins", "check", "peak")
 
     count = len(CHECKS["feature-set"])
     assert code == 0
@@ -56,12 +45,12 @@ def test_a_part_that_conforms(graspsense):
     assert err.count("passed   graspsense-test/peak") == count
 
 
-def test_a_part_that_does_not(graspsense):
+def test_a_part_that_does_not():
     (broken,) = [
         one for one in MUTANTS if one.check == "requires-what-it-reads" and one.role == "feature-set"
     ]
     with IsolatedPlugins(Lab(broken.entry)):
-        code, out, _ = graspsense("check", "peak", "--json")
+        code, out, _ = graspsense("plugins", "check", "peak", "--json")
 
     assert code == 1
     found = json.loads(out)
@@ -73,25 +62,26 @@ def test_a_part_that_does_not(graspsense):
     assert {one["state"] for one in found["results"]} == {"passed", "failed"}
 
 
-def test_settings_reach_the_part_that_is_checked(graspsense):
+def test_settings_reach_the_part_that_is_checked():
     with IsolatedPlugins(Lab(parts.ENTRIES["sensor-backend"])):
         code, out, err = graspsense(
-            *("check", "hand", "-o", "here=true", "--unplugged", "vanishes_s=0.3", "--absent", "here=false")
+            "plugins",
+            *("check", "hand", "-o", "here=true", "--unplugged", "vanishes_s=0.3", "--absent", "here=false"),
         )
         assert (code, out.splitlines()[-1]) == (0, "conforms")
         assert "skipped" not in err
 
-        code, _, err = graspsense("check", "hand", "-o", "hear=true")
+        code, _, err = graspsense("plugins", "check", "hand", "-o", "hear=true")
         assert code == 1
         assert "has no key 'hear'. Did you mean 'here'?" in err
 
-        code, _, err = graspsense("check", "hand", "-o", "nonsense")
+        code, _, err = graspsense("plugins", "check", "hand", "-o", "nonsense")
         assert code == 2
         assert "-o nonsense: expected KEY=VALUE" in err
 
 
-def test_a_name_that_nobody_has(graspsense):
-    code, _, err = graspsense("check", "chita")
+def test_a_name_that_nobody_has():
+    code, _, err = graspsense("plugins", "check", "chita")
 
     assert code == 2
     assert "Did you mean 'chitta'?" in err
@@ -138,25 +128,29 @@ def test_imports_that_moved_are_printed_with_the_new_form_beside(tmp_path, modul
     assert "Channel ->" not in said
 
 
-def test_a_new_package_says_what_to_do_next(graspsense, tmp_path):
-    code, out, _ = graspsense("new", "lab-thing", "--role", "observer", "--folder", str(tmp_path / "thing"))
+def test_a_new_package_says_what_to_do_next(tmp_path):
+    code, out, _ = graspsense(
+        "plugins", "new", "lab-thing", "--role", "observer", "--folder", str(tmp_path / "thing")
+    )
 
     assert code == 0
     assert f"  pip install -e {tmp_path / 'thing'} pytest\n  graspsense plugins list\n" in out
     assert "  graspsense plugins check lab-thing\n" in out
 
 
-def test_a_group_without_a_command_prints_its_help_once(graspsense):
-    code, out, err = graspsense()
+def test_a_group_without_a_command_prints_its_help_once():
+    code, out, err = graspsense("plugins")
 
     assert code == 2
     assert (out + err).count("Usage:") == 1
     assert "shows what there is" not in err
 
 
-def test_a_package_is_made_for_several_roles(graspsense, tmp_path, monkeypatch):
+def test_a_package_is_made_for_several_roles(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    code, out, _ = graspsense("new", "lab-hand", "--role", "controller", "--role", "sensor-backend")
+    code, out, _ = graspsense(
+        "plugins", "new", "lab-hand", "--role", "controller", "--role", "sensor-backend"
+    )
 
     assert code == 0
     assert "graspsense run --pipeline lab-hand" in out
@@ -168,9 +162,9 @@ def test_a_package_is_made_for_several_roles(graspsense, tmp_path, monkeypatch):
     ]
 
 
-def test_a_role_is_given_once(graspsense, tmp_path, monkeypatch):
+def test_a_role_is_given_once(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    code, _, err = graspsense("new", "lab-hand", "--role", "controller", "--role", "controller")
+    code, _, err = graspsense("plugins", "new", "lab-hand", "--role", "controller", "--role", "controller")
 
     assert (code, list(tmp_path.iterdir())) == (2, [])
     assert "--role controller is given 2 times: give each role once" in err

@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 from attrs import evolve, field, frozen
+from commands import graspsense
 from grippers import Scripted, bottle, squeezing
 
-from graspsense.cli.main import main
 from graspsense.core.components.config import resolve
 from graspsense.core.components.registry import installed
 from graspsense.core.components.run_config import RunConfig
@@ -177,18 +177,15 @@ def test_settings_whose_class_ends_the_program_are_wrong_settings():
     assert [one.path for one in ended.value.problems] == [("key",)]
 
 
-def test_a_plugin_that_ends_one_of_our_commands_is_told_with_its_place(monkeypatch, capsys, tmp_path):
+def test_a_plugin_that_ends_one_of_our_commands_is_told_with_its_place(monkeypatch, tmp_path):
     from graspsense.plugins.classifiers.knn import Knn
 
     monkeypatch.setattr(Knn, "fit", leaving)
     table = tmp_path / "table.csv"
     table.write_text("kind,p_first\n" + "".join(f"{'ab'[k % 2]},{7 * k % 5}.5\n" for k in range(20)))
-    with pytest.raises(SystemExit) as ended:
-        main(
-            ["train", str(table), "--label", "kind", "--classifier", "knn", "--out", str(tmp_path / "m.json")]
-        )
-    assert ended.value.code == 2
-    said = capsys.readouterr().err
+    train = ("train", table, "--label", "kind", "--classifier", "knn", "--out", tmp_path / "m.json")
+    code, _, said = graspsense(*train)
+    assert code == 2
     assert "SystemExit: 3 in leaving" in " ".join(said.split())
     assert "internal error" not in said
 

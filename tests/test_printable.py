@@ -6,12 +6,12 @@ import re
 from pathlib import Path
 
 import pytest
+from commands import graspsense
 from hypothesis import given
 from hypothesis import strategies as st
 from kept import BENCH, keep
 
-import graspsense.cli
-from graspsense.cli.main import main
+from graspsense import cli
 from graspsense.cli.terminal import echo, echo_as_it_is, echo_entry, echo_table, talk, warn
 from graspsense.core.values.printable import in_one_line, printable
 from graspsense.store.changes import relabel, set_aside
@@ -80,12 +80,6 @@ def test_a_row_of_a_table_is_one_line_whatever_is_in_it(capsys):
     assert len(capsys.readouterr().out.splitlines()) == 3
 
 
-def run(*arguments):
-    with pytest.raises(SystemExit) as ended:
-        main(arguments)
-    return ended.value.code
-
-
 @pytest.fixture
 def store(tmp_path):
     """Return a store whose labels, reasons and gripper an attacker has chosen, as in a store from elsewhere."""
@@ -132,9 +126,8 @@ COMMANDS = [
 @pytest.mark.parametrize(
     "command", COMMANDS, ids=lambda command: " ".join(command[:2]).encode("unicode_escape").decode()
 )
-def test_no_command_prints_what_acts(store, command, capsys):
-    code = run(*[word.format(store) for word in command])
-    out, err = capsys.readouterr()
+def test_no_command_prints_what_acts(store, command):
+    code, out, err = graspsense(*[word.format(store) for word in command])
     assert acts(out + err) == []
     assert code in (0, 1, 2), err
     assert not any(line.startswith("  9  2026") for line in (out + err).splitlines())
@@ -143,11 +136,12 @@ def test_no_command_prints_what_acts(store, command, capsys):
 @pytest.mark.parametrize(
     "command", [("trials", "list", "{}"), ("trials", "history", "{}"), ("predict", "{}.json", "store:{}")]
 )
-def test_json_has_the_text_as_it_is(store, command, capsys):
-    assert run("train", f"store:{store}", "--classifier", "knn", "--out", f"{store}.json") == 0
-    capsys.readouterr()
-    assert run(*[word.format(store) for word in command], "--json") == 0
-    out = capsys.readouterr().out
+def test_json_has_the_text_as_it_is(store, command):
+    done = graspsense("train", f"store:{store}", "--classifier", "knn", "--out", f"{store}.json")
+    assert done.returncode == 0
+    done = graspsense(*[word.format(store) for word in command], "--json")
+    assert done.returncode == 0
+    out = done.stdout
     assert acts(out) == []
     assert HOSTILE in set(strings(json.loads(out)))
 
@@ -169,7 +163,7 @@ def test_all_that_is_printed_passes_through_the_terminal_module():
         "terminal.py",
         "completion.py",
     }  # the script for the shell is a program, with its own tabulators
-    for path in Path(graspsense.cli.__file__).parent.glob("*.py"):
+    for path in Path(cli.__file__).parent.glob("*.py"):
         if path.name in owners:
             continue
         for node in ast.walk(ast.parse(path.read_text())):

@@ -7,7 +7,8 @@ import json
 import numpy as np
 import pytest
 from attrs import evolve
-from test_conformal import bottles, called
+from commands import graspsense, printed
+from test_conformal import bottles
 from test_evaluate import learner
 
 from graspsense.cli.main import main
@@ -47,7 +48,7 @@ def test_intervals_are_wider_for_more_comparisons():
 
 
 @pytest.mark.slow
-def test_the_command_names_the_best_and_refuses_feature_sets_of_a_csv(tmp_path, capsys):
+def test_the_command_names_the_best_and_refuses_feature_sets_of_a_csv(tmp_path):
     trials = bottles(12)
     lines = ["label,bottle,force [N],noise"]
     for label, name, row in zip(trials.labels, trials.instances, trials.table.values.tolist(), strict=True):
@@ -55,8 +56,8 @@ def test_the_command_names_the_best_and_refuses_feature_sets_of_a_csv(tmp_path, 
     (tmp_path / "t.csv").write_text("\n".join(lines))
     arguments = ("compare", str(tmp_path / "t.csv"), "--label", "label", "--instance", "bottle")
 
-    shown = called(capsys, *arguments, "--classifiers", "tree,knn")
-    listed = json.loads(called(capsys, *arguments, "--classifiers", "tree,knn", "--json"))
+    shown = printed(*arguments, "--classifiers", "tree,knn")
+    listed = json.loads(printed(*arguments, "--classifiers", "tree,knn", "--json"))
 
     assert "has the highest rate" in shown
     assert "RECORDING ORDER" in shown
@@ -67,10 +68,9 @@ def test_the_command_names_the_best_and_refuses_feature_sets_of_a_csv(tmp_path, 
         ("--target-value", "compare is for classifiers"),
         ("--out", "curve: the name of the file must end in .html"),
     ):
-        with pytest.raises(SystemExit) as ended:
-            main([*arguments, option, "curve"])
-        assert ended.value.code == 2
-        assert says in capsys.readouterr().err
+        done = graspsense(*arguments, option, "curve")
+        assert done.returncode == 2
+        assert says in done.stderr
 
 
 def test_features_from_before_the_contact_are_a_control_and_not_compared():
@@ -105,20 +105,18 @@ def test_the_sets_of_every_candidate_are_measured_on_the_same_folds():
         assert 0.8 < one.sets.covered.rate <= 1.0
 
 
-def test_an_unknown_name_is_refused_by_the_option_that_was_typed_before_any_grasp(capsys):
+def test_an_unknown_name_is_refused_by_the_option_that_was_typed_before_any_grasp():
     for option, name, role in (
         ("--feature-sets", "nope", "feature set"),
         ("--classifiers", "svn", "classifier"),
     ):
-        with pytest.raises(SystemExit) as ended:
-            main(["compare", "simulated", option, name])
-        said = capsys.readouterr()
-        assert ended.value.code == 2
-        assert f"{option} {name}: no {role} named" in said.err
-        assert "grasping" not in said.err
+        done = graspsense("compare", "simulated", option, name)
+        assert done.returncode == 2
+        assert f"{option} {name}: no {role} named" in done.stderr
+        assert "grasping" not in done.stderr
 
 
-def test_the_page_has_verdict_rates_losses_sets_and_the_command(tmp_path, capsys):
+def test_the_page_has_verdict_rates_losses_sets_and_the_command(tmp_path):
     trials = bottles(12)
     lines = ["label,bottle,force [N],noise"]
     for label, name, row in zip(trials.labels, trials.instances, trials.table.values.tolist(), strict=True):
@@ -127,7 +125,7 @@ def test_the_page_has_verdict_rates_losses_sets_and_the_command(tmp_path, capsys
     page = tmp_path / "page.html"
     arguments = ("compare", str(tmp_path / "t.csv"), "--label", "label", "--instance", "bottle")
 
-    shown = called(capsys, *arguments, "--classifiers", "tree,knn", "--out", str(page))
+    shown = printed(*arguments, "--classifiers", "tree,knn", "--out", str(page))
 
     text = page.read_text(encoding="utf-8")
     assert str(page) in "".join(shown.split())

@@ -2,11 +2,10 @@
 
 import json
 import shutil
-import subprocess
-import sys
 
 import pytest
 from attrs import evolve
+from commands import graspsense
 from kept import begun, ended, keep, write_recording
 from mcap.reader import make_reader
 
@@ -193,26 +192,20 @@ def test_what_needs_no_recovery_or_cannot_be_recovered_is_told(tmp_path):
         recover_file(tmp_path / "nowhere.mcap")
 
 
-def run(*arguments):
-    command = [sys.executable, "-m", "graspsense", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
-
-
-@pytest.mark.slow
 def test_the_commands_say_what_they_did(store):
     keep(store)
     part(store)
-    done = run("verify", store.folder, "--json")
+    done = graspsense("verify", store.folder, "--json")
     assert done.returncode == 0
     assert json.loads(done.stdout)["unfinished"] == ["20261121-103015-0001.mcap.part was never finished"]
-    done = run("recover", store.folder, "--json")
+    done = graspsense("recover", store.folder, "--json")
     assert done.returncode == 0
     (file,) = json.loads(done.stdout)["files"]
     assert (file["what"], file["trial"]) == ("recovered", 2)
     store.trial(1).recording.unlink()
-    done = run("verify", store.folder)
+    done = graspsense("verify", store.folder)
     assert done.returncode == 5
     assert "is missing" in done.stdout
-    done = run("replay", f"{store.folder}#1")
+    done = graspsense("replay", f"{store.folder}#1")
     assert done.returncode == 5
     assert "recording of trial 1" in done.stderr

@@ -4,8 +4,8 @@ import os
 from pathlib import Path
 
 import pytest
+from commands import graspsense
 
-from graspsense.cli.main import main
 from graspsense.core.files.regular_file import NotAFile, first_bytes
 from graspsense.core.grasp.calibration_files import read_calibration
 from graspsense.core.values.errors import ConfigError
@@ -20,12 +20,6 @@ def pipe(tmp_path):
     path = tmp_path / "pipe.toml"
     os.mkfifo(path)
     return path
-
-
-def exit_code(*arguments):
-    with pytest.raises(SystemExit) as ended:
-        main([str(argument) for argument in arguments])
-    return ended.value.code
 
 
 def test_a_pipe_is_no_file(pipe):
@@ -53,9 +47,10 @@ def test_no_more_is_read_than_asked(tmp_path):
         ("run", "-o", "gripper.type=replay", "-o", "gripper.recording=csv:{}"),
     ],
 )
-def test_a_pipe_for_settings_a_scene_or_a_model_is_refused(pipe, command, capsys):
-    assert exit_code(*[word.format(pipe) for word in command]) == 2
-    assert "Traceback" not in capsys.readouterr().err
+def test_a_pipe_for_settings_a_scene_or_a_model_is_refused(pipe, command):
+    done = graspsense(*[word.format(pipe) for word in command])
+    assert done.returncode == 2
+    assert "Traceback" not in done.stderr
 
 
 def test_a_pipe_for_a_recorded_grasp_or_a_calibration_is_refused(tmp_path):
@@ -68,26 +63,28 @@ def test_a_pipe_for_a_recorded_grasp_or_a_calibration_is_refused(tmp_path):
 
 
 @pytest.mark.skipif(not ZERO.exists(), reason="needs /dev/zero")
-def test_a_device_or_an_endless_file_as_a_model_is_refused(tmp_path, capsys):
+def test_a_device_or_an_endless_file_as_a_model_is_refused(tmp_path):
     (tmp_path / "zero.json").symlink_to(ZERO)
     with (tmp_path / "sparse.json").open("wb") as file:
         file.truncate(40 * 10**9)
     for name in ("zero.json", "sparse.json"):
-        assert exit_code("run", "-o", f"classifier.model={tmp_path / name}") == 2
-        assert "model" in capsys.readouterr().err
+        done = graspsense("run", "-o", f"classifier.model={tmp_path / name}")
+        assert done.returncode == 2
+        assert "model" in done.stderr
 
 
-def test_a_pipe_in_the_place_of_a_database_is_refused(tmp_path, capsys):
+def test_a_pipe_in_the_place_of_a_database_is_refused(tmp_path):
     (tmp_path / "st").mkdir()
     os.mkfifo(tmp_path / "st" / "store.sqlite")
     for command in ("recover", "verify"):
-        assert exit_code(command, tmp_path / "st") == 2
+        assert graspsense(command, tmp_path / "st").returncode == 2
 
 
-def test_a_scene_whose_instances_differ_without_bound_is_refused(tmp_path, capsys):
+def test_a_scene_whose_instances_differ_without_bound_is_refused(tmp_path):
     scene = tmp_path / "s.toml"
     scene.write_text(
         'width_m = 0.06\nstiffness_spread = 1e10\n[[terms]]\ntype = "elastic"\nk1_n_m = 2000.0\n'
     )
-    assert exit_code("run", "--object", scene) == 2
-    assert "stiffness_spread" in capsys.readouterr().err
+    done = graspsense("run", "--object", scene)
+    assert done.returncode == 2
+    assert "stiffness_spread" in done.stderr

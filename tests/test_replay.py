@@ -5,8 +5,6 @@ from __future__ import annotations
 import json
 import math
 import os
-import subprocess
-import sys
 from collections.abc import Sequence
 from contextlib import suppress
 from itertools import chain
@@ -14,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from commands import Done, graspsense
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -310,10 +309,8 @@ def test_nothing_in_the_hand_is_no_contact_and_a_full_bottle_is() -> None:
     assert [touched(f"full_vitamin_water_{k}.txt") for k in range(1, 21)] == [True] * 20
 
 
-def run(recording: str) -> subprocess.CompletedProcess[str]:
-    program = [sys.executable, "-c", "from graspsense.cli.main import main; main()"]
-    arguments = ["run", "--json", "--gripper", "replay", "-o", f"gripper.recording={recording}"]
-    return subprocess.run([*program, *arguments], capture_output=True, text=True, timeout=300)
+def run(recording: str) -> Done:
+    return graspsense("run", "--json", "--gripper", "replay", "-o", f"gripper.recording={recording}")
 
 
 def test_run_ends_a_recorded_grasp_with_outcome_and_features(tmp_path: Path) -> None:

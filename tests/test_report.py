@@ -15,6 +15,7 @@ import kept
 import pytest
 import wayward
 from attrs import evolve
+from commands import graspsense, printed
 from kept import keep
 
 from graspsense.cli.main import main
@@ -276,7 +277,7 @@ def test_the_page_of_an_empty_answer():
     )
 
 
-def test_the_page_of_a_store(tmp_path, capsys):
+def test_the_page_of_a_store(tmp_path):
     folder = tmp_path / "trials"
     with Store.open(folder) as store:
         for k in range(8):
@@ -286,16 +287,10 @@ def test_the_page_of_a_store(tmp_path, capsys):
                 values=(0.066 + 0.001 * (k % 3), 5.0 + k % 2),
                 grasp=k,
             )
-    with pytest.raises(SystemExit) as ended:
-        main(
-            ["report", str(folder), "--out", str(tmp_path / "page"), "--folds", "2", "--grasp", "3", "--json"]
-        )
+    told = printed("report", folder, "--out", tmp_path / "page", "--folds", "2", "--grasp", "3", "--json")
     found = Reader((tmp_path / "page" / "report.html").read_text())
 
-    assert not ended.value.code
-    assert json.loads(capsys.readouterr().out)["answer"].startswith(
-        "c45 recognises the object and its state in "
-    )
+    assert json.loads(told)["answer"].startswith("c45 recognises the object and its state in ")
     assert "Trial 3: can:full_open, steady" in found.text
     assert "one line per grasp" in found.text
     assert "All trials" in found.text
@@ -321,7 +316,7 @@ def test_the_warnings_of_a_trial_are_on_its_page(tmp_path):
     assert '<ul class="warning"><li>left fingertip stuck: check its cable</li></ul>' in page
 
 
-def test_evaluate_writes_a_page_and_replaces_none_of_a_store(tmp_path, capsys):
+def test_evaluate_writes_a_page_and_replaces_none_of_a_store(tmp_path):
     folder = tmp_path / "trials"
     with Store.open(folder) as store:
         for k in range(8):
@@ -331,20 +326,17 @@ def test_evaluate_writes_a_page_and_replaces_none_of_a_store(tmp_path, capsys):
                 values=(0.066, 5.0 + 3 * (k % 2) + 0.01 * k),
                 grasp=k,
             )
-    command = ["evaluate", str(folder), "--folds", "2", "--report"]
-    with pytest.raises(SystemExit) as ended:
-        main([*command, str(tmp_path / "page")])
+    command = ("evaluate", folder, "--folds", "2", "--report")
+    written = graspsense(*command, tmp_path / "page")
+    assert written.returncode == 0
+    assert "report.html" in written.stderr
     found = Reader((tmp_path / "page" / "report.html").read_text())
-    with pytest.raises(SystemExit) as refused:
-        main([*command, str(folder)])
 
-    assert not ended.value.code
-    assert refused.value.code == 2
+    assert graspsense(*command, folder).returncode == 2
     assert not (folder / "report.html").exists()
     for part in ("Controls", "Confusion matrix", "Features", "graspsense evaluate"):
         assert part in found.text
     assert " of 8" in found.text
-    assert "report.html" in capsys.readouterr().err
 
 
 def test_words_in_backticks_are_code_and_names_cannot_make_elements():

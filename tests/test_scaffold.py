@@ -72,7 +72,13 @@ def test_a_role_is_given_once(tmp_path):
         make("lab-thing", ["observer", "controller", "observer"], tmp_path / "lab-thing")
 
 
-@pytest.mark.parametrize("roles", COMBINATIONS, ids="+".join)
+@pytest.mark.parametrize(
+    "roles",
+    [
+        pytest.param(tuple(KINDS), id="all of them"),
+        *(pytest.param((kind,), id=kind, marks=pytest.mark.slow) for kind in KINDS),
+    ],
+)
 def test_the_components_of_a_package_fit_together(roles, tmp_path, monkeypatch):
     make("lab-thing", roles, tmp_path / "lab-thing")
     monkeypatch.syspath_prepend(tmp_path / "lab-thing" / "src")

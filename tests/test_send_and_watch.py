@@ -79,9 +79,17 @@ def grasped(names=PADLESS, thing="a soft object", run=RUN, **keys):
     return body, run_grasp(body, SendAndWatchController(SendAndWatchConfig(**keys)), run)
 
 
-@pytest.mark.parametrize("sends", ["position", "velocity", "force"])
-@pytest.mark.parametrize("names", [PADLESS, WITH_PADS], ids=["without pads", "with pads"])
-@pytest.mark.parametrize("thing", ["a soft object", "a hard object"])
+@pytest.mark.parametrize(
+    ("names", "thing", "sends"),
+    [
+        (PADLESS, "a soft object", "position"),
+        (PADLESS, "a hard object", "velocity"),
+        (PADLESS, "a soft object", "force"),
+        (WITH_PADS, "a hard object", "position"),
+        (WITH_PADS, "a soft object", "velocity"),
+        (WITH_PADS, "a hard object", "force"),
+    ],
+)
 def test_it_approaches_gently_stops_raises_the_force_in_steps_and_waits_for_rest(names, thing, sends):
     body, grasp = grasped(names, thing, sends=sends)
     assert grasp.outcome is Outcome.STEADY, grasp.reason

@@ -6,9 +6,9 @@ from typing import Literal
 
 import pytest
 from attrs import frozen
+from commands import graspsense
 
 from graspsense import load_pipeline
-from graspsense.cli.main import main
 from graspsense.core.components.config import (
     ImplausibleSettings,
     resolve,
@@ -148,12 +148,6 @@ def test_an_implausible_value_is_listed_with_the_other_errors():
     assert "'ramp_s' must be >= 0.0" in str(refused.value)
 
 
-def run(capsys, *arguments):
-    with pytest.raises(SystemExit) as ended:
-        main(arguments)
-    return (ended.value.code, *capsys.readouterr())
-
-
 @pytest.mark.parametrize(
     "command",
     [
@@ -167,10 +161,10 @@ def run(capsys, *arguments):
     ids=lambda words: words[0],
 )
 def test_every_command_with_settings_refuses_an_implausible_one_and_names_force(
-    capsys, tmp_path, monkeypatch, command
+    tmp_path, monkeypatch, command
 ):
     monkeypatch.chdir(tmp_path)
-    code, _, err = run(capsys, *command, "-o", "gripper.step_s=1e-12")
+    code, _, err = graspsense(*command, "-o", "gripper.step_s=1e-12")
 
     assert code == 2
     assert "1e-12 s is not plausible: the plausible range is 1e-05 to 0.01 s" in err
@@ -179,16 +173,16 @@ def test_every_command_with_settings_refuses_an_implausible_one_and_names_force(
 
 
 @pytest.mark.slow
-def test_force_accepts_it(capsys):
+def test_force_accepts_it():
     option = ("-o", "controller.closing_speed_m_s=0.5", "-o", "classifier.type=none")
 
-    assert run(capsys, "config", "validate", *option, "--force")[0] == 0
-    assert run(capsys, "run", *option, "--force", "--json")[0] == 0
+    assert graspsense("config", "validate", *option, "--force")[0] == 0
+    assert graspsense("run", *option, "--force", "--json")[0] == 0
 
 
-def test_import_gives_no_advice_that_it_does_not_follow(capsys, tmp_path):
-    code, _, err = run(
-        capsys, *("import", "a.csv", "--save", str(tmp_path / "t"), "-o", "features.contact_force_n=500")
+def test_import_gives_no_advice_that_it_does_not_follow(tmp_path):
+    code, _, err = graspsense(
+        *("import", "a.csv", "--save", str(tmp_path / "t"), "-o", "features.contact_force_n=500")
     )
 
     assert code == 2
@@ -225,8 +219,8 @@ def test_config_show_tells_meaning_unit_range_default_and_origin_of_each_key(tmp
     assert tomllib.loads(text) == tomllib.loads(to_toml(settings))
 
 
-def test_config_show_describes_the_keys_of_a_table(capsys):
-    code, out, _ = run(capsys, "config", "show", "--gripper", "pr2", "-o", EMULATED[0])
+def test_config_show_describes_the_keys_of_a_table():
+    code, out, _ = graspsense("config", "show", "--gripper", "pr2", "-o", EMULATED[0])
 
     assert code == 0
     assert "# drop: Probability that a report is lost. [0 to 1; default 0.0]\n" in out

@@ -258,7 +258,9 @@ def test_an_exported_grasp_comes_back_with_the_same_features_arrays_and_samples(
     assert acceleration.lost == 0
 
 
-@pytest.mark.parametrize(("ending", "write"), [("csv", write_csv), ("parquet", write_parquet)])
+@pytest.mark.parametrize(
+    ("ending", "write"), [("csv", write_csv), pytest.param("parquet", write_parquet, marks=pytest.mark.slow)]
+)
 def test_columns_of_an_exported_grasp_come_back_as_its_arrays_do(recorded, tmp_path, ending, write):
     _, path, _ = recorded
     grasp = read_recorded(path)

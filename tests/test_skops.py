@@ -30,7 +30,9 @@ def trained(name, tmp_path):
     return model
 
 
-@pytest.mark.parametrize("name", ["svm", "mlp", "forest", "extra-trees", "tree"])
+@pytest.mark.parametrize(
+    "name", ["svm", "mlp", "forest", pytest.param("extra-trees", marks=pytest.mark.slow), "tree"]
+)
 def test_it_comes_back_the_same_without_its_training_trials(name, tmp_path):
     model = trained(name, tmp_path)
     content = json.loads((tmp_path / "m.json").read_text())

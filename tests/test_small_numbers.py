@@ -19,7 +19,9 @@ def measured(factor):
     return Labelled(source="made here", table=table, labels=("stiff", "soft") * 20)
 
 
-@pytest.mark.parametrize("classifier", ["c45", "tree", "forest", "knn", "svm", "ebm"])
+@pytest.mark.parametrize(
+    "classifier", ["c45", "tree", "forest", "knn", "svm", pytest.param("ebm", marks=pytest.mark.slow)]
+)
 @pytest.mark.parametrize("factor", [1e-6, 1e-12])
 def test_a_classifier_recognises_what_differs_by_micrometres(classifier, factor):
     found = evaluate(

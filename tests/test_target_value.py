@@ -8,9 +8,9 @@ import math
 
 import numpy as np
 import pytest
+from commands import graspsense
 from kept import keep
 
-from graspsense.cli.main import main
 from graspsense.core.components.registry import installed
 from graspsense.core.learn.labelled import ControlFeatures, Labelled
 from graspsense.core.learn.model import load_model
@@ -51,17 +51,6 @@ def bottles(objects=20, each=4, seed=0, noise=0.1, **more):
 
 def measured(trials, estimator="ridge", **more):
     return evaluate_regression(estimator, trials, folds=5, **{"permutations": 3, **more})
-
-
-@pytest.fixture
-def run(capsys):
-    def command(*arguments):
-        with pytest.raises(SystemExit) as ended:
-            main(list(map(str, arguments)))
-        out, err = capsys.readouterr()
-        return ended.value.code, out, err
-
-    return command
 
 
 @pytest.mark.slow
@@ -230,8 +219,8 @@ def folder(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_store_is_trained_on_predicted_and_evaluated(folder, run, tmp_path):
-    code, out, err = run(
+def test_a_store_is_trained_on_predicted_and_evaluated(folder, tmp_path):
+    code, out, err = graspsense(
         "evaluate", f"store:{folder}", "--target-value", "fill", "--classifier", "ridge", "--json"
     )
     assert code == 0, err
@@ -253,24 +242,24 @@ def test_a_store_is_trained_on_predicted_and_evaluated(folder, run, tmp_path):
         "--out",
         model,
     )
-    code, out, err = run(*arguments)
+    code, out, err = graspsense(*arguments)
     assert code == 0, err
     assert "ridge predicts fill [ml], trained on 22 trials" in out
-    assert run(*arguments)[0] == 2  # it exists
+    assert graspsense(*arguments)[0] == 2  # it exists
 
-    code, out, err = run("predict", model, f"store:{folder}", "--target-value", "fill", "--json")
+    code, out, err = graspsense("predict", model, f"store:{folder}", "--target-value", "fill", "--json")
     assert code == 0, err
     told = json.loads(out)
     assert told["n"] == 22
     assert told["error"]["mean_absolute"] < 10.0
     assert told["predictions"][4]["truth"] == 20.0
     assert told["predictions"][4]["value"] == pytest.approx(20.0, abs=10.0)
-    assert "PREDICTION [ml]" in run("predict", model, f"store:{folder}")[1]
+    assert "PREDICTION [ml]" in graspsense("predict", model, f"store:{folder}")[1]
 
 
 @pytest.mark.slow
-def test_an_export_and_a_csv_of_other_programs_give_the_same(folder, run, tmp_path):
-    assert run("export", folder, "--to", tmp_path / "t.csv")[0] == 0
+def test_an_export_and_a_csv_of_other_programs_give_the_same(folder, tmp_path):
+    assert graspsense("export", folder, "--to", tmp_path / "t.csv")[0] == 0
     with (tmp_path / "t.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     with (tmp_path / "other.csv").open("w", newline="") as file:
@@ -281,7 +270,7 @@ def test_an_export_and_a_csv_of_other_programs_give_the_same(folder, run, tmp_pa
         )
     more = ("--target-value", "fill", "--classifier", "ridge", "--json")
     stored, exported, other = (
-        json.loads(run("evaluate", source, *more, *options)[1])
+        json.loads(graspsense("evaluate", source, *more, *options)[1])
         for source, options in (
             (f"store:{folder}", ()),
             (tmp_path / "t.csv", ()),
@@ -313,13 +302,13 @@ def test_an_export_and_a_csv_of_other_programs_give_the_same(folder, run, tmp_pa
         (("--target-value", "fill", "--folds", "99"), "22 trials cannot be split into 99 folds"),
     ],
 )
-def test_what_makes_no_sense_is_told(folder, run, arguments, says):
-    code, _, err = run("evaluate", f"store:{folder}", *arguments)
+def test_what_makes_no_sense_is_told(folder, arguments, says):
+    code, _, err = graspsense("evaluate", f"store:{folder}", *arguments)
     assert (code, says in " ".join(err.split())) == (2, True), err
 
 
-def test_simulated_trials_have_no_numbers(run):
-    code, _, err = run("evaluate", "simulated", "--target-value", "fill")
+def test_simulated_trials_have_no_numbers():
+    code, _, err = graspsense("evaluate", "simulated", "--target-value", "fill")
     assert code == 2
     assert "has no numbers to predict: they are in a CSV file or in a store" in err
 

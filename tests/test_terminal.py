@@ -8,9 +8,10 @@ import subprocess
 import sys
 
 import pytest
+from commands import graspsense, printed
 from hypothesis import given
 from hypothesis import strategies as st
-from terminals import COMMAND, in_terminal
+from terminals import in_terminal
 
 from graspsense.cli import terminal
 
@@ -80,19 +81,6 @@ def test_an_error_is_red_and_fits_the_terminal():
     assert shown.coloured
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["plugins", "list"]])
-def test_neither_rich_nor_numpy_is_imported_for_help_and_the_piped_list_of_plugins(arguments):
-    program = (
-        "import sys\ntry:\n    from graspsense.cli.main import main\n    main()\n"
-        "finally:\n    print([name for name in ('rich', 'numpy') if name in sys.modules], file=sys.stderr)"
-    )
-    ran = subprocess.run(
-        [sys.executable, "-c", program, *arguments], capture_output=True, text=True, check=True
-    )
-
-    assert ran.stderr == "[]\n"
-
-
 @given(
     rows=st.lists(
         st.tuples(*[st.text("ab -", max_size=40)] * 3),
@@ -116,11 +104,8 @@ def test_columns_never_take_more_room_than_there_is(rows, room):
 
 def test_json_is_the_same_in_a_terminal_and_in_a_pipe():
     shown = in_terminal(["plugins", "list", "--json"], 60)
-    piped = subprocess.run(
-        [*COMMAND, "plugins", "list", "--json"], capture_output=True, text=True, check=True
-    )
 
-    assert json.loads(shown.text) == json.loads(piped.stdout)
+    assert json.loads(shown.text) == json.loads(printed("plugins", "list", "--json"))
     assert not shown.coloured
 
 
@@ -146,7 +131,7 @@ def test_a_grasp_fits_the_terminal_with_outcome_prediction_and_warning_in_colour
 
 @pytest.mark.slow
 def test_one_unit_for_lengths_and_results_on_stdout_when_piped():
-    ran = subprocess.run([*COMMAND, "run"], capture_output=True, text=True, check=True)
+    ran = graspsense("run")
 
     assert not re.search(r"[0-9] m(/s)?\b", ran.stdout + ran.stderr)
     assert "warning     trained on simulated grasps" in ran.stdout
@@ -193,11 +178,7 @@ def test_evaluate_says_its_verdict_first_and_fits_the_terminal(csv, width):
 @pytest.mark.parametrize("width", WIDTHS)
 def test_predictions_fit_the_terminal_and_count_their_training_trials(csv, tmp_path, width):
     model = tmp_path / "m.json"
-    subprocess.run(
-        [*COMMAND, "train", csv, "--label", "what", "--instance", "thing", "--out", model],
-        capture_output=True,
-        check=True,
-    )
+    printed("train", csv, "--label", "what", "--instance", "thing", "--out", model)
     shown = in_terminal(["predict", str(model), str(csv)], width)
 
     assert shown.code == 0
@@ -216,8 +197,7 @@ def test_the_list_of_experiments_says_how_long_each_takes(width):
 
     assert shown.code == 0
     assert max(map(len, shown.lines)) <= width
-    listed = subprocess.run([*COMMAND, "experiment"], capture_output=True, text=True, check=True).stdout
-    rows = listed.partition("\n\n")[0].splitlines()[1:]
+    rows = printed("experiment").partition("\n\n")[0].splitlines()[1:]
     assert len(rows) > 30
     for row in rows:
         assert re.match(r"\w+ +\d[\d.]* (s|min|h)  ", row), row

@@ -22,11 +22,20 @@ def subject(role, entry, keys=None):
     return Subject(component=Component(entry, "graspsense-test", "0.1", role), keys=keys or {}, **given)
 
 
-SLOW_CHECKS = {"ends-every-grasp", "read-returns-within-its-timeout", "grasps-are-independent"}
+SLOW_CHECKS = {
+    "ends-every-grasp",
+    "read-returns-within-its-timeout",
+    "grasps-are-independent",
+    "what-it-delivers-is-kept",
+}
 
 
 @pytest.mark.parametrize(
-    "role", [pytest.param(one, marks=pytest.mark.slow if one == "controller" else ()) for one in ROLES]
+    "role",
+    [
+        pytest.param(one, marks=pytest.mark.slow if one in ("controller", "sensor-backend") else ())
+        for one in ROLES
+    ],
 )
 def test_a_sound_part_passes_every_check(role):
     report = Examined((subject(role, parts.ENTRIES[role]),)).report()

@@ -6,8 +6,7 @@ import json
 
 import numpy as np
 import pytest
-
-from graspsense.cli.main import main
+from commands import graspsense
 
 MANIFEST = """\
 folder = "grasps"
@@ -19,17 +18,6 @@ gap = "gap [mm]"
 left = "left [N]"
 right = "right [N]"
 """
-
-
-@pytest.fixture
-def run(capsys):
-    def run(*arguments):
-        with pytest.raises(SystemExit) as ended:
-            main([str(one) for one in arguments])
-        out, err = capsys.readouterr()
-        return ended.value.code or 0, out, err
-
-    return run
 
 
 def squeeze(relaxes, rng):
@@ -45,7 +33,7 @@ def squeeze(relaxes, rng):
 
 
 @pytest.fixture
-def store(tmp_path, run):
+def store(tmp_path):
     """Twelve objects of two labels, each squeezed twice; only the course of the hold tells the labels apart."""
     rng = np.random.default_rng(0)
     (tmp_path / "grasps").mkdir()
@@ -55,13 +43,13 @@ def store(tmp_path, run):
                 file = tmp_path / "grasps" / f"{kind}_{instance}_{order}.csv"
                 file.write_text(squeeze(relaxes, rng) + "\n")
     (tmp_path / "m.toml").write_text(MANIFEST)
-    code, _, err = run("import", tmp_path / "m.toml", "--save", tmp_path / "store")
+    code, _, err = graspsense("import", tmp_path / "m.toml", "--save", tmp_path / "store")
     assert code == 0, err
     return tmp_path / "store"
 
 
-def runs(run, store, pipeline):
-    code, out, err = run(
+def runs(store, pipeline):
+    code, out, err = graspsense(
         "run", "--pipeline", pipeline, "--gripper", "replay", "-o", f"gripper.recording=store:{store}#1"
     )
     assert code == 0, err
@@ -71,8 +59,8 @@ def runs(run, store, pipeline):
 
 
 @pytest.mark.slow
-def test_among_all_candidates_one_that_knows_the_hold_is_chosen(run, store, tmp_path):
-    code, out, err = run("train", store, "--choose", "--out", tmp_path / "own.json", "--json")
+def test_among_all_candidates_one_that_knows_the_hold_is_chosen(store, tmp_path):
+    code, out, err = graspsense("train", store, "--choose", "--out", tmp_path / "own.json", "--json")
     assert code == 0, err
     found = json.loads(out)["choice"]
 
@@ -81,7 +69,7 @@ def test_among_all_candidates_one_that_knows_the_hold_is_chosen(run, store, tmp_
     candidates = {(one["classifier"], one["features"]) for one in found["ranking"]["candidates"]}
     assert ("extra-trees", "union") in candidates
     assert len(candidates) >= 24
-    runs(run, store, tmp_path / "own.toml")
+    runs(store, tmp_path / "own.toml")
 
 
 @pytest.mark.parametrize(
@@ -91,42 +79,42 @@ def test_among_all_candidates_one_that_knows_the_hold_is_chosen(run, store, tmp_
         ("--classifier", "extra-trees", "-o", "classifier.trees=10", "-o", "features.type=union"),
     ],
 )
-def test_what_is_written_runs_on_a_recording(run, store, tmp_path, fixed):
-    code, out, err = run("train", store, "--choose", *fixed, "--out", tmp_path / "own.json")
+def test_what_is_written_runs_on_a_recording(store, tmp_path, fixed):
+    code, out, err = graspsense("train", store, "--choose", *fixed, "--out", tmp_path / "own.json")
 
     assert code == 0, err
     assert f"--pipeline {tmp_path / 'own.toml'}" in out
     assert "the whole procedure by instance_held_out" in " ".join(out.split())
-    runs(run, store, tmp_path / "own.toml")
+    runs(store, tmp_path / "own.toml")
 
 
-def test_a_component_that_is_given_stays_and_files_are_not_replaced(run, store, tmp_path):
+def test_a_component_that_is_given_stays_and_files_are_not_replaced(store, tmp_path):
     given = ("train", store, "--choose", "-o", "features.type=chitta", "--classifier", "knn")
-    code, out, err = run(*given, "--out", tmp_path / "own.json", "--json")
+    code, out, err = graspsense(*given, "--out", tmp_path / "own.json", "--json")
     assert code == 0, err
     candidates = json.loads(out)["choice"]["ranking"]["candidates"]
 
     assert [(one["classifier"], one["features"]) for one in candidates] == [("knn", "chitta")]
     (tmp_path / "own.json").unlink()
-    code, _, err = run(*given, "--out", tmp_path / "own.json")
+    code, _, err = graspsense(*given, "--out", tmp_path / "own.json")
     assert code == 2
     assert "own.toml" in err
 
 
-def test_a_file_of_another_kind_beside_the_model_is_never_replaced(run, store, tmp_path):
-    code, _, err = run("train", store, "--choose", "--overwrite", "--out", tmp_path / "m.json")
+def test_a_file_of_another_kind_beside_the_model_is_never_replaced(store, tmp_path):
+    code, _, err = graspsense("train", store, "--choose", "--overwrite", "--out", tmp_path / "m.json")
 
     assert code == 2
     assert "manifest" in err
     assert (tmp_path / "m.toml").read_text() == MANIFEST
 
 
-def test_a_table_has_its_features_and_gets_no_pipeline(run, tmp_path):
+def test_a_table_has_its_features_and_gets_no_pipeline(tmp_path):
     rng = np.random.default_rng(0)
     lines = ["what,thing,f [N]"]
     lines += [f"l{k % 2},l{k % 2}#{k % 12},{k % 2 + 0.1 * rng.normal():.4f}" for k in range(48)]
     (tmp_path / "t.csv").write_text("\n".join(lines) + "\n")
-    code, out, err = run(
+    code, out, err = graspsense(
         "train", tmp_path / "t.csv", "--label", "what", "--instance", "thing", "--choose", "--classifier", "c45",
         "--out", tmp_path / "own.json", "--json",
     )  # fmt: skip
@@ -136,29 +124,29 @@ def test_a_table_has_its_features_and_gets_no_pipeline(run, tmp_path):
     assert not (tmp_path / "own.toml").exists()
 
 
-def test_trials_from_which_nothing_can_be_chosen(run, store, tmp_path):
+def test_trials_from_which_nothing_can_be_chosen(store, tmp_path):
     out = ("--out", tmp_path / "own.json")
-    code, _, err = run("train", store, "--choose", "--only", "foam", *out)
+    code, _, err = graspsense("train", store, "--choose", "--only", "foam", *out)
     assert (code, "'foam'" in err) == (2, True)
     # No pad reaches this force.
     given = ("-o", "features.type=curve", "-o", "features.contact_force_n=15", "--classifier", "knn")
-    code, _, err = run("train", store, "--choose", *given, *out)
+    code, _, err = graspsense("train", store, "--choose", *given, *out)
     assert (code, "no feature" in err) == (2, True)
     assert not list(tmp_path.glob("own*"))
 
 
 @pytest.mark.parametrize("option", [("--checkpoints", "0.1"), ("--target-value", "fill")])
-def test_options_that_do_not_go_with_it(run, store, tmp_path, option):
-    code, _, err = run("train", store, "--choose", *option, "--out", tmp_path / "own.json")
+def test_options_that_do_not_go_with_it(store, tmp_path, option):
+    code, _, err = graspsense("train", store, "--choose", *option, "--out", tmp_path / "own.json")
 
     assert code == 2
     assert "--choose" in err
     assert not (tmp_path / "own.json").exists()
 
 
-def test_recordings_without_contact_are_told_apart_by_the_features_that_need_none(run, store, tmp_path):
+def test_recordings_without_contact_are_told_apart_by_the_features_that_need_none(store, tmp_path):
     given = ("-o", "features.contact_force_n=15", "--classifier", "extra-trees", "-o", "classifier.trees=20")
-    code, told, err = run("train", store, "--choose", *given, "--out", tmp_path / "own.json", "--json")
+    code, told, err = graspsense("train", store, "--choose", *given, "--out", tmp_path / "own.json", "--json")
     assert code == 0, err
     choice = json.loads(told)["choice"]
 
@@ -168,8 +156,8 @@ def test_recordings_without_contact_are_told_apart_by_the_features_that_need_non
     assert any("curve" in note and "0 of 24" in note for note in choice["ranking"]["notes"])
 
 
-def test_sets_of_many_features_are_left_to_classifiers_that_take_them_quickly(run, store, tmp_path):
-    code, told, err = run(
+def test_sets_of_many_features_are_left_to_classifiers_that_take_them_quickly(store, tmp_path):
+    code, told, err = graspsense(
         "train", store, "--choose", "--classifier", "knn", "--out", tmp_path / "own.json", "--json"
     )
     assert code == 0, err

@@ -10,9 +10,9 @@ import sys
 
 import pytest
 from attrs import evolve
+from commands import graspsense
 from kept import BENCH, keep
 
-from graspsense.cli.main import main
 from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.report.store_page import store_page
 from graspsense.store import changes
@@ -31,28 +31,16 @@ def store(tmp_path):
         yield store
 
 
-@pytest.fixture
-def run(capsys):
-    """Return a function that runs the command line and returns its exit code and what it printed."""
-
-    def run(*arguments):
-        with pytest.raises(SystemExit) as ended:
-            main([str(one) for one in arguments])
-        return (ended.value.code, *capsys.readouterr())
-
-    return run
-
-
 def labels(store):
     return [(one.id, one.label, one.instance) for one in reversed(store.page(set_aside=None))]
 
 
-def test_a_relabelled_trial_has_its_new_label_everywhere_and_the_store_is_intact(store, run):
+def test_a_relabelled_trial_has_its_new_label_everywhere_and_the_store_is_intact(store):
     for _ in range(2):
         keep(store, "can:full_open", "can#2", device=REAL)
     keep(store, "toy", device=REAL)
 
-    code, out, _ = run(
+    code, out, _ = graspsense(
         "trials", "relabel", f"{store.folder}#2", "--label", "can:empty_open#3", "--why", "was empty"
     )
 
@@ -63,21 +51,24 @@ def test_a_relabelled_trial_has_its_new_label_everywhere_and_the_store_is_intact
     assert any("labels of 1 trial were changed" in one for one in labelled_store(str(store.folder)).notes)
     assert store.counts() == {("can:full_open", "can#2"): 1, ("can:empty_open", "can#3"): 1, ("toy", None): 1}
     assert verify_store(store.folder).problems == ()
-    code, out, _ = run("trials", "list", store.folder)
+    code, out, _ = graspsense("trials", "list", store.folder)
     assert "relabelled from can:full_open#2 to can:empty_open#3" in out
     page = store_page(str(store.folder)).html()
     assert "relabelled from can:full_open#2 to can:empty_open#3" in page
     assert "was empty" in page
 
 
-def test_a_label_is_restored_as_it_was_recorded_also_none(store, run):
+def test_a_label_is_restored_as_it_was_recorded_also_none(store):
     keep(store, "can:full_open", "can#2", device=REAL)
     keep(store, None, device=REAL)
     before = [store.trial(number).record for number in (1, 2)]
 
     for label in ("toy", "can:empty_open#9"):
-        assert run("trials", "relabel", f"{store.folder}#1", f"{store.folder}#2", "--label", label)[0] == 0
-    assert run("trials", "relabel", f"{store.folder}#1", f"{store.folder}#2", "--as-recorded")[0] == 0
+        assert (
+            graspsense("trials", "relabel", f"{store.folder}#1", f"{store.folder}#2", "--label", label)[0]
+            == 0
+        )
+    assert graspsense("trials", "relabel", f"{store.folder}#1", f"{store.folder}#2", "--as-recorded")[0] == 0
 
     assert [store.trial(number).record for number in (1, 2)] == before
     assert [(one.before, one.after) for one in changes.history(store, 2)] == [
@@ -88,12 +79,12 @@ def test_a_label_is_restored_as_it_was_recorded_also_none(store, run):
     assert verify_store(store.folder).problems == ()
 
 
-def test_trials_that_are_set_aside_are_not_used_until_they_are_brought_back(store, run, tmp_path):
+def test_trials_that_are_set_aside_are_not_used_until_they_are_brought_back(store, tmp_path):
     for grasp, label in enumerate(("can:full_open", "can:empty_open") * 3):
         keep(store, label, grasp=grasp)
     refs = [f"{store.folder}#{number}" for number in (1, 4)]
 
-    assert run("trials", "aside", *refs, "--why", "the bench was moved")[0] == 0
+    assert graspsense("trials", "aside", *refs, "--why", "the bench was moved")[0] == 0
 
     # Trials 2, 3, 5 and 6 of the alternating labels.
     left = ("can:empty_open", "can:full_open", "can:full_open", "can:empty_open")
@@ -101,21 +92,21 @@ def test_trials_that_are_set_aside_are_not_used_until_they_are_brought_back(stor
     assert "trials of the store that are not used: 2 set aside" in labelled_store(str(store.folder)).notes
     for command in ("train", "evaluate"):
         out = ["--out", str(tmp_path / "m.json")] if command == "train" else ["--folds", "2"]
-        assert "2 set aside" in "".join(map(str, run(command, f"store:{store.folder}", *out)))
-    code, told, _ = run("export", store.folder, "--to", tmp_path / "a.csv")
+        assert "2 set aside" in "".join(map(str, graspsense(command, f"store:{store.folder}", *out)))
+    code, told, _ = graspsense("export", store.folder, "--to", tmp_path / "a.csv")
     assert code == 0
     assert "set aside and left out: 2" in told
     assert len((tmp_path / "a.csv").read_text().splitlines()) == 5
-    listed = json.loads(run("trials", "list", store.folder, "--aside", "--json")[1])
+    listed = json.loads(graspsense("trials", "list", store.folder, "--aside", "--json")[1])
     assert [(one["id"], one["set_aside"]) for one in listed] == [
         (4, "the bench was moved"),
         (1, "the bench was moved"),
     ]
 
-    assert run("trials", "restore", *refs, "--why", "it was not")[0] == 0
+    assert graspsense("trials", "restore", *refs, "--why", "it was not")[0] == 0
 
     assert labelled_store(str(store.folder)).labels == ("can:full_open", "can:empty_open") * 3
-    history = json.loads(run("trials", "history", store.folder, "--json")[1])
+    history = json.loads(graspsense("trials", "history", store.folder, "--json")[1])
     assert [(one["trial"], one["action"], one["why"]) for one in history] == [
         (1, "aside", "the bench was moved"),
         (4, "aside", "the bench was moved"),
@@ -139,31 +130,31 @@ def test_trials_that_are_set_aside_are_not_used_until_they_are_brought_back(stor
     ],
     ids=str,
 )
-def test_a_change_that_is_wrong_for_one_trial_changes_none(store, run, command, says):
+def test_a_change_that_is_wrong_for_one_trial_changes_none(store, command, says):
     keep(store, "toy", device=REAL)
     keep(store, "block", device=REAL)
     changes.set_aside(store, [2], "earlier")
     before = (labels(store), changes.history(store))
 
     refs = [f"{store.folder}{word}" if word.startswith("#") else word for word in command]
-    code, _, err = run("trials", *refs)
+    code, _, err = graspsense("trials", *refs)
 
     assert code == 2
     assert says in err
     assert (labels(store), changes.history(store)) == before
 
 
-def test_a_simulated_trial_keeps_the_label_of_its_object(store, run):
+def test_a_simulated_trial_keeps_the_label_of_its_object(store):
     keep(store, "can:empty_open")  # simulated with can:full_open
 
-    code, _, err = run("trials", "relabel", f"{store.folder}#1", "--label", "block")
+    code, _, err = graspsense("trials", "relabel", f"{store.folder}#1", "--label", "block")
     assert code == 2
     assert "trial 1 was simulated with can:full_open, so it cannot be a block" in err
-    assert run("trials", "relabel", f"{store.folder}#1", "--label", "can:full_open")[0] == 0
+    assert graspsense("trials", "relabel", f"{store.folder}#1", "--label", "can:full_open")[0] == 0
 
 
-def test_commands_on_a_folder_without_a_store_create_none(run, tmp_path):
-    code, _, err = run("trials", "aside", f"{tmp_path / 'typo'}#1", "--why", "x")
+def test_commands_on_a_folder_without_a_store_create_none(tmp_path):
+    code, _, err = graspsense("trials", "aside", f"{tmp_path / 'typo'}#1", "--why", "x")
 
     assert code == 2
     assert "there is no store in" in err
@@ -255,7 +246,7 @@ def test_a_store_of_the_first_version_keeps_what_was_set_aside_in_it(tmp_path):
     assert verify_store(tmp_path / "old").problems == ()
 
 
-def test_a_store_in_which_everything_is_set_aside_says_so(store, run, tmp_path):
+def test_a_store_in_which_everything_is_set_aside_says_so(store, tmp_path):
     keep(store)
     changes.set_aside(store, [1], "x")
 
@@ -263,7 +254,7 @@ def test_a_store_in_which_everything_is_set_aside_says_so(store, run, tmp_path):
         trial_table(store.folder)
 
 
-def test_a_store_that_is_rebuilt_from_its_recordings_says_that_its_changes_are_lost(store, run):
+def test_a_store_that_is_rebuilt_from_its_recordings_says_that_its_changes_are_lost(store):
     keep(store, "toy", device=REAL)
     keep(store, "toy", device=REAL)
     changes.relabel(store, [1], labels_of("block"), "")
@@ -272,22 +263,22 @@ def test_a_store_that_is_rebuilt_from_its_recordings_says_that_its_changes_are_l
     for path in store.folder.glob("store.sqlite*"):
         path.unlink()
 
-    code, _, err = run("recover", store.folder)
+    code, _, err = graspsense("recover", store.folder)
 
     assert code == 0
     assert "Labels are as recorded, and no trial is set aside" in err
     with Store.read(store.folder) as rebuilt:
         assert labels(rebuilt) == [(1, "toy", None), (2, "toy", None)]
-    assert "as recorded" not in run("recover", store.folder)[2]
+    assert "as recorded" not in graspsense("recover", store.folder)[2]
 
 
-def test_a_number_is_changed_given_and_restored(store, run):
+def test_a_number_is_changed_given_and_restored(store):
     for cell in ("200", "210"):
         keep(store, device=REAL, labels={"fill [ml]": cell})
     keep(store, device=REAL)
     folder = str(store.folder)
 
-    code, out, _ = run(
+    code, out, _ = graspsense(
         "trials", "value", f"{folder}#1", f"{folder}#3", "--value", "fill [ml]=250", "--why", "scale"
     )
 
@@ -301,7 +292,7 @@ def test_a_number_is_changed_given_and_restored(store, run):
     assert verify_store(store.folder).problems == ()
     # What was recorded stays, and comes back.
     assert store.trial(1).record.labels["fill [ml]"] == "200"
-    assert run("trials", "value", f"{folder}#1", f"{folder}#3", "--as-recorded", "fill")[0] == 0
+    assert graspsense("trials", "value", f"{folder}#1", f"{folder}#3", "--as-recorded", "fill")[0] == 0
     assert labelled_store(folder, value="fill").value.values == (200.0, 210.0)
     assert [one.action for one in changes.history(store)] == ["value"] * 4
 
@@ -319,31 +310,33 @@ def test_a_number_is_changed_given_and_restored(store, run):
         ((), "give either --value"),
     ],
 )
-def test_a_number_that_cannot_be_changed_is_refused(store, run, given, says):
+def test_a_number_that_cannot_be_changed_is_refused(store, given, says):
     for _ in range(2):
         keep(store, device=REAL, labels={"fill [ml]": "200"})
-    code, _, err = run("trials", "value", f"{store.folder}#1", *given)
+    code, _, err = graspsense("trials", "value", f"{store.folder}#1", *given)
     assert code == 2
     assert re.search(says, " ".join(err.split()))
     assert changes.history(store) == []
 
 
-def test_trials_are_not_collected_with_a_number_in_another_unit(store, run):
+def test_trials_are_not_collected_with_a_number_in_another_unit(store):
     keep(store, device=REAL, labels={"fill [ml]": "200"})
     store.close()
-    code, _, err = run("collect", "--save", store.folder, "--labels", "can:full_open", "--value", "fill=3")
+    code, _, err = graspsense(
+        "collect", "--save", store.folder, "--labels", "can:full_open", "--value", "fill=3"
+    )
     assert code == 2
     assert "fill of other trials is in ml, and 'fill' cannot be compared with them" in " ".join(err.split())
 
 
 @pytest.mark.slow
-def test_the_page_of_a_store_has_a_section_for_a_number(store, run, tmp_path):
+def test_the_page_of_a_store_has_a_section_for_a_number(store, tmp_path):
     for k in range(24):
         fill = 100.0 + 5.0 * k
         keep(store, "can:full_open", f"can#{k % 12}", device=REAL, ticks=3, values=(0.066, fill / 20.0), grasp=k,
              labels={"fill [ml]": repr(fill)})  # fmt: skip
 
-    code, out, _ = run(
+    code, out, _ = graspsense(
         "report", store.folder, "--out", tmp_path / "page", "--target-value", "fill", "--folds", "3"
     )
 
@@ -354,7 +347,7 @@ def test_the_page_of_a_store_has_a_section_for_a_number(store, run, tmp_path):
     assert page.count("predicted ") >= 24  # a mark with its words for each trial
     for control in ("mean only", "width only", "shuffled values"):
         assert control in page
-    code, _, err = run("report", store.folder, "--out", tmp_path / "page", "--target-value", "weight")
+    code, _, err = graspsense("report", store.folder, "--out", tmp_path / "page", "--target-value", "weight")
     assert (code, "no trial of the store" in err, "There are: fill" in " ".join(err.split())) == (
         2,
         True,

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import io
 import sys
 
 import pytest
 from attrs import frozen
+from commands import graspsense
 from parts import ACCELERATION, CHANNELS_OF_HAND, Hand, HandConfig, channels
 
-from graspsense.cli.main import main
 from graspsense.core.components.config import resolve
 from graspsense.core.components.registry import IsolatedPlugins
 from graspsense.plugin_api import Reading, SensorBackend, SensorBackendEntry, hookimpl, setting
@@ -98,7 +97,7 @@ def graspsense_sensor_backends():
         )
 
 
-@pytest.fixture
+@pytest.fixture(autouse=True)
 def plugins(monkeypatch):
     monkeypatch.setitem(sys.modules, __name__, HERE)
     with IsolatedPlugins() as plugins:
@@ -106,16 +105,9 @@ def plugins(monkeypatch):
         yield plugins
 
 
-@pytest.fixture
-def graspsense(plugins, capsys, monkeypatch):
-    def graspsense(*arguments, answers=""):
-        monkeypatch.setattr(sys, "stdin", io.StringIO(answers))
-        options = [part for option in PLAIN for part in ("-o", option)]
-        with pytest.raises(SystemExit) as ended:
-            main([*arguments, *options])
-        return ended.value.code, *capsys.readouterr()
-
-    return graspsense
+def plainly(*arguments, answers=""):
+    options = [part for option in PLAIN for part in ("-o", option)]
+    return graspsense(*arguments, *options, answers=answers)
 
 
 def numbers_in(folder):
@@ -136,18 +128,18 @@ def test_a_grasp_whose_recorder_fails_is_not_kept_and_its_outcome_says_why(plugi
     assert [one.suffix for one in (tmp_path / "t" / "recordings").iterdir()] == [".part"]
 
 
-def test_run_says_in_outcome_and_exit_code_that_the_trial_is_not_kept(graspsense, tmp_path):
-    code, out, err = graspsense("run", "--gripper", "uncountable", "--save", str(tmp_path / "t"))
+def test_run_says_in_outcome_and_exit_code_that_the_trial_is_not_kept(tmp_path):
+    code, out, err = plainly("run", "--gripper", "uncountable", "--save", str(tmp_path / "t"))
     assert code == 2
     (outcome,) = [line for line in out.splitlines() if line.startswith("outcome")]
     assert "Recorder failed" in outcome
     assert "kept as trial" not in err
 
 
-def test_collect_neither_counts_it_nor_goes_on(graspsense, tmp_path):
+def test_collect_neither_counts_it_nor_goes_on(tmp_path):
     folder = str(tmp_path / "t")
     command = ("collect", "--labels", "cup:full", "--each", "2", "--save", folder, "--gripper", "uncountable")
-    code, out, err = graspsense(*command, answers="\n\n")
+    code, out, err = plainly(*command, answers="\n\n")
     assert code != 0
     assert "0 of 2" in out
     assert "ticks of the grasp" in err
@@ -164,10 +156,10 @@ def test_collect_neither_counts_it_nor_goes_on(graspsense, tmp_path):
     ids=["collect", "run"],
 )
 def test_a_simulated_gripper_that_cannot_be_told_what_it_holds_grasps_nothing_under_a_label(
-    graspsense, tmp_path, command
+    tmp_path, command
 ):
     Thingless.opened = Thingless.commanded = 0
-    code, _, err = graspsense(*command, str(tmp_path / "t"), "--gripper", "thingless", answers="\n\n")
+    code, _, err = plainly(*command, str(tmp_path / "t"), "--gripper", "thingless", answers="\n\n")
     assert code == 2
     assert "with_object" in err
     assert (Thingless.opened, Thingless.commanded) == (1, 0)
@@ -175,12 +167,10 @@ def test_a_simulated_gripper_that_cannot_be_told_what_it_holds_grasps_nothing_un
 
 
 @pytest.mark.parametrize("what", SPOILT)
-def test_what_a_gripper_does_not_declare_ends_the_grasp_and_the_trial_until_then_is_kept(
-    graspsense, tmp_path, what
-):
+def test_what_a_gripper_does_not_declare_ends_the_grasp_and_the_trial_until_then_is_kept(tmp_path, what):
     folder = tmp_path / "t"
     more = ("--gripper", "shortening", "-o", f"gripper.what={what}", "--save", str(folder))
-    code, out, err = graspsense("run", *more)
+    code, out, err = plainly("run", *more)
     assert code == 4, err
     assert "aborted: hand delivered what it does not declare" in out
     with Store.read(folder) as store:

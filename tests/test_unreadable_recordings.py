@@ -12,9 +12,9 @@ import zipfile
 import numpy as np
 import pytest
 from attrs import evolve
+from commands import graspsense
 from kept import ended, frame, keep, write_recording
 
-from graspsense.cli.main import main
 from graspsense.core.components.registry.plugins import STRICT_VARIABLE
 from graspsense.core.values.errors import ComponentFailed, ConfigError, DataDamaged, TooLarge
 from graspsense.core.values.signals import EFFORT, NO_PADS, Reading
@@ -49,13 +49,6 @@ def folder(tmp_path):
         squeeze(tmp_path / f"{'can' if k % 2 else 'jar'}_{k + 1}.npz", 1.0 + 0.1 * k)
     (tmp_path / "manifest.toml").write_text(MANIFEST)
     return tmp_path
-
-
-def run(capsys, *arguments):
-    with pytest.raises(SystemExit) as ended:
-        main([str(one) for one in arguments])
-    out, err = capsys.readouterr()
-    return ended.value.code, out, err
 
 
 def flipped_in_the_middle(path):
@@ -108,7 +101,7 @@ SPOIL = {
 
 
 @pytest.mark.parametrize("kind", SPOIL)
-def test_of_a_manifest(folder, kind, capsys):
+def test_of_a_manifest(folder, kind):
     spoilt = folder / "can_2.npz"
     SPOIL[kind](spoilt)
     one = list(readable_or_not("manifest", str(folder / "manifest.toml")))
@@ -119,7 +112,7 @@ def test_of_a_manifest(folder, kind, capsys):
         assert "disk" in bad.line
         assert not isinstance(bad.error, DataDamaged)
 
-    code, out, err = run(capsys, "import", folder / "manifest.toml", "--save", folder / "trials", "--json")
+    code, out, err = graspsense("import", folder / "manifest.toml", "--save", folder / "trials", "--json")
     assert code == 5, err
     told = json.loads(out)
     assert len(told["trials"]) == 5
@@ -252,7 +245,7 @@ def test_no_ticks_is_no_recording_to_replay(tmp_path):
         read_named("mcap", str(path))
 
 
-def test_of_a_store(tmp_path, capsys):
+def test_of_a_store(tmp_path):
     folder = tmp_path / "trials"
     with Store.open(folder) as store:
         for k in range(6):
@@ -277,13 +270,13 @@ def test_of_a_store(tmp_path, capsys):
     problems = verify_store(folder).problems
     for number in (2, 3, 4, 6):
         assert any(one.startswith(f"trial {number}:") for one in problems)
-    code, _, err = run(capsys, "report", folder, "--out", tmp_path / "page")
+    code, _, err = graspsense("report", folder, "--out", tmp_path / "page")
     assert code == 0, err
     (page,) = (tmp_path / "page").glob("*.html")
     assert "recordings cannot be read and are left out" in page.read_text()
 
 
-def test_of_icub(tmp_path, capsys):
+def test_of_icub(tmp_path):
     encoders = " ".join(["10"] * 9)
     frames = [encoders, " ".join(["20"] * 5), *[" ".join(["200"] * 12)] * 5]
     for k in range(1, 5):

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from attrs import evolve, fields
+from commands import graspsense
 from hypothesis import given
 from hypothesis import strategies as st
 from kept import keep
 
 from graspsense import evaluate, load_pipeline, load_trials
-from graspsense.cli.main import main
 from graspsense.core.compiling import compile_notice
 from graspsense.core.components.config import resolve
 from graspsense.core.components.firstparty import EXAMPLES
@@ -39,18 +39,12 @@ FILES = {
 
 
 @pytest.fixture
-def run(capsys, monkeypatch, tmp_path):
+def run(monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     for name, text in FILES.items():
         (tmp_path / name).write_text(text)
 
-    def run(*arguments):
-        with pytest.raises(SystemExit) as ended:
-            main([str(one) for one in arguments])
-        out, err = capsys.readouterr()
-        return ended.value.code or 0, out, err
-
-    return run
+    return graspsense
 
 
 @pytest.mark.parametrize(

@@ -48,6 +48,7 @@ from graspsense_franka_hand.protocol import (
 EMULATED = ["gripper.host=emulated", "gripper.calibration=none"]
 
 
+@pytest.mark.slow
 @parametrize_checks(
     "graspsense-franka-hand",
     keys={"host": "emulated", "calibration": "none"},

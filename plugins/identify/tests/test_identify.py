@@ -175,6 +175,7 @@ def test_a_ramp_at_one_speed_shows_no_memory_and_a_hold_does():
     assert shows_memory([held])
 
 
+@pytest.mark.slow
 def test_without_one_object_the_common_stiffness_is_the_mean_of_the_others():
     rng = np.random.default_rng(0)
 
@@ -264,7 +265,7 @@ def test_a_force_that_falls_while_the_fingers_open_is_no_break():
 
 
 @pytest.mark.parametrize("label", ["odwalla:full_open", "odwalla_worn:full_open", "naked:full_open"])
-@pytest.mark.parametrize("sensor", ["ideal", "pads"])
+@pytest.mark.parametrize("sensor", [pytest.param("ideal", marks=pytest.mark.slow), "pads"])
 def test_the_release_of_a_container_with_contents_is_no_break(label, sensor):
     backend, controller = create("sensor-backend", "sim", sensor=sensor), create("controller", "hybrid")
     for grasp in backend.run_many(controller, [label] * 6, list(range(6)), traces=True):
@@ -313,7 +314,9 @@ def test_a_snap_through_early_in_a_squeeze_is_fitted_though_few_images_show_it(c
     assert fitted_snap(squeeze).rms < 0.001
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize(
+    "seed", [*range(3), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(3, 12))]
+)
 def test_a_snap_through_is_found_whatever_the_rounding_of_the_forces(seed):
     rng = np.random.default_rng(seed)
     critical_m, fall_m = rng.uniform(0.0006, 0.0015), rng.uniform(0.0004, 0.0016)

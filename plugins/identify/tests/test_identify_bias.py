@@ -42,6 +42,7 @@ def errors_of(name):
     return before, before - path_bias(model, fitted, [squeeze])
 
 
+@pytest.mark.slow
 def test_the_nodes_of_a_path_bias_relaxation_times_and_the_error_is_taken_away():
     before, after = errors_of("two branches")
     # Noise-free forces: what is left of the error is that of the simulation.
@@ -49,12 +50,14 @@ def test_the_nodes_of_a_path_bias_relaxation_times_and_the_error_is_taken_away()
     assert np.abs(after).max() < 1e-4
 
 
+@pytest.mark.slow
 def test_the_force_of_a_damper_right_after_the_contact_needs_nodes_between_the_ticks():
     before, after = errors_of("creeping and damped")
     assert np.abs(before).max() > 1e-3
     assert np.abs(after).max() < 3e-4
 
 
+@pytest.mark.slow
 def test_a_recording_with_fewer_ticks_than_nodes_has_no_finer_path():
     squeeze = prepared(squeeze_of("spring", sensor="ideal"), 0.0)
     times, gaps = squeeze.course
@@ -68,7 +71,7 @@ def test_a_recording_with_fewer_ticks_than_nodes_has_no_finer_path():
     assert not path_bias(model, fitted, [coarse]).any()
 
 
-@pytest.mark.parametrize("name", ["spring", "stiffening"])
+@pytest.mark.parametrize("name", ["spring", pytest.param("stiffening", marks=pytest.mark.slow)])
 def test_the_balance_of_energy_gives_the_share_of_the_cells_without_bias(name):
     # The friction is that of the settings: with a spread, it would scatter the share by 4 %.
     drive, _ = drive_and_pads(SimConfig())

@@ -10,6 +10,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from click.testing import CliRunner
+from commands import printed
 from lerobot_sets import CELLS, FPS, NAMES, episode, write_lines, write_set
 
 from graspsense.cli.main import cli
@@ -74,10 +75,7 @@ def test_the_moments_of_closing_and_contact_are_told(tmp_path):
 
 def test_the_import_keeps_trials_in_a_store(tmp_path):
     folder = write_set(tmp_path / "set", 3)
-    done = CliRunner().invoke(
-        cli, ["import", f"lerobot:{folder}?gap_m_per_unit=0.001", "--save", str(tmp_path / "s")]
-    )
-    assert done.exit_code == 0, done.output
+    printed("import", f"lerobot:{folder}?gap_m_per_unit=0.001", "--save", tmp_path / "s")
     with Store.read(tmp_path / "s") as store:
         trials = store.page(limit=10)
         assert len(trials) == 4
@@ -86,12 +84,9 @@ def test_the_import_keeps_trials_in_a_store(tmp_path):
 
 def test_check_says_what_was_understood(tmp_path):
     folder = write_set(tmp_path / "set", 2)
-    done = CliRunner().invoke(
-        cli, ["import", f"lerobot:{folder}", "--check", "--plot", str(tmp_path / "p.png")]
-    )
-    assert done.exit_code == 0, done.output
+    told = printed("import", f"lerobot:{folder}", "--check", "--plot", tmp_path / "p.png")
     for word in ("gripper.pos", "gap_m_per_unit", "f0 [counts]", "episode_000000.mp4", "contact at"):
-        assert word in done.output
+        assert word in told
 
 
 def test_a_gripper_in_percent_is_told_and_mended(tmp_path):

@@ -48,6 +48,7 @@ EXAMPLES = TemporaryDirectory()
 write_set(Path(EXAMPLES.name) / "set", 3)
 
 
+@pytest.mark.slow
 @parametrize_checks(
     "graspsense-lerobot",
     keys=KEYS,

@@ -6,9 +6,9 @@ import os
 from pathlib import Path
 
 import pytest
+from commands import graspsense, printed
 
 from graspsense import ConfigError, load_pipeline
-from graspsense.cli.main import main
 from graspsense.plugin_api import EFFORT, Command, DeviceLost, UnknownName, create
 from graspsense.testing_api import parametrize_checks
 from graspsense_mujoco_gripper.catalogue import FOLDER
@@ -16,6 +16,7 @@ from graspsense_mujoco_gripper.catalogue import FOLDER
 PARALLEL = FOLDER.parent / "parallel.xml"
 
 
+@pytest.mark.slow
 @parametrize_checks("graspsense-mujoco-gripper")
 def test_the_distribution_conforms(check):
     check.run()
@@ -60,13 +61,6 @@ def grasped(*options, thing="can", seed=0):
         "default", options=["gripper.type=mujoco", "classifier.type=none", "gripper.spread=false", *options]
     )
     return pipeline.grasp(object=thing, seed=seed)
-
-
-def run_cli(capsys, *arguments: str) -> tuple[int, str]:
-    """Run graspsense; return its exit code and all that it said."""
-    with pytest.raises(SystemExit) as ended:
-        main(arguments)
-    return int(ended.value.code or 0), "".join(capsys.readouterr())
 
 
 def gripper_file(folder: Path, model: Path = PARALLEL, **changed: str) -> Path:
@@ -360,31 +354,26 @@ def test_a_robot_of_the_menagerie_that_cannot_be_had_says_what_to_do(tmp_path):
         create("sensor-backend", "mujoco", file=str(tmp_path / "gripper.toml")).open(0)
 
 
-def test_a_gripper_file_is_written_from_a_model_and_grasps_as_it_is(tmp_path, monkeypatch, capsys):
+def test_a_gripper_file_is_written_from_a_model_and_grasps_as_it_is(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    made = run_cli(
-        capsys, "plugins", "new", "lab-hand", "--role", "sensor-backend", "--mujoco", str(PARALLEL)
-    )
-    assert made[0] == 0, made
-    assert "close" in made[1]
-    assert "Left to fill in" in made[1]
+    told = printed("plugins", "new", "lab-hand", "--role", "sensor-backend", "--mujoco", PARALLEL)
+    assert "close" in told
+    assert "Left to fill in" in told
     trial = grasped("gripper.file=lab-hand.toml", thing="block")
     assert (trial.outcome.words, trial.features["f_steady"]) == ("steady", pytest.approx(20.0, abs=0.2))
-    again = run_cli(
-        capsys, "plugins", "new", "lab-hand", "--role", "sensor-backend", "--mujoco", str(PARALLEL)
-    )
-    assert again[0] == 2
-    assert "there already" in again[1]
+    again = graspsense("plugins", "new", "lab-hand", "--role", "sensor-backend", "--mujoco", PARALLEL)
+    assert again.returncode == 2
+    assert "there already" in again.stderr
 
 
-def test_a_model_without_opposed_fingers_gets_no_gripper_file(tmp_path, monkeypatch, capsys):
+def test_a_model_without_opposed_fingers_gets_no_gripper_file(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "arm.xml").write_text(
         '<mujoco><worldbody><body name="arm"><joint name="j" type="slide" axis="1 0 0" range="0 1"/>'
         '<geom size="0.1"/></body></worldbody><actuator>'
         '<position joint="j" ctrlrange="0 1" kp="10"/></actuator></mujoco>'
     )
-    made = run_cli(capsys, "plugins", "new", "lab-hand", "--role", "sensor-backend", "--mujoco", "arm.xml")
-    assert made[0] == 2
-    assert "opposed" in made[1]
+    made = graspsense("plugins", "new", "lab-hand", "--role", "sensor-backend", "--mujoco", "arm.xml")
+    assert made.returncode == 2
+    assert "opposed" in made.stderr
     assert not (tmp_path / "lab-hand.toml").exists()

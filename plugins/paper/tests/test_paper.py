@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from attrs import evolve, fields, frozen
+from commands import printed
 from hypothesis import given
 from hypothesis import strategies as st
 
-from graspsense.cli.main import main
 from graspsense.core.components.setting import declared, setting
 from graspsense.core.values.errors import ConfigError
 from graspsense.evaluation.over_seeds import OverSeeds
@@ -350,7 +350,7 @@ controls = false
 
 
 @pytest.mark.slow
-def test_parts_are_done_as_if_alone_and_the_resolved_file_means_the_same_tasks(tmp_path, monkeypatch, capsys):
+def test_parts_are_done_as_if_alone_and_the_resolved_file_means_the_same_tasks(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "fig_5.toml").write_text(FIGURE)
     (tmp_path / "table_3.toml").write_text(TABLE)
@@ -381,14 +381,12 @@ def test_parts_are_done_as_if_alone_and_the_resolved_file_means_the_same_tasks(t
     page = experiment_page(summary, results).html()
     assert "Fig. 5: force control on the block" in page
     assert "Table III" in page
-    with pytest.raises(SystemExit) as ended:
-        main(["experiment", "both.toml", "--out", "out", "--resume", "--json"])
-    assert not ended.value.code
-    told = json.loads(capsys.readouterr().out)
+    told = json.loads(printed("experiment", "both.toml", "--out", "out", "--resume", "--json"))
     assert told["findings"]["rows"][0]["id"] == "table_3_can"
     assert "| Table III | state of a can, 20 N |" in (results.folder / "report.md").read_text()
 
 
+@pytest.mark.slow
 def test_a_force_controller_hits_harder_than_the_hybrid_one_and_neither_counts_as_felt_before(tmp_path):
     (tmp_path / "impacts.toml").write_text(FIGURE)
     planned = read_experiment(str(tmp_path / "impacts.toml"), ["seeds=1"])
@@ -440,8 +438,8 @@ def test_the_grasps_on_the_page_are_those_of_this_version(tmp_path):
     for ours, theirs in zip(grasps.rows, of_page, strict=True):
         assert ours[1:4] == tuple(theirs[1:4])
         # Printed to a tenth of a newton and to 1 mm/s, which other processors may round otherwise.
-        for here, printed in zip(ours[4:], theirs[4:], strict=True):
-            assert float(here) == pytest.approx(float(printed), abs=0.11 if "." in here else 1.0)
+        for here, there in zip(ours[4:], theirs[4:], strict=True):
+            assert float(here) == pytest.approx(float(there), abs=0.11 if "." in here else 1.0)
 
 
 def test_every_shipped_experiment_can_be_planned():

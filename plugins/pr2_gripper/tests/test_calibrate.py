@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from commands import graspsense, printed
 
-from graspsense.cli.main import main
 from graspsense.core.grasp.calibration import load_of, load_table
 from graspsense.core.grasp.calibration_files import (
     Calibration,
@@ -26,14 +26,13 @@ GRIPPER = ("--gripper", "pr2", "-o", "gripper.transport=emulated", "--object", "
 
 
 @pytest.fixture
-def shell(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Any:
+def shell(tmp_path: Path) -> Any:
     """Run `graspsense`, with calibrations below this test's own folder; return exit code, JSON, stderr."""
 
     def call(command: str, *arguments: str) -> tuple[int, Any, str]:
-        with pytest.raises(SystemExit) as ended:
-            main([*command.split(), *GRIPPER, "-o", f"gripper.calibration={tmp_path}", "--json", *arguments])
-        out, err = capsys.readouterr()
-        return ended.value.code or 0, json.loads(out), err  # type: ignore[return-value]
+        options = (*GRIPPER, "-o", f"gripper.calibration={tmp_path}", "--json")
+        done = graspsense(*command.split(), *options, *arguments)
+        return done.returncode, done.json, done.stderr
 
     return call
 
@@ -121,15 +120,14 @@ def test_friction_comes_out_near_the_models_own(shell: Any) -> None:
         assert 8.0 <= effort <= 8.5
 
 
-def test_gripper_without_calibrations_says_so(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as ended:
-        main(["calibrate", "tare"])
-    assert ended.value.code == 2
-    assert "keeps no calibrations" in capsys.readouterr().err
+def test_gripper_without_calibrations_says_so() -> None:
+    done = graspsense("calibrate", "tare")
+    assert done.returncode == 2
+    assert "keeps no calibrations" in done.stderr
 
 
 def test_without_a_home_a_calibration_is_refused_before_it_is_made(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     def unknown(uid: int) -> None:
         raise KeyError(f"getpwuid(): uid not found: {uid}")
@@ -137,16 +135,11 @@ def test_without_a_home_a_calibration_is_refused_before_it_is_made(
     monkeypatch.delenv("XDG_DATA_HOME")
     monkeypatch.delenv("HOME", raising=False)
     monkeypatch.setattr(pwd, "getpwuid", unknown)
-    tare = ["calibrate", "tare", "--images", "1000", *GRIPPER]
-    with pytest.raises(SystemExit) as ended:
-        main(tare)
-    assert ended.value.code == 2
-    said = capsys.readouterr().err
-    assert "XDG_DATA_HOME" in said
-    assert "gripper.calibration" in said
-    with pytest.raises(SystemExit) as ended:
-        main(["calibrate", "tare", "--images", "12", *GRIPPER, "-o", f"gripper.calibration={tmp_path}"])
-    assert not ended.value.code
+    done = graspsense("calibrate", "tare", "--images", "1000", *GRIPPER)
+    assert done.returncode == 2
+    assert "XDG_DATA_HOME" in done.stderr
+    assert "gripper.calibration" in done.stderr
+    printed("calibrate", "tare", "--images", "12", *GRIPPER, "-o", f"gripper.calibration={tmp_path}")
     assert (tmp_path / "EMULATED" / "tare.json").exists()
 
 

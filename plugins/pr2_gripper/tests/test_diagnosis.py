@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import json
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
@@ -12,9 +11,9 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from commands import graspsense
 
 import graspsense_pr2_gripper.plugin
-from graspsense.cli.main import main
 from graspsense.core.components.registry import IsolatedPlugins
 from graspsense.core.components.registry import plugins as loader
 from graspsense.core.grasp.calibration_files import Calibration, calibration_path, write_calibration
@@ -31,17 +30,15 @@ Doctor = Callable[..., tuple[int, dict[str, dict[str, Any]]]]
 
 
 @pytest.fixture
-def doctor(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Doctor:
+def doctor(monkeypatch: pytest.MonkeyPatch) -> Doctor:
     """Runs `graspsense doctor --json`; returns the exit code and the PR2 plugin's findings by subject."""
     monkeypatch.setattr(diagnosis, "TRANSPORTS", ("hidraw",))
 
     def run(*arguments: str) -> tuple[int, dict[str, dict[str, Any]]]:
-        with pytest.raises(SystemExit) as ended:
-            main(["doctor", "--json", "--timeout", "0.2", *arguments])
-        said = json.loads(capsys.readouterr().out)
-        (ours,) = (one for one in said["diagnoses"] if one["distribution"] == "graspsense-pr2-gripper")
+        done = graspsense("doctor", "--json", "--timeout", "0.2", *arguments)
+        (ours,) = (one for one in done.json["diagnoses"] if one["distribution"] == "graspsense-pr2-gripper")
         assert ours["error"] == ""
-        return int(ended.value.code or 0), {one["subject"]: one for one in ours["findings"]}
+        return done.returncode, {one["subject"]: one for one in ours["findings"]}
 
     return run
 
@@ -108,9 +105,7 @@ def test_the_doctor_comes_also_where_a_part_of_the_pipeline_is_missing(
 ) -> None:
     alone = IsolatedPlugins(graspsense_pr2_gripper.plugin)  # without the default pipeline's classifier
     monkeypatch.setattr(loader, "_current", alone)
-    with pytest.raises(SystemExit) as ended:
-        main(["doctor", "--json", "--gripper", "pr2"])
-    assert ended.value.code == 1, "there is no gripper"
+    assert graspsense("doctor", "--json", "--gripper", "pr2").returncode == 1, "there is no gripper"
 
 
 def test_a_gripper_is_measured_and_not_moved(

@@ -291,14 +291,14 @@ def test_long_stall_is_a_lost_device_that_has_let_go() -> None:
     "faults",
     [
         FaultConfig(drop=0.05),
-        FaultConfig(corrupt=0.05),
+        pytest.param(FaultConfig(corrupt=0.05), marks=pytest.mark.slow),
         FaultConfig(repeat=0.1),
         FaultConfig(reorder=0.1),
-        FaultConfig(delay=0.05),
+        pytest.param(FaultConfig(delay=0.05), marks=pytest.mark.slow),
         FaultConfig(drop_command=0.2),
-        FaultConfig(corrupt_command=0.2),
-        FaultConfig(freeze_cell=10),
-        FaultConfig(drift_counts_s=1.0),
+        pytest.param(FaultConfig(corrupt_command=0.2), marks=pytest.mark.slow),
+        pytest.param(FaultConfig(freeze_cell=10), marks=pytest.mark.slow),
+        pytest.param(FaultConfig(drift_counts_s=1.0), marks=pytest.mark.slow),
     ],
 )
 def test_one_fault_at_a_time_is_survived_and_counted(faults: FaultConfig) -> None:

@@ -63,6 +63,7 @@ def emulated():
         gripper.close()
 
 
+@pytest.mark.slow
 @parametrize_checks(
     "graspsense-robotiq-2f",
     keys={"port": "emulated"},

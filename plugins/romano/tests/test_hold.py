@@ -8,20 +8,13 @@ import sys
 
 import numpy as np
 import pytest
+from commands import graspsense
 
-from graspsense.cli.main import main
 from graspsense.plugin_api import create
 from graspsense.testing_api import parametrize_checks
 
 COMMAND = [sys.executable, "-m", "graspsense", "hold"]
 PR2 = ["--gripper", "pr2", "-o", "gripper.transport=emulated", "-o", "controller.sends=effort"]
-
-
-def hold(*arguments):
-    """Return the exit code of the command."""
-    with pytest.raises(SystemExit) as ended:
-        main(["hold", *arguments])
-    return ended.value.code
 
 
 @pytest.mark.slow
@@ -46,42 +39,43 @@ def test_conformance(check):
         (["--gripper", "sim"], "controller.sends=effort"),
     ],
 )
-def test_bad_input_is_a_wrong_use(arguments, said, capsys):
-    assert hold(*arguments) == 2
-    assert said in capsys.readouterr().err
+def test_bad_input_is_a_wrong_use(arguments, said):
+    done = graspsense("hold", *arguments)
+    assert done.returncode == 2
+    assert said in done.stderr
 
 
-def test_a_gripper_that_is_lost_ends_it_and_was_not_opened(capsys):
-    assert hold("--seconds", "30", *PR2, "-o", "gripper.faults.unplug_at_s=2") == 4
-    out, err = capsys.readouterr()
-    assert "device lost" in out
-    assert "not opened" in err
-
-
-@pytest.mark.slow
-def test_a_gripper_without_pads_says_that_no_force_is_measured(capsys):
-    assert hold("--pipeline", "robotiq", "-o", "gripper.port=emulated", "--seconds", "1") == 0
-    out, err = capsys.readouterr()
-    assert "steady" in out
-    assert "no pads" in err
-    assert "nan" not in err
-    assert "release" in err
+def test_a_gripper_that_is_lost_ends_it_and_was_not_opened():
+    done = graspsense("hold", "--seconds", "30", *PR2, "-o", "gripper.faults.unplug_at_s=2")
+    assert done.returncode == 4
+    assert "device lost" in done.stdout
+    assert "not opened" in done.stderr
 
 
 @pytest.mark.slow
-def test_a_thing_that_the_force_limit_cannot_hold_says_so(capsys):
+def test_a_gripper_without_pads_says_that_no_force_is_measured():
+    done = graspsense("hold", "--pipeline", "robotiq", "-o", "gripper.port=emulated", "--seconds", "1")
+    assert done.returncode == 0
+    assert "steady" in done.stdout
+    assert "no pads" in done.stderr
+    assert "nan" not in done.stderr
+    assert "release" in done.stderr
+
+
+@pytest.mark.slow
+def test_a_thing_that_the_force_limit_cannot_hold_says_so():
     """3 N and the weight of 0.15 kg need 5.6 N at a friction of 0.4."""
-    assert hold("--seconds", "5", "-o", "controller.force_limit_n=4") == 0
-    out, err = capsys.readouterr()
-    assert "force limit reached" in err
-    assert "slipped" in out
-    assert "too heavy" in out
+    done = graspsense("hold", "--seconds", "5", "-o", "controller.force_limit_n=4")
+    assert done.returncode == 0
+    assert "force limit reached" in done.stderr
+    assert "slipped" in done.stdout
+    assert "too heavy" in done.stdout
 
 
 @pytest.mark.slow
-def test_a_tugged_block_is_held_with_more_force_from_the_first_slip_on(capsys):
-    assert hold("--seconds", "5") == 0
-    out, err = capsys.readouterr()
+def test_a_tugged_block_is_held_with_more_force_from_the_first_slip_on():
+    code, out, err = graspsense("hold", "--seconds", "5")
+    assert code == 0
     told = [line.split() for line in err.splitlines() if line.endswith(("slip", "holds"))]
     slips = [float(t) for t, _, _, _, what in told if what == "slip"]
     forces = {float(t): float(force) for t, _, force, _, what in told if what == "holds"}

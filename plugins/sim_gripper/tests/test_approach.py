@@ -32,12 +32,14 @@ def closing_at(speed_m_s):
     [
         pytest.param(closing_at(0.04), "odwalla:full_closed", id="fast"),
         # The toy stands off the centre, and a finger pushes it across the table.
-        pytest.param(closing_at(0.04), "toy", id="pushed"),
+        pytest.param(closing_at(0.04), "toy", id="pushed", marks=pytest.mark.slow),
         pytest.param(closing_at(0.004), "toy", id="slow", marks=pytest.mark.slow),
         pytest.param(HYBRID, "odwalla:full_closed", id="default", marks=pytest.mark.slow),
         # A constant effort above friction accelerates the fingers up to the contact.
-        pytest.param(create("controller", "force"), "odwalla:full_closed", id="accelerating"),
-        pytest.param(RINGING, "odwalla:full_closed", id="ringing"),
+        pytest.param(
+            create("controller", "force"), "odwalla:full_closed", id="accelerating", marks=pytest.mark.slow
+        ),
+        pytest.param(RINGING, "odwalla:full_closed", id="ringing", marks=pytest.mark.slow),
         # Near the limit of 0.2 m/s, which the guard enforces.
         pytest.param(closing_at(0.199), "odwalla:full_closed", id="limit"),
     ],

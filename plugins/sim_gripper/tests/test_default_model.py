@@ -10,11 +10,11 @@ from importlib.resources import files
 from pathlib import Path
 
 import pytest
+from commands import printed
 
 pytest.importorskip("graspsense_c45", reason="the default model is a tree of graspsense-c45")
 
 from graspsense import load_pipeline
-from graspsense.cli.main import main
 
 MODELS = files("graspsense_sim_gripper").joinpath("models")
 KEPT = json.loads(MODELS.joinpath("default.json").read_text(encoding="utf-8"))
@@ -52,7 +52,9 @@ def test_object_and_state_are_named_at_once_with_the_reason(pipeline, name):
     )
 
 
-@pytest.mark.parametrize("name", ["egg", "block", "toy"])
+@pytest.mark.parametrize(
+    "name", ["egg", *(pytest.param(one, marks=pytest.mark.slow) for one in ("block", "toy"))]
+)
 @pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow)])
 def test_what_it_never_saw_is_unknown(pipeline, name, seed):
     said = pipeline.grasp(object=name, seed=seed).prediction
@@ -126,28 +128,23 @@ def test_an_answer_from_five_training_trials_is_no_certain_one(pipeline):
 
 
 @pytest.mark.filterwarnings("error::RuntimeWarning")
-def test_the_better_pipeline_names_what_the_default_one_confuses(capsys):
+def test_the_better_pipeline_names_what_the_default_one_confuses():
     said = load_pipeline("best").grasp(object="can:empty_open").prediction
 
     assert said.label == "can:empty_open"
     assert said.prediction_set == ("can:empty_open",)
     for name, says in (("default", True), ("best", False)):
-        with pytest.raises(SystemExit) as ended:
-            main(["run", "--pipeline", name])
-        assert not ended.value.code
-        assert ("--pipeline best" in capsys.readouterr().out) is says
+        assert ("--pipeline best" in printed("run", "--pipeline", name)) is says
 
 
-@pytest.mark.parametrize(("force_n", "measured"), [(20, True), (15, False)])
-def test_a_figure_is_printed_only_for_the_force_at_which_it_was_measured(capsys, force_n, measured):
+@pytest.mark.parametrize(
+    ("force_n", "measured"), [(20, True), pytest.param(15, False, marks=pytest.mark.slow)]
+)
+def test_a_figure_is_printed_only_for_the_force_at_which_it_was_measured(force_n, measured):
     option = ("-o", f"controller.probing_force_n={force_n}")
     given = ("--objects", "can:full_open,can:empty_open", "--instances", "1", "--trials", "1")
-    told = []
-    for arguments in (("run",), ("predict", "default", "simulated", *given)):
-        with pytest.raises(SystemExit) as ended:
-            main([*arguments, *option, "--json"])
-        assert not ended.value.code
-        told.append(json.loads(capsys.readouterr().out))
+    asked = (("run",), ("predict", "default", "simulated", *given))
+    told = [json.loads(printed(*arguments, *option, "--json")) for arguments in asked]
 
     for said in (told[0]["prediction"], *told[1]["predictions"]):
         assert (said["certainty"] is not None) is measured
@@ -172,9 +169,7 @@ def test_its_command_makes_it_again(tmp_path: Path) -> None:
     again = tmp_path / "default.json"
     words = shlex.split(KEPT["provenance"]["command"])
     words[words.index("--out") + 1] = str(again)
-    with pytest.raises(SystemExit) as ended:
-        main(words[1:])
-    assert not ended.value.code
+    printed(*words[1:])
     made = json.loads(again.read_text(encoding="utf-8"))
 
     for key in ("classifier", "settings", "target", "features"):

@@ -36,13 +36,15 @@ def assert_same(one, other):
         np.testing.assert_allclose(columns(other)[name], column, rtol=1e-9, atol=1e-15, err_msg=name)
 
 
+# Slow where nothing is kept yet: the loop is compiled, which takes half a minute of processor.
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("scene", "sensor"),
     [
         ("can:empty_open", "pads"),
         ("can:empty_open", "ideal"),
-        pytest.param("odwalla:full_closed", "pads", marks=pytest.mark.slow),
-        pytest.param("none", "pads", marks=pytest.mark.slow),
+        ("odwalla:full_closed", "pads"),
+        ("none", "pads"),
     ],
 )
 def test_runner_plain_loop_and_compiled_loop_give_one_trace(scene, sensor):
@@ -55,6 +57,7 @@ def test_runner_plain_loop_and_compiled_loop_give_one_trace(scene, sensor):
     assert_same(run.trace, fast.trace)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sensor", ["pads", "ideal"])
 def test_with_steps_over_several_ticks_the_plain_loop_and_the_compiled_loop_give_one_trace(sensor):
     config = SimConfig(sensor=sensor)

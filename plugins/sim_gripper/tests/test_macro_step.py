@@ -223,7 +223,10 @@ def test_the_forces_of_a_release_are_those_of_single_ticks():
     assert many.state.step.n_steps < 0.1 * single.state.step.n_steps
 
 
-@pytest.mark.parametrize("settings", [{"pad_delay_s": 0.017}, {"rate_hz": 250.0}, {"rate_hz": 4000.0}])
+@pytest.mark.parametrize(
+    "settings",
+    [{"pad_delay_s": 0.017}, {"rate_hz": 250.0}, pytest.param({"rate_hz": 4000.0}, marks=pytest.mark.slow)],
+)
 def test_images_and_outcome_are_those_of_single_ticks(settings):
     law = create("controller", "hybrid")
     many, single = (
@@ -249,6 +252,7 @@ class Pulse(type(create("controller", "force"))):
         return Command(EFFORT, effort, inf, inf), state
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("compiled", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_a_command_within_a_step_takes_effect_in_its_tick(compiled):
     law = Pulse(create("controller", "force").config)

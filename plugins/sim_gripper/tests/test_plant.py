@@ -526,6 +526,7 @@ def pressed_again(steps):
     return result, state.contact.left.compression_m
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "steps",
     [

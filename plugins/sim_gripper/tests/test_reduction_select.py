@@ -61,7 +61,7 @@ def thing(*terms):
     return ObjectSpec(name="made up", width_m=0.05, terms=terms)
 
 
-@pytest.mark.parametrize("accuracy", [0.1, 0.001])
+@pytest.mark.parametrize("accuracy", [0.1, pytest.param(0.001, marks=pytest.mark.slow)])
 def test_without_spread_the_trial_grasp_is_the_grasp_that_runs(accuracy):
     config, law, odwalla = evolve(CONFIG, accuracy=accuracy), hybrid(), find("odwalla:full_closed")
     problem, model = problem_of(config, odwalla), selected(config, odwalla, law)
@@ -102,9 +102,10 @@ class ForceAbove(FeatureSet[Zero]):
 RINGING = thing(SHELL, ("surface", {"mass_kg": 0.02, "k_n_m": 3e3, "damping_n_s_m": 0.5, "contact_n_m": 2e4}))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("spec", "above_n", "flagged"),
-    [pytest.param(RINGING, 1.0, (), marks=pytest.mark.slow), (thing(SHELL), 1e-7, ("above",))],
+    [(RINGING, 1.0, ()), (thing(SHELL), 1e-7, ("above",))],
 )
 def test_the_features_of_the_pipeline_are_verified_too(spec, above_n, flagged):
     law = hybrid()
@@ -180,6 +181,7 @@ def test_force_and_speed_are_those_of_the_controller_unless_the_settings_say_oth
     assert default_controller(told).controller.config.closing_speed_m_s == 0.002
 
 
+@pytest.mark.slow
 def test_a_slow_approach_is_taken_up_near_the_object(monkeypatch):
     monkeypatch.setattr(verify, "MAX_SECONDS", 4.0)
     model = selected(CONFIG, thing(SHELL), hybrid(closing_speed_m_s=0.002))
@@ -187,6 +189,7 @@ def test_a_slow_approach_is_taken_up_near_the_object(monkeypatch):
     assert model.speed_m_s == pytest.approx(0.002, rel=0.05)
 
 
+@pytest.mark.slow
 def test_selecting_that_takes_long_reports_how_far_it_is(monkeypatch, caplog):
     selected(CONFIG, thing(SHELL), hybrid())
     assert caplog.messages == []
@@ -294,6 +297,7 @@ def test_every_object_of_the_catalogue_has_a_model_of_ordinary_steps():
             assert (model.level in ordinary) != near_a_tick, spec.name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stiffness_spread", [0.0, 1.0])
 def test_with_spread_a_step_per_tick_is_chosen_if_it_suffices_for_several_instances(stiffness_spread):
     spec = evolve(thing(("elastic", {"k1_n_m": 1e5})), stiffness_spread=stiffness_spread)
@@ -304,6 +308,7 @@ def test_with_spread_a_step_per_tick_is_chosen_if_it_suffices_for_several_instan
     assert model.verification.error <= 0.5e-3
 
 
+@pytest.mark.slow
 def test_a_step_per_tick_is_chosen_where_it_is_accurate_enough_and_not_where_it_is_not():
     stiff = thing(("elastic", {"k1_n_m": 5e5}), ("maxwell", {"k_n_m": 2e5, "tau_s": 0.01}))
     tight = selected(evolve(CONFIG, accuracy=1e-4), thing(SHELL), hybrid())
@@ -416,6 +421,7 @@ def test_the_report_says_which_quantities_are_not_verified(terms, further, unsur
     assert grasped.report["not_verified"] == unsure
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("gripper", "gain", "growth"),
     [

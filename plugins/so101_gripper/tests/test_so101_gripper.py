@@ -74,6 +74,7 @@ def driver_of(arm, **keys):
     )
 
 
+@pytest.mark.slow
 @parametrize_checks(
     "graspsense-so101-gripper",
     keys={"port": "emulated"},

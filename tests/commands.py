@@ -1,0 +1,44 @@
+"""The command line as a user types it, in this process: what it ends with and what it prints."""
+
+from __future__ import annotations
+
+import io
+import json
+import sys
+from contextlib import redirect_stderr, redirect_stdout
+from typing import Any, NamedTuple
+
+import pytest
+
+from graspsense.cli.main import main
+
+
+class Done(NamedTuple):
+    """How a command ended; the names are those of `subprocess.CompletedProcess`."""
+
+    returncode: int
+    stdout: str
+    stderr: str
+
+    @property
+    def json(self) -> Any:
+        return json.loads(self.stdout)
+
+
+def graspsense(*arguments: object, answers: str = "") -> Done:
+    """Run `graspsense ARGUMENTS`, with `answers` as its standard input, and return how it ended."""
+    # With bytes below the text, as standard output has them.
+    out, err = (io.TextIOWrapper(io.BytesIO(), "utf-8", newline="", write_through=True) for _ in range(2))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "stdin", io.StringIO(answers))
+        with redirect_stdout(out), redirect_stderr(err), pytest.raises(SystemExit) as ended:
+            main([str(argument) for argument in arguments])
+    code = ended.value.code or 0
+    return Done(code, *(stream.buffer.getvalue().decode() for stream in (out, err)))
+
+
+def printed(*arguments: object) -> str:
+    """Return what a command that ends well prints."""
+    done = graspsense(*arguments)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
