@@ -51,13 +51,20 @@ def main() -> int:
     predictions = model.predictions(trials.table, trials.provenance)
     support = model.classifier.support(trials.table.columns(model.names))
     rests_on = np.full(len(trials), np.nan) if support is None else support
-    known = np.array([one.label != UNKNOWN for one in predictions])
-    right = np.array([one.label == label for one, label in zip(predictions, trials.labels, strict=True)])
-    certainty = np.array([np.nan if one.certainty is None else one.certainty for one in predictions])
-    inside = np.array(
-        [label in one.prediction_set for one, label in zip(predictions, trials.labels, strict=True)]
+    known = np.array([prediction.label != UNKNOWN for prediction in predictions])
+    right = np.array(
+        [prediction.label == label for prediction, label in zip(predictions, trials.labels, strict=True)]
     )
-    sizes = np.array([len(one.prediction_set) for one in predictions])
+    certainty = np.array(
+        [np.nan if prediction.certainty is None else prediction.certainty for prediction in predictions]
+    )
+    inside = np.array(
+        [
+            label in prediction.prediction_set
+            for prediction, label in zip(predictions, trials.labels, strict=True)
+        ]
+    )
+    sizes = np.array([len(prediction.prediction_set) for prediction in predictions])
     print(f"{model.in_a_line}\n{len(trials)} new grasps, seed {asked.seed}: {percentage(right.mean())} right")
     classes = {"all": known} if support is None else dict(_classes(rests_on, known))
     rows = [

@@ -125,8 +125,8 @@ class Paced(SensorBackend[tuple[TactileArray, ...]]):
             self.images += 1
             # Every image is an array of its own, as that of a driver.
             new = [
-                Image(t, self.images, cells_of(one, self.pool[(self.images + i) % POOL].copy()))
-                for i, one in enumerate(self.channels)
+                Image(t, self.images, cells_of(channel, self.pool[(self.images + i) % POOL].copy()))
+                for i, channel in enumerate(self.channels)
             ]
             self.signals = signal_type(self.channels)(*new)
         frame = Frame(t, 1 / RATE_HZ, 0.08 - 0.001 * t, -0.001, 10.0, 0.1 * (self.k % 5), 0.0, 0.0, 0.0, 0)

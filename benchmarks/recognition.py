@@ -77,8 +77,8 @@ def measured(source: str, given: argparse.Namespace, options: Sequence[str]) -> 
         seed=asked["seed"],
         protocols={headline: folds},
         outside={
-            name: OutsideAnswers(predicted={headline: one["predicted"]}, training_s=one["training_s"])
-            for name, one in outside.items()
+            name: OutsideAnswers(predicted={headline: answer["predicted"]}, training_s=answer["training_s"])
+            for name, answer in outside.items()
         },
         progress=told,
     )
@@ -186,18 +186,18 @@ def markdown(ranking: Ranking) -> str:
         "| classifier | features | recognised | loss in points | standing | sets cover | training |",
         "|" + "---|" * 7,
     ]
-    for one in ranking.candidates:
-        rate = one.rates[ranking.protocol]
+    for candidate in ranking.candidates:
+        rate = candidate.rates[ranking.protocol]
         interval = f" ({percentages(rate.interval)})" if rate.interval else ""
-        covered = one.sets.covered if one.sets is not None else None
+        covered = candidate.sets.covered if candidate.sets is not None else None
         cells = [
-            f"`{one.classifier}`" if one.sets is not None else one.classifier,
-            f"`{one.features}`" if one.sets is not None else one.features,
+            f"`{candidate.classifier}`" if candidate.sets is not None else candidate.classifier,
+            f"`{candidate.features}`" if candidate.sets is not None else candidate.features,
             percentage(rate.rate) + interval,
-            "" if one.loss is None else one.loss.points,
-            one.standing,
+            "" if candidate.loss is None else candidate.loss.points,
+            candidate.standing,
             "" if covered is None else percentage(covered.rate),
-            f"{one.training_s:.2g} s",
+            f"{candidate.training_s:.2g} s",
         ]
         lines.append(f"| {' | '.join(cells)} |")
     return "\n".join([*lines, "", *(f"- {note}" for note in ranking.notes)])
@@ -216,7 +216,7 @@ def mean_over(text: str) -> str:
         f"| candidate | {' | '.join(Path(source).name for source in sources)} | mean | difference from {best} |",
         "|" + "---|" * (len(sources) + 3),
     ]
-    for name, of in sorted(complete.items(), key=lambda one: -one[1].mean()):
+    for name, of in sorted(complete.items(), key=lambda item: -item[1].mean()):
         apart = of - complete[best]
         half = stats.t.ppf(0.975, len(of) - 1) * apart.std(ddof=1) / np.sqrt(len(of))
         words = f"{apart.mean():+.1f} ({apart.mean() - half:+.1f} to {apart.mean() + half:+.1f})"

@@ -116,7 +116,7 @@ def sparse_scaled(training: np.ndarray, test: np.ndarray) -> tuple[np.ndarray, n
     roots = [np.sqrt(np.maximum(one, 0.0)) for one in (training, test)]
     spread = roots[0].std(axis=0, ddof=1) + (roots[0] == 0).mean(axis=0) ** 4 + 1e-8
     mean = roots[0].mean(axis=0)
-    scaled = [((one - mean) * (one != 0) / spread).astype(np.float32) for one in roots]
+    scaled = [((root - mean) * (root != 0) / spread).astype(np.float32) for root in roots]
     return scaled[0], scaled[1]
 
 
@@ -136,8 +136,8 @@ def multirocket_hydra(data: dict, training: np.ndarray, test: np.ndarray, seed: 
     features = [rocket.transform(curves[rows].astype(np.float32)) for rows in (training, test)]
     scaler = StandardScaler().fit(features[0])
     joined = [
-        np.concatenate((count, scaler.transform(one).astype(np.float32)), axis=1)
-        for count, one in zip(counts, features, strict=True)
+        np.concatenate((count, scaler.transform(feature).astype(np.float32)), axis=1)
+        for count, feature in zip(counts, features, strict=True)
     ]
     ridge = RidgeClassifierCV(alphas=np.logspace(-3, 3, 10))
     return ridge.fit(joined[0], data["labels"][training]).predict(joined[1])

@@ -165,10 +165,10 @@ def main() -> None:
         "added_p99_us_to_command": added_to_command_us,
         "added_p99_us_to_command_interval": to_command_interval,
         "goal_us": GOAL_US,
-        "recorded_ticks": sum(one.ticks for one in written),
-        "deferred": sum(one.deferred for one in written),
-        "dropped": sum(one.dropped for one in written),
-        "bytes_per_second": sum(one.size for one in written) / (given.rounds * given.seconds),
+        "recorded_ticks": sum(info.ticks for info in written),
+        "deferred": sum(info.deferred for info in written),
+        "dropped": sum(info.dropped for info in written),
+        "bytes_per_second": sum(info.size for info in written) / (given.rounds * given.seconds),
     }
     if given.json:
         print(json.dumps(result, indent=2))

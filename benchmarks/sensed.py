@@ -37,9 +37,9 @@ def table(trade: SensedTrade, accuracy: float) -> list[str]:
         if point.role == "reference":
             continue
         lines += [
-            f"| `{one.feature}` | {one.distance:.1e} | {one.upper:.1e} | {one.p_difference:.2g} | {one.power:.2g} "
-            f"| {'yes' if one.is_equivalent else 'not shown'} |"
-            for one in point.distances
+            f"| `{distance.feature}` | {distance.distance:.1e} | {distance.upper:.1e} | {distance.p_difference:.2g} "
+            f"| {distance.power:.2g} | {'yes' if distance.is_equivalent else 'not shown'} |"
+            for distance in point.distances
         ]
         test = point.equivalence
         if test is not None:
@@ -72,7 +72,7 @@ def main() -> None:
     if given.short:
         given.seeds, given.instances, objects, compiled = 2, 2, ("toy", "block"), "never"
     settings = resolve("default", options=["classifier.type=c45"])
-    reference = next(one for one in variants() if one.role == "reference")
+    reference = next(variant for variant in variants() if variant.role == "reference")
     if given.short:
         # The reference takes a second a grasp in the interpreter.
         reference = SimulationVariant(

@@ -531,7 +531,7 @@ def _faster(title: str, attribute: str, module: Any, classes: Sequence[Any]) -> 
 
 def _fields_signature(cls: Any) -> str:
     """Return the name of a class of attrs or a named tuple, with its fields."""
-    names = getattr(cls, "_fields", None) or tuple(one.name for one in attrs.fields(cls))
+    names = getattr(cls, "_fields", None) or tuple(field.name for field in attrs.fields(cls))
     return f"{cls.__name__}({', '.join(names)})"
 
 
@@ -572,12 +572,12 @@ def _entry(cls: Any) -> list[str]:
         if isinstance(one, ast.AnnAssign) and isinstance(text, ast.Expr)
     }
     attrs.resolve_types(cls)
-    for one in attrs.fields(cls):
-        empty = one.default.factory() if isinstance(one.default, attrs.Factory) else one.default
-        default = "required" if one.default is attrs.NOTHING else f"`{empty!r}`"
-        kind = re.sub(r"graspsense\.core\.entries\.|collections\.abc\.", "", strict._kind_words(one.type))
+    for field in attrs.fields(cls):
+        empty = field.default.factory() if isinstance(field.default, attrs.Factory) else field.default
+        default = "required" if field.default is attrs.NOTHING else f"`{empty!r}`"
+        kind = re.sub(r"graspsense\.core\.entries\.|collections\.abc\.", "", strict._kind_words(field.type))
         kind = kind.replace("|", "or")
-        lines.append(f"| `{one.name}` | {_cell(kind)} | {default} | {_cell(meanings[one.name])} |")
+        lines.append(f"| `{field.name}` | {_cell(kind)} | {default} | {_cell(meanings[field.name])} |")
     return [*lines, "", _text(cls), ""]
 
 

@@ -19,7 +19,7 @@ BEGIN, END = "<!-- tables: which_gripper.py -->\n", "<!-- end of the tables -->\
 
 def of_target(summary: Summary, target: str) -> list[ConditionResult]:
     """Return the conditions of this target, in the order of the file."""
-    return [one for one in summary.conditions if one.target == target]
+    return [condition for condition in summary.conditions if condition.target == target]
 
 
 def told_apart(condition: ConditionResult) -> dict[str, str]:

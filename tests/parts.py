@@ -209,7 +209,7 @@ class Nearest(Classifier[ClassifierConfig]):
         mean = np.nansum(values, axis=0) / counts
         scale = np.sqrt(np.nansum((values - mean) ** 2, axis=0) / counts) + 1e-12
         known = sorted(set(labels))
-        which = np.array([known.index(one) for one in labels])
+        which = np.array([known.index(label) for label in labels])
         scaled = np.nan_to_num((values - mean) / scale)
         centres = np.array([scaled[which == i].mean(axis=0) for i in range(len(known))])
         self._model = {

@@ -53,16 +53,16 @@ def test_an_array_of_three_dimensions_is_read_alike_in_every_file_and_asked_abou
     text = f'files = "{{label}}.{ending}"\norder = "{{part}}"\n{COLUMNS}'
     found = recordings(tmp_path, text)
     assert peaks(found) == pytest.approx([FORCE.max() * k for k in (1, 2, 3)])
-    assert [one.order for one in found] == [0, 1, 2]
-    assert all(any("axes" in notice for notice in one.notices) for one in found)
+    assert [recording.order for recording in found] == [0, 1, 2]
+    assert all(any("axes" in notice for notice in recording.notices) for recording in found)
     confirmed = recordings(tmp_path, text + 'axes = "grasp, time, column"\n')
     assert peaks(confirmed) == peaks(found)
-    assert not any("axes" in notice for one in confirmed for notice in one.notices)
+    assert not any("axes" in notice for recording in confirmed for notice in recording.notices)
     if ending == "npz":
         numbered = recordings(
             tmp_path, text.replace("{label}", "jar") + 'label = "kind{kind}"\naxes = "grasp, time, column"'
         )
-        assert [one.label for one in numbered] == ["kind3", "kind4", "kind5"]
+        assert [recording.label for recording in numbered] == ["kind3", "kind4", "kind5"]
 
 
 def test_the_order_of_the_axes_is_that_of_the_manifest(tmp_path):
@@ -73,9 +73,11 @@ def test_the_order_of_the_axes_is_that_of_the_manifest(tmp_path):
     np.savez(tmp_path / "cup.npz", gap=GAP, force=FORCE, palm=images)
     text = 'files = "{label}.npz"\nrate_hz = 100\ngap = "gap"\nforce = "force"\nchannels = { palm = "palm [counts]" }\n'
     for given in (text, text + 'axes = "row, column, time"\n'):
-        (one,) = recordings(tmp_path, given)
-        assert (one.recording.channels[0].rows, one.recording.channels[0].columns) == (4, 5)
-        assert one.recording.readings[7].signals.palm.cells == pytest.approx(images[:, :, 7].reshape(-1))
+        (recording,) = recordings(tmp_path, given)
+        assert (recording.recording.channels[0].rows, recording.recording.channels[0].columns) == (4, 5)
+        assert recording.recording.readings[7].signals.palm.cells == pytest.approx(
+            images[:, :, 7].reshape(-1)
+        )
     with pytest.raises(ConfigError, match="does not name three axes"):
         recordings(tmp_path, text + 'axes = "time, width, column"\n')
 
@@ -91,9 +93,11 @@ def test_hundreds_of_named_arrays_are_told_apart_by_a_pattern(ending, tmp_path):
     text += 'time = "t"\ngap = "gap"\nforce = "force"\n'
     found = recordings(tmp_path, text)
     assert len(found) == 200
-    assert {one.label for one in found} == {"jar", "tin_can"}
+    assert {recording.label for recording in found} == {"jar", "tin_can"}
     by_order = sorted(
-        (one.order, peak) for one, peak in zip(found, peaks(found), strict=True) if one.label == "jar"
+        (recording.order, peak)
+        for recording, peak in zip(found, peaks(found), strict=True)
+        if recording.label == "jar"
     )
     assert [peak for _, peak in by_order] == pytest.approx([k * FORCE.max() / 10.0 for k in range(1, 101)])
     (refused,) = recordings(tmp_path, text.replace("{label}_", "grasp_{label}_"))
@@ -124,7 +128,7 @@ def test_groups_of_hdf5_are_grasps(tmp_path):
         """
     found = recordings(tmp_path, text)
     assert peaks(found) == pytest.approx([FORCE.max(), 2 * FORCE.max()])
-    assert {one.instance for one in found} == {"Ann"}
+    assert {recording.instance for recording in found} == {"Ann"}
 
 
 def test_a_mat_file_of_version_7_3_is_read_in_the_axes_of_matlab(tmp_path):
@@ -139,7 +143,7 @@ def test_a_mat_file_of_version_7_3_is_read_in_the_axes_of_matlab(tmp_path):
     found = recordings(
         tmp_path, 'files = "*.mat"\nlabel = "{kind}"\nrate_hz = 100\ngap = "gap"\nforce = "data[2]"\n'
     )
-    assert [one.label for one in found] == ["ja"]
+    assert [recording.label for recording in found] == ["ja"]
     assert peaks(found) == pytest.approx([2 * FORCE.max()])
 
 

@@ -145,14 +145,14 @@ def test_predictions_in_the_loop_are_those_of_the_same_part_afterwards(model, tm
     anytime.end()
 
     assert grasp.outcome == Outcome.STEADY
-    assert [one.after_s for one in anytime.predictions] == list(CHECKPOINTS)
+    assert [prediction.after_s for prediction in anytime.predictions] == list(CHECKPOINTS)
     contact = contact_of(grasp.trace)
     for (after_s, part), made in zip(model.checkpoints, anytime.predictions, strict=True):
         features = curve().extract(until_checkpoint(grasp.trace, contact, after_s))
         assert made.features.values == pytest.approx(features.values, nan_ok=True, rel=1e-12)
         assert made.prediction.label == part.predict(features).label
     told = [event.what for event in grasp.events if event.source == "model"]
-    assert told == [one.words for one in anytime.predictions]
+    assert told == [prediction.words for prediction in anytime.predictions]
     assert told[-1].startswith("0.05 s after the contact: soft")
     assert "0.05 s after the contact" in anytime.predictions[-1].prediction.model
 

@@ -60,7 +60,9 @@ def test_the_features_that_tell_the_labels_are_chosen_in_each_fold():
     assert found.chosen_in == {"tree with informed": 5}
     assert found.rate.rate == 1.0
     assert found.ranking.protocol == "instance_held_out"
-    assert {one.standing for one in found.ranking.candidates if one.features == "noise"} == {"worse"}
+    assert {
+        candidate.standing for candidate in found.ranking.candidates if candidate.features == "noise"
+    } == {"worse"}
 
 
 def test_a_feature_that_names_the_object_does_not_pass_for_one_of_the_label():
@@ -122,7 +124,7 @@ def test_a_classifier_that_fails_is_told_and_left_out():
     noise = objects()
     found = choose({"broken": Made(Failing), **NEAREST}, {"informed": informed(noise)})
 
-    assert {one.classifier for one in found.ranking.candidates} == {"nearest"}
+    assert {candidate.classifier for candidate in found.ranking.candidates} == {"nearest"}
     assert any("broken" in note and "it broke" in note for note in found.ranking.notes)
     with pytest.raises(ConfigError, match="it broke"):
         choose({"broken": Made(Failing)}, {"informed": informed(noise)})

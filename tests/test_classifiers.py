@@ -81,7 +81,8 @@ class TestEvery:
         said = classifier.explain(row)
         assert said.label == "can:full"
         assert any(
-            "f_steady is missing" in one.words and "never came to rest" in one.words for one in said.because
+            "f_steady is missing" in reason.words and "never came to rest" in reason.words
+            for reason in said.because
         )
 
     def test_a_feature_that_no_trial_had_and_one_that_is_constant(self, name):
@@ -166,7 +167,8 @@ def test_trees_tell_their_path_in_the_features_own_units():
     for name in ("c45", "tree"):
         because = fitted(name, table, labels).explain(row).because
         assert any(
-            one.words.startswith("p_first = 66.1 mm > ") and one.words.endswith(" mm") for one in because
+            reason.words.startswith("p_first = 66.1 mm > ") and reason.words.endswith(" mm")
+            for reason in because
         )
         assert "training trials" in because[-1].words
 

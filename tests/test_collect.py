@@ -238,7 +238,8 @@ def held(folder):
     with Store.read(folder) as store:
         trials = [store.trial(one.id) for one in reversed(store.page())]
     return [
-        (one.summary.label, one.record.settings["gripper"]["object"], one.summary.simulated) for one in trials
+        (trial.summary.label, trial.record.settings["gripper"]["object"], trial.summary.simulated)
+        for trial in trials
     ]
 
 

@@ -563,7 +563,7 @@ class TestToToml:
         assert again.gripper.config == first.gripper.config
         assert again.run == first.run
         assert set(again.origins.values()) - {"default"} == {
-            one for one in again.origins.values() if one.startswith("again.toml:")
+            origin for origin in again.origins.values() if origin.startswith("again.toml:")
         }
         assert to_toml(again).replace("again.toml", "lab.toml") == to_toml(first)
 

@@ -122,7 +122,7 @@ def readings(force, ticks=40):
 def test_the_part_of_a_recording_is_of_the_same_grasp():
     still = readings(0.0)
     curves = [readings(0.1)[:25], readings(0.1), readings(0.2), readings(0.1), still, still[:20]]
-    assert grasp_numbers([curve_bytes(one) for one in curves]) == [1, 1, 2, 1, 4, 5]
+    assert grasp_numbers([curve_bytes(curve) for curve in curves]) == [1, 1, 2, 1, 4, 5]
 
 
 def table_of_noise(path, copies):

@@ -24,7 +24,7 @@ def test_the_ranges_accept_exactly_what_all_the_tests_accept(tests, value, other
         SplitTest(feature=name, unit="m", value=value, threshold=threshold, above=value > threshold)
         for name, threshold in tests
     ]
-    ranges = {one.feature: one for one in feature_ranges(path)}
+    ranges = {range_.feature: range_ for range_ in feature_ranges(path)}
 
     for name in "abc":
         accepted = all((other > test.threshold) == test.above for test in path if test.feature == name)
@@ -63,14 +63,14 @@ def test_trials_within_the_told_ranges_have_the_same_prediction(name):
     several = 0
     for a, b in rng.uniform(0.0, 0.1, (50, 2)).tolist():
         said = classifier.explain(Features(names=("a", "b"), values=(a, b), units=("m", "m")))
-        tests = [one.words for one in said.because if " = " in one.words]
-        assert len(tests) == len({re.search(r"(\w) = ", one)[1] for one in tests})
-        several += any("<" in one.split(" = ")[0] for one in tests)
+        tests = [reason.words for reason in said.because if " = " in reason.words]
+        assert len(tests) == len({re.search(r"(\w) = ", test)[1] for test in tests})
+        several += any("<" in test.split(" = ")[0] for test in tests)
         # Within the printed bounds, which are rounded, the label does not change.
         inside = {"a": a, "b": b}
-        for one in tests:
+        for test in tests:
             low, feature, value, sign, bound = re.fullmatch(
-                r"(?:(\S+) mm < )?(\w) = (\S+) mm (?:(<=|>) (\S+) mm)", one
+                r"(?:(\S+) mm < )?(\w) = (\S+) mm (?:(<=|>) (\S+) mm)", test
             ).groups()
             end = float(low) if low else float(bound)
             inside[feature] = (float(value) + 0.5 * (end - float(value))) / 1e3

@@ -181,7 +181,7 @@ def test_the_parameters_of_a_law_are_the_numbers_of_its_config():
     params = Law(LawConfig(speed_m_s=0.03, careful=False)).params()
 
     assert params._asdict() == {"speed_m_s": 0.03, "ticks": 3, "careful": 0}
-    assert [type(one) for one in params] == [float, int, int]
+    assert [type(param) for param in params] == [float, int, int]
     assert type(params_of(LawConfig())) is type(params)
 
 
@@ -236,7 +236,7 @@ def test_the_wiring_knows_the_channels_of_the_fitted_fingers():
     assert "or other settings of [gripper]: its channels depend on them" in str(error.value)
     hand = plugins.find("sensor-backend", "fingers")
     assert hand.channels_vary()
-    assert [one.name for one in hand.declared().channels] == ["gap", "velocity"]
+    assert [channel.name for channel in hand.declared().channels] == ["gap", "velocity"]
 
 
 @pytest.mark.slow

@@ -127,7 +127,7 @@ def test_a_distribution_that_is_installed_twice_is_told_of(site, tmp_path, monke
     (second / "entry_points.txt").write_text("[graspsense.plugins]\nmain = lab_peak_plugin\n")
     monkeypatch.syspath_prepend(tmp_path / "second")
 
-    mine = [one for one in installed_sources() if one.distribution == "lab-peak"]
+    mine = [source for source in installed_sources() if source.distribution == "lab-peak"]
     loaded = Plugins([builtin_source(), *mine], {})
     (row,) = [one for one in _rows(loaded) if one["distribution"] == "lab-peak"]
 
@@ -148,7 +148,7 @@ def test_a_hook_with_a_default_is_refused_with_what_to_write(site):
         """,
     )
 
-    (status,) = [one for one in site.discover().statuses if one.distribution == "lab-peak"]
+    (status,) = [statuse for statuse in site.discover().statuses if statuse.distribution == "lab-peak"]
 
     assert status.state == "broken"
     assert "gives timeout_s a default in its signature" in status.reason

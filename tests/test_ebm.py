@@ -93,9 +93,10 @@ def test_without_pairs_each_reason_is_about_one_feature():
     table, labels = trials()
     said = fitted("ebm", table, labels, pairs=0, bags=2).explain(table.row(2))
 
-    assert {len(one.features) for one in said.because} == {0, 1}
+    assert {len(reason.features) for reason in said.because} == {0, 1}
     assert any(
-        one.words.startswith("p_first = ") and "odds of can:full to" in one.words for one in said.because
+        reason.words.startswith("p_first = ") and "odds of can:full to" in reason.words
+        for reason in said.because
     )
 
 

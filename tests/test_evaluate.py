@@ -81,9 +81,9 @@ def test_class_and_state_given_the_class():
     assert state.headline.interval[0] < 0.5 < state.headline.interval[1]
     assert judged(labelled(labels, force), target="state").headline.rate > 0.95
     # Only states of one's own class can be answered.
-    for i, one in enumerate(state.confusion.labels):
+    for i, label in enumerate(state.confusion.labels):
         for j, other in enumerate(state.confusion.labels):
-            assert one[:3] == other[:3] or state.confusion.counts[i][j] == 0
+            assert label[:3] == other[:3] or state.confusion.counts[i][j] == 0
     assert state.controls["majority_class"].rate.rate == 0.5
     assert set(state.by_class) == {"can", "jar"}
 

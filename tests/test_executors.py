@@ -119,7 +119,7 @@ def test_whatever_a_task_does_the_others_are_kept(lab, executor):
 
     assert code == 0, stderr
     assert (found["kept"], found["done"], found["complete"]) == (3, 3, True)
-    assert all(lab.results("out")[name] == one for name, one in kept.items() if one[0] == "done")
+    assert all(lab.results("out")[name] == result for name, result in kept.items() if result[0] == "done")
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="needs SIGKILL")

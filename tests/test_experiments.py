@@ -278,7 +278,9 @@ def test_cases_are_every_combination_and_judge_by_the_same_folds(tmp_path):
     assert names[0] == "few, probing force 17 N, noise 0 counts"
     assert len(set(names)) == 8
     # The classifiers at all points of the sweep over their keys are in one task, on the same trials.
-    assert [one.name for one in planned.cases[0].learners] == [f"knn, neighbours {k}" for k in (1, 3, 5)]
+    assert [learner.name for learner in planned.cases[0].learners] == [
+        f"knn, neighbours {k}" for k in (1, 3, 5)
+    ]
     assert {case.data.trials for case in planned.cases} == {1, 2}
 
 
@@ -439,7 +441,7 @@ def test_what_there_is():
     code, out, _ = graspsense("experiment", "--json")
 
     assert code == 0
-    assert {one["name"] for one in json.loads(out)} == set(shipped())
+    assert {load["name"] for load in json.loads(out)} == set(shipped())
 
 
 def test_help_imports_nothing_heavy():

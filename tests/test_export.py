@@ -117,9 +117,9 @@ def test_one_grasp_tick_by_tick(folder, tmp_path):
     with np.load(tmp_path / "one.npz", allow_pickle=False) as found:
         assert found["pad_left"].shape == (3, 22)
     (recording,) = [
-        one
-        for one in (folder / "recordings").iterdir()
-        if one.read_bytes() == (tmp_path / "one.mcap").read_bytes()
+        path
+        for path in (folder / "recordings").iterdir()
+        if path.read_bytes() == (tmp_path / "one.mcap").read_bytes()
     ]
     assert recording.is_file()
     assert tomllib.loads((tmp_path / "one.toml").read_text())["controller"]["probing_force_n"] == 20.0

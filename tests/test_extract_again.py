@@ -42,9 +42,10 @@ def test_other_thresholds_give_other_features_of_the_same_trials(folder, table):
     assert again.provenance["settings"]["features"]["contact_force_n"] == 0.2
     assert again.provenance["settings"]["gripper"]["type"] == "graspsense-sim-gripper/sim"
     assert any(
-        f"extracted again from the recordings, with {table}.contact_force_n=0.2" in one for one in again.notes
+        f"extracted again from the recordings, with {table}.contact_force_n=0.2" in note
+        for note in again.notes
     )
-    assert any("outcomes that change with these settings: 6 from steady to" in one for one in again.notes)
+    assert any("outcomes that change with these settings: 6 from steady to" in note for note in again.notes)
     assert labelled_store(folder).table.values.tobytes() == stored.table.values.tobytes()
 
 

@@ -218,7 +218,7 @@ def test_the_name_of_a_finger_is_not_that_of_another_channel(name):
 
 
 def test_a_declared_finger_survives_json():
-    assert [from_json(as_json(one)) for one in JAWS] == list(JAWS)
+    assert [from_json(as_json(jaw)) for jaw in JAWS] == list(JAWS)
 
 
 # ------------------------------------------------------------------------------------------------- a grasp
@@ -240,15 +240,15 @@ def test_every_finger_is_in_trace_recording_and_replay(grasped):
     options = ["gripper.type=replay", f"gripper.recording={path}", "classifier.type=none"]
     replayed = grasp_with(load_pipeline(options=options, plugins=plugins).settings, plugins)
 
-    assert [one for one in recorded.channels if isinstance(one, FingerForce)] == list(JAWS)
+    assert [channel for channel in recorded.channels if isinstance(channel, FingerForce)] == list(JAWS)
     assert [note for note in replayed.device.notes if "fingers" in note] == [
         note for note in trial.device.notes if "fingers" in note
     ]
-    for one in JAWS:
-        before = trial.trace.signals[one.name]
+    for jaw in JAWS:
+        before = trial.trace.signals[jaw.name]
         assert before.max() > 1.0
-        assert np.array_equal(before, recorded.trace().signals[one.name])
-        assert np.array_equal(before, replayed.trace.signals[one.name])
+        assert np.array_equal(before, recorded.trace().signals[jaw.name])
+        assert np.array_equal(before, replayed.trace.signals[jaw.name])
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".npz"])
@@ -270,7 +270,7 @@ def test_the_pages_and_the_picture_draw_the_force_of_each_finger(grasped):
     force, gap = Figure().subplots(2)
     draw_trace(trial.trace, force, gap, fingers_of(trial.device.channels))
 
-    (fingers,) = [one for one in figures if "Forces of the fingers" in one]
+    (fingers,) = [figure for figure in figures if "Forces of the fingers" in figure]
     assert len(figures) == 1
     assert all(name in fingers for name in ("thumb", "index", "ring"))
     assert {"thumb", "index", "ring"} <= {line.get_label() for line in force.lines}
@@ -320,9 +320,9 @@ def five_fingers(folder, manifest_lines, offset_n=0.0):
     text = ['files = "{label}-{order:d}.csv"', 'time = "t [s]"', 'gap = "gap [mm]"', *manifest_lines]
     (folder / "manifest.toml").write_text("\n".join(text) + "\n")
     found = list(readable_or_not("manifest", str(folder / "manifest.toml")))
-    for one in found:
-        if isinstance(one, UnreadableRecording):
-            raise one.error
+    for recording in found:
+        if isinstance(recording, UnreadableRecording):
+            raise recording.error
     return found
 
 
@@ -352,7 +352,7 @@ def test_each_finger_of_a_recording_has_its_own_zero(tmp_path):
 
 def test_a_resampled_recording_keeps_the_rule(tmp_path):
     found = five_fingers(tmp_path, [NAMED, 'touch = "each"', "resample_hz = 37.0"])
-    (recording,) = (one.recording for one in found)
+    (recording,) = (finger.recording for finger in found)
 
     for reading in recording.readings:
         assert reading.frame.force_left_n == min(reading.signals)
@@ -373,7 +373,7 @@ def test_an_imported_trial_of_five_fingers_says_of_which_fingers_its_features_ar
     assert code.returncode == 0, code.stderr
     (path,) = (tmp_path / "store" / "recordings").glob("*.mcap")
     recorded = read_recorded(path)
-    assert [one.finger for one in fingers_of(recorded.channels)] == list(FINGERS)
+    assert [finger.finger for finger in fingers_of(recorded.channels)] == list(FINGERS)
     (note,) = [one for one in recorded.device.notes if "fingers" in one]
     assert "left force is of thumb" in note
     assert recorded.record().result.features.values

@@ -86,7 +86,7 @@ def test_it_conforms(plugins):
     report = examined.report()
 
     assert report.failures == []
-    assert {one.check for one in report.results if one.state == "skipped"} <= {
+    assert {result.check for result in report.results if result.state == "skipped"} <= {
         *("images-count-up", "pads-can-be-zeroed", "same-seed-same-frames"),
         # It has no further channels.
         *("signals-have-no-gaps-or-repeats", "images-stay-as-they-were-delivered"),
@@ -107,7 +107,7 @@ def test_its_camera_conforms_and_sees_the_force(hand, plugins):
     examined = examine("lab-hand/seeing", keys=keys, unplugged={"vanishes_s": 0.5}, plugins=plugins)
     report = examined.report()
     assert report.failures == []
-    passed = {one.check for one in report.results if one.state == "passed"}
+    passed = {result.check for result in report.results if result.state == "passed"}
     assert {"images-stay-as-they-were-delivered", "what-it-delivers-is-kept"} <= passed
 
     options = ["gripper.type=lab-hand/seeing", "gripper.patience_s=60", "classifier.type=none"]

@@ -88,7 +88,7 @@ def test_the_documentation_knows_no_other_hook():
 def test_a_component_hook_gives_components_of_its_role(role, hook, name):
     plugins = IsolatedPlugins(example(hook), builtins=False)
 
-    assert [(one.role, one.name) for one in plugins.components()] == [(role, name)]
+    assert [(component.role, component.name) for component in plugins.components()] == [(role, name)]
     assert plugins.find(role, name).qualified == f"graspsense-test/{name}"
 
 
@@ -109,8 +109,8 @@ def test_the_documented_hand_has_the_channels_of_its_fingers():
         open = read = apply = tare = close = None
 
     config = names["LabHandConfig"]
-    assert [one.name for one in Hand(config()).channels] == ["gap", "velocity"]
-    assert [one.name for one in Hand(config(fingers="force-sensing")).channels][2:] == [
+    assert [channel.name for channel in Hand(config()).channels] == ["gap", "velocity"]
+    assert [channel.name for channel in Hand(config(fingers="force-sensing")).channels][2:] == [
         "force_left",
         "force_right",
     ]
@@ -137,7 +137,7 @@ def test_hook_graspsense_classifiers():
 def test_hook_graspsense_pipelines():
     plugins = IsolatedPlugins(example("graspsense_pipelines"))
 
-    assert [one.name for one in plugins.pipelines()] == ["best", "default", "lab"]
+    assert [pipeline.name for pipeline in plugins.pipelines()] == ["best", "default", "lab"]
     assert "[gripper]" in plugins.pipeline("graspsense/default").file().read_text()
 
 
@@ -163,7 +163,7 @@ def test_hook_graspsense_commands():
 
     plugins = IsolatedPlugins(example("graspsense_commands"), Plugin())
 
-    assert [one.name for one in plugins.commands()] == ["again", "home-hand"]
+    assert [command.name for command in plugins.commands()] == ["again", "home-hand"]
     assert plugins.command("again").load() is click.Command
 
 
@@ -176,7 +176,7 @@ def test_hook_graspsense_emulators():
 
 def test_hook_graspsense_live_observers():
     plugins = IsolatedPlugins(example("graspsense_live_observers"))
-    assert [one.entry.target for one in plugins.live_observers()] == ["lab_hand.wall:observe"]
+    assert [observer.entry.target for observer in plugins.live_observers()] == ["lab_hand.wall:observe"]
 
 
 def test_hook_graspsense_identifiers():
@@ -330,7 +330,7 @@ def test_an_observer_that_raises_stops_nobody_and_is_reported_once(caplog, failu
         plugins.grasp_event(RUN, EVENT)
 
     assert seen.events == ["both pads touch", "both pads touch"]
-    assert [one.getMessage() for one in caplog.records] == [
+    assert [record.getMessage() for record in caplog.records] == [
         f"{name} 0.1 failed in graspsense_grasp_event and is passed over: "
         f"{type(failure).__name__}: no room on the disk"
         for name in ("lab-first", "lab-last")

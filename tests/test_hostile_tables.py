@@ -80,7 +80,7 @@ def test_named_groups_are_fields(tmp_path):
     started = f"grasp jar 7\n{GRASP}grasp can 8\n{GRASP}"
     text = MANIFEST.replace('label = "jar"\n', r"start = 'grasp (?P<label>\w+) (?P<order>\d+)'")
     found = list(read_recordings(str(manifest(tmp_path, text, started))))
-    assert [(one.label, one.order) for one in found] == [("jar", 7.0), ("can", 8.0)]
+    assert [(recording.label, recording.order) for recording in found] == [("jar", 7.0), ("can", 8.0)]
 
 
 @pytest.mark.parametrize(

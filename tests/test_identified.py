@@ -65,7 +65,7 @@ def test_a_class_that_the_user_names_is_one_object(monkeypatch):
     }
     monkeypatch.setattr(module, "_of_source", lambda source: [squeezes[source]])
     chosen = recorded_squeezes(["a", "b", "c"], "bottle")
-    assert [(one.name, one.label) for one in chosen] == [("a", "bottle"), ("b", "bottle")]
+    assert [(squeeze.name, squeeze.label) for squeeze in chosen] == [("a", "bottle"), ("b", "bottle")]
     with pytest.raises(ConfigError, match=r"of 2 objects.*name="):
         recorded_squeezes(["a", "b"])
 

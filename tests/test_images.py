@@ -235,7 +235,9 @@ def test_the_trace_has_each_image_once_with_its_type_and_shape(seen):
 def test_images_come_back_from_the_recording_and_a_replay_as_they_were(seen):
     trial, path, _ = seen
     grasp = read_recorded(path)
-    assert [one for one in grasp.channels if one.name not in {c.name for c in FRAME}] == list(IMAGES)
+    assert [channel for channel in grasp.channels if channel.name not in {c.name for c in FRAME}] == list(
+        IMAGES
+    )
     demand_same(trial.trace.signals, grasp.trace())
     demand_same(trial.trace.signals, replayed(read_named("mcap", str(path))))
 
@@ -262,9 +264,9 @@ def test_an_export_as_columns_has_the_images_of_a_camera_in_a_file_of_arrays(see
 def test_a_gripper_with_cameras_conforms(seen):
     _, _, plugins = seen
     report = examine("lab-hand/eyes", plugins=plugins).report()
-    assert [(one.check, one.text) for one in report.results if one.state == "failed"] == []
+    assert [(result.check, result.text) for result in report.results if result.state == "failed"] == []
     assert "images-stay-as-they-were-delivered" in {
-        one.check for one in report.results if one.state == "passed"
+        result.check for result in report.results if result.state == "passed"
     }
 
 
@@ -500,7 +502,7 @@ def test_a_law_for_cells_of_another_type_does_not_fit(seen):
 
 
 def watching(plugins):
-    (law,) = (one for one in plugins.components("controller") if one.name == "watching")
+    (law,) = (component for component in plugins.components("controller") if component.name == "watching")
     return Subject(component=law)
 
 
@@ -508,7 +510,7 @@ def watching(plugins):
 def test_a_law_with_a_reference_image_conforms(seen):
     _, _, plugins = seen
     report = examine("lab-hand/watching", plugins=plugins).report()
-    assert [(one.check, one.text) for one in report.results if one.state == "failed"] == []
+    assert [(result.check, result.text) for result in report.results if result.state == "failed"] == []
 
 
 def test_the_state_of_a_law_holds_images_that_nobody_changes(seen, monkeypatch):
@@ -564,7 +566,7 @@ def test_a_camera_is_a_small_picture_in_the_report():
     cells[:, :120] = (200, 100, 50)
     trace = evolve(trace, signals={**trace.signals, "eye": evolve(trace.signals["eye"], cells=cells)})
     _, *figures = tactile_figures(trace, arrays)
-    assert [one.count("<image") for one in figures] == [3, 3, 3, 3]
+    assert [figure.count("<image") for figure in figures] == [3, 3, 3, 3]
     assert sum(map(len, figures)) < 200_000
     data = base64.b64decode(re.search(r'base64,([^"]+)"', figures[0]).group(1))
     width, height = int.from_bytes(data[16:20]), int.from_bytes(data[20:24])
@@ -601,7 +603,7 @@ def test_the_conformance_check_tells_of_an_image_that_is_changed_later(seen, mon
         bytes_of_all[:] = numbers_of(EYE, counter).tobytes()
         return Image(t_s, counter, shared)
 
-    (eyes,) = (one for one in plugins.components("sensor-backend") if one.name == "eyes")
+    (eyes,) = (component for component in plugins.components("sensor-backend") if component.name == "eyes")
     images_stay_as_they_were_delivered(Subject(component=eyes))
     monkeypatch.setattr(Eyes, "image", refilled)
     with pytest.raises(CheckFailed, match="changed after it was delivered"):

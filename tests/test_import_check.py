@@ -270,7 +270,7 @@ def test_at_least_half_of_a_suggested_manifest_is_right_and_nothing_is_wrong_in_
         return
     found = list(read_recordings(str(place)))
     assert found
-    assert not [one.error for one in found if hasattr(one, "error")]
+    assert not [recording.error for recording in found if hasattr(recording, "error")]
 
 
 def test_what_the_file_states_is_not_questioned(tmp_path):

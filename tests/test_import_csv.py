@@ -55,7 +55,7 @@ def test_one_force_is_that_of_both_pads_and_said_so(squeeze):
 def test_a_gap_in_millimetres_is_refused(squeeze):
     with pytest.raises(DataDamaged, match=r"reaches 74 m, which no gripper has.* its unit behind it: \[mm\]"):
         read_squeeze(name_of(squeeze, gap="opening"))
-    assert not [one for one in read_squeeze(name_of(squeeze)).notes if "gap" in one]
+    assert not [note for note in read_squeeze(name_of(squeeze)).notes if "gap" in note]
 
 
 @pytest.mark.parametrize(

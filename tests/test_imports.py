@@ -196,7 +196,7 @@ def late():
 def test_core_names_the_other_subpackages_in_one_place_only():
     for path in files(SOURCE / "core"):
         strings = [node.value for node in ast.walk(parsed(path)) if isinstance(node, ast.Constant)]
-        named = [one for one in strings if isinstance(one, str) and _is_target(one)]
+        named = [text for text in strings if isinstance(text, str) and _is_target(text)]
         assert not named or path.name == "firstparty.py", f"{path.name} names {named}"
 
 
@@ -221,7 +221,9 @@ def test_a_distribution_knows_the_door_for_authors_only(folder):
 
 @pytest.mark.parametrize("folder", distributions(), ids=lambda folder: folder.name)
 def test_a_distribution_knows_no_other(folder):
-    others = {f"graspsense_{one.name}" for one in distributions()} - {f"graspsense_{folder.name}"}
+    others = {f"graspsense_{distribution.name}" for distribution in distributions()} - {
+        f"graspsense_{folder.name}"
+    }
     for path in files(folder / "src"):
         names = imported(parsed(path), "")
         known = {name for name in names if name.split(".")[0] in others}
@@ -261,7 +263,7 @@ def test_nothing_loads_what_could_run_code():
                 assert ast.unparse(node.value) == "False", f"{path.relative_to(ROOT)}:{node.value.lineno}"
             if isinstance(node, ast.Call) and name_of(node.func) in {"np.load", "numpy.load", "read_array"}:
                 # What it does by default is left to the version of numpy.
-                assert "allow_pickle" in {one.arg for one in node.keywords}, f"{path}:{node.lineno}"
+                assert "allow_pickle" in {keyword.arg for keyword in node.keywords}, f"{path}:{node.lineno}"
 
 
 def test_importing_the_doors_is_light_and_loads_no_plugin():
@@ -348,7 +350,7 @@ def test_examples_need_nothing_of_the_simulators_module():
 def test_settings_are_read_without_the_simulator():
     loaded = loaded_after("from graspsense.core.components.config import resolve; resolve('default')")
 
-    assert not {one for one in loaded if one.startswith("graspsense_sim_gripper.")} - {
+    assert not {name for name in loaded if name.startswith("graspsense_sim_gripper.")} - {
         "graspsense_sim_gripper.plugin",
         "graspsense_sim_gripper.config",
     }

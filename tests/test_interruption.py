@@ -77,7 +77,7 @@ def signalled():
 @pytest.fixture(autouse=True)
 def listening():
     """Handle SIGTERM and SIGHUP as the command line does, whatever the tests were started with."""
-    before = {one: signal.signal(one, signal.default_int_handler) for one in ENDS}
+    before = {end: signal.signal(end, signal.default_int_handler) for end in ENDS}
     yield
     for one, handler in before.items():
         signal.signal(one, handler)

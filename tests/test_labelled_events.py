@@ -55,16 +55,16 @@ def manifest(folder, events='events = { slip = "slip" }', more=""):
 
 def run(capsys, *arguments):
     with pytest.raises(SystemExit) as ended:
-        main([str(one) for one in arguments])
+        main([str(argument) for argument in arguments])
     out, err = capsys.readouterr()
     return ended.value.code, out, err
 
 
 def events_in(folder, **keys):
-    (one,) = readable_or_not("manifest", str(manifest(folder, **keys)))
-    if isinstance(one, UnreadableRecording):
-        raise one.error
-    return {name: [(e.t_s, e.until_s) for e in events] for name, events in one.recording.events.items()}
+    (recording,) = readable_or_not("manifest", str(manifest(folder, **keys)))
+    if isinstance(recording, UnreadableRecording):
+        raise recording.error
+    return {name: [(e.t_s, e.until_s) for e in events] for name, events in recording.recording.events.items()}
 
 
 # What a manifest reads.
@@ -99,15 +99,15 @@ def test_times_come_from_a_list_on_the_clock_of_the_file(tmp_path):
     assert [event.t_s for event in slipped.recording.events["slip"]] == pytest.approx([1.5, 2.5])
     assert none.recording.events == {"slip": ()}
     path.write_text(path.read_text().replace("slips [s]", "slipped [s]"))
-    for one in readable_or_not("manifest", str(path)):
-        assert "no column 'slipped'" in str(one.error)
+    for recording in readable_or_not("manifest", str(path)):
+        assert "no column 'slipped'" in str(recording.error)
 
 
 def test_a_column_of_true_and_false_is_one_of_1_and_0_and_still_a_label(tmp_path):
     write(tmp_path, "box_1", force(), (T_S > 3.0).tolist())
     assert events_in(tmp_path)["slip"] == [(3.005, T_S[-1])]
     path = manifest(tmp_path, more='split = "slip"\nlabel = "slipped{slip}"')
-    labels = [one.label for one in readable_or_not("manifest", str(path))]
+    labels = [recording.label for recording in readable_or_not("manifest", str(path))]
     assert labels == ["slippedFalse", "slippedTrue"]
 
 
@@ -142,11 +142,11 @@ def test_labels_and_times_beside_a_recording_and_cells_that_are_lists(tmp_path):
     (tmp_path / "labels.csv").write_text("\n".join(["pads,slips", *cells]) + "\n")
     beside = "beside = 'labels.csv'\nchannels = { taxels = \"'labels.pads'\" }"
     events = "events = { slip = \"'labels.slips'[0]\" }"
-    (one,) = readable_or_not("manifest", str(manifest(tmp_path, events=events, more=beside)))
-    if isinstance(one, UnreadableRecording):
-        raise one.error
-    assert [(e.t_s, e.until_s) for e in one.recording.events["slip"]] == [(3.0, T_S[-1])]
-    assert list(one.recording.readings[5].signals.taxels.cells) == [5.0, 10.0]
+    (recording,) = readable_or_not("manifest", str(manifest(tmp_path, events=events, more=beside)))
+    if isinstance(recording, UnreadableRecording):
+        raise recording.error
+    assert [(e.t_s, e.until_s) for e in recording.recording.events["slip"]] == [(3.0, T_S[-1])]
+    assert list(recording.recording.readings[5].signals.taxels.cells) == [5.0, 10.0]
     (tmp_path / "labels.csv").write_text("slips\n0\n1\n")
     with pytest.raises(DataDamaged, match="1200, 2 rows"):
         events_in(tmp_path, events="events = { slip = \"'labels.slips'\" }", more=beside)
@@ -171,7 +171,7 @@ def test_an_imported_trial_keeps_the_labels_among_its_events(tmp_path, capsys):
     with Store.read(tmp_path / "trials") as store:
         events = store.trial(1).result.details["events"]
     assert {"t_s": 1.0, "phase": "approach", "what": "slip", "source": "label", "until_s": 1.5} in events
-    assert [one["t_s"] for one in events] == sorted(one["t_s"] for one in events)
+    assert [event["t_s"] for event in events] == sorted(event["t_s"] for event in events)
     # The second was looked at as well, so its detections count.
     one = scored(capsys, f"store:{tmp_path / 'trials'}")
     assert one == scored(capsys, f"manifest:{path}")
@@ -364,7 +364,9 @@ def test_the_squeezes_of_a_file_get_the_labels_of_their_own_time(tmp_path):
     held = ((T_S > 1.0) & (T_S < 2.5)) | ((T_S > 3.5) & (T_S < 5.0))
     write(tmp_path, "box_1", 5.0 * held, flags((1.5, 1.6), (4.0, 4.2), (4.5, 4.6)))
     path = manifest(tmp_path, more='split = "force"')
-    first, second = (one.recording.events["slip"] for one in readable_or_not("manifest", str(path)))
+    first, second = (
+        recording.recording.events["slip"] for recording in readable_or_not("manifest", str(path))
+    )
     assert [event.t_s for event in first] == [1.5]
     assert [(event.t_s, event.until_s) for event in second] == [(4.0, 4.2), (4.5, 4.6)]
 

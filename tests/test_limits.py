@@ -74,7 +74,7 @@ def lines(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
 
 def parameters(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
     arguments = function.args
-    names = [one.arg for one in (*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs)]
+    names = [value.arg for value in (*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs)]
     return len(names) - (names[:1] in (["self"], ["cls"]))
 
 

@@ -67,7 +67,7 @@ def shown(feed, n=20):
 
 
 def column(messages, kind, name):
-    return [value for one in messages if one["kind"] == kind for value in one[name]]
+    return [value for message in messages if message["kind"] == kind for value in message[name]]
 
 
 def check_received(messages, n=20):
@@ -77,7 +77,7 @@ def check_received(messages, n=20):
     assert column(messages, "ticks", "force_left_n") == [None] * n
     assert column(messages, "scalars", "temperature") == [300.0 + k for k in range(n)]
     assert column(messages, "samples", "values") == [[[k + i / 4, -1.0] for i in range(3)] for k in range(n)]
-    images = [one for one in messages if one["kind"] == "image"]
+    images = [message for message in messages if message["kind"] == "image"]
     assert images[-1]["cells"] == [n - 1.0 + i for i in range(6)]
 
 

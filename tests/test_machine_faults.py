@@ -132,7 +132,7 @@ def test_a_grasp_recorded_in_any_year_is_read_and_recovered(tmp_path, monkeypatc
         keep(store, ticks=150)
         write_recording(store.recordings / "late.mcap", 150, finish=False)._out.close()
         found = recover_store(store)
-        assert [one.what for one in found] == ["recovered"]
+        assert [recovered.what for recovered in found] == ["recovered"]
         assert sorted(len(read_recorded(path)) for path in store.recordings.glob("*.mcap"))[1] == 150
     assert verify_store(tmp_path / "t").problems == ()
 

@@ -130,7 +130,7 @@ def test_three_fingers_in_blocks_of_one_file_are_folded_and_kept(tmp_path):
     assert column(first, "gap_m") == pytest.approx(gap)
     assert column(second, "force_left_n") == pytest.approx(0.5 * force)
     assert column(second, "force_right_n") == pytest.approx(0.5 * force)
-    channels = [(one.name, one.unit) for one in first.recording.channels]
+    channels = [(channel.name, channel.unit) for channel in first.recording.channels]
     assert channels[:4] == [("finger1", "N"), ("finger2", "N"), ("finger3", "N"), ("position1", "mm")]
     assert first.recording.readings[0].signals.position1 == pytest.approx(
         37.0
@@ -187,14 +187,14 @@ def test_images_and_blocks_of_samples_become_arrays_with_their_shape_and_fast_ch
         fast = ["acceleration", "sound"]
         """
 
-    (one,) = recordings(tmp_path, text)
+    (recording,) = recordings(tmp_path, text)
 
-    palm, acceleration, heard = one.recording.channels
+    palm, acceleration, heard = recording.recording.channels
     assert (palm.rows, palm.columns, palm.unit) == (7, 4, "N")
     assert (acceleration.samples, acceleration.axes, acceleration.unit) == (3, ("x", "y", "z"), "m/s2")
     assert acceleration.rate_hz == pytest.approx(3000.0)
     assert (heard.samples, heard.axes) == (5, ("value",))
-    signals = signals_of([reading.signals for reading in one.recording.readings])
+    signals = signals_of([reading.signals for reading in recording.recording.readings])
     assert np.array_equal(signals["palm"].cells, 0.5 * taxels.reshape(300, 28))
     rows = shaken.reshape(900, 3)
     assert np.array_equal(signals["acceleration"].values, rows[np.isfinite(rows[:, 0])])
@@ -212,7 +212,7 @@ STABILITY = shipped("biotac_sp")
 
 def test_each_row_of_a_table_is_a_reading_with_its_arrays(tmp_path):
     fingers = ("ff", "mf", "th")
-    names = ["object", "slipped", *(f"{one}_biotac_{k}" for one in fingers for k in range(1, 25))]
+    names = ["object", "slipped", *(f"{finger}_biotac_{k}" for finger in fingers for k in range(1, 25))]
     rows = [["pringles", 0, *range(72)], ["toy car", 1, *range(100, 172)]]
     (tmp_path / "bts3v2_palm_down.csv").write_text(
         "\n".join(",".join(map(str, row)) for row in [names, *rows]) + "\n"
@@ -285,19 +285,19 @@ def texts(separator, decimal=".", comment=""):
 )
 def test_text_files_as_programs_write_them(name, text, tmp_path):
     (tmp_path / name).write_text(text, newline="")
-    (one,) = recordings(tmp_path, PLAIN)
+    (recording,) = recordings(tmp_path, PLAIN)
     gap, force = squeezing()
-    assert column(one, "t_s") == pytest.approx(T_S)
-    assert column(one, "gap_m") == pytest.approx(gap, abs=1e-9)
-    assert column(one, "force_right_n") == pytest.approx(force, abs=1e-6)
+    assert column(recording, "t_s") == pytest.approx(T_S)
+    assert column(recording, "gap_m") == pytest.approx(gap, abs=1e-9)
+    assert column(recording, "force_right_n") == pytest.approx(force, abs=1e-6)
 
 
 def test_columns_without_names_have_numbers(tmp_path):
     (tmp_path / "jar.txt").write_text("\n".join(texts(" ").splitlines()[1:]))
-    (one,) = recordings(
+    (recording,) = recordings(
         tmp_path, PLAIN.replace('"t"', '"c1"').replace("gap [mm]", "c2 [mm]").replace('"F"', '"c3"')
     )
-    assert column(one, "gap_m") == pytest.approx(squeezing()[0], abs=1e-9)
+    assert column(recording, "gap_m") == pytest.approx(squeezing()[0], abs=1e-9)
 
 
 def test_npy_of_three_dimensions_has_a_grasp_for_each_index(tmp_path):
@@ -324,8 +324,8 @@ def test_parquet(tmp_path):
 
     gap, force = squeezing()
     parquet.write_table(pyarrow.table({"t": T_S, "gap": gap * 1e3, "F": force}), tmp_path / "jar.parquet")
-    (one,) = recordings(tmp_path, PLAIN)
-    assert column(one, "gap_m") == pytest.approx(gap, abs=1e-9)
+    (recording,) = recordings(tmp_path, PLAIN)
+    assert column(recording, "gap_m") == pytest.approx(gap, abs=1e-9)
 
 
 @pytest.mark.parametrize("kind", ["bag", "mcap"])
@@ -357,7 +357,7 @@ def test_ros_bags_with_topics_of_different_rates(kind, tmp_path):
         (next(place.glob("*.mcap"))).rename(tmp_path / "jar.mcap")
         (place / "metadata.yaml").unlink()
 
-    (one,) = recordings(
+    (recording,) = recordings(
         tmp_path,
         """
         files = "{label}.*"
@@ -367,9 +367,11 @@ def test_ros_bags_with_topics_of_different_rates(kind, tmp_path):
         """,
     )
 
-    assert column(one, "t_s") == pytest.approx(T_S, abs=1e-6)
-    assert column(one, "gap_m") == pytest.approx(gap)
-    assert column(one, "force_right_n") == pytest.approx(2 * np.repeat(force[::2], 2))  # the last value holds
+    assert column(recording, "t_s") == pytest.approx(T_S, abs=1e-6)
+    assert column(recording, "gap_m") == pytest.approx(gap)
+    assert column(recording, "force_right_n") == pytest.approx(
+        2 * np.repeat(force[::2], 2)
+    )  # the last value holds
 
 
 # Steps.
@@ -415,10 +417,10 @@ def test_a_fault_in_one_squeeze_is_of_that_squeeze(tmp_path, spoilt, value, samp
         tmp_path / "jar.csv", {"t": columns["time"], "gap": columns["gap"] * 1e3, "F": columns["force"]}
     )
     found = list(readable_or_not("manifest", str(manifest(tmp_path, PLAIN + 'split = "force"'))))
-    assert [one.source for one in found] == [f"jar.csv, squeeze {k}" for k in range(1, 7)]
-    bad = [k for k, one in enumerate(found, 1) if isinstance(one, UnreadableRecording)]
+    assert [recording.source for recording in found] == [f"jar.csv, squeeze {k}" for k in range(1, 7)]
+    bad = [k for k, recording in enumerate(found, 1) if isinstance(recording, UnreadableRecording)]
     assert bad == ([] if np.isnan(value) else [3])  # samples without a number are left out
-    good = [one for k, one in enumerate(found, 1) if k != 3]
+    good = [recording for k, recording in enumerate(found, 1) if k != 3]
     assert all(column(one, "force_left_n").max() == pytest.approx(20.0) for one in good)
 
 
@@ -540,7 +542,7 @@ def test_a_whole_set_is_imported_evaluated_and_replayed(tmp_path):
         assert opened.trial(1).record.provenance["source"] == "000_real_life_data.csv, line 3"
     assert labels[0] == {"label": "object17", "recorded_at": "2020-06-15T15:11:27.442126+00:00", "order": "0"}
     assert recording.readings()[-1].signals.finger2 == pytest.approx(0.5 * force[-1])
-    assert [one.name for one in recording.channels][:3] == ["finger1", "finger2", "finger3"]
+    assert [channel.name for channel in recording.channels][:3] == ["finger1", "finger2", "finger3"]
     features = json.loads(graspsense("replay", f"{store}#1", "--json")[1])["features"]
     same = json.loads(graspsense("replay", f"manifest:{described}#1", "--pipeline", "default",
         "-o", "classifier.type=none", "--json")[1])["features"]  # fmt: skip
@@ -670,7 +672,7 @@ def test_cells_of_three_components(tmp_path):
     cells = np.zeros((300, 2, 3, 3))
     cells[..., 0], cells[..., 2] = 0.6 * force[:, None, None], 0.8 * force[:, None, None]
     np.savez(tmp_path / "jar.npz", t=T_S, gap=gap, cells=cells)
-    (one,) = recordings(
+    (recording,) = recordings(
         tmp_path,
         """
         files = "{label}.npz"
@@ -681,11 +683,11 @@ def test_cells_of_three_components(tmp_path):
         channels = { cells = "cells [N]" }
         """,
     )
-    assert column(one, "force_left_n") == pytest.approx(6 * force)
-    assert column(one, "force_right_n") == pytest.approx(6 * 0.8 * force)
-    (channel,) = one.recording.channels
+    assert column(recording, "force_left_n") == pytest.approx(6 * force)
+    assert column(recording, "force_right_n") == pytest.approx(6 * 0.8 * force)
+    (channel,) = recording.recording.channels
     assert (channel.rows, channel.columns, channel.components) == (2, 3, 3)
-    image = one.recording.readings[200].signals.cells
+    image = recording.recording.readings[200].signals.cells
     assert image.cells == tuple(map(tuple, cells[200].reshape(6, 3).tolist()))
 
 
@@ -693,10 +695,10 @@ def test_cells_of_three_components(tmp_path):
 def test_one_finger_stands_for_both_pads(tmp_path, side):
     gap, force = squeezing()
     pandas_csv(tmp_path / "jar.csv", {"t": T_S, "gap": gap, "F": force})
-    (one,) = recordings(tmp_path, f'files = "{{label}}.csv"\ntime = "t"\ngap = "gap"\n{side} = "F"')
-    assert column(one, "force_left_n") == pytest.approx(force)
-    assert column(one, "force_right_n") == pytest.approx(force)
-    assert any("both pads" in note for note in one.recording.notes)
+    (recording,) = recordings(tmp_path, f'files = "{{label}}.csv"\ntime = "t"\ngap = "gap"\n{side} = "F"')
+    assert column(recording, "force_left_n") == pytest.approx(force)
+    assert column(recording, "force_right_n") == pytest.approx(force)
+    assert any("both pads" in note for note in recording.recording.notes)
 
 
 def test_most_grasps_too_wide_is_an_error_that_stores_nothing(tmp_path):
@@ -741,8 +743,8 @@ def test_counts_that_fall_on_contact_are_asked_about(tmp_path):
     rng = np.random.default_rng(0)
     counts = np.round(999.0 - 60.0 * force + rng.normal(size=len(force)))
     pandas_csv(tmp_path / "jar_0.csv", {"t": T_S, "gap": gap, "F": counts})
-    (one,) = recordings(tmp_path, COUNTS)
-    assert any("fall on contact" in notice for notice in one.notices)
+    (recording,) = recordings(tmp_path, COUNTS)
+    assert any("fall on contact" in notice for notice in recording.notices)
     (turned,) = recordings(tmp_path, COUNTS.replace("F [counts]", "999 - F [counts]"))
     assert not turned.notices
     # A hold that relaxes falls too, but is never steady at first.

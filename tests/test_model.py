@@ -113,7 +113,9 @@ def test_nothing_felt_is_unknown_with_the_reason():
         names=NAMES, values=(math.nan,) * 3, units=UNITS, reasons=dict.fromkeys(NAMES, "no contact")
     )
 
-    assert [one.words for one in model().predict(nothing).because] == ["no feature is defined: no contact"]
+    assert [reason.words for reason in model().predict(nothing).because] == [
+        "no feature is defined: no contact"
+    ]
 
 
 @pytest.mark.parametrize(

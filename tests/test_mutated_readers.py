@@ -125,16 +125,16 @@ def copied(source, target):
 
 def import_into(folder, recordings):
     """Import recordings as the command does; each is a trial, or an error of ours."""
-    summary_of([one.labelled for one in recordings])
-    thresholds_for([one.labelled.recording for one in recordings], {})
+    summary_of([recording.labelled for recording in recordings])
+    thresholds_for([recording.labelled.recording for recording in recordings], {})
     with Store.open(folder) as store:
         contents = ImportedContents(store)
-        for one in recordings:
-            flags = (Flag("", "gripper.type", "replay"), Flag("", "gripper.recording", one.name))
+        for recording in recordings:
+            flags = (Flag("", "gripper.type", "replay"), Flag("", "gripper.recording", recording.name))
             settings = resolve("default", options=("classifier.type=none",), flags=flags)
-            with handed_over(one.name, one.labelled.recording):
+            with handed_over(recording.name, recording.labelled.recording):
                 try:
-                    import_recording(store, settings, installed(), one.labelled, contents)
+                    import_recording(store, settings, installed(), recording.labelled, contents)
                 except AlreadyImported:
                     pass
                 except SaveFailed:

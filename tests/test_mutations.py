@@ -32,8 +32,10 @@ NUMBER = MUTATIONS or 150
 
 
 def digests(folder):
-    files = (one for one in folder.rglob("*") if one.is_file() and not one.name.endswith(("-shm", "-wal")))
-    return {one: hashlib.sha256(one.read_bytes()).hexdigest() for one in files}
+    files = (
+        path for path in folder.rglob("*") if path.is_file() and not path.name.endswith(("-shm", "-wal"))
+    )
+    return {file: hashlib.sha256(file.read_bytes()).hexdigest() for file in files}
 
 
 @pytest.mark.slow
@@ -81,8 +83,8 @@ def test_stores(tmp_path):
     rng = random.Random(2)
     told = silent = 0
     for _ in range(NUMBER):
-        for one in folder.glob("store.sqlite*"):
-            one.unlink()
+        for path in folder.glob("store.sqlite*"):
+            path.unlink()
         (folder / "store.sqlite").write_bytes(bytes_of(good, rng))
         before = digests(folder)
         try:

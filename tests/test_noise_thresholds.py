@@ -50,7 +50,7 @@ def test_weak_forces_get_a_contact_threshold_above_their_noise_and_below_their_p
 def test_noisy_forces_get_a_contact_threshold_that_noise_does_not_reach():
     recordings = [squeeze(peak_n=40.0, force_noise_n=0.5, seed=k) for k in range(5)]
     force = thresholds_for(recordings).settings["controller.contact_force_n"]
-    free = [reading.frame.force_left_n for one in recordings for reading in one.readings[:1000]]
+    free = [reading.frame.force_left_n for recording in recordings for reading in recording.readings[:1000]]
     assert max(free) < force < 20.0
 
 
@@ -119,9 +119,9 @@ def test_thresholds_follow_from_recordings_in_any_unit(factors, units):
     settings = {key.partition(".")[2]: value for key, value in thresholds_for(recordings).settings.items()}
     speed = settings.get("rest_speed_m_s", REST_SPEED_M_S)
     window = settings.get("rest_window_s", REST_WINDOW_S)
-    for one in recordings:
+    for recording in recordings:
         times, gap, left, right = (
-            np.array([getattr(reading.frame, name) for reading in one.readings])
+            np.array([getattr(reading.frame, name) for reading in recording.readings])
             for name in ("t_s", "gap_m", "force_left_n", "force_right_n")
         )
         at = int((np.minimum(left, right) >= settings.get("contact_force_n", CONTACT_FORCE_N)).argmax())
@@ -171,9 +171,9 @@ def test_the_window_of_rest_is_that_of_a_step_of_the_gap(step_s, step_m, hold_s)
     if 8e-4 * step_s < step_m:  # the gap repeats its numbers
         assert speed * window >= step_m
         assert "steps of" in chosen.words
-    for one in recordings:
+    for recording in recordings:
         times, gap, force = (
-            np.array([getattr(reading.frame, name) for reading in one.readings])
+            np.array([getattr(reading.frame, name) for reading in recording.readings])
             for name in ("t_s", "gap_m", "force_left_n")
         )
         k = int((force > 0.625).argmax())
@@ -219,9 +219,9 @@ def test_slow_recordings_whose_gap_is_still_at_rest_keep_the_thresholds_of_rest(
     ]  # fmt: skip
     for recordings in (slow, coarse):
         assert thresholds_for(recordings).settings == {}
-        for one in recordings:
-            times = np.array([reading.frame.t_s for reading in one.readings])
-            gap = np.array([reading.frame.gap_m for reading in one.readings])
+        for recording in recordings:
+            times = np.array([reading.frame.t_s for reading in recording.readings])
+            gap = np.array([reading.frame.gap_m for reading in recording.readings])
             since, _ = first_rest(times, gap, np.ones(len(times), dtype=bool), REST_SPEED_M_S, REST_WINDOW_S)
             assert times[since] == pytest.approx(1.5, abs=0.051)
 

@@ -218,7 +218,7 @@ def test_a_notebook_of_what_the_page_shows_is_executed(tmp_path, monkeypatch):
     ).execute()
 
     data = [
-        {kind: text for one in cell.outputs if "data" in one for kind, text in one.data.items()}
+        {kind: text for output in cell.outputs if "data" in output for kind, text in output.data.items()}
         for cell in notebook.cells
     ]
     by_cell = dict(zip(cells, data, strict=True))

@@ -40,8 +40,10 @@ EXAMINED_BY_THEMSELVES = {
 
 
 def components():
-    ours = [one for one in installed().components() if one.distribution.startswith("graspsense")]
-    return [one.qualified for one in ours if one.distribution not in EXAMINED_BY_THEMSELVES]
+    ours = [
+        component for component in installed().components() if component.distribution.startswith("graspsense")
+    ]
+    return [our.qualified for our in ours if our.distribution not in EXAMINED_BY_THEMSELVES]
 
 
 @pytest.mark.slow

@@ -26,11 +26,11 @@ class Lab:
 
     @hookimpl
     def graspsense_feature_sets(self):
-        return [one for one in self.entries if hasattr(one, "features")]
+        return [entry for entry in self.entries if hasattr(entry, "features")]
 
     @hookimpl
     def graspsense_sensor_backends(self):
-        return [one for one in self.entries if hasattr(one, "accepts")]
+        return [entry for entry in self.entries if hasattr(entry, "accepts")]
 
 
 def test_a_part_that_conforms():
@@ -47,7 +47,9 @@ def test_a_part_that_conforms():
 
 def test_a_part_that_does_not():
     (broken,) = [
-        one for one in MUTANTS if one.check == "requires-what-it-reads" and one.role == "feature-set"
+        mutant
+        for mutant in MUTANTS
+        if mutant.check == "requires-what-it-reads" and mutant.role == "feature-set"
     ]
     with IsolatedPlugins(Lab(broken.entry)):
         code, out, _ = graspsense("plugins", "check", "peak", "--json")

@@ -174,7 +174,7 @@ def test_settings_whose_class_ends_the_program_are_wrong_settings():
 
     with pytest.raises(ValidationFailed) as ended:
         structured({"key": 2}, Leaving, "the test")
-    assert [one.path for one in ended.value.problems] == [("key",)]
+    assert [problem.path for problem in ended.value.problems] == [("key",)]
 
 
 def test_a_plugin_that_ends_one_of_our_commands_is_told_with_its_place(monkeypatch, tmp_path):

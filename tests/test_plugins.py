@@ -35,11 +35,11 @@ def backend(name: str, module: str = "somewhere", needs: str = "") -> str:
 
 
 def reason_of(plugins, distribution):
-    return next(one.reason for one in plugins.statuses if one.distribution == distribution)
+    return next(statuse.reason for statuse in plugins.statuses if statuse.distribution == distribution)
 
 
 def states(plugins):
-    return {one.distribution: one.state for one in plugins.statuses}
+    return {statuse.distribution: statuse.state for statuse in plugins.statuses}
 
 
 def test_an_installed_plugin_is_found_and_its_driver_left_alone_until_used(site):
@@ -73,7 +73,7 @@ def test_an_installed_plugin_is_found_and_its_driver_left_alone_until_used(site)
 def test_built_in_parts_need_no_metadata(site):
     plugins = site.discover()
 
-    assert [one.qualified for one in plugins.components("controller")] == [
+    assert [component.qualified for component in plugins.components("controller")] == [
         "graspsense/force",
         "graspsense/hybrid",
         "graspsense/send-and-watch",
@@ -116,7 +116,9 @@ def test_a_broken_plugin_is_listed_with_its_reason_and_the_others_work(site):
     assert states(plugins) == {"graspsense": "loaded", "graspsense-hid": "broken", "lab-hand": "loaded"}
     assert reason_of(plugins, "graspsense-hid") == "ModuleNotFoundError: No module named 'no_such_driver'"
     assert plugins.find("sensor-backend", "hand").distribution == "lab-hand"
-    traceback = next(one.traceback for one in plugins.statuses if one.distribution == "graspsense-hid")
+    traceback = next(
+        statuse.traceback for statuse in plugins.statuses if statuse.distribution == "graspsense-hid"
+    )
     assert "import no_such_driver" in traceback
 
 
@@ -184,7 +186,7 @@ def test_one_entry_point_name_in_two_distributions_drops_neither(site):
     site.install("lab-a", backend("a"), entry="gripper")
     site.install("lab-b", backend("b"), entry="gripper")
 
-    names = [one.name for one in site.discover().components("sensor-backend")]
+    names = [component.name for component in site.discover().components("sensor-backend")]
 
     assert names == ["a", "b", "replay"]
 
@@ -195,7 +197,7 @@ def test_a_distribution_found_twice_on_the_path_is_loaded_once(site, tmp_path, m
     link.symlink_to(site.folder)
     monkeypatch.syspath_prepend(link)
 
-    assert [one.distribution for one in site.discover().statuses] == ["graspsense", "lab-a"]
+    assert [statuse.distribution for statuse in site.discover().statuses] == ["graspsense", "lab-a"]
 
 
 @pytest.mark.parametrize(
@@ -212,7 +214,10 @@ def test_a_disabled_plugin_is_not_even_imported(site, environ, loaded, reason):
 
     plugins = site.discover(**environ)
 
-    assert [one.distribution for one in plugins.components("sensor-backend")] == [*loaded, "graspsense"]
+    assert [component.distribution for component in plugins.components("sensor-backend")] == [
+        *loaded,
+        "graspsense",
+    ]
     assert states(plugins)["lab-a"] == "disabled"
     assert reason_of(plugins, "lab-a") == reason
     assert "lab_a_plugin" not in sys.modules
@@ -435,7 +440,7 @@ def test_isolated_plugins_do_not_discover(site):
 
     with IsolatedPlugins() as plugins:
         assert installed() is plugins
-        assert {one.distribution for one in plugins.statuses} == {"graspsense"}
+        assert {statuse.distribution for statuse in plugins.statuses} == {"graspsense"}
     assert installed() is not plugins
 
 

@@ -20,7 +20,7 @@ def recordings(folder, name):
     path = folder / "manifest.toml"
     path.write_text((MANIFESTS / f"{name}.toml").read_text())
     found = list(readable_or_not("manifest", str(path)))
-    assert not [one.error for one in found if isinstance(one, UnreadableRecording)]
+    assert not [recording.error for recording in found if isinstance(recording, UnreadableRecording)]
     return found
 
 
@@ -40,10 +40,10 @@ def test_presses_in_named_arrays_of_three_dimensions_beside_arrays_of_other_shap
 
     found = recordings(tmp_path, "palpation")
 
-    assert sorted((one.label, one.order) for one in found) == [
+    assert sorted((recording.label, recording.order) for recording in found) == [
         (f"place{i}{j}", k) for i in (1, 2) for j in (1, 2) for k in (0.0, 1.0, 2.0)
     ]
-    second = next(one for one in found if (one.label, one.order) == ("place21", 1.0))
+    second = next(recording for recording in found if (recording.label, recording.order) == ("place21", 1.0))
     gaps = [reading.frame.gap_m for reading in second.recording.readings]
     assert gaps == pytest.approx(0.02 - 0.001 * depth)
     # The mean of 1 to 7 is 4; the zero is the first sample.
@@ -90,11 +90,11 @@ def test_a_slide_with_electrodes_and_a_fast_vibration_and_a_comma_at_the_end_of_
     lines = [",".join(names), *(",".join(map(str, row)) + "," for row in rows)]
     (tmp_path / "raw_data/mat4/mat4_12_bio.csv").write_text("\n".join(lines) + "\n")
 
-    (one,) = recordings(tmp_path, "biotac_slide")
+    (recording,) = recordings(tmp_path, "biotac_slide")
 
-    assert (one.label, one.order) == ("mat4", 12.0)
-    assert forces(one)[:, 0].tolist() == [90.0 + k for k in range(30)]
-    signals = signals_of([reading.signals for reading in one.recording.readings])
+    assert (recording.label, recording.order) == ("mat4", 12.0)
+    assert forces(recording)[:, 0].tolist() == [90.0 + k for k in range(30)]
+    signals = signals_of([reading.signals for reading in recording.recording.readings])
     assert signals["vibration"].values[:, 0].tolist() == list(range(660))
     assert signals["electrodes"].cells.tolist() == [list(range(19))] * 30
 
@@ -110,13 +110,13 @@ def test_slips_in_a_file_beside_those_of_two_fingers(tmp_path):
     slips = [f"{float(60 <= k < 70)},0.0" for k in range(90)]
     (folder / "slip_label.csv").write_text("\n".join(["slip,fail", *slips]) + "\n")
 
-    (one,) = recordings(tmp_path, "uskin_slip")
+    (recording,) = recordings(tmp_path, "uskin_slip")
 
     # 16 cells of each finger rise by 10 or 20 counts.
-    assert forces(one)[-1].tolist() == [160.0, 320.0]
-    (slip,) = one.recording.events["slip"]
+    assert forces(recording)[-1].tolist() == [160.0, 320.0]
+    (slip,) = recording.recording.events["slip"]
     assert (slip.t_s, slip.until_s) == pytest.approx((60 / 59.8, 69 / 59.8))
-    assert (one.label, one.instance) == ("box", "2022-02-21-09-58-49")
+    assert (recording.label, recording.instance) == ("box", "2022-02-21-09-58-49")
 
 
 def test_shocks_of_a_fingertip_with_lists_in_its_cells(tmp_path):
@@ -132,11 +132,13 @@ def test_shocks_of_a_fingertip_with_lists_in_its_cells(tmp_path):
     times = [",time", *(f"{k},{0.7 + 0.2 * k}" for k in range(20))]
     (folder / "times.csv").write_text("\n".join(times) + "\n")
 
-    (one,) = recordings(tmp_path, "fingertip_imu")
+    (recording,) = recordings(tmp_path, "fingertip_imu")
 
-    samples = signals_of([reading.signals for reading in one.recording.readings])["acceleration"]
+    samples = signals_of([reading.signals for reading in recording.recording.readings])["acceleration"]
     assert samples.values[:5, 0].tolist() == [5.0] * 5
     assert samples.values[-1, 0] == pytest.approx(np.hypot(3.0, 23.0))
-    spans = {name: [(e.t_s, e.until_s) for e in events] for name, events in one.recording.events.items()}
+    spans = {
+        name: [(e.t_s, e.until_s) for e in events] for name, events in recording.recording.events.items()
+    }
     assert spans["acceleration"] == [pytest.approx((2.7, 3.5))]
     assert spans["acceleration not known"] == [pytest.approx((3.7, 4.5))]

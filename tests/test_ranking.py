@@ -31,8 +31,10 @@ def test_features_without_information_are_worse_and_the_same_trials_are_compared
     assert found.protocol == "instance_held_out"
     assert found.candidates[0].standing == "best"
     assert found.candidates[0].features == "force"
-    assert {one.standing for one in found.candidates if one.features == "noise"} == {"worse"}
-    assert {one.rates["instance_held_out"].n for one in found.candidates} == {180}
+    assert {candidate.standing for candidate in found.candidates if candidate.features == "noise"} == {
+        "worse"
+    }
+    assert {candidate.rates["instance_held_out"].n for candidate in found.candidates} == {180}
     assert found.candidates[0].name in found.verdict
     assert found.chosen.of == 6
     assert found.chosen.rate <= found.candidates[0].rates["instance_held_out"].rate
@@ -80,7 +82,7 @@ def test_features_from_before_the_contact_are_a_control_and_not_compared():
     width = ControlFeatures(table=trials.table, what="the same numbers")
     found = rank({"tree": learner("tree")}, {"force": evolve(trials, before_contact=width)})
 
-    assert [one.standing for one in found.candidates] == ["best", "control"]
+    assert [candidate.standing for candidate in found.candidates] == ["best", "control"]
     assert found.candidates[1].loss is None
     assert "From before the contact alone, tree recognises" in found.verdict
 
@@ -90,7 +92,7 @@ def test_answers_from_outside_are_compared_like_any_other():
     perfect = OutsideAnswers(predicted={"instance_held_out": trials.labels}, training_s=1.0)
     found = rank({"knn": learner("knn")}, {"force": trials}, outside={("oracle", "all"): perfect})
 
-    assert [one.name for one in found.candidates] == ["oracle with all", "knn with force"]
+    assert [candidate.name for candidate in found.candidates] == ["oracle with all", "knn with force"]
     assert found.candidates[0].rates["instance_held_out"].rate == 1.0
     assert found.candidates[0].sets is None
     assert found.candidates[1].loss.value > 0.0
@@ -100,9 +102,9 @@ def test_answers_from_outside_are_compared_like_any_other():
 def test_the_sets_of_every_candidate_are_measured_on_the_same_folds():
     found = crossed()
 
-    for one in found.candidates:
-        assert one.sets.covered.n == 180
-        assert 0.8 < one.sets.covered.rate <= 1.0
+    for candidate in found.candidates:
+        assert candidate.sets.covered.n == 180
+        assert 0.8 < candidate.sets.covered.rate <= 1.0
 
 
 def test_an_unknown_name_is_refused_by_the_option_that_was_typed_before_any_grasp():

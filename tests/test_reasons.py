@@ -18,7 +18,7 @@ MISSING = Features(names=NAMES, values=(0.0661, math.nan, 0.0), units=UNITS, rea
 
 
 def total(said):
-    return math.fsum(one.contribution.value for one in said.because if one.contribution is not None)
+    return math.fsum(reason.contribution.value for reason in said.because if reason.contribution is not None)
 
 
 @pytest.mark.parametrize("features", [FULL_CAN, MISSING])
@@ -27,8 +27,8 @@ def test_contributions_of_a_forest_add_up_to_the_probability(features):
     said = classifier.explain(features)
 
     assert total(said) == pytest.approx(said.probabilities[said.label], abs=1e-12)
-    given = [one for one in said.because if one.contribution is not None]
-    assert {one.contribution.scale for one in given} == {"probability"}
+    given = [reason for reason in said.because if reason.contribution is not None]
+    assert {reason.contribution.scale for reason in given} == {"probability"}
     assert given[-1].words.startswith("before any feature: 3")
     assert given[-1].words.endswith(" % for can:full")
 
@@ -42,11 +42,11 @@ def test_contributions_in_log_odds_add_up_to_the_odds(name, value, classes):
         labels = [label.partition(":")[0] for label in labels]
     said = fitted(name, table, labels).explain(Features(names=NAMES, values=(value, 8.0, 0.0), units=UNITS))
 
-    given = [one.contribution for one in said.because if one.contribution is not None]
+    given = [reason.contribution for reason in said.because if reason.contribution is not None]
     odds = said.probabilities[said.label] / said.probabilities[given[0].against]
     assert total(said) == pytest.approx(math.log(odds), abs=1e-9)
     assert odds >= 1.0
-    assert {one.label for one in given} == {said.label}
+    assert {contribution.label for contribution in given} == {said.label}
     assert given[0].against == sorted(said.probabilities, key=said.probabilities.get)[-2]
 
 
@@ -58,7 +58,7 @@ def test_the_feature_that_tells_the_labels_apart_contributes_most(name):
     assert first.features == (FeatureValue("p_first", 0.0661, "m"),)
     assert first.words.startswith("p_first = 66.1 mm: ")
     assert first.contribution.value > 0.0
-    assert all(one.features[0].name != "noise" for one in said.because[:1])
+    assert all(reason.features[0].name != "noise" for reason in said.because[:1])
 
 
 def test_words_of_contributions_are_points_or_factors_of_the_odds():
@@ -74,11 +74,11 @@ def test_words_of_contributions_are_points_or_factors_of_the_odds():
         against="jar",
     )
 
-    assert [one.words for one in shares] == [
+    assert [share.words for share in shares] == [
         "p_first = 66.1 mm: +25.0 points",
         "before any feature: 30.0 % for can",
     ]
-    assert [one.words for one in odds] == [
+    assert [odd.words for odd in odds] == [
         "p_first = 66.1 mm and f_steady is missing: odds of can to jar × 10",
         "p_first = 66.1 mm: odds of can to jar ÷ 4",
         "before any feature: odds of can to jar × 1",
@@ -90,10 +90,10 @@ def test_smaller_contributions_are_told_together_and_still_add_up():
 
     reasons = contribution_reasons(parts, 0.2, scale="probability", label="can")
 
-    assert [one.words.partition(" =")[0] for one in reasons[:5]] == ["f10", "f9", "f8", "f7", "f6"]
+    assert [reason.words.partition(" =")[0] for reason in reasons[:5]] == ["f10", "f9", "f8", "f7", "f6"]
     assert reasons[5].words == "5 smaller contributions together: +15.0 points"
     assert len(reasons[5].features) == 5
-    assert math.fsum(one.contribution.value for one in reasons) == pytest.approx(0.75)
+    assert math.fsum(reason.contribution.value for reason in reasons) == pytest.approx(0.75)
 
 
 def test_a_text_becomes_a_reason_and_json_has_what_a_reason_has():

@@ -39,7 +39,7 @@ def manifest(folder, name, palm=True):
 
 
 def ran(*args):
-    done = CliRunner().invoke(cli, [str(one) for one in args])
+    done = CliRunner().invoke(cli, [str(argument) for argument in args])
     error = done.exception
     assert error is None or isinstance(error, SystemExit | Exception)
     return done, str(error) if error is not None and not isinstance(error, SystemExit) else ""
@@ -111,7 +111,13 @@ def test_a_replay_says_which_channels_the_recording_has(tmp_path):
     source = manifest(tmp_path, "set")
     backend = create("sensor-backend", "replay", recording=f"manifest:{source}#1")
 
-    assert [one.name for one in backend.channels] == ["gap", "velocity", "force_left", "force_right", "palm"]
+    assert [channel.name for channel in backend.channels] == [
+        "gap",
+        "velocity",
+        "force_left",
+        "force_right",
+        "palm",
+    ]
     refused, words = ran("replay", f"manifest:{source}#1", *options("features.type=chitta-without-pads"))
     assert refused.exit_code == WiringError.exit_code or "effort" in words
     assert "'effort'" in words
@@ -134,4 +140,4 @@ def test_a_union_needs_what_all_of_its_sets_need():
     union = create("feature-set", "union", sets=("chitta", "contact-image"))
     assert union.requires == ()
     union = create("feature-set", "union", sets=("chitta", "chitta-without-pads"))
-    assert [one.name for one in union.requires] == ["gap"]
+    assert [require.name for require in union.requires] == ["gap"]

@@ -79,7 +79,7 @@ def test_times_are_the_gripper_s_on_the_wall_clock_and_a_chunk_closes_every_50_m
     assert max(abs(step - 1_000_000) for step in steps) <= 2
     with (tmp_path / "g.mcap").open("rb") as file:
         summary = make_reader(file).get_summary()
-    spans = [one.message_end_time - one.message_start_time for one in summary.chunk_indexes]
+    spans = [index.message_end_time - index.message_start_time for index in summary.chunk_indexes]
     assert len(spans) >= 8
     assert max(spans) <= 51_000_000
     assert summary.statistics.message_count == 400 + 10
@@ -103,17 +103,17 @@ def test_fields_are_scalars_and_the_schema_tells_the_bytes(tmp_path):
 def test_our_reader_gives_each_tick_with_the_image_it_had(tmp_path):
     write_recording(tmp_path / "g.mcap", ticks=120, record=ended())
     readings = read_recorded(tmp_path / "g.mcap").readings()
-    assert repr([one.frame for one in readings]) == repr([frame(k) for k in range(120)])
-    assert [one.pads for one in readings] == [pads(k) for k in range(120)]
+    assert repr([reading.frame for reading in readings]) == repr([frame(k) for k in range(120)])
+    assert [reading.pads for reading in readings] == [pads(k) for k in range(120)]
 
 
 def test_a_recording_that_is_being_written_has_another_name(tmp_path):
     file = write_recording(tmp_path / "g.mcap", finish=False)
-    assert [one.name for one in tmp_path.iterdir()] == ["g.mcap.part"]
+    assert [path.name for path in tmp_path.iterdir()] == ["g.mcap.part"]
     with pytest.raises(ConfigError, match="was never finished: graspsense recover"):
         read_recorded(tmp_path / "g.mcap")
     file.finish()
-    assert [one.name for one in tmp_path.iterdir()] == ["g.mcap"]
+    assert [path.name for path in tmp_path.iterdir()] == ["g.mcap"]
 
 
 def test_a_recording_is_never_written_over_another(tmp_path):
@@ -190,7 +190,7 @@ def test_a_grasp_that_ends_without_a_word_leaves_what_was_felt(tmp_path):
         felt.take(Reading(frame(k), pads(k)), 3, command(k))
     felt.leave()
     nothing.leave()
-    assert [one.name for one in tmp_path.iterdir()] == ["felt.mcap.part"]
+    assert [path.name for path in tmp_path.iterdir()] == ["felt.mcap.part"]
     assert len(read_recorded(tmp_path / "felt.mcap.part", salvage=True)) == 10
 
 

@@ -67,16 +67,19 @@ def test_a_cut_recording_becomes_a_trial_that_does_not_count(store):
 def test_recovering_twice_changes_nothing(store):
     part(store)
     recover_store(store)
-    before = sorted(one.name for one in store.recordings.iterdir())
+    before = sorted(path.name for path in store.recordings.iterdir())
     assert recover_store(store) == []
-    assert sorted(one.name for one in store.recordings.iterdir()) == before
+    assert sorted(path.name for path in store.recordings.iterdir()) == before
 
 
 def test_a_finished_trial_that_only_lacks_its_row_counts(store):
     write_recording(store.recordings / "a.mcap", 100, ended())
     file = write_recording(store.recordings / "b.mcap", 100, ended(), finish=False)
     file.leave()  # ended, but not renamed
-    assert [(one.what, one.trial) for one in recover_store(store)] == [("added", 1), ("added", 2)]
+    assert [(recovered.what, recovered.trial) for recovered in recover_store(store)] == [
+        ("added", 1),
+        ("added", 2),
+    ]
     assert store.counts() == {("can:full_open", None): 2}
     assert store.trial(1).result.features.values == (0.066, 5.5)
     assert store.trial(1).summary.made_at == begun().made_at
@@ -103,7 +106,7 @@ def test_a_recording_that_is_being_written_is_left_alone(store):
     assert (found.what, found.why) == ("busy", "it is being written")
     assert verify_store(store.folder).unfinished == ()
     file.finish()
-    assert [one.what for one in recover_store(store)] == ["added"]
+    assert [recovered.what for recovered in recover_store(store)] == ["added"]
 
 
 def test_a_recording_is_not_replaced_by_an_unfinished_one_of_its_name(store):
@@ -121,7 +124,7 @@ def test_a_recording_is_not_replaced_by_an_unfinished_one_of_its_name(store):
 def test_a_file_without_a_tick_makes_no_trial(store, bytes_written):
     path = part(store, ticks=0)
     path.write_bytes(path.read_bytes()[:bytes_written])  # a disk can be full at the first byte
-    assert [one.what for one in recover_store(store)] == ["empty"]
+    assert [recovered.what for recovered in recover_store(store)] == ["empty"]
     assert store.page(set_aside=None) == []
 
 
@@ -146,10 +149,10 @@ def test_a_lost_database_is_made_again_from_the_recordings(store):
     numbers = [keep(store, label) for label in ("can:full_open", "can:empty_open", "toy")]
     before = [(one.label, one.outcome, store.trial(one.id).result.features.values) for one in store.page()]
     store.close()
-    for one in store.folder.glob("store.sqlite*"):
-        one.rename(one.with_name("old-" + one.name))
+    for path in store.folder.glob("store.sqlite*"):
+        path.rename(path.with_name("old-" + path.name))
     with Store.open(store.folder) as new:
-        assert [one.what for one in recover_store(new)] == ["added"] * len(numbers)
+        assert [recovered.what for recovered in recover_store(new)] == ["added"] * len(numbers)
         after = [(one.label, one.outcome, new.trial(one.id).result.features.values) for one in new.page()]
     assert sorted(after) == sorted(before)
 

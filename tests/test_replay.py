@@ -133,7 +133,7 @@ def test_each_of_the_five_fingers_is_kept_beside_the_two_forces(tmp_path: Path) 
 
     last = recording.readings[-1]
 
-    assert [one.name for one in recording.channels] == list(last.signals._fields)
+    assert [channel.name for channel in recording.channels] == list(last.signals._fields)
     assert list(last.signals) == pytest.approx([2.0, 0.5, 0.0, 5.0, 0.0])
     assert (last.frame.force_left_n, last.frame.force_right_n) == pytest.approx((2.0, 5.0))
 

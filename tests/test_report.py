@@ -160,9 +160,9 @@ def test_a_page_can_be_read_aloud(page):
     assert {one["href"][1:] for one in found.all("a")} <= set(ids)
     pictures = found.all("svg")
     assert len(pictures) == 10
-    for one in pictures:
-        assert one["role"] == "img"
-        assert len(one["aria-label"]) > 40
+    for picture in pictures:
+        assert picture["role"] == "img"
+        assert len(picture["aria-label"]) > 40
     for one in found.all("th"):
         assert one["scope"] in ("row", "col")
     for _, attrs in found.elements:
@@ -172,7 +172,7 @@ def test_a_page_can_be_read_aloud(page):
 
 def luminance(colour):
     parts = [int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5)]
-    parts = [one / 12.92 if one <= 0.04045 else ((one + 0.055) / 1.055) ** 2.4 for one in parts]
+    parts = [part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in parts]
     return 0.2126 * parts[0] + 0.7152 * parts[1] + 0.0722 * parts[2]
 
 
@@ -296,10 +296,10 @@ def test_the_page_of_a_store(tmp_path):
     assert "All trials" in found.text
     # The newest trial of each label is drawn; the other small curves can be chosen.
     boxes = [one for one in found.all("input") if one.get("type") == "checkbox"]
-    assert [one["value"] for one in boxes] == [str(k) for k in range(8, 0, -1)]
-    assert [one["value"] for one in boxes if "checked" in one] == ["8", "7"]
+    assert [box["value"] for box in boxes] == [str(k) for k in range(8, 0, -1)]
+    assert [box["value"] for box in boxes if "checked" in box] == ["8", "7"]
     lines = [one for one in found.all("polyline") if "data-trial" in one]
-    assert {one["data-trial"] for one in lines if "class" not in one} == {"8", "7"}
+    assert {line["data-trial"] for line in lines if "class" not in line} == {"8", "7"}
 
 
 def test_the_warnings_of_a_trial_are_on_its_page(tmp_path):
@@ -355,7 +355,7 @@ def test_long_names_are_wrapped_within_a_picture():
 
 def test_features_have_their_unit_and_meaning_from_their_plugin(page):
     text = Reader(page).text
-    (chitta,) = [one for one in installed().feature_sets() if one.name == "chitta"]
+    (chitta,) = [label_set for label_set in installed().feature_sets() if label_set.name == "chitta"]
 
     assert "Features of this grasp" in text
     for feature in chitta.features:

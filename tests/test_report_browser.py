@@ -159,15 +159,17 @@ def test_a_page_runs_its_script_under_its_own_policy_and_loads_nothing(browser, 
     browser.call("Log.enable")
     browser.show(pages["experiment"], 1280)
     asked = [
-        one["params"]["request"]["url"]
-        for one in browser.events
-        if one.get("method") == "Network.requestWillBeSent"
+        event["params"]["request"]["url"]
+        for event in browser.events
+        if event.get("method") == "Network.requestWillBeSent"
     ]
 
     assert browser.run("document.documentElement.className") == "scripted"
     assert [one for one in asked if not one.endswith("report.html")] == []
     assert [
-        one for one in browser.events if one.get("method") in ("Log.entryAdded", "Runtime.exceptionThrown")
+        event
+        for event in browser.events
+        if event.get("method") in ("Log.entryAdded", "Runtime.exceptionThrown")
     ] == []
 
 
@@ -240,7 +242,7 @@ def axis(browser):
     texts = browser.run(
         "[...document.querySelectorAll('#grasp g.axis.x text')].map((one) => one.textContent)"
     )
-    return [float(one.replace("−", "-")) for one in texts]
+    return [float(text.replace("−", "-")) for text in texts]
 
 
 def test_a_drag_enlarges_a_part_of_a_picture_and_a_double_click_restores_it(browser, pages):

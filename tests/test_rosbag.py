@@ -176,7 +176,7 @@ def test_bag_is_the_grasp_that_was_written(case: str, grasp: Any, tmp_path: Path
     write(path, grasp, **CASES[case])  # type: ignore[arg-type]
     recording = read_bag(str(path))
     trace = grasp.trace
-    frames = [one.frame for one in recording.readings]
+    frames = [reading.frame for reading in recording.readings]
     assert recording.rate_hz == pytest.approx(100.0, rel=0.01)
     np.testing.assert_allclose([f.t_s for f in frames], trace.t_s[::10] - trace.t_s[0], atol=1e-6)
     np.testing.assert_allclose([f.gap_m for f in frames], trace.gap_m[::10])
@@ -189,7 +189,9 @@ def test_bag_is_the_grasp_that_was_written(case: str, grasp: Any, tmp_path: Path
     # Zero and images differ from the run's by the noise of 15 counts a cell: sqrt(15) * 15 / 1600 N and a few.
     peak = max(f.force_left_n for f in frames)
     assert peak == pytest.approx(float(np.max(trace.force_left_n)), abs=0.15)
-    assert max(max(one.pads.left) for one in recording.readings) > 2**15, "the load crosses the sign bit"
+    assert max(max(reading.pads.left) for reading in recording.readings) > 2**15, (
+        "the load crosses the sign bit"
+    )
 
 
 def test_bag_replays_to_the_features_of_the_grasp(grasp: Any, tmp_path: Path) -> None:
@@ -219,7 +221,7 @@ def test_loads_beyond_the_sign_bit_do_not_wrap(tmp_path: Path) -> None:
                 set_point=0.0, process_value=0.05, process_value_dot=0.0, error=0.0, time_step=0.0, command=-20.0,
                 p=0.0, i=0.0, d=0.0, i_clamp=0.0)  # fmt: skip
     bag.close()
-    frames = [one.frame for one in read_bag(str(tmp_path / "a.bag")).readings]
+    frames = [reading.frame for reading in read_bag(str(tmp_path / "a.bag")).readings]
     assert [f.force_left_n for f in frames] == pytest.approx(
         [0.0] * 6 + [15 * 100 * i / 1600 for i in range(6, 12)]
     )
@@ -239,8 +241,8 @@ def test_fingertip_that_reads_zero_throughout_is_absent(tmp_path: Path) -> None:
         motion(bag, BEGAN_S + 0.041 * i)
     bag.close()
     recording = read_bag(str(tmp_path / "a.bag"))
-    assert all(math.isnan(one.frame.force_left_n) for one in recording.readings)
-    assert not any(math.isnan(one.frame.force_right_n) for one in recording.readings)
+    assert all(math.isnan(reading.frame.force_left_n) for reading in recording.readings)
+    assert not any(math.isnan(reading.frame.force_right_n) for reading in recording.readings)
     assert any("left fingertip" in note for note in recording.notes)
 
 
@@ -254,7 +256,7 @@ def test_bag_of_both_grippers_must_be_told_which(tmp_path: Path) -> None:
     path = str(tmp_path / "a.bag")
     with pytest.raises(ConfigError, match="#l for the left"):
         read_bag(path)
-    assert {one.frame.gap_m for one in read_bag(path + "#l").readings} == {0.05}
+    assert {reading.frame.gap_m for reading in read_bag(path + "#l").readings} == {0.05}
     assert read_bag(path + "#r").readings[-1].pads.left[0] == 3507
     with pytest.raises(ConfigError, match="write l or r after #"):
         read_bag(path + "#x")

@@ -91,12 +91,14 @@ def test_the_components_of_a_package_fit_together(roles, tmp_path, monkeypatch):
         plugins.add(graspsense_sim_gripper.plugin, "graspsense-sim-gripper")
         plugins.add(plugin, "lab-thing")
 
-        assert [one.role for one in plugins.components() if one.distribution == "lab-thing"] == selected
+        assert [
+            component.role for component in plugins.components() if component.distribution == "lab-thing"
+        ] == selected
         if len(selected) > 1:
             trial = load_pipeline("lab-thing", plugins=plugins).grasp()
             assert (trial.outcome.words, dict(trial.features.reasons)) == ("steady", {})
         else:
-            assert not any(one.distribution == "lab-thing" for one in plugins.pipelines())
+            assert not any(pipeline.distribution == "lab-thing" for pipeline in plugins.pipelines())
 
 
 def test_the_first_commands_find_the_scene_from_where_they_are_printed_and_from_the_package(tmp_path):

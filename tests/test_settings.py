@@ -99,9 +99,9 @@ def all_keys(keys, above=""):
         yield from all_keys(declaration.get("keys", {}), f"{above}{key}.")
 
 
-@pytest.mark.parametrize("table", ["run", *(one.qualified for one in installed().components())])
+@pytest.mark.parametrize("table", ["run", *(component.qualified for component in installed().components())])
 def test_every_shipped_setting_declares_its_meaning_and_the_unit_of_its_name(table):
-    known = {one.qualified: one for one in installed().components()}
+    known = {component.qualified: component for component in installed().components()}
     keys = keys_of(RunConfig if table == "run" else known[table].config_class())
     for key, declaration in all_keys(keys):
         assert declaration["meaning"].endswith((".", ")")), key

@@ -68,13 +68,13 @@ def test_many_features_are_sampled_alike_in_every_call_and_add_up():
 def test_contributions_add_up_to_the_probability(name, features):
     said = fitted(name, *trials(missing=0.1)).explain(features)
 
-    given = [one for one in said.because if one.contribution is not None]
+    given = [reason for reason in said.because if reason.contribution is not None]
     assert total(said) == pytest.approx(said.probabilities[said.label], abs=1e-9)
-    assert {(one.contribution.scale, one.contribution.label) for one in given} == {
+    assert {(reason.contribution.scale, reason.contribution.label) for reason in given} == {
         ("probability", said.label)
     }
     # The median stands for a missing feature, so it contributes nothing.
-    assert all(FeatureValue("f_steady", None, "N") not in one.features for one in given)
+    assert all(FeatureValue("f_steady", None, "N") not in reason.features for reason in given)
 
 
 @pytest.mark.filterwarnings("ignore::sklearn.exceptions.ConvergenceWarning")

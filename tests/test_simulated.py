@@ -118,7 +118,7 @@ def test_a_note_says_in_how_many_grasps_of_which_objects_the_accuracy_is_not_ver
 
     notes = simulated(settings, groups=groups).notes
 
-    assert [one for one in notes if "not verified" in one] == [
+    assert [note for note in notes if "not verified" in note] == [
         "2 of 4 grasps (rod:steel): accuracy not verified for trace, features (reasons: graspsense run --object NAME "
         "--explain-model)"
     ]

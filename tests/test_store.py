@@ -110,10 +110,10 @@ def test_writers_wait_for_one_another(store):
                 keep(mine, ticks=3)
 
     threads = [threading.Thread(target=write) for _ in range(4)]
-    for one in threads:
-        one.start()
-    for one in threads:
-        one.join()
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
     assert sorted(one.id for one in store.page(limit=100)) == list(range(1, 41))
 
 
@@ -126,7 +126,7 @@ def test_a_recording_gets_one_row_whoever_writes_it(store):
 
 
 def bytes_in(folder):
-    return {one.name: one.read_bytes() for one in folder.iterdir() if one.is_file()}
+    return {path.name: path.read_bytes() for path in folder.iterdir() if path.is_file()}
 
 
 def test_a_newer_store_is_refused_and_not_a_byte_of_it_changes(store):
@@ -247,7 +247,7 @@ def test_a_row_cannot_name_a_file_outside_of_the_store(store, name):
     store._connection.execute("UPDATE trial SET recording = ? WHERE id = ?", (name, number))
     with pytest.raises(DataDamaged, match="is not a name of a recording"):
         store.trial(number)
-    assert any("is not a name of a recording" in one for one in verify_store(store.folder).problems)
+    assert any("is not a name of a recording" in problem for problem in verify_store(store.folder).problems)
 
 
 @pytest.mark.parametrize(
@@ -275,7 +275,7 @@ def test_verify_finds_what_became_of_recordings(store):
     paths[2].write_bytes(data[:2000] + b"\0\0\0\0" + data[2004:])
     write_recording(store.recordings / "loose.mcap", 5, ended())
     found = verify_store(store.folder)
-    assert [one.partition(":")[0] for one in found.problems] == ["trial 1", "trial 2", "trial 3"]
+    assert [problem.partition(":")[0] for problem in found.problems] == ["trial 1", "trial 2", "trial 3"]
     assert "is missing" in found.problems[0]
     assert "bytes and had" in found.problems[1]
     assert "damaged" in found.problems[2]
@@ -289,7 +289,7 @@ def test_a_store_on_a_read_only_disk_is_read_and_not_written(mounted, log):
     store = Store.open(disk)
     keep(store)
     if log:  # as if the program that wrote it had been killed: the last trial is in the log alone
-        saved = {one.name: one.read_bytes() for one in disk.iterdir() if one.is_file()}
+        saved = {path.name: path.read_bytes() for path in disk.iterdir() if path.is_file()}
         store.close()
         for name, data in saved.items():
             (disk / name).write_bytes(data)

@@ -62,7 +62,7 @@ def test_every_estimator_predicts_what_a_feature_tells(estimator):
     assert found.headline.mean_absolute < 0.5 * found.controls["mean_only"].error.mean_absolute
     assert found.controls["mean_only"].difference.is_positive
     assert found.controls["width_only"].difference.is_positive
-    assert not [one for one in found.warnings if "mean" in one or "width" in one]
+    assert not [warning for warning in found.warnings if "mean" in warning or "width" in warning]
     assert found.explained > 0.7
 
 
@@ -91,7 +91,9 @@ def test_noise_is_not_predicted_and_said_so():
         ),
         permutations=19,
     )
-    assert any("not shown to be below that of always predicting the mean" in one for one in found.warnings)
+    assert any(
+        "not shown to be below that of always predicting the mean" in warning for warning in found.warnings
+    )
     assert found.explained < 0.2
     assert found.controls["shuffled_values"].permutation_p > 0.05
     assert measured(bottles(), permutations=19).controls["shuffled_values"].permutation_p == 0.05
@@ -113,7 +115,7 @@ def test_a_number_that_is_the_instance_is_found_out():
         "tree",
     )
     assert found.protocols["5_fold"].error.mean_absolute < 0.5 * found.headline.mean_absolute
-    assert any("having seen the same objects" in one for one in found.warnings)
+    assert any("having seen the same objects" in warning for warning in found.warnings)
 
 
 def test_what_the_width_or_the_recording_tells_is_a_warning():
@@ -131,8 +133,10 @@ def test_what_the_width_or_the_recording_tells_is_a_warning():
             first_line=ControlFeatures(table=table(np.full(80, np.nan)), what="the first frame"),
         )
     )
-    assert any("the error with the width alone is not shown to be larger" in one for one in found.warnings)
-    assert any("from before contact alone" in one for one in found.warnings)
+    assert any(
+        "the error with the width alone is not shown to be larger" in warning for warning in found.warnings
+    )
+    assert any("from before contact alone" in warning for warning in found.warnings)
     assert found.controls["first_line"].reason == "0 of 80 trials have such features"
     assert found.controls["recording_order"].error is None
 
@@ -140,8 +144,8 @@ def test_what_the_width_or_the_recording_tells_is_a_warning():
 @pytest.mark.slow
 def test_prediction_intervals_contain_nine_of_ten_new_objects():
     covered = [measured(bottles(objects=40, seed=seed, noise=1.0)).intervals for seed in range(3)]
-    assert np.mean([one.covered.rate for one in covered]) == pytest.approx(0.9, abs=0.06)
-    assert all(1.0 < one.mean_half_width < 3.0 for one in covered)
+    assert np.mean([intervals.covered.rate for intervals in covered]) == pytest.approx(0.9, abs=0.06)
+    assert all(1.0 < intervals.mean_half_width < 3.0 for intervals in covered)
     few = measured(bottles(objects=8)).intervals
     assert few.covered is None
     assert few.reason.endswith("calibration instances, 90 % needs 9")

@@ -41,14 +41,14 @@ def test_a_sound_part_passes_every_check(role):
     report = Examined((subject(role, parts.ENTRIES[role]),)).report()
 
     assert report.failures == []
-    assert [one.state for one in report.results] == ["passed"] * len(CHECKS[role])
+    assert [result.state for result in report.results] == ["passed"] * len(CHECKS[role])
 
 
 @pytest.mark.parametrize(
     "one",
     [
-        pytest.param(one, marks=pytest.mark.slow if one.check in SLOW_CHECKS else ())
-        for one in mutants.MUTANTS
+        pytest.param(mutant, marks=pytest.mark.slow if mutant.check in SLOW_CHECKS else ())
+        for mutant in mutants.MUTANTS
     ],
     ids=lambda one: f"{one.role}-{one.check}",
 )
@@ -89,7 +89,7 @@ def test_a_read_that_other_work_held_up_once_is_within_its_timeout():
 
 @pytest.mark.parametrize("role", ROLES)
 def test_every_check_has_a_mutant(role):
-    caught = {one.check for one in mutants.MUTANTS if one.role in (role, "feature-set")}
+    caught = {mutant.check for mutant in mutants.MUTANTS if mutant.role in (role, "feature-set")}
     assert {one.id for one in CHECKS[role]} - caught == set()
 
 
@@ -115,7 +115,7 @@ def test_a_part_of_which_most_was_skipped_does_not_conform():
 def test_an_expected_failure_is_no_failure_and_an_unexpected_pass_is_one():
     peak = subject("feature-set", parts.ENTRIES["feature-set"])
     checks = {one.id: one for one in CHECKS["feature-set"]}
-    (broken,) = [one for one in mutants.MUTANTS if one.check == "same-trace-same-features"]
+    (broken,) = [mutant for mutant in mutants.MUTANTS if mutant.check == "same-trace-same-features"]
     expected = {"same-trace-same-features": "counts on purpose"}
 
     known = outcome_of(checks["same-trace-same-features"], subject("feature-set", broken.entry), expected)
@@ -148,12 +148,12 @@ def test_one_part_is_found_by_name_and_a_wrong_name_by_likeness():
 
 
 def test_where_the_class_cannot_be_had_nothing_else_is_reported():
-    (broken,) = [one for one in mutants.MUTANTS if "implement extract" in one.says]
+    (broken,) = [mutant for mutant in mutants.MUTANTS if "implement extract" in mutant.says]
 
     report = Examined((subject("feature-set", broken.entry),)).report()
 
     (failure,) = report.failures
     assert "does not implement extract, which FeatureSet of plugin_api requires" in failure
-    assert {one.text for one in report.results[1:]} == {
+    assert {result.text for result in report.results[1:]} == {
         "no other check can run before classes-can-be-imported passes"
     }

@@ -96,8 +96,8 @@ def test_compressed_text_and_json_lines_are_read(tmp_path):
     assert times(read(compressed)) == pytest.approx(T_S)
     objects = [dict(zip(("t", "pos"), row.split(",")[:2], strict=True)) for row in ROWS]
     lines = [
-        json.dumps({**one, "pads": {"left": f, "both": [f, 2 * f]}})
-        for one, f in zip(objects, FORCE_N, strict=True)
+        json.dumps({**thing, "pads": {"left": f, "both": [f, 2 * f]}})
+        for thing, f in zip(objects, FORCE_N, strict=True)
     ]
     path = tmp_path / "jar.jsonl"
     path.write_text("\n".join(lines) + '\n{"t": 2.0, "po')
@@ -153,7 +153,7 @@ def test_a_part_of_a_file_that_cannot_be_read_leaves_the_others(bad, tmp_path):
     keys = 'files = "{day}.csv"\nstart = "^grasp (?P<label>\\\\w+)"\ntime = "t"\ngap = "pos [mm]"\nforce = "f1"\n'
     lines = ["grasp can", HEADER, *ROWS, "grasp cup", *bad, "grasp jar", HEADER, *ROWS]
     found = recordings(tmp_path, lines, keys)
-    assert [getattr(one, "label", "none") for one in found] == ["can", "none", "jar"]
+    assert [getattr(recording, "label", "none") for recording in found] == ["can", "none", "jar"]
     assert "line" in str(found[1].error)
 
 
@@ -224,15 +224,15 @@ def trials(folder, lines, **given):
     "lines",
     [
         ["what,p,q", *TRIALS],
-        ["what;p;q", *(one.replace(",", ";").replace(".", ",") for one in TRIALS)],
-        [",what,p,q", *(f"{k},{one}" for k, one in enumerate(TRIALS))],
-        [",what,p,q", *(f"{(5 * k) % 12},{one}" for k, one in enumerate(TRIALS))],
-        ["Unnamed: 0,what,p,q", *(f"{k},{one}" for k, one in enumerate(TRIALS))],
+        ["what;p;q", *(trial.replace(",", ";").replace(".", ",") for trial in TRIALS)],
+        [",what,p,q", *(f"{k},{trial}" for k, trial in enumerate(TRIALS))],
+        [",what,p,q", *(f"{(5 * k) % 12},{trial}" for k, trial in enumerate(TRIALS))],
+        ["Unnamed: 0,what,p,q", *(f"{k},{trial}" for k, trial in enumerate(TRIALS))],
         ["# what,p,q", *TRIALS],
         ["sep=,", "what,p,q", *TRIALS],
         ["made by a program", "", "what,p,q", *TRIALS],
         ["what,p,q", *TRIALS[:5], "what,p,q", *TRIALS[5:]],
-        ["what,p,q", *(one.replace(".5", "00.5") for one in TRIALS)],
+        ["what,p,q", *(trial.replace(".5", "00.5") for trial in TRIALS)],
     ],
 )
 def test_a_table_of_trials_is_read_by_the_same_rules(lines, tmp_path):
@@ -248,10 +248,10 @@ def test_thousands_are_the_same_number_in_evaluate_as_in_import(tmp_path):
 
 
 def test_words_for_a_missing_number_are_labels(tmp_path):
-    lines = ["what,p,q", *(one.replace("a,", "none,").replace("b,", "NA,") for one in TRIALS)]
+    lines = ["what,p,q", *(trial.replace("a,", "none,").replace("b,", "NA,") for trial in TRIALS)]
     assert trials(tmp_path, lines).labels == ("none", "NA") * 6
     with pytest.raises(DataDamaged, match="line 2"):
-        trials(tmp_path, ["what,p,q", *(one.replace("a,", ",") for one in TRIALS)])
+        trials(tmp_path, ["what,p,q", *(trial.replace("a,", ",") for trial in TRIALS)])
 
 
 def test_labels_that_look_the_same_are_the_same(tmp_path):
@@ -265,7 +265,7 @@ def test_labels_that_look_the_same_are_the_same(tmp_path):
 
 def test_evaluate_and_train_read_what_pandas_wrote(tmp_path):
     path = tmp_path / "trials.csv"
-    path.write_text("\n".join([",what,p,q", *(f"{k},{one}" for k, one in enumerate(TRIALS))]) + "\n")
+    path.write_text("\n".join([",what,p,q", *(f"{k},{trial}" for k, trial in enumerate(TRIALS))]) + "\n")
     for command in (("evaluate", path), ("train", path, "--out", tmp_path / "m.json")):
         printed(*command, "--label", "what")
     assert "index" not in json.dumps(json.loads((tmp_path / "m.json").read_text())["features"])
@@ -274,4 +274,4 @@ def test_evaluate_and_train_read_what_pandas_wrote(tmp_path):
 def test_words_for_a_missing_number_are_labels_of_recordings_too(tmp_path):
     lines = [f"{HEADER},what", *(f"{row},{'NA' if k < 100 else 'none'}" for k, row in enumerate(ROWS))]
     keys = 'files = "*.csv"\nsplit = "what"\nlabel = "{what}"\ntime = "t"\ngap = "pos [mm]"\nforce = "f1"\n'
-    assert [one.label for one in recordings(tmp_path, lines, keys)] == ["NA", "none"]
+    assert [recording.label for recording in recordings(tmp_path, lines, keys)] == ["NA", "none"]

@@ -147,8 +147,8 @@ def written(tmp_path: Path) -> Any:
         if pr2:
             (found,), _ = recordings_to_import([f"rosbag:{tmp_path / 'jar'}"], {}, None)
             return found.labelled
-        (one,) = readable_or_not("manifest", str(tmp_path / "m.toml"))
-        return one
+        (recording,) = readable_or_not("manifest", str(tmp_path / "m.toml"))
+        return recording
 
     return write
 

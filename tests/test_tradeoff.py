@@ -152,9 +152,10 @@ def test_recognition_and_distances_of_variants_against_the_reference(tmp_path):
 
     settings = resolve("default", options=["classifier.type=c45"])
     variants = [
-        one
-        for one in settings.gripper.create().variants()
-        if one.role == "reference" or (one.settings.get("accuracy") == 1e-4 and one.fidelity == "scene")
+        variant
+        for variant in settings.gripper.create().variants()
+        if variant.role == "reference"
+        or (variant.settings.get("accuracy") == 1e-4 and variant.fidelity == "scene")
     ]
     # On the catalogue even the coarsest accuracy gives accurate steps, so that a worse model has to be another one.
     softer = {**variants[-1].settings, "pad_stiffness_n_m": 3000.0}

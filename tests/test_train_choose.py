@@ -94,7 +94,9 @@ def test_a_component_that_is_given_stays_and_files_are_not_replaced(store, tmp_p
     assert code == 0, err
     candidates = json.loads(out)["choice"]["ranking"]["candidates"]
 
-    assert [(one["classifier"], one["features"]) for one in candidates] == [("knn", "chitta")]
+    assert [(candidate["classifier"], candidate["features"]) for candidate in candidates] == [
+        ("knn", "chitta")
+    ]
     (tmp_path / "own.json").unlink()
     code, _, err = graspsense(*given, "--out", tmp_path / "own.json")
     assert code == 2

@@ -48,7 +48,7 @@ def test_a_relabelled_trial_has_its_new_label_everywhere_and_the_store_is_intact
     assert labels(store)[1] == (2, "can:empty_open", "can#3")
     assert store.trial(2).record.labels == {"label": "can:empty_open", "instance": "can#3"}
     assert labelled_store(str(store.folder)).labels == ("can:full_open", "can:empty_open", "toy")
-    assert any("labels of 1 trial were changed" in one for one in labelled_store(str(store.folder)).notes)
+    assert any("labels of 1 trial were changed" in note for note in labelled_store(str(store.folder)).notes)
     assert store.counts() == {("can:full_open", "can#2"): 1, ("can:empty_open", "can#3"): 1, ("toy", None): 1}
     assert verify_store(store.folder).problems == ()
     code, out, _ = graspsense("trials", "list", store.folder)
@@ -71,7 +71,7 @@ def test_a_label_is_restored_as_it_was_recorded_also_none(store):
     assert graspsense("trials", "relabel", f"{store.folder}#1", f"{store.folder}#2", "--as-recorded")[0] == 0
 
     assert [store.trial(number).record for number in (1, 2)] == before
-    assert [(one.before, one.after) for one in changes.history(store, 2)] == [
+    assert [(change.before, change.after) for change in changes.history(store, 2)] == [
         (None, "toy"),
         ("toy", "can:empty_open#9"),
         ("can:empty_open#9", None),
@@ -98,7 +98,7 @@ def test_trials_that_are_set_aside_are_not_used_until_they_are_brought_back(stor
     assert "set aside and left out: 2" in told
     assert len((tmp_path / "a.csv").read_text().splitlines()) == 5
     listed = json.loads(graspsense("trials", "list", store.folder, "--aside", "--json")[1])
-    assert [(one["id"], one["set_aside"]) for one in listed] == [
+    assert [(load["id"], load["set_aside"]) for load in listed] == [
         (4, "the bench was moved"),
         (1, "the bench was moved"),
     ]
@@ -107,7 +107,7 @@ def test_trials_that_are_set_aside_are_not_used_until_they_are_brought_back(stor
 
     assert labelled_store(str(store.folder)).labels == ("can:full_open", "can:empty_open") * 3
     history = json.loads(graspsense("trials", "history", store.folder, "--json")[1])
-    assert [(one["trial"], one["action"], one["why"]) for one in history] == [
+    assert [(load["trial"], load["action"], load["why"]) for load in history] == [
         (1, "aside", "the bench was moved"),
         (4, "aside", "the bench was moved"),
         (1, "restore", "it was not"),
@@ -294,7 +294,7 @@ def test_a_number_is_changed_given_and_restored(store):
     assert store.trial(1).record.labels["fill [ml]"] == "200"
     assert graspsense("trials", "value", f"{folder}#1", f"{folder}#3", "--as-recorded", "fill")[0] == 0
     assert labelled_store(folder, value="fill").value.values == (200.0, 210.0)
-    assert [one.action for one in changes.history(store)] == ["value"] * 4
+    assert [change.action for change in changes.history(store)] == ["value"] * 4
 
 
 @pytest.mark.parametrize(

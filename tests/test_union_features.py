@@ -38,8 +38,8 @@ def test_it_declares_the_features_of_its_sets_and_one_width():
     component = installed().find("feature-set", "graspsense/union")
     declared = component.declared(union(sets=("curve", "chitta")).config)
 
-    assert [one.name for one in declared.features if one.width] == ["contact_gap"]
-    assert {one.name for one in declared.requires} == {"gap", "force_left", "force_right"}
+    assert [feature.name for feature in declared.features if feature.width] == ["contact_gap"]
+    assert {require.name for require in declared.requires} == {"gap", "force_left", "force_right"}
 
 
 @pytest.mark.parametrize("sets", [(), ("curve", "curve"), ("curve", "union")])

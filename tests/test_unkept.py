@@ -125,7 +125,7 @@ def test_a_grasp_whose_recorder_fails_is_not_kept_and_its_outcome_says_why(plugi
     assert "Recorder failed: " in kept.trial.reason
     assert numbers_in(tmp_path / "t") == []
     # What was recorded until then can be recovered; it is no trial that counts.
-    assert [one.suffix for one in (tmp_path / "t" / "recordings").iterdir()] == [".part"]
+    assert [path.suffix for path in (tmp_path / "t" / "recordings").iterdir()] == [".part"]
 
 
 def test_run_says_in_outcome_and_exit_code_that_the_trial_is_not_kept(tmp_path):

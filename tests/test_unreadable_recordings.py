@@ -141,8 +141,8 @@ def test_an_absolute_path_and_one_outside_are_read_and_a_wrong_row_is_of_its_own
     manifest = folder / "set" / "m.toml"
     manifest.write_text('list = "list.csv"\ntime = "t"\ngap = "gap [mm]"\nforce = "f"\n')
     found = list(readable_or_not("manifest", str(manifest)))
-    assert [getattr(one, "label", "") for one in found] == ["a", "b", "c", "", "", "", "", "h"]
-    lines = [one.line for one in found if isinstance(one, UnreadableRecording)]
+    assert [getattr(recording, "label", "") for recording in found] == ["a", "b", "c", "", "", "", "", "h"]
+    lines = [recording.line for recording in found if isinstance(recording, UnreadableRecording)]
     for line, words in zip(
         lines, ("line 5: there is no file", "/dev/zero", "first_row", "first_row"), strict=True
     ):
@@ -269,7 +269,7 @@ def test_of_a_store(tmp_path):
 
     problems = verify_store(folder).problems
     for number in (2, 3, 4, 6):
-        assert any(one.startswith(f"trial {number}:") for one in problems)
+        assert any(problem.startswith(f"trial {number}:") for problem in problems)
     code, _, err = graspsense("report", folder, "--out", tmp_path / "page")
     assert code == 0, err
     (page,) = (tmp_path / "page").glob("*.html")
@@ -283,7 +283,7 @@ def test_of_icub(tmp_path):
         (tmp_path / f"can_{k}.txt").write_text("\n".join(["-10000", *frames * 5]) + "\n")
     (tmp_path / "can_2.txt").write_bytes(b"\xff\x00")
     found = list(readable_or_not("icub", str(tmp_path)))
-    assert [isinstance(one, UnreadableRecording) for one in found] == [False, True, False, False]
+    assert [isinstance(recording, UnreadableRecording) for recording in found] == [False, True, False, False]
 
 
 def test_what_is_ours_passes_through_and_what_is_not_is_named():
@@ -341,7 +341,14 @@ def test_of_a_plugin(monkeypatch):
 
     dataset_of(fails_after_five, monkeypatch)
     found = list(readable_or_not("lab", "place"))
-    assert [isinstance(one, UnreadableRecording) for one in found] == [False, False, True, True, False, True]
+    assert [isinstance(recording, UnreadableRecording) for recording in found] == [
+        False,
+        False,
+        True,
+        True,
+        False,
+        True,
+    ]
     assert "no frames" in found[2].line
     assert "time" in found[3].line
     assert re.search(r"behind recording 5.*lab-data/lab failed.*ZeroDivisionError: no scale", found[5].line)

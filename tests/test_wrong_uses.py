@@ -101,8 +101,8 @@ def test_the_nearest_path_is_one_that_there_is_and_a_known_path_is_its_own(found
 
 
 def test_a_kind_of_file_is_recognised_by_keys_that_it_has():
-    assert KINDS["experiment"].marks <= {one.name for one in fields(Experiment)}
-    assert KINDS["manifest"].marks <= {one.name for one in fields(Manifest)}
+    assert KINDS["experiment"].marks <= {field.name for field in fields(Experiment)}
+    assert KINDS["manifest"].marks <= {field.name for field in fields(Manifest)}
     assert toml_kind({"features": {}}, "pipeline") == "pipeline"
     assert toml_kind({"nonsense": 1}, "scene") == "scene"
 

@@ -265,7 +265,7 @@ def true_values(terms: Sequence[Mapping[str, Any]], identified: str) -> dict[str
     scene = tomllib.loads(identified)["terms"]
     at_m = {one["type"]: one.get("at_m") for one in scene}
     times = [one["tau_s"] for one in scene if one["type"] == "maxwell"]
-    branches = sorted((one for one in terms if one["type"] == "maxwell"), key=lambda one: float(one["tau_s"]))
+    branches = sorted((row for row in terms if row["type"] == "maxwell"), key=lambda one: float(one["tau_s"]))
     if times != sorted(times):
         branches.reverse()
     values = {}
@@ -286,10 +286,10 @@ def true_values(terms: Sequence[Mapping[str, Any]], identified: str) -> dict[str
 
 def named(terms: Sequence[Mapping[str, Any]]) -> str:
     """Return the name of the candidate with these terms."""
-    cubic = sum(one.get("k3_n_m3", 0.0) for one in terms)
+    cubic = sum(term.get("k3_n_m3", 0.0) for term in terms)
     form = "softening" if cubic < 0.0 else "k1, k3" if cubic > 0.0 else "k1"
-    kinds = sorted((one["type"] for one in terms), key=SLOTS.index)
-    vented = any(one.get("vent_m2") for one in terms)
+    kinds = sorted((term["type"] for term in terms), key=SLOTS.index)
+    vented = any(term.get("vent_m2") for term in terms)
     words = {"elastic": f"elastic ({form})", "gas": "gas (vented)" if vented else "gas (closed)"}
     return " + ".join(words.get(kind, kind) for kind in kinds)
 
@@ -344,15 +344,15 @@ def measured(
     terms = drawn(ALL_SCENES[name], repeat)
     text = scene_text(terms, STIFFNESS_SPREAD if count > 1 else 0.0, OWN_SPREADS.get(name, ""), own_spread)
     seeds = seeds_of(name, sensor, count, repeat)
-    squeezes = squeezes_of(text, name, SENSORS[sensor], [str(one) for one in seeds], seeds)
+    squeezes = squeezes_of(text, name, SENSORS[sensor], [str(seed) for seed in seeds], seeds)
     only = named(terms) if terms_known else ""
-    late = [delayed(one, late_s) for one in squeezes]
+    late = [delayed(squeeze, late_s) for squeeze in squeezes]
     result = identify(SimConfig(), late, lambda *_: None, only=only)
-    chosen = next(one for one in result.candidates if one.chosen)
-    true = next((one for one in result.candidates if one.terms == named(terms)), None)
+    chosen = next(candidate for candidate in result.candidates if candidate.chosen)
+    true = next((candidate for candidate in result.candidates if candidate.terms == named(terms)), None)
     right = true is chosen
     truth = true_values(terms, result.scene) if right else {}
-    found = [one for one in result.parameters if one.name in truth]
+    found = [parameter for parameter in result.parameters if parameter.name in truth]
     alike = true is not None and chosen.fit_error <= TOLD_APART * true.fit_error
     return Row(
         scene=name,
@@ -362,23 +362,26 @@ def measured(
         chosen=chosen.terms,
         right_terms=right,
         told_apart=right or true is None or not alike or chosen.parameters > true.parameters,
-        found=tuple((one.name, truth[one.name], one.value, one.low, one.high) for one in found),
+        found=tuple(
+            (parameter.name, truth[parameter.name], parameter.value, parameter.low, parameter.high)
+            for parameter in found
+        ),
         seconds=result.seconds,
         late_s=late_s,
         delay=_delay(result),
         own_spread=own_spread,
         spreads=tuple(
-            (one.name.removesuffix(".spread"), one.value, one.low, one.high)
-            for one in result.parameters
-            if one.name.endswith(".spread")
+            (parameter.name.removesuffix(".spread"), parameter.value, parameter.low, parameter.high)
+            for parameter in result.parameters
+            if parameter.name.endswith(".spread")
         ),
     )
 
 
 def _delay(result: Identification) -> tuple[float, float, float, bool] | None:
     """Return the delay, the ends of its interval, and whether it was used; None if it was refused."""
-    found = next((one for one in result.parameters if one.name == "delay_s"), None)
-    refused = any(one.what == "delay of the sensor" for one in result.undetermined)
+    found = next((parameter for parameter in result.parameters if parameter.name == "delay_s"), None)
+    refused = any(undetermined.what == "delay of the sensor" for undetermined in result.undetermined)
     used = tomllib.loads(result.scene)["identified"]["sensor"]["delay_s"] != 0.0
     return None if found is None or (refused and not used) else (found.value, found.low, found.high, used)
 
@@ -414,10 +417,10 @@ def _covered_share(group: Sequence[Mapping[str, Any]]) -> str:
     The intervals of a scene share their error, so that they count as fewer: by the design effect, which is the variance
     between scenes over that of independent intervals (Korn and Graubard, Survey Methodology 24, 1998).
     """
-    sizes = np.array([len(one["found"]) for one in group if one["found"]])
+    sizes = np.array([len(row["found"]) for row in group if row["found"]])
     if not len(sizes):
         return "–"
-    hits = np.array([sum(_covered([one["found"]])) for one in group if one["found"]])
+    hits = np.array([sum(_covered([row["found"]])) for row in group if row["found"]])
     whole, part, scenes = int(sizes.sum()), int(hits.sum()), len(sizes)
     share = part / whole
     effective = float(scenes)
@@ -432,18 +435,18 @@ def as_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
     """Return the tables of these rows: by sensor and number of recordings, and by scene."""
 
     def line(head: Sequence[str], group: Sequence[Mapping[str, Any]]) -> str:
-        apart = [one for one in group if one["told_apart"]]
-        several = [one for one in group if one["recordings"] > 1]
-        errors = [abs(value / truth - 1.0) for one in group for _, truth, value, *_ in one["found"]]
+        apart = [row for row in group if row["told_apart"]]
+        several = [row for row in group if row["recordings"] > 1]
+        errors = [abs(value / truth - 1.0) for row in group for _, truth, value, *_ in row["found"]]
         cells = (
             *head,
             str(len(group)),
-            _share(sum(one["right_terms"] for one in group), len(group)),
+            _share(sum(row["right_terms"] for row in group), len(group)),
             _share(sum(one["right_terms"] for one in apart), len(apart)),
             _covered_share(group),
             _share(sum(mean_is_covered(one) for one in several), len(several)),
             f"{100.0 * float(np.median(errors)):.2g} %" if errors else "–",
-            f"{float(np.median([one['seconds'] for one in group])):.1f} s",
+            f"{float(np.median([row['seconds'] for row in group])):.1f} s",
         )
         return "| " + " | ".join(cells) + " |"
 
@@ -457,12 +460,12 @@ def as_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
     lines = header(("sensor", "squeezes"))
     for sensor in SENSORS:
         for count in COUNTS:
-            group = [one for one in rows if one["sensor"] == sensor and one["recordings"] == count]
+            group = [row for row in rows if row["sensor"] == sensor and row["recordings"] == count]
             if group:
                 lines.append(line((sensor, str(count)), group))
     lines += [line(("all", "all"), rows), "", *header(("scene",))]
     for name in ALL_SCENES:
-        group = [one for one in rows if one["scene"] == name]
+        group = [row for row in rows if row["scene"] == name]
         if group:
             lines.append(line((name,), group))
     return "\n".join(lines)
@@ -485,9 +488,9 @@ def coverage_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
     columns += ("intervals that cover there", "and in the other scenes", "weighted by nine and one tenths")
     lines = table_head(columns)
     for sensor, count in product(SENSORS, COUNTS):
-        group = [one for one in rows if one["sensor"] == sensor and one["recordings"] == count]
-        within = [one for one in group if drawn_are_covered(one)]
-        beyond = [one for one in group if drawn_are_covered(one) is False]
+        group = [row for row in rows if row["sensor"] == sensor and row["recordings"] == count]
+        within = [row for row in group if drawn_are_covered(row)]
+        beyond = [row for row in group if drawn_are_covered(row) is False]
         if not group:
             continue
         cells = (
@@ -500,7 +503,7 @@ def coverage_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
 
 
 def _hits(group: Sequence[Mapping[str, Any]]) -> str:
-    covered = _covered([one["found"] for one in group])
+    covered = _covered([row["found"] for row in group])
     return f"{sum(covered)} of {len(covered)}" if covered else "–"
 
 
@@ -526,23 +529,23 @@ def delays_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
     columns += ("90 % intervals of the parameters that cover",)
     lines = table_head(columns)
     for key in sorted(
-        {(list(SENSORS).index(one["sensor"]), one["recordings"], one["late_s"]) for one in rows}
+        {(list(SENSORS).index(row["sensor"]), row["recordings"], row["late_s"]) for row in rows}
     ):
         sensor, count, late_s = list(SENSORS)[key[0]], key[1], key[2]
         group = [
-            one
-            for one in rows
-            if (one["sensor"], one["recordings"], one["late_s"]) == (sensor, count, late_s)
+            row
+            for row in rows
+            if (row["sensor"], row["recordings"], row["late_s"]) == (sensor, count, late_s)
         ]
-        found = [one["delay"] for one in group if one["delay"]]
+        found = [row["delay"] for row in group if row["delay"]]
         errors = [1e3 * abs(value - late_s) for value, *_ in found]
-        covered = _covered([one["found"] for one in group])
+        covered = _covered([row["found"] for row in group])
         cells = (
             *(sensor, str(count), f"{1e3 * late_s:.0f} ms", str(len(group))),
             *(str(sum(one[3] for one in found)), str(len(group) - len(found))),
             _share(sum(low <= late_s <= high for _, low, high, _ in found), len(found)),
             f"{float(np.median(errors)):.2g} ms" if errors else "–",
-            _share(sum(one["right_terms"] for one in group), len(group)),
+            _share(sum(row["right_terms"] for row in group), len(group)),
             _share(sum(covered), len(covered)),
         )
         lines.append("| " + " | ".join(cells) + " |")
@@ -563,19 +566,19 @@ def spreads_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
     columns += ("90 % intervals that cover", "median of what was claimed")
     lines = table_head(columns)
     keys = {
-        (list(SENSORS).index(one["sensor"]), one["recordings"], one["scene"], one["own_spread"])
-        for one in rows
+        (list(SENSORS).index(row["sensor"]), row["recordings"], row["scene"], row["own_spread"])
+        for row in rows
     }
     for place, count, scene, spread in sorted(keys):
         sensor, parameter = list(SENSORS)[place], OWN_SPREADS[scene]
         group = [
-            one
-            for one in rows
-            if (one["sensor"], one["recordings"], one["scene"], one["own_spread"])
+            row
+            for row in rows
+            if (row["sensor"], row["recordings"], row["scene"], row["own_spread"])
             == (sensor, count, scene, spread)
         ]
-        found = [claim for one in group for claim in one["spreads"] if claim[0] == parameter]
-        others = sum(any(claim[0] != parameter for claim in one["spreads"]) for one in group)
+        found = [claim for row in group for claim in row["spreads"] if claim[0] == parameter]
+        others = sum(any(claim[0] != parameter for claim in row["spreads"]) for row in group)
         cells = (
             *(sensor, str(count), f"`{parameter}`", f"{spread:g}", str(len(group))),
             *(_share(len(found), len(group)), str(others)),
@@ -607,7 +610,7 @@ def transfer(counts: Sequence[int], tested: int, classifier: str = "forest") -> 
         for seeds in [range(max(TRANSFER_COUNTS) + tested)]
     }
     test = [(extract(one.trace), name) for name in CONTAINERS for one in recorded[name][-tested:]]
-    true = [(extract(one.trace), name) for name in CONTAINERS for one in simulated_of(name, name)]
+    true = [(extract(squeeze.trace), name) for name in CONTAINERS for squeeze in simulated_of(name, name)]
     on_true = _right(settings, true, test)
     rows = []
     with tempfile.TemporaryDirectory() as folder:
@@ -619,7 +622,7 @@ def transfer(counts: Sequence[int], tested: int, classifier: str = "forest") -> 
                 path = Path(folder) / f"{k}-{count}.toml"
                 result = identify(SimConfig(), recorded[name][:count], lambda *_: None)
                 path.write_text(result.scene, encoding="utf-8")
-                simulated += [(extract(one.trace), name) for one in simulated_of(str(path), name)]
+                simulated += [(extract(squeeze.trace), name) for squeeze in simulated_of(str(path), name)]
             rows.append(
                 {
                     "recordings": count,
@@ -645,7 +648,7 @@ def true_steps(count: int, tested: int, runs: int, classifier: str = "forest") -
     for name in CONTAINERS:
         recorded = squeezes_of(name, name, pads, [str(i // 3) for i in range(total)], range(total))
         scenes[name] = identify(SimConfig(), recorded[:count], lambda *_: None).scene
-        test += [(extract(one.trace), name) for one in recorded[-tested:]]
+        test += [(extract(squeeze.trace), name) for squeeze in recorded[-tested:]]
     rows = []
     for step, keys in TRUE_STEPS:
         if keys is None:
@@ -655,7 +658,7 @@ def true_steps(count: int, tested: int, runs: int, classifier: str = "forest") -
         right = []
         for run in range(runs):
             new = {name: simulated_of(scene, name, 10_000 * (run + 1)) for name, scene in scenes.items()}
-            train = [(extract(one.trace), name) for name, squeezes in new.items() for one in squeezes]
+            train = [(extract(squeeze.trace), name) for name, squeezes in new.items() for squeeze in squeezes]
             right.append(_right(settings, train, test))
         rows.append({"step": step, "recordings": count, "tested": len(test), "right": right})
         print(rows[-1], flush=True)
@@ -672,7 +675,7 @@ def with_true(scene: str, true: Any, keys: Sequence[str]) -> str:
 def simulated_of(scene: str, label: str, first: int = 10_000) -> list[RecordedSqueeze]:
     """Return the simulated squeezes of a scene that a classifier is trained on."""
     seeds = [first + i for i in range(SIMULATED)]
-    return squeezes_of(scene, label, SENSORS["PR2 pads"], [str(one) for one in seeds], seeds)
+    return squeezes_of(scene, label, SENSORS["PR2 pads"], [str(seed) for seed in seeds], seeds)
 
 
 def _right(settings: Any, train: Sequence[tuple[Any, str]], test: Sequence[tuple[Any, str]]) -> int:
@@ -731,7 +734,7 @@ def draw_transfer(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
         high = [100.0 * end[1] - rate for rate, end in zip(rates, ends, strict=True)]
         axes.errorbar(counts, rates, yerr=[low, high], marker="o", capsize=3.0, label=f"trained on {name}")
     axes.set_xscale("log")
-    axes.set_xticks(counts, [str(one) for one in counts])
+    axes.set_xticks(counts, [str(count) for count in counts])
     axes.minorticks_off()
     axes.set_xlabel("recordings a class")
     axes.set_ylabel("recognised, % (95 % interval)")

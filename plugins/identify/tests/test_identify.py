@@ -97,7 +97,7 @@ def test_a_contact_whose_force_rises_slowly_does_not_bias_the_exponent():
 def test_every_force_has_the_error_of_the_scale_of_the_force_and_no_length_or_time_has():
     scale = scale_of(prepared(recorded(), 0.0))
     laws = [*static_candidates(scale), *memories(scale)]
-    of = {one.name: one.is_force for law in laws for one in law.free}
+    of = {parameter.name: parameter.is_force for law in laws for parameter in law.free}
     assert {name for name, is_force in of.items() if not is_force} == {
         "exponent",
         "tau_s",
@@ -140,7 +140,7 @@ def test_pads_that_feel_different_forces_are_noted(share, noted):
 
     _fit_to_use(SimConfig(), [squeeze, apart], notes)
 
-    assert [one for one in notes if "the two pads differ" in one] == notes
+    assert [note for note in notes if "the two pads differ" in note] == notes
     assert bool(notes) == noted
 
 
@@ -204,7 +204,7 @@ def test_breaks_give_the_force_of_the_fracture_with_its_spread_and_what_is_left(
     ]
     whole = prepared(recorded(), 0.0)
     assert whole.broken_n is None
-    assert all(one.broken_n is not None for one in squeezes)
+    assert all(squeeze.broken_n is not None for squeeze in squeezes)
     rigid = ForwardModel(pads=RIGID_PADS)
     squeezes.append(whole)
     spring = static_candidates(scale_of(whole))[0]
@@ -216,13 +216,13 @@ def test_breaks_give_the_force_of_the_fracture_with_its_spread_and_what_is_left(
     assert found.spread.value > 0.2
     assert found.spread.low > 0.1
     # Breaks that differ by as much as two measurements do show no spread.
-    same = [evolve(one, broken_n=one.broken_n) for one in squeezes[:1] * 3]
+    same = [evolve(squeeze, broken_n=squeeze.broken_n) for squeeze in squeezes[:1] * 3]
     assert fracture_of(rigid, fit(rigid, spring, same), same).spread is None
     assert fracture_of(rigid, fit(rigid, spring, [whole]), [whole]) is None
     alone = fracture_of(rigid, fit(rigid, spring, squeezes[:1]), squeezes[:1])
     assert alone.value == pytest.approx(4.0, rel=0.02)
     assert "break 3 objects" in alone.undetermined[0].remedy
-    assert [one.what for one in found.undetermined] == ["whether the objects broke"]
+    assert [undetermined.what for undetermined in found.undetermined] == ["whether the objects broke"]
 
 
 def snapping(closure):

@@ -35,7 +35,7 @@ def errors_of(name):
     true = [value for term in SCENES[name] for key, value in term.items() if key != "type"]
     keys = [key for term in SCENES[name] for key in term if key != "type"]
     spring = static_candidates(scale)[0]
-    joined = (spring.joined(one) for one in memories(scale))
+    joined = (spring.joined(memory) for memory in memories(scale))
     (candidate,) = (one for one in joined if [free.name for free in one.free] == keys)
     fitted = fit(model, candidate, [squeeze])
     before = np.log(np.array(fitted.values) / true)
@@ -78,7 +78,7 @@ def test_the_balance_of_energy_gives_the_share_of_the_cells_without_bias(name):
     ideal = squeeze_of(name, sensor="ideal", coulomb_spread_n=0.0)
     assert measured_share(ideal.trace, prepared(ideal, 0.0), drive) == pytest.approx(1.0, rel=5e-4)
     squeezes = [squeeze_of(name, seed, sensor="pads", coulomb_spread_n=0.0) for seed in range(7, 11)]
-    shares = [measured_share(one.trace, prepared(one, 0.0), drive) for one in squeezes]
+    shares = [measured_share(squeeze.trace, prepared(squeeze, 0.0), drive) for squeeze in squeezes]
     # The noise of the cells scatters the share of a squeeze by 0.3 %.
     assert np.mean(shares) == pytest.approx(0.6, rel=4e-3)
 
@@ -104,6 +104,6 @@ def test_an_interval_covers_at_least_what_it_says_however_much_objects_differ(sq
 def test_given_terms_are_not_chosen():
     squeeze = squeeze_of("creeping", sensor="ideal")
     found = identify(SimConfig(), [squeeze], lambda *_: None, only="elastic (k1)")
-    assert [one.terms for one in found.candidates if one.chosen] == ["elastic (k1)"]
+    assert [candidate.terms for candidate in found.candidates if candidate.chosen] == ["elastic (k1)"]
     with pytest.raises(ConfigError, match="no candidate"):
         identify(SimConfig(), [squeeze], lambda *_: None, only="elastic (k7)")

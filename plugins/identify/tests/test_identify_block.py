@@ -46,7 +46,7 @@ def test_the_fingertips_of_known_squeezes_come_back(hardening):
 def test_a_delay_of_which_the_settings_do_not_know_does_not_bias_the_fingertips(gripper):
     config, soft = SimConfig(**gripper), {**gripper, "pad_stiffness_n_m": 6000.0}
     block = squeezes("block", soft, [1, 2, 3])
-    late = [delayed(one, 0.01) for one in block]
+    late = [delayed(squeeze, 0.01) for squeeze in block]
     assert lag_of_block(config, block) == 0.0
     lag_s = lag_of_block(config, late)
     assert lag_s == pytest.approx(0.01, abs=5e-4)
@@ -73,10 +73,10 @@ def test_an_object_is_identified_behind_the_fingertips_of_the_block(tmp_path):
     gripper = {"sensor": "ideal", "pad_stiffness_n_m": 5000.0}
     block, shells = squeezes("block", gripper, [1, 2, 3]), squeezes(str(scene), gripper, [4, 5, 6])
     found = identify(SimConfig(sensor="ideal"), shells, lambda *_: None, block)
-    (k1,) = [one for one in found.parameters if one.name.endswith("k1_n_m")]
+    (k1,) = [parameter for parameter in found.parameters if parameter.name.endswith("k1_n_m")]
     assert k1.value == pytest.approx(1500.0, rel=0.03)
     assert found.notes[0].startswith("the fingertips follow from 3 squeezes of the block: ")
     # With the default fingertips, which are twice as stiff or more, the shell would seem softer.
     wrong = identify(SimConfig(sensor="ideal"), shells, lambda *_: None)
-    (other,) = [one for one in wrong.parameters if one.name.endswith("k1_n_m")]
+    (other,) = [parameter for parameter in wrong.parameters if parameter.name.endswith("k1_n_m")]
     assert other.value < 1400.0

@@ -62,12 +62,14 @@ IN_CI = ((0, 0.025), (1, 0.0), (1, 0.025), (2, 0.01))
 def test_a_known_delay_comes_back_and_does_not_bias_relaxation(gripper, late_s):
     settings_s = gripper.get("pad_delay_s", 0.0)
     found = identify(SimConfig(), late_recordings(gripper, late_s), lambda *_: None)
-    named = {one.name: one for one in found.parameters}
+    named = {parameter.name: parameter for parameter in found.parameters}
     delay, tau = named["delay_s"], named["maxwell.tau_s"]
     assert delay.value == pytest.approx(settings_s + late_s, abs=0.002)
     assert delay.high - delay.low < 0.01
     assert tau.value == pytest.approx(0.2, rel=0.06)
-    assert [one.terms for one in found.candidates if one.chosen] == ["elastic (k1) + maxwell"]
+    assert [candidate.terms for candidate in found.candidates if candidate.chosen] == [
+        "elastic (k1) + maxwell"
+    ]
     used_s = tomllib.loads(found.scene)["identified"]["sensor"]["delay_s"]
     assert used_s == pytest.approx(settings_s + late_s, abs=0.002)
     assert delay.value == pytest.approx(used_s, rel=1e-5)
@@ -83,7 +85,10 @@ def test_the_delay_that_is_reported_is_the_one_that_is_used(shown_s):
     assert found.low <= min(shown_s, 0.01) <= max(shown_s, 0.01) <= found.high
     excluded = not delay.low_s <= 0.01 <= delay.high_s
     assert (delay.error_s > 0.0) == excluded
-    assert any("the recordings rather show" in one.reason for one in delay.undetermined) == excluded
+    assert (
+        any("the recordings rather show" in undetermined.reason for undetermined in delay.undetermined)
+        == excluded
+    )
 
 
 class FoundWithAll(NamedTuple):
@@ -128,10 +133,12 @@ def test_a_delay_is_used_only_if_the_terms_that_are_chosen_with_it_show_it(found
 def test_a_ramp_at_one_speed_does_not_show_the_delay_and_says_so():
     ramp = recorded(hold_s=0.0)
     found = identify(SimConfig(sensor="ideal", pad_stiffness_n_m=float("inf")), [ramp], lambda *_: None)
-    (refused,) = [one for one in found.undetermined if one.what == "delay of the sensor"]
+    (refused,) = [
+        undetermined for undetermined in found.undetermined if undetermined.what == "delay of the sensor"
+    ]
     assert "at one speed" in refused.reason
     assert "changing speed" in refused.remedy
-    assert not [one for one in found.parameters if one.name == "delay_s"]
+    assert not [parameter for parameter in found.parameters if parameter.name == "delay_s"]
 
 
 def test_an_image_has_its_own_force_whatever_the_settings_say_about_its_delay():

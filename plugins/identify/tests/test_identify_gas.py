@@ -114,8 +114,10 @@ def test_a_vented_gas_comes_back_by_its_combinations_and_says_what_is_convention
         for i, one in enumerate(done)
     ]
     found = identify(SimConfig(), squeezes, lambda *_: None)
-    assert [one.terms for one in found.candidates if one.chosen] == ["elastic (k1) + gas (vented)"]
-    named = {one.name: one for one in found.parameters}
+    assert [candidate.terms for candidate in found.candidates if candidate.chosen] == [
+        "elastic (k1) + gas (vented)"
+    ]
+    named = {parameter.name: parameter for parameter in found.parameters}
     for name, value in combinations(true).items():
         assert named[f"gas.{name}"].value == pytest.approx(value, rel=0.05)
         assert named[f"gas.{name}"].low < value < named[f"gas.{name}"].high

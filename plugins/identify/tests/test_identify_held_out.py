@@ -94,6 +94,8 @@ def test_a_snap_whose_end_no_squeeze_reaches_is_not_to_be_written():
 
     squeezes = [recorded(lambda closure, k=k: force(closure, k), hold_s=0.0) for k in (1000.0, 1050.0)]
     found = identify(SimConfig(sensor="ideal", pad_stiffness_n_m=float("inf")), squeezes, lambda *_: None)
-    assert {one.what for one in found.undetermined if one.in_scene} >= {"snap.k2_n_m"}
+    assert {undetermined.what for undetermined in found.undetermined if undetermined.in_scene} >= {
+        "snap.k2_n_m"
+    }
     assert any("snap.k2_n_m" in reason for reason in found.refusals)
     assert max(found.held_out) < 0.05

@@ -80,7 +80,7 @@ def test_scatter_that_the_errors_make_is_not_claimed_and_other_scatter_is():
         if (scatter := between(np.hypot(0.3, errors) * rng.standard_normal(5), errors**2, 0.05))
     ]
     assert len(held) > 285
-    covered = sum(one.low <= 0.3 <= one.high for one in held)
+    covered = sum(index.low <= 0.3 <= index.high for index in held)
     assert covered / len(held) == pytest.approx(0.9, abs=0.05)
 
 
@@ -104,7 +104,7 @@ def test_where_only_the_stiffness_varies_no_other_spread_is_claimed(name):
 def test_objects_without_names_have_no_spreads_of_their_own():
     law, values, varying = laws()["k3_n_m3"]
     squeezes, fitted = of_objects(law, values, varying, 0.3, 0)
-    nameless = [evolve(one, instance="") for one in squeezes]
+    nameless = [evolve(squeeze, instance="") for squeeze in squeezes]
     assert alone(MODEL, fitted, nameless) == []
     assert own_spreads(MODEL, fitted, [], nameless, 0.0) == []
 
@@ -126,7 +126,7 @@ def test_the_scene_of_objects_that_relax_at_different_rates_has_the_spread_and_i
         for k, one in enumerate(done)
     ]
     found = identify(SimConfig(), recordings, lambda *_: None)
-    (spread,) = [one for one in found.parameters if one.name.endswith(".spread")]
+    (spread,) = [parameter for parameter in found.parameters if parameter.name.endswith(".spread")]
     assert spread.name == "maxwell.tau_s.spread"
     assert spread.low < 0.4 < spread.high
     (maxwell,) = [one for one in tomllib.loads(found.scene)["terms"] if one["type"] == "maxwell"]

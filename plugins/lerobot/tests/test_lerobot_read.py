@@ -24,12 +24,12 @@ from graspsense_lerobot.reader import recordings
 
 def read(place: object) -> list[LabelledRecording]:
     found = list(recordings(str(place)))
-    assert all(isinstance(one, LabelledRecording) for one in found)
+    assert all(isinstance(recording, LabelledRecording) for recording in found)
     return found  # type: ignore[return-value]
 
 
-def column(one: LabelledRecording, name: str) -> np.ndarray:
-    return np.array([getattr(reading.frame, name) for reading in one.recording.readings])
+def column(recording: LabelledRecording, name: str) -> np.ndarray:
+    return np.array([getattr(reading.frame, name) for reading in recording.recording.readings])
 
 
 @pytest.mark.parametrize("version", [2, 3])
@@ -43,8 +43,13 @@ def test_each_squeeze_of_an_episode_is_a_trial_with_its_task_as_label(tmp_path, 
     assert [float(column(one, "force_left_n").max()) for one in found] == pytest.approx(
         [24.0, 18.0, 19.5, 30.0], rel=1e-5
     )
-    arrays = {one.name: one for one in found[0].recording.channels if hasattr(one, "components")}
-    assert {name: (one.cells, one.components) for name, one in arrays.items()} == {"f0": (4, 3), "f1": (4, 3)}
+    arrays = {
+        channel.name: channel for channel in found[0].recording.channels if hasattr(channel, "components")
+    }
+    assert {name: (array.cells, array.components) for name, array in arrays.items()} == {
+        "f0": (4, 3),
+        "f1": (4, 3),
+    }
     cells = np.array([reading.signals.f0.cells for reading in found[0].recording.readings])
     assert cells[:, 1, 2].max() == pytest.approx(8.0, rel=1e-5)
     assert cells[:, 1, 0].max() == pytest.approx(0.8, rel=1e-5)
@@ -79,7 +84,7 @@ def test_the_import_keeps_trials_in_a_store(tmp_path):
     with Store.read(tmp_path / "s") as store:
         trials = store.page(limit=10)
         assert len(trials) == 4
-        assert {one.label for one in trials} == {"pick_the_red_cup", "squeeze-_sponge"}
+        assert {trial.label for trial in trials} == {"pick_the_red_cup", "squeeze-_sponge"}
 
 
 def test_check_says_what_was_understood(tmp_path):
@@ -207,7 +212,7 @@ STYLES = {
 def test_cells_are_known_in_other_styles_of_names(style):
     names = [STYLES[style](finger, cell, axis) for finger in range(2) for cell in range(4) for axis in "xyz"]
     arrays = meaning_of(["gripper.pos", *names]).arrays
-    assert [(one.rows * one.columns, one.axes) for one in arrays] == [(4, "xyz"), (4, "xyz")]
+    assert [(array.rows * array.columns, array.axes) for array in arrays] == [(4, "xyz"), (4, "xyz")]
     assert arrays[1].normal == tuple(names[14::3])
 
 
@@ -229,7 +234,7 @@ def test_names_in_lists_of_lists_are_those_of_the_numbers(tmp_path, names):
     about = json.loads((folder / "meta/info.json").read_text())
     about["features"]["observation.state"]["names"] = names
     damage_info(folder, features=about["features"])
-    assert [one.name for one in read(folder)[0].recording.channels] == ["gripper_load", "f0", "f1"]
+    assert [channel.name for channel in read(folder)[0].recording.channels] == ["gripper_load", "f0", "f1"]
 
 
 def test_of_two_arms_the_load_is_that_of_the_chosen_gripper(tmp_path):
@@ -256,7 +261,7 @@ def test_the_unit_in_the_name_of_a_gap_needs_no_option(tmp_path):
 def test_an_episode_whose_file_cannot_be_read_leaves_the_others(tmp_path, damage):
     folder = write_set(tmp_path / "set", 2)
     damage(folder / "data/chunk-000/episode_000000.parquet")
-    kinds = [type(one) for one in recordings(str(folder))]
+    kinds = [type(recording) for recording in recordings(str(folder))]
     assert kinds == [UnreadableRecording, LabelledRecording, LabelledRecording, LabelledRecording]
 
 
@@ -373,7 +378,9 @@ def test_a_damaged_data_set_is_an_error_that_says_what_is_wrong(tmp_path, damage
 
 def _refusal(folder: Path) -> None:
     """Raise the error of a data set, or of its first episode that cannot be read."""
-    raise next(one.error for one in recordings(str(folder)) if isinstance(one, UnreadableRecording))
+    raise next(
+        recording.error for recording in recordings(str(folder)) if isinstance(recording, UnreadableRecording)
+    )
 
 
 def test_a_task_that_is_not_described_is_an_error(tmp_path):
@@ -419,7 +426,7 @@ def test_a_column_of_impossible_numbers_is_told_without_a_warning_of_numpy(tmp_p
     except GraspsenseError:
         return
     assert isinstance(found[-1], LabelledRecording)
-    assert all(isinstance(one, LabelledRecording | UnreadableRecording) for one in found)
+    assert all(isinstance(recording, LabelledRecording | UnreadableRecording) for recording in found)
 
 
 @pytest.mark.parametrize("seed", range(12))

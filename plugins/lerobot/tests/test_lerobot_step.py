@@ -40,7 +40,7 @@ def grasp(width_m=0.05, stiffness_n_m=4000.0, most_n=17.0, speed_m_s=0.02):
 
 def processed(step, observations):
     """Return what LeRobot makes of the observations with this step in a processor."""
-    return [step({"observation": one})["observation"] for one in observations]
+    return [step({"observation": observation})["observation"] for observation in observations]
 
 
 def events(seen):
@@ -86,7 +86,7 @@ def test_reset_begins_anew_and_a_missing_number_is_counted():
     observations = grasp()
     seen = processed(step, observations[:60])
     step.reset()
-    damaged = [{**one, "gripper.pos": math.nan} for one in observations[:3]]
+    damaged = [{**observation, "gripper.pos": math.nan} for observation in observations[:3]]
     again = processed(step, [*damaged, *observations])
     assert len(seen) == 60
     assert step.grasp.missing == 3

@@ -112,7 +112,7 @@ def test_the_raw_rate_is_kept_beside(written):
 
 def test_what_was_written_reads_back_as_the_same_trials(written):
     found = list(recordings(str(written[0])))
-    assert [one.label for one in found] == [
+    assert [recording.label for recording in found] == [
         "pick_the_red_cup",
         "squeeze-_sponge",
         "squeeze-_sponge",
@@ -120,12 +120,12 @@ def test_what_was_written_reads_back_as_the_same_trials(written):
     ]
     with Store.read(written[1]) as store:
         assert len(found) == len(store.page(limit=10))
-    for one, peak in zip(found, [12.0, 9.0, 9.75, 15.0], strict=True):
-        assert not one.recording.units  # metres and newtons, as the metadata says
-        assert max(reading.frame.force_left_n for reading in one.recording.readings) == pytest.approx(
+    for recording, peak in zip(found, [12.0, 9.0, 9.75, 15.0], strict=True):
+        assert not recording.recording.units  # metres and newtons, as the metadata says
+        assert max(reading.frame.force_left_n for reading in recording.recording.readings) == pytest.approx(
             peak, rel=1e-5
         )
-        assert {channel.name for channel in one.recording.channels} >= {"f0", "f1"}
+        assert {channel.name for channel in recording.recording.channels} >= {"f0", "f1"}
 
 
 def test_simulated_trials_are_written(tmp_path):
@@ -136,8 +136,8 @@ def test_simulated_trials_are_written(tmp_path):
     assert np.isfinite(np.stack(rows["observation.state"])).all()
     efforts = [
         reading.frame.effort_n
-        for one in recordings(str(tmp_path / "out"))
-        for reading in one.recording.readings
+        for recording in recordings(str(tmp_path / "out"))
+        for reading in recording.recording.readings
     ]
     assert max(efforts) == pytest.approx(
         float(np.stack(rows["observation.state"])[:, names.index("gripper.effort")].max())
@@ -187,10 +187,10 @@ def test_an_episode_of_an_array_feature_is_read(tmp_path):
 
     table = table.set_column(0, "observation.state", pa.array(state[:, :3].tolist()))
     pq.write_table(table.append_column("observation.tactile.left", pa.array(cells.tolist())), path)
-    (one,) = recordings(str(folder))
-    (array,) = [channel for channel in one.recording.channels if channel.name == "tactile_left"]
+    (recording,) = recordings(str(folder))
+    (array,) = [channel for channel in recording.recording.channels if channel.name == "tactile_left"]
     assert (array.cells, array.components) == (4, 3)
-    assert max(reading.frame.force_left_n for reading in one.recording.readings) == pytest.approx(
+    assert max(reading.frame.force_left_n for reading in recording.recording.readings) == pytest.approx(
         24.0, rel=1e-5
     )
 
@@ -250,7 +250,9 @@ def test_a_copy_says_what_each_trial_of_an_episode_was(annotated):
 def test_an_annotated_copy_reads_as_the_original(annotated):
     _, original, copy = annotated
     for a, b in zip(recordings(str(original)), recordings(str(copy)), strict=True):
-        assert [one.frame for one in a.recording.readings] == [one.frame for one in b.recording.readings]
+        assert [reading.frame for reading in a.recording.readings] == [
+            reading.frame for reading in b.recording.readings
+        ]
 
 
 def test_trials_of_another_origin_annotate_nothing(tmp_path):

@@ -76,7 +76,7 @@ def test_the_palm_feels_gravity_and_the_motion_of_the_fingers(tmp_path):
     still = [backend.read(1.0).signals.acceleration for _ in range(200)]
     assert still[-1].new == 3
     assert still[-1].counter == 600
-    values = np.concatenate([one.values for one in still[100:]])
+    values = np.concatenate([acceleration.values for acceleration in still[100:]])
     assert values.mean(axis=0) == pytest.approx([0.0, 0.0, 9.81], abs=0.05)
     moving = []
     for _ in range(200):

@@ -92,7 +92,7 @@ def fitted() -> dict[tuple[str, str], float]:
 
 def _spread(spec: ObjectSpec) -> re.Match[str]:
     """Return the reason of a fitted spread of stiffness: what it is without the fit, and the scale."""
-    reason = next(one for where, one in spec.reasons.items() if where.endswith("stiffness_spread"))
+    reason = next(name for where, name in spec.reasons.items() if where.endswith("stiffness_spread"))
     found = SPREAD.search(reason)
     assert found is not None, f"{spec.name}: the reason of its stiffness_spread names no scale"
     return found
@@ -140,13 +140,13 @@ WEAK_N: Final = 5.9
 """Splits of the tree of personalrobots-pkg, gripper_realtime_closed_loop.py; newtons at 1600 counts."""
 
 
-def by_the_tree(one: Squeeze) -> str:
+def by_the_tree(squeeze: Squeeze) -> str:
     """Return the state that the authors' tree gives."""
-    if one.delta_t_s > LONG_S:
+    if squeeze.delta_t_s > LONG_S:
         return "full_open"
-    if one.peak_n > PEAK_N:
+    if squeeze.peak_n > PEAK_N:
         return "full_closed"
-    return "empty_open" if one.p_steady_m <= DEEP_M or one.f_steady_n <= WEAK_N else "empty_closed"
+    return "empty_open" if squeeze.p_steady_m <= DEEP_M or squeeze.f_steady_n <= WEAK_N else "empty_closed"
 
 
 def by_the_splits(states: Sequence[str], squeezes: Sequence[Squeeze]) -> dict[str, float]:
@@ -154,10 +154,10 @@ def by_the_splits(states: Sequence[str], squeezes: Sequence[Squeeze]) -> dict[st
 
     def sorts(state: str, others: Sequence[str], on_side: Callable[[Squeeze], bool]) -> float:
         sides = {
-            one: np.mean([on_side(b) for a, b in zip(states, squeezes, strict=True) if a == one])
-            for one in (state, *others)
+            other: np.mean([on_side(b) for a, b in zip(states, squeezes, strict=True) if a == other])
+            for other in (state, *others)
         }
-        return 0.5 * float(sides[state] + np.mean([1.0 - sides[one] for one in others]))
+        return 0.5 * float(sides[state] + np.mean([1.0 - sides[other] for other in others]))
 
     empty = ("empty_open", "empty_closed")
     return {
@@ -179,10 +179,10 @@ class Target(NamedTuple):
 def targets() -> dict[str, Target]:
     """Return what is fitted to: the class (`table_2`), the state in each container, the authors' splits."""
     found = {}
-    for one in published().rates:
-        if one.id.startswith(("table_2", "table_3_")):
-            assert one.n is not None
-            found[one.id] = Target(one.rate, (one.rate * (1.0 - one.rate) / one.n) ** 0.5)
+    for rate in published().rates:
+        if rate.id.startswith(("table_2", "table_3_")):
+            assert rate.n is not None
+            found[rate.id] = Target(rate.rate, (rate.rate * (1.0 - rate.rate) / rate.n) ** 0.5)
     return {**found, **dict.fromkeys(SPLITS, Target(1.0, found["table_3_odwalla"].deviation))}
 
 
@@ -213,13 +213,13 @@ class Bench:
         """Return the rate for each target."""
         trials = {kind: self._of(kind, values) for kind in TRIALS}
         found = {}
-        for kind, one in trials.items():
+        for kind, trial in trials.items():
             found[f"table_3_{kind}"] = self._state_rate(kind, values)
-            found.update(one.tree)
+            found.update(trial.tree)
         rates = []
         for i, seed in enumerate(self.seeds):
-            features = [f for one in trials.values() for f in one.features[i]]
-            classes = [kind for kind, one in trials.items() for _ in one.labels]
+            features = [f for trial in trials.values() for f in trial.features[i]]
+            classes = [kind for kind, trial in trials.items() for _ in trial.labels]
             rates.append(judged(features, classes, seed))
         return {"table_2": float(np.mean(rates)), **found}
 
@@ -310,8 +310,8 @@ def judged(features: Sequence[Features], labels: Sequence[str], seed: int) -> fl
 def objective(rates: Mapping[str, float], of: str = "t") -> float:
     """Return the sum of squared misfits in standard deviations, of the targets whose names begin like this."""
     return sum(
-        ((rates[name] - one.rate) / one.deviation) ** 2
-        for name, one in targets().items()
+        ((rates[name] - target.rate) / target.deviation) ** 2
+        for name, target in targets().items()
         if name.startswith(of)
     )
 
@@ -397,7 +397,7 @@ def main() -> None:
         result.update(
             seeds=n,
             seconds=round(time.time() - began),
-            targets={name: one._asdict() for name, one in targets().items()},
+            targets={name: target._asdict() for name, target in targets().items()},
             rates=rates,
             objectives={
                 what: {name: objective(one, of) for name, one in which.items()}

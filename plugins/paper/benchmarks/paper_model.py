@@ -220,7 +220,7 @@ EXPLANATIONS: Final = {
 }
 """Explanations by name. Each is one figure of the posterior, whose prior is uniform from 0 to 1."""
 
-NAMES: Final = (*(one.name for one in PRIORS), *EXPLANATIONS)
+NAMES: Final = (*(prior.name for prior in PRIORS), *EXPLANATIONS)
 TABLE_IV: Final = (96, 12)
 FORCES_N: Final = (17.0, 20.0, 23.0)
 PLACEMENT_NODES: Final = ((-(3.0**0.5), 1 / 6), (0.0, 2 / 3), (3.0**0.5, 1 / 6))
@@ -235,9 +235,9 @@ CONTAINERS: Final = tuple(TRIALS)
 
 def strength(name: str, values: Values) -> float:
     """Return the figure of an explanation, in its unit."""
-    one = EXPLANATIONS[name]
+    explanation = EXPLANATIONS[name]
     share = max(values[name] - OFF_BELOW, 0.0) / (1.0 - OFF_BELOW)
-    return one.absent + share * (one.limit - one.absent)
+    return explanation.absent + share * (explanation.limit - explanation.absent)
 
 
 def is_on(name: str, values: Values) -> bool:
@@ -367,7 +367,7 @@ def squeeze(
 
 def matrix_of(features: Sequence[Features]) -> Any:
     """Return the features as an array, shape (trials, features)."""
-    return np.array([one.values for one in features])
+    return np.array([feature.values for feature in features])
 
 
 class StateTree(NamedTuple):

@@ -133,7 +133,7 @@ class Weighted(NamedTuple):
 def prior_of(name: str) -> Prior:
     """Return the prior of a figure; that of an explanation is uniform from 0 to 1."""
     if name not in EXPLANATIONS:
-        return next(one for one in PRIORS if one.name == name)
+        return next(prior for prior in PRIORS if prior.name == name)
     reason = EXPLANATIONS[name].reason
     return Prior(name=name, unit="1", law="uniform", args=(0.0, 1.0), origin="assumed", reason=reason)
 
@@ -201,8 +201,10 @@ def nearest(
     accepted: int,
 ) -> Sample:
     """Return the simulations that are nearest to the data, weighted and adjusted."""
-    scores = np.array([[one["scores"][name] for name in names] for one in simulations])
-    weights = mixture_weights(scores, np.array([one["t"] for one in simulations]), history, names)
+    scores = np.array([[simulation["scores"][name] for name in names] for simulation in simulations])
+    weights = mixture_weights(
+        scores, np.array([simulation["t"] for simulation in simulations]), history, names
+    )
     off = np.array(
         [[(s["statistics"][k] - o.value) / o.deviation for k, o in wanted.items()] for s in simulations]
     )
@@ -311,7 +313,7 @@ def gains_alone(folder: Folder, sample: Weighted, simulations: int, draws: int) 
     drawn = np.random.default_rng(0).choice(len(sample.values), draws, p=sample.weight)
     cases = {
         "none": {},
-        **{one: {one: 1.0} for one in EXPLANATIONS},
+        **{explanation: {explanation: 1.0} for explanation in EXPLANATIONS},
         "all": dict.fromkeys(EXPLANATIONS, 1.0),
     }
     for k in range(len(done), draws):
@@ -386,9 +388,9 @@ def summarise(
     predicted = predict(folder, sample, len(simulations), size.predicted, say)
     alone = gains_alone(folder, sample, len(simulations), size.alone)
     say("explanations alone")
-    from_each = Counter(one["t"] for one in simulations)
-    scores = np.array([[one["scores"][name] for name in NAMES] for one in simulations])
-    every = mixture_weights(scores, np.array([one["t"] for one in simulations]), history, NAMES)
+    from_each = Counter(simulation["t"] for simulation in simulations)
+    scores = np.array([[simulation["scores"][name] for name in NAMES] for simulation in simulations])
+    every = mixture_weights(scores, np.array([simulation["t"] for simulation in simulations]), history, NAMES)
     populations = history.get_all_populations()
     w_predicted = sample.weight[: len(predicted)]
     return {
@@ -407,7 +409,7 @@ def summarise(
         "moved": float(np.average(np.abs(nearby.scores - nearby.before).mean(axis=1), weights=w)),
         "conditioned_on": {name: one._asdict() for name, one in observed().items()},
         "accepted": {
-            name: list(weighted_quantiles([one[name] for one in nearby.statistics], w, LEVELS))
+            name: list(weighted_quantiles([statistic[name] for statistic in nearby.statistics], w, LEVELS))
             for name in observed()
         },
         "figures": _figures(sample),
@@ -438,7 +440,7 @@ def _figures(sample: Weighted) -> dict[str, Any]:
 def _predictions(predicted: list[dict[str, float]], w: Any) -> dict[str, Any]:
     found = {}
     for name, (what, printed) in PREDICTED.items() if predicted else ():
-        values = np.array([one[name] for one in predicted], dtype=np.float64)
+        values = np.array([row[name] for row in predicted], dtype=np.float64)
         known = ~np.isnan(values)
         found[name] = {
             "what": what,
@@ -458,19 +460,19 @@ def _explanations(
 ) -> dict[str, Any]:
     """Return the Bayes factors of the explanations, without and with Table IV, and the points that they give."""
     every, w = sample.weight, sample.weight[: len(predicted)]
-    gains = np.array([one["gain"] for one in predicted])
-    rates = np.array([[one["table_4_17"], one["table_4_23"]] for one in predicted])
-    printed = {one.id: one.rate for one in published().rates}
+    gains = np.array([row["gain"] for row in predicted])
+    rates = np.array([[row["table_4_17"], row["table_4_23"]] for row in predicted])
+    printed = {rate.id: rate.rate for rate in published().rates}
     at = np.array([printed["table_4_17"], printed["table_4_23"]])
     found: dict[str, Any] = {}
-    for name, one in EXPLANATIONS.items():
+    for name, explanation in EXPLANATIONS.items():
         on = np.array([is_on(name, v) for v in sample.values])
         of_predicted = on[: len(predicted)]
         found[name] = {
-            "says": one.says,
-            "figure": one.figure,
-            "full_strength": one.limit,
-            "unit": one.unit,
+            "says": explanation.says,
+            "figure": explanation.figure,
+            "full_strength": explanation.limit,
+            "unit": explanation.unit,
             "at_20_n": _odds(on, every),
             "before_adjustment": _odds(np.array([is_on(name, v) for v in before.values]), every),
             "with_table_4": _regressed_odds(of_predicted, w, rates, at),

@@ -82,7 +82,7 @@ def _answer(result: Mapping[str, Any]) -> str:
         for name, one in predicted.items()
         if name != FOLLOWS and one["published"] is not None and one["deviation"] is not None
     ]
-    met = [one for one in tested if _met(one)]
+    met = [item for item in tested if _met(item)]
     if not predicted:
         return (
             "**Nothing was predicted in this run: Tables IV and V, section III.F and the points of each explanation "
@@ -156,7 +156,7 @@ def _determined(result: Mapping[str, Any]) -> str:
             f"**This run is small: its effective sample size is {size:.1f}. It shows that the method works from end to "
             "end; contractions and Bayes factors of this size arise by chance, and nothing follows from them.**"
         )
-    names = [name for name, one in figures.items() if one["contraction"] >= PINNED]
+    names = [name for name, figure in figures.items() if figure["contraction"] >= PINNED]
     if not names:
         return (
             f"None of the {len(figures)} figures is determined by these data (contraction of {PINNED:g} or more). The "
@@ -212,19 +212,20 @@ def _number(value: float, unit: str) -> str:
 
 def _figures(figures: Mapping[str, Any]) -> str:
     rows = []
-    for name, one in figures.items():
+    for name, figure in figures.items():
         prior, posterior = (
-            f"{one[key][1]:.3g} ({one[key][0]:.3g} to {one[key][2]:.3g})" for key in ("prior", "posterior")
+            f"{figure[key][1]:.3g} ({figure[key][0]:.3g} to {figure[key][2]:.3g})"
+            for key in ("prior", "posterior")
         )
         rows.append(
             (
                 f"`{name}`",
-                one["unit"],
-                one["origin"],
-                one["reason"],
+                figure["unit"],
+                figure["origin"],
+                figure["reason"],
                 prior,
                 posterior,
-                f"{one['contraction']:.2f}",
+                f"{figure['contraction']:.2f}",
             )
         )
     return (
@@ -378,7 +379,7 @@ def _interval(one: Mapping[str, Any] | None) -> str:
 
 def _uneven(p: Mapping[str, float]) -> str:
     """Return which histograms are not flat, by Bonferroni's correction for their number."""
-    names = [f"`{name}`" for name, one in p.items() if one * len(p) < 0.05]
+    names = [f"`{name}`" for name, value in p.items() if value * len(p) < 0.05]
     if not names:
         return f"None of the {len(p)} histograms differs from a flat one (corrected for their number)."
     return (

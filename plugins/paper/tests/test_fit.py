@@ -61,8 +61,8 @@ def test_targets_are_those_that_may_be_fitted_to():
         *(f"table_3_{kind}" for kind in fit.TRIALS),
     ]
     assert found["table_2"].rate == 215 / 229
-    assert fit.objective({name: one.rate for name, one in found.items()}) == 0.0
-    off = {name: one.rate + one.deviation for name, one in found.items()}
+    assert fit.objective({name: target.rate for name, target in found.items()}) == 0.0
+    off = {name: target.rate + target.deviation for name, target in found.items()}
     assert fit.objective(off) == pytest.approx(9.0)
     assert fit.objective(off, "tree") == pytest.approx(4.0)
 

@@ -61,12 +61,12 @@ def test_a_printed_rate_is_its_counts_or_a_note_says_what_is_wrong(one):
 def test_every_published_rate_has_an_experiment_with_a_case_for_it():
     planned = read_experiment("paper")
     assert len(planned.seeds) >= 20
-    for one in published().rates:
-        alone = read_experiment(one.experiment)
-        assert any(case.part == one.experiment for case in planned.cases)
+    for rate in published().rates:
+        alone = read_experiment(rate.experiment)
+        assert any(case.part == rate.experiment for case in planned.cases)
         assert any(
-            all(case.at.get(key) == value for key, value in one.at.items())
-            and one.target in case.judge.targets
+            all(case.at.get(key) == value for key, value in rate.at.items())
+            and rate.target in case.judge.targets
             for case in alone.cases
         )
 
@@ -212,7 +212,7 @@ def test_worn_bottles_are_compared_with_other_new_ones():
 
 
 def test_the_answer_counts_no_rate_twice():
-    rates = {one.id: one for one in published().rates}
+    rates = {rate.id: rate for rate in published().rates}
     assert rates["table_5"].repeats == "table_4_23"
     ours = OverSeeds((0.9, 0.91, 0.92), 96)
     held = [
@@ -225,7 +225,7 @@ def test_the_answer_counts_no_rate_twice():
 
 
 def compared(rates, n=96, name="table_4_17"):
-    published_rate = next(one for one in published().rates if one.id == name)
+    published_rate = next(rate for rate in published().rates if rate.id == name)
     return RateComparison(
         published=published_rate, ours=OverSeeds(rates, n), protocol="all", basis="predicted"
     )

@@ -30,7 +30,7 @@ VALUES = {
 
 def trace_of_forces(forces_n):
     n = len(forces_n)
-    columns = {one.name: np.zeros(n) for one in fields(Trace) if one.default is NOTHING}
+    columns = {field.name: np.zeros(n) for field in fields(Trace) if field.default is NOTHING}
     return Trace(**{**columns, "force_left_n": np.array(forces_n)})
 
 
@@ -69,9 +69,9 @@ def test_the_page_says_no_more_than_its_particles_and_the_printed_counts_allow()
 
 @pytest.mark.parametrize("name", paper_model.EXPLANATIONS)
 def test_an_explanation_below_the_middle_is_absent_and_at_one_has_its_full_strength(name):
-    one = paper_model.EXPLANATIONS[name]
-    assert paper_model.strength(name, {name: 0.49}) == one.absent
-    assert paper_model.strength(name, {name: 1.0}) == pytest.approx(one.limit)
+    explanation = paper_model.EXPLANATIONS[name]
+    assert paper_model.strength(name, {name: 0.49}) == explanation.absent
+    assert paper_model.strength(name, {name: 1.0}) == pytest.approx(explanation.limit)
 
 
 def test_pressure_changes_the_share_in_closed_containers_with_the_force():

@@ -224,7 +224,10 @@ def test_samples_survive_a_killed_program_a_replay_and_an_export_to_the_last_bit
     assert len(read) == 500
     assert found.values.tobytes() == complete.values[:1500].tobytes()
     assert found.t_s.tobytes() == complete.t_s[:1500].tobytes()
-    assert CHANNEL.samples == next(one for one in read.channels if one.name == "acceleration").samples
+    assert (
+        CHANNEL.samples
+        == next(channel for channel in read.channels if channel.name == "acceleration").samples
+    )
 
     whole = tmp_path / "whole.mcap"
     part.rename(whole)

@@ -111,7 +111,7 @@ def test_image_counter_stands_still_and_only_a_stale_image_tells_its_age(board: 
         assert [one.image for one in sent[:200]] == [one.image for one in healthy[:200]]
         assert {one.image for one in sent[200:]} == {healthy[200].image}
     assert max(one.image_age_us for one in frozen) <= 41_000
-    ages = [one.image_age_us for one in stale[200:]]
+    ages = [report.image_age_us for report in stale[200:]]
     assert ages[:10] == list(range(ages[0], ages[0] + 10_000, 1000))
     assert ages[-1] == 0xFFFF
 

@@ -63,9 +63,9 @@ def test_all_numbers_that_are_wrong_are_named_at_once() -> None:
 
 
 @pytest.mark.parametrize("end", ["least", "most"])
-@pytest.mark.parametrize("number", [one.number for one in RANGES])
+@pytest.mark.parametrize("number", [range_.number for range_ in RANGES])
 def test_both_ends_of_a_range_are_allowed(number: str, end: str) -> None:
-    (allowed,) = [one for one in RANGES if one.number == number]
+    (allowed,) = [range_ for range_ in RANGES if range_.number == number]
     backend = emulated(identity={number: round(getattr(allowed, end))})
     info = backend.open(0)
     try:
@@ -163,4 +163,6 @@ def test_limit_of_a_weaker_board_is_the_grippers() -> None:
 def test_specification_has_the_ranges_of_the_code() -> None:
     rows = re.findall(r"^\| (\w+) \| (\d+) to (\d+) \| ([^|]+) \|", SPECIFICATION.read_text(), re.M)
     found = {(number, int(least), int(most), unit) for number, least, most, unit in rows}
-    assert found == {(one.number, round(one.least), round(one.most), one.unit) for one in RANGES}
+    assert found == {
+        (range_.number, round(range_.least), round(range_.most), range_.unit) for range_ in RANGES
+    }

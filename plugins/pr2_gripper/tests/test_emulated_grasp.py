@@ -374,7 +374,7 @@ def test_dry_run_shows_a_first_close_that_is_slow_and_weak(monkeypatch: pytest.M
     assert looked == [], "nothing is opened, nor looked for"
     assert rehearsed is not None
     assert rehearsed.outcome == "steady"
-    phases = {one.phase: one for one in rehearsed.phases}
+    phases = {phase.phase: phase for phase in rehearsed.phases}
     assert list(phases) == ["opening", "taring", "approach", "squeeze", "hold", "release"]
     assert (phases["opening"].least_n, phases["opening"].most_n) == (-12.0, -12.0)
     assert (phases["taring"].least_n, phases["taring"].most_n) == (0.0, 0.0)

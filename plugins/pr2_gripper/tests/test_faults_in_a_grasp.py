@@ -102,7 +102,11 @@ def test_a_picture_and_a_notebook_show_the_reason_and_the_warnings() -> None:
     from graspsense.report.grasp_picture import _words
 
     faults = ["pad_fault=stuck", "pad_side=left", "pad_at_s=2"]
-    options = ["gripper.type=pr2", "gripper.transport=emulated", *(f"gripper.faults.{one}" for one in faults)]
+    options = [
+        "gripper.type=pr2",
+        "gripper.transport=emulated",
+        *(f"gripper.faults.{fault}" for fault in faults),
+    ]
     trial = load_pipeline(options=options).grasp()
     assert "left fingertip stuck" in _words(trial)[0]
     assert any(

@@ -32,10 +32,10 @@ def effort(counter: int, newtons: float, **limits: int) -> bytes:
 def test_a_report_a_millisecond_from_power_on(board: Any) -> None:
     wire = board()
     reports = [decode_input(wire.firmware.step()) for _ in range(50)]
-    assert [one.sequence for one in reports] == list(range(50))
-    assert [one.time_us for one in reports] == list(range(0, 50_000, 1000))
-    assert {one.command_result for one in reports} == {NO_COMMAND}
-    assert {one.status for one in reports} == {0}
+    assert [report.sequence for report in reports] == list(range(50))
+    assert [report.time_us for report in reports] == list(range(0, 50_000, 1000))
+    assert {report.command_result for report in reports} == {NO_COMMAND}
+    assert {report.status for report in reports} == {0}
 
 
 @pytest.mark.parametrize("transmission", sorted(LINKAGES))

@@ -100,7 +100,7 @@ def test_opened_gripper_declares_the_bits_and_the_friction_of_its_drive() -> Non
 )
 def test_no_frame_has_a_bit_that_is_not_declared(reported: InputReport, image: RawImage, swap: bool) -> None:
     frame = measure(IDENTITY, swap).reading(reported, image).frame
-    declared = sum(one.mask for one in status_bits(swap))
+    declared = sum(bit.mask for bit in status_bits(swap))
     assert frame.status & ~declared == 0
     assert frame.status & 0xFFFF == reported.status
     assert frame.effort_n == reported.effort_un / 1e6, (
@@ -165,8 +165,8 @@ def test_gap_that_jumps_is_implausible_in_that_frame(step_m: float, time_us: int
     ticks = [round(revolutions_at(LINKAGES["pr2"], 0.05 + gap_m) * 1200) for gap_m in (0.0, step_m, step_m)]
     times = (0, time_us, time_us + 1000)
     statuses = [
-        made.reading(report(encoder_ticks=one, time_us=at_us), None).frame.status
-        for one, at_us in zip(ticks, times, strict=True)
+        made.reading(report(encoder_ticks=tick, time_us=at_us), None).frame.status
+        for tick, at_us in zip(ticks, times, strict=True)
     ]
     assert statuses == [0, ENCODER_WRONG if wrong else 0, 0]
 
@@ -182,11 +182,11 @@ def test_words_name_the_pad_that_has_no_force(bit: int, swap: bool) -> None:
 
 
 def test_what_a_grasp_cannot_do_without_has_a_limit_and_what_only_informs_has_none() -> None:
-    endless = {one.name for one in status_bits(False) if one.limit_s == math.inf}
+    endless = {bit.name for bit in status_bits(False) if bit.limit_s == math.inf}
     assert endless == {"samples missed", "bad cell", "beyond load table", "command refused"}
     # The gaps between reports are summed over the whole grasp.
-    short = [one for one in status_bits(False) if one.name not in {*endless, "reports lost"}]
-    assert all(0.0 < one.limit_s <= 0.2 for one in short)
+    short = [bit for bit in status_bits(False) if bit.name not in {*endless, "reports lost"}]
+    assert all(0.0 < bit.limit_s <= 0.2 for bit in short)
 
 
 def test_page_has_the_table_of_the_code() -> None:
@@ -208,4 +208,4 @@ def test_bits_that_the_board_sets_reach_the_frames() -> None:
         backend.open(0)
         readings = [backend.read(0.1) for _ in range(4)]
         backend.close()
-        assert [one.frame.status for one in readings if one] == [0, 0, 1 << bit, 1 << bit]
+        assert [reading.frame.status for reading in readings if reading] == [0, 0, 1 << bit, 1 << bit]

@@ -149,7 +149,10 @@ def test_a_host_finds_the_device_that_the_document_describes(served: Served) -> 
     _, configuration = host.control(0x80, 6, 2 << 8, 0, 512)
     assert len(configuration) == total
     endpoints = [configuration[i : i + 7] for i in (total - 14, total - 7)]
-    assert [(one[2], one[3], struct.unpack_from("<H", one, 4)[0], one[6]) for one in endpoints] == [
+    assert [
+        (endpoint[2], endpoint[3], struct.unpack_from("<H", endpoint, 4)[0], endpoint[6])
+        for endpoint in endpoints
+    ] == [
         (0x81, 3, 64, 1),
         (0x01, 3, 64, 1),
     ]
@@ -193,26 +196,26 @@ def test_every_unlink_is_answered_and_every_transfer_ends_once(does: list[str | 
                 if status:
                     ended.append(victim)
 
-        for one in does:
-            if one == "in":
+        for doe in does:
+            if doe == "in":
                 reading[host.submit(1, True, 64)] = True
                 submitted.add(host.number)
-            elif one == "out":
+            elif doe == "out":
                 reading[host.submit(1, False, 64, data=bytes(64))] = False
                 submitted.add(host.number)
-            elif one == "control":
+            elif doe == "control":
                 reading[host.submit(0, True, 18, struct.pack("<BBHHH", 0x80, 6, 1 << 8, 0, 18))] = True
                 submitted.add(host.number)
-            elif one == "report":
+            elif doe == "report":
                 served.server.send(bytes(64))
-            elif one == "halt":
+            elif doe == "halt":
                 served.server.halt()
-            elif isinstance(one, int):
-                unlinks[host.unlink(one)] = one
+            elif isinstance(doe, int):
+                unlinks[host.unlink(doe)] = doe
                 while unlinks:
                     hear()
             else:
-                device.stalled = one == "stall"
+                device.stalled = doe == "stall"
         device.stalled = False
         for one in sorted(submitted - set(ended)):
             if one not in ended:
@@ -366,7 +369,7 @@ def test_the_command_does_what_it_is_told_until_it_is_told_to_quit(
     said = capsys.readouterr()
     states = [json.loads(line) for line in said.out.splitlines()]
     assert ended.value.code == 0
-    assert [(one["did"], one["plugged"]) for one in states] == [
+    assert [(state["did"], state["plugged"]) for state in states] == [
         ("plug", True),
         ("unplug", False),
         ("state", False),

@@ -395,7 +395,7 @@ def test_each_packet_of_a_millisecond_is_a_sample_of_every_fast_channel(where):
     )
     for samples in zip(*(reading.signals for reading in readings), strict=True):
         # 10 ms a frame: none twice, none lost.
-        assert {one.new for one in samples[1:]} == {10}
+        assert {sample.new for sample in samples[1:]} == {10}
         assert {now.counter - before.counter for before, now in pairwise(samples)} == {10}
     assert set(last.signals.acceleration_left.values[:10]) == {(0.0, 0.0, 16384.0)}
 

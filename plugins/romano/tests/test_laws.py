@@ -201,7 +201,9 @@ def test_the_detector_tells_placing_once_by_an_acceleration_of_one_or_three_axes
     for shock in ((30.0,), (0.0, 0.0, 30.0)):
         still = tuple(0.0 for _ in shock)
         samples = [Palm(Samples(k * 0.001, k, 1, (shock if k == 500 else still,))) for k in range(1000)]
-        told = detected(*(reading(k * 0.001, 5.0 + 0.15 * (k >= 480), one) for k, one in enumerate(samples)))
+        told = detected(
+            *(reading(k * 0.001, 5.0 + 0.15 * (k >= 480), sample) for k, sample in enumerate(samples))
+        )
         assert [name for _, name in told].count("acceleration") == 1
         assert [round(t_s, 3) for t_s, name in told if name == "place"] == [0.5]
         assert EVENTS[7] not in [name for _, name in told]

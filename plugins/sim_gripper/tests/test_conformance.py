@@ -63,5 +63,5 @@ COMPRESSED_M = 0.0001 * 10
 def test_the_conformance_kit_runs_it_for_a_distribution_with_terms():
     sim = package_of("graspsense-sim-gripper", installed())
 
-    assert "simulator-terms-are-laws" in {one.name for one in installed().conformance_checks()}
+    assert "simulator-terms-are-laws" in {resource.name for resource in installed().conformance_checks()}
     assert all(check.id != "simulator-terms-are-laws" for check in checks_for(sim))

@@ -67,7 +67,7 @@ def test_nothing_there_is_unknown(pipeline):
     said = pipeline.grasp(object="none").prediction
 
     assert said.label == "unknown"
-    assert [one.words for one in said.because] == [
+    assert [reason.words for reason in said.because] == [
         "no feature is defined: no pad felt 0.625 N while the fingers closed"
     ]
 
@@ -82,11 +82,13 @@ def test_a_grasp_has_predictions_while_it_goes_on_and_the_answer_of_the_whole_gr
     trial = pipeline.grasp(object="odwalla:full_closed", seed=5, on_event=events.append)
     told = [event for event in events if event.source == "model"]
 
-    assert [one.after_s for one in trial.checkpoints] == [
+    assert [checkpoint.after_s for checkpoint in trial.checkpoints] == [
         one["after_contact_s"] for one in KEPT["checkpoints"]
     ]
-    assert [event.what for event in told] == [one.words for one in trial.checkpoints]
-    assert all("odwalla:full_closed" in one.prediction.prediction_set for one in trial.checkpoints)
+    assert [event.what for event in told] == [checkpoint.words for checkpoint in trial.checkpoints]
+    assert all(
+        "odwalla:full_closed" in checkpoint.prediction.prediction_set for checkpoint in trial.checkpoints
+    )
     assert trial.prediction.model == trial.checkpoints[0].prediction.model.partition(", 0.")[0]
 
 

@@ -108,7 +108,7 @@ def test_a_drawn_grasp_is_that_of_the_seed(config, name, seeds):
         start = scene.drawn(drawing, key_of(seed), number, memory)
 
         assert start.numbers.tobytes() == expected.numbers.tobytes()
-        assert [one.tobytes() for one in start.arrays] == [one.tobytes() for one in expected.arrays]
+        assert [array.tobytes() for array in start.arrays] == [array.tobytes() for array in expected.arrays]
 
 
 def test_an_instance_that_does_not_fit_is_refused_as_it_is_by_itself():

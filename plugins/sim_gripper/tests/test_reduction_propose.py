@@ -31,7 +31,7 @@ def proposed(config, spec):
 def decided(*terms, config=CONFIG):
     spec = ObjectSpec(name="made up", width_m=0.05, terms=terms)
     model = proposed(config, spec)
-    return {one.subject: one for one in model.decisions}, model
+    return {decision.subject: decision for decision in model.decisions}, model
 
 
 def test_a_contact_too_stiff_for_the_tick_is_said_to_be():
@@ -99,10 +99,10 @@ def test_scenes_on_which_it_was_once_broken(benchmark, number):
     # second finger that meets what the first pushes or presses, a contact that is sensitive to the approach.
     module, bench = benchmark
     (row,) = module.measure(bench, range(number, number + 1))["rows"]
-    missed = [one for one in module.ACCURACIES if row[f"{one:g}"]["error"] > one]
+    missed = [accuracy for accuracy in module.ACCURACIES if row[f"{accuracy:g}"]["error"] > accuracy]
     # At 0.1 % the trial grasps of the last scene reach their limit of work: its report says that nothing is verified.
     assert missed == ([0.001] if number == 2164 else [])
-    assert all(row[f"{one:g}"]["verified"] is None for one in missed)
+    assert all(row[f"{accuracy:g}"]["verified"] is None for accuracy in missed)
 
 
 @pytest.mark.slow

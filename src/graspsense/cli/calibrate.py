@@ -148,9 +148,9 @@ def friction(gaps: int, narrowest_m: float, replace: bool, as_json: bool, **aske
         step_m = (widest_m - narrowest_m) / (gaps - 1)
         found = breakaways(setup.rig, [narrowest_m + i * step_m for i in range(gaps)], setup.first_effort_n)
         data = {
-            "gap_m": [one.gap_m for one in found],
-            "closing_n": [one.closing_n for one in found],
-            "opening_n": [one.opening_n for one in found],
+            "gap_m": [breakaway.gap_m for breakaway in found],
+            "closing_n": [breakaway.closing_n for breakaway in found],
+            "opening_n": [breakaway.opening_n for breakaway in found],
         }
         _store(setup, "friction", data, as_json)
         if not as_json:

@@ -83,10 +83,10 @@ def chosen(
 
     names = (classifier or "given",) if classifier or _sets(given, "classifier.type") else CLASSIFIERS
     learners = {name: learner_of(source, None if name == "given" else name, given) for name in names}
-    learners = {one.component.name: one for one in learners.values()}
+    learners = {learner.component.name: learner for learner in learners.values()}
     notes: list[str] = []
     with ProgressLine() as progress:
-        trials = {name: aimed(one) for name, one in _tables(source, progress, given, notes).items()}
+        trials = {name: aimed(table) for name, table in _tables(source, progress, given, notes).items()}
         pairs = _pairs(learners, trials, notes)
         choice = choose(learners, trials, pairs, seed=given["seed"], notes=notes, progress=progress)
     return Chosen(
@@ -200,7 +200,7 @@ def _with_union(
     source: str, progress: ProgressLine, given: Mapping[str, Any], sets: Sequence[Component]
 ) -> Labelled:
     """Return the trials with the features of these sets together."""
-    names = ", ".join(f'"{one.qualified}"' for one in sets)
+    names = ", ".join(f'"{label_set.qualified}"' for label_set in sets)
     options = (*given["options"], f'features.type="{UNION}"', f"features.sets=[{names}]")
     return trials_of(source, progress, {**given, "options": options})
 
@@ -256,7 +256,9 @@ def pipeline_text(chosen: Chosen, model: str) -> str:
     ]
     for table, values in settings.items():
         lines += ["", f"[{table}]"]
-        lines += [f"{toml_key(key)} = {toml_value(one)}" for key, one in values.items() if one is not None]
+        lines += [
+            f"{toml_key(key)} = {toml_value(value)}" for key, value in values.items() if value is not None
+        ]
     return "\n".join(lines) + "\n"
 
 

@@ -220,9 +220,11 @@ def _prepare(store: Store, values: tuple[str, ...]) -> None:
     from graspsense.store.changes import refuse_other_units
     from graspsense.store.recover import recover_store
 
-    for one in recover_store(store):
-        number = f" as trial {one.trial}" if one.trial is not None else ""
-        talk(f"{one.file.name}: {one.what}{number}{f' ({one.why})' if one.why else ''}")
+    for recovered in recover_store(store):
+        number = f" as trial {recovered.trial}" if recovered.trial is not None else ""
+        talk(
+            f"{recovered.file.name}: {recovered.what}{number}{f' ({recovered.why})' if recovered.why else ''}"
+        )
     refuse_other_units(store, [value_label(text)[0] for text in values])
 
 

@@ -120,18 +120,21 @@ def _print(found: Ranking) -> None:
     echo(found.verdict, Style.HEADING)
     echo_entry("trials", f"{found.trials} of {found.source}; compared by {found.protocol}")
     echo()
-    protocols = list(dict.fromkeys(name for one in found.candidates for name in one.rates))
+    protocols = list(dict.fromkeys(name for candidate in found.candidates for name in candidate.rates))
     rows = [
         (
-            one.classifier,
-            one.features,
-            *(percentage(one.rates[name].rate) if name in one.rates else "" for name in protocols),
-            "" if one.loss is None else one.loss.points,
-            one.standing,
-            _coverage(one),
-            f"{one.training_s:.2g} s",
+            candidate.classifier,
+            candidate.features,
+            *(
+                percentage(candidate.rates[name].rate) if name in candidate.rates else ""
+                for name in protocols
+            ),
+            "" if candidate.loss is None else candidate.loss.points,
+            candidate.standing,
+            _coverage(candidate),
+            f"{candidate.training_s:.2g} s",
         )
-        for one in found.candidates
+        for candidate in found.candidates
     ]
     headings = [name.replace("_", " ").upper() for name in protocols]
     echo_table(
@@ -141,9 +144,9 @@ def _print(found: Ranking) -> None:
         echo_entry("note", note)
     default = next(
         (
-            one
-            for one in found.candidates
-            if one.classifier == DEFAULT_CLASSIFIER and one.features in DEFAULT_FEATURES
+            candidate
+            for candidate in found.candidates
+            if candidate.classifier == DEFAULT_CLASSIFIER and candidate.features in DEFAULT_FEATURES
         ),
         None,
     )

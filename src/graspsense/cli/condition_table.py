@@ -19,13 +19,13 @@ def condition_rows(conditions: Conditions) -> list[tuple[str, ...]]:
     """Return one row for each feature."""
     return [
         (
-            one.feature,
-            _share(one.median),
-            _share(one.finest),
-            f"{100 * one.beyond:.0f} % of grasps",
-            _most_by(one),
+            feature.feature,
+            _share(feature.median),
+            _share(feature.finest),
+            f"{100 * feature.beyond:.0f} % of grasps",
+            _most_by(feature),
         )
-        for one in conditions.features
+        for feature in conditions.features
     ]
 
 
@@ -39,7 +39,9 @@ def print_conditions(conditions: Conditions, accuracy: float | None = None) -> N
         + (f" (sensor {conditions.sensor})" if conditions.sensor else ""),
     )
     if conditions.grasps == 1:
-        rows = [(one.feature, _share(one.finest), _most_by(one)) for one in conditions.features]
+        rows = [
+            (feature.feature, _share(feature.finest), _most_by(feature)) for feature in conditions.features
+        ]
         echo_table(("FEATURE", "MOVEMENT", "MOST BY"), rows)
     else:
         echo_table(HEADER, condition_rows(conditions))
@@ -47,7 +49,7 @@ def print_conditions(conditions: Conditions, accuracy: float | None = None) -> N
         return
     finer = conditions.finer_than_possible(accuracy)
     if finer:
-        names = ", ".join(one.feature for one in finer)
+        names = ", ".join(condition.feature for condition in finer)
         echo_entry(
             "warning",
             f"gripper.accuracy = {accuracy:g} is finer than {names} can be: 1 ppm of a parameter moves "
@@ -62,24 +64,24 @@ def conditions_markdown(measured: Sequence[Conditions]) -> str:
     from graspsense.experiments.versions import where_measured
 
     lines = ["# Condition of the features", "", "Written by `graspsense tradeoff condition`. Simulated.", ""]
-    for one in measured:
+    for conditions in measured:
         lines += [
-            f"Sensor {one.sensor}: {counted(one.grasps, 'grasp')} of {', '.join(one.scenes)}, "
-            f"{counted(one.parameters, 'parameter')}, each "
+            f"Sensor {conditions.sensor}: {counted(conditions.grasps, 'grasp')} of {', '.join(conditions.scenes)}, "
+            f"{counted(conditions.parameters, 'parameter')}, each "
             "larger by 1 ppm. Movements are relative to the value of the feature, or to 1 mm, 1 N, 50 ms, 1 mm/s or "
             "1 N/s if that is larger.",
             "",
             f"| {' | '.join(HEADER)} |",
             f"|{'---|' * len(HEADER)}",
-            *(f"| {' | '.join(row)} |" for row in condition_rows(one)),
+            *(f"| {' | '.join(row)} |" for row in condition_rows(conditions)),
             "",
         ]
     return "\n".join([*lines, f"CandidateResult with: {where_measured()}.", ""])
 
 
-def _most_by(one: FeatureCondition) -> str:
+def _most_by(condition: FeatureCondition) -> str:
     """Return the parameter that moves a feature most; "none" if nothing moves it."""
-    return one.parameter if one.finest > 0.0 else "none"
+    return condition.parameter if condition.finest > 0.0 else "none"
 
 
 def _share(movement: float) -> str:

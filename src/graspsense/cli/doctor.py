@@ -62,14 +62,14 @@ def doctor(timeout_s: float, repetitions: int | None, as_json: bool, **asked: An
         diagnoses = [Diagnosis("graspsense", _ourselves(plugins)), *plugins.diagnose(config, timeout_s)]
         if repetitions is not None:
             diagnoses.append(_latency(settings, repetitions))
-    problems = sum(one.error != "" for one in diagnoses) + sum(
-        finding.state == "problem" for one in diagnoses for finding in one.findings
+    problems = sum(diagnose.error != "" for diagnose in diagnoses) + sum(
+        finding.state == "problem" for diagnose in diagnoses for finding in diagnose.findings
     )
     if as_json:
-        echo_json({"problems": problems, "diagnoses": [_as_json(one) for one in diagnoses]})
+        echo_json({"problems": problems, "diagnoses": [_as_json(diagnose) for diagnose in diagnoses]})
     else:
-        for one in diagnoses:
-            _print(one)
+        for diagnose in diagnoses:
+            _print(diagnose)
         echo(f"{problems} problem(s)", Style.BAD) if problems else echo("no problem found", Style.GOOD)
     if problems:
         raise click.exceptions.Exit(EXIT_PROBLEM)
@@ -135,7 +135,7 @@ def _as_json(diagnosis: Diagnosis) -> dict[str, Any]:
     return {
         "distribution": diagnosis.distribution,
         "error": diagnosis.error,
-        "findings": [attrs.asdict(one) for one in diagnosis.findings],
+        "findings": [attrs.asdict(finding) for finding in diagnosis.findings],
     }
 
 
@@ -143,13 +143,13 @@ def _print(diagnosis: Diagnosis) -> None:
     echo(diagnosis.distribution, Style.HEADING)
     if diagnosis.error:
         echo_entry("  PROBLEM", f"could not look: {diagnosis.error}", Style.BAD, width=_MARK)
-    for one in diagnosis.findings:
-        style = None if one.state == "ok" else state_style(one.state)
-        echo_entry(f"  {MARKS[one.state]}", f"{one.subject}: {one.found}", style, width=_MARK)
-        if one.state != "ok" and one.advice:
-            if "\n" in one.advice:
-                for line in filter(None, one.advice.split("\n")):
+    for finding in diagnosis.findings:
+        style = None if finding.state == "ok" else state_style(finding.state)
+        echo_entry(f"  {MARKS[finding.state]}", f"{finding.subject}: {finding.found}", style, width=_MARK)
+        if finding.state != "ok" and finding.advice:
+            if "\n" in finding.advice:
+                for line in filter(None, finding.advice.split("\n")):
                     # Not wrapped: lines of a file, or commands, are copied.
                     echo_as_it_is(f"             {line}")
             else:
-                echo(f"             {one.advice}")
+                echo(f"             {finding.advice}")

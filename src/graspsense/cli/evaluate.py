@@ -242,7 +242,7 @@ def _print(found: Evaluation) -> None:
     for note in found.notes:
         echo_entry("note", note)
     echo()
-    controls = {name: one for name, one in found.controls.items() if name not in found.protocols}
+    controls = {name: control for name, control in found.controls.items() if name not in found.protocols}
     measured = {name: one for name, one in {**found.protocols, **controls}.items() if one.rate is not None}
     echo_table(
         ("PROTOCOL OR CONTROL", "RATE", "95 %", "TRIALS", "LOWER BY, IN POINTS", "WHAT"),
@@ -256,8 +256,8 @@ def _print(found: Evaluation) -> None:
         echo(f"  {line}")
     if len(found.by_class) > 1 and found.target != "class":
         echo()
-        rows = [(name, percentage(one.rate), percentages(one.interval), f"{one.correct} of {one.n}")
-                for name, one in found.by_class.items()]  # fmt: skip
+        rows = [(name, percentage(rate.rate), percentages(rate.interval), f"{rate.correct} of {rate.n}")
+                for name, rate in found.by_class.items()]  # fmt: skip
         echo_table(("CLASS", "RATE", "95 %", "TRIALS"), rows)
     if found.reliability is not None:
         echo("\nreliability of the probabilities")

@@ -59,9 +59,11 @@ def _evaluated(source: str, tolerance_s: float, folds: int, given: Mapping[str, 
     known = type(controller).events
     with ProgressLine() as progress:
         read = event_recordings(source, given["only"])
-        recordings = tuple(one.recording for one in read.recordings)
+        recordings = tuple(recording.recording for recording in read.recordings)
         check_detector(controller, recordings)
-        labelled = [_labelled(one, group) for one, group in zip(recordings, read.groups, strict=True)]
+        labelled = [
+            _labelled(recording, group) for recording, group in zip(recordings, read.groups, strict=True)
+        ]
         names = list(dict.fromkeys(n for one in labelled for n in one.labelled if not n.endswith(NOT_KNOWN)))
         total = len(recordings) * (len(STEPS) + 1)
         teller = EventTeller(controller, recordings, lambda done: progress("detecting events", done, total))
@@ -94,7 +96,7 @@ def _evaluated(source: str, tolerance_s: float, folds: int, given: Mapping[str, 
     )
 
 
-def _labelled(one: Recording, group: str) -> LabelledEvents:
+def _labelled(recording: Recording, group: str) -> LabelledEvents:
     from graspsense.evaluation.events import LabelledEvents
 
     return LabelledEvents(
@@ -102,16 +104,16 @@ def _labelled(one: Recording, group: str) -> LabelledEvents:
             name: tuple(
                 (event.t_s, event.t_s if event.until_s is None else event.until_s) for event in events
             )
-            for name, events in one.events.items()
+            for name, events in recording.events.items()
         },
-        begin_s=one.readings[0].frame.t_s,
-        end_s=one.readings[-1].frame.t_s,
+        begin_s=recording.readings[0].frame.t_s,
+        end_s=recording.readings[-1].frame.t_s,
         group=group,
     )
 
 
 def _print(found: EventsEvaluation) -> None:
-    scored = (f"{name}: {_in_words(one.fitted or one.given)}" for name, one in found.kinds.items())
+    scored = (f"{name}: {_in_words(kind.fitted or kind.given)}" for name, kind in found.kinds.items())
     words = "; ".join(scored) or "no event that is labelled can be scored"
     echo(f"{found.detector} on {found.recordings} recordings of {found.source}. {words}", Style.HEADING)
     echo()
@@ -125,11 +127,11 @@ def _print(found: EventsEvaluation) -> None:
     others = [f"{name} ({count} times)" for name, count in found.not_labelled.items()]
     if others:
         echo_entry("not judged", f"told as well, without labels to judge by: {', '.join(others)}")
-    for name, one in found.kinds.items():
-        if one.fitted is None:
-            echo_entry("not fitted", f"{name}: {one.not_fitted}", Style.CAUTION)
+    for name, kind in found.kinds.items():
+        if kind.fitted is None:
+            echo_entry("not fitted", f"{name}: {kind.not_fitted}", Style.CAUTION)
         else:
-            low, high = (f"{end(one.factors):.3g}" for end in (min, max))
+            low, high = (f"{end(kind.factors):.3g}" for end in (min, max))
             factors = low if low == high else f"{low} to {high}"
             echo_entry(
                 "fitted",
@@ -156,26 +158,28 @@ def _print_tables(found: EventsEvaluation) -> None:
         "95 %",
     )
     rows = []
-    for name, one in found.kinds.items():
-        rows.append((name, "as set", *_row(one.given)))
-        if one.fitted is not None:
-            rows.append((name, "fitted", *_row(one.fitted)))
-        rows.append((name, "by chance", *_row(one.chance)))
+    for name, kind in found.kinds.items():
+        rows.append((name, "as set", *_row(kind.given)))
+        if kind.fitted is not None:
+            rows.append((name, "fitted", *_row(kind.fitted)))
+        rows.append((name, "by chance", *_row(kind.chance)))
     echo_table(heads, rows)
     echo(
         "FALSE: false alarms, and their number a minute. DELAY: median (10 to 90 %), with the interval of the median."
     )
     echo("by chance: the same detections, moved by half of their recording")
-    scores = [score for one in found.kinds.values() for score in (one.fitted, one.given) if score is not None]
+    scores = [
+        score for kind in found.kinds.values() for score in (kind.fitted, kind.given) if score is not None
+    ]
     rates = [one for score in scores for one in (score.recall, score.precision) if one is not None]
-    reasons = dict.fromkeys(one.no_interval for one in rates if one.interval is None)
+    reasons = dict.fromkeys(rate.no_interval for rate in rates if rate.interval is None)
     for reason in reasons:
         echo(f"no interval: {reason}")
     echo()
     groups = [
         (name, group, f"{hits} of {labelled}", str(alarms))
-        for name, one in found.kinds.items()
-        for group, (hits, labelled, alarms) in one.by_group.items()
+        for name, kind in found.kinds.items()
+        for group, (hits, labelled, alarms) in kind.by_group.items()
     ]
     echo_table(("EVENT", found.held_out.upper(), "FOUND", "FALSE"), groups)
 

@@ -248,9 +248,9 @@ def _print(found: Summary, more: Findings | None, account: Account, page: str) -
     if more is None:
         _print_rates(found)
     else:
-        for one in more.tables:
-            echo(one.title, Style.HEADING)
-            echo_table(tuple(name.upper() for name in one.header), list(one.rows))
+        for table in more.tables:
+            echo(table.title, Style.HEADING)
+            echo_table(tuple(name.upper() for name in table.header), list(table.rows))
             echo()
     for note in account.notes:
         echo(f"note: {note}", Style.CAUTION, indent=2)
@@ -271,8 +271,14 @@ def _print_rates(found: Summary) -> None:
     from graspsense.evaluation.intervals import percentage, percentages
 
     rows = [
-        (one.name or "-", one.target, percentage(one.rate.mean), percentages(one.rate.interval), one.protocol)
-        for one in found.conditions
+        (
+            condition.name or "-",
+            condition.target,
+            percentage(condition.rate.mean),
+            percentages(condition.rate.interval),
+            condition.protocol,
+        )
+        for condition in found.conditions
     ]
     if rows:
         echo_table(("CASE", "TARGET", "RATE", "95 %", "PROTOCOL"), rows)

@@ -69,9 +69,9 @@ def features(source: str, options: tuple[str, ...], keep: str | None, overwrite:
     echo_table(
         ("FEATURE", "UNIT", "TRIALS BEFORE", "NOW", "MEDIAN BEFORE", "NOW"),
         [
-            (one["name"], one["unit"], _count(one["trials_before"], before), _count(one["trials"], after),
-             _number(one["median_before"]), _number(one["median"]))
-            for one in rows
+            (row["name"], row["unit"], _count(row["trials_before"], before), _count(row["trials"], after),
+             _number(row["median_before"]), _number(row["median"]))
+            for row in rows
         ],
     )  # fmt: skip
     echo()

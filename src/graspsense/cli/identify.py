@@ -143,14 +143,23 @@ def _print(result: Identification) -> None:
     echo()
     echo_table(
         ("PARAMETER", "VALUE", "UNIT", "90 % INTERVAL", "BASIS"),
-        [(one.name, f"{one.value:.4g}", one.unit, _interval(one), one.basis) for one in result.parameters],
+        [
+            (parameter.name, f"{parameter.value:.4g}", parameter.unit, _interval(parameter), parameter.basis)
+            for parameter in result.parameters
+        ],
     )
     echo()
     echo_table(
         ("CANDIDATE", "PARAMETERS", "ERROR", "FIT", "VERDICT"),
         [
-            (one.terms, str(one.parameters), _percent(one.error), _percent(one.fit_error), one.verdict)
-            for one in result.candidates
+            (
+                candidate.terms,
+                str(candidate.parameters),
+                _percent(candidate.error),
+                _percent(candidate.fit_error),
+                candidate.verdict,
+            )
+            for candidate in result.candidates
         ],
         {"VERDICT": lambda cell: Style.GOOD if cell == "chosen" else None},
     )
@@ -158,7 +167,10 @@ def _print(result: Identification) -> None:
     echo("not determined by these recordings:")
     echo_table(
         ("WHAT", "WHY", "WHAT WOULD DETERMINE IT"),
-        [(one.what, one.reason, one.remedy) for one in result.undetermined],
+        [
+            (undetermined.what, undetermined.reason, undetermined.remedy)
+            for undetermined in result.undetermined
+        ],
     )
     echo()
 
@@ -179,7 +191,7 @@ def _as_values(out: str | None, result: Identification) -> dict[str, Any]:
     from graspsense.core.components.identification import repeatability
 
     def values(items: Sequence[Any]) -> list[dict[str, Any]]:
-        return [asdict(one) for one in items]
+        return [asdict(item) for item in items]
 
     return {
         "scene": out,
@@ -188,10 +200,10 @@ def _as_values(out: str | None, result: Identification) -> dict[str, Any]:
         "parameters": values(result.parameters),
         "candidates": values(result.candidates),
         "undetermined": values(result.undetermined),
-        "fits": [{"name": one.name, "rms_n": one.rms_n, "peak_n": one.peak_n} for one in result.fits],
+        "fits": [{"name": fit.name, "rms_n": fit.rms_n, "peak_n": fit.peak_n} for fit in result.fits],
         "held_out": list(result.held_out),
         "refusals": list(result.refusals),
         "repeatability": None if len(result.fits) < 2 else repeatability(result.fits),
-        "checks": [{"statistic": one.statistic, "p": one.p} for one in result.checks],
+        "checks": [{"statistic": check.statistic, "p": check.p} for check in result.checks],
         "notes": list(result.notes),
     }

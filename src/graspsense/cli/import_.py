@@ -210,12 +210,14 @@ class _Chosen:
         from graspsense.recording.replayable import recorded_channels
 
         users, fitting = (self._settings.controller, self._settings.features), []
-        for one in recordings:
+        for recording in recordings:
             try:
-                check_recording(recorded_channels(one.labelled.recording), one.labelled.source, *users)
-                fitting.append(one)
+                check_recording(
+                    recorded_channels(recording.labelled.recording), recording.labelled.source, *users
+                )
+                fitting.append(recording)
             except WiringError as error:
-                unreadable.append(UnreadableRecording(source=one.labelled.source, error=error))
+                unreadable.append(UnreadableRecording(source=recording.labelled.source, error=error))
         if not fitting:
             raise error_of_all(unreadable)
         return fitting
@@ -224,7 +226,7 @@ class _Chosen:
         """Choose the thresholds that are not given. Raises ConfigError for implausible ones in SI units."""
         from graspsense.sources.noise_thresholds import THRESHOLDS, thresholds_for
 
-        self._any_unit = any(one.labelled.recording.units for one in recordings)
+        self._any_unit = any(recording.labelled.recording.units for recording in recordings)
         if not self._any_unit:
             self._refuse_doubt()
         controller = self._settings.values.get("controller", {})
@@ -233,7 +235,7 @@ class _Chosen:
         given: dict[str, float] = {
             key: controller[key] for key in THRESHOLDS if key in controller and key not in is_open
         }
-        found = thresholds_for([one.labelled.recording for one in recordings], timeouts, given)
+        found = thresholds_for([recording.labelled.recording for recording in recordings], timeouts, given)
         open_keys = {key for key in found.settings if key.partition(".")[2] in is_open}
         self.words = found.words if open_keys or not found.settings else "thresholds: those that are given"
         self.words += self._unpredicted
@@ -304,7 +306,7 @@ def _import(
         refused = counted(len(stored.refused), "recording")
         echo(f"  {refused} left out: {stored.refused[0]}", Style.CAUTION, err=as_json)
     if as_json:
-        failed = [one.line for one in unreadable]
+        failed = [recording.line for recording in unreadable]
         echo_json(
             {
                 "store": save,
@@ -334,13 +336,15 @@ def _store(
     stored = _Stored([], [], [])
     with Store.open(save) as store, ProgressLine() as progress:
         contents = ImportedContents(store)
-        for done, one in enumerate(recordings):
-            source = one.labelled.source
-            with handed_over(one.name, one.labelled.recording):
+        for done, recording in enumerate(recordings):
+            source = recording.labelled.source
+            with handed_over(recording.name, recording.labelled.recording):
                 try:
                     with readable(source):
-                        settings = chosen.settings(one)
-                        trial, number = import_recording(store, settings, installed(), one.labelled, contents)
+                        settings = chosen.settings(recording)
+                        trial, number = import_recording(
+                            store, settings, installed(), recording.labelled, contents
+                        )
                 except AlreadyImported as error:
                     stored.refused.append(str(error))
                     continue
@@ -358,8 +362,10 @@ def _store(
 def _echo_unreadable(unreadable: Sequence[UnreadableRecording]) -> None:
     """Print why each recording cannot be read, in one line each, and what to do."""
     echo(f"{counted(len(unreadable), 'recording')} cannot be read:", Style.CAUTION, err=True)
-    for one in unreadable[:LISTED]:
-        echo_as_it_is(f"  {one.line}", err=True)  # not wrapped, so that a program can take it line by line
+    for recording in unreadable[:LISTED]:
+        echo_as_it_is(
+            f"  {recording.line}", err=True
+        )  # not wrapped, so that a program can take it line by line
     if len(unreadable) > LISTED:
         echo(f"and {len(unreadable) - LISTED} more; --json lists all", indent=2, err=True)
     echo(
@@ -391,7 +397,7 @@ def _show(
     summary, outcomes = _summary(recordings), outcomes_of(recordings, chosen.settings)
     ends = {outcome.words: count for outcome, count in outcomes.most_common()}
     if as_json:
-        failed = [one.line for one in unreadable]
+        failed = [recording.line for recording in unreadable]
         echo_json({**asdict(summary), "unreadable": failed, "thresholds": chosen.words, "outcomes": ends})
     else:
         _echo_summary(summary)
@@ -413,7 +419,7 @@ def _show(
 def _summary(recordings: Sequence[ImportedRecording]) -> ImportSummary:
     from graspsense.sources.import_summary import summary_of
 
-    return summary_of([one.labelled for one in recordings])
+    return summary_of([recording.labelled for recording in recordings])
 
 
 def _echo_summary(summary: ImportSummary) -> None:
@@ -427,16 +433,16 @@ def _echo_summary(summary: ImportSummary) -> None:
     )  # fmt: skip
     rows = [
         (
-            one.label or "none",
-            str(one.grasps),
-            "unknown" if one.instances is None else str(one.instances),
-            _span(one.samples),
-            _span(one.rate_hz),
-            _span(tuple(factor * value for value in one.gap)),
-            _span(one.left),
-            _span(one.right),
+            label.label or "none",
+            str(label.grasps),
+            "unknown" if label.instances is None else str(label.instances),
+            _span(label.samples),
+            _span(label.rate_hz),
+            _span(tuple(factor * value for value in label.gap)),
+            _span(label.left),
+            _span(label.right),
         )
-        for one in summary.labels
+        for label in summary.labels
     ]
     echo_table(header, rows)
     echo()

@@ -37,13 +37,13 @@ def show_files(sources: Sequence[str], picture: str, as_json: bool) -> bool:
     if as_json:
         echo_json(
             [
-                {**asdict(one, filter=lambda field, _: field.name != "courses"), "path": str(one.path)}
-                for one in files
+                {**asdict(file, filter=lambda field, _: field.name != "courses"), "path": str(file.path)}
+                for file in files
             ]
         )
     else:
-        for one in files:
-            _echo_file(one)
+        for file in files:
+            _echo_file(file)
     _draw(files[0], Path(picture))
     return True
 
@@ -83,21 +83,21 @@ def echo_channels(channels: Sequence[ChannelFacts]) -> None:
         "Age, s",
     )
     rows = []
-    for one in channels:
-        unit, factor = display_unit(one.unit)
+    for channel in channels:
+        unit, factor = display_unit(channel.unit)
         rows.append(
             (
-                one.name,
+                channel.name,
                 unit or "unknown",
-                str(one.samples),
-                str(one.missing),
+                str(channel.samples),
+                str(channel.missing),
                 "none"
-                if one.low is None or one.high is None
-                else f"{factor * one.low:.4g} to {factor * one.high:.4g}",
-                "none" if one.resolution is None else f"{factor * one.resolution:.3g}",
-                _shown(one.rate_hz),
-                _shown(one.longest_gap_s),
-                _shown(one.age_s),
+                if channel.low is None or channel.high is None
+                else f"{factor * channel.low:.4g} to {factor * channel.high:.4g}",
+                "none" if channel.resolution is None else f"{factor * channel.resolution:.3g}",
+                _shown(channel.rate_hz),
+                _shown(channel.longest_gap_s),
+                _shown(channel.age_s),
             )
         )
     echo()
@@ -108,30 +108,30 @@ def _shown(value: float | None) -> str:
     return "unknown" if value is None else f"{value:.4g}"
 
 
-def _echo_file(one: UnderstoodFile) -> None:
-    echo_entry("file", str(one.path))
-    for note in one.notes:
+def _echo_file(file: UnderstoodFile) -> None:
+    echo_entry("file", str(file.path))
+    for note in file.notes:
         echo_entry("", note)
-    echo_channels(one.channels)
+    echo_channels(file.channels)
     echo()
-    if one.force:
-        echo_entry("squeezes", f"{len(one.squeezes)} in {one.force}")
+    if file.force:
+        echo_entry("squeezes", f"{len(file.squeezes)} in {file.force}")
     else:
         echo_entry("squeezes", "no channel is known to be a force")
-    for line in one.suggested:
-        echo_entry("" if line is not one.suggested[0] else "most likely", line)
+    for line in file.suggested:
+        echo_entry("" if line is not file.suggested[0] else "most likely", line)
     echo("To import it, name its columns (--time, --gap, --force) or write a manifest: --suggest FILE.toml")
 
 
-def _draw(one: UnderstoodFile, picture: Path) -> None:
+def _draw(file: UnderstoodFile, picture: Path) -> None:
     from graspsense.core.values.errors import PluginUnavailable
     from graspsense.report.channels_picture import channels_png
 
-    changing = {facts.name for facts in one.channels if facts.resolution is not None}
-    forces = one.force.split(", ")
-    courses = {name: one.courses[name] for name in (*forces, *one.courses) if name in changing}
+    changing = {facts.name for facts in file.channels if facts.resolution is not None}
+    forces = file.force.split(", ")
+    courses = {name: file.courses[name] for name in (*forces, *file.courses) if name in changing}
     try:
-        channels_png(picture, courses, one.squeezes)
+        channels_png(picture, courses, file.squeezes)
         talk(f"picture written to {picture}")
     except PluginUnavailable as error:
         echo(f"no picture: {error}", Style.CAUTION, err=True)

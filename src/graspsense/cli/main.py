@@ -175,7 +175,7 @@ def _exit_code(arguments: list[str]) -> int:
         _give_up_stdout()  # the reader of the pipe has gone
         return EXIT_BROKEN_PIPE
     except SystemExit as error:
-        if next((one for one in arguments if not one.startswith("-")), "") not in COMMANDS:
+        if next((argument for argument in arguments if not argument.startswith("-")), "") not in COMMANDS:
             raise  # the command of a plugin may choose its exit code
         return _report(_plugin_exit(error), arguments)
     except Exception as error:

@@ -61,7 +61,7 @@ def pipeline_options(command: CommandT) -> CommandT:
 def names_object(object_name: str | None, options: Sequence[str]) -> bool:
     """Return whether these options say which object a simulated gripper holds."""
     return object_name is not None or any(
-        one.partition("=")[0].strip() == "gripper.object" for one in options
+        option.partition("=")[0].strip() == "gripper.object" for option in options
     )
 
 

@@ -93,7 +93,7 @@ def check_outputs(*paths: str | None, overwrite: bool, sources: Sequence[str] = 
     from graspsense.core.values.errors import ConfigError
 
     outputs: list[Path] = []
-    for path in (Path(one) for one in paths if one is not None):
+    for path in (Path(name) for name in paths if name is not None):
         if path.resolve() in (other.resolve() for other in outputs):
             raise ConfigError(f"two options name the same file {path}: name another for one of them")
         if any(Path(source).is_file() and path.resolve() == Path(source).resolve() for source in sources):

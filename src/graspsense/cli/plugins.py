@@ -44,8 +44,8 @@ def list_plugins(as_json: bool) -> None:
     advice += loaded.unknown_names
     if advice:
         echo("\nTo be done:", Style.CAUTION)
-        for one in advice:
-            echo(f"  {one}", indent=2)
+        for fromkey in advice:
+            echo(f"  {fromkey}", indent=2)
 
 
 @plugins.command()
@@ -58,9 +58,9 @@ def show(name: str, as_json: bool) -> None:
     loaded = installed()
     statuses = [status for status in loaded.statuses if status.distribution == canonical(name)]
     components = [
-        one
-        for one in loaded.components()
-        if name in (one.name, one.qualified) or one.distribution == canonical(name)
+        component
+        for component in loaded.components()
+        if name in (component.name, component.qualified) or component.distribution == canonical(name)
     ]
     if not statuses and not components:
         raise loaded.unknown(name)
@@ -68,11 +68,13 @@ def show(name: str, as_json: bool) -> None:
         echo_json(
             {
                 "plugins": [attrs.asdict(status) for status in statuses],
-                "components": [_described(one) for one in components],
+                "components": [_described(component) for component in components],
             }
         )
         return
-    texts = [_status_text(status) for status in statuses] + [_component_text(one) for one in components]
+    texts = [_status_text(status) for status in statuses] + [
+        _component_text(component) for component in components
+    ]
     for number, text in enumerate(texts):
         echo(f"\n{text}" if number else text, indent=4)
 
@@ -263,7 +265,10 @@ def _settings(options: Sequence[str]) -> dict[str, Any]:
     layers, complaints = option_layers(options)
     if complaints:
         raise ConfigError(
-            "\n".join(one.replace("TABLE.KEY=VALUE, as in -o run.seed=3", "KEY=VALUE") for one in complaints)
+            "\n".join(
+                complaint.replace("TABLE.KEY=VALUE, as in -o run.seed=3", "KEY=VALUE")
+                for complaint in complaints
+            )
         )
     merged = Merged()
     for layer in layers:
@@ -280,17 +285,17 @@ def _rows(loaded: Plugins) -> list[dict[str, Any]]:
         advice[status.distribution] = (*advice.get(status.distribution, ()), *_advice(status))
     rows = [
         _row(
-            one.role,
-            one.name,
-            one.distribution,
-            one.version,
+            component.role,
+            component.name,
+            component.distribution,
+            component.version,
             "loaded",
-            one.entry.summary,
+            component.entry.summary,
         )
-        | {"advice": [*_clash(one, loaded), *advice[one.distribution]]}
-        for one in loaded.components()
+        | {"advice": [*_clash(component, loaded), *advice[component.distribution]]}
+        for component in loaded.components()
     ]
-    bringing = {one.distribution for one in loaded.components()}
+    bringing = {component.distribution for component in loaded.components()}
     rows += [
         _row(
             None,
@@ -440,7 +445,7 @@ def _key_lines(keys: dict[str, dict[str, Any]], indent: str) -> list[str]:
     for key, declaration in keys.items():
         facts = [
             declaration["type"],
-            *(one for one in key_facts(declaration) if not one.startswith("one of")),
+            *(fact for fact in key_facts(declaration) if not fact.startswith("one of")),
         ]
         lines.append(f"{indent}{key}: {'; '.join(facts)}")
         text = declaration["meaning"] or "no meaning is declared"

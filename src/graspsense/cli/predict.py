@@ -67,19 +67,21 @@ def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
     rate = None
     if labels is not None:
         rate = RecognitionRate(
-            sum(one.label == label for one, label in zip(predictions, labels, strict=True)), len(labels)
+            sum(prediction.label == label for prediction, label in zip(predictions, labels, strict=True)),
+            len(labels),
         )
-    warnings = list(dict.fromkeys(warning for one in predictions for warning in one.warnings))
+    warnings = list(dict.fromkeys(warning for prediction in predictions for warning in prediction.warnings))
     if as_json:
         echo_json(
             {
                 "model": asked.in_a_line,
                 "n": len(predictions),
                 "predictions": [
-                    _as_json(one, None if labels is None else labels[i]) for i, one in enumerate(predictions)
+                    _as_json(prediction, None if labels is None else labels[i])
+                    for i, prediction in enumerate(predictions)
                 ],
                 "rate": None if rate is None else to_json(rate),
-                "unknown": sum(not _known(one) for one in predictions),
+                "unknown": sum(not _known(prediction) for prediction in predictions),
                 "warnings": warnings,
                 "notes": list(notes),
             },
@@ -131,18 +133,22 @@ def _trials(
 def _print(predictions: Sequence[Prediction], labels: tuple[str, ...] | None) -> None:
     from graspsense.core.values.features import percent
 
-    coverage = next((one.coverage for one in predictions if one.coverage is not None), None)
+    coverage = next(
+        (prediction.coverage for prediction in predictions if prediction.coverage is not None), None
+    )
     sets = () if coverage is None else (f"{100 * coverage:.0f} % SET",)
     header = ("TRIAL", "PREDICTION", "CERTAINTY", *sets, *(("LABEL", "CORRECT") if labels else ()), "BECAUSE")
     rows = []
-    for i, one in enumerate(predictions):
-        certainty = percent(one.certainty) if one.certainty is not None else ""
-        of_set = () if coverage is None else (" or ".join(one.prediction_set),)
-        label = (labels[i], "yes" if one.label == labels[i] else "no") if labels else ()
-        because = "; ".join(reason.words for reason in one.because)
-        rows.append((str(i + 1), one.label, certainty, *of_set, *label, because))
+    for i, prediction in enumerate(predictions):
+        certainty = percent(prediction.certainty) if prediction.certainty is not None else ""
+        of_set = () if coverage is None else (" or ".join(prediction.prediction_set),)
+        label = (labels[i], "yes" if prediction.label == labels[i] else "no") if labels else ()
+        because = "; ".join(reason.words for reason in prediction.because)
+        rows.append((str(i + 1), prediction.label, certainty, *of_set, *label, because))
     echo_table(header, rows, {"PREDICTION": prediction_style, "CORRECT": correct_style})
-    for reason in dict.fromkeys(one.no_certainty for one in predictions if one.no_certainty):
+    for reason in dict.fromkeys(
+        prediction.no_certainty for prediction in predictions if prediction.no_certainty
+    ):
         echo_entry("certainty", f"none: {reason}")
 
 

@@ -249,7 +249,7 @@ def _print_better(settings: Settings, trial: Trial) -> None:
     """Name the pipeline that recognises more, if the plugin of this one declares it."""
     from graspsense.core.components.registry import installed
 
-    shipped = {one.entry.name: one.entry for one in installed().pipelines()}
+    shipped = {pipeline.entry.name: pipeline.entry for pipeline in installed().pipelines()}
     entry = shipped.get(settings.pipeline)
     if entry is not None and entry.better and trial.prediction is not None and trial.device.simulated:
         echo_entry(
@@ -456,7 +456,7 @@ def _say_what_would_be_done(settings: Settings, as_json: bool) -> None:
             "components": dict(settings.components),
             "settings": settings.values,
             "rehearsed_on": rehearsed.device if rehearsed else None,
-            "commands": [one._asdict() for one in rehearsed.phases] if rehearsed else None,
+            "commands": [phase._asdict() for phase in rehearsed.phases] if rehearsed else None,
         }
         echo_json(plan)
         return
@@ -475,16 +475,16 @@ def _say_what_would_be_done(settings: Settings, as_json: bool) -> None:
         echo(f"would command, as rehearsed on {rehearsed.device} ({rehearsed.outcome}):")
         rows = [
             (
-                one.phase,
-                ", ".join(one.kinds) or "none",
-                f"{one.seconds:.2f} s",
-                effort_words(one.kinds, one.least_n, one.most_n),
-                f"{one.fastest_m_s * 1e3:.0f} mm/s",
-                f"{one.limited} limited" if one.limited else "",
+                phase.phase,
+                ", ".join(phase.kinds) or "none",
+                f"{phase.seconds:.2f} s",
+                effort_words(phase.kinds, phase.least_n, phase.most_n),
+                f"{phase.fastest_m_s * 1e3:.0f} mm/s",
+                f"{phase.limited} limited" if phase.limited else "",
             )
-            for one in rehearsed.phases
+            for phase in rehearsed.phases
         ]
         echo_table(("PHASE", "COMMAND", "FOR", "EFFORT (+ squeezes)", "FASTEST", "BY THE GUARD"), rows)
-        if not any(one.seconds for one in rehearsed.phases):
+        if not any(phase.seconds for phase in rehearsed.phases):
             echo("the emulated gripper was commanded nothing: this rehearsal shows nothing of the real one")
     echo("nothing was opened")

@@ -208,7 +208,7 @@ def trials_of(
         described = structured(values, TrialSource, source)
     except ValidationFailed as misfit:
         raise ConfigError(
-            "\n".join(f"--{_dashed(one.path[0])}: {one.text}" for one in misfit.problems)
+            "\n".join(f"--{_dashed(problem.path[0])}: {problem.text}" for problem in misfit.problems)
         ) from None
     if kind == SIMULATED and folds is not None:
         from graspsense.evaluation.folds import check_folds
@@ -248,19 +248,19 @@ def command_line(without: Sequence[str], command: str = "") -> str:
     """Return the command that is running, or another one with its arguments, without some of its options."""
     context = click.get_current_context()
     words = ["graspsense", command or str(context.info_name)]
-    for one in context.command.params:
-        name = str(one.name)
+    for param in context.command.params:
+        name = str(param.name)
         typed = context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE
         if name in without or not typed:
             continue
         value = context.params[name]
-        if isinstance(one, click.Argument):
+        if isinstance(param, click.Argument):
             words.append(str(value))
-        elif isinstance(one, click.Option) and one.is_flag:
-            words.append(one.opts[0])
+        elif isinstance(param, click.Option) and param.is_flag:
+            words.append(param.opts[0])
         else:
-            for each in value if one.multiple else [value]:
-                words += [one.opts[0], str(each)]
+            for each in value if param.multiple else [value]:
+                words += [param.opts[0], str(each)]
     return shlex.join(words)
 
 

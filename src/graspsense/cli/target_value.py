@@ -114,7 +114,9 @@ def predict_value(model_name: str, source: str, as_json: bool, given: Mapping[st
     predictions = model.predict(table)
     error = None
     if truth is not None:
-        error = error_of([one.value - true for one, true in zip(predictions, truth, strict=True)], None)
+        error = error_of(
+            [prediction.value - true for prediction, true in zip(predictions, truth, strict=True)], None
+        )
     if as_json:
         echo_json(
             {
@@ -124,12 +126,12 @@ def predict_value(model_name: str, source: str, as_json: bool, given: Mapping[st
                 "n": len(predictions),
                 "predictions": [
                     {
-                        "value": one.value,
-                        "interval": None if one.low is None else [one.low, one.high],
-                        "unlike": one.unlike,
+                        "value": prediction.value,
+                        "interval": None if prediction.low is None else [prediction.low, prediction.high],
+                        "unlike": prediction.unlike,
                         **({} if truth is None else {"truth": truth[i]}),
                     }
-                    for i, one in enumerate(predictions)
+                    for i, prediction in enumerate(predictions)
                 ],
                 "error": None if error is None else to_json(error),
                 "warnings": list(model.warnings),
@@ -193,10 +195,10 @@ def _print_predictions(
     unit = f" [{model.target.unit}]" if model.target.unit else ""
     header = ("TRIAL", f"PREDICTION{unit}", "90 % INTERVAL", *(("TRUE", "ERROR") if truth else ()), "NOTE")
     rows = []
-    for i, one in enumerate(predictions):
-        interval = "" if one.low is None else f"{one.low:.4g} to {one.high:.4g}"
-        true = () if truth is None else (f"{truth[i]:.4g}", f"{one.value - truth[i]:+.3g}")
-        rows.append((str(i + 1), f"{one.value:.4g}", interval, *true, one.unlike))
+    for i, prediction in enumerate(predictions):
+        interval = "" if prediction.low is None else f"{prediction.low:.4g} to {prediction.high:.4g}"
+        true = () if truth is None else (f"{truth[i]:.4g}", f"{prediction.value - truth[i]:+.3g}")
+        rows.append((str(i + 1), f"{prediction.value:.4g}", interval, *true, prediction.unlike))
     echo_table(header, rows)
 
 

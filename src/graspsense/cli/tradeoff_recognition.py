@@ -40,7 +40,7 @@ def _command(name: str, file: str, summary: str) -> click.Command:
     return click.Command(
         name,
         callback=run,
-        params=[one for one in experiment.params if one.name != "experiment"],
+        params=[param for param in experiment.params if param.name != "experiment"],
         short_help=summary,
         help=f"{summary}\n\nThe same as `graspsense experiment {file}`: resumable, with a page in --out. Simulated.",
     )

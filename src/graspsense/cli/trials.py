@@ -48,7 +48,7 @@ def list_trials(folder: str, label: str | None, aside: bool | None, limit: int, 
     with Store.read(folder) as store:
         page = store.page(label=label, set_aside=aside, limit=limit)
         changes = history(store)
-    last_relabel = {one.trial: one for one in changes if one.action == "relabel"}
+    last_relabel = {change.trial: change for change in changes if change.action == "relabel"}
     if as_json:
         echo_json([{**one.as_json(), "relabelled": one.id in last_relabel} for one in page])
         return
@@ -156,11 +156,11 @@ def show_history(source: str, as_json: bool) -> None:
     with Store.read(folder) as store:
         found = history(store, number)
     if as_json:
-        echo_json([one.as_json() for one in found])
+        echo_json([change.as_json() for change in found])
         return
     if not found:
         echo("nothing was changed after recording")
-    echo_table(("TRIAL", "WHEN", "CHANGE", "WHY"), [_row(one) for one in found])
+    echo_table(("TRIAL", "WHEN", "CHANGE", "WHY"), [_row(change) for change in found])
 
 
 def _row(change: Change) -> tuple[str, str, str, str]:

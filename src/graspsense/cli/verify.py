@@ -36,10 +36,10 @@ def verify(source: str, as_json: bool) -> None:
     else:
         for problem in found.problems:
             echo_entry("damaged", str(problem), Style.BAD)
-        for one in found.unread:
-            echo_entry("not read", str(one), Style.CAUTION)
-        for one in found.unfinished:
-            echo_entry("unfinished", str(one), Style.CAUTION)
+        for name in found.unread:
+            echo_entry("not read", str(name), Style.CAUTION)
+        for name in found.unfinished:
+            echo_entry("unfinished", str(name), Style.CAUTION)
         counts = (
             f"{counted(found.trials, 'trial')}, {counted(found.recordings, 'recording')}, "
             f"{len(found.problems)} damaged"

@@ -32,7 +32,7 @@ def _split_options(arguments: Sequence[str]) -> Iterator[str]:
 def _misplaced_words(context: click.Context, arguments: Sequence[str]) -> Iterator[str]:
     """Yield the option for each word that is no argument of the command, but may be the value of an option."""
     command = context.command
-    options = {name for one in command.params if isinstance(one, click.Option) for name in one.opts}
+    options = {name for param in command.params if isinstance(param, click.Option) for name in param.opts}
     words = (
         list(arguments[arguments.index(str(context.info_name)) + 1 :])
         if context.info_name in arguments
@@ -62,6 +62,6 @@ def _option_for(word: str) -> str:
         return "-o"
     from graspsense.core.components.registry import installed
 
-    if word in {one.name for one in installed().components("sensor-backend")}:
+    if word in {component.name for component in installed().components("sensor-backend")}:
         return "--gripper"
-    return "--pipeline" if word in {one.name for one in installed().pipelines()} else "--object"
+    return "--pipeline" if word in {pipeline.name for pipeline in installed().pipelines()} else "--object"

@@ -103,11 +103,11 @@ def early_recognition(
     answers = [_answers(learner, part, instances, of, seed) for part in parts]
     ended = answers[-1].predicted
     rows = []
-    for part, one in zip(parts, answers, strict=True):
-        predicted = [a or b for a, b in zip(one.predicted, ended, strict=True)]
+    for part, answer in zip(parts, answers, strict=True):
+        predicted = [a or b for a, b in zip(answer.predicted, ended, strict=True)]
         name = WHOLE if part.after_s is None else f"{part.after_s:g} s"
-        rows.append(_row(name, whole, part, one, predicted))
-    reason = next((one.reason for one in answers if one.reason), "")
+        rows.append(_row(name, whole, part, answer, predicted))
+    reason = next((answer.reason for answer in answers if answer.reason), "")
     if not reason:
         rows.append(_stopped(whole, parts, answers))
     return EarlyRecognition(
@@ -162,7 +162,7 @@ def _true_inside(pooled: Pooled, inside: NDArray[np.bool_], labels: Sequence[str
 
 
 def _row(
-    name: str, whole: Labelled, part: CheckpointTrials, one: _Answers, predicted: Sequence[str]
+    name: str, whole: Labelled, part: CheckpointTrials, answers: _Answers, predicted: Sequence[str]
 ) -> EarlyRate:
     reached = part.rows.tolist()
     right = [a == b for a, b in zip(predicted, whole.labels, strict=True)]
@@ -171,8 +171,8 @@ def _row(
         rate=_rate(whole, right, range(len(whole))),
         seconds=_mean(part.used_s) or 0.0,
         newtons=_mean(part.used_n),
-        covered=None if one.reason else _rate(whole, one.covered.tolist(), reached),
-        single=None if one.reason else _rate(whole, (one.sizes == 1).tolist(), reached),
+        covered=None if answers.reason else _rate(whole, answers.covered.tolist(), reached),
+        single=None if answers.reason else _rate(whole, (answers.sizes == 1).tolist(), reached),
     )
 
 
@@ -184,10 +184,10 @@ def _stopped(whole: Labelled, parts: Sequence[CheckpointTrials], answers: Sequen
         parts[-1].used_n.copy(),
     )
     stopped = np.zeros(len(whole), dtype=np.bool_)
-    for part, one in zip(parts[:-1], answers[:-1], strict=True):
-        now = (one.sizes == 1) & ~stopped
+    for part, answer in zip(parts[:-1], answers[:-1], strict=True):
+        now = (answer.sizes == 1) & ~stopped
         for i in np.flatnonzero(now).tolist():
-            predicted[i] = one.predicted[i]
+            predicted[i] = answer.predicted[i]
         seconds[now], newtons[now] = part.used_s[now], part.used_n[now]
         stopped |= now
     right = [a == b for a, b in zip(predicted, whole.labels, strict=True)]

@@ -94,7 +94,7 @@ def choose(
     """
     known = next(iter(trials.values()))
     protocol, folds = _folds(known, seed)
-    notes = [*dict.fromkeys(note for one in trials.values() for note in one.notes), *notes]
+    notes = [*dict.fromkeys(note for trial in trials.values() for note in trial.notes), *notes]
     if protocol != INSTANCE_HELD_OUT:
         why = known.no_instances or "a label has a single instance"
         notes.append(f"{why}: whole objects cannot be held out, so the rate is that for these objects")
@@ -112,8 +112,8 @@ def choose(
     rate = rate_of(right, known.instances, known.no_interval)
     ranking = ranking_of(
         {
-            key: CandidateResult(right={protocol: one.outer.tolist()}, training_s=one.training_s)
-            for key, one in answers.items()
+            key: CandidateResult(right={protocol: answer.outer.tolist()}, training_s=answer.training_s)
+            for key, answer in answers.items()
         },
         protocol,
         known,
@@ -147,7 +147,7 @@ def _nested(answers: Mapping[tuple[str, str], _Answers], folds: Folds) -> tuple[
     right = np.zeros(len(folds), dtype=np.bool_)
     chosen: Counter[str] = Counter()
     for fold in range(int(folds.max()) + 1) if answers else ():
-        name, best = max(answers.items(), key=lambda one: int(one[1].inner[fold].sum()))
+        name, best = max(answers.items(), key=lambda item: int(item[1].inner[fold].sum()))
         right[folds == fold] = best.outer[folds == fold]
         chosen[" with ".join(name)] += 1
     return right.tolist(), dict(chosen.most_common())

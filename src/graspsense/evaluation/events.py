@@ -153,7 +153,7 @@ def evaluate_kind(
     `told` gives the detections in the recording of this number with thresholds times a factor; `factor` is what the
     thresholds have to be multiplied by for the unit of the forces.
     """
-    rows = [(k, one) for k, one in enumerate(recordings) if name in one.labelled]
+    rows = [(k, recording) for k, recording in enumerate(recordings) if name in recording.labelled]
     groups = [one.group for _, one in rows]
 
     def scores(factors: Sequence[float]) -> tuple[EventScore, EventScore, dict[str, tuple[int, int, int]]]:

@@ -88,7 +88,7 @@ def mean_difference(
 
     if len(first) != len(second) or len(first) < 2:
         raise ValueError(f"{len(first)} and {len(second)} rates: give two or more, of the same seeds")
-    each = [one - other for one, other in zip(first, second, strict=True)]
+    each = [value - other for value, other in zip(first, second, strict=True)]
     mean = math.fsum(each) / len(each)
     error = max(_deviation(each), 1 / n) / math.sqrt(len(each))
     half = _t(len(each) - 1, comparisons) * error
@@ -98,7 +98,7 @@ def mean_difference(
 
 def _deviation(values: Sequence[float]) -> float:
     mean = math.fsum(values) / len(values)
-    return math.sqrt(math.fsum((one - mean) ** 2 for one in values) / (len(values) - 1))
+    return math.sqrt(math.fsum((value - mean) ** 2 for value in values) / (len(values) - 1))
 
 
 def _t(degrees: int, comparisons: int = 1) -> float:

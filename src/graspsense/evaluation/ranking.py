@@ -80,9 +80,9 @@ class Ranking:
         if self.chosen is not None:
             text += f" As the best of {self.chosen.of} it was lucky too: of new trials expect {self.chosen.words}."
         text += f" {self.equals}"
-        controls = [one for one in self.candidates if one.standing == "control"]
+        controls = [candidate for candidate in self.candidates if candidate.standing == "control"]
         if controls:
-            early = max(controls, key=lambda one: one.rates[self.protocol].rate)
+            early = max(controls, key=lambda control: control.rates[self.protocol].rate)
             share = 100 * early.rates[self.protocol].rate
             text += f" From before the contact alone, {early.classifier} recognises {share:.1f} %."
         return text
@@ -91,16 +91,16 @@ class Ranking:
     def equals(self) -> str:
         """Those that are equivalent to the best or undecided, and the cheapest of them, in words."""
         best = self.candidates[0]
-        equal = [one for one in self.candidates if one.standing in ("best", "equivalent")]
-        open_ = [one for one in self.candidates if one.standing == "undecided"]
+        equal = [candidate for candidate in self.candidates if candidate.standing in ("best", "equivalent")]
+        open_ = [candidate for candidate in self.candidates if candidate.standing == "undecided"]
         if len(equal) > 1:
-            cheapest = min(equal, key=lambda one: one.training_s)
-            others = ", ".join(one.name for one in equal[1:])
+            cheapest = min(equal, key=lambda candidate: candidate.training_s)
+            others = ", ".join(candidate.name for candidate in equal[1:])
             text = f"Equivalent within {100 * MARGIN:.0f} points: {others}. The cheapest to train is {cheapest.name}."
         else:
             text = f"None is shown to be equivalent within {100 * MARGIN:.0f} points."
         if open_:
-            cheapest = min((best, *open_), key=lambda one: one.training_s)
+            cheapest = min((best, *open_), key=lambda candidate: candidate.training_s)
             verb = "is" if len(open_) == 1 else "are"
             text += f" {len(open_)} more {verb} undecided. Of these and the best, {cheapest.name} is the cheapest."
         return text
@@ -143,14 +143,14 @@ def rank(
     and of its features. Raises ConfigError if the trials differ in labels, or if no candidate can be measured.
     """
     first = next(iter(trials.values()))
-    for name, one in trials.items():
-        if (one.labels, one.instances) != (first.labels, first.instances):
+    for name, trial in trials.items():
+        if (trial.labels, trial.instances) != (first.labels, first.instances):
             raise ConfigError(
                 f"the trials with the features {name!r} are not those with {next(iter(trials))!r}"
             )
     protocols = protocols or protocols_of(first, folds, seed)
     headline = next(iter(protocols))
-    tables = {name: one.table for name, one in trials.items()}
+    tables = {name: trial.table for name, trial in trials.items()}
     if first.before_contact is not None:
         tables[BEFORE_CONTACT] = first.before_contact.table
     measured: dict[tuple[str, str], CandidateResult] = {}
@@ -189,7 +189,7 @@ def ranking_of(
     judged = [key for key in measured if key[1] != BEFORE_CONTACT]
     if not judged:
         raise ConfigError(
-            "no classifier could be trained on these trials" + "".join(f"\n{one}" for one in notes)
+            "no classifier could be trained on these trials" + "".join(f"\n{note}" for note in notes)
         )
     right_of = np.array([measured[key].right[headline] for key in judged])
     if chosen is None and len(judged) > 1:
@@ -258,7 +258,7 @@ def _ranked(
 ) -> tuple[Candidate, ...]:
     """Return the candidates by their rate under the headline protocol; those from before contact come last."""
     judged = [key for key in measured if key[1] != BEFORE_CONTACT]
-    right = {key: one.right[headline] for key, one in measured.items()}
+    right = {key: result.right[headline] for key, result in measured.items()}
     best = max(judged, key=lambda key: sum(right[key]))
     candidates = []
     for key in sorted(right, key=lambda key: (key[1] == BEFORE_CONTACT, -sum(right[key]), key != best)):

@@ -80,32 +80,33 @@ class ExperimentComparison:
         """The result as a person would say it, from the first difference."""
         if not self.differences:
             return f"{self.names} have no case in common"
-        one = self.differences[0]
-        first, recognises = self.experiments[0].name, TARGETS[one.first.recognised]
-        mine, theirs = in_hundred(one.first.rate.mean), in_hundred(one.other.rate.mean)
-        if one.verdict == "not shown to differ":
+        difference = self.differences[0]
+        first, recognises = self.experiments[0].name, TARGETS[difference.first.recognised]
+        mine, theirs = in_hundred(difference.first.rate.mean), in_hundred(difference.other.rate.mean)
+        if difference.verdict == "not shown to differ":
             return (
-                f"{one.other_name} is not shown to recognise {recognises} better or worse than {first}: "
+                f"{difference.other_name} is not shown to recognise {recognises} better or worse than {first}: "
                 f"{theirs} grasps against {mine}"
             )
         return (
-            f"{one.other_name} recognises {recognises} {'more' if one.verdict == 'higher' else 'less'} often than "
-            f"{first}: {theirs} grasps against {mine}"
+            f"{difference.other_name} recognises {recognises} "
+            f"{'more' if difference.verdict == 'higher' else 'less'} often than {first}: {theirs} grasps against {mine}"
         )
 
     @property
     def names(self) -> str:
         """The names of the experiments, in words."""
-        *others, last = (one.name for one in self.experiments)
+        *others, last = (experiment.name for experiment in self.experiments)
         return f"{', '.join(others)} and {last}"
 
     @property
     def answer(self) -> str:
         """The differences and the number of settings that differ, in a few sentences."""
         told = [
-            f"{condition_name(one.other)}, {TARGETS[one.other.recognised]}: {one.other_name} minus "
-            f"{self.experiments[0].name} is {one.difference.words}, {one.how}."
-            for one in self.differences[:4]
+            f"{condition_name(difference.other)}, {TARGETS[difference.other.recognised]}: "
+            f"{difference.other_name} minus {self.experiments[0].name} is {difference.difference.words}, "
+            f"{difference.how}."
+            for difference in self.differences[:4]
         ]
         more = len(self.differences) - len(told)
         if more > 0:
@@ -122,24 +123,26 @@ class ExperimentComparison:
             "answer": self.answer,
             "settings": [
                 {
-                    "key": one.key,
-                    **dict(zip((e.name for e in self.experiments), one.values, strict=True)),
+                    "key": setting.key,
+                    **dict(zip((e.name for e in self.experiments), setting.values, strict=True)),
                 }
-                for one in self.settings
+                for setting in self.settings
             ],
-            "experiments": {one.name: one.summary.as_json() for one in self.experiments},
+            "experiments": {experiment.name: experiment.summary.as_json() for experiment in self.experiments},
             "differences": [
                 {
-                    "experiment": one.other_name,
+                    "experiment": difference.other_name,
                     "minus": self.experiments[0].name,
-                    "case": one.other.name,
-                    "target": one.other.target,
-                    "difference": one.difference.value,
-                    "interval": None if one.difference.interval is None else list(one.difference.interval),
-                    "how": one.how,
-                    "verdict": one.verdict,
+                    "case": difference.other.name,
+                    "target": difference.other.target,
+                    "difference": difference.difference.value,
+                    "interval": None
+                    if difference.difference.interval is None
+                    else list(difference.difference.interval),
+                    "how": difference.how,
+                    "verdict": difference.verdict,
                 }
-                for one in self.differences
+                for difference in self.differences
             ],
         }
 
@@ -213,11 +216,11 @@ def _of_another_version(results: Results, reason: str) -> str:
 
 def _setting_differences(experiments: Sequence[FinishedExperiment]) -> list[SettingDifference]:
     """Return the keys whose values differ between the experiments."""
-    columns = [_settings(one.summary) for one in experiments]
+    columns = [_settings(experiment.summary) for experiment in experiments]
     meanings: dict[str, str] = {}
-    for one in experiments:
-        meanings |= _meanings(one.summary.planned.cases[0])
-    columns_made = [_circumstances(one) for one in experiments]
+    for experiment in experiments:
+        meanings |= _meanings(experiment.summary.planned.cases[0])
+    columns_made = [_circumstances(experiment) for experiment in experiments]
     found = []
     for each in (columns, columns_made):
         for key in dict.fromkeys(key for column in each for key in column):
@@ -270,9 +273,9 @@ def _meanings(case: ExperimentCase) -> dict[str, str]:
     }
 
 
-def _circumstances(one: FinishedExperiment) -> dict[str, str]:
+def _circumstances(experiment: FinishedExperiment) -> dict[str, str]:
     """Return what else a result may depend on: the versions, and the commit of the code."""
-    made = one.results.provenance()
+    made = experiment.results.provenance()
     versions = {f"version of {name}": str(version) for name, version in (made.get("versions") or {}).items()}
     return {**versions, "commit": _commit(made)}
 
@@ -303,11 +306,15 @@ def _matched(
     mine: Sequence[ConditionResult], theirs: Sequence[ConditionResult]
 ) -> list[tuple[ConditionResult, ConditionResult]]:
     """Return the conditions of the same name and target; if there are none, the best ones for each target."""
-    by_name = {(one.name, one.target): one for one in theirs}
-    found = [(one, by_name[one.name, one.target]) for one in mine if (one.name, one.target) in by_name]
+    by_name = {(their.name, their.target): their for their in theirs}
+    found = [
+        (result, by_name[result.name, result.target])
+        for result in mine
+        if (result.name, result.target) in by_name
+    ]
     if found:
         return found
-    targets = list(dict.fromkeys(one.target for one in mine))
+    targets = list(dict.fromkeys(result.target for result in mine))
     best = [
         tuple(
             max((one for one in side if one.target == target), key=lambda one: one.rate.mean, default=None)
@@ -318,27 +325,27 @@ def _matched(
     return [(a, b) for a, b in best if a is not None and b is not None]
 
 
-def _difference(one: ConditionResult, other: ConditionResult, comparisons: int) -> tuple[Difference, str]:
+def _difference(result: ConditionResult, other: ConditionResult, comparisons: int) -> tuple[Difference, str]:
     """Return the rate of one condition minus that of another, and what the interval rests on."""
     corrected = f", corrected for {comparisons} comparisons" if comparisons > 1 else ""
-    same_trials = one.simulated and other.simulated and plain(one.case.data) == plain(other.case.data)
-    common = [seed for seed in one.rates if seed in other.rates]
-    paired = one.minus(other, comparisons) if same_trials else None
+    same_trials = result.simulated and other.simulated and plain(result.case.data) == plain(other.case.data)
+    common = [seed for seed in result.rates if seed in other.rates]
+    paired = result.minus(other, comparisons) if same_trials else None
     if paired is not None:
         return Difference(paired.value, paired.interval), f"paired over {len(common)} common seeds{corrected}"
-    if not one.simulated or not other.simulated:
+    if not result.simulated or not other.simulated:
         reason = "recorded trials are not paired"
     elif not same_trials:
         reason = "the trials differ"
     else:
         reason = f"{counted(len(common), 'common seed')}, two are needed"
-    value = one.rate.mean - other.rate.mean
-    high, low = one.rate.interval, other.rate.interval
+    value = result.rate.mean - other.rate.mean
+    high, low = result.rate.interval, other.rate.interval
     if high is None or low is None:
         return Difference(value, None, "a rate has none"), f"unpaired: {reason}"
     # Newcombe's method of squares (Stat. Med. 17, 1998, 873, method 10), widened for several comparisons.
     wider = NormalDist().inv_cdf(1 - 0.025 / comparisons) / NormalDist().inv_cdf(0.975)
-    below = wider * math.hypot(one.rate.mean - high[0], low[1] - other.rate.mean)
-    above = wider * math.hypot(high[1] - one.rate.mean, other.rate.mean - low[0])
+    below = wider * math.hypot(result.rate.mean - high[0], low[1] - other.rate.mean)
+    above = wider * math.hypot(high[1] - result.rate.mean, other.rate.mean - low[0])
     interval = (max(value - below, -1.0), min(value + above, 1.0))
     return Difference(value, interval), f"unpaired: {reason}{corrected}"

@@ -19,7 +19,7 @@ DIFFERENCE_HEADER = ("experiment", "case", "recognises", "points", "95 % interva
 def comparison_page(comparison: ExperimentComparison) -> Page:
     """Return the page."""
     first = comparison.experiments[0].name
-    simulated = any(one.simulated for e in comparison.experiments for one in e.summary.conditions)
+    simulated = any(condition.simulated for e in comparison.experiments for condition in e.summary.conditions)
     text = (
         f"Differences are those from {first}. Where both experiments simulate the same trials with the same seeds, "
         "they are paired by seed; otherwise the interval follows from those of both rates."
@@ -28,7 +28,9 @@ def comparison_page(comparison: ExperimentComparison) -> Page:
         kind="Comparison of experiments",
         title=comparison.names,
         question=" ".join(
-            dict.fromkeys(one.summary.planned.experiment.question for one in comparison.experiments)
+            dict.fromkeys(
+                experiment.summary.planned.experiment.question for experiment in comparison.experiments
+            )
         ).strip(),
         answer=comparison.answer,
         headline=comparison.headline,
@@ -42,37 +44,39 @@ def comparison_page(comparison: ExperimentComparison) -> Page:
 def failure_lines(comparison: ExperimentComparison) -> list[str]:
     """Return a sentence for each experiment of which tasks failed or are missing."""
     failed = [
-        f"{one.name}: {len(one.summary.failed)} tasks failed and {one.summary.missing} have no result; they are not "
-        "included"
-        for one in comparison.experiments
-        if one.summary.failed or one.summary.missing
+        f"{experiment.name}: {len(experiment.summary.failed)} tasks failed and "
+        f"{experiment.summary.missing} have no result; they are not included"
+        for experiment in comparison.experiments
+        if experiment.summary.failed or experiment.summary.missing
     ]
     return failed + [
-        f"{one.name}: {line}" for one in comparison.experiments for line in unreadable_lines(one.summary)
+        f"{experiment.name}: {line}"
+        for experiment in comparison.experiments
+        for line in unreadable_lines(experiment.summary)
     ]
 
 
 def settings_rows(comparison: ExperimentComparison) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Return header and rows of the settings that differ."""
-    header = ("setting", *(one.name for one in comparison.experiments), "meaning")
-    return header, [(one.key, *one.values, one.meaning) for one in comparison.settings]
+    header = ("setting", *(experiment.name for experiment in comparison.experiments), "meaning")
+    return header, [(setting.key, *setting.values, setting.meaning) for setting in comparison.settings]
 
 
 def rate_rows(comparison: ExperimentComparison) -> list[tuple[str, ...]]:
     """Return the rates of all conditions, for `RATE_HEADER`."""
     found: list[tuple[str, ...]] = []
     for experiment in comparison.experiments:
-        for one in experiment.summary.conditions:
-            row = RateRow(name="", rate=one.rate.mean, interval=one.rate.interval)
+        for condition in experiment.summary.conditions:
+            row = RateRow(name="", rate=condition.rate.mean, interval=condition.rate.interval)
             found.append(
                 (
                     experiment.name,
-                    condition_name(one),
-                    TARGETS[one.recognised],
-                    f"{100 * one.rate.mean:.1f} %",
+                    condition_name(condition),
+                    TARGETS[condition.recognised],
+                    f"{100 * condition.rate.mean:.1f} %",
                     row.interval_text,
-                    str(one.rate.n),
-                    str(len(one.by_seed)),
+                    str(condition.rate.n),
+                    str(len(condition.by_seed)),
                 )
             )
     return found
@@ -81,20 +85,20 @@ def rate_rows(comparison: ExperimentComparison) -> list[tuple[str, ...]]:
 def difference_rows(comparison: ExperimentComparison) -> list[tuple[str, ...]]:
     """Return the differences from the first experiment, for `DIFFERENCE_HEADER`."""
     found: list[tuple[str, ...]] = []
-    for one in comparison.differences:
-        interval = one.difference.interval
-        case = condition_name(one.other)
-        if one.other.name != one.first.name:
-            case = f"{case} (here) and {condition_name(one.first)} (first)"
+    for difference in comparison.differences:
+        interval = difference.difference.interval
+        case = condition_name(difference.other)
+        if difference.other.name != difference.first.name:
+            case = f"{case} (here) and {condition_name(difference.first)} (first)"
         found.append(
             (
-                one.other_name,
+                difference.other_name,
                 case,
-                TARGETS[one.other.recognised],
-                f"{100 * one.difference.value:+.1f}",
+                TARGETS[difference.other.recognised],
+                f"{100 * difference.difference.value:+.1f}",
                 "none" if interval is None else f"{100 * interval[0]:+.1f} to {100 * interval[1]:+.1f}",
-                one.verdict,
-                one.how,
+                difference.verdict,
+                difference.how,
             )
         )
     return found
@@ -114,7 +118,7 @@ def _settings(comparison: ExperimentComparison) -> Section:
 
 def _rates(comparison: ExperimentComparison) -> Section:
     body = []
-    conditions = [(e, one) for e in comparison.experiments for one in e.summary.conditions]
+    conditions = [(e, condition) for e in comparison.experiments for condition in e.summary.conditions]
     for target in dict.fromkeys(one.target for _, one in conditions):
         of = [(e, one) for e, one in conditions if one.target == target]
         best = max((one for _, one in of), key=lambda one: one.rate.mean)
@@ -149,14 +153,14 @@ def _differences(comparison: ExperimentComparison) -> Section:
 
 def _made_of(comparison: ExperimentComparison) -> Section:
     body = []
-    for one in comparison.experiments:
-        made, planned = one.results.provenance(), one.summary.planned
+    for experiment in comparison.experiments:
+        made, planned = experiment.results.provenance(), experiment.summary.planned
         pairs = [
             ("experiment", f"{planned.experiment.title} ({planned.name})"),
-            ("folder", str(one.results.folder)),
-            ("answer", answer(one.summary)),
+            ("folder", str(experiment.results.folder)),
+            ("answer", answer(experiment.summary)),
             ("command", str(made.get("command", ""))),
             ("begun", str(made.get("begun_at", ""))),
         ]
-        body.append(f"<h3>{escape(one.name)}</h3>{facts(pairs)}")
+        body.append(f"<h3>{escape(experiment.name)}</h3>{facts(pairs)}")
     return Section(id="made", title="Provenance", body="".join(body))

@@ -58,7 +58,7 @@ class Conditions:
 
     def finer_than_possible(self, accuracy: float) -> tuple[FeatureCondition, ...]:
         """Return the features that cannot have this accuracy in 99 % of single grasps."""
-        return tuple(one for one in self.features if one.finest > accuracy)
+        return tuple(feature for feature in self.features if feature.finest > accuracy)
 
     def as_values(self) -> dict[str, object]:
         """Return plain values, for JSON."""

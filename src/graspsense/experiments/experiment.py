@@ -176,7 +176,8 @@ class Planned:
             "data": plain(case.data),
             "test": None if case.test is None else plain(case.test),
             "learners": [
-                {"name": one.name, "type": one.type, "config": dict(one.config)} for one in case.learners
+                {"name": learner.name, "type": learner.type, "config": dict(learner.config)}
+                for learner in case.learners
             ],
             "judge": plain(case.judge),
             "first": first,
@@ -292,11 +293,11 @@ class _Plan:
 
     def planned(self) -> Planned:
         """Return the experiment with its cases. Raises ConfigError that lists all errors."""
-        one = self.experiment
-        kind_of(one.kind)
-        seeds = _listed(one.seeds)
+        experiment = self.experiment
+        kind_of(experiment.kind)
+        seeds = _listed(experiment.seeds)
         pipelines = {}
-        for asked in one.pipelines:
+        for asked in experiment.pipelines:
             of = asked if isinstance(asked, PipelineOf) else PipelineOf(name=Path(asked).stem, pipeline=asked)
             if of.name in pipelines:
                 raise ConfigError(
@@ -310,19 +311,21 @@ class _Plan:
         self._check_cases(sweep, len(pipelines))
         cases = []
         for pipeline, settings in pipelines.items():
-            for variant in one.variants or (Variant(name=""),):
+            for variant in experiment.variants or (Variant(name=""),):
                 for point in _points(sweep, "classifier", within=False):
                     at: dict[str, Any] = {}
                     if len(pipelines) > 1:
                         at["pipeline"] = pipeline
-                    if one.variants:
+                    if experiment.variants:
                         at["variant"] = variant.name
                     at.update((dotted(path), value) for path, value in point)
                     cases.append(self._case(settings, variant, point, sweep, at))
         self._check_effect(cases, sweep)
         if self.complaints:
             raise ConfigError("\n".join(dict.fromkeys(self.complaints)))
-        return Planned(name=self.name, experiment=one, cases=tuple(cases), seeds=seeds, pipelines=pipelines)
+        return Planned(
+            name=self.name, experiment=experiment, cases=tuple(cases), seeds=seeds, pipelines=pipelines
+        )
 
     def _check_effect(
         self, cases: Sequence[ExperimentCase], sweep: Mapping[tuple[str, ...], Sequence[Any]]
@@ -348,8 +351,8 @@ class _Plan:
 
     def _check_cases(self, sweep: Mapping[tuple[str, ...], Sequence[Any]], pipelines: int) -> None:
         """Raise ConfigError if there are too many cases, before any of them is made."""
-        one = self.experiment
-        cases = pipelines * max(len(one.variants), 1) * max(len(one.classifiers), 1)
+        experiment = self.experiment
+        cases = pipelines * max(len(experiment.variants), 1) * max(len(experiment.classifiers), 1)
         cases *= math.prod(len(values) for values in sweep.values())
         if too_many := CASES.exceeded(cases):
             raise ConfigError(f"{self.layer.label}: {too_many}")
@@ -386,9 +389,9 @@ class _Plan:
         sweep: Mapping[tuple[str, ...], Sequence[Any]],
         at: dict[str, Any],
     ) -> ExperimentCase:
-        one = self.experiment
+        experiment = self.experiment
         merged = Merged()
-        merged.add((), _tables(one), self.layer)
+        merged.add((), _tables(experiment), self.layer)
         merged.add((), _tables(variant), self.layer)
         values = merged.values
         for path, value in point:
@@ -411,7 +414,7 @@ class _Plan:
         )
         if any(source is not None and source.kind == SIMULATED for source in (data, test)):
             simulated_objects(settings)
-        judge = self._keys(values.get("judge", {}), kind_of(one.kind).keys_class(), "judge")
+        judge = self._keys(values.get("judge", {}), kind_of(experiment.kind).keys_class(), "judge")
         if test is None and data is not None and judge is not None:
             self._check_folds(settings, data, judge)
         return ExperimentCase(
@@ -422,7 +425,7 @@ class _Plan:
             test=test,
             learners=tuple(self._learners(pipeline, values.get("classifier", {}), sweep)),
             judge=judge,
-            kind=one.kind,
+            kind=experiment.kind,
         )
 
     def _fingertips(self, data: TrialSource | None, test: TrialSource | None) -> dict[str, float]:
@@ -530,7 +533,7 @@ def _what_matters(case: ExperimentCase, inert: set[str]) -> str:
         for source in (case.data, case.test)
         if source is not None
     ]
-    learners = [(one.name, one.type, dict(one.config)) for one in case.learners]
+    learners = [(learner.name, learner.type, dict(learner.config)) for learner in case.learners]
     return repr((tables, sources, learners, plain(case.judge)))
 
 
@@ -565,8 +568,10 @@ def _fresh(config: Any) -> dict[str, Any]:
     return {key: one for key, one in plain(config).items() if one is not None and key != "model"}
 
 
-def _tables(one: Experiment | Variant) -> dict[str, Mapping[str, Any]]:
-    return {table: dict(getattr(one, table)) for table in SWEPT_TABLES if getattr(one, table, None)}
+def _tables(experiment: Experiment | Variant) -> dict[str, Mapping[str, Any]]:
+    return {
+        table: dict(getattr(experiment, table)) for table in SWEPT_TABLES if getattr(experiment, table, None)
+    }
 
 
 def _points(

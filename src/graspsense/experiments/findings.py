@@ -59,7 +59,9 @@ class FoundTable:
 def control_cells(condition: ConditionResult) -> tuple[str, ...]:
     """Return the rate of each control of a condition, for the columns of `CONTROLS`; empty if it was not measured."""
     controls = [condition.controls.get(name) for name in CONTROLS]
-    return tuple("" if one is None or one.rate is None else percent(one.rate.mean) for one in controls)
+    return tuple(
+        "" if control is None or control.rate is None else percent(control.rate.mean) for control in controls
+    )
 
 
 @frozen(kw_only=True)
@@ -99,7 +101,7 @@ class Findings:
         for one in self.tables:
             lines += one.markdown
         if self.notes:
-            lines += ["## Notes", "", *(f"- {_cell(one)}" for one in self.notes), ""]
+            lines += ["## Notes", "", *(f"- {_cell(note)}" for note in self.notes), ""]
         return "\n".join(lines)
 
 

@@ -55,13 +55,13 @@ def findings_of(summary: Summary) -> Findings | None:
 
 def experiment_page(summary: Summary, results: Results) -> Page:
     """Return the page."""
-    one = summary.planned.experiment
+    experiment = summary.planned.experiment
     found = findings_of(summary)
     if found is not None:
         return Page(
             kind="Experiment",
-            title=one.title,
-            question=one.question,
+            title=experiment.title,
+            question=experiment.question,
             answer=found.answer,
             headline=found.headline,
             beside=_failures(summary) + bullets([SIMULATED], "notes"),
@@ -74,8 +74,8 @@ def experiment_page(summary: Summary, results: Results) -> Page:
     sections.append(_made_of(summary, results))
     return Page(
         kind="Experiment",
-        title=one.title,
-        question=one.question,
+        title=experiment.title,
+        question=experiment.question,
         answer=answer(summary),
         headline=headline(summary),
         beside=_beside(summary, best),
@@ -267,11 +267,11 @@ def measurement_sections(summary: Summary, best: ConditionResult) -> list[Sectio
 
 def _made_of(summary: Summary, results: Results) -> Section:
     made = results.provenance()
-    one = summary.planned.experiment
+    experiment = summary.planned.experiment
     result = next(iter(summary.results.values()), None)
     notes = result.notes if isinstance(result, RecognitionResult) else ()
     pairs = [
-        ("experiment", f"{summary.planned.name} ({one.kind})"),
+        ("experiment", f"{summary.planned.name} ({experiment.kind})"),
         ("command", str(made.get("command", ""))),
         ("begun", str(made.get("begun_at", ""))),
         ("trials", "none yet" if result is None else result.source),

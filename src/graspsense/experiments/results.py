@@ -91,8 +91,8 @@ class Results:
         """Write the experiment, its pipelines and its provenance next to the results. Raises SaveFailed."""
         # Without the settings that follow another one, since a sweep may change that.
         texts = {
-            f"{name}.toml": to_toml(evolve(one, values=without_followers(one.values)))
-            for name, one in planned.pipelines.items()
+            f"{name}.toml": to_toml(evolve(pipeline, values=without_followers(pipeline.values)))
+            for name, pipeline in planned.pipelines.items()
         }
         for name, text in texts.items():
             _write(self.folder / PIPELINES / name, text)
@@ -168,11 +168,11 @@ def resolved(planned: Planned) -> str:
     lines = [
         f"# {planned.name}, with everything filled in: `graspsense experiment FILE` gives the same again."
     ]
-    tables = {key: one for key, one in values.items() if isinstance(one, Mapping)}
+    tables = {key: value for key, value in values.items() if isinstance(value, Mapping)}
     lines += [
-        f"{toml_key(key)} = {toml_value(one)}"
-        for key, one in values.items()
-        if key not in tables and one is not None
+        f"{toml_key(key)} = {toml_value(value)}"
+        for key, value in values.items()
+        if key not in tables and value is not None
     ]
     for table, keys in tables.items():
         if keys:
@@ -183,7 +183,7 @@ def resolved(planned: Planned) -> str:
 def _unswept(planned: Planned) -> list[Any]:
     """Return the classifiers of the pipelines, unless the sweep changes them."""
     swept = any(key.split(".")[0] == "classifier" for key in planned.experiment.sweep)
-    varied = any(one.classifier for one in planned.experiment.variants)
+    varied = any(variant.classifier for variant in planned.experiment.variants)
     return [] if swept or varied else list(planned.cases[0].learners)
 
 

@@ -167,8 +167,8 @@ def _changed_inputs(results: Results, planned: Planned) -> list[str]:
 def _notes(known: Sequence[TaskResult]) -> list[str]:
     """Return the differences between the versions of the existing results and those of this process."""
     found: list[str] = []
-    for one in known:
-        for line in differences(versions(), one.made.get("versions", {})):
+    for result in known:
+        for line in differences(versions(), result.made.get("versions", {})):
             text = f"results from before were made with other versions: {line}"
             if text not in found:
                 found.append(text)

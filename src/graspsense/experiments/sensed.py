@@ -62,7 +62,7 @@ class SensedPoint:
     @property
     def largest(self) -> DistributionDistance:
         """The distance of the feature that is furthest away, by the upper end of its interval."""
-        return max(self.distances, key=lambda one: one.upper)
+        return max(self.distances, key=lambda distance: distance.upper)
 
 
 @frozen(kw_only=True)
@@ -80,13 +80,18 @@ class SensedTrade:
     @property
     def coarsest(self) -> SensedPoint | None:
         """The variant to take: among the fastest that are equivalent to the reference, the nearest to it."""
-        equal = [one for one in self.points if one.equivalence is not None and one.equivalence.is_equivalent]
+        equal = [
+            point
+            for point in self.points
+            if point.equivalence is not None and point.equivalence.is_equivalent
+        ]
         if not equal:
             return None
-        fastest = min(one.seconds for one in equal)
+        fastest = min(point.seconds for point in equal)
         # Times that differ by less are not told apart, and of those the nearest to the reference is taken.
         return min(
-            (one for one in equal if one.seconds <= TIME_MARGIN * fastest), key=lambda one: one.largest.upper
+            (point for point in equal if point.seconds <= TIME_MARGIN * fastest),
+            key=lambda point: point.largest.upper,
         )
 
 
@@ -150,7 +155,7 @@ def sensed_trade(
         classifier=settings.classifier.component.qualified,
         grasps=len(training.plans[0].labels),
         seeds=tuple(seeds),
-        points=tuple(sorted(points, key=lambda one: one.seconds)),
+        points=tuple(sorted(points, key=lambda point: point.seconds)),
     )
 
 

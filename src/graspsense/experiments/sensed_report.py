@@ -32,23 +32,23 @@ def sensed_rows(trade: SensedTrade) -> tuple[tuple[str, ...], list[tuple[str, ..
     features = tuple(one.feature.upper() for one in trade.points[0].distances)
     rows = [
         (
-            one.method,
-            one.fidelity,
-            one.step,
-            f"{1e3 * one.seconds:.3g}",
-            f"{100 * sum(one.rates) / len(one.rates):.1f} %",
-            _difference(one),
-            *(f"{distance.distance:.1e} ({distance.upper:.1e})" for distance in one.distances),
+            point.method,
+            point.fidelity,
+            point.step,
+            f"{1e3 * point.seconds:.3g}",
+            f"{100 * sum(point.rates) / len(point.rates):.1f} %",
+            _difference(point),
+            *(f"{distance.distance:.1e} ({distance.upper:.1e})" for distance in point.distances),
         )
-        for one in trade.points
+        for point in trade.points
     ]
     return (*HEADER, *features), rows
 
 
-def _difference(one: SensedPoint) -> str:
-    if one.role == "reference":
+def _difference(point: SensedPoint) -> str:
+    if point.role == "reference":
         return "the reference"
-    test = one.equivalence
+    test = point.equivalence
     if test is None:
         return "-"
     low, high = test.interval
@@ -58,7 +58,7 @@ def _difference(one: SensedPoint) -> str:
 
 def conclusion(trade: SensedTrade) -> str:
     """Return the coarsest equivalent variant in words."""
-    tests = [one.equivalence for one in trade.points if one.equivalence is not None]
+    tests = [point.equivalence for point in trade.points if point.equivalence is not None]
     if not tests:
         return "With one seed, no test of equivalence is possible: give two seeds or more."
     margin, least = f"{100 * tests[0].margin:g} points", min(test.power for test in tests)
@@ -128,24 +128,26 @@ def _draw_rates(ax: Any, trade: SensedTrade) -> None:
     """Draw the rate of each variant less that of the reference, with the interval of its tests and the margin."""
     axes_of(ax, "recognition, trained on the variant, tested on the reference", "points from the reference")
     ax.set_yscale("linear")
-    for k, one in enumerate(trade.points):
-        test = one.equivalence
+    for k, point in enumerate(trade.points):
+        test = point.equivalence
         if test is None:
-            ax.axvline(1e3 * one.seconds, color="0.5", lw=1.0, ls=":", label=f"{one.name} (the reference)")
+            ax.axvline(
+                1e3 * point.seconds, color="0.5", lw=1.0, ls=":", label=f"{point.name} (the reference)"
+            )
             continue
         ends = [
             [100.0 * (test.difference - test.interval[0])],
             [100.0 * (test.interval[1] - test.difference)],
         ]
         ax.errorbar(
-            1e3 * one.seconds,
+            1e3 * point.seconds,
             100.0 * test.difference,
             yerr=ends,
             marker="os^vDP*X"[k % 8],
             color=f"C{k % 10}",
             ms=5,
             capsize=2,
-            label=one.name,
+            label=point.name,
         )
         ax.axhspan(-100.0 * test.margin, 100.0 * test.margin, color="0.93", zorder=0, lw=0)
     ax.legend(fontsize=6.5, loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=2)
@@ -154,13 +156,13 @@ def _draw_rates(ax: Any, trade: SensedTrade) -> None:
 def _draw_distances(ax: Any, trade: SensedTrade) -> None:
     """Draw the upper end of the distance of each feature against time, sorted by time."""
     axes_of(ax, "distance of the distributions, upper end at 95 %", "standard deviations of the reference")
-    points = [one for one in trade.points if one.role != "reference"]
-    features = [one.feature for one in points[0].distances] if points else []
+    points = [point for point in trade.points if point.role != "reference"]
+    features = [distance.feature for distance in points[0].distances] if points else []
     for k, feature in enumerate(features):
-        heights = [max(one.distances[k].upper, LEAST_DISTANCE) for one in points]
+        heights = [max(point.distances[k].upper, LEAST_DISTANCE) for point in points]
         heights = [height if math.isfinite(height) else 1.0 for height in heights]
         ax.plot(
-            [1e3 * one.seconds for one in points],
+            [1e3 * point.seconds for point in points],
             heights,
             "os^vDP*X"[k % 8],
             color=f"C{k}",

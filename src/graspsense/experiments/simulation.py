@@ -154,20 +154,20 @@ def _point(
 ) -> VariantPoint:
     worst: dict[str, float] = {}
     missing = ""
-    for one, true in zip(felt, reference, strict=True):
+    for measured, true in zip(felt, reference, strict=True):
         features = true.features
         for name, unit in zip(features.names, features.units, strict=True):
-            expected, value = features[name], one.features[name]
+            expected, value = features[name], measured.features[name]
             if math.isnan(expected):
                 continue
             error = abs(value - expected) / max(abs(expected), SCALES.get(unit, 1.0))
             if math.isnan(error):
-                missing, error = f"{name} is missing: {one.features.reasons.get(name, '')}", math.inf
+                missing, error = f"{name} is missing: {measured.features.reasons.get(name, '')}", math.inf
             worst[name] = max(worst.get(name, 0.0), error)
-        n = min(len(one.force), len(true.force))
+        n = min(len(measured.force), len(true.force))
         peak = max(float(np.max(true.force, initial=0.0)), SCALES["N"])
-        found = float(np.max(one.force, initial=0.0))
-        off = float(np.sqrt(np.mean((one.force[:n] - true.force[:n]) ** 2))) if n else math.inf
+        found = float(np.max(measured.force, initial=0.0))
+        off = float(np.sqrt(np.mean((measured.force[:n] - true.force[:n]) ** 2))) if n else math.inf
         worst[PEAK] = max(worst.get(PEAK, 0.0), abs(found - float(np.max(true.force, initial=0.0))) / peak)
         worst[TRACE] = max(worst.get(TRACE, 0.0), off / peak)
     failure = missing or ("" if all(map(math.isfinite, worst.values())) else "no number in the force trace")

@@ -118,12 +118,12 @@ class ConditionResult:
         return mean_difference(first, second, self.rate.n, comparisons)
 
     def _over_seeds(self, measured: list[RecognitionRate]) -> OverSeeds:
-        rates = [one.rate for one in measured]
+        rates = [rate.rate for rate in measured]
         single = measured[0]
         if not self.simulated:
             rates = [sum(rates) / len(rates)]
             # The same trials in other folds: the ends of the intervals are averaged as the rates are.
-            intervals = [one.interval for one in measured if one.interval is not None]
+            intervals = [rate.interval for rate in measured if rate.interval is not None]
             if len(intervals) == len(measured):
                 low, high = (sum(ends) / len(ends) for ends in zip(*intervals, strict=True))
                 single = evolve(single, interval=(low, high))
@@ -175,18 +175,20 @@ class Summary:
             "seeds": list(self.planned.seeds),
             "conditions": [
                 {
-                    "case": one.case.name,
-                    "at": dict(one.case.at),
-                    "classifier": one.classifier,
-                    "target": one.target,
-                    "protocol": one.protocol,
-                    "n": one.rate.n,
-                    "rates": {str(seed): rate for seed, rate in one.rates.items()},
-                    "rate": one.rate.mean,
-                    "interval": None if one.rate.interval is None else list(one.rate.interval),
-                    "prediction_interval": None if one.rate.prediction is None else list(one.rate.prediction),
+                    "case": condition.case.name,
+                    "at": dict(condition.case.at),
+                    "classifier": condition.classifier,
+                    "target": condition.target,
+                    "protocol": condition.protocol,
+                    "n": condition.rate.n,
+                    "rates": {str(seed): rate for seed, rate in condition.rates.items()},
+                    "rate": condition.rate.mean,
+                    "interval": None if condition.rate.interval is None else list(condition.rate.interval),
+                    "prediction_interval": None
+                    if condition.rate.prediction is None
+                    else list(condition.rate.prediction),
                 }
-                for one in self.conditions
+                for condition in self.conditions
             ],
             "failed": [{"task": one.name, "reason": one.reason} for one in self.failed],
             "missing": self.missing,

@@ -32,7 +32,7 @@ class TimeLeft:
             return None
         n = len(known)
         mean = sum(known) / n
-        spread = math.sqrt(sum((one - mean) ** 2 for one in known) / (n - 1))
+        spread = math.sqrt(sum((second - mean) ** 2 for second in known) / (n - 1))
         # Both the mean itself and the tasks to come are uncertain.
         error = spread * math.sqrt(rest * rest / n + rest)
         return max(rest * mean - 2 * error, 0.0) / self.workers, (rest * mean + 2 * error) / self.workers

@@ -128,7 +128,11 @@ class DeviceRecord:
     def of(cls, device: DeviceInfo) -> DeviceRecord:
         """Return the record of an open gripper."""
         values = {name: getattr(device, name) for name in cls.__annotations__}
-        arrays = tuple(one for one in device.channels if isinstance(one, TactileArray) and one.name == "pads")
+        arrays = tuple(
+            channel
+            for channel in device.channels
+            if isinstance(channel, TactileArray) and channel.name == "pads"
+        )
         return cls(**{**values, "channels": (*arrays, *further(device.channels))})
 
     @property

@@ -56,6 +56,6 @@ def difference_of_errors(
     first: Sequence[float], second: Sequence[float], instances: Sequence[str] | None
 ) -> Difference:
     """Return the mean absolute error of `first` minus that of `second`, on the same trials, with its 95 % interval."""
-    each = [abs(one) - abs(other) for one, other in zip(first, second, strict=True)]
+    each = [abs(value) - abs(other) for value, other in zip(first, second, strict=True)]
     interval, reason = mean_interval(each, instances)
     return Difference(math.fsum(each) / len(each), interval, reason)

@@ -54,7 +54,7 @@ def doubt_section(sets: SetCoverage, reliability: Reliability) -> Section:
             name = f"labels recognised in less than {100 * sets.asked:.0f} %"
             rows.append(RateRow(name=name, rate=below.rate, interval=below.interval, strong=True))
         rows += [
-            RateRow(name=name, rate=one.rate, interval=one.interval) for name, one in sets.by_label.items()
+            RateRow(name=name, rate=rate.rate, interval=rate.interval) for name, rate in sets.by_label.items()
         ]
         text += (
             f" In held-out grasps the sets contain it in {sets.covered.words}. They have {sets.mean_size:.2f} "

@@ -41,11 +41,15 @@ def channel_figures(trace: Trace, channels: Sequence[Channel]) -> list[str]:
     begin = float(trace.t_s[shown_from(trace)]) if len(trace) else 0.0
     figures = []
     fingers = {
-        one.name: one for one in fingers_of(channels) if isinstance(trace.signals.get(one.name), np.ndarray)
+        finger.name: finger
+        for finger in fingers_of(channels)
+        if isinstance(trace.signals.get(finger.name), np.ndarray)
     }
     if fingers:
         shown = trace.t_s >= begin
-        lines = {without_underscores(one.finger): trace.signals[name][shown] for name, one in fingers.items()}
+        lines = {
+            without_underscores(finger.finger): trace.signals[name][shown] for name, finger in fingers.items()
+        }
         channel = Channel("forces_of_the_fingers", next(iter(fingers.values())).unit)
         figures.append(_figure(trace, channel, trace.t_s[shown] - zero, lines, contact is not None))
     for name, signal in trace.signals.items():

@@ -46,11 +46,14 @@ class Page:
 
     def html(self) -> str:
         """Return the whole file."""
-        links = "".join(f'<li><a href="#{one.id}">{escape(one.title)}</a></li>' for one in self.sections)
+        links = "".join(
+            f'<li><a href="#{section.id}">{escape(section.title)}</a></li>' for section in self.sections
+        )
         sections = "".join(
-            f'<section id="{one.id}" aria-labelledby="{one.id}-h"><h2 id="{one.id}-h">{escape(one.title)}</h2>'
-            f"{one.body}</section>"
-            for one in self.sections
+            f'<section id="{section.id}" aria-labelledby="{section.id}-h">'
+            f'<h2 id="{section.id}-h">{escape(section.title)}</h2>'
+            f"{section.body}</section>"
+            for section in self.sections
         )
         question = f'<p class="question">{inline(self.question)}</p>' if self.question else ""
         kind = f"{self.kind}: {self.title}" if self.headline else self.kind
@@ -91,7 +94,7 @@ def paragraph(text: str, kind: str = "") -> str:
 
 def bullets(items: Sequence[str], kind: str = "") -> str:
     """Return a list of plain texts; an empty text if there are none."""
-    return f"<ul{_class(kind)}>{''.join(f'<li>{inline(one)}</li>' for one in items)}</ul>" if items else ""
+    return f"<ul{_class(kind)}>{''.join(f'<li>{inline(item)}</li>' for item in items)}</ul>" if items else ""
 
 
 def figure(picture: str, caption: str) -> str:
@@ -128,7 +131,7 @@ def table(
     """
     kinds = [' class="n"' if k >= numbers and k not in verdicts else "" for k in range(len(header))]
     head = "".join(
-        f'<th scope="col"{kind}>{escape(one)}</th>' for one, kind in zip(header, kinds, strict=True)
+        f'<th scope="col"{kind}>{escape(name)}</th>' for name, kind in zip(header, kinds, strict=True)
     )
     body = "".join(
         "<tr>"

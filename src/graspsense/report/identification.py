@@ -33,8 +33,8 @@ BINS: Final = 24
 
 def identification_page(result: Identification, scene: str) -> Page:
     """Return the page of an identification; `scene` is the name of the scene file."""
-    relative = [one.residual for one in result.fits]
-    chosen = next(one.terms for one in result.candidates if one.chosen)
+    relative = [fit.residual for fit in result.fits]
+    chosen = next(candidate.terms for candidate in result.candidates if candidate.chosen)
     what = result.label or "the object"
     return Page(
         kind="Identified object",
@@ -69,8 +69,15 @@ def _held_out(errors: Sequence[float]) -> str:
 
 def _parameters(parameters: Sequence[IdentifiedParameter]) -> str:
     rows = [
-        (one.name, f"{one.value:.4g}", _number(one.low), _number(one.high), one.unit, one.basis)
-        for one in parameters
+        (
+            parameter.name,
+            f"{parameter.value:.4g}",
+            _number(parameter.low),
+            _number(parameter.high),
+            parameter.unit,
+            parameter.basis,
+        )
+        for parameter in parameters
     ]
     return table(
         "Values with 90 % intervals", ("parameter", "value", "from", "to", "unit", "the interval is"), rows, 1
@@ -78,14 +85,22 @@ def _parameters(parameters: Sequence[IdentifiedParameter]) -> str:
 
 
 def _undetermined(result: Identification) -> str:
-    rows = [(one.what, one.reason, one.remedy) for one in result.undetermined]
+    rows = [
+        (undetermined.what, undetermined.reason, undetermined.remedy) for undetermined in result.undetermined
+    ]
     return table("What these recordings leave open", ("what", "why", "what would determine it"), rows)
 
 
 def _candidates(result: Identification) -> str:
     rows = [
-        (one.terms, str(one.parameters), _percent(one.error), _percent(one.fit_error), one.verdict)
-        for one in result.candidates
+        (
+            candidate.terms,
+            str(candidate.parameters),
+            _percent(candidate.error),
+            _percent(candidate.fit_error),
+            candidate.verdict,
+        )
+        for candidate in result.candidates
     ]
     note = paragraph(
         "The error is the rms residual over the peak force, of other recordings with a width and a stiffness of their "
@@ -98,7 +113,7 @@ def _candidates(result: Identification) -> str:
 
 def _fits(fits: Sequence[SqueezeFit]) -> str:
     figures = [
-        figure(_fit_picture(one), f"{one.name}: rms {1e3 * one.rms_n:.0f} mN") for one in fits[:MAX_FITS]
+        figure(_fit_picture(fit), f"{fit.name}: rms {1e3 * fit.rms_n:.0f} mN") for fit in fits[:MAX_FITS]
     ]
     left = len(fits) - MAX_FITS
     rest = paragraph(f"{left} more squeezes are not drawn.") if left > 0 else ""
@@ -134,7 +149,7 @@ def _points(
 
 
 def _pairs(result: Identification) -> str:
-    names = [one.name for one in result.parameters if "." in one.name]
+    names = [parameter.name for parameter in result.parameters if "." in parameter.name]
     draws = result.draws
     if draws is None or len(names) < 2 or draws.shape[1] != len(names):
         return paragraph("There is one free parameter, so there are no pairs.")
@@ -159,12 +174,12 @@ def _checks(checks: Sequence[PredictiveCheck]) -> str:
         return paragraph("No squeezes were simulated.")
     rows = [
         (
-            f"{one.statistic}{f', {one.unit}' if one.unit else ''}",
-            f"{np.mean(one.recorded):.4g}",
-            f"{np.quantile(one.simulated, 0.05):.4g} to {np.quantile(one.simulated, 0.95):.4g}",
-            f"{one.p:.2f}",
+            f"{check.statistic}{f', {check.unit}' if check.unit else ''}",
+            f"{np.mean(check.recorded):.4g}",
+            f"{np.quantile(check.simulated, 0.05):.4g} to {np.quantile(check.simulated, 0.95):.4g}",
+            f"{check.p:.2f}",
         )
-        for one in checks
+        for check in checks
     ]
     note = paragraph(
         "New squeezes were simulated on the recorded paths of the gap, of objects drawn from the identified values and "
@@ -172,7 +187,7 @@ def _checks(checks: Sequence[PredictiveCheck]) -> str:
         "does not describe the recordings."
     )
     header = ("statistic", "recorded, mean", "simulated, 90 %", "p")
-    return note + table("Predictive check", header, rows, 1) + panels([_histogram(one) for one in checks])
+    return note + table("Predictive check", header, rows, 1) + panels([_histogram(check) for check in checks])
 
 
 def _histogram(check: PredictiveCheck) -> str:

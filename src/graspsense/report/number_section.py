@@ -86,11 +86,17 @@ def number_section(found: RegressionEvaluation) -> Section:
     return Section(id=f"number-{_identifier(name)}", title=f"Predicted number: {name}", body=body)
 
 
-def _row(key: str, one: RegressionMeasurement) -> tuple[str, ...]:
-    assert one.error is not None
-    interval = one.error.interval
+def _row(key: str, measurement: RegressionMeasurement) -> tuple[str, ...]:
+    assert measurement.error is not None
+    interval = measurement.error.interval
     span = "none" if interval is None else f"{number(interval[0])} to {number(interval[1])}"
-    return (key.replace("_", " "), number(one.error.mean_absolute), span, str(one.error.n), one.what)
+    return (
+        key.replace("_", " "),
+        number(measurement.error.mean_absolute),
+        span,
+        str(measurement.error.n),
+        measurement.what,
+    )
 
 
 def _scatter(found: RegressionEvaluation) -> str:

@@ -27,31 +27,34 @@ def ranking_page(ranking: Ranking, command: str) -> Page:
 
 
 def _rates(ranking: Ranking) -> Section:
-    protocols = list(dict.fromkeys(name for one in ranking.candidates for name in one.rates))
+    protocols = list(dict.fromkeys(name for candidate in ranking.candidates for name in candidate.rates))
     rows = [
         RateRow(
-            name=_name(one),
-            rate=one.rates[ranking.protocol].rate,
-            interval=one.rates[ranking.protocol].interval,
-            strong=one.standing == "best",
+            name=_name(candidate),
+            rate=candidate.rates[ranking.protocol].rate,
+            interval=candidate.rates[ranking.protocol].interval,
+            strong=candidate.standing == "best",
         )
-        for one in ranking.candidates
+        for candidate in ranking.candidates
     ]
     bars = " Bars are 95 % intervals." if any(row.interval for row in rows) else ""
     picture = rates_picture(rows, f"Recognition rates.{bars}")
     text = paragraph(f"Every grasp is classified by {protocol_words(ranking.protocol)}.")
     words = [control_words(name, "") for name in protocols]
-    if any(one.standing == "control" for one in ranking.candidates):
+    if any(candidate.standing == "control" for candidate in ranking.candidates):
         words.append(CONTROLS["before_contact"])
     text += facts(words)
     cells = [
         (
-            one.classifier,
-            _features(one),
-            *(percentage(one.rates[name].rate) if name in one.rates else "" for name in protocols),
-            f"{one.training_s:.2g}",
+            candidate.classifier,
+            _features(candidate),
+            *(
+                percentage(candidate.rates[name].rate) if name in candidate.rates else ""
+                for name in protocols
+            ),
+            f"{candidate.training_s:.2g}",
         )
-        for one in ranking.candidates
+        for candidate in ranking.candidates
     ]
     header = ("classifier", "features", *(control_words(name, "")[0] for name in protocols), "training, s")
     return Section(
@@ -69,9 +72,9 @@ def _differences(ranking: Ranking) -> Section:
         f"below {margin}, worse if it is above zero, else undecided: more grasps could show either."
     )
     rows = [
-        (one.classifier, _features(one), one.loss.points, one.standing)
-        for one in ranking.candidates
-        if one.loss is not None
+        (candidate.classifier, _features(candidate), candidate.loss.points, candidate.standing)
+        for candidate in ranking.candidates
+        if candidate.loss is not None
     ]
     header = ("classifier", "features", "loss (interval), points", "standing")
     body = table(f"Losses against {best.name}", header, rows, verdicts=(3,)) if rows else ""
@@ -79,7 +82,7 @@ def _differences(ranking: Ranking) -> Section:
 
 
 def _sets(ranking: Ranking) -> Section:
-    judged = [one.sets for one in ranking.candidates if one.sets is not None]
+    judged = [candidate.sets for candidate in ranking.candidates if candidate.sets is not None]
     if not judged:
         return Section(id="sets", title="Prediction sets", body=paragraph("Not measured."))
     text = (
@@ -89,18 +92,20 @@ def _sets(ranking: Ranking) -> Section:
         "that is also covered more often; the next column has the other labels."
     )
     rows = []
-    for one in ranking.candidates:
-        sets = one.sets
+    for candidate in ranking.candidates:
+        sets = candidate.sets
         if sets is None:
             continue
         if sets.covered is None or sets.mean_size is None or sets.single is None:
-            rows.append((one.classifier, _features(one), f"not measured: {sets.reason}", "", "", "", ""))
+            rows.append(
+                (candidate.classifier, _features(candidate), f"not measured: {sets.reason}", "", "", "", "")
+            )
             continue
         lowest = min(sets.by_label.items(), key=lambda item: item[1].rate)
         rows.append(
             (
-                one.classifier,
-                _features(one),
+                candidate.classifier,
+                _features(candidate),
                 percentage(sets.covered.rate),
                 "" if sets.covered_below is None else percentage(sets.covered_below.rate),
                 f"{percentage(lowest[1].rate)} ({lowest[0]})",
@@ -129,9 +134,9 @@ def _made_of(ranking: Ranking, command: str) -> Section:
     return Section(id="made", title="Provenance", body=facts(pairs))
 
 
-def _features(one: Candidate) -> str:
-    return "before contact (control)" if one.standing == "control" else one.features
+def _features(candidate: Candidate) -> str:
+    return "before contact (control)" if candidate.standing == "control" else candidate.features
 
 
-def _name(one: Candidate) -> str:
-    return f"{one.classifier}, {_features(one)}"
+def _name(candidate: Candidate) -> str:
+    return f"{candidate.classifier}, {_features(candidate)}"

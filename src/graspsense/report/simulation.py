@@ -64,14 +64,16 @@ def simulation_rows(trade: SimulationTrade) -> tuple[tuple[str, ...], list[tuple
     """Return the header and the rows of the table: time, set-up and the largest error of each quantity."""
     header = (*HEADER, *(name.upper() for name in trade.quantities), "")
     rows = []
-    for one in trade.points:
-        errors = [_short(one.errors.get(name, math.nan)) for name in trade.quantities]
-        note = one.failure or {
+    for point in trade.points:
+        errors = [_short(point.errors.get(name, math.nan)) for name in trade.quantities]
+        note = point.failure or {
             "reference": "the reference",
             "floor": "the remaining error is that of the model",
-        }.get(one.role, "")
-        seconds, setup = (f"{v:.3g}" if math.isfinite(v) else "-" for v in (1e3 * one.seconds, one.setup_s))
-        rows.append((one.method, one.fidelity, one.step, seconds, setup, *errors, note))
+        }.get(point.role, "")
+        seconds, setup = (
+            f"{v:.3g}" if math.isfinite(v) else "-" for v in (1e3 * point.seconds, point.setup_s)
+        )
+        rows.append((point.method, point.fidelity, point.step, seconds, setup, *errors, note))
     return header, rows
 
 

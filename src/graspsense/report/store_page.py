@@ -251,8 +251,8 @@ def _provenance(
     pairs = [
         ("store", folder),
         ("trials", f"{total}, the newest made {listed[0].made_at}"),
-        ("grippers", ", ".join(sorted({one.device for one in listed}))),
-        ("simulated", f"{sum(one.simulated for one in listed)} of the newest {len(listed)}"),
+        ("grippers", ", ".join(sorted({summary.device for summary in listed}))),
+        ("simulated", f"{sum(summary.simulated for summary in listed)} of the newest {len(listed)}"),
         ("machine", f"{made.get('host', '?')}, {made.get('system', '?')}"),
         ("code", f"graspsense {made.get('graspsense', '?')}, commit {commit_text(made)}"),
         *((f"component {name}", str(one)) for name, one in (made.get("components") or {}).items()),
@@ -267,8 +267,15 @@ def _provenance(
         for count in counts
     ]
     rows = [
-        (str(one.id), one.made_at, one.label or "", one.instance or "", one.outcome, one.set_aside or "")
-        for one in listed
+        (
+            str(summary.id),
+            summary.made_at,
+            summary.label or "",
+            summary.instance or "",
+            summary.outcome,
+            summary.set_aside or "",
+        )
+        for summary in listed
     ]
     newest = f"The newest {len(rows)} of {counted(total, 'trial')}" if total > len(rows) else "All trials"
     header = ("trial", "made", "label", "instance", "outcome", "set aside")
@@ -286,6 +293,6 @@ def _changes(changes: Sequence[Change]) -> str:
     """Return the table of labels that were changed and of trials that were set aside or brought back."""
     if not changes:
         return ""
-    rows = [(str(one.trial), one.made_at or "unknown", one.words, one.why) for one in changes]
+    rows = [(str(change.trial), change.made_at or "unknown", change.words, change.why) for change in changes]
     title = f"Changes after recording: {len(rows)}"
     return folded(title, table(title, ("trial", "when", "change", "why"), rows))

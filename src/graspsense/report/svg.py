@@ -52,7 +52,7 @@ class AxisScale:
 
 def reaching(values: Sequence[float], start: float, end: float, *, zero: bool = False) -> AxisScale:
     """Return a scale that shows all of these values, and also zero if `zero` is set."""
-    known = [one for one in values if math.isfinite(one)] or [0.0, 1.0]
+    known = [value for value in values if math.isfinite(value)] or [0.0, 1.0]
     low, high = min(known), max(known)
     if zero:
         low, high = min(low, 0.0), max(high, 0.0)

@@ -104,9 +104,9 @@ def draw_trace(trace: Trace, force: Any, gap: Any, fingers: Sequence[FingerForce
     t = trace.t_s[start:] - zero
     force.plot(t, trace.force_left_n[start:], color=LEFT, lw=1.6, label="left pad")
     force.plot(t, trace.force_right_n[start:], color=RIGHT, lw=1.6, ls="--", label="right pad")
-    for k, one in enumerate(fingers):
-        label = without_underscores(one.finger)
-        force.plot(t, trace.signals[one.name][start:], color=f"C{k + 2}", lw=0.8, label=label)
+    for k, finger in enumerate(fingers):
+        label = without_underscores(finger.finger)
+        force.plot(t, trace.signals[finger.name][start:], color=f"C{k + 2}", lw=0.8, label=label)
     force.set_ylabel(f"force, {trace.units['force_left']}")
     # Noise alone does not fill the axis.
     force.set_ylim(top=max(force.get_ylim()[1], 1.0))

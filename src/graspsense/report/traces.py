@@ -181,9 +181,9 @@ def feature_meanings(names: Sequence[str]) -> dict[str, str]:
     """
     sets = sorted(
         installed().feature_sets(),
-        key=lambda one: set(names) <= {feature.name for feature in one.features or ()},
+        key=lambda label_set: set(names) <= {feature.name for feature in label_set.features or ()},
     )
-    return {feature.name: feature.meaning for one in sets for feature in one.features or ()}
+    return {feature.name: feature.meaning for label_set in sets for feature in label_set.features or ()}
 
 
 def features_table(caption: str, features: Sequence[tuple[str, str]], values: Sequence[float | None]) -> str:

@@ -152,8 +152,8 @@ def words_of(name: str, roles: Sequence[str]) -> dict[str, str]:
         "import_effort": "    EFFORT,\n" if kind == "effort" else "",
         "import_velocity": "    VELOCITY,\n" if kind == "velocity" else "",
         "command": command,
-        "needs": "".join(f', "{one}"' for one in needs),
-        "tests": ", ".join(f'"{one}"' for one in tests),
+        "needs": "".join(f', "{fromkey}"' for fromkey in needs),
+        "tests": ", ".join(f'"{test}"' for test in tests),
         "core": _compatible(__version__),
         "imports": _imports([*sorted(entries), "hookimpl"]),
     }
@@ -281,11 +281,12 @@ def _check_importable(name: str) -> None:
 def _check_free(kind: ScaffoldKind, part: str, name: str) -> None:
     if kind.role is None:
         return
-    taken = [one for one in installed().components(kind.role) if one.name == part]
-    for one in taken:
-        if one.distribution != name:
+    taken = [component for component in installed().components(kind.role) if component.name == part]
+    for component in taken:
+        if component.distribution != name:
             raise ConfigError(
-                f"the {kind.role.replace('-', ' ')} name {part!r} is taken by {one.qualified}: choose another name"
+                f"the {kind.role.replace('-', ' ')} name {part!r} is taken by {component.qualified}: choose another "
+                "name"
             )
 
 

@@ -60,20 +60,20 @@ def channel_facts(
 
 def together(parts: Sequence[ChannelFacts]) -> ChannelFacts:
     """Return the facts of the same channel in several recordings: the extremes, and the median rate."""
-    rates = [one.rate_hz for one in parts if one.rate_hz is not None]
+    rates = [part.rate_hz for part in parts if part.rate_hz is not None]
     return ChannelFacts(
         name=parts[0].name,
         unit=parts[0].unit,
-        samples=sum(one.samples for one in parts),
-        missing=sum(one.missing for one in parts),
-        low=min((one.low for one in parts if one.low is not None), default=None),
-        high=max((one.high for one in parts if one.high is not None), default=None),
-        resolution=min((one.resolution for one in parts if one.resolution is not None), default=None),
+        samples=sum(part.samples for part in parts),
+        missing=sum(part.missing for part in parts),
+        low=min((part.low for part in parts if part.low is not None), default=None),
+        high=max((part.high for part in parts if part.high is not None), default=None),
+        resolution=min((part.resolution for part in parts if part.resolution is not None), default=None),
         rate_hz=float(np.median(rates)) if rates else None,
         longest_gap_s=max(
-            (one.longest_gap_s for one in parts if one.longest_gap_s is not None), default=None
+            (part.longest_gap_s for part in parts if part.longest_gap_s is not None), default=None
         ),
-        age_s=max((one.age_s for one in parts if one.age_s is not None), default=None),
+        age_s=max((part.age_s for part in parts if part.age_s is not None), default=None),
     )
 
 

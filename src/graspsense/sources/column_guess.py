@@ -192,7 +192,7 @@ def _gap(table: ColumnTable, names: Sequence[str], force: Numbers | None) -> Gue
 
 
 def _effort(table: ColumnTable, force: Numbers | None) -> Iterator[Guess]:
-    name = next((one for one in table.numbers if EFFORT_WORDS & set(words_of(one))), None)
+    name = next((number for number in table.numbers if EFFORT_WORDS & set(words_of(number))), None)
     if name is None or force is None or table.numbers[name].ndim > 1:
         return
     values = table.numbers[name]

@@ -30,12 +30,12 @@ _handed: dict[str, Recording] = {}
 
 def datasets_with_recordings() -> tuple[str, ...]:
     """Return the names of the installed data sets that have recordings."""
-    return tuple(one.name for one in installed().datasets() if one.entry.recordings)
+    return tuple(dataset.name for dataset in installed().datasets() if dataset.entry.recordings)
 
 
 def datasets_to_write() -> tuple[str, ...]:
     """Return the names of the installed data sets that trials can be written as."""
-    return tuple(one.name for one in installed().datasets() if one.entry.export)
+    return tuple(dataset.name for dataset in installed().datasets() if dataset.entry.export)
 
 
 def write_dataset(kind: str, place: str, store: str) -> dict[str, int]:
@@ -83,16 +83,16 @@ def recordings_of(
         yield UnreadableRecording(source=f"{kind}:{place}, behind recording {number}", error=error)
 
 
-def _checked(one: LabelledRecording | UnreadableRecording) -> LabelledRecording | UnreadableRecording:
+def _checked(recording: LabelledRecording | UnreadableRecording) -> LabelledRecording | UnreadableRecording:
     """Return the recording with all that looks wrong in it, or why it cannot be used."""
-    if isinstance(one, UnreadableRecording):
-        return one
+    if isinstance(recording, UnreadableRecording):
+        return recording
     try:
-        with readable(one.source):
-            check_recording(one.recording)
-            return with_notices(one)
+        with readable(recording.source):
+            check_recording(recording.recording)
+            return with_notices(recording)
     except GraspsenseError as error:
-        return UnreadableRecording(source=str(one.source), error=error)
+        return UnreadableRecording(source=str(recording.source), error=error)
 
 
 @contextmanager

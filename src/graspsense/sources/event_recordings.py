@@ -109,12 +109,14 @@ def check_detector(controller: Controller[Any], recordings: tuple[Recording, ...
         raise ConfigError(
             f"{law.__name__} tells no events, so it cannot be scored: choose another controller.type"
         )
-    for one in recordings:
-        own = {channel.name for channel in one.channels}
-        no_gap = ("gap", "velocity") if one.units.get("gap") == NO_GAP else ()
+    for recording in recordings:
+        own = {channel.name for channel in recording.channels}
+        no_gap = ("gap", "velocity") if recording.units.get("gap") == NO_GAP else ()
         absent = [c.name for c in law.requires if c.name in no_gap or c.name not in (*CHANNELS, *own)]
         if absent:
-            raise ConfigError(f"{law.__name__} reads {listed(absent)}, and {one.name} has no such channel")
+            raise ConfigError(
+                f"{law.__name__} reads {listed(absent)}, and {recording.name} has no such channel"
+            )
 
 
 @frozen(eq=False)
@@ -165,11 +167,11 @@ def threshold_factor(recordings: tuple[Recording, ...]) -> float:
 
     For another unit it is a power of ten, by which the median range of the force becomes about 10.
     """
-    if not any("force_left" in one.units for one in recordings):
+    if not any("force_left" in recording.units for recording in recordings):
         return 1.0
     ranges = []
-    for one in recordings:
-        forces = [reading.frame.force_left_n for reading in one.readings]
+    for recording in recordings:
+        forces = [reading.frame.force_left_n for reading in recording.readings]
         ranges.append(max(forces) - min(forces))
     middle = sorted(ranges)[len(ranges) // 2]
     return float(10.0 ** (round(math.log10(middle)) - 1)) if middle > 0.0 else 1.0

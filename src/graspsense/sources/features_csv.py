@@ -164,7 +164,7 @@ def _labels(columns: CsvColumns, label: str | None, notes: list[str]) -> list[st
             f"which column of {columns.path} holds the label? Name it: {option('label', 'COLUMN')}"
         )
     written = columns.complete_column(label, "the label")
-    labels = [label_text(one) for one in written]
+    labels = [label_text(name) for name in written]
     if words := sorted({one for one in labels if is_missing(one)}):
         notes.append(f"taken as labels, not as missing ones: {listed(words)}")
     if len(set(written)) > len(set(labels)):
@@ -247,7 +247,7 @@ def _feature_table(
     for name in names:
         if name in reserved:
             raise ConfigError(f"{name!r} cannot be a feature: it is the label, the instance or the order")
-    table = columns.table([one for name in names for one in columns.columns_of(name)])
+    table = columns.table([column for name in names for column in columns.columns_of(name)])
     for name in features:
         if name in columns.cells and (why := identified(name)):
             notes.append(f"{name} is used, although its values {why}: it may reveal the labels")

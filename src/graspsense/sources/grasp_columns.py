@@ -125,7 +125,7 @@ class GraspColumns:
 def finger_sides(fingers: Sequence[FingerForce], forces: Mapping[str, Numbers]) -> tuple[Numbers, Numbers]:
     """Return `left_n` and `right_n` of a hand from the force of each finger, by the rule of its fingers."""
     forces_of = opposed_forces(fingers)
-    rows = np.column_stack([forces[one.name] for one in fingers]).tolist()
+    rows = np.column_stack([forces[finger.name] for finger in fingers]).tolist()
     left, right = np.array([forces_of(row) for row in rows], dtype=np.float64).reshape(-1, 2).T
     return left, right
 
@@ -231,9 +231,9 @@ def _check_lengths(columns: GraspColumns) -> None:
         if len(values) != rows:
             of = f"`times` has {rows} for it" if name in columns.times else f"t_s has {rows}"
             raise DataDamaged(f"{columns.source}: {name!r} has {len(values)} samples, and {of}")
-    for one in columns.fingers:
-        if one.name not in columns.scalars:
-            raise DataDamaged(f"{columns.source}: `fingers` names {one.name!r}, which is not in `scalars`")
+    for finger in columns.fingers:
+        if finger.name not in columns.scalars:
+            raise DataDamaged(f"{columns.source}: `fingers` names {finger.name!r}, which is not in `scalars`")
     for name in sorted(columns.fast - columns.arrays.keys()):
         raise DataDamaged(f"{columns.source}: `fast` names {name!r}, which is not in `arrays`")
     for name, values in columns.arrays.items():
@@ -374,7 +374,7 @@ def _units(units: Mapping[str, str]) -> dict[str, str]:
 
 
 def _channels(columns: GraspColumns) -> tuple[Channel, ...]:
-    fingers = {one.name: one for one in columns.fingers}
+    fingers = {finger.name: finger for finger in columns.fingers}
     scalars = [fingers.get(name) or Channel(name, columns.units.get(name, "1")) for name in columns.scalars]
     return (*scalars, *(_array(columns, name, values) for name, values in columns.arrays.items()))
 

@@ -67,7 +67,7 @@ def read_dataset(folder: str, features: FeatureSet[Any], *, unreliable: bool = F
         raise error_of_all(unreadable)
     recordings = [recording_of(grasp, path.name) for (path, *_), grasp in zip(paths, grasps, strict=True)]
     check_recording(recorded_channels(recordings[0]), f"icub:{folder}", features)
-    table = table_of([features.extract(trace_of_recording(one)) for one in recordings])
+    table = table_of([features.extract(trace_of_recording(recording)) for recording in recordings])
     notes = [
         "the data of the iCub hand have no time stamps: times are frame numbers (delta_t is in frames)",
         "metres and newtons are nominal, and relative to the first frame (docs/icub.md)",
@@ -178,7 +178,10 @@ def _first_frame(grasps: list[IcubGrasp]) -> FeatureTable:
     maxima = [f"{finger}_maximum" for finger in FINGERS]
     taxels = [f"{finger}_{k + 1}" for finger in FINGERS for k in range(12)]
     values = np.array(
-        [np.concatenate((one.encoders_deg[0], one.maxima[0], one.taxels[0].ravel())) for one in grasps]
+        [
+            np.concatenate((grasp.encoders_deg[0], grasp.maxima[0], grasp.taxels[0].ravel()))
+            for grasp in grasps
+        ]
     )
     names = (*joints, *maxima, *taxels)
     return FeatureTable(names=names, units=("deg",) * 9 + ("counts",) * 65, values=values)

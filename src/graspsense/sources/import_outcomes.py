@@ -28,10 +28,10 @@ def outcomes_of(
 ) -> Counter[Outcome]:
     """Return how many of some recordings, evenly spread, end in which way."""
     found: Counter[Outcome] = Counter()
-    for one in recordings[:: -(-len(recordings) // MOST)]:
-        with handed_over(one.name, one.labelled.recording):
+    for recording in recordings[:: -(-len(recordings) // MOST)]:
+        with handed_over(recording.name, recording.labelled.recording):
             try:
-                found[grasp_with(settings_of(one), installed()).outcome] += 1
+                found[grasp_with(settings_of(recording), installed()).outcome] += 1
             except GraspsenseError:  # which the import itself reports
                 continue
     return found
@@ -58,7 +58,9 @@ def refuse_useless(
 
 def _refuse_below_zero(recordings: Sequence[ImportedRecording]) -> None:
     """Raise ConfigError if the forces of most recordings are below zero throughout."""
-    frames = [[reading.frame for reading in one.labelled.recording.readings] for one in recordings]
+    frames = [
+        [reading.frame for reading in recording.labelled.recording.readings] for recording in recordings
+    ]
     below = sum(
         max((min(each.force_left_n, each.force_right_n) for each in grasp), default=0.0) < 0.0
         for grasp in frames

@@ -71,29 +71,33 @@ def summary_of(recordings: Sequence[LabelledRecording]) -> ImportSummary:
     """Return the summary of at least one recording."""
     by_label: dict[str, list[LabelledRecording]] = {}
     notices: dict[str, int] = {}
-    for one in recordings:
-        by_label.setdefault(one.label, []).append(one)
-        for notice in one.notices:
+    for recording in recordings:
+        by_label.setdefault(recording.label, []).append(recording)
+        for notice in recording.notices:
             notices[notice] = notices.get(notice, 0) + 1
     first = recordings[0].recording
-    times = sorted(one.recorded_at for one in recordings)
+    times = sorted(recording.recorded_at for recording in recordings)
     return ImportSummary(
         grasps=len(recordings),
         labels=tuple(_label(label, some) for label, some in sorted(by_label.items())),
         units=dict(first.units),
-        channels=tuple(f"{one.name} [{one.unit}]" for one in further(first.channels)),
-        values=tuple(dict.fromkeys(name for one in recordings for name in one.values)),
+        channels=tuple(f"{channel.name} [{channel.unit}]" for channel in further(first.channels)),
+        values=tuple(dict.fromkeys(name for recording in recordings for name in recording.values)),
         recorded=(times[0], times[-1]) if times[0] else None,
         notes=first.notes,
-        notices=tuple(sorted(notices.items(), key=lambda one: -one[1])),
-        measured=_measured([one.recording for one in recordings]),
+        notices=tuple(sorted(notices.items(), key=lambda item: -item[1])),
+        measured=_measured([recording.recording for recording in recordings]),
     )
 
 
 def _measured(recordings: Sequence[Recording]) -> tuple[ChannelFacts, ...]:
     parts: dict[str, list[ChannelFacts]] = {}
     for recording in recordings:
-        units = {**SI_UNITS, **recording.units, **{one.name: one.unit for one in recording.channels}}
+        units = {
+            **SI_UNITS,
+            **recording.units,
+            **{channel.name: channel.unit for channel in recording.channels},
+        }
         t_s = np.array([reading.frame.t_s for reading in recording.readings])
         for name, values, new in _series(recording):
             facts = channel_facts(name, units.get(name, "1"), values, t_s[new])
@@ -112,31 +116,31 @@ def _series(recording: Recording) -> Iterator[tuple[str, Numbers, Any]]:
     for channel in further(recording.channels):
         values = [getattr(reading.signals, channel.name) for reading in recording.readings]
         if isinstance(values[0], Image) and dtype_of(values[0]) != FLOATS:
-            counters = np.array([0, *(one.counter for one in values)])
+            counters = np.array([0, *(value.counter for value in values)])
             new = np.flatnonzero(np.diff(counters))
             if len(new):
                 yield channel.name, np.array([values[k].cells for k in new]), new
         elif isinstance(values[0], Image):
-            yield channel.name, np.array([one.cells for one in values], dtype=np.float64), every
+            yield channel.name, np.array([value.cells for value in values], dtype=np.float64), every
         elif not isinstance(values[0], Samples):
             yield channel.name, np.array(values, dtype=np.float64), every
 
 
 def _label(label: str, recordings: Sequence[LabelledRecording]) -> LabelSummary:
-    instances = {one.instance for one in recordings}
+    instances = {recording.instance for recording in recordings}
     frames = np.array(
         [
             (frame.gap_m, frame.force_left_n, frame.force_right_n)
-            for one in recordings
-            for frame, *_ in one.recording.readings
+            for recording in recordings
+            for frame, *_ in recording.recording.readings
         ]
     )
     return LabelSummary(
         label=label,
         grasps=len(recordings),
         instances=None if "" in instances else len(instances),
-        samples=_range([len(one.recording.readings) for one in recordings]),
-        rate_hz=_range([one.recording.rate_hz for one in recordings]),
+        samples=_range([len(recording.recording.readings) for recording in recordings]),
+        rate_hz=_range([recording.recording.rate_hz for recording in recordings]),
         gap=_range(frames[:, 0]),
         left=_range(frames[:, 1]),
         right=_range(frames[:, 2]),

@@ -163,7 +163,7 @@ def _named_files(path: str, folders: tuple[str, ...], found: set[str]) -> set[st
         return found  # the task tells it
     folder = os.path.dirname(path)
     folders += (folder, *(place for text in texts if os.path.isdir(place := os.path.join(folder, text))))
-    for place in sorted({os.path.join(one, text) for one in folders for text in texts} - found - {path}):
+    for place in sorted({os.path.join(name, text) for name in folders for text in texts} - found - {path}):
         if os.path.isfile(place):
             found.add(place)
             _named_files(place, folders, found)

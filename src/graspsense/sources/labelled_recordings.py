@@ -46,22 +46,22 @@ def labelled_recordings(
     unreadable: list[UnreadableRecording] = []
     unlabelled = 0
     read = list(readable_or_not(kind, place))
-    known = [one.recording for one in read if isinstance(one, LabelledRecording)]
+    known = [recording.recording for recording in read if isinstance(recording, LabelledRecording)]
     fitted, threshold_notes = _fitted(features, known)
     features = with_checkpoints(fitted, checkpoints_s)
-    for one in read:
-        if isinstance(one, UnreadableRecording):
-            unreadable.append(one)
-        elif not one.label:
+    for recording in read:
+        if isinstance(recording, UnreadableRecording):
+            unreadable.append(recording)
+        elif not recording.label:
             unlabelled += 1
         else:
-            for found in each_readable(one.source, partial(_features_of, one, features)):
+            for found in each_readable(recording.source, partial(_features_of, recording, features)):
                 if isinstance(found, UnreadableRecording):
                     unreadable.append(found)
                     continue
                 rows.append(found[0])
                 before.append(found[1])
-                facts.append(one)
+                facts.append(recording)
     if unreadable and not facts:
         raise error_of_all(unreadable)
     if not facts:
@@ -69,22 +69,22 @@ def labelled_recordings(
     table = table_of(rows)
     notes = note_on(unreadable, len(facts) + len(unreadable) + unlabelled)
     notes += [f"{counted(unlabelled, 'recording')} left out: no label"] if unlabelled else []
-    notes += [*_counted(one.notices for one in facts), *threshold_notes]
-    units = {unit for one in facts for unit in one.recording.units.values()}
+    notes += [*_counted(fact.notices for fact in facts), *threshold_notes]
+    units = {unit for fact in facts for unit in fact.recording.units.values()}
     if units:
         notes.append(f"units that are not SI units: {', '.join(sorted(units))}")
     order = _order(facts)
     return Labelled(
         source=f"{kind}:{place}",
         table=table,
-        labels=tuple(one.label for one in facts),
-        instances=tuple(f"{class_of(one.label)}#{one.instance}" for one in facts)
-        if all(one.instance for one in facts)
+        labels=tuple(fact.label for fact in facts),
+        instances=tuple(f"{class_of(fact.label)}#{fact.instance}" for fact in facts)
+        if all(fact.instance for fact in facts)
         else None,
         no_instances="the data set does not say which trials are of the same object",
         order=order,
         no_order="" if order is not None else "the data set does not say when each trial was recorded",
-        content=tuple(map(str, grasp_numbers([curve_bytes(one.recording.readings) for one in facts]))),
+        content=tuple(map(str, grasp_numbers([curve_bytes(fact.recording.readings) for fact in facts]))),
         **_controls(table, before, facts),
         notes=tuple(notes),
         provenance={"simulated": False},
@@ -93,7 +93,7 @@ def labelled_recordings(
 
 def _fitted(features: FeatureSet[Any], recordings: Sequence[Recording]) -> tuple[FeatureSet[Any], list[str]]:
     """Return the features with thresholds from recordings in other units than SI, where they have the defaults."""
-    if not any({"gap", "force_left"} & one.units.keys() for one in recordings):
+    if not any({"gap", "force_left"} & recording.units.keys() for recording in recordings):
         return features, []
     config, default = features.config, type(features.config)()
     keys = [key for key in THRESHOLDS if hasattr(config, key)]
@@ -107,10 +107,10 @@ def _fitted(features: FeatureSet[Any], recordings: Sequence[Recording]) -> tuple
     return (type(features)(evolve(config, **chosen)), [found.words]) if chosen else (features, [])
 
 
-def _features_of(one: LabelledRecording, features: FeatureSet[Any]) -> tuple[tuple[Features, Features]]:
+def _features_of(recording: LabelledRecording, features: FeatureSet[Any]) -> tuple[tuple[Features, Features]]:
     """Return the features of a recording, and those from before contact. Raises WiringError if it lacks a channel."""
-    check_recording(recorded_channels(one.recording), one.source, features)
-    trace = trace_of_recording(one.recording)
+    check_recording(recorded_channels(recording.recording), recording.source, features)
+    trace = trace_of_recording(recording.recording)
     try:
         extracted = features.extract(trace)
     except (GraspsenseError, MemoryError):
@@ -142,10 +142,10 @@ def trace_of_recording(recording: Recording) -> Trace:
 def _order(facts: Sequence[LabelledRecording]) -> tuple[int, ...] | None:
     """Return the rank of each trial by its time of recording, or else by its number; None if neither is known."""
     keys: list[Any]
-    if all(one.recorded_at for one in facts):
-        keys = [one.recorded_at for one in facts]
-    elif all(one.order is not None for one in facts):
-        keys = [one.order for one in facts]
+    if all(fact.recorded_at for fact in facts):
+        keys = [fact.recorded_at for fact in facts]
+    elif all(fact.order is not None for fact in facts):
+        keys = [fact.order for fact in facts]
     else:
         return None
     ranks = {key: rank for rank, key in enumerate(sorted(set(keys)))}
@@ -154,7 +154,7 @@ def _order(facts: Sequence[LabelledRecording]) -> tuple[int, ...] | None:
 
 def _first_lines(facts: Sequence[LabelledRecording]) -> FeatureTable:
     """Return the numbers of the first frame of each recording."""
-    values = np.array([numbers_of(one.recording.readings[0].frame) for one in facts], dtype=np.float64)
+    values = np.array([numbers_of(fact.recording.readings[0].frame) for fact in facts], dtype=np.float64)
     values[np.isinf(values)] = np.nan
     return FeatureTable(names=NAMES, units=UNITS, values=values)
 
@@ -166,13 +166,13 @@ def _controls(
         table, table_of(before), before_missing=_why_missing(before), first_line=_first_lines(facts)
     )
     return without_constant_gap(
-        found, ([reading.frame.gap_m for reading in one.recording.readings] for one in facts)
+        found, ([reading.frame.gap_m for reading in fact.recording.readings] for fact in facts)
     )
 
 
 def _why_missing(before: Sequence[Features]) -> str:
     """Return why trials have no features from before contact, empty if all have them."""
-    return next((reason for one in before for reason in one.reasons.values()), "")
+    return next((reason for features in before for reason in features.reasons.values()), "")
 
 
 def _counted(notices: Any) -> list[str]:

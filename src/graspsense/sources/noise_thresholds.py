@@ -98,11 +98,11 @@ def thresholds_for(
     Recordings in other units than most are left out; those of a data set that counts time in frames, whose metres and
     newtons are nominal, keep the defaults.
     """
-    long_enough = [one for one in recordings if len(one.readings) > _FEW]
+    long_enough = [recording for recording in recordings if len(recording.readings) > _FEW]
     if not long_enough:
         return Thresholds(settings={}, words="thresholds of contact and rest: the defaults")
-    units = Counter(tuple(sorted(one.units.items())) for one in long_enough).most_common(1)[0][0]
-    used = [one for one in long_enough if tuple(sorted(one.units.items())) == units]
+    units = Counter(tuple(sorted(recording.units.items())) for recording in long_enough).most_common(1)[0][0]
+    used = [recording for recording in long_enough if tuple(sorted(recording.units.items())) == units]
     scale = _Scale.of(dict(units))
     if scale.is_nominal:
         return Thresholds(settings={}, words="thresholds of contact and rest: the defaults")
@@ -222,9 +222,9 @@ class _Noise:
 def _contact_force(measured: Sequence[_Noise], scale: _Scale) -> tuple[dict[str, float], str]:
     """Return the contact threshold if the default does not fit, and why."""
     si = scale.force == "N"
-    base = float(np.median([one.baseline for one in measured]))
-    needed = float(np.quantile([one.free_force for one in measured], 0.9))
-    peaks = [one.peak_force for one in measured]
+    base = float(np.median([noise.baseline for noise in measured]))
+    needed = float(np.quantile([noise.free_force for noise in measured], 0.9))
+    peaks = [noise.peak_force for noise in measured]
     if si and needed <= CONTACT_FORCE_N <= float(np.quantile(peaks, 1.0 - _REACHING, method="lower")):
         return {}, ""
     # Nine of ten recordings must reach the threshold by a factor of two.
@@ -234,7 +234,7 @@ def _contact_force(measured: Sequence[_Noise], scale: _Scale) -> tuple[dict[str,
     above = max(needed - base, min(typical, most), _LEAST_FORCE_N if si else 0.0)
     chosen = base + (min(_rounded_up(above), _MOST_FORCE_N) if si else _rounded_up(above))
     if not si and chosen > float(np.quantile(peaks, 1.0 - _REACHING, method="lower")):
-        chosen = max(_rounded_down(min(one.baseline for one in measured)), _LEAST_FORCE_N)
+        chosen = max(_rounded_down(min(noise.baseline for noise in measured)), _LEAST_FORCE_N)
         return {"controller.contact_force_n": chosen}, (
             f"contact_force_n {chosen:g} {scale.force}, so that recordings are in contact from the beginning (their "
             "forces at the beginning differ by more than they grow later; if the fingers were free then, write zero)"
@@ -310,14 +310,14 @@ def _window(needed: float, least: float, scale: _Scale) -> float:
 
 def _never(measured: Sequence[_Noise]) -> dict[str, float]:
     """Return a window that no recording is long enough for: a gap that was not recorded shows no rest."""
-    longest = max(float(one.times[-1] - one.times[0]) for one in measured)
+    longest = max(float(noise.times[-1] - noise.times[0]) for noise in measured)
     return {"controller.rest_window_s": _rounded_up(2.0 * longest)}
 
 
 def _ends(measured: Sequence[_Noise], scale: _Scale, contact: float) -> tuple[dict[str, float], str]:
     """Return what keeps a recorded squeeze from being taken for one that failed, and why."""
-    least = min(float(np.fmin.reduce(one.gap)) for one in measured)
-    span = max(float(np.fmax.reduce(one.gap)) for one in measured) - least
+    least = min(float(np.fmin.reduce(noise.gap)) for noise in measured)
+    span = max(float(np.fmax.reduce(noise.gap)) for noise in measured) - least
     chosen: dict[str, float] = {}
     if scale.gap != "m":
         chosen = {
@@ -331,9 +331,9 @@ def _ends(measured: Sequence[_Noise], scale: _Scale, contact: float) -> tuple[di
             else f"nothing is too wide, closed or crushed by a gap in {scale.gap}"
         )
     else:
-        travels = [_travel(one, contact) for one in measured]
+        travels = [_travel(noise, contact) for noise in measured]
         close = sum(travel < _SOON_M for travel in travels)
-        thin = sum(_is_thin(one, contact) for one in measured)
+        thin = sum(_is_thin(noise, contact) for noise in measured)
         parts = []
         if close:
             grown = -min(0.0, *travels)
@@ -350,19 +350,19 @@ def _ends(measured: Sequence[_Noise], scale: _Scale, contact: float) -> tuple[di
                 f"pads feel an object in a gap of {_CLOSED_M * 1e3:g} mm or less)"
             )
         words = "; ".join(parts)
-        if not any(float(np.ptp(one.gap)) > 0.0 for one in measured):
+        if not any(float(np.ptp(noise.gap)) > 0.0 for noise in measured):
             words = "the gap does not change, so nothing is too wide or closed by it"
     if scale.t != "s":
-        duration = float(np.median([one.times[-1] - one.times[0] for one in measured]))
+        duration = float(np.median([noise.times[-1] - noise.times[0] for noise in measured]))
         chosen["controller.slip_time_s"] = max(_SLIP_SHARE * duration, 1.0)
     return chosen, words
 
 
 def _seen(measured: Sequence[_Noise], scale: _Scale) -> str:
     """Return in words how finely the gap was measured."""
-    step = float(np.quantile([one.step for one in measured], 0.9))
-    period = float(np.quantile([one.period for one in measured], 0.9))
-    sampled = float(np.median([one.sampled for one in measured]))
+    step = float(np.quantile([noise.step for noise in measured], 0.9))
+    period = float(np.quantile([noise.period for noise in measured], 0.9))
+    sampled = float(np.median([noise.sampled for noise in measured]))
     unit = "ms" if scale.t == "s" else scale.t
     factor = 1e3 if scale.t == "s" else 1.0
     words = f"; samples are {factor * sampled:.3g} {unit} apart"
@@ -379,7 +379,9 @@ def _timeouts(
     recordings: Sequence[Recording], timeouts_s: Mapping[str, float], scale: _Scale
 ) -> tuple[dict[str, float], str]:
     """Return the time-outs that are shorter than a recording, extended to the longest one, and why."""
-    longest = max(one.readings[-1].frame.t_s - one.readings[0].frame.t_s for one in recordings)
+    longest = max(
+        recording.readings[-1].frame.t_s - recording.readings[0].frame.t_s for recording in recordings
+    )
     limit = min(_rounded_up(longest), _MOST_TIMEOUT_S) if scale.t == "s" else _rounded_up(longest)
     chosen = {f"controller.{key}": limit for key, value in timeouts_s.items() if value < longest}
     if not chosen:
@@ -388,15 +390,15 @@ def _timeouts(
     return chosen, f"{keys} {limit:g} {scale.t} (recordings last up to {longest:.3g} {scale.t})"
 
 
-def _travel(one: _Noise, contact: float) -> float:
+def _travel(noise: _Noise, contact: float) -> float:
     """Return how far the gap has closed when both pads touch; infinite if never, or from the first sample on."""
-    touched = np.flatnonzero(one.both >= contact)
-    return float(one.gap[0] - one.gap[touched[0]]) if len(touched) and touched[0] else math.inf
+    touched = np.flatnonzero(noise.both >= contact)
+    return float(noise.gap[0] - noise.gap[touched[0]]) if len(touched) and touched[0] else math.inf
 
 
-def _is_thin(one: _Noise, contact: float) -> bool:
+def _is_thin(noise: _Noise, contact: float) -> bool:
     """Return whether both pads feel an object in a gap in which the fingers count as closed."""
-    return bool((one.gap[one.both >= contact] <= _CLOSED_M).any())
+    return bool((noise.gap[noise.both >= contact] <= _CLOSED_M).any())
 
 
 def _loaded(force: NDArray[np.float64], baseline: float) -> int:

@@ -134,7 +134,9 @@ class _Found:
     def add(self, topic: str, recorded_ns: int, message: Any) -> None:
         """Add a message, unless it is of other joints."""
         if topic == self.acceleration:
-            self.samples.append(_Sampled(0, tuple((one.x, one.y, one.z) for one in message.samples)))
+            self.samples.append(
+                _Sampled(0, tuple((sample.x, sample.y, sample.z) for sample in message.samples))
+            )
         elif topic == self.pressure:
             self.images.append(_image(self.path, message))
         elif (motion := _motion(message, f"{self.side}_gripper_joint")) is not None:
@@ -152,7 +154,7 @@ def _recording(path: Path, found: _Found) -> Recording:
             f"{path} contains {len(found.motions)} positions of the {gripper} on {source} and {len(found.images)} cell "
             f"images on {pressure}: a grasp needs both"
         )
-    topics = {topic: one for topic, one in found.times.items() if one.recorded_ns}
+    topics = {topic: time_s for topic, time_s in found.times.items() if time_s.recorded_ns}
     clock = common_clock(path.name, topics, (pressure, source))
     moved = _timed(found.motions, clock.topics[source])
     motions = [one for one in moved if clock.begin_ns <= one.t_ns <= clock.end_ns]
@@ -163,7 +165,7 @@ def _recording(path: Path, found: _Found) -> Recording:
     images = clock.topics[pressure]
     readings = tuple(_readings(motions, _timed(found.images, images), images, notes))
     channels: tuple[Channel, ...] = ()
-    if any(one.values for one in found.samples):
+    if any(sample.values for sample in found.samples):
         timed = _timed(found.samples, clock.topics[found.acceleration])
         channels, readings = _with_acceleration(readings, motions[0].t_ns, timed)
     return Recording(
@@ -253,7 +255,7 @@ def _readings(
     try:
         zero = tare(first, PAD_COUNTS_PER_N, FIRST_PAD_CELL)
     except TareRefused as refused:
-        zero = zero_of([one.left for one in first]), zero_of([one.right for one in first])
+        zero = zero_of([pad.left for pad in first]), zero_of([pad.right for pad in first])
         notes.append(
             f"the zero of the pads is uncertain, because the first {len(first)} images cannot be used for it: {refused}"
         )

@@ -253,7 +253,7 @@ def simulated(
             "groups": [plain(group) for group in plan.groups],
             "seed_of_the_trials": seed,
             "settings": {t: dict(settings.values[t]) for t in ("gripper", "controller", "features")},
-            "components": {t: one for t, one in settings.components.items() if t != "classifier"},
+            "components": {t: component for t, component in settings.components.items() if t != "classifier"},
         },
     )
 

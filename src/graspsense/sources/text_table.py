@@ -161,7 +161,7 @@ class _Layout:
     def _header(self) -> tuple[list[str], list[str] | None, int, int]:
         """Return the names, the units if a line has them, the first row behind both, and the line of the names."""
         sample = _sample([row for _, row in self.rows])
-        width = max(Counter(map(len, sample)).items(), key=lambda one: (one[1], one[0]))[0]
+        width = max(Counter(map(len, sample)).items(), key=lambda item: (item[1], item[0]))[0]
         sample = sample[: max(2, _SAMPLED_CELLS // width)]
         numeric = _numeric_columns(sample, width)
         data = next((k for k, (_, row) in enumerate(self.rows) if _is_data(row, width, numeric)), None)
@@ -315,8 +315,8 @@ def _cells_of(value: Any, name: str, depth: int) -> Iterator[tuple[str, str]]:
             "" if value is None else str(int(value)) if isinstance(value, bool) else str(value).strip(),
         )
         return
-    for key, one in parts.items():
-        yield from _cells_of(one, f"{name}.{key}" if name else key, depth + 1)
+    for key, part in parts.items():
+        yield from _cells_of(part, f"{name}.{key}" if name else key, depth + 1)
 
 
 def _sample(lines: Sequence[Any]) -> list[Any]:
@@ -335,7 +335,7 @@ def _separator(lines: Sequence[str]) -> str:
     if agreeing.get(" ", 0) >= agreeing.get(",", 1) and _commas_are_within_numbers(lines):
         agreeing.pop(",", None)
     able = [one for one, count in agreeing.items() if count >= 0.9 * max(agreeing.values())]
-    fitting = [one for one in able if _width(lines[:1], one)[0] == widths[one][0]]
+    fitting = [item for item in able if _width(lines[:1], item)[0] == widths[item][0]]
     return next(iter(fitting or able), " ")
 
 
@@ -354,7 +354,7 @@ def _width(lines: Sequence[str], separator: str) -> tuple[int, int]:
         except (csv.Error, ValueError):
             continue
         widths[len(cells)] += 1
-    return max(widths.items(), key=lambda one: one[1], default=(1, 0))
+    return max(widths.items(), key=lambda item: item[1], default=(1, 0))
 
 
 def _numeric_columns(rows: Sequence[Sequence[str]], width: int) -> frozenset[int]:

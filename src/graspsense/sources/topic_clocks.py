@@ -104,7 +104,7 @@ def on_one_clock(
 
     Raises DataDamaged if the times do not fit into 64 bits.
     """
-    began_ns = min(min(one.recorded_ns) for one in topics.values())
+    began_ns = min(min(messages.recorded_ns) for messages in topics.values())
     try:
         stamped, recorded = _relative(topics, began_ns)
     except OverflowError as error:
@@ -130,9 +130,9 @@ def common_clock(
     lasting = {topic: one for topic, one in wanted.items() if one.usual_ns} or wanted
     begin = max(int(one.ns[0]) for one in lasting.values())
     end = min(one.until_ns for one in lasting.values())
-    earliest = min(int(one.ns[0]) for one in times.values())
+    earliest = min(int(time_s.ns[0]) for time_s in times.values())
     inside = {topic: one.between(begin, end) for topic, one in lasting.items()}
-    notes = tuple(_words(topic, one, earliest, inside.get(topic)) for topic, one in times.items())
+    notes = tuple(_words(topic, time_s, earliest, inside.get(topic)) for topic, time_s in times.items())
     if end <= begin:
         raise DataDamaged(
             f"{source}: there is no time at which all topics have messages: {'; '.join(notes)}. Check the clocks of "
@@ -164,14 +164,14 @@ def _relative(
     Raises OverflowError.
     """
     recorded = {
-        topic: np.array([ns - began for ns in one.recorded_ns], dtype=np.int64)
-        for topic, one in topics.items()
+        topic: np.array([ns - began for ns in messages.recorded_ns], dtype=np.int64)
+        for topic, messages in topics.items()
     }
     stamped = {}
-    for topic, one in topics.items():
-        known = np.array([ns != 0 for ns in one.stamped_ns])
+    for topic, messages in topics.items():
+        known = np.array([ns != 0 for ns in messages.stamped_ns])
         ns = np.array(
-            [stamp - began if stamp else 0 for stamp in one.stamped_ns],
+            [stamp - began if stamp else 0 for stamp in messages.stamped_ns],
             dtype=np.int64,
         )
         delay = int(np.median((recorded[topic] - ns)[known])) if known.any() else 0
@@ -230,8 +230,8 @@ def _words(topic: str, times: TopicTimes, earliest_ns: int, inside: Nanoseconds 
 
 def _trimmed(lasting: Mapping[str, TopicTimes], begin_ns: int, end_ns: int) -> Iterator[str]:
     """Yield a sentence if much of the recording is outside the common interval."""
-    first = min(int(one.ns[0]) for one in lasting.values())
-    last = max(one.until_ns for one in lasting.values())
+    first = min(int(times.ns[0]) for times in lasting.values())
+    last = max(times.until_ns for times in lasting.values())
     much = NOTICED * (last - first)
     late = max(lasting, key=lambda topic: int(lasting[topic].ns[0]))
     early = min(lasting, key=lambda topic: lasting[topic].until_ns)

@@ -109,7 +109,9 @@ def load_trials(
     try:
         described = structured({**keys, "source": source}, TrialSource, source)
     except ValidationFailed as misfit:
-        raise ConfigError("\n".join(f"{one.path[0]}: {one.text}" for one in misfit.problems)) from None
+        raise ConfigError(
+            "\n".join(f"{problem.path[0]}: {problem.text}" for problem in misfit.problems)
+        ) from None
     settings = cache(lambda: resolve(pipeline, options=options, flags=gripper_flags(source)))
     return without_copies(
         labelled_trials(

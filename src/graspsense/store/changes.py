@@ -190,8 +190,8 @@ def with_changed_numbers(
     for trial, before, after in rows:
         changed.setdefault(trial, []).append((before, after))
     current: list[Mapping[str, str]] = []
-    for trial, one in zip(trials, labels, strict=True):
-        values = dict(one)
+    for trial, label in zip(trials, labels, strict=True):
+        values = dict(label)
         for before, after in changed.get(trial, ()):
             if before is not None:
                 values.pop(before.rpartition("=")[0], None)
@@ -211,11 +211,11 @@ def inconsistencies(store: Store) -> dict[int, str]:
     """Return the trials whose label or state does not follow from their recording and their changes, and why."""
     labels: dict[int, str | None] = {}
     aside: dict[int, bool] = {}
-    for one in history(store):
-        if one.action == "relabel":
-            labels[one.trial] = one.after
-        elif one.action != "value":
-            aside[one.trial] = one.action == "aside"
+    for change in history(store):
+        if change.action == "relabel":
+            labels[change.trial] = change.after
+        elif change.action != "value":
+            aside[change.trial] = change.action == "aside"
     problems = {}
     rows = store.query(
         "SELECT id, label, instance, set_aside, labels FROM trial JOIN detail ON detail.trial = trial.id ORDER BY id"

@@ -135,7 +135,7 @@ class Collection:
         Other operators may collect into the same store; their trials are not this operator's to undo.
         """
         newest_first = reversed(self.collected)
-        return next((one for one in newest_first if self.store.summary(one).set_aside is None), None)
+        return next((name for name in newest_first if self.store.summary(name).set_aside is None), None)
 
     def _grasp(self, word: str) -> None:
         settings = self.settings_for(word, self.wanted.seed + self._number_of_trials())

@@ -334,8 +334,8 @@ def _table(trials: Sequence[FeatureValues]) -> FeatureTable:
 def _most_frequent_reason(missing: Sequence[Mapping[str, str]]) -> str:
     """Return the most frequent of the reasons why features of these trials are missing; empty without any."""
     reasons: Counter[str] = Counter()
-    for one in missing:
-        reasons.update(set(one.values()))
+    for row in missing:
+        reasons.update(set(row.values()))
     return reasons.most_common(1)[0][0] if reasons else ""
 
 

@@ -98,7 +98,7 @@ def trial_table(folder: str | Path) -> TrialTable:
     if not rows:
         aside = f" that is not set aside ({set_aside} are)" if set_aside else ""
         raise ConfigError(f"the store in {folder} has no trial to export{aside}")
-    columns |= {name: tuple(one.get(name) for one in labels) for name in (RECORDED_AT, ORDER)}
+    columns |= {name: tuple(label.get(name) for label in labels) for name in (RECORDED_AT, ORDER)}
     before = _unpacked(folder, sets, columns["before_set"], columns["before_contact"])
     parts = [(BEFORE, before), (FIRST, first_line), (VALUE, _numbers_to_predict(numbers))]
     return TrialTable(
@@ -123,14 +123,14 @@ def _numbers_to_predict(labels: Sequence[Mapping[str, str]]) -> FeatureTable:
     """Return the numbers among the labels of the trials, NaN where a trial does not have one."""
     headings = {
         heading: name_and_unit(heading)
-        for one in labels
-        for heading, cell in one.items()
+        for label in labels
+        for heading, cell in label.items()
         if name_and_unit(heading)[0] not in RESERVED and number_of(cell) is not None
     }
     values = np.full((len(labels), len(headings)), np.nan)
-    for row, one in enumerate(labels):
+    for row, label in enumerate(labels):
         for k, heading in enumerate(headings):
-            number = number_of(one.get(heading, ""))
+            number = number_of(label.get(heading, ""))
             values[row, k] = np.nan if number is None else number
     return FeatureTable(
         names=tuple(name for name, _ in headings.values()),

@@ -125,7 +125,7 @@ class EncodedRow:
             *(self.trial[name] for name in TRIAL_COLUMNS),
             *(self.detail[name] for name in DETAIL_COLUMNS),
         ]
-        return _hash(json_text([one.hex() if isinstance(one, bytes) else one for one in columns]))
+        return _hash(json_text([column.hex() if isinstance(column, bytes) else column for column in columns]))
 
 
 def encoded(record: TrialRecord, recording: RecordingInfo, *, complete: bool) -> EncodedRow:

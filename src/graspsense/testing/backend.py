@@ -146,7 +146,7 @@ def channels_are_those_declared(subject: Subject) -> None:
         if channel not in declared:
             demand(
                 all(map(isnan, values)),
-                f"{name} has numbers ({next((one for one in values if not isnan(one)), nan):g}), and no channel "
+                f"{name} has numbers ({next((value for value in values if not isnan(value)), nan):g}), and no channel "
                 f"{channel!r} is declared: declare Channel({channel!r}, {CHANNELS[channel]!r}, rate), or give NaN",
             )
         elif not recording:
@@ -223,7 +223,7 @@ def _demand_images(name: str, images: Sequence[Any]) -> None:
 
 def images_stay_as_they_were_delivered(subject: Subject) -> None:
     """An image that is a numpy array is contiguous and read-only, and nobody changes it after it was delivered."""
-    if all(declared_dtype(one) == FLOATS for one in further(subject.entry.channels)):
+    if all(declared_dtype(channel) == FLOATS for channel in further(subject.entry.channels)):
         raise CheckSkipped("this gripper has no images that are numpy arrays")
     problem, session = Delivered(subject.entry.channels).problem, subject.session
     for reading, before in zip(session.readings, session.sums, strict=True):
@@ -292,7 +292,7 @@ def channels_follow_from_the_settings(subject: Subject) -> None:
     backend, again = subject.create(), subject.create()
     before = backend.channels
     demand(
-        isinstance(before, tuple) and all(isinstance(one, Channel) for one in before),
+        isinstance(before, tuple) and all(isinstance(channel, Channel) for channel in before),
         f"`channels` returns {before!r:.80}: return a tuple of Channel",
     )
     try:
@@ -310,7 +310,7 @@ def channels_follow_from_the_settings(subject: Subject) -> None:
 
 
 def _named(channels: Sequence[Channel]) -> str:
-    return ", ".join(f"{one.name} at {one.rate_hz:g} Hz" for one in channels) or "none"
+    return ", ".join(f"{channel.name} at {channel.rate_hz:g} Hz" for channel in channels) or "none"
 
 
 def _infinite(value: float) -> bool:
@@ -395,7 +395,7 @@ def forces_are_in_newtons(subject: Subject) -> None:
     most = max(3.0 * info.effort_limit_n, 50.0)
     for name in ("force_left_n", "force_right_n", "edge_left_n", "edge_right_n", "effort_n"):
         values = [abs(getattr(frame, name)) for frame in subject.session.frames]
-        worst = max((one for one in values if not isnan(one)), default=0.0)
+        worst = max((value for value in values if not isnan(value)), default=0.0)
         demand(
             worst <= most,
             f"{name} reaches {worst:g} while the fingers are closed gently on a gripper of {info.effort_limit_n:g} N: "
@@ -544,7 +544,7 @@ def read_returns_within_its_timeout(subject: Subject) -> None:
 
 def pads_can_be_zeroed(subject: Subject) -> None:
     """After a tare with unloaded images the forces are near zero; a tare without enough images is refused."""
-    info, declared = subject.session.info, {one.name for one in subject.entry.channels}
+    info, declared = subject.session.info, {channel.name for channel in subject.entry.channels}
     if not info.tare_images or not declared & {"force_left", "force_right"}:
         raise CheckSkipped("this gripper is not tared")
     backend = subject.create()
@@ -578,7 +578,7 @@ def pads_can_be_zeroed(subject: Subject) -> None:
             backend.apply(info.relaxed)
             if reading is not None:
                 forces += [reading.frame.force_left_n, reading.frame.force_right_n]
-        known = [one for one in forces if not isnan(one)]
+        known = [force for force in forces if not isnan(force)]
         demand(
             bool(known) and abs(fmean(known)) < 0.6,
             f"after the tare the unloaded pads feel {fmean(known or [nan]):.3g} N: subtract the zero, "

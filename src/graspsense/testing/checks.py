@@ -66,8 +66,12 @@ MINIMUM_CHECKS: Final[Mapping[str, int]] = {
 def checks_of(*functions: Callable[[Any], None]) -> tuple[Check, ...]:
     """Return a check for each of these functions, with its name."""
     return tuple(
-        Check(one.__name__.replace("_", "-"), (one.__doc__ or "").partition("\n")[0].rstrip("."), one)
-        for one in functions
+        Check(
+            function.__name__.replace("_", "-"),
+            (function.__doc__ or "").partition("\n")[0].rstrip("."),
+            function,
+        )
+        for function in functions
     )
 
 
@@ -122,8 +126,12 @@ class ConformanceReport:
     @property
     def failures(self) -> list[str]:
         """Return the reasons why the components do not conform."""
-        found = [f"{one.subject}: {one.check}: {one.text}" for one in self.results if one.state == "failed"]
-        for subject, role in dict.fromkeys((one.subject, one.role) for one in self.results):
+        found = [
+            f"{result.subject}: {result.check}: {result.text}"
+            for result in self.results
+            if result.state == "failed"
+        ]
+        for subject, role in dict.fromkeys((result.subject, result.role) for result in self.results):
             text = self.too_few_ran(subject, role)
             if text and not any(one.startswith(f"{subject}: ") for one in found):
                 found.append(f"{subject}: {text}")
@@ -131,11 +139,11 @@ class ConformanceReport:
 
     def too_few_ran(self, subject: str, role: str) -> str:
         """Return a message if too few checks of a component ran, else an empty string."""
-        mine = [one for one in self.results if (one.subject, one.role) == (subject, role)]
-        ran = sum(one.state != "skipped" for one in mine)
+        mine = [result for result in self.results if (result.subject, result.role) == (subject, role)]
+        ran = sum(result.state != "skipped" for result in mine)
         if ran >= MINIMUM_CHECKS[role]:
             return ""
-        skipped = "; ".join(f"{one.check}: {one.text}" for one in mine if one.state == "skipped")
+        skipped = "; ".join(f"{result.check}: {result.text}" for result in mine if result.state == "skipped")
         return (
             f"only {ran} of {len(mine)} checks of a {role.replace('-', ' ')} ran, {MINIMUM_CHECKS[role]} must. "
             f"Skipped: {skipped or 'none'}"
@@ -144,9 +152,9 @@ class ConformanceReport:
     def counts(self) -> str:
         """Return a line for each component: the numbers of checks that passed, failed, were skipped."""
         lines = []
-        for subject, role in dict.fromkeys((one.subject, one.role) for one in self.results):
+        for subject, role in dict.fromkeys((result.subject, result.role) for result in self.results):
             states: Sequence[str] = [
-                one.state for one in self.results if (one.subject, one.role) == (subject, role)
+                result.state for result in self.results if (result.subject, result.role) == (subject, role)
             ]
             kinds = [f"{states.count(kind)} {kind}" for kind in dict.fromkeys(states)]
             lines.append(

@@ -67,7 +67,7 @@ def classes_are_the_labels(subject: Subject) -> None:
     fitted, _, labels = _learned(subject)
     classes = fitted.classes()
     demand(
-        isinstance(classes, tuple) and all(type(one) is str for one in classes),
+        isinstance(classes, tuple) and all(type(object_class) is str for object_class in classes),
         f"classes gives {classes!r}: return a tuple of str (convert text of numpy by str(...))",
     )
     demand(
@@ -237,7 +237,7 @@ def explains_its_predictions(subject: Subject) -> None:
                 f"{shares.get(label)}: write float(...)",
             )
         demand(
-            len(said.because) > 0 and all(one.words for one in said.because),
+            len(said.because) > 0 and all(reason.words for reason in said.because),
             f"explain gives the reasons {said.because!r}: give each reason in words and units",
         )
 

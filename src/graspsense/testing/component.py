@@ -61,7 +61,7 @@ def config_name(subject: Subject) -> str:
 def settings_have_types(subject: Subject) -> None:
     """Every key of the config class has a type, so that values from files can be checked."""
     cls: Any = subject.component.config_class()
-    bare = [one.alias for one in attrs.fields(cls) if one.init and one.type is None]
+    bare = [field.alias for field in attrs.fields(cls) if field.init and field.type is None]
     demand(
         not bare,
         f"{config_name(subject)} has keys without a type: {', '.join(bare)}. Annotate them, as in "
@@ -99,15 +99,15 @@ def defaults_are_what_their_types_say(subject: Subject) -> None:
     """Every default has the annotated type of its key; an int is not a float."""
     cls: Any = subject.component.config_class()
     attrs.resolve_types(cls)
-    for one in attrs.fields(cls):
-        default = one.default
-        if one.type is float and type(default) is int:
-            where = f"key {one.alias!r} of {config_name(subject)}"
+    for field in attrs.fields(cls):
+        default = field.default
+        if field.type is float and type(default) is int:
+            where = f"key {field.alias!r} of {config_name(subject)}"
             demand(False, f"{where} is a float, its default {default!r} is an int: write {float(default)!r}")
-        if one.type is int and type(default) in (float, bool):
+        if field.type is int and type(default) in (float, bool):
             demand(
                 False,
-                f"key {one.alias!r} of {config_name(subject)} is an int, its default is {default!r}: write an int, "
+                f"key {field.alias!r} of {config_name(subject)} is an int, its default is {default!r}: write an int, "
                 "or annotate it with what it is",
             )
 
@@ -116,7 +116,7 @@ def settings_survive_a_file(subject: Subject) -> None:
     """Settings written as TOML and read again are the same settings."""
     config = subject.config()
     values = {key: one for key, one in plain(config).items() if one is not None}
-    text = "\n".join(f"{toml_key(key)} = {toml_value(one)}" for key, one in values.items())
+    text = "\n".join(f"{toml_key(key)} = {toml_value(value)}" for key, value in values.items())
     again = build(subject.component, tomllib.loads(text))
     demand(
         plain(again) == plain(config),

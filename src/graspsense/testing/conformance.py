@@ -80,7 +80,7 @@ class MinimumCase:
         import pytest
 
         report = ConformanceReport(
-            [self.examined.result(self.subject, one) for one in checks_for(self.subject)]
+            [self.examined.result(self.subject, check) for check in checks_for(self.subject)]
         )
         print(report.counts())  # noqa: T201 (pytest shows it beside a failure, and with -rP)
         text = report.too_few_ran(self.subject.name, self.subject.role)
@@ -189,7 +189,7 @@ def parametrize_checks(name: str, **options: Any) -> Any:
     import pytest
 
     cases = list(examine(name, **options).cases())
-    return pytest.mark.parametrize("check", cases, ids=[one.id for one in cases])
+    return pytest.mark.parametrize("check", cases, ids=[case.id for case in cases])
 
 
 class Conformance:

@@ -285,7 +285,7 @@ def state_holds_everything(subject: Subject) -> None:
     whole = ticks_of(subject)
     resumed = fresh_ticks(subject, first=max(len(whole) // 2, 1))
     demand(
-        [repr(one.command) for one in whole] == [repr(one.command) for one in resumed],
+        [repr(tick.command) for tick in whole] == [repr(tick.command) for tick in resumed],
         "going on from a state that was written down it commands something else: keep everything in the state, as "
         "numbers",
     )
@@ -297,7 +297,7 @@ def grasps_are_independent(subject: Subject) -> None:
     fresh_ticks(subject, "nothing")
     again = fresh_ticks(subject)
     demand(
-        [repr(one.command) for one in first] == [repr(one.command) for one in again],
+        [repr(tick.command) for tick in first] == [repr(tick.command) for tick in again],
         "a second grasp differs from the first: keep no state in the class or the module",
     )
 
@@ -308,8 +308,8 @@ def requires_what_it_reads(subject: Subject) -> None:
     demand(
         [repr(one.command) for one in full] == [repr(one.command) for one in own],
         "on a gripper that has only the channels it declares "
-        f"({', '.join(sorted(one.name for one in _required(subject))) or 'none'}) it commands something else: add what "
-        "it reads to `requires`",
+        f"({', '.join(sorted(channel.name for channel in _required(subject))) or 'none'}) it commands something else: "
+        "add what it reads to `requires`",
     )
 
 
@@ -381,7 +381,7 @@ def events_are_declared(subject: Subject) -> None:
         )
         for i, name in enumerate(names):
             demand(
-                not bits or len(bits) < 2 or not all(one >> i & 1 for one in bits),
+                not bits or len(bits) < 2 or not all(bit >> i & 1 for bit in bits),
                 f"the event {name!r} is told in every tick: set its bit only in the tick in which it happens",
             )
 

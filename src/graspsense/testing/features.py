@@ -64,7 +64,7 @@ def _all(subject: Subject) -> dict[str, Trace]:
 
 def _own(subject: Subject) -> Trace:
     """Return a whole grasp of a gripper that has only the channels in `requires`."""
-    return with_channels(_whole(subject), {one.name for one in subject.entry.requires})
+    return with_channels(_whole(subject), {require.name for require in subject.entry.requires})
 
 
 def _same(a: Features, b: Features) -> bool:
@@ -156,7 +156,7 @@ def does_not_change_the_trace(subject: Subject) -> None:
 def requires_what_it_reads(subject: Subject) -> None:
     """The channels in `requires` suffice: without the others, the features are the same."""
     full, own = _features(subject, _whole(subject)), _features(subject, _own(subject), "a grasp")
-    required = {one.name for one in subject.entry.requires}
+    required = {require.name for require in subject.entry.requires}
     others = [name for name in COLUMNS_OF_CHANNEL if name not in required]
     demand(
         _same(full, own),

@@ -22,7 +22,7 @@ def fingers_are_those_declared(subject: Subject) -> None:
     except ValueError as error:
         raise CheckFailed(f"its fingers: {error}") from error
     for reading in subject.session.readings:
-        each = [getattr(reading.signals, one.name) for one in fingers]
+        each = [getattr(reading.signals, finger.name) for finger in fingers]
         frame = reading.frame
         for side, given, follows in zip(
             ("left", "right"), (frame.force_left_n, frame.force_right_n), forces_of(each), strict=True

@@ -128,7 +128,9 @@ def names_are_unique(package: Package) -> None:
 
 def pipelines_fit_together(package: Package) -> None:
     """Every pipeline file it ships resolves, and its components fit each other."""
-    names = [one.qualified for one in package.resources if isinstance(one.entry, PipelineEntry)]
+    names = [
+        resource.qualified for resource in package.resources if isinstance(resource.entry, PipelineEntry)
+    ]
     if not names:
         raise CheckSkipped("it ships no pipeline")
     for name in names:
@@ -173,11 +175,13 @@ def observers_change_nothing(package: Package) -> None:
 
 def probe_returns_in_time(package: Package) -> None:
     """The search for devices ends in time and raises nothing, whatever is connected."""
-    if not any("graspsense_probe_devices" in one.hooks for one in package.statuses):
+    if not any("graspsense_probe_devices" in statuse.hooks for statuse in package.statuses):
         raise CheckSkipped("it looks for no devices")
     began = time.perf_counter()
     probes = [
-        one for one in package.plugins.probe_devices(PROBE_S) if one.distribution == package.distribution
+        device
+        for device in package.plugins.probe_devices(PROBE_S)
+        if device.distribution == package.distribution
     ]
     took = time.perf_counter() - began
     for probe in probes:
@@ -247,7 +251,7 @@ def _sources(package: Package) -> Iterator[Path]:
     folder = _editable_folder(package.distribution)
     tops = {module.partition(".")[0] for module in _modules_of(package)} - {"graspsense"}
     specs = [spec for top in sorted(tops) if (spec := importlib.util.find_spec(top)) is not None]
-    folders = [Path(one) for spec in specs for one in spec.submodule_search_locations or ()]
+    folders = [Path(location) for spec in specs for location in spec.submodule_search_locations or ()]
     if folder is not None and tops:
         folders = [folder]
     elif not folders:

@@ -78,37 +78,45 @@ def reader_errors_name_file_and_column(package: Package) -> None:
 
 def _examples(package: Package) -> Iterator[tuple[Resource, Path]]:  # type: ignore[type-arg]
     """Yield each reader with the folder of its examples."""
-    readers = [one for one in package.resources if getattr(one.entry, "recordings", "")]
+    readers = [resource for resource in package.resources if getattr(resource.entry, "recordings", "")]
     if not readers:
         raise CheckSkipped("it has no reader of recordings")
-    lacking = [one.name for one in readers if one.name not in package.data]
+    lacking = [reader.name for reader in readers if reader.name not in package.data]
     if lacking:
         raise CheckSkipped(
             f"no examples were given of {', '.join(lacking)} (--data {lacking[0]}=FOLDER, or `data` in a test)"
         )
-    for one in readers:
-        folder = Path(package.data[one.name])
+    for reader in readers:
+        folder = Path(package.data[reader.name])
         if not folder.is_dir():
-            raise CheckFailed(f"there is no folder {folder} with examples of {one.name}")
-        yield one, folder
+            raise CheckFailed(f"there is no folder {folder} with examples of {reader.name}")
+        yield reader, folder
 
 
 def _read(dataset: Resource, folder: Path) -> _Read:  # type: ignore[type-arg]
     recordings, errors = [], []
     try:
-        for one in recordings_of(dataset, dataset.name, str(folder)):
-            if isinstance(one, UnreadableRecording):
-                errors.append(one.line)
+        for recording in recordings_of(dataset, dataset.name, str(folder)):
+            if isinstance(recording, UnreadableRecording):
+                errors.append(recording.line)
             else:
-                recordings.append(_text(one))
+                recordings.append(_text(recording))
     except GraspsenseError as error:
         errors.append(" ".join(str(error).split()))
     return _Read(recordings, errors)
 
 
-def _text(one: LabelledRecording) -> str:
-    facts = (one.source, one.label, one.instance, one.recorded_at, one.order, dict(one.values), one.notices)
-    return f"{facts} {content_sha256(one.recording)}"
+def _text(recording: LabelledRecording) -> str:
+    facts = (
+        recording.source,
+        recording.label,
+        recording.instance,
+        recording.recorded_at,
+        recording.order,
+        dict(recording.values),
+        recording.notices,
+    )
+    return f"{facts} {content_sha256(recording.recording)}"
 
 
 def _read_with(dataset: Resource, folder: Path, inside: Path, content: bytes) -> _Read:  # type: ignore[type-arg]

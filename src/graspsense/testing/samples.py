@@ -140,12 +140,13 @@ def copied(trace: Trace) -> Trace:
 
 def arrays_of(trace: Trace) -> dict[str, NDArray[Any]]:
     """Return the arrays of a trace, and of its further channels, by their names in it."""
-    found = {one.name: getattr(trace, one.name) for one in fields(Trace)}
+    found = {field.name: getattr(trace, field.name) for field in fields(Trace)}
     for name, signal in trace.signals.items():
         found[f"signals[{name!r}]"] = signal
         if not isinstance(signal, np.ndarray):
             found |= {
-                f"signals[{name!r}].{one.name}": getattr(signal, one.name) for one in fields(type(signal))
+                f"signals[{name!r}].{field.name}": getattr(signal, field.name)
+                for field in fields(type(signal))
             }
     return {name: value for name, value in found.items() if isinstance(value, np.ndarray)}
 

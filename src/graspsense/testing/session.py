@@ -48,7 +48,7 @@ class Session:
     @property
     def frames(self) -> list[Frame]:
         """Return the frames, in order."""
-        return [one.frame for one in self.readings]
+        return [reading.frame for reading in self.readings]
 
     @property
     def images(self) -> list[Pads]:

@@ -86,7 +86,7 @@ def package_of(
 ) -> Package | None:
     """Return the distribution of this name as it is installed, or None."""
     name = canonical(distribution)
-    statuses = tuple(one for one in plugins.statuses if one.distribution == name)
+    statuses = tuple(statuse for statuse in plugins.statuses if statuse.distribution == name)
     if not statuses:
         return None
     resources: list[Resource[Any]] = [
@@ -104,8 +104,8 @@ def package_of(
         distribution=name,
         version=statuses[0].version,
         statuses=statuses,
-        components=tuple(one for one in plugins.components() if one.distribution == name),
-        resources=tuple(one for one in resources if one.distribution == name),
+        components=tuple(component for component in plugins.components() if component.distribution == name),
+        resources=tuple(resource for resource in resources if resource.distribution == name),
         plugins=plugins,
         builds=builds,
         data=dict(data or {}),

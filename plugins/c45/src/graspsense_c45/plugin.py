@@ -109,7 +109,9 @@ class C45(Classifier[C45Config]):
         config = self.config
         classes = tuple(sorted(set(labels)))
         columns, values = with_codes(table)
-        schema = Schema(tuple(Attribute(one.name, one.unit, one.values) for one in columns), classes)
+        schema = Schema(
+            tuple(Attribute(column.name, column.unit, column.values) for column in columns), classes
+        )
         numbers = {label: k for k, label in enumerate(classes)}
         options = Options(
             criterion=config.criterion,
@@ -152,11 +154,11 @@ class C45(Classifier[C45Config]):
         path = explain(tree, row)
         missing = [
             missing_feature(
-                one.name,
-                one.unit,
-                f": {features.reasons.get(one.columns[0], 'no value that was trained on')}",
+                column.name,
+                column.unit,
+                f": {features.reasons.get(column.columns[0], 'no value that was trained on')}",
             )
-            for one, value in zip(columns, row, strict=True)
+            for column, value in zip(columns, row, strict=True)
             if math.isnan(value)
         ]
         tests = [
@@ -231,4 +233,6 @@ class C45(Classifier[C45Config]):
 
 def _coded_columns(tree: Tree) -> list[CodedColumn]:
     """Return the attributes of a tree as columns of a table of features."""
-    return [CodedColumn(one.name, one.unit, one.values) for one in tree.schema.attributes]
+    return [
+        CodedColumn(attribute.name, attribute.unit, attribute.values) for attribute in tree.schema.attributes
+    ]

@@ -46,7 +46,7 @@ def lag_of_block(config: SimConfig, block: Sequence[RecordedSqueeze]) -> float:
     The fingertips have no memory of their own here, so every lag is one of the sensor. Raises ConfigError if a squeeze
     has no contact or too few measurements of the force.
     """
-    ready = [prepared(one, config.force_delay_s) for one in block]
+    ready = [prepared(squeeze, config.force_delay_s) for squeeze in block]
     n = sum(len(one.force_n) for one in ready)
     own, lagging = (_fitted(ready, hardens=True, has_lag=has_lag) for has_lag in (False, True))
     gain = math.log(_error(own) / _error(lagging))
@@ -66,7 +66,7 @@ def with_fingertips_of_block(
     `share`: the part of the force that the cells measure, for each squeeze. `lag_s`: by how much the forces lag beyond
     the delay of the settings. Raises ConfigError if a squeeze has no contact or too few measurements of the force.
     """
-    ready = [prepared(one, config.force_delay_s, FULL, lag_s) for one in block]
+    ready = [prepared(squeeze, config.force_delay_s, FULL, lag_s) for squeeze in block]
     ready = [evolve(one, force_n=one.force_n / part) for one, part in zip(ready, share, strict=True)]
     linear = _fitted(ready, hardens=False)
     fit = _fitted(ready, hardens=True)
@@ -103,18 +103,18 @@ def _fitted(squeezes: Sequence[Squeeze], *, hardens: bool, has_lag: bool = False
     """
     from scipy.optimize import least_squares
 
-    peak = float(np.median([one.peak_n for one in squeezes]))
-    depth = max(float(np.median([one.depth_m for one in squeezes])), 1e-6)
+    peak = float(np.median([squeeze.peak_n for squeeze in squeezes]))
+    depth = max(float(np.median([squeeze.depth_m for squeeze in squeezes])), 1e-6)
     first = 2.0 * peak / depth
 
     def residuals(at: np.ndarray) -> np.ndarray:
         k, cubic = math.exp(at[0]), at[1] if hardens else 0.0
         parts = []
-        for one, width in zip(squeezes, at[-len(squeezes) :], strict=True):
-            gap = one.delayed(LAG_UNIT_S * at[1 + hardens]).gap_m if has_lag else one.gap_m
-            x = np.maximum(one.width_m + depth * width - gap, 0.0)
+        for squeeze, width in zip(squeezes, at[-len(squeezes) :], strict=True):
+            gap = squeeze.delayed(LAG_UNIT_S * at[1 + hardens]).gap_m if has_lag else squeeze.gap_m
+            x = np.maximum(squeeze.width_m + depth * width - gap, 0.0)
             parts.append(
-                (one.at_samples(0.5 * k * x * (1.0 + cubic * (x / depth) ** 2)) - one.force_n) / peak
+                (squeeze.at_samples(0.5 * k * x * (1.0 + cubic * (x / depth) ** 2)) - squeeze.force_n) / peak
             )
         return np.concatenate(parts)
 

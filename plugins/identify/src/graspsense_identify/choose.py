@@ -89,20 +89,22 @@ def choose(
     if not candidates:
         raise ConfigError(f"no candidate for these squeezes has the terms {only}")
     directly = in_threads(lambda one: fit(direct, one, squeezes), candidates, counter.done)
-    least_directly = max(min(one.rms for one in directly), LEAST_ERROR)
-    near = [one for one in directly if one.rms <= WORTH_REFINING * least_directly]
+    least_directly = max(min(thread.rms for thread in directly), LEAST_ERROR)
+    near = [thread for thread in directly if thread.rms <= WORTH_REFINING * least_directly]
     fits = in_threads(lambda one: refined(model, one, squeezes), near, counter.done)
-    least = max(min(one.rms for one in fits), LEAST_ERROR)
-    worth = [one for one in fits if one.rms <= WORTH_TRYING * least and not _adds_nothing(one, fits)]
+    least = max(min(thread.rms for thread in fits), LEAST_ERROR)
+    worth = [
+        thread for thread in fits if thread.rms <= WORTH_TRYING * least and not _adds_nothing(thread, fits)
+    ]
     judged = in_threads(lambda one: _judged(model, one, squeezes), worth, counter.done)
     best = _simplest(judged)
     converged = fit(
         model, best.fitted.candidate, squeezes, start=best.fitted, max_evaluations=MANY_EVALUATIONS
     )
-    names = {one.candidate.name for one in fits}
-    only_directly = [one for one in directly if one.candidate.name not in names]
-    only_directly += [one for k, one in enumerate(rough) if k not in kept]
-    scores = [_score(one, best, judged, fits) for one in fits]
+    names = {thread.candidate.name for thread in fits}
+    only_directly = [thread for thread in directly if thread.candidate.name not in names]
+    only_directly += [fitted for k, fitted in enumerate(rough) if k not in kept]
+    scores = [_score(thread, best, judged, fits) for thread in fits]
     dropped = [
         CandidateScore(
             terms=one.candidate.name,
@@ -131,7 +133,7 @@ def _rough(
     if not with_memory:
         return alone
     # From its own starts, and from the fit without a memory, which has found the corners of the law.
-    roughly = [one.joined(with_memory[1]) for one in statics]
+    roughly = [static.joined(with_memory[1]) for static in statics]
     roughly += [one.starting_at(_values(own)) for one, own in zip(roughly, alone, strict=True)]
     tried = in_threads(lambda one: fit(direct, one, squeezes), roughly, counter.done)
     pairs = zip(tried[: len(statics)], tried[len(statics) :], strict=True)
@@ -161,19 +163,19 @@ def _dropped(times: float) -> str:
 def chosen_instead(choice: Choice, fitted: Fitted, verdict: str) -> Choice:
     """Return the choice of another of the refined candidates."""
     scores = [
-        evolve(one, chosen=True, verdict=f"chosen: {verdict}")
-        if one.terms == fitted.candidate.name
-        else evolve(one, chosen=False, verdict="only common values need its terms")
-        if one.chosen
-        else one
-        for one in choice.scores
+        evolve(score, chosen=True, verdict=f"chosen: {verdict}")
+        if score.terms == fitted.candidate.name
+        else evolve(score, chosen=False, verdict="only common values need its terms")
+        if score.chosen
+        else score
+        for score in choice.scores
     ]
     return Choice(fitted=fitted, refined=choice.refined, scores=tuple(sorted(scores, key=_rank)))
 
 
 def _kept(rough: Sequence[Fitted]) -> list[int]:
     """Return which laws are tried with every memory: those that fit best."""
-    order = np.argsort([one.cost for one in rough], kind="stable").tolist()
+    order = np.argsort([fitted.cost for fitted in rough], kind="stable").tolist()
     # A gas takes no other law's place: it resembles a spring that stiffens.
     first = [k for k in order if GAS not in rough[k].candidate.slots][:STATIC_KEPT]
     # The simplest law stays among the candidates, so that the table shows what it costs to leave the others out.
@@ -182,7 +184,7 @@ def _kept(rough: Sequence[Fitted]) -> list[int]:
 
 def _joined(static: CandidateLaw, with_memory: Sequence[CandidateLaw]) -> list[CandidateLaw]:
     """Return a law with each memory whose terms it does not have already."""
-    return [static.joined(one) for one in with_memory if static.can_join(one)]
+    return [static.joined(law) for law in with_memory if static.can_join(law)]
 
 
 def _adds_nothing(fitted: Fitted, fits: Sequence[Fitted]) -> bool:
@@ -201,7 +203,9 @@ def _adds_nothing(fitted: Fitted, fits: Sequence[Fitted]) -> bool:
 
 
 def _contains(fitted: Fitted, simpler: Fitted) -> bool:
-    free, fewer = ({(one.slot, one.name) for one in each.candidate.free} for each in (fitted, simpler))
+    free, fewer = (
+        {(parameter.slot, parameter.name) for parameter in each.candidate.free} for each in (fitted, simpler)
+    )
     return fewer < free
 
 
@@ -233,7 +237,9 @@ class _Counter:
 
 
 def _values(fitted: Fitted) -> dict[str, float]:
-    return {one.label: value for one, value in zip(fitted.candidate.free, fitted.values, strict=True)}
+    return {
+        parameter.label: value for parameter, value in zip(fitted.candidate.free, fitted.values, strict=True)
+    }
 
 
 def _judged(model: ForwardModel, fitted: Fitted, squeezes: Sequence[Squeeze]) -> _Judged:

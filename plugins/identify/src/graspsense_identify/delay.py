@@ -129,22 +129,22 @@ def lag_beyond_settings(model: ForwardModel, refined: Sequence[Fitted], squeezes
     lagging = in_threads(lambda one: fit(model, one.candidate, squeezes, start=one, has_lag=True), refined)
     best = min(lagging, key=information)
     own = refined[lagging.index(best)]
-    gained = information(best) <= min(information(one) for one in refined) - EVIDENCE
+    gained = information(best) <= min(information(fitted) for fitted in refined) - EVIDENCE
     better = least_error(best) <= (1.0 - LEAST_GAIN) * least_error(own)
     if not gained or not better or abs(best.lag_s) > 0.98 * MAX_LAG_S:
         return Lag()
-    near = [one for one in lagging if information(one) <= information(best) + PLAUSIBLE]
+    near = [thread for thread in lagging if information(thread) <= information(best) + PLAUSIBLE]
     lags = [one.lag_s for one in near if not _is_dominated(one, near)]
     return Lag(
         lag_s=best.lag_s,
-        error_s=math.hypot(PATH_ERROR_S, max(abs(one - best.lag_s) for one in lags) / normal()),
+        error_s=math.hypot(PATH_ERROR_S, max(abs(lag - best.lag_s) for lag in lags) / normal()),
     )
 
 
 def _is_dominated(fitted: Fitted, others: Sequence[Fitted]) -> bool:
     """Return whether a simpler candidate has more evidence."""
     return any(
-        one.parameters < fitted.parameters and information(one) < information(fitted) for one in others
+        other.parameters < fitted.parameters and information(other) < information(fitted) for other in others
     )
 
 
@@ -176,7 +176,7 @@ def delay_of(
         damped = evolve(
             fitted,
             candidate=fitted.candidate.joined(damper),
-            values=(*fitted.values, *(one.starts[0] for one in damper.free)),
+            values=(*fitted.values, *(parameter.starts[0] for parameter in damper.free)),
         )
         beside = fit(model, damped.candidate, squeezes, start=damped, has_lag=True).lag_error_s
     return Delay(

@@ -110,26 +110,26 @@ class _Problem:
         self.p, self.n = len(candidate.free), len(squeezes)
         self.contrasts = contrasts(self.n)
         self.paths = model.paths(squeezes)
-        self.first_widths = np.array([one.width_m for one in squeezes])
-        self.depths = np.array([one.depth_m for one in squeezes])
+        self.first_widths = np.array([squeeze.width_m for squeeze in squeezes])
+        self.depths = np.array([squeeze.depth_m for squeeze in squeezes])
         sizes = [int(mask.sum()) for mask in masks]
         self.size = sum(sizes)
         self.of_squeeze = np.repeat(np.arange(self.n), sizes)
         kept = list(zip(squeezes, masks, strict=True))
         self.masks = masks
         self.measured = np.concatenate([one.force_n[mask] for one, mask in kept])
-        self.peaks = np.repeat([one.peak_n for one in squeezes], sizes)
+        self.peaks = np.repeat([squeeze.peak_n for squeeze in squeezes], sizes)
         self._last: tuple[Floats, Floats] | None = None
         """The last vector, and its residuals."""
 
     def bounds(self) -> tuple[Floats, Floats]:
-        low = [math.log(one.low) for one in self.candidate.free]
-        high = [math.log(one.high) for one in self.candidate.free]
+        low = [math.log(parameter.low) for parameter in self.candidate.free]
+        high = [math.log(parameter.high) for parameter in self.candidate.free]
         wide = [WIDTH_RANGE] * self.n
         factors = [FACTOR_RANGE] * (self.n - 1)
         lag = [MAX_LAG_S / LAG_UNIT_S] if self.has_lag else []
         return (
-            np.array([*low, *(-one for one in (*wide, *factors, *lag))]),
+            np.array([*low, *(-factor for factor in (*wide, *factors, *lag))]),
             np.array([*high, *wide, *factors, *lag]),
         )
 
@@ -143,11 +143,11 @@ class _Problem:
     def vector(self, fitted: Fitted) -> Floats:
         """Return the vector of a fit to these squeezes, without its lag."""
         shares = [
-            (width - one.width_m) / one.depth_m
-            for width, one in zip(fitted.widths_m, self.squeezes, strict=True)
+            (width - squeeze.width_m) / squeeze.depth_m
+            for width, squeeze in zip(fitted.widths_m, self.squeezes, strict=True)
         ]
         factors = np.log(fitted.factors)
-        is_stiffness = np.array([one.is_stiffness for one in fitted.candidate.free])
+        is_stiffness = np.array([parameter.is_stiffness for parameter in fitted.candidate.free])
         values = np.log(fitted.values) + float(np.mean(factors)) * is_stiffness
         return np.concatenate([values, shares, factors @ self.contrasts])
 
@@ -166,13 +166,15 @@ class _Problem:
         lags, which = np.unique(self.lags_s(xs), return_inverse=True)
         paths = self.paths
         if self.has_lag:
-            paths = self.model.paths([one.delayed(lag) for lag in lags.tolist() for one in self.squeezes])
+            paths = self.model.paths(
+                [squeeze.delayed(lag) for lag in lags.tolist() for squeeze in self.squeezes]
+            )
         path = (self.n * which.reshape(-1, 1) + np.arange(self.n)).ravel()
         forces = self.model.run(paths, Runs(path, widths.ravel(), numbers, self.candidate.active))
         by_vector = forces.reshape(len(xs), self.n, -1)
         samples = [
-            one.at_samples(by_vector[:, i, : len(one.t_s)])[:, self.masks[i]]
-            for i, one in enumerate(self.squeezes)
+            squeeze.at_samples(by_vector[:, i, : len(squeeze.t_s)])[:, self.masks[i]]
+            for i, squeeze in enumerate(self.squeezes)
         ]
         return _relative(np.concatenate(samples, axis=1) - self.measured, self.peaks)
 
@@ -211,7 +213,7 @@ def contrasts(n: int) -> Floats:
 
 def whole(squeezes: Sequence[Squeeze]) -> list[Mask]:
     """Return the masks that use every sample."""
-    return [np.ones(len(one.force_n), dtype=np.bool_) for one in squeezes]
+    return [np.ones(len(squeeze.force_n), dtype=np.bool_) for squeeze in squeezes]
 
 
 def fit(
@@ -330,7 +332,7 @@ def _starts(problem: _Problem, start: Fitted | None) -> list[Floats]:
         if not problem.has_lag:
             return [known]
         lags = LAG_STARTS if start.lag_s == 0.0 else (start.lag_s / LAG_UNIT_S,)
-        return [np.append(known, one) for one in lags]
+        return [np.append(known, lag) for lag in lags]
     law = problem.candidate
     vectors = [np.concatenate([np.log(one), own]) for one in law.starts()]
     if len(vectors) > STARTS:

@@ -140,7 +140,7 @@ class ForwardModel:
     def _table(self) -> tuple[Floats, Floats]:
         """Forces (N), and the compression (m) of both fingertips under them."""
         forces = np.concatenate([[0.0], np.geomspace(1e-3, LARGEST_N, TABLE)])
-        return forces, np.array([pad_compression(self.pads, float(one)) for one in forces])
+        return forces, np.array([pad_compression(self.pads, float(force)) for force in forces])
 
     @cached_property
     def _compliance(self) -> tuple[Floats, Floats]:

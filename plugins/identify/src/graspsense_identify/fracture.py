@@ -161,7 +161,7 @@ def not_broken(squeezes: Sequence[Squeeze]) -> list[int]:
     again = [bears_again(squeezes, i) for i in range(len(squeezes))]
     if True not in again:
         return []
-    return [i for i, one in enumerate(squeezes) if one.broken_n is not None and again[i] is not False]
+    return [i for i, squeeze in enumerate(squeezes) if squeeze.broken_n is not None and again[i] is not False]
 
 
 def bears_again(squeezes: Sequence[Squeeze], i: int) -> bool | None:

@@ -45,7 +45,7 @@ def _of_fold(
     )
     others = [squeezes[i] for i in train]
     part = fit(model, fitted.candidate, others, start=start)
-    beyond_m = float(np.mean(np.array(part.widths_m) - [one.width_m for one in others]))
+    beyond_m = float(np.mean(np.array(part.widths_m) - [other.width_m for other in others]))
     return {
         i: held_out_rms(model, part, squeezes[i], squeezes[i].width_m + beyond_m, own_stiffness=False)
         for i in held_out

@@ -28,7 +28,7 @@ Floats = NDArray[np.float64]
 
 def alone(model: ForwardModel, fitted: Fitted, squeezes: Sequence[Squeeze]) -> list[Fitted]:
     """Return the fits of a candidate to each squeeze by itself; none with fewer than three objects with names."""
-    names = {one.instance for one in squeezes}
+    names = {squeeze.instance for squeeze in squeezes}
     if "" in names or len(names) < LEAST_INSTANCES:
         return []
     return in_threads(lambda i: _alone(model, fitted, squeezes[i], i), range(len(squeezes)))
@@ -72,19 +72,19 @@ def simplest_alone(model: ForwardModel, choice: Choice, squeezes: Sequence[Squee
     own = alone(model, choice.fitted, squeezes)
     if not own or _evidence(own) > _common_evidence(choice.fitted) - EVIDENCE:
         return Individual(choice, own, varies=False)
-    simpler = [one for one in choice.refined if one.parameters < choice.fitted.parameters]
-    for one in sorted(simpler, key=lambda one: (one.parameters, one.cost)):
-        fits = alone(model, one, squeezes)
+    simpler = [fitted for fitted in choice.refined if fitted.parameters < choice.fitted.parameters]
+    for fitted in sorted(simpler, key=lambda one: (one.parameters, one.cost)):
+        fits = alone(model, fitted, squeezes)
         if _evidence(fits) < min(_evidence(own), _common_evidence(choice.fitted)) - EVIDENCE:
-            chosen = chosen_instead(choice, one, "simpler, with values of each object")
+            chosen = chosen_instead(choice, fitted, "simpler, with values of each object")
             return Individual(chosen, fits, varies=True)
     return Individual(choice, own, varies=True)
 
 
 def _evidence(fits: Sequence[Fitted]) -> float:
     """Return half of the Bayesian information criterion of fits to each squeeze, less a constant."""
-    residuals = np.concatenate([one.residuals for one in fits])
-    free = sum(len(one.values) for one in fits)
+    residuals = np.concatenate([fitted.residuals for fitted in fits])
+    free = sum(len(fitted.values) for fitted in fits)
     return _information(float(np.sqrt(np.mean(residuals**2))), free, len(residuals))
 
 
@@ -99,7 +99,7 @@ def _information(rms: float, free: int, n: int) -> float:
 
 def stiffnesses(fitted: Fitted) -> list[int]:
     """Return the places of the stiffnesses among the free parameters."""
-    return [i for i, one in enumerate(fitted.candidate.free) if one.is_stiffness]
+    return [i for i, parameter in enumerate(fitted.candidate.free) if parameter.is_stiffness]
 
 
 def reference_stiffness(fitted: Fitted, values: Floats) -> int | None:
@@ -110,8 +110,8 @@ def reference_stiffness(fitted: Fitted, values: Floats) -> int | None:
 def _alone(model: ForwardModel, fitted: Fitted, squeeze: Squeeze, i: int) -> Fitted:
     factor = fitted.factors[i]
     own = tuple(
-        value * factor if one.is_stiffness else value
-        for one, value in zip(fitted.candidate.free, fitted.values, strict=True)
+        value * factor if parameter.is_stiffness else value
+        for parameter, value in zip(fitted.candidate.free, fitted.values, strict=True)
     )
     start = evolve(fitted, values=own, widths_m=(fitted.widths_m[i],), factors=(1.0,))
     return fit(model, fitted.candidate, [squeeze], start=start)

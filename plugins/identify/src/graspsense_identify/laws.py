@@ -158,8 +158,13 @@ class CandidateLaw:
             for name, value in {**_defaults(term.params), **fixed}.items():
                 numbers[_column(slot, name)] = value
             stiff += [_column(slot, name) for name in term.stiffnesses]
-        own = [one for one in self.free if one.slot != GAS]
-        return numbers, [_column(one.slot, one.name) for one in own], [one.sign for one in own], stiff
+        own = [parameter for parameter in self.free if parameter.slot != GAS]
+        return (
+            numbers,
+            [_column(parameter.slot, parameter.name) for parameter in own],
+            [parameter.sign for parameter in own],
+            stiff,
+        )
 
     def numbers(self, values: Floats, factors: Floats) -> Floats:
         """Return the numbers of the terms, as `terms_of` reads them, with every stiffness times the factor of its row.
@@ -168,10 +173,12 @@ class CandidateLaw:
         """
         base, columns, signs, stiff = self._numbers
         numbers = np.tile(base, (len(values), 1))
-        own = [i for i, one in enumerate(self.free) if one.slot != GAS]
+        own = [i for i, parameter in enumerate(self.free) if parameter.slot != GAS]
         numbers[:, columns] = values[:, own] * np.array(signs)
         if len(own) < len(self.free):
-            combined = {one.name: values[:, i] for i, one in enumerate(self.free) if one.slot == GAS}
+            combined = {
+                parameter.name: values[:, i] for i, parameter in enumerate(self.free) if parameter.slot == GAS
+            }
             for name, value in self._of_gas(combined).items():
                 numbers[:, _column(GAS, name)] = value
         numbers[:, stiff] *= factors[:, np.newaxis]
@@ -184,10 +191,10 @@ class CandidateLaw:
     def starting_at(self, values: Mapping[str, float]) -> CandidateLaw:
         """Return the candidate that starts at these values, by label, where it has the parameter."""
         free = tuple(
-            evolve(one, starts=(min(max(values[one.label], one.low), one.high),))
-            if one.label in values
-            else one
-            for one in self.free
+            evolve(parameter, starts=(min(max(values[parameter.label], parameter.low), parameter.high),))
+            if parameter.label in values
+            else parameter
+            for parameter in self.free
         )
         return evolve(self, free=free, more_starts=())
 
@@ -203,9 +210,9 @@ def _column(slot: int, name: str) -> int:
 
 
 _PARAMS: Final[tuple[Any, ...]] = tuple(find_term(kind)[1].params for kind in SLOTS)
-_FIRST: Final = tuple(sum(len(one._fields) for one in _PARAMS[:slot]) for slot in range(len(SLOTS)))
+_FIRST: Final = tuple(sum(len(param._fields) for param in _PARAMS[:slot]) for slot in range(len(SLOTS)))
 """The first column of each slot."""
-N_NUMBERS: Final = sum(len(one._fields) for one in _PARAMS)
+N_NUMBERS: Final = sum(len(param._fields) for param in _PARAMS)
 """The number of parameters of the terms of all slots."""
 
 

@@ -50,14 +50,18 @@ def without_path_error(
 def path_bias(model: ForwardModel, fitted: Fitted, squeezes: Sequence[Squeeze]) -> Floats:
     """Return by how much the logarithms of the values are too large; zeros if the recordings have no finer path."""
     none = np.zeros(len(fitted.values))
-    finest = [on_fine_path(one) for one in squeezes]
+    finest = [on_fine_path(squeeze) for squeeze in squeezes]
     if any(
-        len(fine.t_s) <= NODES_PER_TICK * len(one.t_s) for fine, one in zip(finest, squeezes, strict=True)
+        len(fine.t_s) <= NODES_PER_TICK * len(squeeze.t_s)
+        for fine, squeeze in zip(finest, squeezes, strict=True)
     ):
         return none
     simulated = [
-        evolve(one, force_n=_measured(one, fine, model.forces(fine, fitted.candidate, fitted.values, *own)))
-        for one, fine, own in zip(
+        evolve(
+            squeeze,
+            force_n=_measured(squeeze, fine, model.forces(fine, fitted.candidate, fitted.values, *own)),
+        )
+        for squeeze, fine, own in zip(
             squeezes, finest, zip(fitted.widths_m, fitted.factors, strict=True), strict=True
         )
     ]

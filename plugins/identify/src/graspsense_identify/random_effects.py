@@ -90,11 +90,13 @@ def own_spreads(
     """
     if not fits:
         return []
-    names = [one.instance for one in squeezes]
-    values = np.log([one.values for one in fits])
+    names = [squeeze.instance for squeeze in squeezes]
+    values = np.log([fit.values for fit in fits])
     covariances = np.array([_covariance(model, *each) for each in zip(fits, squeezes, strict=True)])
     stiff, reference = stiffnesses(fitted), reference_stiffness(fitted, values)
-    tested = [i for i, one in enumerate(fitted.candidate.free) if i != reference and one.slot != GAS]
+    tested = [
+        i for i, parameter in enumerate(fitted.candidate.free) if i != reference and parameter.slot != GAS
+    ]
     found = []
     for i in tested:
         logs, variances = values[:, i], covariances[:, i, i]

@@ -78,9 +78,9 @@ _REMEDIES: Final = {
 
 def shows_memory(squeezes: Sequence[Squeeze]) -> bool:
     """Return whether the squeezes can determine a term with a memory: by a hold, or by different speeds."""
-    if any(one.stretches.hold_s >= LEAST_HOLD_S for one in squeezes):
+    if any(squeeze.stretches.hold_s >= LEAST_HOLD_S for squeeze in squeezes):
         return True
-    speeds = [one.stretches.speed_m_s for one in squeezes if one.stretches.speed_m_s > 0.0]
+    speeds = [squeeze.stretches.speed_m_s for squeeze in squeezes if squeeze.stretches.speed_m_s > 0.0]
     return bool(speeds) and max(speeds) >= SPEED_RATIO * min(speeds)
 
 
@@ -100,7 +100,7 @@ def undetermined(
                 remedy="record the effort, or weigh the object's contact with a force gauge",
             )
         )
-    if not all(one.stretches.has_approach for one in squeezes):
+    if not all(squeeze.stretches.has_approach for squeeze in squeezes):
         open_.append(
             Undetermined(
                 what="width_m",
@@ -122,7 +122,7 @@ def refusals(
     `held_out`: the errors of the squeezes predicted from others; none for a single one, which is judged by its fit.
     """
     found = [f"{one.what} is not determined: {one.reason}; {one.remedy}" for one in open_ if one.in_scene]
-    errors = held_out or [one.residual for one in fits]
+    errors = held_out or [fit.residual for fit in fits]
     limit = max(CONFIRMS, repeatability(fits)) if held_out else CONFIRMS
     if not min(errors) <= limit:
         what = "held-out squeeze" if held_out else "squeeze"
@@ -176,7 +176,7 @@ def _falls(fitted: Fitted, squeezes: Sequence[Squeeze]) -> list[Undetermined]:
 
 
 def _memory(fitted: Fitted, squeezes: Sequence[Squeeze]) -> list[Undetermined]:
-    load_s = max(one.stretches.load_s for one in squeezes)
+    load_s = max(squeeze.stretches.load_s for squeeze in squeezes)
     return [
         Undetermined(
             what="relaxation (maxwell, loss)",
@@ -187,8 +187,8 @@ def _memory(fitted: Fitted, squeezes: Sequence[Squeeze]) -> list[Undetermined]:
 
 
 def _parameters(fitted: Fitted, found: Uncertainty, squeezes: Sequence[Squeeze]) -> list[Undetermined]:
-    hold_s = max(one.stretches.hold_s for one in squeezes)
-    depth_mm = 1e3 * max(one.depth_m for one in squeezes)
+    hold_s = max(squeeze.stretches.hold_s for squeeze in squeezes)
+    depth_mm = 1e3 * max(squeeze.depth_m for squeeze in squeezes)
     open_ = []
     for i, parameter in enumerate(fitted.candidate.free):
         at_bound = fitted.at_bound(i)
@@ -217,7 +217,7 @@ def _parameters(fitted: Fitted, found: Uncertainty, squeezes: Sequence[Squeeze])
 def _spreads(found: Uncertainty, squeezes: Sequence[Squeeze]) -> list[Undetermined]:
     open_ = []
     if math.isnan(found.between_objects):
-        names = {one.instance for one in squeezes if one.instance}
+        names = {squeeze.instance for squeeze in squeezes if squeeze.instance}
         count = (
             "one object"
             if len(names) == 1

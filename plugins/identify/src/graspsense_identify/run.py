@@ -134,14 +134,14 @@ def _delay(model: ForwardModel, used: Timed, settings_s: float) -> Delay:
 def _distinct(squeezes: Sequence[RecordedSqueeze], notes: list[str]) -> list[RecordedSqueeze]:
     """Return the recordings without copies, which would confirm each other; a note names each copy."""
     first: dict[bytes, RecordedSqueeze] = {}
-    for one in squeezes:
-        trace = one.trace
+    for squeeze in squeezes:
+        trace = squeeze.trace
         content = b"".join(
             column.tobytes() for column in (trace.t_s, trace.gap_m, trace.force_left_n, trace.force_right_n)
         )
         if content in first:
-            notes.append(f"left out: {one.name} is a copy of {first[content].name}")
-        first.setdefault(content, one)
+            notes.append(f"left out: {squeeze.name} is a copy of {first[content].name}")
+        first.setdefault(content, squeeze)
     return list(first.values())
 
 
@@ -195,13 +195,13 @@ def _fit_to_use(
 ) -> tuple[list[RecordedSqueeze], list[Squeeze]]:
     """Return the squeezes with contact and enough measurements, as recorded and prepared."""
     kept, ready, refusals = [], [], []
-    for one in squeezes:
+    for squeeze in squeezes:
         try:
-            ready.append(prepared(one, config.force_delay_s, resolution(len(squeezes)), lag_s))
+            ready.append(prepared(squeeze, config.force_delay_s, resolution(len(squeezes)), lag_s))
         except NoSqueeze as refusal:
             refusals.append(refusal)
         else:
-            kept.append(one)
+            kept.append(squeeze)
     if not ready:
         raise refusals[0]
     for i in not_broken(ready):
@@ -223,7 +223,7 @@ def _shares(config: SimConfig, block: Sequence[RecordedSqueeze], lag_s: float) -
     if not _has_cells(config, block):
         return [1.0] * len(block)
     drive, _ = drive_and_pads(config)
-    ready = [prepared(one, config.force_delay_s, FULL, lag_s) for one in block]
+    ready = [prepared(squeeze, config.force_delay_s, FULL, lag_s) for squeeze in block]
     return [_share(_measured_shares(block, ready, drive))] * len(block)
 
 
@@ -231,7 +231,7 @@ def _measured_shares(
     recorded: Sequence[RecordedSqueeze], ready: Sequence[Squeeze], drive: Drive
 ) -> list[float]:
     """Return the share of each squeeze by itself; NaN where it cannot be measured."""
-    return [measured_share(one.trace, two, drive) for one, two in zip(recorded, ready, strict=True)]
+    return [measured_share(squeeze.trace, two, drive) for squeeze, two in zip(recorded, ready, strict=True)]
 
 
 def _settings(
@@ -250,9 +250,11 @@ def _own_settings(config: SimConfig, squeezes: Sequence[RecordedSqueeze]) -> tup
     """Return the settings of the gripper of the recordings: their own, or those given. Raises ConfigError."""
     known = fields_dict(SimConfig).keys() - {"object", "explain", "compile"}
     own: list[dict[str, Any]] = [
-        {key: value for key, value in one.gripper.items() if key in known} for one in squeezes if one.gripper
+        {key: value for key, value in squeeze.gripper.items() if key in known}
+        for squeeze in squeezes
+        if squeeze.gripper
     ]
-    if own and any(one != own[0] for one in own):
+    if own and any(row != own[0] for row in own):
         raise ConfigError(
             "the recordings were made with different settings of the gripper: identify those of one setting together"
         )
@@ -281,9 +283,9 @@ def _used(squeezes: Sequence[RecordedSqueeze], notes: list[str]) -> Sequence[Rec
         return squeezes
     turn: dict[str, int] = {}
     turns = []
-    for i, one in enumerate(squeezes):
-        turn[one.instance] = turn.get(one.instance, -1) + 1
-        turns.append((turn[one.instance], i))
+    for i, squeeze in enumerate(squeezes):
+        turn[squeeze.instance] = turn.get(squeeze.instance, -1) + 1
+        turns.append((turn[squeeze.instance], i))
     # The first squeeze of every object, then the second ones; among these evenly over the whole order.
     order = [i for _, i in sorted(turns)]
     last = turns[order[MAX_SQUEEZES - 1]][0]
@@ -299,12 +301,14 @@ def _has_cells(config: SimConfig, squeezes: Sequence[RecordedSqueeze]) -> bool:
     """Whether the force was measured by the cells of PR2 fingertips, on which a part of the force lands."""
     if squeezes[0].gripper:
         return config.sensor == "pads"
-    return all(one.trace.pad_left.ndim == 2 and one.trace.pad_left.shape[1] == CELLS for one in squeezes)
+    return all(
+        squeeze.trace.pad_left.ndim == 2 and squeeze.trace.pad_left.shape[1] == CELLS for squeeze in squeezes
+    )
 
 
 def _share(shares: Sequence[float]) -> float:
     """Return the mean share. The scatter of a median is a quarter larger, which `_share_error` does not count."""
-    known = [one for one in shares if math.isfinite(one)]
+    known = [share for share in shares if math.isfinite(share)]
     return min(float(np.mean(known)), 1.0) if known else 1.0
 
 
@@ -319,7 +323,7 @@ def _between_objects(
 
 def _force_scatter(shares: Sequence[float]) -> float:
     """Return the standard deviation of the logarithm of the share between squeezes."""
-    known = [one for one in shares if math.isfinite(one)]
+    known = [share for share in shares if math.isfinite(share)]
     return float(np.std(np.log(known), ddof=1)) if len(known) > 1 else 0.0
 
 
@@ -335,7 +339,7 @@ def _share_error(config: SimConfig, squeezes: Sequence[Squeeze]) -> float:
     The mean is over the way of the fingers, as in the balance of energy that the share follows from.
     """
     drive, _ = drive_and_pads(config)
-    mean_n = float(np.median([_mean_over_way(one) for one in squeezes]))
+    mean_n = float(np.median([_mean_over_way(squeeze) for squeeze in squeezes]))
     return float(config.coulomb_spread_n / ((1.0 + drive.friction.load_friction_coefficient) * mean_n))
 
 
@@ -356,13 +360,13 @@ def _with_share(squeeze: Squeeze, share: float) -> Squeeze:
 
 
 def _scale(squeezes: Sequence[Squeeze]) -> DataScale:
-    times = [one.stretches for one in squeezes]
+    times = [squeeze.stretches for squeeze in squeezes]
     return DataScale(
-        force_n=float(np.median([one.peak_n for one in squeezes])),
-        depth_m=float(np.median([one.depth_m for one in squeezes])),
-        load_s=float(np.median([one.load_s for one in times])),
-        memory_s=max(one.load_s + one.hold_s for one in times),
-        sample_s=float(np.median([np.median(np.diff(one.t_s[one.sample])) for one in squeezes])),
+        force_n=float(np.median([squeeze.peak_n for squeeze in squeezes])),
+        depth_m=float(np.median([squeeze.depth_m for squeeze in squeezes])),
+        load_s=float(np.median([time_s.load_s for time_s in times])),
+        memory_s=max(time_s.load_s + time_s.hold_s for time_s in times),
+        sample_s=float(np.median([np.median(np.diff(squeeze.t_s[squeeze.sample])) for squeeze in squeezes])),
     )
 
 
@@ -374,7 +378,7 @@ def _values(
     `shares`: those of each squeeze, none without cells. `share_error`: the relative error of each.
     """
     widths = np.array(fitted.widths_m)
-    known = np.array([one for one in shares if math.isfinite(one)])
+    known = np.array([share for share in shares if math.isfinite(share)])
     parameters = [_mean("width_m", "m", widths)]
     values = {"width_m": float(widths.mean())}
     width_spread = found.width_objects_m if math.isfinite(found.width_objects_m) else found.width_squeezes_m
@@ -390,13 +394,13 @@ def _values(
         beyond = share_spread(known.tolist(), share_error)
         if beyond > 0.0:
             values["share_spread"] = beyond
-    for i, one in enumerate(fitted.candidate.free):
-        ends = sorted((one.sign * found.low[i], one.sign * found.high[i]))
+    for i, parameter in enumerate(fitted.candidate.free):
+        ends = sorted((parameter.sign * found.low[i], parameter.sign * found.high[i]))
         parameters.append(
             IdentifiedParameter(
-                name=one.label,
-                unit=_unit(one.name),
-                value=one.sign * fitted.values[i],
+                name=parameter.label,
+                unit=_unit(parameter.name),
+                value=parameter.sign * fitted.values[i],
                 low=ends[0],
                 high=ends[1],
                 basis=found.basis,

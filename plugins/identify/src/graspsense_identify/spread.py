@@ -95,7 +95,9 @@ def uncertainty(
     own = _scale_errors(model, fitted, squeezes, force_scale) + PATH_ERROR**2 * np.eye(len(at))
     own += np.diag(corner_errors(model, fitted, squeezes) ** 2)
     if lag_error_s > 0.0:
-        later = fit(model, fitted.candidate, [one.delayed(lag_error_s) for one in squeezes], start=fitted)
+        later = fit(
+            model, fitted.candidate, [squeeze.delayed(lag_error_s) for squeeze in squeezes], start=fitted
+        )
         shift = np.log(later.values) - at
         own += np.outer(shift, shift)
     own += _area_errors(model, fitted, squeezes)
@@ -147,10 +149,10 @@ def _scale_errors(
     if force_scale == 0.0:
         return np.zeros((len(fitted.values), len(fitted.values)))
     more = math.exp(force_scale)
-    stronger = [evolve(one, force_n=more * one.force_n) for one in squeezes]
+    stronger = [evolve(squeeze, force_n=more * squeeze.force_n) for squeeze in squeezes]
     scaled = [
-        value * more if one.is_force else value
-        for one, value in zip(fitted.candidate.free, fitted.values, strict=True)
+        value * more if parameter.is_force else value
+        for parameter, value in zip(fitted.candidate.free, fitted.values, strict=True)
     ]
     found = fit(model, fitted.candidate, stronger, start=evolve(fitted, values=tuple(scaled)))
     shift = np.log(found.values) - np.log(fitted.values)
@@ -209,14 +211,16 @@ def corner_errors(model: ForwardModel, fitted: Fitted, squeezes: Sequence[Squeez
     fewer, the corners that were fitted and the true ones lie anywhere between two samples, and a bootstrap leaves them
     where they are.
     """
-    values = {one.name: value for one, value in zip(fitted.candidate.free, fitted.values, strict=True)}
+    values = {
+        parameter.name: value for parameter, value in zip(fitted.candidate.free, fitted.values, strict=True)
+    }
     if "critical_m" not in values:
         return np.zeros(len(fitted.values))
-    ways = [np.abs(np.diff(one.gap_m[one.sample])) for one in squeezes]
+    ways = [np.abs(np.diff(squeeze.gap_m[squeeze.sample])) for squeeze in squeezes]
     moving = np.concatenate([way[way > MOVING_SHARE * np.max(way)] for way in ways])
     share = math.sqrt(1.0 / 6.0)
     if _on_falling_part(model, fitted, squeezes, values["critical_m"], values["fall_m"]) >= LEAST_FALLING:
-        share = MEAN_OVER_CORNER if any(np.any(one.averaged_s2 > 0.0) for one in squeezes) else 0.0
+        share = MEAN_OVER_CORNER if any(np.any(squeeze.averaged_s2 > 0.0) for squeeze in squeezes) else 0.0
     error_m = share * float(np.median(moving)) / math.sqrt(len(squeezes))
     along_n = error_m * (values["k1_n_m"] + values["k2_n_m"])
     errors = {
@@ -224,7 +228,12 @@ def corner_errors(model: ForwardModel, fitted: Fitted, squeezes: Sequence[Squeez
         "fall_m": math.sqrt(2.0) * error_m / values["fall_m"],
         "drop_n": along_n / values["drop_n"],
     }
-    return np.array([errors.get(one.name, 0.0) if one.slot == SNAP else 0.0 for one in fitted.candidate.free])
+    return np.array(
+        [
+            errors.get(parameter.name, 0.0) if parameter.slot == SNAP else 0.0
+            for parameter in fitted.candidate.free
+        ]
+    )
 
 
 def _on_falling_part(
@@ -240,15 +249,15 @@ def _on_falling_part(
 
 
 def _instances(squeezes: Sequence[Squeeze]) -> int:
-    return len({one.instance for one in squeezes if one.instance})
+    return len({squeeze.instance for squeeze in squeezes if squeeze.instance})
 
 
 def _groups(squeezes: Sequence[Squeeze]) -> list[list[int]]:
     """Return the squeezes that are left out together: those of an object, or each alone."""
     n = len(squeezes)
-    if _instances(squeezes) >= LEAST_INSTANCES and all(one.instance for one in squeezes):
-        names = sorted({one.instance for one in squeezes})
-        groups = [[i for i, one in enumerate(squeezes) if one.instance == name] for name in names]
+    if _instances(squeezes) >= LEAST_INSTANCES and all(squeeze.instance for squeeze in squeezes):
+        names = sorted({squeeze.instance for squeeze in squeezes})
+        groups = [[i for i, squeeze in enumerate(squeezes) if squeeze.instance == name] for name in names]
     else:
         groups = [[i] for i in range(n)]
     if len(groups) > MAX_GROUPS:
@@ -292,7 +301,7 @@ def _bootstrapped(
 
 def _spreads(fitted: Fitted, squeezes: Sequence[Squeeze]) -> dict[str, float]:
     """Return the spreads between objects and between squeezes of an object, of stiffness and width."""
-    names = [one.instance or "" for one in squeezes]
+    names = [squeeze.instance or "" for squeeze in squeezes]
     stiffness = _components(np.log(fitted.factors), names)
     width = _components(np.array(fitted.widths_m), names)
     return {
@@ -306,13 +315,13 @@ def _spreads(fitted: Fitted, squeezes: Sequence[Squeeze]) -> dict[str, float]:
 def _components(values: Floats, names: Sequence[str]) -> tuple[float, float]:
     """Return the standard deviations between and within groups of these names (analysis of variance)."""
     groups = [values[[i for i, one in enumerate(names) if one == name]] for name in sorted(set(names))]
-    degrees = sum(len(one) - 1 for one in groups)
+    degrees = sum(len(group) - 1 for group in groups)
     within = math.nan
     if degrees > 0:
-        within = math.sqrt(sum(float(np.sum((one - one.mean()) ** 2)) for one in groups) / degrees)
+        within = math.sqrt(sum(float(np.sum((group - group.mean()) ** 2)) for group in groups) / degrees)
     if len(groups) < LEAST_INSTANCES:
         return math.nan, within
-    means = np.array([one.mean() for one in groups])
+    means = np.array([group.mean() for group in groups])
     size = len(values) / len(groups)
     inside = 0.0 if math.isnan(within) else within * within / size
     return math.sqrt(max(float(np.var(means, ddof=1)) - inside, 0.0)), within

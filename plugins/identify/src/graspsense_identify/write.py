@@ -44,13 +44,17 @@ def scene_text(facts: SceneFacts) -> str:
         "# Written by `graspsense identify`. Numbers in brackets are 90 % intervals.",
         f"summary = {json.dumps(what)}",
     ]
-    intervals = {one.name: one for one in facts.parameters}
+    intervals = {parameter.name: parameter for parameter in facts.parameters}
     for key, value in facts.values.items():
         interval = intervals.get(key)
         lines.append(f"{key} = {_number(value)}" + ("" if interval is None else f"  # {_interval(interval)}"))
     for slot, given in facts.fitted.candidate.parameters(facts.fitted.values).items():
         lines += ["", "[[terms]]", f'type = "{SLOTS[slot]}"']
-        labels = {one.name: one.label for one in facts.fitted.candidate.free if one.slot == slot}
+        labels = {
+            parameter.name: parameter.label
+            for parameter in facts.fitted.candidate.free
+            if parameter.slot == slot
+        }
         for name, value in given.items():
             interval = intervals.get(labels.get(name, ""))
             comment = _not_fitted(facts, slot, name) if interval is None else _interval(interval)
@@ -89,7 +93,7 @@ def _fracture(fit: FractureFit, intervals: Mapping[str, IdentifiedParameter]) ->
 
 
 def _identified(facts: SceneFacts) -> list[str]:
-    intervals = [one for one in facts.parameters if not math.isnan(one.low)]
+    intervals = [parameter for parameter in facts.parameters if not math.isnan(parameter.low)]
     return [
         "# What the scene was identified from. The simulator checks this table and does not use it.",
         "[identified]",
@@ -103,21 +107,24 @@ def _identified(facts: SceneFacts) -> list[str]:
         "",
         "[identified.intervals]",
         *(
-            f"{json.dumps(one.name)} = [{_number(one.low)}, {_number(one.high)}]  # {one.basis}"
-            for one in intervals
+            f"{json.dumps(interval.name)} = [{_number(interval.low)}, {_number(interval.high)}]  # {interval.basis}"
+            for interval in intervals
         ),
         "",
         "[identified.recordings]",
-        *(f"{json.dumps(one.name)} = {json.dumps(one.sha256)}" for one in facts.squeezes),
+        *(f"{json.dumps(squeeze.name)} = {json.dumps(squeeze.sha256)}" for squeeze in facts.squeezes),
         "",
         "# The error by which the candidates were compared, over the peak force; nan where it was not computed.",
         "[identified.candidates]",
-        *(f"{json.dumps(one.terms)} = {_number(one.error)}  # {one.verdict}" for one in facts.candidates),
+        *(
+            f"{json.dumps(candidate.terms)} = {_number(candidate.error)}  # {candidate.verdict}"
+            for candidate in facts.candidates
+        ),
         "",
         "[identified.undetermined]",
         *(
-            f"{json.dumps(one.what)} = {json.dumps(f'{one.reason}; {one.remedy}')}"
-            for one in facts.undetermined
+            f"{json.dumps(undetermined.what)} = {json.dumps(f'{undetermined.reason}; {undetermined.remedy}')}"
+            for undetermined in facts.undetermined
         ),
     ]
 

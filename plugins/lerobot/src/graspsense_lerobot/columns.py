@@ -31,7 +31,7 @@ class Column:
 
 def parquet_columns(columns: Sequence[Column]) -> Any:
     """Return the frames as a table: a number in each row, or a list of them where there are several."""
-    return pyarrow.table({one.key: _arrow(one.values) for one in columns})
+    return pyarrow.table({column.key: _arrow(column.values) for column in columns})
 
 
 def _arrow(values: Any) -> Any:

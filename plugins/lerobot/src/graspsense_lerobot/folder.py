@@ -134,9 +134,9 @@ class Folder:
     def _wanted(self) -> tuple[str, ...]:
         """The columns of a data file that are numbers."""
         numbers = [
-            one.key
-            for one in self.features.values()
-            if one.dtype not in ("video", "image", "string", "language")
+            feature.key
+            for feature in self.features.values()
+            if feature.dtype not in ("video", "image", "string", "language")
         ]
         return tuple(dict.fromkeys((*numbers, "timestamp", "frame_index", "episode_index", "task_index")))
 
@@ -149,9 +149,9 @@ class Folder:
         if not files:
             raise DataDamaged(f"{self.place}: meta/episodes has no Parquet file")
         videos = [
-            f"videos/{one.key}/{what}"
-            for one in self.features.values()
-            if one.dtype == "video"
+            f"videos/{feature.key}/{what}"
+            for feature in self.features.values()
+            if feature.dtype == "video"
             for what in ("chunk_index", "file_index", "from_timestamp")
         ]
         for file in files:
@@ -231,23 +231,26 @@ class Folder:
 
     def _videos(self, row: Mapping[str, Any], index: int) -> dict[str, tuple[str, float]]:
         found = {}
-        for one in self.features.values():
-            if one.dtype != "video":
+        for feature in self.features.values():
+            if feature.dtype != "video":
                 continue
             if self.version == 2:
                 chunk = index // self._chunk_size
                 fields: dict[str, int | str] = {
                     "episode_chunk": chunk,
                     "episode_index": index,
-                    "video_key": one.key,
+                    "video_key": feature.key,
                 }
-                found[one.key] = self._filled("video_path", fields), 0.0
+                found[feature.key] = self._filled("video_path", fields), 0.0
                 continue
-            names = {name: f"videos/{one.key}/{name}" for name in ("chunk_index", "file_index")}
+            names = {name: f"videos/{feature.key}/{name}" for name in ("chunk_index", "file_index")}
             if all(name in row for name in names.values()):
                 numbers = {name: _whole(row, column, "meta/episodes") for name, column in names.items()}
-                start_s = float(row.get(f"videos/{one.key}/from_timestamp", 0.0))
-                found[one.key] = self._filled("video_path", {**numbers, "video_key": one.key}), start_s
+                start_s = float(row.get(f"videos/{feature.key}/from_timestamp", 0.0))
+                found[feature.key] = (
+                    self._filled("video_path", {**numbers, "video_key": feature.key}),
+                    start_s,
+                )
         return found
 
 

@@ -77,10 +77,14 @@ def meaning_of(names: Iterable[str], gap: str = "", force: str = "") -> Meaning:
     chosen = tuple(dict.fromkeys((*((gap,) if gap else ()), *grippers)))
     arm = grippers.get(chosen[0], "") if chosen else ""
     # A gripper without a name in front of it is the only one.
-    foreign = tuple(one for one in grippers.values() if one != arm) if arm and all(grippers.values()) else ()
+    foreign = (
+        tuple(gripper for gripper in grippers.values() if gripper != arm)
+        if arm and all(grippers.values())
+        else ()
+    )
     own = [name for name in every if not name.lower().startswith(foreign)]
     arrays = _arrays(own)
-    cells = {name for one in arrays for name in one.numbers}
+    cells = {name for array in arrays for name in array.numbers}
     lower = {name: name.lower() for name in own if name not in cells and name not in grippers}
     given = tuple(name.strip() for name in force.split(",") if name.strip())
     effort = tuple(
@@ -129,7 +133,7 @@ def _arrays(names: Sequence[str]) -> tuple[CellArray, ...]:
             place = (int(match["row"] or 0), int(match["cell"] or match["column"]), axis)
             found.setdefault(match["finger"], {})[place] = name
     arrays = (_array(finger, cells) for finger, cells in found.items())
-    return tuple(one for one in arrays if one is not None)
+    return tuple(array for array in arrays if array is not None)
 
 
 def _array(finger: str, cells: Mapping[tuple[int, int, str], str]) -> CellArray | None:

@@ -83,7 +83,9 @@ def frames_of(understood: Understood, episode: Episode) -> list[GraspColumns]:
     try:
         return [squeeze for part in parts for squeeze in squeezes(part)]
     except DataDamaged as error:
-        chosen = "; ".join(one for one in understood.notes if one.startswith(("gap:", "force:", "further")))
+        chosen = "; ".join(
+            note for note in understood.notes if note.startswith(("gap:", "force:", "further"))
+        )
         raise DataDamaged(f"{error} ({chosen}; ?gap=NAME&force=NAME chooses others)") from error
 
 
@@ -236,7 +238,7 @@ def _sum(cells: Sequence[Numbers]) -> Numbers:
 def _unit_of_force(understood: Understood) -> str:
     units = units_of(understood.folder)
     arrays = understood.meaning.arrays
-    names = understood.forces or tuple(one.numbers[0] for one in arrays if not understood.images)
+    names = understood.forces or tuple(array.numbers[0] for array in arrays if not understood.images)
     if names and all(units.get(name) == "N" for name in names):
         return ""
     if not understood.forces:

@@ -61,7 +61,7 @@ class FollowedGrasp:
         self._model = model_for(loaded.settings, loaded.plugins)
         self._features: Any = loaded.settings.features.create()
         self._law: Any = loaded.settings.controller.create()
-        lacking = [one.name for one in self._features.requires if one.name not in KNOWN]
+        lacking = [require.name for require in self._features.requires if require.name not in KNOWN]
         if lacking:
             raise ConfigError(
                 f"the features of this pipeline need {', '.join(lacking)}; from observations come {', '.join(KNOWN)}"

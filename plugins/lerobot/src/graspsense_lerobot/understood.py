@@ -118,9 +118,9 @@ def numbers_of_feature(folder: Folder, feature: DataColumn, episode: Episode) ->
 
 def _vectors(folder: Folder) -> list[DataColumn]:
     return [
-        one
-        for one in folder.features.values()
-        if one.key.startswith("observation.") and _is_number(one) and len(one.shape) == 1
+        feature
+        for feature in folder.features.values()
+        if feature.key.startswith("observation.") and _is_number(feature) and len(feature.shape) == 1
     ]
 
 

@@ -115,7 +115,9 @@ def planned(grasps: Sequence[StoredGrasp], fps: int) -> Plan:
         if state is not None and any(state[name] != unit for name, unit in units.items() if name in state):
             raise ConfigError(f"trial {grasp.number} is in other units than those before: export them apart")
         state = units if state is None else {name: unit for name, unit in state.items() if name in units}
-        arrays = tuple(one for one in arrays if one in grasp.channels and len(trace.signals[one.name].t_s))
+        arrays = tuple(
+            array for array in arrays if array in grasp.channels and len(trace.signals[array.name].t_s)
+        )
         commanded &= bool(np.isfinite(trace.command).all())
     if not state:
         raise ConfigError("the trials have no channel in common, and an episode needs one")
@@ -149,12 +151,12 @@ def predictions(grasp: StoredGrasp) -> list[tuple[float, str]]:
 
 def predicted_classes(grasps: Sequence[StoredGrasp]) -> tuple[str, ...]:
     """Return every label that was predicted."""
-    return tuple(dict.fromkeys(label for one in grasps for _, label in predictions(one)))
+    return tuple(dict.fromkeys(label for grasp in grasps for _, label in predictions(grasp)))
 
 
 def told_events(grasps: Sequence[StoredGrasp]) -> tuple[str, ...]:
     """Return the name of every event that was told."""
-    return tuple(dict.fromkeys(str(event["what"]) for one in grasps for event in _told(one)))
+    return tuple(dict.fromkeys(str(event["what"]) for grasp in grasps for event in _told(grasp)))
 
 
 def _told(grasp: StoredGrasp) -> list[Mapping[str, Any]]:
@@ -163,9 +165,9 @@ def _told(grasp: StoredGrasp) -> list[Mapping[str, Any]]:
 
 def _arrays(grasp: StoredGrasp) -> tuple[TactileArray, ...]:
     return tuple(
-        one
-        for one in grasp.channels
-        if isinstance(one, TactileArray) and one.name != "pads" and one.numbers <= LARGEST_ARRAY
+        channel
+        for channel in grasp.channels
+        if isinstance(channel, TactileArray) and channel.name != "pads" and channel.numbers <= LARGEST_ARRAY
     )
 
 
@@ -201,8 +203,8 @@ def _write(folder: Path, grasps: Sequence[StoredGrasp], plan: Plan) -> int:
             writer = parquet.ParquetWriter(path, table.schema)
         writer.write_table(table)
         size += table.nbytes
-        for one in columns:
-            every.setdefault(one.key, []).append(one.values)
+        for column in columns:
+            every.setdefault(column.key, []).append(column.values)
         n = len(columns[0].values)
         rows.append(_episode_row(grasp, columns, k, start, n, file))
         start += n
@@ -230,7 +232,7 @@ def _columns(grasp: StoredGrasp, trace: Trace, plan: Plan, episode: int, start: 
     action = trace.command[tick] if plan.commanded else np.append(position[1:], position[-1])
     columns = [
         Column("observation.state", state.astype(np.float32), plan.state, plan.units),
-        *(_array_column(one, trace, late) for one in plan.arrays),
+        *(_array_column(array, trace, late) for array in plan.arrays),
         Column(
             "action", action.astype(np.float32), ("gripper.command" if plan.commanded else "gripper.pos",)
         ),
@@ -292,7 +294,9 @@ def _episode_row(
     grasp: StoredGrasp, columns: Sequence[Column], episode: int, start: int, n: int, file: int
 ) -> dict[str, Any]:
     stats = {
-        f"stats/{one.key}/{name}": value for one in columns for name, value in statistics(one.values).items()
+        f"stats/{column.key}/{name}": value
+        for column in columns
+        for name, value in statistics(column.values).items()
     }
     return {
         "episode_index": episode,
@@ -353,7 +357,7 @@ def _write_meta(
             "splits": {"train": f"0:{len(rows)}"},
             "data_path": DATA_PATHS[3],
             "video_path": None,
-            "features": {one.key: one.declared() for one in columns},
+            "features": {column.key: column.declared() for column in columns},
         },
     )
     write_json(folder / "meta/graspsense.json", _meanings(grasps, plan))
@@ -365,7 +369,7 @@ def _meanings(grasps: Sequence[StoredGrasp], plan: Plan) -> dict[str, Any]:
     return {
         **meanings_of_numbers(plan.events, plan.classes),
         "action": "the value that was commanded" if plan.commanded else "the position one frame later",
-        "units of features": {name: unit for one in grasps for name, unit in one.units.items()},
+        "units of features": {name: unit for grasp in grasps for name, unit in grasp.units.items()},
         "raw": "graspsense/raw: the channels of each episode at their own rates",
     }
 
@@ -394,7 +398,7 @@ def _listed(row: Mapping[str, Any], plan: Plan) -> dict[str, Any]:
 
 
 def _card(grasps: Sequence[StoredGrasp], plan: Plan) -> str:
-    made = "Some or all grasps are synthetic (simulated)." if any(one.simulated for one in grasps) else (
+    made = "Some or all grasps are synthetic (simulated)." if any(grasp.simulated for grasp in grasps) else (
         "The grasps were recorded; none is synthetic."
     )  # fmt: skip
     return f"""---
@@ -409,7 +413,7 @@ Grasps of a gripper with force sensors, written by graspsense. {made}
 
 Robot: {grasps[0].device}. Tasks: {", ".join(plan.tasks)}.
 
-Sensors: {", ".join((*plan.state, *(one.name for one in plan.arrays)))}. There is no camera.
+Sensors: {", ".join((*plan.state, *(array.name for array in plan.arrays)))}. There is no camera.
 
 Limitations: channels are taken at {plan.fps} frames per second; `graspsense/raw` has them at their own rates. \
 `meta/graspsense.json` says what the numbers of phase, event and prediction stand for.

@@ -132,7 +132,7 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
             channels.append(TactileArray("pads", "N", rate, rows=left.rows, columns=left.columns))
         if gripper.left.edge:
             channels += [Channel("edge_left", "N", rate), Channel("edge_right", "N", rate)]
-        channels += [Channel(name, one.unit, rate) for name, one in gripper.channels.items()]
+        channels += [Channel(name, channel.unit, rate) for name, channel in gripper.channels.items()]
         if gripper.accelerometer is not None:
             steps = self._steps_of_a_tick()
             channels.append(
@@ -245,13 +245,13 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
             else ForceGauge(model, data, fingers, things, travel.axis)
         )
         self._sensors = [
-            int(model.sensor_adr[identifier(model, OBJ.mjOBJ_SENSOR, one.sensor, "sensor")])
-            for one in self._gripper.channels.values()
+            int(model.sensor_adr[identifier(model, OBJ.mjOBJ_SENSOR, channel.sensor, "sensor")])
+            for channel in self._gripper.channels.values()
         ]
         self._edges = [
-            int(model.sensor_adr[identifier(model, OBJ.mjOBJ_SENSOR, one.edge, "sensor")])
-            for one in fingers
-            if one.edge
+            int(model.sensor_adr[identifier(model, OBJ.mjOBJ_SENSOR, finger.edge, "sensor")])
+            for finger in fingers
+            if finger.edge
         ]
         self._signals: Any = signal_type(self._channels_of(self._gripper))
         self._shell = [
@@ -325,7 +325,7 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
     def _check_start(self, data: mujoco.MjData) -> None:
         """Raise ConfigError where the thing is in the fingers at the start."""
         contacts = [data.contact[k] for k in range(data.ncon)]
-        within = [one.dist for one in contacts if sum(map(self._of_thing, one.geom)) == 1]
+        within = [contact.dist for contact in contacts if sum(map(self._of_thing, contact.geom)) == 1]
         deepest = min(within, default=0.0)
         if deepest < -DEEPEST_M:
             raise ConfigError(

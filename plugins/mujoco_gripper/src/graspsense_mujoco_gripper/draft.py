@@ -85,7 +85,8 @@ def drafted(name: str, folder: Path) -> Draft:
     lines += [f"# A sensor of the model: {sensor}" for sensor in sensors]
     left = ["speed_limit_m_s, where it is not 0.1 m/s"]
     if not all(
-        model.actuator(one).forcelimited or model.actuator(one).ctrllimited for one in closing.actuators
+        model.actuator(actuator).forcelimited or model.actuator(actuator).ctrllimited
+        for actuator in closing.actuators
     ):
         left.append("effort_limit_n: the actuators have no limits")
     if sensors:

@@ -93,7 +93,7 @@ def functions() -> dict[str, Any]:
 
     folder = Path(mujoco.__file__).parent
     # Python's module has loaded it already.
-    (library,) = (one for one in folder.iterdir() if one.name.startswith(("libmujoco.", "mujoco.dll")))
+    (library,) = (path for path in folder.iterdir() if path.name.startswith(("libmujoco.", "mujoco.dll")))
     load_library_permanently(str(library))
     address, number = types.intp, types.float64
     return {

@@ -215,7 +215,9 @@ def _gripper_of(values: Mapping[str, Any], path: Path) -> GripperFile:
     try:
         return structured(values, GripperFile, "a gripper file")
     except ValidationFailed as misfit:
-        said = [f"{'.'.join(map(str, one.path)) or 'the file'}: {one.text}" for one in misfit.problems]
+        said = [
+            f"{'.'.join(map(str, problem.path)) or 'the file'}: {problem.text}" for problem in misfit.problems
+        ]
         raise ConfigError(f"gripper.file: {path}\n  " + "\n  ".join(said)) from None
 
 

@@ -329,7 +329,7 @@ def faces(model: mujoco.MjModel, data: mujoco.MjData, gripper: GripperFile) -> t
     """Return where the left and the right finger touch things: what the gap is measured between, or their geoms."""
     gap = gripper.gap
     if sites := _face_sites(model, gap):
-        left, right = (data.site_xpos[one].mean(axis=0) for one in sites)
+        left, right = (data.site_xpos[site].mean(axis=0) for site in sites)
     elif gap.geoms:
         left, right = (
             data.geom_xpos[identifier(model, OBJ.mjOBJ_GEOM, name, "geom")].copy() for name in gap.geoms

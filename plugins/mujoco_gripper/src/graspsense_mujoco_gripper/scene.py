@@ -213,7 +213,9 @@ def _scene_of(path: Path) -> Scene:
     except TomlError as error:
         raise ConfigError(f"the scene {path}, line {error.line}: {error}") from error
     except ValidationFailed as misfit:
-        said = [f"{'.'.join(map(str, one.path)) or 'the file'}: {one.text}" for one in misfit.problems]
+        said = [
+            f"{'.'.join(map(str, problem.path)) or 'the file'}: {problem.text}" for problem in misfit.problems
+        ]
         raise ConfigError(f"the scene {path}\n  " + "\n  ".join(said)) from None
 
 

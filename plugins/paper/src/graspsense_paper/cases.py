@@ -22,7 +22,7 @@ def of_protocol(summary: Summary, protocol: Protocol) -> Summary:
     return evolve(
         summary,
         planned=evolve(summary.planned, cases=cases),
-        conditions=tuple(one for one in summary.conditions if one.case.name in kept),
+        conditions=tuple(condition for condition in summary.conditions if condition.case.name in kept),
     )
 
 

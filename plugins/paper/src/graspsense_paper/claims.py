@@ -178,7 +178,7 @@ def _probing_force(summary: Summary) -> Claim | None:
 def _printed_rise() -> str:
     """Return the printed rise of the rate from 17 to 23 N, with the interval of its counts (Newcombe, 1998)."""
     weak, strong = (
-        next(one for one in published().rates if one.id == name) for name in ("table_4_17", "table_4_23")
+        next(rate for rate in published().rates if rate.id == name) for name in ("table_4_17", "table_4_23")
     )
     value = strong.rate - weak.rate
     if strong.interval is None or weak.interval is None:
@@ -697,7 +697,7 @@ def _fig_6_rest(summary: Summary) -> Claim | None:
 def _near(name: str, says: str, times: Sequence[float], wanted: tuple[float, float], on: Basis) -> Claim:
     """Return a claim on a time in seconds, `wanted` with its tolerance."""
     time, tolerance = wanted
-    near = sum(abs(one - time) <= tolerance for one in times)
+    near = sum(abs(time_s - time) <= tolerance for time_s in times)
     return Claim(
         id=name,
         says=says,

@@ -63,7 +63,7 @@ def findings(summary: Summary) -> Findings:
                 id="claims",
                 title="Claims of the paper",
                 header=claimed.HEADER,
-                rows=tuple(one.cells for one in checked),
+                rows=tuple(claim.cells for claim in checked),
                 verdicts=(2,),
             )
         )
@@ -81,7 +81,7 @@ def findings(summary: Summary) -> Findings:
         sections=tuple(_sections(summary, paper)),
         values={
             "rows": [row.as_json() for row in held],
-            "claims": [one.as_json() for one in checked],
+            "claims": [claim.as_json() for claim in checked],
             "fitted_parameters": list(paper.fitted.parameters),
         },
     )
@@ -126,7 +126,7 @@ def _answer(held: Sequence[RateComparison], checked: Sequence[Claim]) -> str:
                 )
         parts += by_protocol
     for basis in BASES:
-        verdicts = [one.verdict for one in _counted_once(held, checked) if one.basis == basis]
+        verdicts = [claim.verdict for claim in _counted_once(held, checked) if claim.basis == basis]
         if verdicts:
             parts.append(f"of {len(verdicts)} claims that are {basis}, {counted(verdicts)}")
     return "In simulation, " + "; ".join(parts) + "." if parts else "The table shows how the grasps went."
@@ -135,7 +135,9 @@ def _answer(held: Sequence[RateComparison], checked: Sequence[Claim]) -> str:
 def _counted_once(held: Sequence[RateComparison], checked: Sequence[Claim]) -> list[Claim]:
     """Return the claims without those that rates decide which are compared as well."""
     compared = {row.published.id for row in held}
-    return [one for one in checked if not one.follows_from or not compared.issuperset(one.follows_from)]
+    return [
+        claim for claim in checked if not claim.follows_from or not compared.issuperset(claim.follows_from)
+    ]
 
 
 def _headline(held: Sequence[RateComparison], checked: Sequence[Claim]) -> str:
@@ -148,7 +150,7 @@ def _headline(held: Sequence[RateComparison], checked: Sequence[Claim]) -> str:
     if rates:
         of_both = [found[0] if len(set(found)) == 1 else UNTOLD for found in rates.values()]
         parts.append(f"of {len(rates)} predicted rates of the paper, {counted(of_both)}")
-    claims = [one.verdict for one in _counted_once(held, checked) if one.basis == "predicted"]
+    claims = [claim.verdict for claim in _counted_once(held, checked) if claim.basis == "predicted"]
     if claims:
         parts.append(f"of {len(claims)} predicted claims, {counted(claims)}")
     return f"In simulation, {'; '.join(parts)}" if parts else ""
@@ -298,7 +300,7 @@ def _notes(paper: Published, held: Sequence[RateComparison]) -> tuple[str, ...]:
         f"Fitted to results of the paper and to the authors' tree were {fitted.count} numbers: "
         f"{'; '.join(fitted.parameters)}. {fitted.rests}",
         *dict.fromkeys(notes),
-        *(f"{one.where}: {one.note}" for one in paper.matrices if one.note),
+        *(f"{matrix.where}: {matrix.note}" for matrix in paper.matrices if matrix.note),
         *paper.inconsistencies.lines,
         *(f"Left out: {line}" for line in paper.left_out.lines),
     )
@@ -401,7 +403,7 @@ def _tree(summary: Summary, paper: Published) -> list[Section]:
             result = summary.recognition(case.name, seed)
             if (case.part or summary.planned.name) != name or result is None:
                 continue
-            tree = next((one.tree for one in result.classifiers if one.tree), None)
+            tree = next((classifier.tree for classifier in result.classifiers if classifier.tree), None)
             if tree is None:
                 continue
             theirs = code("\n".join(paper.authors_tree.lines))

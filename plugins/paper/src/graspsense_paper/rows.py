@@ -72,15 +72,17 @@ class RateComparison:
     @property
     def cells(self) -> tuple[str, ...]:
         """The row of a table."""
-        one = self.published
-        its, beyond = one.interval, self.interval
+        published = self.published
+        its, beyond = published.interval, self.interval
         return (
-            one.where,
-            one.what,
+            published.where,
+            published.what,
             self.basis,
             PROTOCOLS[self.protocol],
-            percent(one.printed),
-            f"{one.correct}/{one.n} = {percent(one.rate)}, {span(its)}" if its else "counts not given",
+            percent(published.printed),
+            f"{published.correct}/{published.n} = {percent(published.rate)}, {span(its)}"
+            if its
+            else "counts not given",
             percent(self.ours.mean),
             span(self.ours.interval),
             self.n,
@@ -92,16 +94,16 @@ class RateComparison:
 
     def as_json(self) -> dict[str, Any]:
         """Return the fields as JSON values."""
-        one = self.published
+        published = self.published
         return {
-            "id": one.id,
-            "where": one.where,
-            "what": one.what,
+            "id": published.id,
+            "where": published.where,
+            "what": published.what,
             "basis": self.basis,
             "each_bottle_in": PROTOCOLS[self.protocol],
-            "printed": one.printed,
-            "published": one.rate,
-            "published_interval": None if one.interval is None else list(one.interval),
+            "printed": published.printed,
+            "published": published.rate,
+            "published_interval": None if published.interval is None else list(published.interval),
             "ours": self.ours.mean,
             "interval": list(self.ours.interval or ()),
             "prediction_interval": list(self.ours.prediction or ()),
@@ -110,7 +112,7 @@ class RateComparison:
             "difference": self.difference,
             "difference_interval": None if self.interval is None else list(self.interval),
             "verdict": self.verdict,
-            "note": one.note,
+            "note": published.note,
         }
 
 
@@ -132,19 +134,21 @@ HEADER = (
 def rows(summary: Summary, paper: Published) -> list[RateComparison]:
     """Return a comparison for each published rate and protocol that there are results for."""
     found = []
-    for one in paper.rates:
+    for rate in paper.rates:
         for protocol in PROTOCOLS:
-            condition = condition_result(of_protocol(summary, protocol), one.experiment, one.target, one.at)
+            condition = condition_result(
+                of_protocol(summary, protocol), rate.experiment, rate.target, rate.at
+            )
             if condition is None or condition.case.data.states_per_instance != protocol:
                 continue
-            rates = of_class(condition, one.class_) if one.class_ else condition.rate
+            rates = of_class(condition, rate.class_) if rate.class_ else condition.rate
             if rates is not None:
                 found.append(
                     RateComparison(
-                        published=one,
+                        published=rate,
                         ours=rates,
                         protocol=protocol,
-                        basis=basis(summary, one.experiment, *one.about),
+                        basis=basis(summary, rate.experiment, *rate.about),
                     )
                 )
     return found

@@ -211,7 +211,7 @@ class Pr2Backend(SensorBackend[Pr2Config]):
         self._speed_limit_m_s = min(identity.speed_limit_um_s / 1e6, SPEED_CEILING_M_S)
         self._sent = self._echo = self._lost = 0
         self._heard_us = 0
-        notes = [f"calibration {kind} of {one.made} is in use" for kind, one in found.items()]
+        notes = [f"calibration {kind} of {calibration.made} is in use" for kind, calibration in found.items()]
         friction_n = FRICTION_N
         if config.calibration not in ("", UNCALIBRATED) and not found:
             notes.append(f"{config.calibration} has no calibration of {identity.serial}: uncalibrated")
@@ -238,7 +238,7 @@ class Pr2Backend(SensorBackend[Pr2Config]):
             relaxed=Command(EFFORT, 0.0, math.inf, math.inf),
             tare_images=TARE_IMAGES,
             numbers=device_numbers(identity),
-            calibration={kind: one.sha256 for kind, one in found.items()},
+            calibration={kind: calibration.sha256 for kind, calibration in found.items()},
             notes=tuple(notes),
             friction_n=friction_n,
             status_bits=status_bits(config.swap_fingers),

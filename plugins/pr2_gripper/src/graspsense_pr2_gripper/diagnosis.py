@@ -99,23 +99,23 @@ def _plugged(found: Search, named: bool) -> Iterator[Finding]:
                 "-o gripper.product_id=0x0001",
             )
         return
-    for one in found.matching:
-        where = f"serial {one.serial or 'none'} at {one.path}, " + (
+    for device in found.matching:
+        where = f"serial {device.serial or 'none'} at {device.path}, " + (
             f"USB {', '.join(on_bus)}" if on_bus else "not on USB (through uhid?)"
         )
-        yield Finding("device", "ok", where, numbers={"serial": one.serial, "path": one.path})
-        if not one.readable:
+        yield Finding("device", "ok", where, numbers={"serial": device.serial, "path": device.path})
+        if not device.readable:
             yield Finding(
                 "permission",
                 "problem",
-                f"no permission to open {one.path}",
+                f"no permission to open {device.path}",
                 f"put this line in {RULES_FILE}:\n  {hidraw_rule(config)}\nthen `{RELOAD}`, and plug it in again",
             )
         else:
             yield Finding(
                 "permission",
                 "ok",
-                f"permission to open {one.path}",
+                f"permission to open {device.path}",
                 f"the udev rule, for users without permission:\n  {hidraw_rule(config)}",
             )
     if (config.vendor_id, config.product_id) == TEST_NUMBER:

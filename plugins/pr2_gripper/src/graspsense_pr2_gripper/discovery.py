@@ -65,10 +65,10 @@ def search(config: Pr2Config) -> Search:
             f"the PR2 gripper needs the module {LIBRARY} of hidapi: {error}\n  try: pip install hidapi"
         ) from error
     matching = tuple(
-        HidDevice(serial=one["serial_number"] or "", path=os.fsdecode(one["path"]))
-        for one in listed
-        if (one["vendor_id"], one["product_id"]) == (config.vendor_id, config.product_id)
-        and config.serial in ("", one["serial_number"])
+        HidDevice(serial=row["serial_number"] or "", path=os.fsdecode(row["path"]))
+        for row in listed
+        if (row["vendor_id"], row["product_id"]) == (config.vendor_id, config.product_id)
+        and config.serial in ("", row["serial_number"])
     )
     return Search(config, matching, len(listed))
 
@@ -91,12 +91,12 @@ def found_devices() -> Sequence[FoundDevice]:
     return [
         FoundDevice(
             backend=BACKEND,
-            serial=one.serial,
-            where=one.path,
-            ready=one.readable,
+            serial=device.serial,
+            where=device.path,
+            ready=device.readable,
             advice=""
-            if one.readable
-            else f"no permission on {one.path}: `graspsense doctor` gives the udev rule",
+            if device.readable
+            else f"no permission on {device.path}: `graspsense doctor` gives the udev rule",
         )
-        for one in search(Pr2Config()).matching
+        for device in search(Pr2Config()).matching
     ]

@@ -120,7 +120,7 @@ def _hidraw(config: Pr2Config) -> tuple[Sequence[Callable[[], Transport]], NoDev
         "       other USB ids: -o gripper.vendor_id=0x1209 -o gripper.product_id=0x0001\n"
         "       no gripper at hand: -o gripper.transport=emulated, or `graspsense run --gripper sim`"
     )
-    return [partial(HidrawTransport, one) for one in found.matching], missing
+    return [partial(HidrawTransport, device) for device in found.matching], missing
 
 
 def _pyusb(config: Pr2Config) -> tuple[Sequence[Callable[[], Transport]], NoDevice]:
@@ -133,4 +133,4 @@ def _pyusb(config: Pr2Config) -> tuple[Sequence[Callable[[], Transport]], NoDevi
         "  try: plug it in and switch it on; gripper.transport hidraw sees devices that are not on USB, too\n"
         "       no gripper at hand: -o gripper.transport=emulated, or `graspsense run --gripper sim`"
     )
-    return [partial(PyusbTransport, one) for one in devices], missing
+    return [partial(PyusbTransport, device) for device in devices], missing

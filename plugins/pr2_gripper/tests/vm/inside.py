@@ -425,7 +425,9 @@ def ran(*arguments: str) -> tuple[int, Any]:
 
 def whole_grasp(way: Way) -> None:
     options = (f"gripper.transport={way.transport}", *PATIENT)
-    code, trial = ran("run", "--json", "--gripper", "pr2", *(word for one in options for word in ("-o", one)))
+    code, trial = ran(
+        "run", "--json", "--gripper", "pr2", *(word for option in options for word in ("-o", option))
+    )
     features = trial.get("features", {})
     missing = {name for name, value in features.items() if value is None}
     # A cell image takes 11 reports: at 100 Hz the fingers may stand when the contact is seen. Then no rate is known.
@@ -497,7 +499,7 @@ def main() -> int:
     rules = Path("/run/udev/rules.d")
     rules.mkdir(parents=True)
     lines = (hidraw_rule(Pr2Config()), usb_rule(Pr2Config()), UHID_RULE)
-    (rules / "70-graspsense.rules").write_text("".join(f"{one}\n" for one in lines))
+    (rules / "70-graspsense.rules").write_text("".join(f"{line}\n" for line in lines))
     subprocess.run(["/lib/systemd/systemd-udevd", "--daemon"], check=True)
     installed()
     # Everything is imported once before anything is timed: reading files takes its time here.

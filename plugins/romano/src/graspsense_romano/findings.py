@@ -111,11 +111,12 @@ def _ranges(rows: Sequence[TouchRow]) -> Iterator[FoundTable]:
         "Held: the greatest force, and how far it slipped. Lost: the greatest force; at the limit, if all of the force "
         "limit was asked for. In brackets the force that friction needs."
     )
-    header = ("mass", *(f"friction {one:g}" for one in frictions))
+    header = ("mass", *(f"friction {friction:g}" for friction in frictions))
     for law in dict.fromkeys(row.law for row in rows):
         fates = {(row.mass_kg, row.friction): _fate(row) for row in rows if row.law == law}
         table = [
-            (f"{mass_kg:g} kg", *(fates.get((mass_kg, one), "") for one in frictions)) for mass_kg in masses
+            (f"{mass_kg:g} kg", *(fates.get((mass_kg, friction), "") for friction in frictions))
+            for mass_kg in masses
         ]
         title = f"Weight and friction: {law}"
         yield FoundTable(id=f"range-{law}", title=title, header=header, rows=tuple(table), note=note)

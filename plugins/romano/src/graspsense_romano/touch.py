@@ -262,8 +262,8 @@ def measured(trace: Trace, scene: TouchSettings) -> dict[str, Any]:
     signals, from_s = followed(trace), since_s + scene.disturbed_s
     kept = held & (t_s > from_s - 0.2) & (t_s < t_s[held][-1] - LAST_S)
     for key, low_n in (("slip_high_n", PUBLISHED_LOW_N), ("slip_wide_n", WIDE_LOW_N)):
-        row[key] = _greatest(np.array([_disturbance(one, low_n) for one in signals]), kept)
-    shocks = np.array([one.acceleration.norm_m_s2 for one in signals])
+        row[key] = _greatest(np.array([_disturbance(signal, low_n) for signal in signals]), kept)
+    shocks = np.array([signal.acceleration.norm_m_s2 for signal in signals])
     down_s = since_s + scene.down_s
     if down_s == down_s:
         at = (t_s > down_s + AROUND_S[0]) & (t_s < down_s + AROUND_S[1])
@@ -272,7 +272,7 @@ def measured(trace: Trace, scene: TouchSettings) -> dict[str, Any]:
         row["shock_at_m_s2"] = _greatest(shocks, at) if held[at].all() else None
         row["placed_s"] = next((t - down_s for t, what, _ in told if what == "place"), None)
     if scene.bump_at:
-        edges = np.array([max(one.edge_left.high_n, one.edge_right.high_n) for one in signals])
+        edges = np.array([max(signal.edge_left.high_n, signal.edge_right.high_n) for signal in signals])
         bump_s, lasts_s = since_s + scene.bumped_s, BALL_M / scene.bump_m_s + scene.bump_touch_s + AROUND_S[1]
         at = held & (t_s > bump_s) & (t_s < bump_s + lasts_s)
         before = held & (t_s <= bump_s)
@@ -289,4 +289,4 @@ def _greatest(values: NDArray[np.float64], where: NDArray[np.bool_]) -> float | 
 def _disturbance(signals: Signals, low_n: float) -> float:
     """Return the high band (N) of the pads whose low band is below this force (N)."""
     pads = (signals.left, signals.right)
-    return max((abs(one.high_n) for one in pads if abs(one.low.y1) < low_n), default=0.0)
+    return max((abs(pad.high_n) for pad in pads if abs(pad.low.y1) < low_n), default=0.0)

@@ -214,7 +214,9 @@ def _resolved_layers(
             complaints += [(merged.owner_of(one.path), one) for one in misfit.under(table)]
             continue
         if not force:
-            of_table = [one.under(table) for one in implausible_values(config) if one.path[0] not in followed]
+            of_table = [
+                value.under(table) for value in implausible_values(config) if value.path[0] not in followed
+            ]
             doubts += [_in_a_line(merged.owner_of(one.path), one) for one in of_table]
         if component is None:
             run = config
@@ -249,8 +251,10 @@ def _told(complaints: Sequence[_Complaint], classes: Mapping[str, type], plugins
     """Return what is wrong, line by line; a key that is unknown may mean one of any table."""
     known = [path for table, cls in classes.items() for path in key_paths(keys_of(cls), table)]
     return [
-        one if isinstance(one, str) else _in_a_line(one[0], _with_owners(one[1], plugins), known)
-        for one in complaints
+        complaint
+        if isinstance(complaint, str)
+        else _in_a_line(complaint[0], _with_owners(complaint[1], plugins), known)
+        for complaint in complaints
     ]
 
 
@@ -286,7 +290,7 @@ def _choose_sent_kind(merged: Merged, controller: Component, gripper: SelectedCo
         return  # The wiring check reports it.
     if not entry.alternatives or "sends" in merged.values:
         return
-    kind = next((one for one in (*entry.commands, *entry.alternatives) if one in accepted), None)
+    kind = next((name for name in (*entry.commands, *entry.alternatives) if name in accepted), None)
     if kind is not None and kind not in entry.commands:
         merged.values["sends"] = kind
         merged.owner[controller.table, "sends"] = Layer.of(
@@ -339,7 +343,7 @@ def build(component: Component, values: Mapping[str, Any]) -> Any:
     try:
         return structured(values, component.config_class(), component.qualified)
     except ValidationFailed as misfit:
-        lines = [f"{dotted((component.table, *one.path))}: {one.text}" for one in misfit.problems]
+        lines = [f"{dotted((component.table, *problem.path))}: {problem.text}" for problem in misfit.problems]
         raise ConfigError(_listed(lines)) from None
 
 
@@ -351,7 +355,7 @@ def build_plausible(component: Component, values: Mapping[str, Any], *, force: b
     config = build(component, values)
     doubts = [] if force else implausible_values(config)
     if doubts:
-        lines = [f"{dotted((component.table, *one.path))}: {one.text}" for one in doubts]
+        lines = [f"{dotted((component.table, *doubt.path))}: {doubt.text}" for doubt in doubts]
         raise ImplausibleSettings(_listed(lines))
     return config
 
@@ -416,7 +420,9 @@ def to_toml(settings: Settings, origins: bool = False) -> str:
             notes = [f"version {versions[table]}"] if key == "type" else []
             if origins:
                 inside = {
-                    path: one for path, one in settings.origins.items() if _within(path, f"{table}.{key}")
+                    path: origin
+                    for path, origin in settings.origins.items()
+                    if _within(path, f"{table}.{key}")
                 }
                 notes += list(dict.fromkeys(inside.values()))
             lines.append(f"{line:<40}  # {', '.join(notes)}" if notes else line)
@@ -558,5 +564,5 @@ def _listed(complaints: Sequence[str]) -> str:
     if len(complaints) == 1:
         return complaints[0]
     return "\n".join(
-        [f"{len(complaints)} errors in the settings:", *(indent(one, "  ") for one in complaints)]
+        [f"{len(complaints)} errors in the settings:", *(indent(complaint, "  ") for complaint in complaints)]
     )

@@ -37,7 +37,7 @@ def disabled_in_config() -> tuple[str, ...]:
     except TomlError as error:
         raise ConfigError(f'{path}: {error}. It holds one line, disabled = ["NAME", ...]') from error
     names = values.pop("disabled", [])
-    if values or not isinstance(names, list) or not all(isinstance(one, str) for one in names):
+    if values or not isinstance(names, list) or not all(isinstance(name, str) for name in names):
         what = f"the unknown key {next(iter(values))!r}" if values else f"disabled = {names!r}"
         raise ConfigError(f'{path}: found {what}. It holds one line, disabled = ["NAME", ...]')
     return tuple(names)

@@ -31,7 +31,7 @@ def fitted_results(origin: str) -> tuple[str, ...]:
     if origin in ORIGINS:
         return ()
     results = tuple(origin.removeprefix(FITTED_TO).split(", "))
-    if not origin.startswith(FITTED_TO) or not all(one.isidentifier() for one in results):
+    if not origin.startswith(FITTED_TO) or not all(result.isidentifier() for result in results):
         raise ValueError(
             f"{origin!r} is not an origin. Known: {', '.join(ORIGINS)}, or {FITTED_TO}the ids of published results"
         )

@@ -110,14 +110,14 @@ def repeatability(fits: Sequence[SqueezeFit]) -> float:
 
     if len(fits) < 2:
         return math.nan
-    deepest = min(float(np.max(one.compression_m)) for one in fits)
+    deepest = min(float(np.max(fit.compression_m)) for fit in fits)
     at = np.linspace(LEAST_COMPRESSION * deepest, deepest, COMPARED)
     forces = []
-    for one in fits:
-        load = slice(0, int(np.argmax(one.compression_m)) + 1)
-        forces.append(np.interp(at, np.maximum.accumulate(one.compression_m[load]), one.measured_n[load]))
+    for fit in fits:
+        load = slice(0, int(np.argmax(fit.compression_m)) + 1)
+        forces.append(np.interp(at, np.maximum.accumulate(fit.compression_m[load]), fit.measured_n[load]))
     deviation = float(np.sqrt(np.mean(np.var(forces, axis=0, ddof=1))))
-    return deviation / float(np.mean([one.peak_n for one in fits]))
+    return deviation / float(np.mean([fit.peak_n for fit in fits]))
 
 
 def held_out_in_words(errors: Sequence[float]) -> str:

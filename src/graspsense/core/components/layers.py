@@ -210,7 +210,7 @@ def _nearby(missing: Traversable) -> str:
     if not folder.is_dir():
         return f": there is no folder {str(folder)!r}"
     # Without the ending, which would make all names similar.
-    near = get_close_matches(missing.stem, [one.stem for one in folder.glob("*.toml")], n=1)
+    near = get_close_matches(missing.stem, [path.stem for path in folder.glob("*.toml")], n=1)
     return f" in {folder}" + (f". Did you mean {near[0] + '.toml'!r}?" if near else "")
 
 
@@ -219,7 +219,7 @@ def option_layers(options: Sequence[str]) -> tuple[list[Layer], list[str]]:
 
     VALUE is a TOML value; any other text is a string. Raises ConfigError if the options are no list of texts.
     """
-    if isinstance(options, str | Mapping) or not all(isinstance(one, str) for one in options):
+    if isinstance(options, str | Mapping) or not all(isinstance(name, str) for name in options):
         example = options if isinstance(options, str) else "run.seed=3"
         raise ConfigError(f"options: expected a list of texts, as in [{example!r}], found {options!r}")
     layers, complaints = [], []

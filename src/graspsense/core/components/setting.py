@@ -224,7 +224,9 @@ def settings_marked(config_class: type, effect: Mapping[str, Any]) -> frozenset[
     if not attrs.has(config_class):
         return frozenset()
     wanted = effect[_EFFECT]
-    return frozenset(one.name for one in attrs.fields(config_class) if one.metadata.get(_EFFECT) == wanted)
+    return frozenset(
+        field.name for field in attrs.fields(config_class) if field.metadata.get(_EFFECT) == wanted
+    )
 
 
 def _limits(

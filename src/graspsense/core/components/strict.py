@@ -70,7 +70,7 @@ class ValidationFailed(Exception):
 
     def under(self, key: str | int) -> list[InvalidValue]:
         """Return the problems with paths that begin with this key."""
-        return [one.under(key) for one in self.problems]
+        return [problem.under(key) for problem in self.problems]
 
 
 def structured(values: Mapping[str, Any], cls: type[ConfigT], called: str) -> ConfigT:
@@ -167,7 +167,7 @@ def implausible_values(config: object) -> list[InvalidValue]:
 
 def _kind_words(kind: Any) -> str:
     if cast(Any, get_origin(kind)) is Literal:
-        return " | ".join(repr(one) for one in get_args(kind))
+        return " | ".join(repr(argument) for argument in get_args(kind))
     return kind.__name__ if isinstance(kind, type) and not get_args(kind) else str(kind)
 
 
@@ -298,7 +298,7 @@ def _choice(value: object, cls: Any) -> Any:
 
 def _union(value: object, cls: Any) -> Any:
     members = get_args(cls)
-    exact = [one for one in members if type(value) is one]
+    exact = [argument for argument in members if type(value) is argument]
     misfits = []
     for member in [*exact, *members]:
         try:
@@ -308,7 +308,9 @@ def _union(value: object, cls: Any) -> Any:
     wanted = [misfit for member, misfit in misfits if member is not type(None)]
     if len(wanted) == 1:
         raise wanted[0]
-    raise _expected(" or ".join(_in_words(one) for one in members if one is not type(None)), value)
+    raise _expected(
+        " or ".join(_in_words(argument) for argument in members if argument is not type(None)), value
+    )
 
 
 def _in_words(kind: Any) -> str:

@@ -159,10 +159,10 @@ class PairedBackend(SensorBackend[Any]):
             later = signals
             if signals:
                 later = type(signals)._make(
-                    one._replace(t_s=one.t_s + offset_s)
-                    if isinstance(one, Image | Samples) and one.counter
-                    else one
-                    for one in signals
+                    signal._replace(t_s=signal.t_s + offset_s)
+                    if isinstance(signal, Image | Samples) and signal.counter
+                    else signal
+                    for signal in signals
                 )
             self._signals = signals, later
         return Reading(frame._replace(t_s=frame.t_s + offset_s), self._pads[1], self._signals[1])  # type: ignore[arg-type]

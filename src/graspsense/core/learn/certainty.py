@@ -54,7 +54,7 @@ class Certainty:
 
     def class_of(self, support: NDArray[np.float64]) -> NDArray[np.int64]:
         """Return the number of the class of support of each answer. NaN is an answer without support."""
-        bounds = [one.least for one in self.classes[1:]]
+        bounds = [object_class.least for object_class in self.classes[1:]]
         found = np.searchsorted(np.array(bounds) - _ROUNDING, np.nan_to_num(support, nan=0.0), side="right")
         return np.asarray(found, dtype=np.int64)
 
@@ -62,44 +62,46 @@ class Certainty:
         """Return the rate of right answers among those with this probability and support."""
         chosen = self.class_of(support)
         result = np.empty(len(probability))
-        for k, one in enumerate(self.classes):
+        for k, object_class in enumerate(self.classes):
             rows = np.flatnonzero(chosen == k)
-            steps = np.array(one.probabilities[1:]) - _ROUNDING
-            result[rows] = np.array(one.rates)[np.searchsorted(steps, probability[rows], side="right")]
+            steps = np.array(object_class.probabilities[1:]) - _ROUNDING
+            result[rows] = np.array(object_class.rates)[
+                np.searchsorted(steps, probability[rows], side="right")
+            ]
         return result
 
     def to_json(self) -> list[dict[str, Any]]:
         """Return the rates as values that JSON represents exactly."""
         return [
             {
-                "support": one.least,
-                "units": one.units,
-                "probabilities": list(one.probabilities),
-                "rates": list(one.rates),
+                "support": object_class.least,
+                "units": object_class.units,
+                "probabilities": list(object_class.probabilities),
+                "rates": list(object_class.rates),
             }
-            for one in self.classes
+            for object_class in self.classes
         ]
 
 
 def certainty_from(kept: Sequence[StoredValues]) -> Certainty:
     """Return the certainty of a stored model. Raises DataDamaged."""
     classes: list[SupportClass] = []
-    for one in kept:
-        rates = one.numbers("rates", (None,), least=0.0)
-        probabilities = one.numbers("probabilities", (len(rates),), least=0.0)
+    for values in kept:
+        rates = values.numbers("rates", (None,), least=0.0)
+        probabilities = values.numbers("probabilities", (len(rates),), least=0.0)
         if not len(rates) or (rates > 1.0).any():
-            raise one.refusal("rates", "there is none, or one is above 1")
+            raise values.refusal("rates", "there is none, or one is above 1")
         if (np.diff(probabilities) <= 0.0).any():
-            raise one.refusal("probabilities", "they do not rise")
-        least = one.number("support", least=0.0)
+            raise values.refusal("probabilities", "they do not rise")
+        least = values.number("support", least=0.0)
         if classes and least <= classes[-1].least:
-            raise one.refusal("support", "the classes of support do not rise")
+            raise values.refusal("support", "the classes of support do not rise")
         classes.append(
             SupportClass(
                 least=least,
                 probabilities=tuple(probabilities.tolist()),
                 rates=tuple(rates.tolist()),
-                units=one.number("units", least=0.0),
+                units=values.number("units", least=0.0),
             )
         )
     return Certainty(classes=tuple(classes))

@@ -196,9 +196,9 @@ def _with_columns(labelled: Labelled, columns: Sequence[str], names: Sequence[st
     """Return the trials with these columns of their table under these names; variants have the names already."""
     table = labelled.table.columns(columns)
     variants = {
-        name: ControlFeatures(table=one.table.columns(names), what=one.what)
-        for name, one in labelled.variants.items()
-        if set(names) <= set(one.table.names)
+        name: ControlFeatures(table=variant.table.columns(names), what=variant.what)
+        for name, variant in labelled.variants.items()
+        if set(names) <= set(variant.table.names)
     }
     return evolve(
         labelled,

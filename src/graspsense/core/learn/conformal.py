@@ -154,7 +154,7 @@ class PredictionSets:
     @property
     def uncalibrated(self) -> tuple[str, ...]:
         """The labels that are in every set, because they have too few units."""
-        return tuple(sorted(name for name, one in self.thresholds.items() if one.score is None))
+        return tuple(sorted(name for name, threshold in self.thresholds.items() if threshold.score is None))
 
     @property
     def in_words(self) -> str:
@@ -165,9 +165,8 @@ class PredictionSets:
         shared = self.uncalibrated
         text = f"{100 * self.coverage:.0f} % for {len(self.thresholds) - len(shared)} of {len(self.thresholds)} labels"
         if not shared:
-            return (
-                f"{text} ({min(one.units for one in self.thresholds.values())} {self.unit} or more of each)"
-            )
+            fewest = min(threshold.units for threshold in self.thresholds.values())
+            return f"{text} ({fewest} {self.unit} or more of each)"
         lacking = ", ".join(f"{name} {needed - self.thresholds[name].units} more" for name in shared)
         return f"{text}; the others are in every set; a label needs {needed} {self.unit}: {lacking}"
 
@@ -180,7 +179,8 @@ class PredictionSets:
             "unknown": self.unknown,
             "trials": self.trials,
             "thresholds": {
-                name: {"units": one.units, "score": one.score} for name, one in self.thresholds.items()
+                name: {"units": threshold.units, "score": threshold.score}
+                for name, threshold in self.thresholds.items()
             },
             "of_support": list(self.of_support),
         }
@@ -230,8 +230,8 @@ def sets_of(
         of_label = len(np.unique(units[rows]))
         score = calibrated_threshold(scores[rows], units[rows], coverage) if of_label >= needed else None
         thresholds[classes[k]] = LabelThreshold(score=score, units=of_label)
-    if all(one.score is None for one in thresholds.values()):
-        most = max((one.units for one in thresholds.values()), default=0)
+    if all(threshold.score is None for threshold in thresholds.values()):
+        most = max((threshold.units for threshold in thresholds.values()), default=0)
         reason = f"{most} calibration {unit} at most of a label, {100 * coverage:.0f} % needs {needed}"
         return PredictionSets(coverage=coverage, unit=unit, thresholds={}, reason=reason)
     numbers = range(int(answers.support_class.max()) + 1)

@@ -125,7 +125,10 @@ class Labelled:
             if self.value is None
             else evolve(self.value, values=_picked(self.value.values, numbers)),
             width=_control_rows(self.width, which),
-            variants={name: evolve(one, table=one.table.rows(which)) for name, one in self.variants.items()},
+            variants={
+                name: evolve(variant, table=variant.table.rows(which))
+                for name, variant in self.variants.items()
+            },
         )
 
     def of_class(self, name: str) -> Labelled:

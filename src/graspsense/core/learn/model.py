@@ -191,7 +191,7 @@ class Model:
         warnings = (*self._kind_warnings(differences), *differences)
         labels, shares = self.answers(table)
         made = self._calibrated(table.columns(self.names), labels, shares, bool(differences))
-        return [evolve(one, warnings=warnings, model=self.in_a_line) for one in made]
+        return [evolve(prediction, warnings=warnings, model=self.in_a_line) for prediction in made]
 
     def _calibrated(
         self, table: FeatureTable, labels: Sequence[str], shares: NDArray[np.float64], elsewhere: bool
@@ -333,7 +333,7 @@ class Model:
             names = ", ".join(self.sets.uncalibrated)
             yield f"in every set, because too few {self.sets.unit} calibrate it: {names}"
         if self.simulated and not any(
-            one.startswith("trained on simulated grasps, but") for one in differences
+            difference.startswith("trained on simulated grasps, but") for difference in differences
         ):
             yield "trained on simulated grasps: valid for the simulator, untested on real objects"
 
@@ -355,7 +355,7 @@ class Model:
             **(
                 {}
                 if not self.checkpoints
-                else {"checkpoints": [_part_as_json(*one) for one in self.checkpoints]}
+                else {"checkpoints": [_part_as_json(*checkpoint) for checkpoint in self.checkpoints]}
             ),
         }
         return {**content, "sha256": digest(content)}
@@ -436,7 +436,7 @@ def classifier_from(
         if (
             len(classes) < 1
             or len(set(classes)) < len(classes)
-            or not all(type(one) is str for one in classes)
+            or not all(type(object_class) is str for object_class in classes)
         ):
             raise ValueError("its labels are not different texts")
         empty = FeatureTable(names=names, units=units, values=np.full((1, len(names)), np.nan))
@@ -698,8 +698,8 @@ def model_for(settings: Settings, plugins: Plugins) -> Model | None:
     given = settings.features.declared.features
     misfit = model.misfit(
         FeatureTable(
-            names=tuple(one.name for one in given),
-            units=tuple(one.unit for one in given),
+            names=tuple(feature.name for feature in given),
+            units=tuple(feature.unit for feature in given),
             values=np.empty((0, len(given))),
         )
     )

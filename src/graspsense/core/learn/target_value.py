@@ -60,9 +60,9 @@ def values_of_labels(name: str, labels: Sequence[Mapping[str, str]], where: str)
     units: dict[str, None] = {}
     known: set[str] = set()
     values = []
-    for one in labels:
+    for label in labels:
         value = math.nan
-        for heading, cell in one.items():
+        for heading, cell in label.items():
             called, unit = name_and_unit(heading)
             number = number_of(cell)
             if number is not None and called not in RESERVED:

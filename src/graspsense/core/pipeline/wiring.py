@@ -30,7 +30,7 @@ def check(settings: Settings) -> None:
             "the components do not fit together" if len(misfits) > 1 else "two components do not fit together"
         )
         raise WiringError(
-            "\n".join([f"{head}:", *(f"  {one}" for one in misfits), f"  {_fitting(settings)}"])
+            "\n".join([f"{head}:", *(f"  {misfit}" for misfit in misfits), f"  {_fitting(settings)}"])
         )
     if too_small := [*_too_small(settings)]:
         raise WiringError("\n  ".join(["the gripper cannot do as little as is asked:", *too_small]))
@@ -44,7 +44,7 @@ def check_recording(
     Raises WiringError that names each one that it lacks, and the arrays that it has with the options that choose them.
     """
     given = {channel.name: channel for channel in channels}
-    misfits = [one for user in users for one in _misfits_of(_user(user), given, "this recording")]
+    misfits = [misfit for user in users for misfit in _misfits_of(_user(user), given, "this recording")]
     if misfits:
         raise WiringError(f"{source}: {'; '.join(misfits)}")
 
@@ -133,8 +133,8 @@ def _user(part: SelectedComponent | FeatureSet[Any]) -> _User:
     if isinstance(part, FeatureSet):
         requires = getattr(part, "requires", ())  # a set whose entry declares them has none of its own
         return _User(f"features {type(part).__name__}", "features", "feature-set", requires, part.config)
-    one = part.component
-    return _User(_named(one), one.table, one.role, part.declared.requires, part.config)
+    component = part.component
+    return _User(_named(component), component.table, component.role, part.declared.requires, part.config)
 
 
 def _channel_misfits(gripper: SelectedComponent, user: SelectedComponent) -> Iterator[str]:
@@ -172,18 +172,18 @@ def _arrays(user: _User, wanted: Channel, given: Mapping[str, Channel]) -> str:
         if wanted.name in map(str.strip, str(value).split(","))
     ]
     words = ""
-    for one in given.values():
-        if named and isinstance(one, TactileArray):
+    for channel in given.values():
+        if named and isinstance(channel, TactileArray):
             layout = {
-                named[0]: one.name, "unit": one.unit, "rows": one.rows or 1, "columns": one.columns or one.cells,
-                "components": one.components, "dtype": one.dtype,
+                named[0]: channel.name, "unit": channel.unit, "rows": channel.rows or 1,
+                "columns": channel.columns or channel.cells, "components": channel.components, "dtype": channel.dtype,
             }  # fmt: skip
             changed = [
                 f"{user.table}.{key}={value}"
                 for key, value in layout.items()
                 if getattr(user.config, key, value) != value
             ]
-            words += f". For its array {one.name}: {set_option(*changed)}"
+            words += f". For its array {channel.name}: {set_option(*changed)}"
     return words
 
 
@@ -224,7 +224,7 @@ def _command_misfits(gripper: SelectedComponent, controller: SelectedComponent) 
             kinds = ", ".join(accepted) or "none"
             law = controller.declared
             fits = (
-                [one for one in (*law.commands, *law.alternatives) if one in accepted]
+                [name for name in (*law.commands, *law.alternatives) if name in accepted]
                 if law.alternatives
                 else []
             )

@@ -56,7 +56,9 @@ def event_as_json(event: GraspEvent) -> dict[str, Any]:
 
 def event_from_json(value: Mapping[str, Any]) -> GraspEvent:
     """Return the event of `event_as_json`; without a source it is of the runner. Raises KeyError, ValueError."""
-    source: EventSource = next((one for one in get_args(EventSource) if one == value.get("source")), "runner")
+    source: EventSource = next(
+        (argument for argument in get_args(EventSource) if argument == value.get("source")), "runner"
+    )
     until = value.get("until_s")
     return GraspEvent(
         float(value["t_s"]),

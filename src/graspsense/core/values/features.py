@@ -162,7 +162,7 @@ def _texts(items: Iterable[str]) -> tuple[str, ...]:
 
 
 def _reasons(items: Iterable[Reason | str]) -> tuple[Reason, ...]:
-    return tuple(one if isinstance(one, Reason) else Reason(words=one) for one in items)
+    return tuple(item if isinstance(item, Reason) else Reason(words=item) for item in items)
 
 
 @frozen(kw_only=True)
@@ -224,7 +224,7 @@ class Prediction:
             "certainty": self.certainty,
             "calibrated": self.calibrated,
             "no_certainty": self.no_certainty,
-            "because": [one.as_json() for one in self.because],
+            "because": [reason.as_json() for reason in self.because],
         }
 
     def __repr__(self) -> str:

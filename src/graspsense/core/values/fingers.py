@@ -59,7 +59,7 @@ class FingerForce(Channel):
 
 def fingers_of(channels: Iterable[Channel]) -> tuple[FingerForce, ...]:
     """Return the fingers among these channels."""
-    return tuple(one for one in channels if isinstance(one, FingerForce))
+    return tuple(channel for channel in channels if isinstance(channel, FingerForce))
 
 
 def opposed_forces(channels: Iterable[Channel]) -> Callable[[Sequence[float]], tuple[float, float]]:
@@ -83,7 +83,7 @@ def opposed_forces(channels: Iterable[Channel]) -> Callable[[Sequence[float]], t
     (4.0, 4.0)
     """
     fingers = fingers_of(channels)
-    rules = {one.touch for one in fingers}
+    rules = {finger.touch for finger in fingers}
     if len(fingers) < 2 or len(rules) != 1:
         raise ValueError(
             f"{len(fingers)} fingers with the rules {', '.join(sorted(rules)) or 'none'}: declare two or more fingers "
@@ -109,7 +109,7 @@ def fingers_in_words(fingers: Sequence[FingerForce]) -> str:
     """Return which fingers the two forces of a frame are of, and with them every feature of the force."""
     if not fingers:
         return ""
-    names = [one.finger.replace("_", " ") for one in fingers]
+    names = [finger.finger.replace("_", " ") for finger in fingers]
     if fingers[0].touch == "each":
         forces = f"the left force is the least of {', '.join(names)}, the right one the greatest"
         rule = "both touch when every finger does"
@@ -118,7 +118,7 @@ def fingers_in_words(fingers: Sequence[FingerForce]) -> str:
         rule = "both touch when two opposed fingers do"
     else:
         sides = [
-            " and ".join(name for one, name in zip(fingers, names, strict=True) if one.side == side)
+            " and ".join(name for finger, name in zip(fingers, names, strict=True) if finger.side == side)
             for side in ("left", "right")
         ]
         forces = f"the left force is of {sides[0]}, the right one of {sides[1]}"
@@ -140,7 +140,7 @@ def _dot(a: Sequence[float], b: Sequence[float]) -> float:
 
 def _shares(fingers: Sequence[FingerForce], side: str) -> tuple[tuple[int, float], ...]:
     """Return the place of each finger of a side, and the share of its force along the direction of the side."""
-    places = [k for k, one in enumerate(fingers) if one.side == side]
+    places = [k for k, finger in enumerate(fingers) if finger.side == side]
     if len(places) < 2 or not all(fingers[k].closing for k in places):
         return tuple((k, 1.0) for k in places)
     directions = [_unit(fingers[k].closing) for k in places]
@@ -148,7 +148,7 @@ def _shares(fingers: Sequence[FingerForce], side: str) -> tuple[tuple[int, float
     if _length(total) < 1e-6:
         raise ValueError(f"the fingers of the {side} side close against each other: put them on two sides")
     axis = _unit(total)
-    return tuple((k, _dot(one, axis)) for k, one in zip(places, directions, strict=True))
+    return tuple((k, _dot(direction, axis)) for k, direction in zip(places, directions, strict=True))
 
 
 def _borne(shares: Sequence[tuple[int, float]], forces: Sequence[float]) -> float:

@@ -44,7 +44,7 @@ def settings_from_json(values: Mapping[str, Any], config_class: type) -> dict[st
     A setting that is text keeps these words.
     """
     attrs.resolve_types(config_class)
-    types = {one.alias: one.type for one in attrs.fields(config_class)}
+    types = {field.alias: field.type for field in attrs.fields(config_class)}
     return {key: _read(value, types.get(key)) for key, value in values.items()}
 
 

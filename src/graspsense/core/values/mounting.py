@@ -74,9 +74,9 @@ class Mounting:
 
 def mounting_from_json(values: object) -> dict[str, Mounting]:
     """Return the mounting of each frame from `Mounting.as_json` of it. Raises TypeError or ValueError."""
-    if not isinstance(values, dict) or not all(isinstance(one, dict) for one in values.values()):
+    if not isinstance(values, dict) or not all(isinstance(value, dict) for value in values.values()):
         raise TypeError("the mounting of the gripper is not a table of tables")
-    return {str(name): Mounting(**one) for name, one in values.items()}
+    return {str(name): Mounting(**value) for name, value in values.items()}
 
 
 def _scaled(numbers: str, unit: str, factors: Mapping[str, float]) -> Triple:

@@ -32,7 +32,9 @@ class CodedColumn:
     def columns(self) -> tuple[str, ...]:
         """The names of its columns in a table of features."""
         return (
-            (self.name,) if self.values is None else tuple(value_name(self.name, one) for one in self.values)
+            (self.name,)
+            if self.values is None
+            else tuple(value_name(self.name, value) for value in self.values)
         )
 
 

@@ -83,7 +83,8 @@ class Reason:
         result: dict[str, Any] = {"words": self.words}
         if self.features:
             result["features"] = [
-                {"name": one.name, "value": one.value, "unit": one.unit} for one in self.features
+                {"name": feature.name, "value": feature.value, "unit": feature.unit}
+                for feature in self.features
             ]
         if self.above is not None or self.up_to is not None:
             result["rule"] = {"above": self.above, "up_to": self.up_to}
@@ -123,10 +124,11 @@ def contribution_reasons(
         return Reason(words=f"{text}: {given.words}", features=features, contribution=given)
 
     reasons = [
-        reason(" and ".join(one.words for one in features), features, value) for features, value in shown
+        reason(" and ".join(feature.words for feature in features), features, value)
+        for features, value in shown
     ]
     if others:
-        rest = tuple(dict.fromkeys(one for features, _ in others for one in features))
+        rest = tuple(dict.fromkeys(feature for features, _ in others for feature in features))
         value = math.fsum(value for _, value in others)
         reasons.append(reason(f"{len(others)} smaller contributions together", rest, value))
     before = Contribution(start, scale, label, against)

@@ -89,8 +89,12 @@ def trial_as_json(trial: Trial) -> dict[str, Any]:
         "reasons": dict(features.reasons),
         "prediction": None if prediction is None else _prediction_as_json(prediction),
         "checkpoints": [
-            {"after_s": one.after_s, "t_s": one.t_s, **_prediction_as_json(one.prediction)}
-            for one in trial.checkpoints
+            {
+                "after_s": checkpoint.after_s,
+                "t_s": checkpoint.t_s,
+                **_prediction_as_json(checkpoint.prediction),
+            }
+            for checkpoint in trial.checkpoints
         ],
         "components": dict(trial.run.components),
         "seed": trial.run.seed,

@@ -131,13 +131,13 @@ def columns_of_numbers(columns: Mapping[str, Sequence[str]]) -> dict[str, Number
     {'N': [0.0, 1.5], 'mm': [2.0, 1000.0]}
     """
     fits = {name: _common(cells) for name, cells in columns.items()}
-    certain = [one.notations for one in fits.values() if isinstance(one, _Fit)]
-    points = any(not one & COMMA for one in certain)
-    commas = any(one == COMMA for one in certain)
+    certain = [fit.notations for fit in fits.values() if isinstance(fit, _Fit)]
+    points = any(not notations & COMMA for notations in certain)
+    commas = any(notations == COMMA for notations in certain)
     of_file = (COMMA if commas else 0) | (THOUSANDS if points else 0)
     return {
-        name: one if isinstance(one, NotNumbers) else _read(columns[name], one, of_file)
-        for name, one in fits.items()
+        name: fit if isinstance(fit, NotNumbers) else _read(columns[name], fit, of_file)
+        for name, fit in fits.items()
     }
 
 
@@ -174,8 +174,8 @@ def _common(cells: Sequence[str]) -> _Fit | NotNumbers:
 def _mixed(cells: Sequence[str]) -> NotNumbers:
     """Return which cell is written in another way than most."""
     fits = [_EVERY if is_missing(cell) else _notations(cell) for cell in cells]
-    usual = max(_NOTATIONS, key=lambda notation: sum(1 for one in fits if one & notation))
-    row = next(k for k, one in enumerate(fits) if not one & usual)
+    usual = max(_NOTATIONS, key=lambda notation: sum(1 for fit in fits if fit & notation))
+    row = next(k for k, fit in enumerate(fits) if not fit & usual)
     advice = {
         POINT: "write a decimal point",
         THOUSANDS: "the other cells have a decimal point and commas between thousands",
@@ -202,7 +202,9 @@ def _read(cells: Sequence[str], fit: _Fit, of_file: int) -> Numbers | NotNumbers
     else:
         return _values(cells, common)
     row = next(k for k, cell in enumerate(cells) if "," in cell or "." in cell)
-    readings = " or ".join(f"{_values([cells[row]], one)[0]:.15g}" for one in _NOTATIONS if common & one)
+    readings = " or ".join(
+        f"{_values([cells[row]], notation)[0]:.15g}" for notation in _NOTATIONS if common & notation
+    )
     return NotNumbers(
         row, cells[row], f"which can be {readings}: write a decimal point, and nothing between thousands"
     )

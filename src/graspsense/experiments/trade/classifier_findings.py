@@ -60,8 +60,10 @@ def compare_classifiers(part: str, title: str, conditions: Sequence[ConditionRes
     base = conditions[0]
     comparisons = max(len(conditions) - 1, 1)
     compared = [
-        _Comparison(condition=one, difference=None if one is base else one.minus(base, comparisons))
-        for one in conditions
+        _Comparison(
+            condition=condition, difference=None if condition is base else condition.minus(base, comparisons)
+        )
+        for condition in conditions
     ]
     classifiers = [one for one in compared if not one.name.startswith(WITHOUT)]
     reduced = [one for one in compared if one.name.startswith(WITHOUT)]
@@ -79,7 +81,7 @@ def compare_classifiers(part: str, title: str, conditions: Sequence[ConditionRes
             id=part,
             title=title,
             header=header,
-            rows=tuple(one.cells for one in classifiers),
+            rows=tuple(classifier.cells for classifier in classifiers),
             note=f"{text} Differences are paired by seed. Their intervals and p-values (Student's t) are corrected "
             f"for all {comparisons} comparisons with {base.classifier} by Bonferroni's method: an interval excludes "
             "zero exactly if p is below 0.05.",
@@ -101,8 +103,16 @@ def compare_classifiers(part: str, title: str, conditions: Sequence[ConditionRes
 
 def _text(base: ConditionResult, classifiers: Sequence[_Comparison], reduced: Sequence[_Comparison]) -> str:
     rate = f"{percent(base.rate.mean)} ({span(base.rate.interval)})"
-    better = [f"{one.name} ({one.points} points)" for one in classifiers if one.is_better]
-    needed = [f"{one.name.removeprefix(WITHOUT)} ({one.points} points)" for one in reduced if one.is_worse]
+    better = [
+        f"{classifier.name} ({classifier.points} points)"
+        for classifier in classifiers
+        if classifier.is_better
+    ]
+    needed = [
+        f"{comparison.name.removeprefix(WITHOUT)} ({comparison.points} points)"
+        for comparison in reduced
+        if comparison.is_worse
+    ]
     if len(base.by_seed) < 2:
         return (
             f"{base.classifier} recognises {rate}. With one seed, it cannot be told which classifiers differ."

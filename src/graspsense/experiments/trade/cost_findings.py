@@ -36,7 +36,9 @@ def cost_report(part: str, title: str, conditions: Sequence[ConditionResult], co
     advice: list[Advice] = []
     series: dict[str, Sequence[TradePoint]] = {}
     for target in dict.fromkeys(condition.target for condition in conditions):
-        points = trade_points([one for one in conditions if one.target == target], cost.cheap == "low")
+        points = trade_points(
+            [result for result in conditions if result.target == target], cost.cheap == "low"
+        )
         advice.append(advise(points, title, cost.axis, cost.caution))
         rows += [
             (
@@ -73,13 +75,13 @@ def damage_table() -> tuple[FoundTable, list[str]]:
         title="Force from which a container is damaged",
         header=("container", "force on a pad, N", "probing force, N"),
         rows=tuple(
-            (name, f"{one['force_n']:g}", f"{1.5 * one['force_n'] + 7:.0f}") for name, one in known.items()
+            (name, f"{row['force_n']:g}", f"{1.5 * row['force_n'] + 7:.0f}") for name, row in known.items()
         ),
         note="These are assumptions, not measurements. A probing force is an effort: the friction of the default "
         "gripper takes 7 N of it, plus half of the force on the pads.",
         numbers=1,
     )
-    return table, [f"Damage, {name}: {one['reason']}" for name, one in known.items()]
+    return table, [f"Damage, {name}: {row['reason']}" for name, row in known.items()]
 
 
 def _picture(series: Mapping[str, Sequence[TradePoint]], axis: str, title: str) -> str:

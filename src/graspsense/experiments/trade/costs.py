@@ -54,7 +54,9 @@ def trade(params: Mapping[str, Any], seed: int) -> RecognitionResult:
         cost = mean_seconds(params["settings"], result.trials)
     else:
         cost = _setting(params, settings.cost)
-    return evolve(result, classifiers=tuple(evolve(one, cost=cost) for one in result.classifiers))
+    return evolve(
+        result, classifiers=tuple(evolve(classifier, cost=cost) for classifier in result.classifiers)
+    )
 
 
 def _setting(params: Mapping[str, Any], key: str) -> float:

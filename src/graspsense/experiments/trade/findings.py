@@ -63,7 +63,9 @@ def findings(summary: Summary) -> Findings:
 
 
 def _conditions_of(summary: Summary, part: str) -> list[ConditionResult]:
-    return [one for one in summary.conditions if (one.case.part or summary.planned.name) == part]
+    return [
+        condition for condition in summary.conditions if (condition.case.part or summary.planned.name) == part
+    ]
 
 
 def _controls_table(summary: Summary, titles: Mapping[str, str]) -> FoundTable | None:

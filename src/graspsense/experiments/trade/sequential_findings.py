@@ -19,7 +19,7 @@ def compare_sequential(
     part: str, title: str, conditions: Sequence[ConditionResult], fixed_n: float
 ) -> Report:
     """Return the comparison of every case with the single squeeze of `fixed_n`."""
-    fixed = next(one for one in conditions if one.classifier == fixed_name(fixed_n))
+    fixed = next(condition for condition in conditions if condition.classifier == fixed_name(fixed_n))
     rows, faster = [], []
     for point in trade_points(conditions, True):
         difference = saved = None
@@ -64,7 +64,7 @@ def _text(fixed: ConditionResult, fixed_n: float, faster: Sequence[tuple[TradePo
 
 
 def _cells(point: TradePoint, difference: MeanDifference | None, saved: Saved | None) -> tuple[str, ...]:
-    squeezes = [one.squeezes or 0.0 for one in point.condition.by_seed.values()]
+    squeezes = [result.squeezes or 0.0 for result in point.condition.by_seed.values()]
     return (
         point.name,
         f"{point.cost:.2f}",

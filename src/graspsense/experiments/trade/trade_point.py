@@ -160,7 +160,7 @@ def _on_front(condition: ConditionResult, rivals: Sequence[ConditionResult]) -> 
 
 def mean_cost(condition: ConditionResult) -> float:
     """Return the mean cost over the seeds; NaN if there is none."""
-    costs = [math.nan if one.cost is None else one.cost for one in condition.by_seed.values()]
+    costs = [math.nan if result.cost is None else result.cost for result in condition.by_seed.values()]
     return math.fsum(costs) / len(costs)
 
 

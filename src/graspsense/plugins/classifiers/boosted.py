@@ -89,7 +89,7 @@ class Boosted(ScikitClassifier[BoostedConfig]):
                 return [0.0] * row.shape[1]
             column = 0
         trees = [stage[column].tree_ for stage in fitted.estimator.estimators_]
-        _, parts = path_contributions(trees, [means_from_leaves(one) for one in trees], row)
+        _, parts = path_contributions(trees, [means_from_leaves(tree) for tree in trees], row)
         return [fitted.estimator.learning_rate * value for value in parts]
 
     def _raw(self, fitted: FittedEstimator, row: NDArray[np.float64], label: str) -> float:

@@ -57,10 +57,10 @@ class Forest(ScikitClassifier[ForestConfig]):
         column = self.classes().index(label)
         trees = fitted.estimator.estimators_
         means = []
-        for one in trees:
-            values = one.tree_.value[:, 0, :]
+        for tree in trees:
+            values = tree.tree_.value[:, 0, :]
             means.append(values[:, column] / values.sum(axis=1))
-        start, parts = path_contributions([one.tree_ for one in trees], means, row)
+        start, parts = path_contributions([tree.tree_ for tree in trees], means, row)
         weights = np.array([start, *parts]) / len(trees)
         return (
             *contribution_reasons(

@@ -209,7 +209,7 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
         row = fitted.ready(np.array([values]))
         found = self.shares(fitted, row)[0].tolist()
         shares = dict(zip(self.classes(), found, strict=True))
-        ranked = dict(sorted(shares.items(), key=lambda one: -one[1]))
+        ranked = dict(sorted(shares.items(), key=lambda item: -item[1]))
         given = [
             FeatureValue(name, None if math.isnan(value) else value, unit)
             for name, unit, value in zip(fitted.table.names, fitted.table.units, values, strict=True)

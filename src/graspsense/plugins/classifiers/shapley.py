@@ -69,7 +69,7 @@ def _sampled(
 
     rng, n = np.random.default_rng(SEED), len(differing)
     forwards = [rng.permutation(n) for _ in range(ORDERS)]
-    orders = np.array([order for one in forwards for order in (one, one[::-1])])
+    orders = np.array([order for forward in forwards for order in (forward, forward[::-1])])
     rank = np.argsort(orders, axis=1)
     # After k steps of an order, the features of rank below k are known.
     known = rank[:, np.newaxis, :] < np.arange(n + 1)[:, np.newaxis]

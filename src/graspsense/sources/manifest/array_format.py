@@ -152,7 +152,7 @@ def _grasps(path: Path, arrays: Arrays, rules: ArrayRules) -> Iterator[ColumnTab
 
 def _in_order(array: NDArray[Any], axes: Sequence[str]) -> NDArray[Any]:
     """Return an array with its axes in the order of `AXES`."""
-    return np.transpose(array, [axes.index(one) for one in AXES if one in axes])
+    return np.transpose(array, [axes.index(axis) for axis in AXES if axis in axes])
 
 
 def _have_a_time(arrays: Arrays, used: Collection[str]) -> bool:

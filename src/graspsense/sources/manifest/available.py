@@ -43,7 +43,7 @@ class AvailableColumns(dict[str, Any]):
 
     def chosen(self, parts: Sequence[Expression]) -> Expression:
         """Return the first expression whose columns exist, or the first if there is none."""
-        return next((one for one in parts if self.has(one)), parts[0])
+        return next((part for part in parts if self.has(part)), parts[0])
 
     def unit(self, expression: Expression, quantity: str) -> str:
         """Return the unit behind an expression, or the one that the file states for a column on its own."""

@@ -177,7 +177,7 @@ def read_manifest(place: Path) -> ReadManifest:
     try:
         keys = structured(layer.values, Manifest, "a manifest")
     except ValidationFailed as misfit:
-        raise ConfigError("\n".join(layer.complain(one) for one in misfit.problems)) from None
+        raise ConfigError("\n".join(layer.complain(problem) for problem in misfit.problems)) from None
     problems = [f"{layer.where(path)}: {why}" for path, why in _too_many(keys)]
     if problems:
         raise ConfigError("\n".join(problems))
@@ -261,7 +261,7 @@ def _contradictions(keys: Manifest) -> list[tuple[tuple[str, ...], str]]:
     if (
         not keys.label
         and not keys.list
-        and not any("{label" in one for one in _patterns(keys))
+        and not any("{label" in pattern for pattern in _patterns(keys))
         and "?P<label>" not in keys.start
         and "{label" not in keys.arrays
     ):

@@ -152,10 +152,12 @@ class Expression:
 
     def _called(self, node: ast.Call, name: str, arguments: list[Values]) -> Values:
         if name in FOLDS:
-            rows = max((len(one) for one in arguments if one.ndim), default=1)
+            rows = max((len(values) for values in arguments if values.ndim), default=1)
             parts = [
-                np.broadcast_to(one if one.ndim == 2 else np.reshape(one, (-1, 1)), (rows, *_width(one)))
-                for one in arguments
+                np.broadcast_to(
+                    values if values.ndim == 2 else np.reshape(values, (-1, 1)), (rows, *_width(values))
+                )
+                for values in arguments
             ]
             together = np.column_stack(parts)
             if together.shape[1] < 2:
@@ -287,7 +289,7 @@ def _is_component(index: ast.expr) -> bool:
     parts = (index,) if not isinstance(index, ast.Slice) else (index.lower, index.step)
     if isinstance(index, ast.Slice) and index.upper is not None:
         return False
-    numbers = [one.value for one in parts if isinstance(one, ast.Constant) and type(one.value) is int]
+    numbers = [part.value for part in parts if isinstance(part, ast.Constant) and type(part.value) is int]
     return len(numbers) == len(parts) and numbers[0] >= 0 and all(step > 0 for step in numbers[1:])
 
 
@@ -299,7 +301,7 @@ def _checked_call(node: ast.Call, text: str, at: int) -> Sequence[ast.AST]:
             at,
             f"no function {name or 'of this kind'}. There are {', '.join(FUNCTIONS)}.{suggestion(name, FUNCTIONS)}",
         )
-    if node.keywords or any(isinstance(one, ast.Starred) for one in node.args):
+    if node.keywords or any(isinstance(argument, ast.Starred) for argument in node.args):
         raise _error(text, at, f"{name} takes columns, separated by commas")
     if not node.args or (name not in FOLDS and len(node.args) != 1):
         wanted = "at least one argument" if name in FOLDS else "one argument"

@@ -77,7 +77,7 @@ def recorded_at_of(manifest: ReadManifest, table: ColumnTable) -> str:
     number = number_in(text)
     try:
         if stamp is not None:
-            return datetime(*(int(one) for one in stamp.groups()), tzinfo=UTC).isoformat()  # type: ignore[misc, arg-type]
+            return datetime(*(int(group) for group in stamp.groups()), tzinfo=UTC).isoformat()  # type: ignore[misc, arg-type]
         if number is not None:
             while number > 1e11:  # milliseconds, microseconds or nanoseconds
                 number /= 1e3

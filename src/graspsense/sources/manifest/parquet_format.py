@@ -103,7 +103,7 @@ def _numbers(column: Any) -> Numbers | None:
 def _numbers_of_texts(column: Any) -> Numbers | None:
     whole = column.unify_dictionaries().combine_chunks()
     words = whole.dictionary.to_pylist()
-    found = columns_of_numbers({"": [one.strip() for one in words if isinstance(one, str)]})[""]
+    found = columns_of_numbers({"": [word.strip() for word in words if isinstance(word, str)]})[""]
     if isinstance(found, NotNumbers) or len(found) < len(words):
         return None
     known = np.concatenate(([np.nan], found))

@@ -166,8 +166,10 @@ def _format(manifest: ReadManifest, path: Path) -> Callable[[Path], list[ColumnT
 
         return lambda file: read_text(file, manifest.keys.start)
     if suffix in ARRAY_SUFFIXES:
-        parts = [one for alternatives in manifest.expressions.values() for one in alternatives]
-        used = frozenset(name for one in parts for name in one.names)
+        parts = [
+            alternative for alternatives in manifest.expressions.values() for alternative in alternatives
+        ]
+        used = frozenset(name for part in parts for name in part.names)
         rules = ArrayRules(pattern=manifest.keys.arrays, axes=axes_of(manifest.keys.axes), used=used)
         return lambda file: read_arrays(file, rules)
     if suffix in PARQUET_SUFFIXES:
@@ -185,7 +187,7 @@ def _format(manifest: ReadManifest, path: Path) -> Callable[[Path], list[ColumnT
 def _bag(manifest: ReadManifest) -> Callable[[Path], list[ColumnTable]]:
     from graspsense.sources.manifest.ros_format import read_bag
 
-    texts = [one.text for parts in manifest.expressions.values() for one in parts]
+    texts = [part.text for parts in manifest.expressions.values() for part in parts]
     further = (*manifest.channels.values(), *manifest.values.values(), *manifest.events.values())
     texts += [one.text for one in further]
     topics = {match[1] for text in texts for match in re.finditer(r"['\"](/[^.'\"*?]+)\.", text)}

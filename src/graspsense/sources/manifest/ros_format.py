@@ -66,7 +66,7 @@ def _collected(
     kept = Unpacked(path)
     for topic, recorded_ns, message in _messages(path, topics):
         columns = dict(numbers_in(message, topic))
-        kept.add(sum(_NUMBER_BYTES + 8 * np.size(one) for one in columns.values()))
+        kept.add(sum(_NUMBER_BYTES + 8 * np.size(column) for column in columns.values()))
         values.setdefault(topic, []).append(columns)
         times.setdefault(topic, Messages()).add(recorded_ns, stamp_ns(message))
     values = {topic: found for topic, found in values.items() if found[0]}
@@ -176,7 +176,7 @@ def read_topics(path: Path) -> list[ColumnTable]:
         numbers: dict[str, Numbers] = {}
         for name, example in rows[0].items():
             width = np.size(example)
-            if all(np.size(one.get(name, ())) == width for one in rows):
+            if all(np.size(row.get(name, ())) == width for row in rows):
                 every = np.array([rows[k][name] for k in times[topic].order], dtype=np.float64)
                 every = every.reshape(len(rows), -1)
                 numbers[name] = every[:, 0] if width == 1 else every

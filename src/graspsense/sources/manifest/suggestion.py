@@ -101,8 +101,8 @@ def suggested_manifest(folder: Path, place: Path) -> Suggestion:
     if _LABELS & _fields_of(about) or (not divided and _is_of_readings(table)):
         # Arrays or rows tell what was grasped.
         lines = [
-            evolve(one, value=one.value.replace("{label}", "{part}")) if one.key == "files" else one
-            for one in lines
+            evolve(line, value=line.value.replace("{label}", "{part}")) if line.key == "files" else line
+            for line in lines
         ]
         fields -= {"label"}
     lines += _label(fields | _fields_of(about), table, divided)
@@ -169,7 +169,7 @@ def _repeats(values: Sequence[str]) -> bool:
 def _label_values(pieces: Sequence[tuple[str, Sequence[str]]]) -> Sequence[str] | None:
     """Return the piece that most likely is the label: a text with few values that do not name parts of a set."""
     texts = [values for what, values in pieces if what == "text"]
-    able = [values for values in texts if not any(_OF_A_SET.search(one.lower()) for one in values)]
+    able = [values for values in texts if not any(_OF_A_SET.search(value.lower()) for value in values)]
     return min(able or texts, key=lambda values: len(set(values)), default=None)
 
 
@@ -246,7 +246,7 @@ def _start(path: Path) -> tuple[str, int] | None:
             continue
         name = named if named and named not in taken else f"field{len(taken) + 1}"
         taken.add(name)
-        written.append(f"(?P<{name}>{r'[0-9]+' if all(one.isdecimal() for one in cells) else '[^,]+'})")
+        written.append(f"(?P<{name}>{r'[0-9]+' if all(cell.isdecimal() for cell in cells) else '[^,]+'})")
     return ",".join(written), len(begins)
 
 
@@ -274,7 +274,7 @@ def _array_pattern(path: Path) -> tuple[str, tuple[int, ...]]:
     start = f"{{label}}{signs.pop()}" if signs in ({"_"}, {"/"}, {"."}) else "{label}"
     if len(ends) == 1:
         return f"{start}{{order:d}}{ends.pop()}", shape
-    signs = {one[:1] for one in ends}
+    signs = {end[:1] for end in ends}
     pattern = f"{start}{{order:d}}{signs.pop()}{{{COLUMN}}}" if signs in ({"_"}, {"/"}, {"."}) else ""
     return pattern, shape
 

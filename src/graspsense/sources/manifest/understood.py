@@ -55,7 +55,7 @@ def understood_file(path: Path) -> UnderstoodFile:
             )
             courses[name] = (t_s, values if values.ndim == 1 else values.sum(axis=1))
     force, found = _squeezes(timed)
-    likely = [one for table in shown for one in guesses(table) if one.value and one.key != "rate_hz"]
+    likely = [guess for table in shown for guess in guesses(table) if guess.value and guess.key != "rate_hz"]
     return UnderstoodFile(
         path=path,
         tables=len(tables),
@@ -101,7 +101,7 @@ def _squeezes(
             found = squeezes(columns)
         except DataDamaged:
             return names[0], ()
-        return ", ".join(names), tuple(_held(one) for one in found)
+        return ", ".join(names), tuple(_held(squeeze) for squeeze in found)
     return "", ()
 
 

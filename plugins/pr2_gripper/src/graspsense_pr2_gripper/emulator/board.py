@@ -208,7 +208,7 @@ _WHY_NOT: Final = {"uhid": why_no_uhid, "usb": why_no_vhci}
 def _way_in(wire: str) -> str:
     """Return this wire, or the first that is available. Raises NoDevice with the reason for each wire."""
     wires = (wire,) if wire else tuple(_PORTS)
-    reasons = {one: _WHY_NOT[one]() for one in wires}
+    reasons = {port: _WHY_NOT[port]() for port in wires}
     for one, reason in reasons.items():
         if not reason:
             return one

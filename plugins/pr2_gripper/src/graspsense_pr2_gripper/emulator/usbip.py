@@ -136,8 +136,8 @@ class UsbipServer:
             else:
                 self._waiting.append(one)
 
-    def _return(self, one: _Waiting, status: int, length: int, data: bytes) -> None:
-        self._write(RETURN.pack(RET_SUBMIT, one.number, 0, 0, 0, status, length, 0, 0, 0) + data)
+    def _return(self, waiting: _Waiting, status: int, length: int, data: bytes) -> None:
+        self._write(RETURN.pack(RET_SUBMIT, waiting.number, 0, 0, 0, status, length, 0, 0, 0) + data)
 
     def _write(self, data: bytes) -> None:
         if self._connection is not None:

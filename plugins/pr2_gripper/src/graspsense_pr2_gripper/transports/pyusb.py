@@ -68,8 +68,8 @@ class PyusbTransport(Transport):
         self._util.claim_interface(device, _INTERFACE)
         endpoints = device.get_active_configuration()[(_INTERFACE, 0)].endpoints()
         addresses = [endpoint.bEndpointAddress for endpoint in endpoints]
-        self._in = next((one for one in addresses if one & 0x80), 0x81)
-        self._out = next((one for one in addresses if not one & 0x80), 0x01)
+        self._in = next((address for address in addresses if address & 0x80), 0x81)
+        self._out = next((address for address in addresses if not address & 0x80), 0x01)
 
     def read(self, timeout_s: float) -> bytes:
         """Return the next report, empty bytes after the timeout."""

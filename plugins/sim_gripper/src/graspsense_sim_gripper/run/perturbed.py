@@ -55,8 +55,8 @@ def _settings(config: SimConfig) -> Iterator[str]:
         unused.add("pad_creep_s")
     if config.sensor == "ideal":
         unused.update(("noise_counts", "pad_period_s", "pad_delay_s"))
-    for one in fields(SimConfig):
-        value = getattr(config, one.name)
+    for field in fields(SimConfig):
+        value = getattr(config, field.name)
         is_number = isinstance(value, float) and value != 0.0 and math.isfinite(value)
-        if is_number and one.name not in unused.union(OF_THE_MODEL):
-            yield one.name
+        if is_number and field.name not in unused.union(OF_THE_MODEL):
+            yield field.name

@@ -156,7 +156,7 @@ def _folder_of(kind: type) -> str:
     if source is None:
         return ""
     with suppress(OSError):
-        return "".join(_stamp(one) for one in sorted(Path(source).parent.glob("*.py")))
+        return "".join(_stamp(path) for path in sorted(Path(source).parent.glob("*.py")))
     return ""
 
 

@@ -65,7 +65,7 @@ def find_term(name: str) -> tuple[str, Term]:
     foreign = _foreign()
     if name in foreign:
         return name, foreign[name]
-    matching = [one for one in foreign if one.rpartition("/")[2] == name]
+    matching = [term for term in foreign if term.rpartition("/")[2] == name]
     if len(matching) == 1:
         return matching[0], foreign[matching[0]]
     if matching:
@@ -92,8 +92,8 @@ def in_order(names: Sequence[str]) -> list[int]:
 def laws_of(names: Sequence[str]) -> list[Law | OnSum]:
     """Return the laws of an object with these terms. The parameters of each are `Switchable`. Raises UnknownName."""
     return [
-        OnSum(bind(switched_on_sum, on_sum=one.law)) if isinstance(one, OnSum) else bind(switched, law=one)
-        for one in active_laws(names)
+        OnSum(bind(switched_on_sum, on_sum=law.law)) if isinstance(law, OnSum) else bind(switched, law=law)
+        for law in active_laws(names)
     ]
 
 
