@@ -184,15 +184,15 @@ def table(rows: Iterable[FaultyGrasp]) -> str:
         "| longest until release | outcomes | told |",
         "|---|---|---|---|---|---|---|---|---|",
     ]
-    for (fault, controller), found in groups.items():
-        outcomes = ", ".join(dict.fromkeys(row.outcome for row in found))
-        told = ", ".join(dict.fromkeys(word for row in found for word in row.words.split("; ") if word))
+    for (fault, controller), group in groups.items():
+        outcomes = ", ".join(dict.fromkeys(row.outcome for row in group))
+        told = ", ".join(dict.fromkeys(word for row in group for word in row.words.split("; ") if word))
         # A fault in the opening counts from the moment at which the fingers close.
-        longest = max(row.released_after_s for row in found)
+        longest = max(row.released_after_s for row in group)
         released = "" if longest == -inf else f"{longest:.2f} s"
         lines.append(
-            f"| {fault} | {controller} | {len(found)} | {max(row.largest_effort_n for row in found):.1f} N "
-            f"| {max(row.strong_s for row in found):.2f} s | {max(row.largest_force_n for row in found):.1f} N "
+            f"| {fault} | {controller} | {len(group)} | {max(row.largest_effort_n for row in group):.1f} N "
+            f"| {max(row.strong_s for row in group):.2f} s | {max(row.largest_force_n for row in group):.1f} N "
             f"| {released} | {outcomes} | {told} |"
         )
     return "\n".join(lines)

@@ -94,13 +94,11 @@ def compared(scene: PeerScene, repeats: int, *, adaptive: bool) -> dict[str, Any
         print(f"{scene.name}: {engines[-1][0].name}, {engines[-1][0].setting} is ready", file=sys.stderr)
     runs: list[list[tuple[Run, float]]] = [[] for _ in engines]
     for _ in range(repeats):
-        for found, (engine, _) in zip(runs, engines, strict=True):
-            if not found or found[-1][1] < WARM_S:
+        for run, (engine, _) in zip(runs, engines, strict=True):
+            if not run or run[-1][1] < WARM_S:
                 engine.grasp()
-            found.append(timed(engine))
-    rows = [
-        row(engine, setup, found, reference) for (engine, setup), found in zip(engines, runs, strict=True)
-    ]
+            run.append(timed(engine))
+    rows = [row(engine, setup, run, reference) for (engine, setup), run in zip(engines, runs, strict=True)]
     return {"name": scene.name, "says": scene.says, "runs": rows, "ratios": dict(ratios(rows))}
 
 

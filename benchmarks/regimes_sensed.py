@@ -215,17 +215,17 @@ def against(best: Grasps, grasps: Grasps, first: int, end: int) -> Row:
     }
 
 
-def largest(found: Row) -> float:
+def largest(row: Row) -> float:
     """Return the largest distance of a feature, or difference of the shares that have it."""
-    return max(Distance(*one).largest for one in found["features"].values())
+    return max(Distance(*one).largest for one in row["features"].values())
 
 
-def differs(found: Row) -> bool:
+def differs(row: Row) -> bool:
     """Return whether a feature is beyond the accuracy, and its distribution is not that of the reference by chance.
 
     The tests of the features together have the probability `DIFFERS` of an error (Bonferroni).
     """
-    some = [Distance(*one) for one in found["features"].values()]
+    some = [Distance(*one) for one in row["features"].values()]
     return any(one.largest > ACCURACY and one.p < DIFFERS / len(some) for one in some)
 
 

@@ -56,8 +56,8 @@ def main() -> int:
     print(
         f"{len(labels)} recordings of {len(classes)} labels, {len(np.unique(folds))} folds; majority {counts.max()}"
     )
-    for name, found in answers.items():
-        right = int((np.asarray(found) == labels).sum())
+    for name, answer in answers.items():
+        right = int((np.asarray(answer) == labels).sum())
         low, high = wilson(right, len(labels))
         print(f"| {name} | {right} of {len(labels)} = {right / len(labels):.3f} ({low:.2f} to {high:.2f}) |")
     return 0

@@ -207,9 +207,11 @@ def _manifest(folder: Path, manifest: str, rng: random.Random) -> None:
         ("list.txt", LIST, which == 2),
     ):
         (folder / name).write_bytes(changed(text, rng) if mutate else text.encode())
-    for found in read_recordings(str(folder / "manifest.toml")):
-        if isinstance(found, UnreadableRecording):
-            _check_words(found.error, f"{found.source} {found.error}", ("grasp", "manifest", "list.txt"))
+    for recording in read_recordings(str(folder / "manifest.toml")):
+        if isinstance(recording, UnreadableRecording):
+            _check_words(
+                recording.error, f"{recording.source} {recording.error}", ("grasp", "manifest", "list.txt")
+            )
 
 
 def _check_words(error: Exception, words: str, names: tuple[str, ...]) -> None:

@@ -59,7 +59,7 @@ def test_equal_rates_of_few_grasps_are_not_said_to_agree():
 
 @pytest.mark.parametrize("rates", [(0.8, 1.0), (1.0, 0.8), (0.5,), (1.0, 1.0, 0.0)])
 def test_the_interval_of_recorded_trials_in_several_folds_is_around_their_mean(rates):
-    found = condition("17 N", *rates, n=20, simulated=False).rate
-    low, high = found.interval
-    assert low <= found.mean <= high
+    rate = condition("17 N", *rates, n=20, simulated=False).rate
+    low, high = rate.interval
+    assert low <= rate.mean <= high
     assert high - low > 0.1

@@ -434,8 +434,8 @@ class TestDevices:
         assert ran.stdout == (
             "GRIPPER  SERIAL  WHERE  STATE      ADVICE\nhand     42      bus 1  not ready  add a udev rule\n"
         )
-        found = run("devices", "--timeout", "0.5", "--json").json
-        assert found["devices"] == [
+        json = run("devices", "--timeout", "0.5", "--json").json
+        assert json["devices"] == [
             {
                 "backend": "hand",
                 "serial": "42",
@@ -445,7 +445,7 @@ class TestDevices:
                 "distribution": "lab-b",
             }
         ]
-        assert found["failed"] == {"lab-a": "OSError: no bus"}
+        assert json["failed"] == {"lab-a": "OSError: no bus"}
 
     def test_a_timeout_is_positive(self, run):
         assert run("devices", "--timeout", "0").returncode == 2

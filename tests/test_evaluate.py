@@ -178,9 +178,9 @@ def test_a_control_is_measured_on_the_trials_that_have_its_features():
 def test_too_few_trials_with_a_feature_are_not_measured():
     labels, width, force = four_states()
     one = np.where(np.arange(120) == 7, 0.08, np.nan)
-    found = judged(labelled(labels, width, force, before_contact=before(one))).controls["before_contact"]
-    assert found.rate is None
-    assert found.reason == "1 of 120 trials have such features; these are too few to learn from"
+    control = judged(labelled(labels, width, force, before_contact=before(one))).controls["before_contact"]
+    assert control.rate is None
+    assert control.reason == "1 of 120 trials have such features; these are too few to learn from"
 
 
 @pytest.mark.slow

@@ -372,17 +372,19 @@ def test_a_key_of_a_manifest_out_of_bounds_is_answered(tmp_path, key):
 
 @pytest.mark.parametrize("rate_hz", ["1e9", "1e300", "9223372036854775807"])
 def test_resampling_to_more_samples_than_the_limit_is_refused(tmp_path, rate_hz):
-    (found,) = read_recordings(str(manifest(tmp_path, MANIFEST + f"resample_hz = {rate_hz}\n")))
-    assert isinstance(found, UnreadableRecording)
-    assert limits.SAMPLES.variable in str(found.error)
+    (recording,) = read_recordings(str(manifest(tmp_path, MANIFEST + f"resample_hz = {rate_hz}\n")))
+    assert isinstance(recording, UnreadableRecording)
+    assert limits.SAMPLES.variable in str(recording.error)
 
 
 @pytest.mark.parametrize("split", ["rows", "t"])
 def test_a_file_that_is_split_into_too_many_grasps_is_refused(tmp_path, split):
     rows = "".join(f"{k},60,1\n" for k in range(limits.RECORDINGS.default + 1))
-    (found,) = read_recordings(str(manifest(tmp_path, MANIFEST + f'split = "{split}"\n', "t,g,F\n" + rows)))
-    assert isinstance(found, UnreadableRecording)
-    assert limits.RECORDINGS.variable in str(found.error)
+    (recording,) = read_recordings(
+        str(manifest(tmp_path, MANIFEST + f'split = "{split}"\n', "t,g,F\n" + rows))
+    )
+    assert isinstance(recording, UnreadableRecording)
+    assert limits.RECORDINGS.variable in str(recording.error)
 
 
 @pytest.mark.parametrize(
@@ -456,9 +458,9 @@ def test_an_expression_that_is_out_of_bounds_is_refused(text):
 
 
 def test_division_by_zero_gives_a_missing_force_and_not_an_error(tmp_path):
-    (found,) = read_recordings(str(manifest(tmp_path, MANIFEST.replace('"F"', '"F/0"'))))
-    assert isinstance(found, UnreadableRecording)
-    assert "no number" in str(found.error)
+    (recording,) = read_recordings(str(manifest(tmp_path, MANIFEST.replace('"F"', '"F/0"'))))
+    assert isinstance(recording, UnreadableRecording)
+    assert "no number" in str(recording.error)
 
 
 def test_an_expression_over_more_cells_than_the_limit_is_refused(monkeypatch):

@@ -43,14 +43,14 @@ def test_check_on_a_table_tells_each_channel_and_draws_its_squeezes(tmp_path):
         "import", tmp_path / "jar.csv", "--check", "--json", "--plot", tmp_path / "x.png"
     )
     assert code == 0, err
-    (found,) = json.loads(out)
-    by_name = {one["name"]: one for one in found["channels"]}
+    (load,) = json.loads(out)
+    by_name = {one["name"]: one for one in load["channels"]}
     assert by_name["pos (mm)"]["unit"] == "mm"
     assert by_name["F (N)"]["rate_hz"] == pytest.approx(100.0)
     assert by_name["still"]["resolution"] is None
     assert by_name["still"]["age_s"] == pytest.approx(T_S[-1])
-    assert len(found["squeezes"]) == 2
-    assert found["squeezes"][0] == pytest.approx([1.01, 1.49])
+    assert len(load["squeezes"]) == 2
+    assert load["squeezes"][0] == pytest.approx([1.01, 1.49])
     assert (tmp_path / "x.png").stat().st_size > 5000
     code, out, _ = graspsense("import", tmp_path / "jar.csv", "--check", "--plot", tmp_path / "x.png")
     assert code == 0

@@ -210,7 +210,7 @@ times = st.lists(st.floats(0, 10), max_size=8)
 
 @given(times, times, st.floats(0.01, 2))
 def test_every_label_and_every_detection_has_one_outcome(labels, told, tolerance_s):
-    found = outcomes([(at, at) for at in labels], [], told, tolerance_s)
+    found = outcomes([(label, label) for label in labels], [], told, tolerance_s)
     assert len(found.delays_s) + found.missed == len(labels)
     assert len(found.delays_s) + found.false_alarms + found.repeated == len(told)
     assert all(abs(delay) <= tolerance_s for delay in found.delays_s)

@@ -119,10 +119,10 @@ def test_a_model_of_nominal_features_predicts_from_other_tables(weather, tmp_pat
     )
     done = graspsense("predict", model, other, "--json")
     assert done.returncode == 0
-    found = json.loads(done.stdout)["predictions"]
-    assert [one["label"] for one in found[:2]] == ["yes", "no"]
+    load = json.loads(done.stdout)["predictions"]
+    assert [one["label"] for one in load[:2]] == ["yes", "no"]
     # A value that the training did not have is as a missing one.
-    assert any("outlook is missing" in reason["words"] for reason in found[2]["because"])
+    assert any("outlook is missing" in reason["words"] for reason in load[2]["because"])
 
 
 def test_arff_is_read_as_it_is_written(tmp_path):

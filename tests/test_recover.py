@@ -35,10 +35,10 @@ def part(store, name="20261121-103015-0001.mcap", ticks=200):
 
 def test_a_cut_recording_becomes_a_trial_that_does_not_count(store):
     path = part(store)
-    (found,) = recover_store(store)
-    assert (found.what, found.trial) == ("recovered", 1)
+    (recovered,) = recover_store(store)
+    assert (recovered.what, recovered.trial) == ("recovered", 1)
     # Of 200 ticks, those of the last chunk that was closed are there: 50 ms of 1 kHz at most are missing.
-    assert 150 <= found.ticks <= 200
+    assert 150 <= recovered.ticks <= 200
     kept = store.trial(1)
     assert (kept.summary.outcome, kept.summary.complete, kept.summary.label) == (
         "aborted",
@@ -50,9 +50,9 @@ def test_a_cut_recording_becomes_a_trial_that_does_not_count(store):
         "p_first",
         "m",
     )  # extracted with the settings in the recording
-    assert len(read_recorded(kept.recording)) == found.ticks
+    assert len(read_recorded(kept.recording)) == recovered.ticks
     with kept.recording.open("rb") as file:  # complete for other readers: it has a summary again
-        assert make_reader(file).get_summary().statistics.channel_message_counts[1] == found.ticks
+        assert make_reader(file).get_summary().statistics.channel_message_counts[1] == recovered.ticks
     assert path.with_name("20261121-103015-0001.mcap.cut").is_file()
     assert store.counts() == {}
     assert verify_store(store.folder).as_json() == {
@@ -89,9 +89,9 @@ def test_recovery_that_was_killed_itself_is_done_again(store):
     path = part(store)
     copy = path.with_name("20261121-103015-0001-recovered.mcap")
     write_recording(copy, 3, begun(), finish=False)._out.close()
-    (found,) = recover_store(store)
-    assert (found.what, found.recording) == ("recovered", copy)
-    assert len(read_recorded(copy)) == found.ticks > 100
+    (recovered,) = recover_store(store)
+    assert (recovered.what, recovered.recording) == ("recovered", copy)
+    assert len(read_recorded(copy)) == recovered.ticks > 100
     # And killed after the copy was written, before the row was.
     store._connection.execute("DELETE FROM detail")
     store._connection.execute("DELETE FROM trial")
@@ -115,8 +115,8 @@ def test_a_recording_is_not_replaced_by_an_unfinished_one_of_its_name(store):
     before = path.read_bytes()
     write_recording(store.recordings / "b.mcap", 100, ended(), finish=False).leave()
     (store.recordings / "b.mcap.part").rename(path.with_name(f"{path.name}.part"))
-    (found,) = recover_store(store)
-    assert (found.what, path.read_bytes()) == ("failed", before)
+    (recovered,) = recover_store(store)
+    assert (recovered.what, path.read_bytes()) == ("failed", before)
     assert verify_store(store.folder).problems == ()
 
 
@@ -132,16 +132,16 @@ def test_a_file_without_a_tick_makes_no_trial(store, bytes_written):
 def test_a_recording_with_settings_that_nobody_can_read_is_told(store, settings):
     path = store.recordings / "a.mcap"
     write_recording(path, 100, ended(), settings=settings)
-    (found,) = recover_store(store)
-    assert found.what == "failed"
+    (recovered,) = recover_store(store)
+    assert recovered.what == "failed"
     assert path.is_file()
 
 
 def test_a_feature_set_that_is_not_installed_does_not_lose_the_trial(store):
     settings = begun().settings_text.replace("graspsense/chitta", "elsewhere/mine")
     write_recording(store.recordings / "a.mcap", 100, begun(settings=settings))
-    (found,) = recover_store(store)
-    assert (found.what, found.trial) == ("recovered", 1)
+    (recovered,) = recover_store(store)
+    assert (recovered.what, recovered.trial) == ("recovered", 1)
     assert "elsewhere/mine" in json.loads(store.query("SELECT missing FROM detail")[0][0])[""]
 
 

@@ -92,13 +92,13 @@ def page(tmp_path_factory):
 
 @pytest.mark.slow
 def test_a_page_loads_nothing_and_runs_only_its_own_script(page):
-    found = Reader(page)
+    reader = Reader(page)
     scripts = re.findall(r"<script>(.*?)</script>", page, flags=re.DOTALL)
 
     assert scripts == [files("graspsense.report").joinpath("page.js").read_text()]
-    assert found.all("script") == [{}]
-    assert not found.all("link") + found.all("img") + found.all("iframe")
-    for _, attrs in found.elements:
+    assert reader.all("script") == [{}]
+    assert not reader.all("link") + reader.all("img") + reader.all("iframe")
+    for _, attrs in reader.elements:
         assert not {"src", "srcset", "data", "action"} & attrs.keys()
         assert not [name for name in attrs if name.startswith("on")]
         assert attrs.get("href", "#").startswith("#")
@@ -107,16 +107,16 @@ def test_a_page_loads_nothing_and_runs_only_its_own_script(page):
     assert "url(" not in page.replace(scripts[0], "")
     assert "@import" not in page
     assert NASTY not in page
-    assert "How hard " + NASTY in found.text
-    policy = next(one["content"] for one in found.all("meta") if "http-equiv" in one)
+    assert "How hard " + NASTY in reader.text
+    policy = next(one["content"] for one in reader.all("meta") if "http-equiv" in one)
     digest = base64.b64encode(hashlib.sha256(scripts[0].encode()).digest()).decode()
     assert policy.startswith("default-src 'none'")
     assert f"script-src 'sha256-{digest}'" in policy
 
 
 def test_a_page_answers_first_and_says_what_it_rests_on(page):
-    found = Reader(page)
-    text = found.text
+    reader = Reader(page)
+    text = reader.text
 
     assert (
         text.index("Does it matter?")
@@ -148,24 +148,24 @@ def test_a_page_answers_first_and_says_what_it_rests_on(page):
 
 
 def test_a_page_can_be_read_aloud(page):
-    found = Reader(page)
-    ids = [attrs["id"] for _, attrs in found.elements if "id" in attrs]
-    levels = [int(tag[1]) for tag, _ in found.elements if re.fullmatch(r"h[1-6]", tag)]
+    reader = Reader(page)
+    ids = [attrs["id"] for _, attrs in reader.elements if "id" in attrs]
+    levels = [int(tag[1]) for tag, _ in reader.elements if re.fullmatch(r"h[1-6]", tag)]
 
-    assert found.all("html")[0]["lang"] == "en"
-    assert len(found.all("main")) == len(found.all("h1")) == 1
+    assert reader.all("html")[0]["lang"] == "en"
+    assert len(reader.all("main")) == len(reader.all("h1")) == 1
     assert levels[0] == 1
     assert all(after <= before + 1 for before, after in pairwise(levels))
     assert len(ids) == len(set(ids))
-    assert {one["href"][1:] for one in found.all("a")} <= set(ids)
-    pictures = found.all("svg")
+    assert {one["href"][1:] for one in reader.all("a")} <= set(ids)
+    pictures = reader.all("svg")
     assert len(pictures) == 10
     for picture in pictures:
         assert picture["role"] == "img"
         assert len(picture["aria-label"]) > 40
-    for one in found.all("th"):
+    for one in reader.all("th"):
         assert one["scope"] in ("row", "col")
-    for _, attrs in found.elements:
+    for _, attrs in reader.elements:
         if attrs.get("class") == "wide":
             assert (attrs["tabindex"], attrs["role"]) == ("0", "region")
 
@@ -288,17 +288,17 @@ def test_the_page_of_a_store(tmp_path):
                 grasp=k,
             )
     told = printed("report", folder, "--out", tmp_path / "page", "--folds", "2", "--grasp", "3", "--json")
-    found = Reader((tmp_path / "page" / "report.html").read_text())
+    reader = Reader((tmp_path / "page" / "report.html").read_text())
 
     assert json.loads(told)["answer"].startswith("c45 recognises the object and its state in ")
-    assert "Trial 3: can:full_open, steady" in found.text
-    assert "one line per grasp" in found.text
-    assert "All trials" in found.text
+    assert "Trial 3: can:full_open, steady" in reader.text
+    assert "one line per grasp" in reader.text
+    assert "All trials" in reader.text
     # The newest trial of each label is drawn; the other small curves can be chosen.
-    boxes = [one for one in found.all("input") if one.get("type") == "checkbox"]
+    boxes = [one for one in reader.all("input") if one.get("type") == "checkbox"]
     assert [box["value"] for box in boxes] == [str(k) for k in range(8, 0, -1)]
     assert [box["value"] for box in boxes if "checked" in box] == ["8", "7"]
-    lines = [one for one in found.all("polyline") if "data-trial" in one]
+    lines = [one for one in reader.all("polyline") if "data-trial" in one]
     assert {line["data-trial"] for line in lines if "class" not in line} == {"8", "7"}
 
 
@@ -330,13 +330,13 @@ def test_evaluate_writes_a_page_and_replaces_none_of_a_store(tmp_path):
     written = graspsense(*command, tmp_path / "page")
     assert written.returncode == 0
     assert "report.html" in written.stderr
-    found = Reader((tmp_path / "page" / "report.html").read_text())
+    reader = Reader((tmp_path / "page" / "report.html").read_text())
 
     assert graspsense(*command, folder).returncode == 2
     assert not (folder / "report.html").exists()
     for part in ("Controls", "Confusion matrix", "Features", "graspsense evaluate"):
-        assert part in found.text
-    assert " of 8" in found.text
+        assert part in reader.text
+    assert " of 8" in reader.text
 
 
 def test_words_in_backticks_are_code_and_names_cannot_make_elements():

@@ -284,8 +284,8 @@ def test_bag_that_is_cut_short_or_changed_raises_nothing_but_our_own(grasp: Any,
     for i in range(60):
         broken = bytearray(data[: int(chance.integers(len(data)))] if i % 2 else data)
         if not i % 2:
-            for at in chance.integers(len(broken), size=40):
-                broken[at] = int(chance.integers(256))
+            for integer in chance.integers(len(broken), size=40):
+                broken[integer] = int(chance.integers(256))
         path = tmp_path / f"{i}.bag"
         path.write_bytes(bytes(broken))
         try:

@@ -332,9 +332,9 @@ def test_a_grasp_ends_as_it_would_have_when_the_disk_fills_up_under_it(mounted):
     assert "Traceback" not in done.stderr
     mounted("size=4m", remount=True)
     with Store.open(disk) as store:
-        (found,) = recover_store(store)
-        assert found.what == "recovered"
-        assert found.ticks > 500
+        (recovered,) = recover_store(store)
+        assert recovered.what == "recovered"
+        assert recovered.ticks > 500
 
 
 @pytest.mark.parametrize(

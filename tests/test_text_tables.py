@@ -159,8 +159,8 @@ def test_a_part_of_a_file_that_cannot_be_read_leaves_the_others(bad, tmp_path):
 
 def test_a_large_loss_is_a_warning(tmp_path):
     half = [row if k % 4 else row.rpartition(",")[0] + ",nan" for k, row in enumerate(ROWS)]
-    (found,) = recordings(tmp_path, [HEADER, *half])
-    assert [notice for notice in found.notices if "50 samples" in notice]
+    (recording,) = recordings(tmp_path, [HEADER, *half])
+    assert [notice for notice in recording.notices if "50 samples" in notice]
     (few,) = recordings(tmp_path, spoiled(150, "1.500,48.5,NaN,NaN"))
     assert few.notices == ()
     (most,) = recordings(
@@ -193,15 +193,15 @@ def test_a_column_in_two_notations_is_refused_with_its_row(tmp_path):
 def test_gram_force_is_proposed(heading, tmp_path):
     lines = [f"t,pos,{heading}", *(row.rpartition(",")[0] for row in ROWS)]
     keys = f"""files = "{{label}}.csv"\ntime = "t"\ngap = "pos [mm]"\nforce = "'{heading}'"\n"""
-    (found,) = recordings(tmp_path, lines, keys)
-    assert [notice for notice in found.notices if "[gf]" in notice]
+    (recording,) = recordings(tmp_path, lines, keys)
+    assert [notice for notice in recording.notices if "[gf]" in notice]
 
 
 def test_units_that_the_file_states_are_used_or_compared(tmp_path):
     keys = 'files = "{label}.csv"\ntime = "t"\ngap = "pos"\nforce = "f1 [mN]"\n'
-    (found,) = recordings(tmp_path, [HEADER, "s,mm,N,N", *ROWS], keys)
-    assert found.recording.readings[0].frame.gap_m == pytest.approx(0.08)
-    assert [notice for notice in found.notices if "[mN]" in notice and "states N" in notice]
+    (recording,) = recordings(tmp_path, [HEADER, "s,mm,N,N", *ROWS], keys)
+    assert recording.recording.readings[0].frame.gap_m == pytest.approx(0.08)
+    assert [notice for notice in recording.notices if "[mN]" in notice and "states N" in notice]
 
 
 def test_numbers_without_a_header_in_reach_ask_for_the_line(tmp_path):

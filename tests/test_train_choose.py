@@ -62,11 +62,11 @@ def runs(store, pipeline):
 def test_among_all_candidates_one_that_knows_the_hold_is_chosen(store, tmp_path):
     code, out, err = graspsense("train", store, "--choose", "--out", tmp_path / "own.json", "--json")
     assert code == 0, err
-    found = json.loads(out)["choice"]
+    load = json.loads(out)["choice"]
 
-    assert found["rate"]["rate"] >= 0.9
-    assert found["rate"]["instances"] == 12
-    candidates = {(one["classifier"], one["features"]) for one in found["ranking"]["candidates"]}
+    assert load["rate"]["rate"] >= 0.9
+    assert load["rate"]["instances"] == 12
+    candidates = {(one["classifier"], one["features"]) for one in load["ranking"]["candidates"]}
     assert ("extra-trees", "union") in candidates
     assert len(candidates) >= 24
     runs(store, tmp_path / "own.toml")

@@ -105,7 +105,7 @@ def test_of_a_manifest(folder, kind):
     spoilt = folder / "can_2.npz"
     SPOIL[kind](spoilt)
     one = list(readable_or_not("manifest", str(folder / "manifest.toml")))
-    (bad,) = (found for found in one if isinstance(found, UnreadableRecording))
+    (bad,) = (recording for recording in one if isinstance(recording, UnreadableRecording))
     assert len(one) == 6
     assert "can_2.npz" in bad.line
     if kind == "disk":
@@ -367,8 +367,8 @@ def test_a_mistake_in_a_reader_is_raised_where_plugins_are_strict(monkeypatch):
         yield from each_readable("a.file", lambda: [undefined])  # noqa: F821
 
     dataset_of(wrong, monkeypatch)
-    (found,) = readable_or_not("lab", "place")
-    assert "NameError" in found.line
+    (recording,) = readable_or_not("lab", "place")
+    assert "NameError" in recording.line
     monkeypatch.setenv(STRICT_VARIABLE, "1")
     with pytest.raises(NameError):
         list(readable_or_not("lab", "place"))

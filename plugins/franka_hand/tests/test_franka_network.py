@@ -171,16 +171,16 @@ def test_a_hand_that_answers_is_listed_and_goes_on(emulated):
     assert driver.read(PATIENT_S).frame.gap_m > 0.0
     driver.close()
     before = hand.state()
-    [found] = found_devices(PATIENT_S, hand.where)
-    assert (found.backend, found.where, found.ready) == ("franka", hand.where, True)
+    [device] = found_devices(PATIENT_S, hand.where)
+    assert (device.backend, device.where, device.ready) == ("franka", hand.where, True)
     assert hand.state()["pressing"] == before["pressing"]
 
 
 def test_another_version_is_listed_as_not_ready_and_another_device_is_not(emulated):
     hand = emulated(faults=FrankaFaults(mood="old"))
-    [found] = found_devices(PATIENT_S, hand.where)
-    assert not found.ready
-    assert "version" in found.advice
+    [device] = found_devices(PATIENT_S, hand.where)
+    assert not device.ready
+    assert "version" in device.advice
     with socket.create_server(("127.0.0.77", PORT)) as other:
 
         def answer():

@@ -198,9 +198,12 @@ def test_breaks_give_the_force_of_the_fracture_with_its_spread_and_what_is_left(
     forces = (4.0, 5.0, 6.5)
     squeezes = [
         prepared(
-            recorded(lambda closure, at=at: np.where(closure < at / 1000.0, 1000.0, 200.0) * closure), 0.0
+            recorded(
+                lambda closure, force=force: np.where(closure < force / 1000.0, 1000.0, 200.0) * closure
+            ),
+            0.0,
         )
-        for at in forces
+        for force in forces
     ]
     whole = prepared(recorded(), 0.0)
     assert whole.broken_n is None

@@ -80,9 +80,9 @@ def test_a_known_delay_comes_back_and_does_not_bias_relaxation(gripper, late_s):
 @pytest.mark.parametrize("shown_s", [-0.0011, 0.0, 0.0102, 0.03])
 def test_the_delay_that_is_reported_is_the_one_that_is_used(shown_s):
     delay = Delay(settings_s=0.0, used_s=0.01, shown_s=shown_s, low_s=shown_s - 1e-3, high_s=shown_s + 1e-3)
-    (found,) = delay.parameters
-    assert found.value == delay.used_s
-    assert found.low <= min(shown_s, 0.01) <= max(shown_s, 0.01) <= found.high
+    (parameter,) = delay.parameters
+    assert parameter.value == delay.used_s
+    assert parameter.low <= min(shown_s, 0.01) <= max(shown_s, 0.01) <= parameter.high
     excluded = not delay.low_s <= 0.01 <= delay.high_s
     assert (delay.error_s > 0.0) == excluded
     assert (

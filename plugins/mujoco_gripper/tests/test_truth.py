@@ -85,7 +85,7 @@ def test_the_test_move_finds_the_mass_of_the_gap(truth, tmp_path, monkeypatch):
     monkeypatch.setattr(truth, "_features", lambda gripper, **given: settings.update(given))
     truth.by_mujoco(tmp_path, 5e-4)
     gripper = create("sensor-backend", "mujoco", **settings)
-    found = gripper.open(0).numbers["moving_mass_kg"]
+    number = gripper.open(0).numbers["moving_mass_kg"]
     gripper.close()
     # Both fingers of 60 g move with half of the speed of the gap.
-    assert found == pytest.approx(truth.MASS_KG + 2 * 0.06 / 4, rel=1e-3)
+    assert number == pytest.approx(truth.MASS_KG + 2 * 0.06 / 4, rel=1e-3)

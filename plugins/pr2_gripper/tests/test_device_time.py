@@ -167,8 +167,8 @@ def test_board_in_real_time_may_leave_out_reports_without_a_number_but_no_time()
     check.check(1, 1000)
     check.check(2, 30_000_000)
     slow = CountedTime(1000, numbers_all=False)
-    found = next(i for i in range(1000) if not right(slow, i, 500 * i))
-    assert found == pytest.approx(COUNTED_OFF_S / 0.5e-3, abs=2)
+    index = next(i for i in range(1000) if not right(slow, i, 500 * i))
+    assert index == pytest.approx(COUNTED_OFF_S / 0.5e-3, abs=2)
 
 
 def right(check: CountedTime, sequence: int, time_us: int) -> bool:

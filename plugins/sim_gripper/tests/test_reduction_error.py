@@ -40,9 +40,9 @@ def test_the_quantities_are_those_of_the_motion_whatever_the_clock():
     touches = (0.0005 + 0.625 / STIFFNESS) / SPEED
     rests = 0.1 + TAU * math.log(SPEED / 1e-4)
     for dt in (1e-3, 2e-4):
-        found = squeeze(dt).quantities
-        assert found["delta_t"] == pytest.approx(rests - touches, abs=1e-5)
-        assert found["p_first"] == pytest.approx(0.045 - 0.625 / STIFFNESS, abs=1e-9)
+        quantities = squeeze(dt).quantities
+        assert quantities["delta_t"] == pytest.approx(rests - touches, abs=1e-5)
+        assert quantities["p_first"] == pytest.approx(0.045 - 0.625 / STIFFNESS, abs=1e-9)
 
 
 @pytest.mark.parametrize("late", [1e-4, 3.7e-4, 9e-4])
@@ -97,7 +97,7 @@ def test_a_rest_before_the_hold_is_not_the_one_that_is_meant():
         pad_right=nothing,
     )
     wanted = create("feature-set", "chitta").extract(trace).as_dict()
-    found = evolve(
+    quantities = evolve(
         squeeze(),
         gap_m=gap,
         speed_m_s=speed,
@@ -105,24 +105,24 @@ def test_a_rest_before_the_hold_is_not_the_one_that_is_meant():
         right_n=force,
         hold_from=int(np.sum(phase < HOLD)),
     ).quantities
-    assert found["f_steady"] == pytest.approx(wanted["f_steady"], rel=1e-3)
-    assert found["p_steady"] == pytest.approx(wanted["p_steady"], abs=1.5e-5)
-    assert found["df_dt"] == pytest.approx(wanted["df_dt"], rel=0.01)
+    assert quantities["f_steady"] == pytest.approx(wanted["f_steady"], rel=1e-3)
+    assert quantities["p_steady"] == pytest.approx(wanted["p_steady"], abs=1.5e-5)
+    assert quantities["df_dt"] == pytest.approx(wanted["df_dt"], rel=0.01)
 
 
 def test_at_rest_from_the_very_contact_on_there_is_no_rate():
     creeping = evolve(squeeze(), speed_m_s=np.full(1000, -5e-5))
-    found = creeping.quantities
-    assert found["delta_t"] == 0.0
-    assert math.isnan(found["dp_dt"])
-    assert math.isnan(found["df_dt"])
+    quantities = creeping.quantities
+    assert quantities["delta_t"] == 0.0
+    assert math.isnan(quantities["dp_dt"])
+    assert math.isnan(quantities["df_dt"])
 
 
 def test_they_are_the_feature_sets_own_to_a_tick():
     backend = SimBackend(SimConfig(sensor="ideal", spread=False))
     trace = run_grasp(backend, create("controller", "hybrid"), RunConfig()).trace
     drawn = create("feature-set", "chitta").extract(trace).as_dict()
-    found = GraspRecord(
+    quantities = GraspRecord(
         outcome=STEADY,
         dt_s=1e-3,
         gap_m=trace.gap_m,
@@ -133,6 +133,6 @@ def test_they_are_the_feature_sets_own_to_a_tick():
         peak_n=0.0,
     ).quantities
     # The feature set's rest is told from the way in 50 ms, which begins a little before the speed is as low.
-    assert found["delta_t"] == pytest.approx(drawn["delta_t"], abs=0.05)
-    assert found["p_first"] == pytest.approx(drawn["p_first"], abs=1.5e-5)
-    assert found["f_steady"] == pytest.approx(drawn["f_steady"], rel=0.01)
+    assert quantities["delta_t"] == pytest.approx(drawn["delta_t"], abs=0.05)
+    assert quantities["p_first"] == pytest.approx(drawn["p_first"], abs=1.5e-5)
+    assert quantities["f_steady"] == pytest.approx(drawn["f_steady"], rel=0.01)

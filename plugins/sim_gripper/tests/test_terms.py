@@ -508,9 +508,9 @@ def test_every_term_says_how_fast_it_is_and_how_much_it_matters(name):
 
 
 def test_the_importance_of_a_spring_and_a_damper_is_their_force():
-    at = WorkingPoint(0.005, 0.01, 2.0)
-    assert TERMS["elastic"].importance(Elastic(2000.0, 0.0), at) == pytest.approx(10.0)
-    assert TERMS["loss"].importance(Loss(650.0), at) == pytest.approx(6.5)
+    point = WorkingPoint(0.005, 0.01, 2.0)
+    assert TERMS["elastic"].importance(Elastic(2000.0, 0.0), point) == pytest.approx(10.0)
+    assert TERMS["loss"].importance(Loss(650.0), point) == pytest.approx(6.5)
 
 
 def test_a_term_that_does_not_fit_together_is_refused_where_it_is_declared():

@@ -114,13 +114,13 @@ def compared_trials(
     }
 
 
-def _print(found: Ranking) -> None:
+def _print(ranking: Ranking) -> None:
     from graspsense.evaluation.intervals import percentage
 
-    echo(found.verdict, Style.HEADING)
-    echo_entry("trials", f"{found.trials} of {found.source}; compared by {found.protocol}")
+    echo(ranking.verdict, Style.HEADING)
+    echo_entry("trials", f"{ranking.trials} of {ranking.source}; compared by {ranking.protocol}")
     echo()
-    protocols = list(dict.fromkeys(name for candidate in found.candidates for name in candidate.rates))
+    protocols = list(dict.fromkeys(name for candidate in ranking.candidates for name in candidate.rates))
     rows = [
         (
             candidate.classifier,
@@ -134,18 +134,18 @@ def _print(found: Ranking) -> None:
             _coverage(candidate),
             f"{candidate.training_s:.2g} s",
         )
-        for candidate in found.candidates
+        for candidate in ranking.candidates
     ]
     headings = [name.replace("_", " ").upper() for name in protocols]
     echo_table(
         ("CLASSIFIER", "FEATURES", *headings, "LOSS, IN POINTS", "STANDING", "SETS COVER", "TRAINING"), rows
     )
-    for note in found.notes:
+    for note in ranking.notes:
         echo_entry("note", note)
     default = next(
         (
             candidate
-            for candidate in found.candidates
+            for candidate in ranking.candidates
             if candidate.classifier == DEFAULT_CLASSIFIER and candidate.features in DEFAULT_FEATURES
         ),
         None,

@@ -196,15 +196,15 @@ def _parts(
     )
 
 
-def _print_early(found: EarlyRecognition) -> None:
+def _print_early(recognition: EarlyRecognition) -> None:
     from graspsense.evaluation.checkpoints import SURE
     from graspsense.evaluation.intervals import percentage, percentages
 
-    echo(f"\nanswers while the grasp goes on, by {found.protocol}")
-    if found.reason:
-        echo(f"no prediction sets: {found.reason}", indent=2)
+    echo(f"\nanswers while the grasp goes on, by {recognition.protocol}")
+    if recognition.reason:
+        echo(f"no prediction sets: {recognition.reason}", indent=2)
     rows = []
-    for row in found.rows:
+    for row in recognition.rows:
         told = [
             "-" if one is None else percentage(one.rate) if one.n else "-"
             for one in (row.covered, row.single)
@@ -214,67 +214,72 @@ def _print_early(found: EarlyRecognition) -> None:
         rows.append((row.name, percentage(row.rate.rate), percentages(row.rate.interval), *costs, *told))
     heads = ("ANSWER AFTER", "RATE", "95 %", "TIME", "FORCE", "TRUE LABEL IN SET", "SETS OF ONE")
     echo_table(heads, rows)
-    if found.rows[-1].name == SURE:
+    if recognition.rows[-1].name == SURE:
         echo(
             f"{SURE}: the last two are the rate among the grasps that were ended early, and their share",
             indent=2,
         )
 
 
-def _print(found: Evaluation) -> None:
+def _print(evaluation: Evaluation) -> None:
     from graspsense.evaluation.intervals import percentage, percentages
     from graspsense.report.confusion import confusion_text
     from graspsense.report.verdict import verdict
 
-    echo(verdict(found), Style.HEADING)
-    for warning in found.warnings:
+    echo(verdict(evaluation), Style.HEADING)
+    for warning in evaluation.warnings:
         echo_entry("WARNING", warning, Style.CAUTION)
     echo()
-    echo_entry("rate", f"{found.headline.words}, by {found.protocol}")
-    for name, part in found.by_features.items():
+    echo_entry("rate", f"{evaluation.headline.words}, by {evaluation.protocol}")
+    for name, part in evaluation.by_features.items():
         echo_entry("", f"{percentage(part.rate)} ({part.correct} of {part.n}) {name}")
-    echo_entry("classifier", found.classifier)
-    echo_entry("features", ", ".join(name for name, _ in found.features))
+    echo_entry("classifier", evaluation.classifier)
+    echo_entry("features", ", ".join(name for name, _ in evaluation.features))
     echo_entry(
-        "unknown", f"{found.unknown.words} would be called unknown (false alarms: their labels are known)"
+        "unknown",
+        f"{evaluation.unknown.words} would be called unknown (false alarms: their labels are known)",
     )
-    _print_doubt(found)
-    for note in found.notes:
+    _print_doubt(evaluation)
+    for note in evaluation.notes:
         echo_entry("note", note)
     echo()
-    controls = {name: control for name, control in found.controls.items() if name not in found.protocols}
-    measured = {name: one for name, one in {**found.protocols, **controls}.items() if one.rate is not None}
+    controls = {
+        name: control for name, control in evaluation.controls.items() if name not in evaluation.protocols
+    }
+    measured = {
+        name: one for name, one in {**evaluation.protocols, **controls}.items() if one.rate is not None
+    }
     echo_table(
         ("PROTOCOL OR CONTROL", "RATE", "95 %", "TRIALS", "LOWER BY, IN POINTS", "WHAT"),
-        [_row(name, one, found.headline.n) for name, one in measured.items()],
+        [_row(name, one, evaluation.headline.n) for name, one in measured.items()],
     )
-    for name, one in {**found.protocols, **controls}.items():
+    for name, one in {**evaluation.protocols, **controls}.items():
         if one.rate is None:
             echo(f"{name}: not measured ({one.reason})", indent=2)
     echo("\nconfusion (rows are the truth)")
-    for line in confusion_text(found.confusion):
+    for line in confusion_text(evaluation.confusion):
         echo(f"  {line}")
-    if len(found.by_class) > 1 and found.target != "class":
+    if len(evaluation.by_class) > 1 and evaluation.target != "class":
         echo()
         rows = [(name, percentage(rate.rate), percentages(rate.interval), f"{rate.correct} of {rate.n}")
-                for name, rate in found.by_class.items()]  # fmt: skip
+                for name, rate in evaluation.by_class.items()]  # fmt: skip
         echo_table(("CLASS", "RATE", "95 %", "TRIALS"), rows)
-    if found.reliability is not None:
+    if evaluation.reliability is not None:
         echo("\nreliability of the probabilities")
         bins = [(percentage(one.probability), percentage(one.rate.rate), percentages(one.rate.interval),
-                 str(one.rate.n)) for one in found.reliability.curve]  # fmt: skip
+                 str(one.rate.n)) for one in evaluation.reliability.curve]  # fmt: skip
         echo_table(("MEAN PROBABILITY", "RATE", "95 %", "TRIALS"), bins)
-    if found.learning_curve:
+    if evaluation.learning_curve:
         echo("\nlearning curve")
         points = [(f"{one.trained_on:.0f}", percentage(one.rate.rate), percentages(one.rate.interval))
-                  for one in found.learning_curve]  # fmt: skip
+                  for one in evaluation.learning_curve]  # fmt: skip
         echo_table(("TRAINING TRIALS", "RATE", "95 %"), points)
 
 
-def _print_doubt(found: Evaluation) -> None:
+def _print_doubt(evaluation: Evaluation) -> None:
     from graspsense.evaluation.intervals import percentage
 
-    sets = found.sets
+    sets = evaluation.sets
     if sets is not None and (sets.covered is None or sets.single is None):
         echo_entry("sets", f"not measured ({sets.reason})")
     elif sets is not None and sets.covered is not None and sets.single is not None:
@@ -289,13 +294,13 @@ def _print_doubt(found: Evaluation) -> None:
         least = min(sets.by_label, key=lambda name: sets.by_label[name].rate)
         echo_entry("", f"{sets.mean_size:.2f} labels on average, {percentage(sets.single.rate)} of the sets have one; "
                        f"lowest coverage: {percentage(sets.by_label[least].rate)} of {least}")  # fmt: skip
-    if found.reliability is not None:
-        error = percentage(found.reliability.calibration_error)
-        raw = found.reliability.uncalibrated_error
+    if evaluation.reliability is not None:
+        error = percentage(evaluation.reliability.calibration_error)
+        raw = evaluation.reliability.uncalibrated_error
         before = "" if raw is None else f" ({percentage(raw)} before calibration)"
         echo_entry(
             "probability",
-            f"Brier score {found.reliability.brier:.3f}, expected calibration error {error}{before}",
+            f"Brier score {evaluation.reliability.brier:.3f}, expected calibration error {error}{before}",
         )
 
 

@@ -112,22 +112,27 @@ def _labelled(recording: Recording, group: str) -> LabelledEvents:
     )
 
 
-def _print(found: EventsEvaluation) -> None:
-    scored = (f"{name}: {_in_words(kind.fitted or kind.given)}" for name, kind in found.kinds.items())
+def _print(evaluation: EventsEvaluation) -> None:
+    scored = (f"{name}: {_in_words(kind.fitted or kind.given)}" for name, kind in evaluation.kinds.items())
     words = "; ".join(scored) or "no event that is labelled can be scored"
-    echo(f"{found.detector} on {found.recordings} recordings of {found.source}. {words}", Style.HEADING)
+    echo(
+        f"{evaluation.detector} on {evaluation.recordings} recordings of {evaluation.source}. {words}",
+        Style.HEADING,
+    )
     echo()
     echo_entry(
         "rule",
-        f"an event is found by a detection at most {found.tolerance_s:g} s from its begin, and a detection finds one "
-        "event at most. Other detections while an event goes on do not count; all others are false",
+        f"an event is found by a detection at most {evaluation.tolerance_s:g} s from its begin, and a detection "
+        "finds one event at most. Other detections while an event goes on do not count; all others are false",
     )
-    for name in found.not_told:
-        echo_entry("not told", f"{name} is labelled, and {found.detector} has no such event", Style.CAUTION)
-    others = [f"{name} ({count} times)" for name, count in found.not_labelled.items()]
+    for name in evaluation.not_told:
+        echo_entry(
+            "not told", f"{name} is labelled, and {evaluation.detector} has no such event", Style.CAUTION
+        )
+    others = [f"{name} ({count} times)" for name, count in evaluation.not_labelled.items()]
     if others:
         echo_entry("not judged", f"told as well, without labels to judge by: {', '.join(others)}")
-    for name, kind in found.kinds.items():
+    for name, kind in evaluation.kinds.items():
         if kind.fitted is None:
             echo_entry("not fitted", f"{name}: {kind.not_fitted}", Style.CAUTION)
         else:
@@ -135,15 +140,15 @@ def _print(found: EventsEvaluation) -> None:
             factors = low if low == high else f"{low} to {high}"
             echo_entry(
                 "fitted",
-                f"{name}: all thresholds times {factors}, with each {found.held_out} held out as a whole",
+                f"{name}: all thresholds times {factors}, with each {evaluation.held_out} held out as a whole",
             )
-    for note in found.notes:
+    for note in evaluation.notes:
         echo_entry("note", note)
-    if found.kinds:
-        _print_tables(found)
+    if evaluation.kinds:
+        _print_tables(evaluation)
 
 
-def _print_tables(found: EventsEvaluation) -> None:
+def _print_tables(evaluation: EventsEvaluation) -> None:
     echo()
     heads = (
         "EVENT",
@@ -158,7 +163,7 @@ def _print_tables(found: EventsEvaluation) -> None:
         "95 %",
     )
     rows = []
-    for name, kind in found.kinds.items():
+    for name, kind in evaluation.kinds.items():
         rows.append((name, "as set", *_row(kind.given)))
         if kind.fitted is not None:
             rows.append((name, "fitted", *_row(kind.fitted)))
@@ -169,7 +174,10 @@ def _print_tables(found: EventsEvaluation) -> None:
     )
     echo("by chance: the same detections, moved by half of their recording")
     scores = [
-        score for kind in found.kinds.values() for score in (kind.fitted, kind.given) if score is not None
+        score
+        for kind in evaluation.kinds.values()
+        for score in (kind.fitted, kind.given)
+        if score is not None
     ]
     rates = [one for score in scores for one in (score.recall, score.precision) if one is not None]
     reasons = dict.fromkeys(rate.no_interval for rate in rates if rate.interval is None)
@@ -178,10 +186,10 @@ def _print_tables(found: EventsEvaluation) -> None:
     echo()
     groups = [
         (name, group, f"{hits} of {labelled}", str(alarms))
-        for name, kind in found.kinds.items()
+        for name, kind in evaluation.kinds.items()
         for group, (hits, labelled, alarms) in kind.by_group.items()
     ]
-    echo_table(("EVENT", found.held_out.upper(), "FOUND", "FALSE"), groups)
+    echo_table(("EVENT", evaluation.held_out.upper(), "FOUND", "FALSE"), groups)
 
 
 def _row(score: EventScore) -> tuple[str, ...]:

@@ -145,13 +145,13 @@ def _run(
         )
 
 
-def _written_page(found: Summary, results: Results) -> tuple[Path | None, str]:
+def _written_page(summary: Summary, results: Results) -> tuple[Path | None, str]:
     """Write the page and return its path, or None and why it could not be written."""
     from graspsense.experiments.page import write_page
     from graspsense.recording.atomic_file import SaveFailed
 
     try:
-        return write_page(found, results), ""
+        return write_page(summary, results), ""
     except SaveFailed as error:
         return None, str(error)
 
@@ -235,18 +235,20 @@ def _plan(planned: Planned, results: Results, workers: int, as_json: bool) -> No
     echo("nothing was run")
 
 
-def _print_json(found: Summary, more: Findings | None, page: Path | None, counts: dict[str, object]) -> None:
+def _print_json(
+    summary: Summary, more: Findings | None, page: Path | None, counts: dict[str, object]
+) -> None:
     findings = {} if more is None else {"answer": more.answer, "findings": dict(more.values)}
-    echo_json({**found.as_json(), **findings, "page": None if page is None else str(page), **counts})
+    echo_json({**summary.as_json(), **findings, "page": None if page is None else str(page), **counts})
 
 
-def _print(found: Summary, more: Findings | None, account: Account, page: str) -> None:
+def _print(summary: Summary, more: Findings | None, account: Account, page: str) -> None:
     from graspsense.experiments.answer import answer
 
-    echo(answer(found) if more is None else more.answer, Style.HEADING)
+    echo(answer(summary) if more is None else more.answer, Style.HEADING)
     echo()
     if more is None:
-        _print_rates(found)
+        _print_rates(summary)
     else:
         for table in more.tables:
             echo(table.title, Style.HEADING)
@@ -267,7 +269,7 @@ def _print(found: Summary, more: Findings | None, account: Account, page: str) -
     echo_entry("page", page)
 
 
-def _print_rates(found: Summary) -> None:
+def _print_rates(summary: Summary) -> None:
     from graspsense.evaluation.intervals import percentage, percentages
 
     rows = [
@@ -278,7 +280,7 @@ def _print_rates(found: Summary) -> None:
             percentages(condition.rate.interval),
             condition.protocol,
         )
-        for condition in found.conditions
+        for condition in summary.conditions
     ]
     if rows:
         echo_table(("CASE", "TARGET", "RATE", "95 %", "PROTOCOL"), rows)

@@ -66,10 +66,8 @@ def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
         predictions = [asked.predict(table.row(i), provenance=provenance) for i in range(len(table))]
     rate = None
     if labels is not None:
-        rate = RecognitionRate(
-            sum(prediction.label == label for prediction, label in zip(predictions, labels, strict=True)),
-            len(labels),
-        )
+        pairs = zip(predictions, labels, strict=True)
+        rate = RecognitionRate(sum(prediction.label == label for prediction, label in pairs), len(labels))
     warnings = list(dict.fromkeys(warning for prediction in predictions for warning in prediction.warnings))
     if as_json:
         echo_json(

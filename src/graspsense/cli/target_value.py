@@ -202,44 +202,45 @@ def _print_predictions(
     echo_table(header, rows)
 
 
-def _print_evaluation(found: RegressionEvaluation) -> None:
-    unseen = found.protocol == "instance_held_out"
+def _print_evaluation(evaluation: RegressionEvaluation) -> None:
+    unseen = evaluation.protocol == "instance_held_out"
     objects = "objects of which no grasp was used for training" if unseen else (
         "objects of which other grasps may have been used for training"
     )  # fmt: skip
     echo(
-        f"{found.estimator} predicts {found.target_value} of {counted(found.headline.n, 'trial')} of "
-        f"{found.source} with a mean "
-        f"absolute error of {found.headline.words(found.unit)}, on {objects}.",
+        f"{evaluation.estimator} predicts {evaluation.target_value} of {counted(evaluation.headline.n, 'trial')} of "
+        f"{evaluation.source} with a mean "
+        f"absolute error of {evaluation.headline.words(evaluation.unit)}, on {objects}.",
         Style.HEADING,
     )
-    for warning in found.warnings:
+    for warning in evaluation.warnings:
         echo_entry("WARNING", warning, Style.CAUTION)
     echo()
-    echo_entry("error", f"{found.headline.words(found.unit)}, by {found.protocol}")
+    echo_entry("error", f"{evaluation.headline.words(evaluation.unit)}, by {evaluation.protocol}")
     echo_entry(
-        "", f"root of the mean squared error {_with_unit(found.headline.root_mean_square, found.unit)}"
+        "",
+        f"root of the mean squared error {_with_unit(evaluation.headline.root_mean_square, evaluation.unit)}",
     )
-    if found.explained is not None:
-        echo_entry("R2", f"{found.explained:.2f} (1 is perfect, 0 is no better than the mean)")
-    intervals = found.intervals
+    if evaluation.explained is not None:
+        echo_entry("R2", f"{evaluation.explained:.2f} (1 is perfect, 0 is no better than the mean)")
+    intervals = evaluation.intervals
     if intervals.covered is None or intervals.mean_half_width is None:
         echo_entry("intervals", f"not measured ({intervals.reason})")
     else:
         echo_entry(
             "intervals",
             f"{intervals.covered.words} contain the true number; {100 * intervals.asked:.0f} % asked for, by "
-            f"{intervals.unit}; plus or minus {_with_unit(intervals.mean_half_width, found.unit)} on average",
+            f"{intervals.unit}; plus or minus {_with_unit(intervals.mean_half_width, evaluation.unit)} on average",
         )
-    echo_entry("features", ", ".join(name for name, _ in found.features))
-    for note in found.notes:
+    echo_entry("features", ", ".join(name for name, _ in evaluation.features))
+    for note in evaluation.notes:
         echo_entry("note", note)
     echo()
-    all_of = {**found.protocols, **found.controls}
-    unit = f" [{found.unit}]" if found.unit else ""
+    all_of = {**evaluation.protocols, **evaluation.controls}
+    unit = f" [{evaluation.unit}]" if evaluation.unit else ""
     echo_table(
         ("PROTOCOL OR CONTROL", f"ERROR{unit}", "95 %", "TRIALS", "LARGER BY", "WHAT"),
-        [_row(name, one, found.headline.n) for name, one in all_of.items() if one.error is not None],
+        [_row(name, one, evaluation.headline.n) for name, one in all_of.items() if one.error is not None],
     )
     for name, one in all_of.items():
         if one.error is None:

@@ -179,30 +179,30 @@ def simulation(
 
 
 def _write_files(
-    png: str | None, markdown: str | None, found: SimulationTrade, sensed: SensedTrade | None
+    png: str | None, markdown: str | None, trade: SimulationTrade, sensed: SensedTrade | None
 ) -> None:
     """Draw the pictures and write the page, if they are asked for."""
     from graspsense.experiments.sensed_report import sensed_markdown
     from graspsense.report.simulation import simulation_markdown
 
-    pictures = _drawn(Path(png), found, sensed) if png else []
+    pictures = _drawn(Path(png), trade, sensed) if png else []
     if markdown is None:
         return
     places = [os.path.relpath(picture, Path(markdown).parent) for picture in pictures]
-    page = simulation_markdown(found, places[0] if places else None)
+    page = simulation_markdown(trade, places[0] if places else None)
     if sensed is not None:
         drawn = [f"![Recognition against time]({places[1]})", ""] if places else []
         page = "\n".join([page, *drawn, *sensed_markdown(sensed)])
     write_text(markdown, page)
 
 
-def _drawn(path: Path, found: SimulationTrade, sensed: SensedTrade | None) -> list[Path]:
+def _drawn(path: Path, trade: SimulationTrade, sensed: SensedTrade | None) -> list[Path]:
     """Draw the result and return the names of the pictures."""
     from graspsense.experiments.sensed_report import sensed_png
     from graspsense.report.simulation import simulation_png
 
     pictures = [path]
-    simulation_png(found, path)
+    simulation_png(trade, path)
     if sensed is not None:
         pictures.append(path.with_name(f"{path.stem}_recognition.png"))
         sensed_png(sensed, pictures[1])

@@ -259,13 +259,13 @@ def set_coverage(
     sizes = inside.sum(axis=1)
     rows_of = {name: [i for i, label in enumerate(labels) if label == name] for name in pooled.classes}
     right = np.array(pooled.right(labels))
-    below = [i for of in rows_of.values() if right[of].mean() < COVERAGE for i in of]
+    below = [i for row in rows_of.values() if right[row].mean() < COVERAGE for i in row]
     return SetCoverage(
         asked=COVERAGE,
         unit=unit,
         covered=rate_of(covered, None),
         covered_below=rate_of(covered, sorted(below)) if below else None,
-        by_label={name: rate_of(covered, of) for name, of in rows_of.items()},
+        by_label={name: rate_of(covered, row) for name, row in rows_of.items()},
         mean_size=float(sizes.mean()),
         single=rate_of((sizes == 1).tolist(), None),
     )

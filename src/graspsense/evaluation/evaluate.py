@@ -327,7 +327,7 @@ class _Evaluator:
         """Cross-validate and report progress under this name. Raises FitRefused."""
         labels = self.labels if labels is None else labels
         groups = self.groups if groups is None else groups
-        total = sum(int(of.max()) + 1 for of in folds)
+        total = sum(int(fold.max()) + 1 for fold in folds)
         done = 0
 
         def step() -> None:
@@ -524,11 +524,11 @@ def _among(
 ) -> tuple[list[NDArray[np.int64]], list[Folds]]:
     """Return groups and folds of the trials in a mask, without groups that are not in several folds."""
     kept_groups, kept_folds = [], []
-    for rows, of in zip(groups, folds, strict=True):
+    for rows, fold in zip(groups, folds, strict=True):
         kept = having[rows]
-        if len(np.unique(of[kept])) > 1:
+        if len(np.unique(fold[kept])) > 1:
             kept_groups.append(rows[kept])
-            kept_folds.append(of[kept])
+            kept_folds.append(fold[kept])
     return kept_groups, kept_folds
 
 
@@ -554,7 +554,7 @@ def _with_several_states(labelled: Labelled, notes: list[str]) -> Labelled:
     states: dict[str, set[str]] = {}
     for label in labelled.labels:
         states.setdefault(class_of(label), set()).add(label)
-    single = sorted(name for name, of in states.items() if len(of) == 1)
+    single = sorted(name for name, state in states.items() if len(state) == 1)
     if not single:
         return labelled
     notes.append(f"classes left out because they have a single state: {', '.join(single)}")

@@ -50,7 +50,7 @@ class LabelledEvents:
         """Return detections moved by half of the recording; what leaves it at the end comes in at the begin."""
         if not self.seconds:
             return list(told)
-        return [self.begin_s + (at - self.begin_s + 0.5 * self.seconds) % self.seconds for at in told]
+        return [self.begin_s + (value - self.begin_s + 0.5 * self.seconds) % self.seconds for value in told]
 
 
 @frozen(kw_only=True)

@@ -226,14 +226,14 @@ def _measured(
     """Return the answers of a classifier under each protocol. Raises FitRefused."""
     labels, groups = trials.labels, [np.arange(len(trials))]
     right, seconds, sets = {}, [], None
-    for protocol, of in protocols.items():
+    for protocol, folds in protocols.items():
         began = time.perf_counter()
-        pooled = cross_validate(learner, table, labels, groups, [of], seed=seed)
-        seconds.append((time.perf_counter() - began) / (int(of.max()) + 1))
+        pooled = cross_validate(learner, table, labels, groups, [folds], seed=seed)
+        seconds.append((time.perf_counter() - began) / (int(folds.max()) + 1))
         right[protocol] = pooled.right(labels)
         if sets is None:
             sets = set_coverage(
-                pooled, labels, exchangeable_instances(trials), groups, [of], _rate_among(trials)
+                pooled, labels, exchangeable_instances(trials), groups, [folds], _rate_among(trials)
             )
     return CandidateResult(right=right, training_s=seconds[0], sets=sets)
 

@@ -112,12 +112,12 @@ def _tables(grasp: RecordedGrasp) -> Iterator[tuple[str, Table]]:
         SIGNAL_TOPIC + channel.name: channel for channel in grasp.channels if isinstance(channel, FastChannel)
     }
     signals = grasp.trace().signals if fast else {}
-    for name, found in grasp.topics.items():
+    for name, topic in grasp.topics.items():
         if name in cameras:
             continue
         channel = fast.get(name)
         if channel is None:
-            yield name, _flat(found.rows)
+            yield name, _flat(topic.rows)
         else:
             samples = signals[channel.name]
             rows = np.column_stack([samples.t_s, samples.values]).tolist()

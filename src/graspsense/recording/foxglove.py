@@ -112,12 +112,12 @@ def with_pictures(grasp: RecordedGrasp) -> bytes:
                     pictures.channel = writer.register_channel(pictures.topic, "cdr", raw_image)
             elif isinstance(record, Message):
                 number, topic = channels[record.channel_id]
-                at = record.log_time
-                writer.add_message(number, at, record.data, record.publish_time, record.sequence)
+                log_time = record.log_time
+                writer.add_message(number, log_time, record.data, record.publish_time, record.sequence)
                 for pictures in of_topic.get(topic, ()):
                     picture = pictures.grid.picture(next(pictures.images))
-                    data = raw_image_message(at, pictures.frame_id, picture)
-                    writer.add_message(pictures.channel, at, data, at, pictures.number)
+                    data = raw_image_message(log_time, pictures.frame_id, picture)
+                    writer.add_message(pictures.channel, log_time, data, log_time, pictures.number)
                     pictures.number += 1
     writer.finish()  # type: ignore[no-untyped-call]
     return out.getvalue()
@@ -143,10 +143,10 @@ def _pictures(grasp: RecordedGrasp) -> Mapping[str, Sequence[_Pictures]]:
     """Return what is to be drawn of each topic with tactile images."""
     declared = {channel.name: channel for channel in grasp.channels if isinstance(channel, TactileArray)}
     drawn: dict[str, Sequence[_Pictures]] = {}
-    for name, found in grasp.topics.items():
-        fields = found.rows.dtype.names or ()
+    for name, topic in grasp.topics.items():
+        fields = topic.rows.dtype.names or ()
         if name == PADS_TOPIC:
-            values = np.array([found.numbers(i)[2:] for i in range(len(found.rows))], dtype=float)
+            values = np.array([topic.numbers(i)[2:] for i in range(len(topic.rows))], dtype=float)
             cells = values.shape[1] // 2
             array = declared.get("pads")
             if array is None or array.cells != cells:
@@ -159,7 +159,7 @@ def _pictures(grasp: RecordedGrasp) -> Mapping[str, Sequence[_Pictures]]:
             )
         elif name.startswith(SIGNAL_TOPIC) and "cells" in fields:
             array = declared[name.removeprefix(SIGNAL_TOPIC)]
-            cells = found.rows["cells"].reshape(len(found.rows), array.cells, array.components)
+            cells = topic.rows["cells"].reshape(len(topic.rows), array.cells, array.components)
             images = iter(cells.squeeze(axis=2) if array.components == 1 else cells)
             if array.dtype != "uint8" or array.components == 2:
                 images = _brightness(cells)

@@ -129,9 +129,9 @@ class RecordedGrasp:
     def images(self) -> int:
         """The number of images of the fingertips and of all other arrays."""
         return sum(
-            len(found.rows)
-            for name, found in self.topics.items()
-            if name == PADS_TOPIC or "cells" in (found.rows.dtype.names or ())
+            len(topic.rows)
+            for name, topic in self.topics.items()
+            if name == PADS_TOPIC or "cells" in (topic.rows.dtype.names or ())
         )
 
     @property
@@ -139,14 +139,14 @@ class RecordedGrasp:
         """The recorded arrays and further channels, as the gripper declared them or else as their messages show."""
         declared = {channel.name: channel for channel in self.device.channels}
         shown: list[DeclaredChannel] = []
-        for name, found in self.topics.items():
-            numbers = {field: max(number, 1) for field, _, number in found.topic.fields}
+        for name, topic in self.topics.items():
+            numbers = {field: max(number, 1) for field, _, number in topic.topic.fields}
             if name == SCALARS_TOPIC:
                 shown += [DeclaredChannel(field, "unknown") for field in numbers if field != "t_s"]
             elif name.startswith(SIGNAL_TOPIC) and "cells" in numbers:
-                shown.append(shown_array(found.topic))
+                shown.append(shown_array(topic.topic))
             elif name.startswith(SIGNAL_TOPIC):
-                axes = int(found.rows["axes"][0]) if len(found.rows) else numbers["values"]
+                axes = int(topic.rows["axes"][0]) if len(topic.rows) else numbers["values"]
                 shown.append(
                     FastChannel(
                         name[len(SIGNAL_TOPIC) :],
@@ -257,11 +257,11 @@ class RecordedGrasp:
     def _column(self, channel: DeclaredChannel, nothing: Any) -> list[Any]:
         """Return the value of a further channel in each tick, `nothing` before the first one."""
         scalar = not isinstance(channel, TactileArray | FastChannel)
-        found = self.topics[SCALARS_TOPIC if scalar else SIGNAL_TOPIC + channel.name]
+        topic = self.topics[SCALARS_TOPIC if scalar else SIGNAL_TOPIC + channel.name]
         values: list[Any] = [nothing] * len(self.ticks)
-        names = found.rows.dtype.names or ()
+        names = topic.rows.dtype.names or ()
         last = nothing
-        for at, row in zip(found.before, found.rows, strict=True):
+        for at, row in zip(topic.before, topic.rows, strict=True):
             if at >= len(values):
                 break
             if scalar:

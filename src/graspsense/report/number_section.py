@@ -99,20 +99,24 @@ def _row(key: str, measurement: RegressionMeasurement) -> tuple[str, ...]:
     )
 
 
-def _scatter(found: RegressionEvaluation) -> str:
+def _scatter(evaluation: RegressionEvaluation) -> str:
     """Return each prediction over the true number, beside the line on which they are equal."""
-    values = [value for pair_ in found.predictions for value in pair_]
+    values = [value for pair_ in evaluation.predictions for value in pair_]
     picture = Picture(330)
     x, y = reaching(values, 50.0, picture.width - 16), reaching(values, 280.0, 24.0)
-    picture.x_axis(x, 24, 280, _with_unit(f"true {found.target_value}", found.unit and f"in {found.unit}"))
-    picture.y_axis(y, 50.0, picture.width - 16, _with_unit("predicted", found.unit and f"in {found.unit}"))
+    picture.x_axis(
+        x, 24, 280, _with_unit(f"true {evaluation.target_value}", evaluation.unit and f"in {evaluation.unit}")
+    )
+    picture.y_axis(
+        y, 50.0, picture.width - 16, _with_unit("predicted", evaluation.unit and f"in {evaluation.unit}")
+    )
     with picture.plot(x, y, 24, 280):
         picture.line([(x(one), y(one)) for one in (x.low, x.high)], QUIET)
-        for truth, predicted in found.predictions:
+        for truth, predicted in evaluation.predictions:
             words = f"{number(truth)}, predicted {number(predicted)}"
             picture.mark(x(truth), y(predicted), INKS[0], words=words)
     caption = "Each mark is a grasp that was held out from training. The line is where both are equal."
-    return figure(picture.svg(f"Predicted and true {found.target_value}. {caption}"), caption)
+    return figure(picture.svg(f"Predicted and true {evaluation.target_value}. {caption}"), caption)
 
 
 def _with_unit(text: str, unit: str) -> str:

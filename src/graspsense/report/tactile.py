@@ -75,8 +75,8 @@ def tactile_figures(trace: Trace, channels: Sequence[Channel]) -> list[str]:
             shape = TactileArray("pads", trace.units.get("pads", "counts"), rows=1, columns=cells)
         if is_picture(shape):
             pictures += [
-                camera_figure(f"{side} fingertip", of, shape, moments(trace))
-                for side, of in fingertips.items()
+                camera_figure(f"{side} fingertip", fingertip, shape, moments(trace))
+                for side, fingertip in fingertips.items()
             ]
         else:
             arrays.append(("fingertips", fingertips, shape))
@@ -97,7 +97,7 @@ def _figure(
     title: str, images: Mapping[str, ImageTrace], shape: TactileArray, times: Mapping[str, float]
 ) -> str:
     unit, factor = display_unit(shape.unit)
-    shown = {side: images_at(of, factor, times) for side, of in images.items()}
+    shown = {side: images_at(image, factor, times) for side, image in images.items()}
     relative = all(at.relative for at in shown.values())
     facing = list(shape.facing) or [True] * shape.cells
     scale = HeatScale.over(

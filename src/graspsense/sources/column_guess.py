@@ -136,7 +136,7 @@ def numbered_groups(names: Sequence[str]) -> dict[str, list[str]]:
     groups: dict[str, list[str]] = {}
     for name in names:
         groups.setdefault(re.sub(r"\d+$", "*", name), []).append(name)
-    return {pattern: found for pattern, found in groups.items() if len(found) >= _FEWEST_CELLS}
+    return {pattern: group for pattern, group in groups.items() if len(group) >= _FEWEST_CELLS}
 
 
 def _gap_columns(table: ColumnTable, taken: Sequence[str | None]) -> tuple[str, ...]:

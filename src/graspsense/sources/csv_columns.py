@@ -101,19 +101,19 @@ class CsvColumns:
         self.column(name, "a feature")
         if self._numbers is None:
             self._numbers = columns_of_numbers(self.cells)
-        found = self._numbers[name]
-        if isinstance(found, NotNumbers):
+        number = self._numbers[name]
+        if isinstance(number, NotNumbers):
             times = seconds_since_first(self.cells[name])
             if times is not None:
                 return [float(value) for value in times]
-            raise DataDamaged(f"{self.path}, line {self.lines[found.row]}: {name} is {found.words}")
-        infinite = np.flatnonzero(np.isinf(found))
+            raise DataDamaged(f"{self.path}, line {self.lines[number.row]}: {name} is {number.words}")
+        infinite = np.flatnonzero(np.isinf(number))
         if len(infinite):
             raise DataDamaged(
                 f"{self.path}, line {self.lines[int(infinite[0])]}: {name} is infinite; leave the cell empty if the "
                 "value is missing"
             )
-        values: list[float] = found.tolist()
+        values: list[float] = number.tolist()
         return values
 
     def has_numbers(self, name: str) -> bool:
@@ -176,7 +176,7 @@ class CsvColumns:
         """Return the nominal column and the value that a name such as `colour=red` means; None for another name."""
         if name in self.cells:
             return None
-        return next((found for found in splits_of(name) if found[0] in self.cells), None)
+        return next((split for split in splits_of(name) if split[0] in self.cells), None)
 
     def _is_value(self, column: str, value: str, known: set[str]) -> list[float]:
         """Return 1 where a nominal column has this value, NaN where it has none of those that are known."""

@@ -100,22 +100,22 @@ def _series(times: NDArray[np.float64], arrays: Arrays, channel: Channel) -> lis
     """Return the value of a further channel in each tick."""
     values = arrays[f"signal_{channel.name}"]
     if isinstance(channel, TactileArray):
-        at = arrays[f"signal_{channel.name}_t_s"]
+        array = arrays[f"signal_{channel.name}_t_s"]
         if channel.dtype != FLOATS:
             values = read_only(values, channel.dtype)  # once, so that its images are passed by reference
         images = [
             Image(t_s, k, cells_of(channel, cells))
-            for k, (t_s, cells) in enumerate(zip(at.tolist(), values, strict=True), 1)
+            for k, (t_s, cells) in enumerate(zip(array.tolist(), values, strict=True), 1)
         ]
-        return _latest(times, at, images, no_signals((channel,))[0])
+        return _latest(times, array, images, no_signals((channel,))[0])
     if isinstance(channel, FastChannel):
         return sample_blocks(times, arrays[f"signal_{channel.name}_t_s"], values, channel)
     return list(values.tolist())
 
 
 def _latest(
-    times: NDArray[np.float64], at: NDArray[np.float64], values: list[Any], nothing: Any
+    times: NDArray[np.float64], array: NDArray[np.float64], values: list[Any], nothing: Any
 ) -> list[Any]:
     """Return the last of the values in each tick; `nothing` before the first."""
-    counts = np.searchsorted(at, times, side="right").tolist()
+    counts = np.searchsorted(array, times, side="right").tolist()
     return [values[count - 1] if count else nothing for count in counts]

@@ -273,9 +273,9 @@ def _feature_names(
         else:
             names.append(name)
             nominal += [name] if columns.is_nominal(name) else []
-    for why, found in identifiers.items():
+    for why, identifier in identifiers.items():
         notes.append(
-            f"not used, because they {why}: {listed(found)} "
+            f"not used, because they {why}: {listed(identifier)} "
             f"(use {option('features', python='columns')} to include them)"
         )
     if blank:

@@ -116,8 +116,8 @@ class GraspColumns:
         for name, values in channels.items():
             rows = which
             if name in self.times:
-                at = self.times[name]
-                rows = (at >= t_s[0]) & (at <= t_s[-1]) if len(t_s) else np.zeros(len(at), bool)
+                time_s = self.times[name]
+                rows = (time_s >= t_s[0]) & (time_s <= t_s[-1]) if len(t_s) else np.zeros(len(time_s), bool)
             found[name] = values[rows]
         return found
 
@@ -206,13 +206,13 @@ def _check_lengths(columns: GraspColumns) -> None:
         for name in ("t_s", "gap_m", "left_n", "right_n", "effort_n", "velocity_m_s")
         if getattr(columns, name) is not None
     }
-    for name, at in columns.times.items():
+    for name, time_s in columns.times.items():
         if name not in columns.scalars and name not in columns.arrays:
             raise DataDamaged(
                 f"{columns.source}: `times` names {name!r}, which is neither a scalar nor an array"
             )
-        wrong = np.flatnonzero(~(np.diff(at) > 0.0)) if np.ndim(at) == 1 else np.zeros(1, int)
-        if len(wrong) or not np.isfinite(at).all():
+        wrong = np.flatnonzero(~(np.diff(time_s) > 0.0)) if np.ndim(time_s) == 1 else np.zeros(1, int)
+        if len(wrong) or not np.isfinite(time_s).all():
             raise DataDamaged(
                 f"{columns.source}: the times of {name!r} do not increase at sample {_second(wrong)}"
             )
@@ -246,15 +246,15 @@ def _within_ticks(columns: GraspColumns) -> GraspColumns:
     Raises DataDamaged if a channel with its own times has none within them.
     """
     arrays, times, notes = dict(columns.arrays), dict(columns.times), [*columns.notes]
-    for name, at in columns.times.items():
-        within = (at >= columns.t_s[0]) & (at <= columns.t_s[-1])
-        if len(at) and not within.any():
+    for name, time_s in columns.times.items():
+        within = (time_s >= columns.t_s[0]) & (time_s <= columns.t_s[-1])
+        if len(time_s) and not within.any():
             raise DataDamaged(
-                f"{columns.source}: the times of {name!r} are {at[0]:g} to {at[-1]:g} s, and those of t_s "
+                f"{columns.source}: the times of {name!r} are {time_s[0]:g} to {time_s[-1]:g} s, and those of t_s "
                 f"{columns.t_s[0]:g} to {columns.t_s[-1]:g} s: give both in seconds on one clock"
             )
         if name in columns.fast and not within.all():
-            arrays[name], times[name] = arrays[name][within], at[within]
+            arrays[name], times[name] = arrays[name][within], time_s[within]
             notes.append(f"{int((~within).sum())} samples of {name} are before or after those of the gap")
     return evolve(columns, arrays=arrays, times=times, notes=tuple(notes))
 

@@ -88,7 +88,9 @@ class Collection:
         """Return the number of trials of each label that count so far."""
         stored = self.store.counts("collect")
         labels = {word: labels_of(word) for word in self.wanted.words}
-        return {word: stored.get((of["label"], of.get("instance")), 0) for word, of in labels.items()}
+        return {
+            word: stored.get((label["label"], label.get("instance")), 0) for word, label in labels.items()
+        }
 
     def following(self) -> str | None:
         """Return the label that comes next, or None if nothing is left."""

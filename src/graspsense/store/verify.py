@@ -116,11 +116,11 @@ def _problem_of(path: Path, sha256: str, size: int) -> str:
         with path.open("rb") as file:
             if hashlib.file_digest(file, "sha256").hexdigest() == sha256:
                 return ""
-        found = path.stat().st_size
+        st_size = path.stat().st_size
     except FileNotFoundError:
         return f"its recording {path.name} is missing"
-    if found != size:
-        return f"its recording {path.name} has {found} bytes and had {size}"
+    if st_size != size:
+        return f"its recording {path.name} has {st_size} bytes and had {size}"
     try:
         read_recorded(path)
     except GraspsenseError as error:

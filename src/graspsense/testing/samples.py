@@ -56,7 +56,7 @@ def squeeze(stiffness_n_m: float = 4000.0, contacts: tuple[float, float] = (0.06
     relaxed = np.where(times > 1.5, 0.85 + 0.15 * np.exp(-(times - 1.5) / 0.1), 1.0)
     # A small ripple takes the place of noise, and is the same every time.
     ripple = 0.004 * np.sin(2.0 * np.pi * 61.0 * times)
-    force = [stiffness_n_m * np.maximum(at - gap, 0.0) * relaxed + ripple for at in contacts]
+    force = [stiffness_n_m * np.maximum(contact - gap, 0.0) * relaxed + ripple for contact in contacts]
     frames = [
         _Frame(float(t), dt, float(g), float(v), float(2.0 + f), float(f), float(r), 0.01, 0.01, 0)
         for t, g, v, f, r in zip(times, gap, velocity, force[0], force[1], strict=True)

@@ -186,15 +186,15 @@ def _memory(fitted: Fitted, squeezes: Sequence[Squeeze]) -> list[Undetermined]:
     ]
 
 
-def _parameters(fitted: Fitted, found: Uncertainty, squeezes: Sequence[Squeeze]) -> list[Undetermined]:
+def _parameters(fitted: Fitted, uncertainty: Uncertainty, squeezes: Sequence[Squeeze]) -> list[Undetermined]:
     hold_s = max(squeeze.stretches.hold_s for squeeze in squeezes)
     depth_mm = 1e3 * max(squeeze.depth_m for squeeze in squeezes)
     open_ = []
     for i, parameter in enumerate(fitted.candidate.free):
         at_bound = fitted.at_bound(i)
-        if not at_bound and found.high[i] <= WIDE * found.low[i]:
+        if not at_bound and uncertainty.high[i] <= WIDE * uncertainty.low[i]:
             continue
-        interval = f"its 90 % interval is {found.low[i]:.3g} to {found.high[i]:.3g}"
+        interval = f"its 90 % interval is {uncertainty.low[i]:.3g} to {uncertainty.high[i]:.3g}"
         reason = "the fit is at the end of the range" if at_bound else interval
         if parameter.name == "tau_s" or parameter.term.startswith("maxwell"):
             tau = next(
@@ -214,9 +214,9 @@ def _parameters(fitted: Fitted, found: Uncertainty, squeezes: Sequence[Squeeze])
     return open_
 
 
-def _spreads(found: Uncertainty, squeezes: Sequence[Squeeze]) -> list[Undetermined]:
+def _spreads(uncertainty: Uncertainty, squeezes: Sequence[Squeeze]) -> list[Undetermined]:
     open_ = []
-    if math.isnan(found.between_objects):
+    if math.isnan(uncertainty.between_objects):
         names = {squeeze.instance for squeeze in squeezes if squeeze.instance}
         count = (
             "one object"

@@ -148,7 +148,7 @@ def _headline(held: Sequence[RateComparison], checked: Sequence[Claim]) -> str:
         if row.basis == "predicted" and not row.published.repeats:
             rates.setdefault(row.published.id, []).append(row.verdict)
     if rates:
-        of_both = [found[0] if len(set(found)) == 1 else UNTOLD for found in rates.values()]
+        of_both = [rate[0] if len(set(rate)) == 1 else UNTOLD for rate in rates.values()]
         parts.append(f"of {len(rates)} predicted rates of the paper, {counted(of_both)}")
     claims = [claim.verdict for claim in _counted_once(held, checked) if claim.basis == "predicted"]
     if claims:

@@ -123,7 +123,7 @@ def main(graspsense):
 
 def judge(trial, messages):
     """Compare the messages with what the program printed."""
-    counts = {topic: len(found) for topic, found in messages.items()}
+    counts = {topic: len(message) for topic, message in messages.items()}
     sys.stdout.write(f"{counts}\n")
     assert all(counts.values()), counts
     ticks = trial["counts"]["ticks"]

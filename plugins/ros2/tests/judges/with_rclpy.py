@@ -77,7 +77,7 @@ def judge_grasp(node, executor):
     assert missed < 100, (missed, told["counts"])
     assert max(wrench.wrench.force.z for wrench in messages["wrench/left"]) > 1.0
     assert len(messages["tactile/pads_left"][0].data) == 22
-    counts = {name: len(found) for name, found in messages.items()}
+    counts = {name: len(message) for name, message in messages.items()}
     sys.stdout.write(f"with rclpy: {counts}, {told['outcome']}\n")
 
 

@@ -246,12 +246,12 @@ class So101Backend(SensorBackend[So101Config]):
             self._kept(lambda: self._tried(lambda bus: bus.write(self.config.motor, STATE[0], data)))
             self._asked = asked
 
-    def _give_back(self, bus: ServoBus, found: MotorRequest) -> None:
+    def _give_back(self, bus: ServoBus, request: MotorRequest) -> None:
         """Let the motor stay where it is, with the torque and the limits that it had before, also if it only hears."""
         motor, position = self.config.motor, self._position
         with suppress(NoStatusPacket, OSError):
             position = motor_state(bus.read(motor, *STATE)).position
-        stop = found._replace(goal_position=position, goal_time=0).written()
+        stop = request._replace(goal_position=position, goal_time=0).written()
         for _ in range(ATTEMPTS):
             with suppress(NoStatusPacket, OSError):
                 bus.write(motor, STATE[0], stop)

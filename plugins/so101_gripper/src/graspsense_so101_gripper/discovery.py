@@ -27,9 +27,9 @@ def serial_number(config: So101Config, port: str) -> str:
     from serial.tools.list_ports import comports
 
     board = "emulated" if config.port == "emulated" else "unknown"
-    for found in comports():
-        if os.path.realpath(found.device) == os.path.realpath(port) and found.serial_number:
-            board = re.sub(r"[^\w+-]", "_", found.serial_number)
+    for comport in comports():
+        if os.path.realpath(comport.device) == os.path.realpath(port) and comport.serial_number:
+            board = re.sub(r"[^\w+-]", "_", comport.serial_number)
     return f"{board}-{config.motor}"
 
 

@@ -214,10 +214,8 @@ def _resolved_layers(
             complaints += [(merged.owner_of(one.path), one) for one in misfit.under(table)]
             continue
         if not force:
-            of_table = [
-                value.under(table) for value in implausible_values(config) if value.path[0] not in followed
-            ]
-            doubts += [_in_a_line(merged.owner_of(one.path), one) for one in of_table]
+            doubted = (value for value in implausible_values(config) if value.path[0] not in followed)
+            doubts += _lines(merged, [value.under(table) for value in doubted])
         if component is None:
             run = config
             values[table] = plain(config)
@@ -241,6 +239,10 @@ def _resolved_layers(
         values=values,
         origins=origins,
     )
+
+
+def _lines(merged: Merged, values: Sequence[InvalidValue]) -> list[str]:
+    return [_in_a_line(merged.owner_of(value.path), value) for value in values]
 
 
 _Complaint = str | tuple[Layer | None, InvalidValue]

@@ -92,8 +92,8 @@ def number_in(text: str) -> float | None:
     cell = text.strip()
     if not cell or is_missing(cell):
         return None
-    found = columns_of_numbers({"": [cell]})[""]
-    return None if isinstance(found, NotNumbers) or not math.isfinite(found[0]) else float(found[0])
+    column = columns_of_numbers({"": [cell]})[""]
+    return None if isinstance(column, NotNumbers) or not math.isfinite(column[0]) else float(column[0])
 
 
 def truths(cells: Sequence[str]) -> Numbers | None:

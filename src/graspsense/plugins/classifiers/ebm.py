@@ -258,7 +258,7 @@ def _model_of(boosting: Any, table: FeatureTable) -> AdditiveModel:
     for features, scores in zip(boosting.term_features_, boosting.term_scores_, strict=True):
         levels = [boosting.bins_[k] for k in features]
         cuts = tuple(
-            np.asarray(of[min(len(features), len(of)) - 1], dtype=np.float64).copy() for of in levels
+            np.asarray(level[min(len(features), len(level)) - 1], dtype=np.float64).copy() for level in levels
         )
         known = columns(scores)[(slice(-1),) * len(features)].copy()
         terms.append(EbmTerm(tuple(int(k) for k in features), cuts, known))

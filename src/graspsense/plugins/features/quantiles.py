@@ -92,13 +92,13 @@ class QuantileFeatures(FeatureSet[ContactThreshold]):
             else:
                 values += _quantiles(samples, start_s, end_s).tolist()
         absent = [math.nan] * (len(self.features) - len(values))
-        found = Features(
+        features = Features(
             names=tuple(feature.name for feature in self.features),
             values=(*values, *absent),
             units=_units(trace),
             reasons=reasons,
         )
-        return without_gap(trace, found, _OF_GAP)
+        return without_gap(trace, features, _OF_GAP)
 
 
 def _contact(samples: CurveSamples, contact_force_n: float) -> tuple[float, float] | str:

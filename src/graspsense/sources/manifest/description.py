@@ -231,7 +231,7 @@ def _too_many(keys: Manifest) -> list[tuple[tuple[str, ...], str]]:
         **{name: getattr(keys, name) for name in ("channels", "values", "fingers", "events")},
     }
     entries |= {name: texts_of(getattr(keys, name)) for name in QUANTITIES}
-    return [((name,), why) for name, found in entries.items() if (why := ENTRIES.exceeded(len(found)))]
+    return [((name,), why) for name, entry in entries.items() if (why := ENTRIES.exceeded(len(entry)))]
 
 
 def _contradictions(keys: Manifest) -> list[tuple[tuple[str, ...], str]]:

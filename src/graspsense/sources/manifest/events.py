@@ -37,11 +37,11 @@ def labelled_events(found: AvailableColumns, t_s: Numbers, origin_s: float) -> d
     return events
 
 
-def _check_flags(found: AvailableColumns, kind: str, values: Numbers) -> None:
+def _check_flags(columns: AvailableColumns, kind: str, values: Numbers) -> None:
     """Raise DataDamaged for the first value that is neither 0 nor 1 nor missing."""
     wrong = np.flatnonzero((values != 0.0) & (values != 1.0) & ~np.isnan(values))
     if len(wrong):
-        table, k = found.table, int(wrong[0])
+        table, k = columns.table, int(wrong[0])
         place = f"sample {k + 1}" if table.lines is None else f"line {table.lines[k]}"
         raise DataDamaged(
             f"{table.source}, {place}: the label of events.{kind} is {values[k]:g}; it must be 0 or 1, or missing. For "
@@ -67,20 +67,20 @@ def _where_set(values: Numbers, t_s: Numbers) -> tuple[Spans, Spans]:
 
 
 def _at_times(
-    found: AvailableColumns, kind: str, expression: Expression, t_s: Numbers, origin_s: float
+    columns: AvailableColumns, kind: str, expression: Expression, t_s: Numbers, origin_s: float
 ) -> Spans:
     """Return the events at the times that a field, a column or an expression gives; each ends where it begins."""
-    manifest, table = found.manifest, found.table
+    manifest, table = columns.manifest, columns.table
     if expression.unit not in TO_SI["time"]:
         raise ConfigError(
             f"{manifest.place}: events.{kind}: the unit {expression.unit!r} is not one of time. There are "
             f"{', '.join(TO_SI['time'])}; a column of 0 and 1 has none"
         )
-    if expression.column in table.blank and expression.column not in found:
+    if expression.column in table.blank and expression.column not in columns:
         return ()
     text = table.value(expression.column) if expression.column else None
     if text is None:
-        column = found.computed(f"events.{kind}", lambda: expression.numbers(found, len(table)))
+        column = columns.computed(f"events.{kind}", lambda: expression.numbers(columns, len(table)))
         distinct = np.unique(column)
         if len(distinct) > 1:
             raise ConfigError(
@@ -94,10 +94,10 @@ def _at_times(
             raise DataDamaged(f"{table.source}: events.{kind}: {word!r} is not a time")
         if number is not None:
             times.append(number * TO_SI["time"][expression.unit] - origin_s)
-    for at in times:
-        if not t_s[0] <= at <= t_s[-1]:
+    for time_s in times:
+        if not t_s[0] <= time_s <= t_s[-1]:
             raise DataDamaged(
-                f"{table.source}: events.{kind}: {at:g} s is outside of the recording, which is from {t_s[0]:g} to "
+                f"{table.source}: events.{kind}: {time_s:g} s is outside of the recording, which is from {t_s[0]:g} to "
                 f"{t_s[-1]:g} s"
             )
-    return tuple((at, at) for at in sorted(times))
+    return tuple((time_s, time_s) for time_s in sorted(times))

@@ -93,10 +93,10 @@ def recorded_at_of(manifest: ReadManifest, table: ColumnTable) -> str:
 @np.errstate(all="ignore")  # of infinite values
 def values_of(manifest: ReadManifest, file: NamedFile, table: ColumnTable) -> dict[str, float]:
     """Return the properties of a grasp, under their names with units. Raises ConfigError, DataDamaged."""
-    found = AvailableColumns(manifest, table)
+    columns = AvailableColumns(manifest, table)
     values = {}
     for name, expression in manifest.values.items():
-        column = found.computed(f"values.{name}", lambda one=expression: one.numbers(found, len(table)))  # type: ignore[misc]
+        column = columns.computed(f"values.{name}", lambda one=expression: one.numbers(columns, len(table)))  # type: ignore[misc]
         if np.ptp(column) > 0.0:
             raise ConfigError(
                 f"{manifest.place}: values.{name} changes during {table.source}: take peak(...), "

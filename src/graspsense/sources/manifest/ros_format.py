@@ -44,8 +44,8 @@ def read_bag(path: Path, topics: Collection[str] = ()) -> list[ColumnTable]:
     rows_ns = clock.topics[max(values, key=lambda topic: len(values[topic]))].ns
     rows_ns = rows_ns[(rows_ns >= clock.begin_ns) & (rows_ns <= clock.end_ns)]
     numbers: dict[str, Numbers] = {}
-    for topic, found in values.items():
-        numbers |= _held(clock.topics[topic], found, rows_ns)
+    for topic, value in values.items():
+        numbers |= _held(clock.topics[topic], value, rows_ns)
     return [
         ColumnTable(
             source=path.name,
@@ -69,7 +69,7 @@ def _collected(
         kept.add(sum(_NUMBER_BYTES + 8 * np.size(column) for column in columns.values()))
         values.setdefault(topic, []).append(columns)
         times.setdefault(topic, Messages()).add(recorded_ns, stamp_ns(message))
-    values = {topic: found for topic, found in values.items() if found[0]}
+    values = {topic: value for topic, value in values.items() if value[0]}
     if not values:
         raise DataDamaged(f"{path} has no messages with numbers")
     return values, {topic: times[topic] for topic in values}

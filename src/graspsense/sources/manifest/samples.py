@@ -100,12 +100,12 @@ def samples(manifest: ReadManifest, table: ColumnTable) -> GraspColumns:
     return without_duplicates(whole) if keys.duplicates == "drop" else whole
 
 
-def _sides(manifest: ReadManifest, found: AvailableColumns, zero: int) -> tuple[Numbers, Numbers, str]:
+def _sides(manifest: ReadManifest, columns: AvailableColumns, zero: int) -> tuple[Numbers, Numbers, str]:
     """Return the forces of the two pads that a manifest names, and their unit. Raises ConfigError."""
     expressions = manifest.expressions
-    both = found.value("force", expressions["force"], "force")
-    left = both or found.value("left", expressions["left"], "force")
-    right = both or found.value("right", expressions["right"], "force") or left
+    both = columns.value("force", expressions["force"], "force")
+    left = both or columns.value("left", expressions["left"], "force")
+    right = both or columns.value("right", expressions["right"], "force") or left
     left = left or right
     assert left is not None  # the manifest was checked for them
     assert right is not None
@@ -122,14 +122,14 @@ def _zeroed(force: Numbers, zero: int) -> Numbers:
 
 
 def _fingers(
-    manifest: ReadManifest, found: AvailableColumns, zero: int
+    manifest: ReadManifest, columns: AvailableColumns, zero: int
 ) -> tuple[tuple[FingerForce, ...], dict[str, Numbers]]:
     """Return the fingers that a manifest names, and the force of each by its channel. Raises ConfigError."""
     forces: dict[str, Numbers] = {}
     units: dict[str, str] = {}
     for name in manifest.keys.fingers:
         key = f"{PREFIX}{name}"
-        given = found.value(f"fingers.{name}", manifest.expressions[key], "force")
+        given = columns.value(f"fingers.{name}", manifest.expressions[key], "force")
         assert given is not None  # each finger has an expression
         forces[key], units[name] = _zeroed(given[0], zero), given[1] or "N"
     if len(set(units.values())) > 1:
@@ -138,15 +138,15 @@ def _fingers(
     return hand_of(manifest.keys, next(iter(units.values()), "N")), forces
 
 
-def _doubtful_units(manifest: ReadManifest, found: AvailableColumns) -> Iterator[str]:
+def _doubtful_units(manifest: ReadManifest, columns: AvailableColumns) -> Iterator[str]:
     """Yield a sentence for each quantity whose unit the file states otherwise than the manifest."""
     for key, parts in manifest.expressions.items():
         quantity = "force" if key in ("left", "right") or key.startswith(PREFIX) else key
-        chosen = found.chosen(parts) if parts else None
-        if chosen is None or not found.has(chosen):
+        chosen = columns.chosen(parts) if parts else None
+        if chosen is None or not columns.has(chosen):
             continue
-        stated = found.stated(chosen)
-        if quantity == "force" and (grams := _gram_force(chosen, stated, tuple(found))):
+        stated = columns.stated(chosen)
+        if quantity == "force" and (grams := _gram_force(chosen, stated, tuple(columns))):
             yield (
                 f"{key}: the unit or the name of the column is that of a mass, as of a scale: for gram-force write "
                 f'{key} = "{chosen.text} [{grams}]"'
@@ -179,9 +179,9 @@ def _folds(manifest: ReadManifest) -> list[str]:
     return notes
 
 
-def _has_time(manifest: ReadManifest, table: ColumnTable, found: AvailableColumns) -> bool:
+def _has_time(manifest: ReadManifest, table: ColumnTable, columns: AvailableColumns) -> bool:
     return bool(
-        manifest.keys.rate_hz or table.t_s is not None or any(map(found.has, manifest.expressions["time"]))
+        manifest.keys.rate_hz or table.t_s is not None or any(map(columns.has, manifest.expressions["time"]))
     )
 
 
@@ -228,7 +228,7 @@ def _unit_since_1970(times: Numbers) -> str:
 
 
 def _channels(
-    manifest: ReadManifest, table: ColumnTable, found: AvailableColumns
+    manifest: ReadManifest, table: ColumnTable, columns: AvailableColumns
 ) -> tuple[dict[str, Numbers], dict[str, Numbers], dict[str, str]]:
     """Return the further channels with one number a sample, the arrays, and the units of both. Raises ConfigError."""
     scalars: dict[str, Numbers] = {}
@@ -240,11 +240,11 @@ def _channels(
                 f"{manifest.place}: channels: {name!r} cannot be the name of a channel: write small letters, digits "
                 "and underscores, a letter first, and no name of a channel of every gripper"
             )
-        values = found.computed(f"channels.{name}", lambda one=expression: one.values(found, len(table)))  # type: ignore[misc]
+        values = columns.computed(f"channels.{name}", lambda one=expression: one.values(columns, len(table)))  # type: ignore[misc]
         if name in manifest.fast:
             values = values.reshape(len(values), -1)
         (scalars if values.ndim == 1 else arrays)[name] = values
-        units[name] = expression.unit or found.stated(expression) or "1"
+        units[name] = expression.unit or columns.stated(expression) or "1"
     return scalars, arrays, units
 
 

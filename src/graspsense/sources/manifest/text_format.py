@@ -98,10 +98,10 @@ def _columns(path: Path, part: _Part, table: TextTable, *, several: bool) -> Col
     texts: dict[str, Sequence[str]] = {}
     not_numbers: dict[str, str] = {}
     seconds: dict[str, str] = {}
-    for name, found in columns_of_numbers(cells).items():
-        if not isinstance(found, NotNumbers):
-            numbers[name] = found
-            if np.isnan(found).any() and any(map(_is_word, cells[name])):
+    for name, column in columns_of_numbers(cells).items():
+        if not isinstance(column, NotNumbers):
+            numbers[name] = column
+            if np.isnan(column).any() and any(map(_is_word, cells[name])):
                 texts[name] = cells[
                     name
                 ]  # as numbers `none` and `NA` are missing, and as labels they are not
@@ -117,8 +117,8 @@ def _columns(path: Path, part: _Part, table: TextTable, *, several: bool) -> Col
             seconds[name] = "s"
         elif logical is not None:
             numbers[name] = logical
-        elif found.row or is_number(found.cell):
-            not_numbers[name] = f"line {table.lines[found.row]} has {found.words}"
+        elif column.row or is_number(column.cell):
+            not_numbers[name] = f"line {table.lines[column.row]} has {column.words}"
     units = {name: _unit_in(name) or unit for name, unit in zip(cells, table.units, strict=True)}
     return ColumnTable(
         source=f"{path.name}, line {table.named_in or table.lines[0]}" if several else path.name,

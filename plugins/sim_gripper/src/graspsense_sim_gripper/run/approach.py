@@ -130,19 +130,19 @@ def _pushed(contact: Contact, space_m: float) -> Contact:
     return Contact(left_n, right_n, offset, touched, left, right, pending, unbalanced)
 
 
-def _most_ticks(params: GraspParams, at: LoopProgress, nearest_m: float, limits: FreeLimits) -> int:
+def _most_ticks(params: GraspParams, progress: LoopProgress, nearest_m: float, limits: FreeLimits) -> int:
     """Return the number of ticks before the next image, and before the gap and the time at which the motion ends."""
-    dt_s, motion = params.dt_s, at.plant.motion
+    dt_s, motion = params.dt_s, progress.plant.motion
     closing = -motion.speed_rev_s * motion.jacobian_m_rev
     if closing <= 0.0:
         return 0
-    t_s = at.ticks * dt_s
+    t_s = progress.ticks * dt_s
     left_s = min((motion.gap_m - nearest_m) / closing, limits.until_s - t_s, MAX_TICKS * dt_s)
-    left_s = min(left_s, next_image_s(params.sensor, at.sensor) - t_s)
+    left_s = min(left_s, next_image_s(params.sensor, progress.sensor) - t_s)
     if left_s <= 0.0:
         return 0
     n: int = math.ceil(left_s / dt_s)
-    return min(n, params.max_ticks - at.ticks)
+    return min(n, params.max_ticks - progress.ticks)
 
 
 def _approach(params: GraspParams, motion: Motion, load_n: float, n: int) -> Approach:

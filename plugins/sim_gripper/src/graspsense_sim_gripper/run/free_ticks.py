@@ -85,11 +85,11 @@ def free_ticks(
     return LoopProgress(ticks, recorded, effort, plant, moved_sensor(at.sensor, shown), state)
 
 
-def _is_free(params: GraspParams, at: LoopProgress, frame: Frame) -> bool:
+def _is_free(params: GraspParams, progress: LoopProgress, frame: Frame) -> bool:
     """Return whether nothing is pressed, and the next frame shows the forces of this one unless an image arrives."""
-    contact = at.plant.contact
+    contact = progress.plant.contact
     same = frame.force_left_n == contact.left_n and frame.force_right_n == contact.right_n
-    return (same or params.sensor.ideal == 0) and can_glide(params.plant, at.plant, params.dt_s)
+    return (same or params.sensor.ideal == 0) and can_glide(params.plant, progress.plant, params.dt_s)
 
 
 def approach_or_free_ticks(

@@ -203,9 +203,9 @@ def _never_begins(
 
 
 def _every_tick(
-    params: GraspParams, at: LoopProgress, frame: Frame, columns: Table, phases: Any
+    params: GraspParams, progress: LoopProgress, frame: Frame, columns: Table, phases: Any
 ) -> LoopProgress:
-    return at
+    return progress
 
 
 move: Callable[[PlantParams, PlantState, float, float], PlantState] = move_unbound

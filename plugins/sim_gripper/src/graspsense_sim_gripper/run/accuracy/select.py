@@ -314,13 +314,17 @@ def _culprit(problem: Problem, grip: Grip, trial: TrialGrasps) -> str:
     return term if term and errors[term] < CULPRIT * with_all else ""
 
 
-def _undecided(problem: Problem, found: Sensitivity) -> str:
-    changes = f"{found.quantity} by {found.change:.2g}" if math.isfinite(found.change) else "the outcome"
+def _undecided(problem: Problem, sensitivity: Sensitivity) -> str:
+    changes = (
+        f"{sensitivity.quantity} by {sensitivity.change:.2g}"
+        if math.isfinite(sensitivity.change)
+        else "the outcome"
+    )
     return (
         f"{_inaccurate(problem)}: the controller compares with a threshold that is met at a tick within "
-        f"{found.force_n:.1g} N, or {found.travel:.1g} of the travel, so that the grasp may continue a tick earlier or "
-        f"later, which changes {changes}. Change where the ticks fall (gripper.open_gap_m, or the controller's speed "
-        f"or threshold), or {_advice(2.0 * found.change)}"
+        f"{sensitivity.force_n:.1g} N, or {sensitivity.travel:.1g} of the travel, so that the grasp may continue a "
+        f"tick earlier or later, which changes {changes}. Change where the ticks fall (gripper.open_gap_m, or the "
+        f"controller's speed or threshold), or {_advice(2.0 * sensitivity.change)}"
     )
 
 
