@@ -11,8 +11,8 @@ from graspsense.plugin_api import ConfigError
 from graspsense_ros2.names import absolute
 from graspsense_ros2.node import MOST_REQUESTS, ServiceFailed
 
-DEPTH: Final = 1000
-"""Messages that wait for a subscriber: those of a second, since ticks are published in bursts."""
+DEPTH: Final = 10_000
+"""Messages that wait for a subscriber: those of ten seconds, since ticks are published in bursts."""
 _OF_ACTIONS: Final = {
     "SendGoal": "SendGoalService",
     "GetResult": "GetResultService",
