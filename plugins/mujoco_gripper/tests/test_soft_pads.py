@@ -8,7 +8,9 @@ import pytest
 
 from graspsense import ConfigError, load_pipeline
 from graspsense.plugin_api import POSITION, Command, create
+from graspsense_mujoco_gripper.config import MujocoConfig
 from graspsense_mujoco_gripper.gripper_file import Finger, PalmSensor
+from graspsense_mujoco_gripper.prepared import prepare
 from graspsense_mujoco_gripper.scene import read_scene
 
 CELL_N_M = 1500.0
@@ -207,3 +209,12 @@ def test_a_finger_without_an_edge_sensor_is_not_bumped_into(tmp_path):
 def test_a_bump_that_cannot_be_says_why(tmp_path, line, said):
     with pytest.raises(ConfigError, match=said):
         read_scene(str(scene(tmp_path, "[bump]", "t_s = 0.2", line)))
+
+
+def test_walls_have_a_soft_contact_with_cells_and_a_stiff_one_else():
+    stiff, soft = (prepare(MujocoConfig(file=file, object="cup"), 1e-3) for file in ("", "soft_pads"))
+    for prepared, contact_s in ((stiff, 0.001), (soft, 0.004)):
+        model = prepared.with_thing(np.random.default_rng(0))
+        walls = [k for k in range(model.ngeom) if model.geom(k).name.endswith(("cup_left", "cup_right"))]
+        assert len(walls) == 2
+        assert model.geom_solref[walls, 0] == pytest.approx([contact_s, contact_s])

@@ -28,6 +28,7 @@ TRAVEL_SHARE: Final = 0.4
 """Share of the width by which each wall can yield."""
 STIFF, SOFT = [0.99, 0.999, 0.0001, 0.5, 2.0], [0.9, 0.95, 0.001, 0.5, 2.0]
 """MuJoCo's solimp of a contact whose own stiffness hardly counts, and its default."""
+CELL_CONTACT_S: Final = 0.004
 WAVE: Final = 1.8412
 """The first zero of the derivative of the Bessel function J1."""
 GRAVITY_M_S2: Final = 9.81
@@ -104,8 +105,7 @@ class Walls:
     """Two walls on springs and dampers: what both fingers feel together (SI units).
 
     `armature_kg` is an inertia of each wall that has no weight, so that the steps need not be short. Not set: with it,
-    a wall swings with 100 rad/s. `contact_s` is the time constant of a softer contact with each wall: on pads of many
-    cells a light thing rattles with a stiff one.
+    a wall swings with 100 rad/s.
     """
 
     width_m: float
@@ -114,7 +114,6 @@ class Walls:
     mass_kg: float
     friction: float = 0.5
     armature_kg: float | None = None
-    contact_s: float | None = None
     contents: Contents | None = None
 
     def spec(self, name: str) -> mujoco.MjSpec:
@@ -152,12 +151,19 @@ class Walls:
                 friction=[self.friction, 0.005, 0.0001],
                 condim=4,
                 priority=1,
-                solref=[self.contact_s or 0.001, 1.0],
-                solimp=STIFF if self.contact_s is None else SOFT,
+                solref=[0.001, 1.0],
+                solimp=STIFF,
             )
         if self.contents is not None:
             self.contents.add_to(core)
         return spec
+
+
+def soften_walls(spec: mujoco.MjSpec) -> None:
+    """Give the contacts of walls the usual softness: on pads of many cells a light thing rattles with stiff ones."""
+    for geom in spec.geoms:
+        if list(geom.solimp) == STIFF:
+            geom.solref, geom.solimp = [CELL_CONTACT_S, 1.0], SOFT
 
 
 @frozen(kw_only=True)

@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 from attrs import define, evolve, frozen
 
+from graspsense_mujoco_gripper.catalogue import soften_walls
 from graspsense_mujoco_gripper.config import MujocoConfig
 from graspsense_mujoco_gripper.drive import Travel, test_move
 from graspsense_mujoco_gripper.gripper_file import GripperFile, read_gripper
@@ -64,6 +65,8 @@ def prepare(config: MujocoConfig, timestep_s: float) -> Prepared:
     """Read gripper and thing, and move the empty gripper. Raises ConfigError, UnknownName."""
     gripper, path = read_gripper(config.file)
     scene = read_scene(config.object, config.scene)
+    if scene.spec is not None and gripper.left.cells:
+        soften_walls(scene.spec)
     spec = gripper_spec(path, gripper, timestep_s)
     put_on_arm(spec, scene.scene)
     _integrate(spec, config.integrator, soft=scene.spec is not None and len(scene.spec.flexes) > 0)

@@ -122,7 +122,13 @@ class TouchSettings:
             ]
         if self.stiffness_n_m:
             lines += ["[walls]", "width_m = 0.04", f"stiffness_n_m = {self.stiffness_n_m}"]
-            lines += ["damping_n_s_m = 20.0", f"mass_kg = {self.mass_kg}", f"friction = {self.friction}"]
+            # Without the usual inertia of walls, which an impact feels.
+            lines += [
+                "armature_kg = 0.0",
+                "damping_n_s_m = 20.0",
+                f"mass_kg = {self.mass_kg}",
+                f"friction = {self.friction}",
+            ]
         return "\n".join(lines) + "\n"
 
 
