@@ -47,7 +47,7 @@ def event_recordings(source: str, only: str | None = None) -> EventRecordings:
     if kind != STORE.removesuffix(":") and (not place or kind not in datasets_with_recordings()):
         known = ", ".join(f"{name}:PLACE" for name in ("store", *datasets_with_recordings()))
         raise ConfigError(
-            f"--events needs recordings, and {source} has none. Sources with recordings are {known}"
+            f"--events needs recordings, and {source!r} is not a source of them. There are {known}"
         )
     read = list(_stored(place) if source.startswith(STORE) else readable_or_not(kind, place))
     unreadable = [one for one in read if isinstance(one, UnreadableRecording)]
