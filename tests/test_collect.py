@@ -192,9 +192,7 @@ def test_nothing_there_counts_since_it_is_an_answer_of_the_gripper(tmp_path):
 
 
 @pytest.mark.slow
-def test_the_first_trials_are_collected_for_a_model_that_does_not_exist_yet(
-    graspsense, tmp_path, monkeypatch
-):
+def test_the_first_trials_are_collected_for_a_model_that_does_not_exist_yet(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "mine.toml").write_text(
         'extends = "default"\n[classifier]\ntype = "knn"\nmodel = "mine.json"\n'
