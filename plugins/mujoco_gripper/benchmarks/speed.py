@@ -9,16 +9,17 @@ compiled. `over reading` compares one of many with a bare loop that reads the ga
 tick. The columns of the cores give grasps a second of `run_many`, with the start of its processes, and in brackets the
 real-time factor: the time that is simulated, divided by the time that it takes. The 2F-140 needs robosuite.
 
-Processor times of 2026-11-27, on two cores that other work shared:
+Processor times of 2026-11-27, on two cores without other work:
 
-| thing | gripper | one grasp | one of many | over reading |
-|---|---|---|---|---|
-| rigid (block) | parallel | 240% | 25% | -36% |
-| springs (can) | parallel | 185% | 21% | -46% |
-| rigid (block) | Robotiq 2F-140 | 227% | 5% | -21% |
-| soft body (sponge) | parallel | 61% | -5% | -38% |
+| thing | gripper | one grasp | one of many | over reading | 1 core | 2 cores |
+|---|---|---|---|---|---|---|
+| rigid (block) | parallel | 193% | 21% | -33% | 32.6 (68.4) | 30.0 (62.8) |
+| springs (can) | parallel | 165% | 9% | -50% | 28.5 (44.8) | 27.6 (43.3) |
+| rigid (block) | Robotiq 2F-140 | 197% | 3% | -22% | 3.4 (40.6) | 7.4 (87.5) |
+| soft body (sponge) | parallel | 22% | 1% | -31% | 1.3 (4.0) | 2.0 (6.1) |
 
-These are uncertain to 5 %. The aim is at most 30 % for one of many. A grasp of the block takes 32 ms: 25 ms in 2,100
+Percentages are uncertain to 5 %. The 64 grasps of block and can take two seconds, in which a second process has hardly
+started. The aim is at most 30 % for one of many. A grasp of the block takes 32 ms: 25 ms in 2,100
 ticks with two `mj_step` each, 2.5 ms for its model, 1 ms in the ticks of the interpreter at changes of the phase, and
 the rest for the trace.
 Compiling takes 6.4 s, loading what was compiled before 0.6 s; a grasp saves 0.06 s.
