@@ -24,7 +24,7 @@ def test_the_ranges_accept_exactly_what_all_the_tests_accept(tests, value, other
         SplitTest(feature=name, unit="m", value=value, threshold=threshold, above=value > threshold)
         for name, threshold in tests
     ]
-    ranges = {range_.feature: range_ for range_ in feature_ranges(path)}
+    ranges = {feature_range.feature: feature_range for feature_range in feature_ranges(path)}
 
     for name in "abc":
         accepted = all((other > test.threshold) == test.above for test in path if test.feature == name)

@@ -355,7 +355,7 @@ def test_long_names_are_wrapped_within_a_picture():
 
 def test_features_have_their_unit_and_meaning_from_their_plugin(page):
     text = Reader(page).text
-    (chitta,) = [label_set for label_set in installed().feature_sets() if label_set.name == "chitta"]
+    (chitta,) = [feature_set for feature_set in installed().feature_sets() if feature_set.name == "chitta"]
 
     assert "Features of this grasp" in text
     for feature in chitta.features:

@@ -63,9 +63,9 @@ def test_all_numbers_that_are_wrong_are_named_at_once() -> None:
 
 
 @pytest.mark.parametrize("end", ["least", "most"])
-@pytest.mark.parametrize("number", [range_.number for range_ in RANGES])
+@pytest.mark.parametrize("number", [ceiling.number for ceiling in RANGES])
 def test_both_ends_of_a_range_are_allowed(number: str, end: str) -> None:
-    (allowed,) = [range_ for range_ in RANGES if range_.number == number]
+    (allowed,) = [ceiling for ceiling in RANGES if ceiling.number == number]
     backend = emulated(identity={number: round(getattr(allowed, end))})
     info = backend.open(0)
     try:
@@ -164,5 +164,5 @@ def test_specification_has_the_ranges_of_the_code() -> None:
     rows = re.findall(r"^\| (\w+) \| (\d+) to (\d+) \| ([^|]+) \|", SPECIFICATION.read_text(), re.M)
     found = {(number, int(least), int(most), unit) for number, least, most, unit in rows}
     assert found == {
-        (range_.number, round(range_.least), round(range_.most), range_.unit) for range_ in RANGES
+        (ceiling.number, round(ceiling.least), round(ceiling.most), ceiling.unit) for ceiling in RANGES
     }

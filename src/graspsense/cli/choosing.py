@@ -200,7 +200,7 @@ def _with_union(
     source: str, progress: ProgressLine, given: Mapping[str, Any], sets: Sequence[Component]
 ) -> Labelled:
     """Return the trials with the features of these sets together."""
-    names = ", ".join(f'"{label_set.qualified}"' for label_set in sets)
+    names = ", ".join(f'"{feature_set.qualified}"' for feature_set in sets)
     options = (*given["options"], f'features.type="{UNION}"', f"features.sets=[{names}]")
     return trials_of(source, progress, {**given, "options": options})
 

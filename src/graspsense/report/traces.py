@@ -181,9 +181,9 @@ def feature_meanings(names: Sequence[str]) -> dict[str, str]:
     """
     sets = sorted(
         installed().feature_sets(),
-        key=lambda label_set: set(names) <= {feature.name for feature in label_set.features or ()},
+        key=lambda feature_set: set(names) <= {feature.name for feature in feature_set.features or ()},
     )
-    return {feature.name: feature.meaning for label_set in sets for feature in label_set.features or ()}
+    return {feature.name: feature.meaning for feature_set in sets for feature in feature_set.features or ()}
 
 
 def features_table(caption: str, features: Sequence[tuple[str, str]], values: Sequence[float | None]) -> str:

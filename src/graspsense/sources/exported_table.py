@@ -49,7 +49,7 @@ class ExportedTable:
             raise DataDamaged(f"{columns.path} has no labelled trial that ended by itself")
         if "feature_set" in self.about:
             sets = columns.cells["feature_set"]
-            newest = [label_set == sets[rows[-1]] for label_set in sets]
+            newest = [feature_set == sets[rows[-1]] for feature_set in sets]
             several = len({sets[i] for i in rows}) > 1
             rows = _kept(rows, newest, "their features differ from those of the newest trial", notes)
             columns.keep(rows)

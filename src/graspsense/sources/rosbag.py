@@ -154,7 +154,7 @@ def _recording(path: Path, found: _Found) -> Recording:
             f"{path} contains {len(found.motions)} positions of the {gripper} on {source} and {len(found.images)} cell "
             f"images on {pressure}: a grasp needs both"
         )
-    topics = {topic: time_s for topic, time_s in found.times.items() if time_s.recorded_ns}
+    topics = {topic: stamps for topic, stamps in found.times.items() if stamps.recorded_ns}
     clock = common_clock(path.name, topics, (pressure, source))
     moved = _timed(found.motions, clock.topics[source])
     motions = [one for one in moved if clock.begin_ns <= one.t_ns <= clock.end_ns]

@@ -130,9 +130,9 @@ def common_clock(
     lasting = {topic: one for topic, one in wanted.items() if one.usual_ns} or wanted
     begin = max(int(one.ns[0]) for one in lasting.values())
     end = min(one.until_ns for one in lasting.values())
-    earliest = min(int(time_s.ns[0]) for time_s in times.values())
+    earliest = min(int(stamps.ns[0]) for stamps in times.values())
     inside = {topic: one.between(begin, end) for topic, one in lasting.items()}
-    notes = tuple(_words(topic, time_s, earliest, inside.get(topic)) for topic, time_s in times.items())
+    notes = tuple(_words(topic, stamps, earliest, inside.get(topic)) for topic, stamps in times.items())
     if end <= begin:
         raise DataDamaged(
             f"{source}: there is no time at which all topics have messages: {'; '.join(notes)}. Check the clocks of "

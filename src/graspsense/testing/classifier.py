@@ -67,7 +67,7 @@ def classes_are_the_labels(subject: Subject) -> None:
     fitted, _, labels = _learned(subject)
     classes = fitted.classes()
     demand(
-        isinstance(classes, tuple) and all(type(object_class) is str for object_class in classes),
+        isinstance(classes, tuple) and all(type(name) is str for name in classes),
         f"classes gives {classes!r}: return a tuple of str (convert text of numpy by str(...))",
     )
     demand(

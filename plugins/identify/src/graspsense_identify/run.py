@@ -364,8 +364,8 @@ def _scale(squeezes: Sequence[Squeeze]) -> DataScale:
     return DataScale(
         force_n=float(np.median([squeeze.peak_n for squeeze in squeezes])),
         depth_m=float(np.median([squeeze.depth_m for squeeze in squeezes])),
-        load_s=float(np.median([time_s.load_s for time_s in times])),
-        memory_s=max(time_s.load_s + time_s.hold_s for time_s in times),
+        load_s=float(np.median([timing.load_s for timing in times])),
+        memory_s=max(timing.load_s + timing.hold_s for timing in times),
         sample_s=float(np.median([np.median(np.diff(squeeze.t_s[squeeze.sample])) for squeeze in squeezes])),
     )
 

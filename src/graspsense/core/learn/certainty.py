@@ -54,7 +54,7 @@ class Certainty:
 
     def class_of(self, support: NDArray[np.float64]) -> NDArray[np.int64]:
         """Return the number of the class of support of each answer. NaN is an answer without support."""
-        bounds = [object_class.least for object_class in self.classes[1:]]
+        bounds = [support_class.least for support_class in self.classes[1:]]
         found = np.searchsorted(np.array(bounds) - _ROUNDING, np.nan_to_num(support, nan=0.0), side="right")
         return np.asarray(found, dtype=np.int64)
 
@@ -62,10 +62,10 @@ class Certainty:
         """Return the rate of right answers among those with this probability and support."""
         chosen = self.class_of(support)
         result = np.empty(len(probability))
-        for k, object_class in enumerate(self.classes):
+        for k, support_class in enumerate(self.classes):
             rows = np.flatnonzero(chosen == k)
-            steps = np.array(object_class.probabilities[1:]) - _ROUNDING
-            result[rows] = np.array(object_class.rates)[
+            steps = np.array(support_class.probabilities[1:]) - _ROUNDING
+            result[rows] = np.array(support_class.rates)[
                 np.searchsorted(steps, probability[rows], side="right")
             ]
         return result
@@ -74,12 +74,12 @@ class Certainty:
         """Return the rates as values that JSON represents exactly."""
         return [
             {
-                "support": object_class.least,
-                "units": object_class.units,
-                "probabilities": list(object_class.probabilities),
-                "rates": list(object_class.rates),
+                "support": support_class.least,
+                "units": support_class.units,
+                "probabilities": list(support_class.probabilities),
+                "rates": list(support_class.rates),
             }
-            for object_class in self.classes
+            for support_class in self.classes
         ]
 
 

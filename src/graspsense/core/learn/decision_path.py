@@ -85,7 +85,7 @@ def path_reasons(tests: Sequence[SplitTest]) -> tuple[Reason, ...]:
         for test in tests
         if math.isnan(test.value)
     ]
-    return (*(_of_range(range_) for range_ in feature_ranges(tests)), *missing)
+    return (*(_of_range(feature_range) for feature_range in feature_ranges(tests)), *missing)
 
 
 def leaf_reason(with_label: float, trials: float, label: str) -> Reason:

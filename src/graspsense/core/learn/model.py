@@ -436,7 +436,7 @@ def classifier_from(
         if (
             len(classes) < 1
             or len(set(classes)) < len(classes)
-            or not all(type(object_class) is str for object_class in classes)
+            or not all(type(name) is str for name in classes)
         ):
             raise ValueError("its labels are not different texts")
         empty = FeatureTable(names=names, units=units, values=np.full((1, len(names)), np.nan))
