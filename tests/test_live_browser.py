@@ -167,6 +167,8 @@ def test_fifty_channels_do_not_grow_the_page_or_its_process(browser, feed, ticks
     assert browser.run("[...series.values()].every((one) => one.n === 30000)")
     assert browser.run("series.get('channel channel_49').last()") == ticks - 1 + 49
     assert feed.dropped == 0
-    page, process = ([one[side] for one in kept] for side in (0, 1))
+    page, process = zip(*kept, strict=True)
     assert max(page) < page[0] + (4 << 20), kept
-    assert max(process) < process[0] + (8 << 20), kept
+    # What waits to be sent comes and goes with the load of the machine; what is never given back raises the least as well.
+    halves = process[: len(process) // 2 or 1], process[len(process) // 2 :]
+    assert min(halves[1]) < min(halves[0]) + (4 << 20), kept
