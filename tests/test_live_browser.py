@@ -169,6 +169,6 @@ def test_fifty_channels_do_not_grow_the_page_or_its_process(browser, feed, ticks
     assert feed.dropped == 0
     page, process = zip(*kept, strict=True)
     assert max(page) < page[0] + (4 << 20), kept
-    # What waits to be sent comes and goes with the load of the machine; what is never given back raises the least as well.
-    halves = process[: len(process) // 2 or 1], process[len(process) // 2 :]
+    # What waits to be sent comes and goes with the machine's load; what is never given back raises the least as well.
+    halves = process[: len(process) // 2], process[len(process) // 2 :]
     assert min(halves[1]) < min(halves[0]) + (4 << 20), kept
