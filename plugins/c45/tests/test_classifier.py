@@ -131,12 +131,12 @@ def test_categorical_columns_are_nominal() -> None:
 def test_unknown_and_missing_categories_are_missing() -> None:
     frame, y, _ = weather()
     classifier = C45Classifier().fit(frame.astype(str).astype("category"), y)
-    one = frame.astype(str).iloc[[0]].copy()
-    unknown, missing = one.copy(), one.copy()
+    row = frame.astype(str).iloc[[0]].copy()
+    unknown, missing = row.copy(), row.copy()
     unknown["outlook"] = "hail"
     missing["outlook"] = None
     assert classifier.predict_proba(unknown).tolist() == classifier.predict_proba(missing).tolist()
-    assert classifier.predict_proba(unknown).tolist() != classifier.predict_proba(one).tolist()
+    assert classifier.predict_proba(unknown).tolist() != classifier.predict_proba(row).tolist()
 
 
 def test_mixed_columns() -> None:

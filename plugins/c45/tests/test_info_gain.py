@@ -34,7 +34,7 @@ def best_cut(
     least = 0.1 * n / n_classes
     least = min_objects if least <= min_objects else min(least, 25)
     whole = entropy(count([k for _, k in pairs], n_classes))
-    best, at, number = 0.0, None, 0
+    best, place, number = 0.0, None, 0
     for i in range(1, n):
         if not pairs[i - 1][0] + 1e-5 < pairs[i][0] or i < least - EPSILON or n - i < least - EPSILON:
             continue
@@ -44,12 +44,12 @@ def best_cut(
             whole - i / n * entropy(count(left, n_classes)) - (n - i) / n * entropy(count(right, n_classes))
         )
         if gain > best + EPSILON:
-            best, at = gain, i
-    if at is None:
+            best, place = gain, i
+    if place is None:
         return None
     if mdl:
         best -= log2(number) / n
-    return (best, (pairs[at - 1][0] + pairs[at][0]) / 2) if best >= EPSILON else None
+    return (best, (pairs[place - 1][0] + pairs[place][0]) / 2) if best >= EPSILON else None
 
 
 def grow(

@@ -115,8 +115,8 @@ def test_drawing_names_every_node() -> None:
 def test_importances_share_the_information() -> None:
     # 28 rows: 1.557 bits in all, delta_t tells 0.985 (12 against 16), the material 16/28.
     importances = feature_importances(grasp_tree())
-    first = -(12 / 28 * math.log2(12 / 28) + 16 / 28 * math.log2(16 / 28))
-    assert importances.tolist() == pytest.approx([first / (first + 16 / 28), 16 / 28 / (first + 16 / 28)])
+    gained = -(12 / 28 * math.log2(12 / 28) + 16 / 28 * math.log2(16 / 28))
+    assert importances.tolist() == pytest.approx([gained / (gained + 16 / 28), 16 / 28 / (gained + 16 / 28)])
     leaf = fit(make_table(Schema((Attribute("x"),), ("a",)), [[1.0]], [0]))
     assert feature_importances(leaf).tolist() == [0.0]
 

@@ -76,9 +76,9 @@ def test_ties_go_to_the_first_column_and_the_first_cut() -> None:
 
 def test_of_two_zeros_the_first_in_the_rows_is_the_threshold() -> None:
     # As J48; it is the one thing about a threshold that the order of the rows decides.
-    for first, second in ((0.0, -0.0), (-0.0, 0.0)):
-        tree = fit(table([[first], [second]] * 3 + [[1.0]] * 6, [0] * 6 + [1] * 6))
-        assert np.signbit(tree.to_dict()["threshold"]) == np.signbit(first)
+    for zero, opposite in ((0.0, -0.0), (-0.0, 0.0)):
+        tree = fit(table([[zero], [opposite]] * 3 + [[1.0]] * 6, [0] * 6 + [1] * 6))
+        assert np.signbit(tree.to_dict()["threshold"]) == np.signbit(zero)
 
 
 def test_majority_ties_go_to_the_first_class() -> None:
@@ -231,11 +231,11 @@ def test_the_order_of_the_columns_matters_in_ties_only() -> None:
     pairs = [(straight, turned)]
     compared = 0
     while pairs:
-        one, other = pairs.pop()
-        assert one["class_weights"] == other["class_weights"]
-        if "feature" in one:
-            assert (one["feature"], one["threshold"]) == (2 - other["feature"], other["threshold"])
-            pairs += list(zip(one["children"], other["children"], strict=True))
+        node, other = pairs.pop()
+        assert node["class_weights"] == other["class_weights"]
+        if "feature" in node:
+            assert (node["feature"], node["threshold"]) == (2 - other["feature"], other["threshold"])
+            pairs += list(zip(node["children"], other["children"], strict=True))
             compared += 1
     assert compared >= 3
 

@@ -176,7 +176,7 @@ class Row:
     right_terms: bool
     told_apart: bool
     """Whether the data tell the true terms from the chosen ones: the chosen ones fit worse, or are more."""
-    found: tuple[tuple[str, float, float, float, float], ...]
+    parameters: tuple[tuple[str, float, float, float, float], ...]
     """Each parameter with its true value, its value, and the ends of its interval, where the true terms were chosen."""
     seconds: float
     late_s: float = 0.0
@@ -263,9 +263,11 @@ def true_values(terms: Sequence[Mapping[str, Any]], identified: str) -> dict[str
     The first of two Maxwell branches is the one that is the first in the identified scene, by their relaxation times.
     """
     scene = tomllib.loads(identified)["terms"]
-    at_m = {one["type"]: one.get("at_m") for one in scene}
-    times = [one["tau_s"] for one in scene if one["type"] == "maxwell"]
-    branches = sorted((row for row in terms if row["type"] == "maxwell"), key=lambda one: float(one["tau_s"]))
+    at_m = {term["type"]: term.get("at_m") for term in scene}
+    times = [term["tau_s"] for term in scene if term["type"] == "maxwell"]
+    branches = sorted(
+        (row for row in terms if row["type"] == "maxwell"), key=lambda branch: float(branch["tau_s"])
+    )
     if times != sorted(times):
         branches.reverse()
     values = {}
@@ -352,7 +354,7 @@ def measured(
     true = next((candidate for candidate in result.candidates if candidate.terms == named(terms)), None)
     right = true is chosen
     truth = true_values(terms, result.scene) if right else {}
-    found = [parameter for parameter in result.parameters if parameter.name in truth]
+    known = [parameter for parameter in result.parameters if parameter.name in truth]
     alike = true is not None and chosen.fit_error <= TOLD_APART * true.fit_error
     return Row(
         scene=name,
@@ -362,9 +364,9 @@ def measured(
         chosen=chosen.terms,
         right_terms=right,
         told_apart=right or true is None or not alike or chosen.parameters > true.parameters,
-        found=tuple(
+        parameters=tuple(
             (parameter.name, truth[parameter.name], parameter.value, parameter.low, parameter.high)
-            for parameter in found
+            for parameter in known
         ),
         seconds=result.seconds,
         late_s=late_s,
@@ -380,16 +382,16 @@ def measured(
 
 def _delay(result: Identification) -> tuple[float, float, float, bool] | None:
     """Return the delay, the ends of its interval, and whether it was used; None if it was refused."""
-    found = next((parameter for parameter in result.parameters if parameter.name == "delay_s"), None)
+    delay = next((parameter for parameter in result.parameters if parameter.name == "delay_s"), None)
     refused = any(undetermined.what == "delay of the sensor" for undetermined in result.undetermined)
     used = tomllib.loads(result.scene)["identified"]["sensor"]["delay_s"] != 0.0
-    return None if found is None or (refused and not used) else (found.value, found.low, found.high, used)
+    return None if delay is None or (refused and not used) else (delay.value, delay.low, delay.high, used)
 
 
 def in_words(row: Row) -> str:
     """Return a row as a line of text."""
-    errors = ", ".join(f"{100.0 * (value / truth - 1.0):+.2f}" for _, truth, value, *_ in row.found)
-    covered = _covered([row.found])
+    errors = ", ".join(f"{100.0 * (value / truth - 1.0):+.2f}" for _, truth, value, *_ in row.parameters)
+    covered = _covered([row.parameters])
     right = (
         "right terms" if row.right_terms else f"{row.chosen}{'' if row.told_apart else ' (as good a fit)'}"
     )
@@ -417,10 +419,10 @@ def _covered_share(group: Sequence[Mapping[str, Any]]) -> str:
     The intervals of a scene share their error, so that they count as fewer: by the design effect, which is the variance
     between scenes over that of independent intervals (Korn and Graubard, Survey Methodology 24, 1998).
     """
-    sizes = np.array([len(row["found"]) for row in group if row["found"]])
+    sizes = np.array([len(row["parameters"]) for row in group if row["parameters"]])
     if not len(sizes):
         return "–"
-    hits = np.array([sum(_covered([row["found"]])) for row in group if row["found"]])
+    hits = np.array([sum(_covered([row["parameters"]])) for row in group if row["parameters"]])
     whole, part, scenes = int(sizes.sum()), int(hits.sum()), len(sizes)
     share = part / whole
     effective = float(scenes)
@@ -437,14 +439,14 @@ def as_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
     def line(head: Sequence[str], group: Sequence[Mapping[str, Any]]) -> str:
         apart = [row for row in group if row["told_apart"]]
         several = [row for row in group if row["recordings"] > 1]
-        errors = [abs(value / truth - 1.0) for row in group for _, truth, value, *_ in row["found"]]
+        errors = [abs(value / truth - 1.0) for row in group for _, truth, value, *_ in row["parameters"]]
         cells = (
             *head,
             str(len(group)),
             _share(sum(row["right_terms"] for row in group), len(group)),
-            _share(sum(one["right_terms"] for one in apart), len(apart)),
+            _share(sum(row["right_terms"] for row in apart), len(apart)),
             _covered_share(group),
-            _share(sum(mean_is_covered(one) for one in several), len(several)),
+            _share(sum(mean_is_covered(row) for row in several), len(several)),
             f"{100.0 * float(np.median(errors)):.2g} %" if errors else "–",
             f"{float(np.median([row['seconds'] for row in group])):.1f} s",
         )
@@ -503,7 +505,7 @@ def coverage_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
 
 
 def _hits(group: Sequence[Mapping[str, Any]]) -> str:
-    covered = _covered([row["found"] for row in group])
+    covered = _covered([row["parameters"] for row in group])
     return f"{sum(covered)} of {len(covered)}" if covered else "–"
 
 
@@ -513,8 +515,8 @@ def _weighted(within: Sequence[Mapping[str, Any]], beyond: Sequence[Mapping[str,
         return "–"
     share = variance = 0.0
     for weight, group in ((LEVEL, within), (1.0 - LEVEL, beyond)):
-        sizes = np.array([len(one["found"]) for one in group])
-        hits = np.array([sum(_covered([one["found"]])) for one in group])
+        sizes = np.array([len(row["parameters"]) for row in group])
+        hits = np.array([sum(_covered([row["parameters"]])) for row in group])
         own = float(hits.sum() / sizes.sum())
         squares = float(np.sum((hits - own * sizes) ** 2)) * len(group) / (len(group) - 1)
         share += weight * own
@@ -537,13 +539,13 @@ def delays_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
             for row in rows
             if (row["sensor"], row["recordings"], row["late_s"]) == (sensor, count, late_s)
         ]
-        found = [row["delay"] for row in group if row["delay"]]
-        errors = [1e3 * abs(value - late_s) for value, *_ in found]
-        covered = _covered([row["found"] for row in group])
+        delays = [row["delay"] for row in group if row["delay"]]
+        errors = [1e3 * abs(value - late_s) for value, *_ in delays]
+        covered = _covered([row["parameters"] for row in group])
         cells = (
             *(sensor, str(count), f"{1e3 * late_s:.0f} ms", str(len(group))),
-            *(str(sum(one[3] for one in found)), str(len(group) - len(found))),
-            _share(sum(low <= late_s <= high for _, low, high, _ in found), len(found)),
+            *(str(sum(delay[3] for delay in delays)), str(len(group) - len(delays))),
+            _share(sum(low <= late_s <= high for _, low, high, _ in delays), len(delays)),
             f"{float(np.median(errors)):.2g} ms" if errors else "–",
             _share(sum(row["right_terms"] for row in group), len(group)),
             _share(sum(covered), len(covered)),
@@ -577,13 +579,13 @@ def spreads_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
             if (row["sensor"], row["recordings"], row["scene"], row["own_spread"])
             == (sensor, count, scene, spread)
         ]
-        found = [claim for row in group for claim in row["spreads"] if claim[0] == parameter]
+        claims = [claim for row in group for claim in row["spreads"] if claim[0] == parameter]
         others = sum(any(claim[0] != parameter for claim in row["spreads"]) for row in group)
         cells = (
             *(sensor, str(count), f"`{parameter}`", f"{spread:g}", str(len(group))),
-            *(_share(len(found), len(group)), str(others)),
-            _share(sum(low <= spread <= high for *_, low, high in found), len(found)) if spread else "–",
-            f"{float(np.median([value for _, value, *_ in found])):.2g}" if found else "–",
+            *(_share(len(claims), len(group)), str(others)),
+            _share(sum(low <= spread <= high for *_, low, high in claims), len(claims)) if spread else "–",
+            f"{float(np.median([value for _, value, *_ in claims])):.2g}" if claims else "–",
         )
         lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines)
@@ -592,11 +594,11 @@ def spreads_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
 def write_between(path: Path, mark: str, text: str) -> None:
     """Replace what is between the two comments `mark` of a page by a text."""
     begin, end = f"<!-- {mark} -->", f"<!-- end of {mark} -->"
-    before, _, rest = path.read_text(encoding="utf-8").partition(begin)
-    _, found, after = rest.partition(end)
-    if not found:
+    head, _, tail = path.read_text(encoding="utf-8").partition(begin)
+    _, has_end, after = tail.partition(end)
+    if not has_end:
         raise SystemExit(f"{path} has no lines {begin} and {end}")
-    path.write_text(f"{before}{begin}\n{text}\n{end}{after}", encoding="utf-8")
+    path.write_text(f"{head}{begin}\n{text}\n{end}{after}", encoding="utf-8")
 
 
 def transfer(counts: Sequence[int], tested: int, classifier: str = "forest") -> list[dict[str, float]]:
@@ -609,13 +611,15 @@ def transfer(counts: Sequence[int], tested: int, classifier: str = "forest") -> 
         for name in CONTAINERS
         for seeds in [range(max(TRANSFER_COUNTS) + tested)]
     }
-    test = [(extract(one.trace), name) for name in CONTAINERS for one in recorded[name][-tested:]]
+    test = [(extract(squeeze.trace), name) for name in CONTAINERS for squeeze in recorded[name][-tested:]]
     true = [(extract(squeeze.trace), name) for name in CONTAINERS for squeeze in simulated_of(name, name)]
     on_true = _right(settings, true, test)
     rows = []
     with tempfile.TemporaryDirectory() as folder:
         for count in counts:
-            own = [(extract(one.trace), name) for name in CONTAINERS for one in recorded[name][:count]]
+            own = [
+                (extract(squeeze.trace), name) for name in CONTAINERS for squeeze in recorded[name][:count]
+            ]
             simulated = []
             begin = time.monotonic()
             for k, name in enumerate(CONTAINERS):
@@ -672,9 +676,9 @@ def with_true(scene: str, true: Any, keys: Sequence[str]) -> str:
     return "\n".join([*kept, *(f"{key} = {getattr(true, key)}" for key in keys), "", mark + terms])
 
 
-def simulated_of(scene: str, label: str, first: int = 10_000) -> list[RecordedSqueeze]:
+def simulated_of(scene: str, label: str, first_seed: int = 10_000) -> list[RecordedSqueeze]:
     """Return the simulated squeezes of a scene that a classifier is trained on."""
-    seeds = [first + i for i in range(SIMULATED)]
+    seeds = [first_seed + i for i in range(SIMULATED)]
     return squeezes_of(scene, label, SENSORS["PR2 pads"], [str(seed) for seed in seeds], seeds)
 
 
@@ -786,7 +790,7 @@ def main() -> None:
         )
         if asked.rows:
             with asked.rows.open("a", encoding="utf-8") as out:
-                out.writelines(f"{json.dumps(one)}\n" for one in rows)
+                out.writelines(f"{json.dumps(row)}\n" for row in rows)
     else:
         # A run that is stopped has all scenes in its rows.
         for repeat in range(asked.first, asked.first + asked.repeats):

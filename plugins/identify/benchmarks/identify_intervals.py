@@ -36,7 +36,10 @@ CLAIM: Final = 0.05
 def larger(scatter: Floats, degrees: int) -> Floats:
     """Return the squared half width of `identify`, for scatters in units of the variance of the fit."""
     least = np.array([[(normal() / student(degrees)) ** 2]])
-    return np.array([at_least(np.array([[one]]), least)[0, 0] for one in scatter]) * student(degrees) ** 2
+    return (
+        np.array([at_least(np.array([[variance]]), least)[0, 0] for variance in scatter])
+        * student(degrees) ** 2
+    )
 
 
 def scatter_only(scatter: Floats, degrees: int) -> Floats:

@@ -97,8 +97,8 @@ def test_a_contact_whose_force_rises_slowly_does_not_bias_the_exponent():
 def test_every_force_has_the_error_of_the_scale_of_the_force_and_no_length_or_time_has():
     scale = scale_of(prepared(recorded(), 0.0))
     laws = [*static_candidates(scale), *memories(scale)]
-    of = {parameter.name: parameter.is_force for law in laws for parameter in law.free}
-    assert {name for name, is_force in of.items() if not is_force} == {
+    is_force_of = {parameter.name: parameter.is_force for law in laws for parameter in law.free}
+    assert {name for name, is_force in is_force_of.items() if not is_force} == {
         "exponent",
         "tau_s",
         "critical_m",
@@ -112,7 +112,7 @@ def test_of_many_recordings_thirty_of_as_many_objects_as_possible_are_used():
     notes = []
     used = _used(squeezes, notes)
     assert len(used) == 30
-    assert {one.instance for one in used} == {f"cup#{i}" for i in range(20)}
+    assert {squeeze.instance for squeeze in used} == {f"cup#{i}" for i in range(20)}
     assert len(notes) == 1
     assert "30 of the 80 recordings" in notes[0]
     assert _used(squeezes[:30], notes) == squeezes[:30]
@@ -159,7 +159,7 @@ def test_recordings_without_contact_are_left_out_with_a_note_unless_all_are():
 
     kept, ready = _fit_to_use(SimConfig(), [recorded(), empty, recorded()], notes)
 
-    assert [one.name for one in kept] == ["one", "one"]
+    assert [squeeze.name for squeeze in kept] == ["one", "one"]
     assert len(ready) == 2
     assert notes == ["left out: empty: no force exceeds the noise: nothing was touched"]
     with pytest.raises(ConfigError, match="nothing was touched"):
@@ -191,7 +191,7 @@ def test_without_one_object_the_common_stiffness_is_the_mean_of_the_others():
     again = refits(model, fit(model, law, ready), ready, np.random.default_rng(0), has_lag=False)
 
     # Where it stayed that of all objects, the jackknife would find too little scatter between them.
-    assert np.mean(np.log([one.factors for one in again.fits]), axis=1) == pytest.approx(0.0, abs=1e-9)
+    assert np.mean(np.log([refit.factors for refit in again.fits]), axis=1) == pytest.approx(0.0, abs=1e-9)
 
 
 def test_breaks_give_the_force_of_the_fracture_with_its_spread_and_what_is_left():
@@ -211,13 +211,13 @@ def test_breaks_give_the_force_of_the_fracture_with_its_spread_and_what_is_left(
     rigid = ForwardModel(pads=RIGID_PADS)
     squeezes.append(whole)
     spring = static_candidates(scale_of(whole))[0]
-    found = fracture_of(rigid, fit(rigid, spring, squeezes), squeezes)
-    assert (found.broken, found.whole) == (3, 1)
-    assert found.left == pytest.approx(0.2, rel=0.05)
+    fracture = fracture_of(rigid, fit(rigid, spring, squeezes), squeezes)
+    assert (fracture.broken, fracture.whole) == (3, 1)
+    assert fracture.left == pytest.approx(0.2, rel=0.05)
     # The object that bore 8 N says that others may bear more than those that broke.
-    assert 5.1 < found.value < 6.5
-    assert found.spread.value > 0.2
-    assert found.spread.low > 0.1
+    assert 5.1 < fracture.value < 6.5
+    assert fracture.spread.value > 0.2
+    assert fracture.spread.low > 0.1
     # Breaks that differ by as much as two measurements do show no spread.
     same = [evolve(squeeze, broken_n=squeeze.broken_n) for squeeze in squeezes[:1] * 3]
     assert fracture_of(rigid, fit(rigid, spring, same), same).spread is None
@@ -225,7 +225,7 @@ def test_breaks_give_the_force_of_the_fracture_with_its_spread_and_what_is_left(
     alone = fracture_of(rigid, fit(rigid, spring, squeezes[:1]), squeezes[:1])
     assert alone.value == pytest.approx(4.0, rel=0.02)
     assert "break 3 objects" in alone.undetermined[0].remedy
-    assert [undetermined.what for undetermined in found.undetermined] == ["whether the objects broke"]
+    assert [undetermined.what for undetermined in fracture.undetermined] == ["whether the objects broke"]
 
 
 def snapping(closure):
@@ -244,12 +244,12 @@ def test_an_object_that_bears_the_force_again_in_its_next_squeeze_has_not_broken
     def ready(*squeezes):
         return _fit_to_use(SimConfig(sensor="ideal"), squeezes, [])[1]
 
-    assert [one.broken_n is None for one in ready(broken, whole)] == [True, True]
+    assert [squeeze.broken_n is None for squeeze in ready(broken, whole)] == [True, True]
     # After one fall that is none, the last squeeze of an object, or that of another one, shows none either.
-    assert [one.broken_n is None for one in ready(broken, broken, other)] == [True, True, True]
-    assert [one.broken_n is None for one in ready(broken, shards)] == [False, True]
+    assert [squeeze.broken_n is None for squeeze in ready(broken, broken, other)] == [True, True, True]
+    assert [squeeze.broken_n is None for squeeze in ready(broken, shards)] == [False, True]
     # What another object bears says nothing, nor what this one bore before.
-    assert [one.broken_n is None for one in ready(whole, broken, of_object(3))] == [True, False, True]
+    assert [squeeze.broken_n is None for squeeze in ready(whole, broken, of_object(3))] == [True, False, True]
     assert [bears_again(ready(broken, shards, other), i) for i in range(3)] == [False, None, None]
 
 
@@ -351,8 +351,8 @@ def test_the_law_that_made_the_forces_is_chosen_with_its_numbers():
     rng = np.random.default_rng(0)
     clean = model.forces(squeeze, true, values, WIDTH_M, 1.0)
     noisy = with_forces(squeeze, clean + 0.01 * rng.standard_normal(len(clean)))
-    found = fit(model, true, [noisy])
-    assert found.values == pytest.approx(values, rel=0.1)
+    fitted = fit(model, true, [noisy])
+    assert fitted.values == pytest.approx(values, rel=0.1)
     chosen = choose(model, [noisy], scale, has_memory=True, progress=lambda done, total: None)
     assert chosen.fitted.candidate.name == "elastic (k1, k3) + maxwell"
 
@@ -364,8 +364,8 @@ def test_a_hold_through_compliant_pads_is_not_biased_as_a_direct_fit_is():
     true = static_candidates(scale)[0].joined(memories(scale)[1])
     values = (1000.0, 800.0, 0.06)
     forces = model.forces(squeeze, true, values, WIDTH_M, 1.0)
-    found = fit(model, true, [with_forces(squeeze, forces)])
-    assert found.values == pytest.approx(values, rel=0.02)
+    fitted = fit(model, true, [with_forces(squeeze, forces)])
+    assert fitted.values == pytest.approx(values, rel=0.02)
 
 
 @pytest.mark.slow
@@ -377,8 +377,8 @@ def test_fingertips_that_harden_are_part_of_the_forward_model(direct):
     forces = ForwardModel(pads=pads).forces(squeeze, spring, (1500.0,), WIDTH_M, 1.0)
     # Linear fingertips of 2000 N/m in series with the spring: 6.86 N at 8 mm.
     assert forces.max() > 8.0
-    found = fit(ForwardModel(pads=pads, direct=direct), spring, [with_forces(squeeze, forces)])
-    assert found.values == pytest.approx((1500.0,), rel=1e-3)
+    fitted = fit(ForwardModel(pads=pads, direct=direct), spring, [with_forces(squeeze, forces)])
+    assert fitted.values == pytest.approx((1500.0,), rel=1e-3)
 
 
 def test_the_table_identified_of_a_scene_is_checked():

@@ -36,24 +36,24 @@ def errors_of(name):
     keys = [key for term in SCENES[name] for key in term if key != "type"]
     spring = static_candidates(scale)[0]
     joined = (spring.joined(memory) for memory in memories(scale))
-    (candidate,) = (one for one in joined if [free.name for free in one.free] == keys)
+    (candidate,) = (candidate for candidate in joined if [free.name for free in candidate.free] == keys)
     fitted = fit(model, candidate, [squeeze])
-    before = np.log(np.array(fitted.values) / true)
-    return before, before - path_bias(model, fitted, [squeeze])
+    biased = np.log(np.array(fitted.values) / true)
+    return biased, biased - path_bias(model, fitted, [squeeze])
 
 
 @pytest.mark.slow
 def test_the_nodes_of_a_path_bias_relaxation_times_and_the_error_is_taken_away():
-    before, after = errors_of("two branches")
+    biased, after = errors_of("two branches")
     # Noise-free forces: what is left of the error is that of the simulation.
-    assert np.abs(before).max() > 5e-4
+    assert np.abs(biased).max() > 5e-4
     assert np.abs(after).max() < 1e-4
 
 
 @pytest.mark.slow
 def test_the_force_of_a_damper_right_after_the_contact_needs_nodes_between_the_ticks():
-    before, after = errors_of("creeping and damped")
-    assert np.abs(before).max() > 1e-3
+    biased, after = errors_of("creeping and damped")
+    assert np.abs(biased).max() > 1e-3
     assert np.abs(after).max() < 3e-4
 
 
@@ -103,7 +103,7 @@ def test_an_interval_covers_at_least_what_it_says_however_much_objects_differ(sq
 @pytest.mark.slow
 def test_given_terms_are_not_chosen():
     squeeze = squeeze_of("creeping", sensor="ideal")
-    found = identify(SimConfig(), [squeeze], lambda *_: None, only="elastic (k1)")
-    assert [candidate.terms for candidate in found.candidates if candidate.chosen] == ["elastic (k1)"]
+    result = identify(SimConfig(), [squeeze], lambda *_: None, only="elastic (k1)")
+    assert [candidate.terms for candidate in result.candidates if candidate.chosen] == ["elastic (k1)"]
     with pytest.raises(ConfigError, match="no candidate"):
         identify(SimConfig(), [squeeze], lambda *_: None, only="elastic (k7)")

@@ -51,8 +51,8 @@ def test_a_delay_of_which_the_settings_do_not_know_does_not_bias_the_fingertips(
     lag_s = lag_of_block(config, late)
     assert lag_s == pytest.approx(0.01, abs=5e-4)
     in_time, _ = _settings(config, late, block)
-    found, (said,) = _settings(config, late, late)
-    assert found.pad_stiffness_n_m == pytest.approx(in_time.pad_stiffness_n_m, rel=2e-3)
+    settings, (said,) = _settings(config, late, late)
+    assert settings.pad_stiffness_n_m == pytest.approx(in_time.pad_stiffness_n_m, rel=2e-3)
     assert "which these squeezes show" in said
     # With the delay of the settings, they seem 4 % stiffer with the ideal sensor, and 6 % with pads.
     wrong, said = with_fingertips_of_block(config, late, _shares(config, late, 0.0))
@@ -72,10 +72,10 @@ def test_an_object_is_identified_behind_the_fingertips_of_the_block(tmp_path):
     scene.write_text('width_m = 0.05\n[[terms]]\ntype = "elastic"\nk1_n_m = 1500.0\n')
     gripper = {"sensor": "ideal", "pad_stiffness_n_m": 5000.0}
     block, shells = squeezes("block", gripper, [1, 2, 3]), squeezes(str(scene), gripper, [4, 5, 6])
-    found = identify(SimConfig(sensor="ideal"), shells, lambda *_: None, block)
-    (k1,) = [parameter for parameter in found.parameters if parameter.name.endswith("k1_n_m")]
+    result = identify(SimConfig(sensor="ideal"), shells, lambda *_: None, block)
+    (k1,) = [parameter for parameter in result.parameters if parameter.name.endswith("k1_n_m")]
     assert k1.value == pytest.approx(1500.0, rel=0.03)
-    assert found.notes[0].startswith("the fingertips follow from 3 squeezes of the block: ")
+    assert result.notes[0].startswith("the fingertips follow from 3 squeezes of the block: ")
     # With the default fingertips, which are twice as stiff or more, the shell would seem softer.
     wrong = identify(SimConfig(sensor="ideal"), shells, lambda *_: None)
     (other,) = [parameter for parameter in wrong.parameters if parameter.name.endswith("k1_n_m")]

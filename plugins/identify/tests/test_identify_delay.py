@@ -61,16 +61,16 @@ IN_CI = ((0, 0.025), (1, 0.0), (1, 0.025), (2, 0.01))
 )
 def test_a_known_delay_comes_back_and_does_not_bias_relaxation(gripper, late_s):
     settings_s = gripper.get("pad_delay_s", 0.0)
-    found = identify(SimConfig(), late_recordings(gripper, late_s), lambda *_: None)
-    named = {parameter.name: parameter for parameter in found.parameters}
+    result = identify(SimConfig(), late_recordings(gripper, late_s), lambda *_: None)
+    named = {parameter.name: parameter for parameter in result.parameters}
     delay, tau = named["delay_s"], named["maxwell.tau_s"]
     assert delay.value == pytest.approx(settings_s + late_s, abs=0.002)
     assert delay.high - delay.low < 0.01
     assert tau.value == pytest.approx(0.2, rel=0.06)
-    assert [candidate.terms for candidate in found.candidates if candidate.chosen] == [
+    assert [candidate.terms for candidate in result.candidates if candidate.chosen] == [
         "elastic (k1) + maxwell"
     ]
-    used_s = tomllib.loads(found.scene)["identified"]["sensor"]["delay_s"]
+    used_s = tomllib.loads(result.scene)["identified"]["sensor"]["delay_s"]
     assert used_s == pytest.approx(settings_s + late_s, abs=0.002)
     assert delay.value == pytest.approx(used_s, rel=1e-5)
     if late_s == 0.0:
@@ -114,31 +114,31 @@ def test_a_delay_is_used_only_if_the_terms_that_are_chosen_with_it_show_it(found
     def timed(lag):
         return Timed([], [], [], FoundWithAll(found_s), lag)
 
-    def delay(found):
-        shown_s = shown(found.lag.lag_s)
+    def delay(used):
+        shown_s = shown(used.lag.lag_s)
         return Delay(
             settings_s=0.0,
-            used_s=found.lag.lag_s,
+            used_s=used.lag.lag_s,
             shown_s=shown_s,
             low_s=shown_s - 0.00151,
             high_s=shown_s + 0.00151,
         )
 
-    found, told = with_delay(timed, delay, ForwardModel(pads=RIGID_PADS))
+    used, told = with_delay(timed, delay, ForwardModel(pads=RIGID_PADS))
     assert told.used_s == pytest.approx(used_s, abs=1e-9)
-    assert found.lag.lag_s == told.used_s
+    assert used.lag.lag_s == told.used_s
 
 
 @pytest.mark.slow
 def test_a_ramp_at_one_speed_does_not_show_the_delay_and_says_so():
     ramp = recorded(hold_s=0.0)
-    found = identify(SimConfig(sensor="ideal", pad_stiffness_n_m=float("inf")), [ramp], lambda *_: None)
+    result = identify(SimConfig(sensor="ideal", pad_stiffness_n_m=float("inf")), [ramp], lambda *_: None)
     (refused,) = [
-        undetermined for undetermined in found.undetermined if undetermined.what == "delay of the sensor"
+        undetermined for undetermined in result.undetermined if undetermined.what == "delay of the sensor"
     ]
     assert "at one speed" in refused.reason
     assert "changing speed" in refused.remedy
-    assert not [parameter for parameter in found.parameters if parameter.name == "delay_s"]
+    assert not [parameter for parameter in result.parameters if parameter.name == "delay_s"]
 
 
 def test_an_image_has_its_own_force_whatever_the_settings_say_about_its_delay():

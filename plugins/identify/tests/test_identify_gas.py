@@ -71,14 +71,16 @@ def behind_pads(length, noise_n):
 @pytest.mark.slow
 def test_intervals_of_a_gas_are_wide_where_the_shell_and_the_gas_do_nearly_the_same():
     squeeze, model, law, true = behind_pads(3.0, 0.03)
-    found = uncertainty(model, fit(model, law, [squeeze]), [squeeze])
-    assert all(low < one < high for low, one, high in zip(found.low, true, found.high, strict=True))
+    intervals = uncertainty(model, fit(model, law, [squeeze]), [squeeze])
+    assert all(
+        low < value < high for low, value, high in zip(intervals.low, true, intervals.high, strict=True)
+    )
     # The stiffness of the shell is not determined beside that of the gas.
-    assert found.high[0] > 4.0 * found.low[0]
+    assert intervals.high[0] > 4.0 * intervals.low[0]
     (shell,) = [
-        one
-        for one in undetermined(fit(model, law, [squeeze]), found, [squeeze], [1.0], cells=False)
-        if one.what == "elastic.k1_n_m"
+        part
+        for part in undetermined(fit(model, law, [squeeze]), intervals, [squeeze], [1.0], cells=False)
+        if part.what == "elastic.k1_n_m"
     ]
     assert "open" in shell.remedy
 
@@ -110,20 +112,20 @@ def test_a_vented_gas_comes_back_by_its_combinations_and_says_what_is_convention
     backend, controller = create("sensor-backend", "sim", **gripper), create("controller", "hybrid")
     done = backend.run_many(controller, [scene] * 3, [1, 2, 3], run=RunConfig(hold_s=1.0), traces=True)
     squeezes = [
-        RecordedSqueeze(name=str(i), sha256="0" * 64, trace=one.trace, gripper=gripper)
-        for i, one in enumerate(done)
+        RecordedSqueeze(name=str(i), sha256="0" * 64, trace=grasp.trace, gripper=gripper)
+        for i, grasp in enumerate(done)
     ]
-    found = identify(SimConfig(), squeezes, lambda *_: None)
-    assert [candidate.terms for candidate in found.candidates if candidate.chosen] == [
+    result = identify(SimConfig(), squeezes, lambda *_: None)
+    assert [candidate.terms for candidate in result.candidates if candidate.chosen] == [
         "elastic (k1) + gas (vented)"
     ]
-    named = {parameter.name: parameter for parameter in found.parameters}
+    named = {parameter.name: parameter for parameter in result.parameters}
     for name, value in combinations(true).items():
         assert named[f"gas.{name}"].value == pytest.approx(value, rel=0.05)
         assert named[f"gas.{name}"].low < value < named[f"gas.{name}"].high
-    (gas,) = [one for one in tomllib.loads(found.scene)["terms"] if one["type"] == "gas"]
+    (gas,) = [term for term in tomllib.loads(result.scene)["terms"] if term["type"] == "gas"]
     assert gas["area_m2"] == AREA_M2
-    (refused,) = [one for one in found.undetermined if one.what.startswith("gas")]
+    (refused,) = [part for part in result.undetermined if part.what.startswith("gas")]
     assert "area_m2 = 0.001" in refused.reason
     # The scene is one that the simulator takes.
-    backend.run_many(controller, [found.scene], [1], run=RunConfig(hold_s=0.2))
+    backend.run_many(controller, [result.scene], [1], run=RunConfig(hold_s=0.2))

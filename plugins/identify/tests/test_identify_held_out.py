@@ -27,13 +27,13 @@ def springs(*stiffnesses):
 
 
 def test_a_recording_is_predicted_by_others_without_its_own_stiffness():
-    ready = [prepared(one, 0.0) for one in springs(1000.0, 1500.0)]
+    ready = [prepared(squeeze, 0.0) for squeeze in springs(1000.0, 1500.0)]
     spring = static_candidates(scale_of(ready[0]))[0]
     fitted = fit(RIGID, spring, ready)
-    first, second = held_out_errors(RIGID, fitted, ready)
+    soft_error, stiff_error = held_out_errors(RIGID, fitted, ready)
 
     # At the peak, the force is wrong by a half or a third; a width of its own hides a part of that.
-    assert 0.08 < min(first, second) < max(first, second) < 0.2
+    assert 0.08 < min(soft_error, stiff_error) < max(soft_error, stiff_error) < 0.2
     # With a stiffness of its own, each seems to be known.
     chosen = choose(RIGID, ready, scale_of(ready[0]), has_memory=False, progress=lambda done, total: None)
     assert chosen.scores[0].error < 0.01
@@ -41,11 +41,11 @@ def test_a_recording_is_predicted_by_others_without_its_own_stiffness():
 
 
 def test_a_copy_of_a_recording_confirms_nothing():
-    first, second = springs(1000.0, 1100.0)
+    soft, stiff = springs(1000.0, 1100.0)
     notes = []
-    copy = evolve(first, name="copy", sha256="1" * 64)
+    copy = evolve(soft, name="copy", sha256="1" * 64)
 
-    assert _distinct([first, second, copy], notes) == [first, second]
+    assert _distinct([soft, stiff, copy], notes) == [soft, stiff]
     assert notes == ["left out: copy is a copy of one"]
 
 
@@ -93,9 +93,9 @@ def test_a_snap_whose_end_no_squeeze_reaches_is_not_to_be_written():
         return (closure > 0.0) * (shell(k, 0.0055, 3.0, 0.004, 1200.0)(closure) + noise)
 
     squeezes = [recorded(lambda closure, k=k: force(closure, k), hold_s=0.0) for k in (1000.0, 1050.0)]
-    found = identify(SimConfig(sensor="ideal", pad_stiffness_n_m=float("inf")), squeezes, lambda *_: None)
-    assert {undetermined.what for undetermined in found.undetermined if undetermined.in_scene} >= {
+    result = identify(SimConfig(sensor="ideal", pad_stiffness_n_m=float("inf")), squeezes, lambda *_: None)
+    assert {undetermined.what for undetermined in result.undetermined if undetermined.in_scene} >= {
         "snap.k2_n_m"
     }
-    assert any("snap.k2_n_m" in reason for reason in found.refusals)
-    assert max(found.held_out) < 0.05
+    assert any("snap.k2_n_m" in reason for reason in result.refusals)
+    assert max(result.held_out) < 0.05

@@ -64,8 +64,8 @@ def laws():
 def claimed(name, spread, seed):
     law, values, varying = laws()[name]
     squeezes, fitted = of_objects(law, values, varying, spread, seed)
-    found = own_spreads(MODEL, fitted, alone(MODEL, fitted, squeezes), squeezes, 0.0)
-    return {law.free[one.place].name: one.scatter for one in found}
+    spreads = own_spreads(MODEL, fitted, alone(MODEL, fitted, squeezes), squeezes, 0.0)
+    return {law.free[spread.place].name: spread.scatter for spread in spreads}
 
 
 def test_scatter_that_the_errors_make_is_not_claimed_and_other_scatter_is():
@@ -73,7 +73,7 @@ def test_scatter_that_the_errors_make_is_not_claimed_and_other_scatter_is():
     errors = np.array([0.02, 0.05, 0.1, 0.03, 0.04])
     null = [between(errors * rng.standard_normal(5), errors**2, 0.05) for _ in range(1000)]
     # Two standard deviations of the number of 1000 tests of probability 0.05.
-    assert sum(one is not None for one in null) == pytest.approx(50, abs=14)
+    assert sum(scatter is not None for scatter in null) == pytest.approx(50, abs=14)
     held = [
         scatter
         for _ in range(300)
@@ -87,11 +87,11 @@ def test_scatter_that_the_errors_make_is_not_claimed_and_other_scatter_is():
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["tau_s", "k3_n_m3"])
 def test_a_parameter_that_varies_has_a_spread_and_no_other_has(name):
-    found = [claimed(name, 0.3, seed) for seed in range(10)]
-    assert sum(name in one for one in found) >= 9
+    claims = [claimed(name, 0.3, seed) for seed in range(10)]
+    assert sum(name in claim for claim in claims) >= 9
     # Their interval for the true spread is of probability 0.9.
-    assert sum(one[name].low <= 0.3 <= one[name].high for one in found if name in one) >= 7
-    assert sum(bool(one.keys() - {name}) for one in found) <= 2
+    assert sum(claim[name].low <= 0.3 <= claim[name].high for claim in claims if name in claim) >= 7
+    assert sum(bool(claim.keys() - {name}) for claim in claims) <= 2
 
 
 @pytest.mark.slow
@@ -121,14 +121,14 @@ def test_the_scene_of_objects_that_relax_at_different_rates_has_the_spread_and_i
     done = backend.run_many(controller, objects, [1, 2, 3, 4], run=RunConfig(hold_s=1.0), traces=True)
     recordings = [
         RecordedSqueeze(
-            name=str(k), sha256="0" * 64, trace=one.trace, gripper=gripper, label="cup", instance=f"cup#{k}"
+            name=str(k), sha256="0" * 64, trace=grasp.trace, gripper=gripper, label="cup", instance=f"cup#{k}"
         )
-        for k, one in enumerate(done)
+        for k, grasp in enumerate(done)
     ]
-    found = identify(SimConfig(), recordings, lambda *_: None)
-    (spread,) = [parameter for parameter in found.parameters if parameter.name.endswith(".spread")]
+    result = identify(SimConfig(), recordings, lambda *_: None)
+    (spread,) = [parameter for parameter in result.parameters if parameter.name.endswith(".spread")]
     assert spread.name == "maxwell.tau_s.spread"
     assert spread.low < 0.4 < spread.high
-    (maxwell,) = [one for one in tomllib.loads(found.scene)["terms"] if one["type"] == "maxwell"]
+    (maxwell,) = [term for term in tomllib.loads(result.scene)["terms"] if term["type"] == "maxwell"]
     assert maxwell["spread"] == {"tau_s": pytest.approx(spread.value, rel=1e-4)}
-    backend.run_many(controller, [found.scene], [1], run=RunConfig(hold_s=0.2))
+    backend.run_many(controller, [result.scene], [1], run=RunConfig(hold_s=0.2))

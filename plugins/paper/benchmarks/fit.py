@@ -74,7 +74,7 @@ Values = Mapping[tuple[str, str], float]
 
 def fitted() -> dict[tuple[str, str], float]:
     """Return the catalogue's fitted figures, by container and name."""
-    found = {}
+    values = {}
     for name, spec in catalogue().items():
         kind = name.partition(":")[0]
         for where, reason in spec.reasons.items():
@@ -82,20 +82,20 @@ def fitted() -> dict[tuple[str, str], float]:
             if kind not in TRIALS or not reason.startswith("fitted"):
                 continue
             if figure == "stiffness_spread":
-                found[kind, "stiffness_scale"] = float(_spread(spec)[2])
+                values[kind, "stiffness_scale"] = float(_spread(spec)[2])
             elif figure == "damping_n_s_m":
-                found[kind, figure] = dict(spec.terms)["loss"][figure]
+                values[kind, figure] = dict(spec.terms)["loss"][figure]
             else:
-                found[kind, figure] = float(getattr(spec, figure))
-    return found
+                values[kind, figure] = float(getattr(spec, figure))
+    return values
 
 
 def _spread(spec: ObjectSpec) -> re.Match[str]:
     """Return the reason of a fitted spread of stiffness: what it is without the fit, and the scale."""
     reason = next(name for where, name in spec.reasons.items() if where.endswith("stiffness_spread"))
-    found = SPREAD.search(reason)
-    assert found is not None, f"{spec.name}: the reason of its stiffness_spread names no scale"
-    return found
+    match = SPREAD.search(reason)
+    assert match is not None, f"{spec.name}: the reason of its stiffness_spread names no scale"
+    return match
 
 
 def start() -> dict[tuple[str, str], float]:
@@ -161,10 +161,12 @@ def by_the_splits(states: Sequence[str], squeezes: Sequence[Squeeze]) -> dict[st
 
     empty = ("empty_open", "empty_closed")
     return {
-        "tree_delta_t": sorts("full_open", ("full_closed", *empty), lambda one: one.delta_t_s > LONG_S),
-        "tree_peak": sorts("full_closed", empty, lambda one: one.peak_n > PEAK_N),
-        "tree_p_steady": sorts("empty_open", empty[1:], lambda one: one.p_steady_m <= DEEP_M),
-        "tree_f_steady": sorts("empty_open", empty[1:], lambda one: one.f_steady_n <= WEAK_N),
+        "tree_delta_t": sorts(
+            "full_open", ("full_closed", *empty), lambda squeeze: squeeze.delta_t_s > LONG_S
+        ),
+        "tree_peak": sorts("full_closed", empty, lambda squeeze: squeeze.peak_n > PEAK_N),
+        "tree_p_steady": sorts("empty_open", empty[1:], lambda squeeze: squeeze.p_steady_m <= DEEP_M),
+        "tree_f_steady": sorts("empty_open", empty[1:], lambda squeeze: squeeze.f_steady_n <= WEAK_N),
         "tree": float(np.mean([by_the_tree(b) == a for a, b in zip(states, squeezes, strict=True)])),
     }
 
@@ -178,12 +180,15 @@ class Target(NamedTuple):
 
 def targets() -> dict[str, Target]:
     """Return what is fitted to: the class (`table_2`), the state in each container, the authors' splits."""
-    found = {}
+    targets_by_name = {}
     for rate in published().rates:
         if rate.id.startswith(("table_2", "table_3_")):
             assert rate.n is not None
-            found[rate.id] = Target(rate.rate, (rate.rate * (1.0 - rate.rate) / rate.n) ** 0.5)
-    return {**found, **dict.fromkeys(SPLITS, Target(1.0, found["table_3_odwalla"].deviation))}
+            targets_by_name[rate.id] = Target(rate.rate, (rate.rate * (1.0 - rate.rate) / rate.n) ** 0.5)
+    return {
+        **targets_by_name,
+        **dict.fromkeys(SPLITS, Target(1.0, targets_by_name["table_3_odwalla"].deviation)),
+    }
 
 
 @frozen
@@ -212,27 +217,27 @@ class Bench:
     def rates(self, values: Values) -> dict[str, float]:
         """Return the rate for each target."""
         trials = {kind: self._of(kind, values) for kind in TRIALS}
-        found = {}
+        by_name = {}
         for kind, trial in trials.items():
-            found[f"table_3_{kind}"] = self._state_rate(kind, values)
-            found.update(trial.tree)
+            by_name[f"table_3_{kind}"] = self._state_rate(kind, values)
+            by_name.update(trial.tree)
         rates = []
         for i, seed in enumerate(self.seeds):
             features = [f for trial in trials.values() for f in trial.features[i]]
             classes = [kind for kind, trial in trials.items() for _ in trial.labels]
             rates.append(judged(features, classes, seed))
-        return {"table_2": float(np.mean(rates)), **found}
+        return {"table_2": float(np.mean(rates)), **by_name}
 
     def _of(self, kind: str, values: Values) -> Trials:
         figures = tuple(values[kind, figure] for figure in FIGURES)
         return self._once(("trials", kind, *figures), lambda: grasped(kind, figures, self.seeds))
 
     def _state_rate(self, kind: str, values: Values) -> float:
-        one = self._of(kind, values)
+        trials = self._of(kind, values)
         return self._once(
             ("rate", kind, *(values[kind, figure] for figure in FIGURES)),
             lambda: float(
-                np.mean([judged(one.features[i], one.labels, s) for i, s in enumerate(self.seeds)])
+                np.mean([judged(trials.features[i], trials.labels, s) for i, s in enumerate(self.seeds)])
             ),
         )
 
@@ -246,7 +251,7 @@ def grasped(kind: str, figures: Sequence[float], seeds: range) -> Trials:
     """Grasp a container with these figures as the paper did, once a seed."""
     with tempfile.TemporaryDirectory() as folder:
         named = {}
-        (states,) = (one.states for one in object_kinds() if one.name == kind)
+        (states,) = (object_kind.states for object_kind in object_kinds() if object_kind.name == kind)
         for state in states:
             # Things are numbered by the file's name: with that of the kind they are those of the catalogue.
             path = Path(folder) / state / f"{kind}.toml"
@@ -255,24 +260,24 @@ def grasped(kind: str, figures: Sequence[float], seeds: range) -> Trials:
             path.write_text(as_toml(spec), encoding="utf-8")
             named[f"{kind}:{state}"] = str(path)
         # Trials are numbered over all containers, in the paper's order.
-        first = sum(
+        offset = sum(
             n for other, (n, _) in TRIALS.items() if list(TRIALS).index(other) < list(TRIALS).index(kind)
         )
         features = create("feature-set", "chitta")
-        labels, extracted = _run(named, TRIALS[kind], 20.0, features.extract, seeds, first)
+        labels, extracted = _run(named, TRIALS[kind], 20.0, features.extract, seeds, offset)
         tree: dict[str, float] = {}
         if kind == "odwalla":
             one_pad = create("feature-set", "chitta", force="left")
 
             def squeeze(trace: Trace) -> Squeeze:
                 felt = one_pad.extract(trace)
-                of = dict(zip(felt.names, felt.values, strict=True))
+                by_name = dict(zip(felt.names, felt.values, strict=True))
                 peak = float(np.max(trace.force_left_n))
-                return Squeeze(of["delta_t"], of["p_steady"], of["f_steady"], peak)
+                return Squeeze(by_name["delta_t"], by_name["p_steady"], by_name["f_steady"], peak)
 
             true, felt = _run(named, TREE_TRIALS, 23.0, squeeze, seeds, 0)
             states = [label.partition(":")[2] for label in true] * len(seeds)
-            tree = by_the_splits(states, [one for of in felt for one in of])
+            tree = by_the_splits(states, [squeezed for squeezes in felt for squeezed in squeezes])
     return Trials(labels, extracted, tree)
 
 
@@ -282,20 +287,20 @@ def _run(
     force_n: float,
     extract: Callable[[Trace], Any],
     seeds: range,
-    first: int,
+    offset: int,
 ) -> tuple[list[str], list[list[Any]]]:
     """Return the label of each trial, and what was extracted from it at each seed."""
     dealt = Group(named=named, total=trials[0], instances=trials[1]).planned(kinds=())
     scenes, numbers = [], []
     for seed in seeds:
-        scenes += [f"{one.object_name}#{OBJECTS_PER_SEED * seed + one.instance}" for one in dealt]
-        numbers += [TRIALS_PER_SEED * seed + first + k for k in range(len(dealt))]
+        scenes += [f"{trial.object_name}#{OBJECTS_PER_SEED * seed + trial.instance}" for trial in dealt]
+        numbers += [TRIALS_PER_SEED * seed + offset + k for k in range(len(dealt))]
     controller = create("controller", "hybrid", probing_force_n=force_n)
     config = SimConfig(fidelity="scene")
     done = run_many(config, controller, scenes, numbers, extract=extract, traces=False, compiled=True)
-    extracted = [one.extracted for one in done]
+    extracted = [trial.extracted for trial in done]
     n = len(dealt)
-    return [one.label for one in dealt], [extracted[n * i : n * (i + 1)] for i in range(len(seeds))]
+    return [trial.label for trial in dealt], [extracted[n * i : n * (i + 1)] for i in range(len(seeds))]
 
 
 def judged(features: Sequence[Features], labels: Sequence[str], seed: int) -> float:
@@ -307,12 +312,12 @@ def judged(features: Sequence[Features], labels: Sequence[str], seed: int) -> fl
     )
 
 
-def objective(rates: Mapping[str, float], of: str = "t") -> float:
+def objective(rates: Mapping[str, float], prefix: str = "t") -> float:
     """Return the sum of squared misfits in standard deviations, of the targets whose names begin like this."""
     return sum(
         ((rates[name] - target.rate) / target.deviation) ** 2
         for name, target in targets().items()
-        if name.startswith(of)
+        if name.startswith(prefix)
     )
 
 
@@ -342,25 +347,31 @@ def descend(
     Each round goes through all figures in order, and a further one tries the middles to the neighbours in the grid. A
     value moves only where that is better, so that what makes no difference stays where it was.
     """
-    found = dict(values)
-    least = cost(found)
+    current = dict(values)
+    least = cost(current)
     tried: dict[tuple[str, str], dict[float, float]] = {}
     for number in range(rounds + 1):
-        for key, value in list(found.items()):
+        for key, value in list(current.items()):
             grid = sorted({*grids[key[1]], value})
             if number == rounds:
-                at = grid.index(value)
-                grid = [0.5 * (value + one) for one in (*grid[max(at - 1, 0) : at], *grid[at + 1 : at + 2])]
-            costs = {one: least if one == value else cost({**found, key: one}) for one in grid}
+                place = grid.index(value)
+                grid = [
+                    0.5 * (value + neighbour)
+                    for neighbour in (*grid[max(place - 1, 0) : place], *grid[place + 1 : place + 2])
+                ]
+            costs = {
+                tried_value: least if tried_value == value else cost({**current, key: tried_value})
+                for tried_value in grid
+            }
             if not costs:
                 continue  # A grid of one value has no middles.
-            best = min(costs, key=lambda one: costs[one])
+            best = min(costs, key=lambda tried_value: costs[tried_value])
             if costs[best] < least:
-                found[key], least = best, costs[best]
+                current[key], least = best, costs[best]
             if number < rounds:
                 tried[key] = costs
         say(f"{'middles' if number == rounds else f'round {number + 1}'}: objective {least:.2f}")
-    return Descent(found, least, tried)
+    return Descent(current, least, tried)
 
 
 def main() -> None:
@@ -384,14 +395,14 @@ def main() -> None:
         began = time.time()
         n = 1 if given.short else given.seeds
         bench, further = Bench(range(n)), Bench(range(n, 2 * n))
-        found = descend(
+        descent = descend(
             lambda values: objective(bench.rates(values)),
             start(),
             {name: grid[:1] if given.short else grid for name, grid in GRIDS.items()},
             1 if given.short else given.rounds,
             lambda text: print(f"{text} ({time.time() - began:.0f} s)", file=sys.stderr),
         )
-        columns = {"start": start(), "found": found.values, "catalogue": shipped}
+        columns = {"start": start(), "found": descent.values, "catalogue": shipped}
         rates = {name: bench.rates(values) for name, values in columns.items()}
         others = {name: further.rates(values) for name, values in columns.items()}
         result.update(
@@ -400,15 +411,15 @@ def main() -> None:
             targets={name: target._asdict() for name, target in targets().items()},
             rates=rates,
             objectives={
-                what: {name: objective(one, of) for name, one in which.items()}
-                for what, which, of in (
+                what: {name: objective(figures, prefix) for name, figures in which.items()}
+                for what, which, prefix in (
                     ("objective", rates, "t"),
                     ("  of the tables", rates, "table"),
                     ("  of the tree's splits", rates, "tree"),
                     ("on as many other seeds", others, "t"),
                 )
             },
-            pinned={".".join(key): found.pinned(key, PINNED_BY) for key in shipped},
+            pinned={".".join(key): descent.pinned(key, PINNED_BY) for key in shipped},
         )
     result["values"] = {
         name: {f"{kind}.{figure}": value for (kind, figure), value in values.items()}
@@ -432,8 +443,8 @@ def as_text(result: Mapping[str, Any]) -> str:
             "",
             f"{'target':<26}" + "".join(f"{name:>12}" for name in (*columns, "printed", "its s.d.")),
         ]
-        for key, one in result["targets"].items():
-            rates = (*(result["rates"][name][key] for name in columns), one["rate"], one["deviation"])
+        for key, target in result["targets"].items():
+            rates = (*(result["rates"][name][key] for name in columns), target["rate"], target["deviation"])
             lines.append(f"{key:<26}" + "".join(f"{rate:>12.3f}" for rate in rates))
         whole = "".join(f"{result['rates'][name]['tree']:>12.3f}" for name in columns)
         lines += [f"{'(the tree as a whole)':<26}{whole}", ""]

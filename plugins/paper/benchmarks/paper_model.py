@@ -251,7 +251,7 @@ class Trials(NamedTuple):
     labels: list[str]
     extracted: list[Any]
 
-    def of(self, *kinds: str) -> Trials:
+    def of_containers(self, *kinds: str) -> Trials:
         """Return the trials of these containers."""
         kept = [i for i, label in enumerate(self.labels) if label.partition(":")[0] in kinds]
         return Trials([self.labels[i] for i in kept], [self.extracted[i] for i in kept])
@@ -340,29 +340,29 @@ def squeeze(
             states_per_instance="one" if one_state else "all",
         )
         # Instances of different kinds have different numbers, because all scenes have the same name.
-        planned += [(first_instance + 50 * k + one.instance, one) for one in group.planned(())]
+        planned += [(first_instance + 50 * k + trial.instance, trial) for trial in group.planned(())]
     rng = np.random.default_rng([seed, int(force_n), first_instance])
     nodes = rng.choice(len(PLACEMENT_NODES), len(planned), p=[share for _, share in PLACEMENT_NODES])
     texts = {
         (name, k): scene_of(name, values, force_n, PLACEMENT_NODES[k][0])
-        for name, k in {(one.object_name, int(k)) for (_, one), k in zip(planned, nodes, strict=True)}
+        for name, k in {(trial.object_name, int(k)) for (_, trial), k in zip(planned, nodes, strict=True)}
     }
     scenes = [
-        f"{texts[one.object_name, int(k)]}\n#{OBJECTS_PER_SEED * seed + number}"
-        for (number, one), k in zip(planned, nodes, strict=True)
+        f"{texts[trial.object_name, int(k)]}\n#{OBJECTS_PER_SEED * seed + number}"
+        for (number, trial), k in zip(planned, nodes, strict=True)
     ]
-    first = TRIALS_PER_SEED * seed + 1000 * int(force_n) + first_instance
+    offset = TRIALS_PER_SEED * seed + 1000 * int(force_n) + first_instance
     done = run_many(
         config_of(values),
         create("controller", "hybrid", probing_force_n=force_n),
         scenes,
-        [first + k for k in range(len(planned))],
+        [offset + k for k in range(len(planned))],
         extract=with_nonlinear_cells(extract, values["cell_curvature"]),
         traces=False,
         compiled=True,
         workers=1,
     )
-    return Trials([one.label for _, one in planned], [one.extracted for one in done])
+    return Trials([trial.label for _, trial in planned], [trial.extracted for trial in done])
 
 
 def matrix_of(features: Sequence[Features]) -> Any:
@@ -392,29 +392,31 @@ def tree_of(features: Any, labels: Sequence[str]) -> StateTree:
 def answers(features: Sequence[Features], labels: Sequence[str], seed: int) -> list[str]:
     """Return what a C4.5 tree answers for each trial, in ten stratified folds."""
     values, folds = matrix_of(features), stratified(labels, FOLDS, seed)
-    known, found = np.array(labels), np.empty(len(labels), dtype=object)
+    known, predicted = np.array(labels), np.empty(len(labels), dtype=object)
     for fold in range(int(folds.max()) + 1):
         test = folds == fold
         if not test.any():
             continue
         if len(set(known[~test])) == 1:
-            found[test] = known[~test][0]
+            predicted[test] = known[~test][0]
             continue
-        found[test] = tree_of(values[~test], known[~test].tolist()).answers(values[test])
-    return [str(one) for one in found]
+        predicted[test] = tree_of(values[~test], known[~test].tolist()).answers(values[test])
+    return [str(label) for label in predicted]
 
 
-def rate(found: Sequence[str], labels: Sequence[str]) -> float:
+def rate(predicted: Sequence[str], labels: Sequence[str]) -> float:
     """Return the share of answers that are the label."""
-    return float(np.mean([a == b for a, b in zip(found, labels, strict=True)]))
+    return float(np.mean([a == b for a, b in zip(predicted, labels, strict=True)]))
 
 
-def split(trials: Trials, feature: str, one: Callable[[str], bool], other: Callable[[str], bool]) -> float:
+def split(
+    trials: Trials, feature: str, is_low: Callable[[str], bool], is_high: Callable[[str], bool]
+) -> float:
     """Return the largest share that one threshold assigns correctly; 0.5 if one group never has the feature."""
     sides: list[list[float]] = [[], []]
     for label, features in zip(trials.labels, trials.extracted, strict=True):
         value = features.as_dict()[feature]
-        for k, belongs in enumerate((one, other)):
+        for k, belongs in enumerate((is_low, is_high)):
             if belongs(label) and value is not None:
                 sides[k].append(value)
     return split_by(*sides) if all(sides) else 0.5
@@ -429,13 +431,13 @@ def rates_at_20_n(values: Values, seed: int) -> dict[str, float]:
     """Return the figures of Tables II and III and the facts at 20 N, of one replicate: what is conditioned on."""
     trials = squeeze(TRIALS, values, seed, 20.0, create("feature-set", "chitta").extract)
     classes = [label.partition(":")[0] for label in trials.labels]
-    found = answers(trials.extracted, classes, seed)
-    pairs = [(a, b) for a, b in zip(found, classes, strict=True) if a != b]
+    predicted = answers(trials.extracted, classes, seed)
+    pairs = [(a, b) for a, b in zip(predicted, classes, strict=True) if a != b]
     alike = sum({a, b} == {"odwalla", "naked"} for a, b in pairs)
-    statistics = {"table_2": rate(found, classes), "confused": alike / len(pairs) if pairs else 0.0}
+    statistics = {"table_2": rate(predicted, classes), "confused": alike / len(pairs) if pairs else 0.0}
     for kind in CONTAINERS:
-        of = trials.of(kind)
-        statistics[f"table_3_{kind}"] = rate(answers(of.extracted, of.labels, seed), of.labels)
+        own = trials.of_containers(kind)
+        statistics[f"table_3_{kind}"] = rate(answers(own.extracted, own.labels, seed), own.labels)
     lowest, bottles = 1.0, 0.0
     for i, a in enumerate(CONTAINERS):
         for b in CONTAINERS[i + 1 :]:
@@ -461,15 +463,17 @@ class Observed(NamedTuple):
 
 def observed() -> dict[str, Observed]:
     """Return the published figures that a posterior is conditioned on."""
-    found = {}
-    for one in published().rates:
-        if one.id.startswith(("table_2", "table_3_")):
-            assert one.n is not None
-            found[one.id] = Observed(one.rate, (one.rate * (1.0 - one.rate) / one.n) ** 0.5)
-    found["confused"] = Observed(9 / 14, (9 / 14 * 5 / 14 / 14) ** 0.5)
+    figures = {}
+    for printed in published().rates:
+        if printed.id.startswith(("table_2", "table_3_")):
+            assert printed.n is not None
+            figures[printed.id] = Observed(
+                printed.rate, (printed.rate * (1.0 - printed.rate) / printed.n) ** 0.5
+            )
+    figures["confused"] = Observed(9 / 14, (9 / 14 * 5 / 14 / 14) ** 0.5)
     for name in ("p_first_separates", "p_first_does_not_separate", "f_steady_separates"):
-        found[name] = Observed(0.0, 0.05)
-    return found
+        figures[name] = Observed(0.0, 0.05)
+    return figures
 
 
 def gain(values: Values, seed: int) -> float:
@@ -488,17 +492,23 @@ def table_4(values: Values, seed: int) -> dict[str, Any]:
 
     def extract(trace: Trace) -> tuple[Features, Squeeze]:
         felt = one_pad.extract(trace)
-        of = dict(zip(felt.names, felt.values, strict=True))
+        by_name = dict(zip(felt.names, felt.values, strict=True))
         peak = float(np.max(trace.force_left_n))
-        return both.extract(trace), Squeeze(of["delta_t"], of["p_steady"], of["f_steady"], peak)
+        return both.extract(trace), Squeeze(
+            by_name["delta_t"], by_name["p_steady"], by_name["f_steady"], peak
+        )
 
-    found: dict[str, Any] = {}
+    figures: dict[str, Any] = {}
     for force_n in FORCES_N:
         trials = squeeze({"odwalla": TABLE_IV}, values, seed, force_n, extract)
-        features = [one for one, _ in trials.extracted]
-        found[f"table_4_{force_n:g}"] = rate(answers(features, trials.labels, seed), trials.labels)
-    found["gain"] = found["table_4_23"] - found["table_4_17"]
-    return {**found, "trials": Trials(trials.labels, features), "squeezes": [s for _, s in trials.extracted]}
+        features = [extracted for extracted, _ in trials.extracted]
+        figures[f"table_4_{force_n:g}"] = rate(answers(features, trials.labels, seed), trials.labels)
+    figures["gain"] = figures["table_4_23"] - figures["table_4_17"]
+    return {
+        **figures,
+        "trials": Trials(trials.labels, features),
+        "squeezes": [s for _, s in trials.extracted],
+    }
 
 
 def predictions(values: Values, seed: int) -> dict[str, float]:
@@ -507,32 +517,33 @@ def predictions(values: Values, seed: int) -> dict[str, float]:
     trials, squeezes = table.pop("trials"), table.pop("squeezes")
     states = [label.partition(":")[2] for label in trials.labels]
     splits = by_the_splits(states, squeezes)
-    found: dict[str, float] = {**table, **{name: splits[name] for name in (*SPLITS, "tree")}}
+    figures: dict[str, float] = {**table, **{name: splits[name] for name in (*SPLITS, "tree")}}
     for feature, state, others in (
         ("f_steady", "empty_open", ("empty_closed",)),
         ("p_steady", "full_closed", ("full_open", "empty_closed", "empty_open")),
     ):
-        found[f"{feature}_splits"] = split(
+        figures[f"{feature}_splits"] = split(
             trials,
             feature,
             lambda label, state=state: label == f"odwalla:{state}",  # type: ignore[misc]
             lambda label, others=others: label.partition(":")[2] in others,  # type: ignore[misc]
         )
-    times = [one.delta_t_s for one in squeezes]
+    times = [squeeze.delta_t_s for squeeze in squeezes]
     medians = {
-        s: np.nanmedian([t for t, of in zip(times, states, strict=True) if of == s]) for s in set(states)
+        s: np.nanmedian([t for t, state in zip(times, states, strict=True) if state == s])
+        for s in set(states)
     }
-    found["full_open_longest"] = float(max(medians, key=lambda s: medians[s]) == "full_open")
+    figures["full_open_longest"] = float(max(medians, key=lambda s: medians[s]) == "full_open")
     extract = create("feature-set", "chitta").extract
     without_water = {kind: TRIALS[kind] for kind in CONTAINERS if kind != "water"}
     eleven = squeeze(without_water, values, seed, 20.0, extract)
-    found["eleven_classes"] = rate(answers(eleven.extracted, eleven.labels, seed), eleven.labels)
+    figures["eleven_classes"] = rate(answers(eleven.extracted, eleven.labels, seed), eleven.labels)
     tree = tree_of(matrix_of(trials.extracted), states)
     for name, kind in (("worn_bottles", "odwalla_worn"), ("other_new_bottles", "odwalla")):
         tested = squeeze({kind: TABLE_IV}, values, seed, 23.0, extract, first_instance=500)
         true = [label.partition(":")[2] for label in tested.labels]
-        found[name] = rate(tree.answers(matrix_of(tested.extracted)), true)
-    return {**found, **_figures(values, seed)}
+        figures[name] = rate(tree.answers(matrix_of(tested.extracted)), true)
+    return {**figures, **_figures(values, seed)}
 
 
 def _figures(values: Values, seed: int) -> dict[str, float]:
@@ -542,7 +553,7 @@ def _figures(values: Values, seed: int) -> dict[str, float]:
     def extract(trace: Trace) -> tuple[dict[str, float], Features]:
         return measures(trace), feature_set.extract(trace)
 
-    found: dict[str, float] = {}
+    figures: dict[str, float] = {}
     cases = {
         "fig_4_20": ("hybrid", 20.0),
         "fig_4_100": ("hybrid", 100.0),
@@ -562,10 +573,10 @@ def _figures(values: Values, seed: int) -> dict[str, float]:
         )
         measured, features = done.extracted
         if name.startswith("fig_4"):
-            found[f"{name}_counts"] = measured.get("left_counts", float("nan"))
+            figures[f"{name}_counts"] = measured.get("left_counts", float("nan"))
         elif name == "fig_5":
-            found["fig_5_peak_n"] = float(done.state.peak_n)
+            figures["fig_5_peak_n"] = float(done.state.peak_n)
         else:
-            found["fig_6_peak_n"] = measured.get("measured_peak_force_n", float("nan"))
-            found["fig_6_rest_s"] = features.as_dict()["delta_t"] or float("nan")
-    return found
+            figures["fig_6_peak_n"] = measured.get("measured_peak_force_n", float("nan"))
+            figures["fig_6_rest_s"] = features.as_dict()["delta_t"] or float("nan")
+    return figures

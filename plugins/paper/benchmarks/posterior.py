@@ -155,7 +155,9 @@ def abc_of(
     return pyabc.ABCSMC(
         simulate,
         pyabc.Distribution({name: pyabc.RV("norm", 0.0, 1.0) for name in names}),
-        pyabc.PNormDistance(p=2, fixed_weights={name: 1.0 / one.deviation for name, one in wanted.items()}),
+        pyabc.PNormDistance(
+            p=2, fixed_weights={name: 1.0 / figure.deviation for name, figure in wanted.items()}
+        ),
         population_size=particles,
         transitions=NormalScores(),
         eps=pyabc.MedianEpsilon(),
@@ -164,10 +166,10 @@ def abc_of(
 
 
 class Sample(NamedTuple):
-    """The accepted simulations: normal scores adjusted to the data, and before, weights, figures and distances."""
+    """The accepted simulations: normal scores adjusted to the data, and unadjusted, weights, figures and distances."""
 
     scores: Any
-    before: Any
+    unadjusted: Any
     weights: Any
     statistics: list[dict[str, float]]
     distances: Any
@@ -213,7 +215,7 @@ def nearest(
     near = np.random.default_rng(0).permutation(np.argsort(distances)[:accepted])
     return Sample(
         scores=adjusted(scores[near], off[near], weights[near]),
-        before=scores[near],
+        unadjusted=scores[near],
         weights=weights[near],
         statistics=[dict(simulations[i]["statistics"]) for i in near],
         distances=distances[near],
@@ -223,7 +225,7 @@ def nearest(
 def sample_of(scores: Any, w: Any) -> Weighted:
     """Return the figures of particles with these normal scores."""
     rows = [values_at(dict(zip(NAMES, row, strict=True))) for row in scores]
-    return Weighted(rows, [float(one) for one in w])
+    return Weighted(rows, [float(weight) for weight in w])
 
 
 def least_epsilon() -> float:
@@ -231,7 +233,7 @@ def least_epsilon() -> float:
 
     Claims without a number do not count: where they are met, they add nothing.
     """
-    return math.sqrt(2.0 * sum(one.value > 0.0 for one in observed().values()))
+    return math.sqrt(2.0 * sum(figure.value > 0.0 for figure in observed().values()))
 
 
 @frozen
@@ -278,7 +280,7 @@ def infer(folder: Folder, size: Size, say: Callable[[str], None]) -> pyabc.Histo
     abc = abc_of(simulate, NAMES, wanted, size.particles)
     database = folder.path / "abc.db"
     begun = database.exists()
-    published = {name: one.value for name, one in wanted.items()}
+    published = {name: figure.value for name, figure in wanted.items()}
     url = f"sqlite:///{database}"
     history = abc.load(url, 1, published) if begun else abc.new(url, published)
     left = size.generations - (history.n_populations if begun else 0)
@@ -329,7 +331,7 @@ def calibrate(simulations: list[dict[str, Any]], weights: Any) -> dict[str, list
     The true ones are those that were drawn from the prior. The posterior of one is the share `NEAREST` of all others
     that are nearest to it, weighted and adjusted as the sample is.
     """
-    deviations = {name: one.deviation for name, one in observed().items()}
+    deviations = {name: figure.deviation for name, figure in observed().items()}
     seen = np.array([[s["statistics"][name] / d for name, d in deviations.items()] for s in simulations])
     scores = np.array([[s["scores"][name] for name in NAMES] for s in simulations])
     ranks: dict[str, list[float]] = {name: [] for name in NAMES}
@@ -401,13 +403,13 @@ def summarise(
         "particles": len(w),
         "simulations": len(simulations),
         "effective_sample_size": effective_sample_size(w),
-        "generation_epsilon": [float(one) for one in populations["epsilon"][populations["t"] >= 0]],
+        "generation_epsilon": [float(epsilon) for epsilon in populations["epsilon"][populations["t"] >= 0]],
         "simulations_by_proposal": [from_each[t] for t in sorted(from_each)],
         "epsilon": float(nearby.distances.max()),
         "least_epsilon": least_epsilon(),
         "median_distance": weighted_quantiles(nearby.distances, w, (0.5,))[0],
-        "moved": float(np.average(np.abs(nearby.scores - nearby.before).mean(axis=1), weights=w)),
-        "conditioned_on": {name: one._asdict() for name, one in observed().items()},
+        "moved": float(np.average(np.abs(nearby.scores - nearby.unadjusted).mean(axis=1), weights=w)),
+        "conditioned_on": {name: figure._asdict() for name, figure in observed().items()},
         "accepted": {
             name: list(weighted_quantiles([statistic[name] for statistic in nearby.statistics], w, LEVELS))
             for name in observed()
@@ -416,45 +418,45 @@ def summarise(
         "predicted_particles": len(predicted),
         "predicted_effective_sample_size": effective_sample_size(w_predicted) if predicted else 0.0,
         "predictions": _predictions(predicted, w_predicted),
-        "explanations": _explanations(sample, sample_of(nearby.before, w), predicted, alone),
+        "explanations": _explanations(sample, sample_of(nearby.unadjusted, w), predicted, alone),
         "calibration": _calibration(calibrate(simulations, every)),
     }
 
 
 def _figures(sample: Weighted) -> dict[str, Any]:
-    found = {}
+    figures = {}
     for name in NAMES:
         prior = prior_of(name)
-        one = contraction(prior, [v[name] for v in sample.values], sample.weight)
-        found[name] = {
+        contracted = contraction(prior, [v[name] for v in sample.values], sample.weight)
+        figures[name] = {
             "unit": prior.unit,
             "origin": prior.origin,
             "reason": prior.reason,
-            "prior": list(one.prior),
-            "posterior": list(one.posterior),
-            "contraction": one.contraction,
+            "prior": list(contracted.prior),
+            "posterior": list(contracted.posterior),
+            "contraction": contracted.contraction,
         }
-    return found
+    return figures
 
 
 def _predictions(predicted: list[dict[str, float]], w: Any) -> dict[str, Any]:
-    found = {}
+    predictions = {}
     for name, (what, printed) in PREDICTED.items() if predicted else ():
         values = np.array([row[name] for row in predicted], dtype=np.float64)
         known = ~np.isnan(values)
-        found[name] = {
+        predictions[name] = {
             "what": what,
             "published": None if printed is None else printed.value,
             "deviation": None if printed is None or math.isnan(printed.deviation) else printed.deviation,
             "mean": float(np.average(values[known], weights=w[known])),
             "interval": list(weighted_quantiles(values[known], w[known], (0.025, 0.975))),
         }
-    return found
+    return predictions
 
 
 def _explanations(
     sample: Weighted,
-    before: Weighted,
+    unadjusted: Weighted,
     predicted: list[dict[str, float]],
     alone: Mapping[str, list[float]],
 ) -> dict[str, Any]:
@@ -463,19 +465,19 @@ def _explanations(
     gains = np.array([row["gain"] for row in predicted])
     rates = np.array([[row["table_4_17"], row["table_4_23"]] for row in predicted])
     printed = {rate.id: rate.rate for rate in published().rates}
-    at = np.array([printed["table_4_17"], printed["table_4_23"]])
-    found: dict[str, Any] = {}
+    printed_rates = np.array([printed["table_4_17"], printed["table_4_23"]])
+    by_name: dict[str, Any] = {}
     for name, explanation in EXPLANATIONS.items():
         on = np.array([is_on(name, v) for v in sample.values])
         of_predicted = on[: len(predicted)]
-        found[name] = {
+        by_name[name] = {
             "says": explanation.says,
             "figure": explanation.figure,
             "full_strength": explanation.limit,
             "unit": explanation.unit,
             "at_20_n": _odds(on, every),
-            "before_adjustment": _odds(np.array([is_on(name, v) for v in before.values]), every),
-            "with_table_4": _regressed_odds(of_predicted, w, rates, at),
+            "before_adjustment": _odds(np.array([is_on(name, v) for v in unadjusted.values]), every),
+            "with_table_4": _regressed_odds(of_predicted, w, rates, printed_rates),
             "gain_if_on": _mean(gains, w, of_predicted),
             "gain_if_off": _mean(gains, w, ~of_predicted),
             "alone": _mean_of(alone[name]),
@@ -489,11 +491,11 @@ def _explanations(
             "alone": _mean_of(alone["all"]),
             "explains": _mean_of(_differences(alone["all"], alone["none"])),
         },
-        "of": found,
+        "of": by_name,
     }
 
 
-def _regressed_odds(on: Any, w: Any, rates: Any, at: Any) -> dict[str, float] | None:
+def _regressed_odds(on: Any, w: Any, rates: Any, printed: Any) -> dict[str, float] | None:
     """Return the odds that an explanation is on at the rates `at`, by logistic regression on the simulated rates.
 
     The interval is that of resampled particles. None if the particles do not have both answers.
@@ -501,21 +503,21 @@ def _regressed_odds(on: Any, w: Any, rates: Any, at: Any) -> dict[str, float] | 
     if not len(on) or on.all() or not on.any():
         return None
     spread = rates.std(axis=0) + 1e-9
-    centred = (rates - at) / spread
+    centred = (rates - printed) / spread
     size = max(round(effective_sample_size(w)), 4)
-    rng, found = np.random.default_rng(0), []
+    rng, intercepts = np.random.default_rng(0), []
     for _ in range(BOOTSTRAPS):
         drawn = rng.choice(len(on), size, p=w / w.sum())
         if len(set(on[drawn])) == 2:
-            found.append(LogisticRegression().fit(centred[drawn], on[drawn]).intercept_[0])
-    if not found:
+            intercepts.append(LogisticRegression().fit(centred[drawn], on[drawn]).intercept_[0])
+    if not intercepts:
         return None
     middle = float(LogisticRegression().fit(centred, on, sample_weight=w * size / w.sum()).intercept_[0])
-    low, high = np.quantile(found, (0.025, 0.975))
+    low, high = np.quantile(intercepts, (0.025, 0.975))
     return dict(
         zip(
             ("bayes_factor", "bayes_factor_low", "bayes_factor_high"),
-            (math.exp(one) for one in (middle, float(low), float(high))),
+            (math.exp(log_odds) for log_odds in (middle, float(low), float(high))),
             strict=True,
         )
     )
@@ -543,11 +545,11 @@ def _odds(on: Any, w: Any) -> dict[str, float]:
     }
 
 
-def _mean(values: Any, w: Any, of: Any) -> dict[str, Any] | None:
+def _mean(values: Any, w: Any, chosen: Any) -> dict[str, Any] | None:
     """Return the weighted mean of those values, its 95 % interval, and that of one replicate; None without any."""
-    if not of.any():
+    if not chosen.any():
         return None
-    v, w = np.asarray(values, dtype=np.float64)[of], w[of]
+    v, w = np.asarray(values, dtype=np.float64)[chosen], w[chosen]
     mean, n = float(np.average(v, weights=w)), effective_sample_size(w)
     half = Z * math.sqrt(float(np.average((v - mean) ** 2, weights=w)) / n)
     return {
@@ -571,13 +573,13 @@ def _mean_of(values: list[float]) -> dict[str, Any] | None:
 
 
 def _calibration(ranks: Mapping[str, list[float]]) -> dict[str, Any]:
-    every = [rank for of in ranks.values() for rank in of]
+    every = [rank for own in ranks.values() for rank in own]
     return {
         "runs": len(next(iter(ranks.values()))),
         "accepted": NEAREST,
         "bins": BINS,
-        "histograms": {name: rank_histogram(of, BINS).tolist() for name, of in ranks.items()},
-        "p": {name: uniformity_p(rank_histogram(of, BINS)) for name, of in ranks.items()},
+        "histograms": {name: rank_histogram(own, BINS).tolist() for name, own in ranks.items()},
+        "p": {name: uniformity_p(rank_histogram(own, BINS)) for name, own in ranks.items()},
         "all": rank_histogram(every, BINS).tolist(),
         "coverage_90": float(np.mean([0.05 <= rank <= 0.95 for rank in every])),
     }

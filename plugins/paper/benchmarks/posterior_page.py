@@ -78,9 +78,9 @@ def _answer(result: Mapping[str, Any]) -> str:
     """Return what follows from the result, in a paragraph."""
     predicted = result["predictions"]
     tested = [
-        one
-        for name, one in predicted.items()
-        if name != FOLLOWS and one["published"] is not None and one["deviation"] is not None
+        figure
+        for name, figure in predicted.items()
+        if name != FOLLOWS and figure["published"] is not None and figure["deviation"] is not None
     ]
     met = [item for item in tested if _met(item)]
     if not predicted:
@@ -108,8 +108,8 @@ def _rise(explanations: Mapping[str, Any], printed: Mapping[str, Any]) -> str:
     )
     if together is None:
         return text
-    best = max(explanations["of"].values(), key=lambda one: one["alone"]["mean"])
-    most = max(together, best["alone"], key=lambda one: float(one["interval"][1]))
+    best = max(explanations["of"].values(), key=lambda explanation: explanation["alone"]["mean"])
+    most = max(together, best["alone"], key=lambda effect: float(effect["interval"][1]))
     left = printed["published"] - most["mean"]
     half = math.hypot(error, most["interval"][1] - most["mean"])
     return (
@@ -128,11 +128,11 @@ def _evidence(result: Mapping[str, Any]) -> str:
         return ""
     decided = []
     size = result["effective_sample_size"]
-    for one in result["explanations"]["of"].values():
-        factors = (one["at_20_n"], one["before_adjustment"])
+    for explanation in result["explanations"]["of"].values():
+        factors = (explanation["at_20_n"], explanation["before_adjustment"])
         if any(_particles(factor, size) < MIN_PARTICLES for factor in factors):
             continue
-        words = f"it that {one['says']} ({_factor(factors[0])}, before the adjustment {_factor(factors[1])})"
+        words = f"it that {explanation['says']} ({_factor(factors[0])}, before the adjustment {_factor(factors[1])})"
         if all(factor["bayes_factor_low"] > TOLD_APART for factor in factors):
             decided.append(f"for {words}")
         elif all(factor["bayes_factor_high"] < 1.0 / TOLD_APART for factor in factors):
@@ -150,7 +150,7 @@ def _determined(result: Mapping[str, Any]) -> str:
     """Return which figures the data determine, if the sample is large enough to say so."""
     size, explained = result["effective_sample_size"], result["explanations"]["of"]
     # Whether an explanation is there is judged by its Bayes factor.
-    figures = {name: one for name, one in result["figures"].items() if name not in explained}
+    figures = {name: figure for name, figure in result["figures"].items() if name not in explained}
     if size < LEAST_SAMPLE:
         return (
             f"**This run is small: its effective sample size is {size:.1f}. It shows that the method works from end to "
@@ -168,9 +168,9 @@ def _determined(result: Mapping[str, Any]) -> str:
     )
 
 
-def _met(one: Mapping[str, Any]) -> bool:
-    low, high = one["interval"]
-    return bool(low <= one["published"] <= high)
+def _met(prediction: Mapping[str, Any]) -> bool:
+    low, high = prediction["interval"]
+    return bool(low <= prediction["published"] <= high)
 
 
 def _points(share: float) -> str:
@@ -238,13 +238,13 @@ def _figures(figures: Mapping[str, Any]) -> str:
 
 def _data(result: Mapping[str, Any]) -> str:
     rows = []
-    for name, one in result["conditioned_on"].items():
+    for name, datum in result["conditioned_on"].items():
         low, middle, high = result["accepted"][name]
         rows.append(
             (
                 TITLES[name],
-                percentage(one["value"]),
-                percentage(one["deviation"]),
+                percentage(datum["value"]),
+                percentage(datum["deviation"]),
                 f"{percentage(middle)} ({percentage(low)} to {percentage(high)})",
             )
         )
@@ -261,7 +261,7 @@ def _predictions(result: Mapping[str, Any]) -> str:
         command = "python plugins/paper/benchmarks/posterior.py --out FOLDER"
         return f"Not simulated in this run: `{command}` continues with them."
     rows = []
-    for name, one in result["predictions"].items():
+    for name, prediction in result["predictions"].items():
         is_share = not name.startswith("fig_")
 
         def show(value: float | None, is_share: bool = is_share, name: str = name) -> str:
@@ -271,12 +271,18 @@ def _predictions(result: Mapping[str, Any]) -> str:
                 return f"{_points(value)} points"
             return percentage(value) if is_share else f"{value:.4g}"
 
-        low, high = one["interval"]
+        low, high = prediction["interval"]
         verdict = ""
-        if one["published"] is not None and one["deviation"] is not None:
-            verdict = "yes" if _met(one) else "no"
+        if prediction["published"] is not None and prediction["deviation"] is not None:
+            verdict = "yes" if _met(prediction) else "no"
         rows.append(
-            (one["what"], show(one["published"]), show(one["mean"]), f"{show(low)} to {show(high)}", verdict)
+            (
+                prediction["what"],
+                show(prediction["published"]),
+                show(prediction["mean"]),
+                f"{show(low)} to {show(high)}",
+                verdict,
+            )
         )
     return (
         "None of these were used for the inference. The interval is that of one replicate with the numbers of trials "
@@ -290,18 +296,19 @@ def _predictions(result: Mapping[str, Any]) -> str:
 
 def _explanations(explanations: Mapping[str, Any], size: float) -> str:
     rows = [("none of them", "", "", "", "", "", _interval(explanations["none"]), "")]
-    for one in explanations["of"].values():
-        on = _particles(one["at_20_n"], size)
+    for explanation in explanations["of"].values():
+        on = _particles(explanation["at_20_n"], size)
+        strength = _number(explanation["full_strength"], explanation["unit"])
         rows.append(
             (
-                f"{one['says']} (`{one['figure']}`, full strength {_number(one['full_strength'], one['unit'])})",
-                _factor(one["at_20_n"], on),
-                _factor(one["before_adjustment"], _particles(one["before_adjustment"], size)),
-                _factor(one["with_table_4"], on),
-                _mean(one["gain_if_on"]),
-                _mean(one["gain_if_off"]),
-                _interval(one["alone"]),
-                _interval(one["explains"]),
+                f"{explanation['says']} (`{explanation['figure']}`, full strength {strength})",
+                _factor(explanation["at_20_n"], on),
+                _factor(explanation["before_adjustment"], _particles(explanation["before_adjustment"], size)),
+                _factor(explanation["with_table_4"], on),
+                _mean(explanation["gain_if_on"]),
+                _mean(explanation["gain_if_off"]),
+                _interval(explanation["alone"]),
+                _interval(explanation["explains"]),
             )
         )
     together = explanations["all"]
@@ -348,13 +355,13 @@ def _replicates(explanations: Mapping[str, Any]) -> int:
     return int(explanations["none"]["replicates"]) if explanations["none"] else 0
 
 
-def _mean(one: Mapping[str, Any] | None) -> str:
+def _mean(summary: Mapping[str, Any] | None) -> str:
     """Return a mean over particles with the interval of the mean, if there are enough of them."""
-    if one is None:
+    if summary is None:
         return "not simulated"
-    if one["effective_sample_size"] < MIN_PARTICLES:
-        return f"too few particles ({one['effective_sample_size']:.0f})"
-    return _interval({**one, "interval": one["interval_of_mean"]})
+    if summary["effective_sample_size"] < MIN_PARTICLES:
+        return f"too few particles ({summary['effective_sample_size']:.0f})"
+    return _interval({**summary, "interval": summary["interval_of_mean"]})
 
 
 def _particles(odds: Mapping[str, float], size: float) -> float:
@@ -362,19 +369,19 @@ def _particles(odds: Mapping[str, float], size: float) -> float:
     return size * min(odds["probability"], 1.0 - odds["probability"])
 
 
-def _factor(one: Mapping[str, float] | None, particles: float = math.inf) -> str:
-    if one is None:
+def _factor(odds: Mapping[str, float] | None, particles: float = math.inf) -> str:
+    if odds is None:
         return "not known"
     if particles < MIN_PARTICLES:
         return f"too few particles ({particles:.0f})"
-    return f"{one['bayes_factor']:.2g} ({one['bayes_factor_low']:.2g} to {one['bayes_factor_high']:.2g})"
+    return f"{odds['bayes_factor']:.2g} ({odds['bayes_factor_low']:.2g} to {odds['bayes_factor_high']:.2g})"
 
 
-def _interval(one: Mapping[str, Any] | None) -> str:
-    if one is None:
+def _interval(effect: Mapping[str, Any] | None) -> str:
+    if effect is None:
         return "not simulated"
-    low, high = one["interval"]
-    return f"{_points(one['mean'])} ({_points(low)} to {_points(high)})"
+    low, high = effect["interval"]
+    return f"{_points(effect['mean'])} ({_points(low)} to {_points(high)})"
 
 
 def _uneven(p: Mapping[str, float]) -> str:

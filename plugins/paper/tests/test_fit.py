@@ -9,16 +9,16 @@ from graspsense_sim_gripper.scene.library import catalogue
 
 
 def test_what_is_fitted_is_three_figures_of_each_of_four_containers():
-    found = fit.fitted()
-    assert {kind for kind, _ in found} == {"odwalla", "naked", "can", "water"}
-    assert len(found) == 12
-    assert found.keys() == fit.start().keys()
-    assert found["can", "damping_n_s_m"] == 200.0
+    values = fit.fitted()
+    assert {kind for kind, _ in values} == {"odwalla", "naked", "can", "water"}
+    assert len(values) == 12
+    assert values.keys() == fit.start().keys()
+    assert values["can", "damping_n_s_m"] == 200.0
     # The scale and the unfitted spread stand in the reason; the value beside it is their product.
     for name, spec in catalogue().items():
         kind = name.partition(":")[0]
         if kind in fit.TRIALS:
-            again = fit.with_figures(spec, *(found[kind, figure] for figure in fit.FIGURES))
+            again = fit.with_figures(spec, *(values[kind, figure] for figure in fit.FIGURES))
             assert again.stiffness_spread == pytest.approx(spec.stiffness_spread, rel=1e-12)
             assert (again.share, again.terms) == (spec.share, spec.terms)
 
@@ -30,7 +30,7 @@ def test_the_search_begins_where_nothing_was_fitted():
     assert begun.stiffness_spread == 0.08
     assert dict(begun.terms)["loss"]["damping_n_s_m"] == 0.0
     table = tomllib.loads(fit.as_toml(begun))
-    assert {one["type"]: one for one in table["terms"]}["loss"]["damping_n_s_m"] == 0.0
+    assert {term["type"]: term for term in table["terms"]}["loss"]["damping_n_s_m"] == 0.0
 
 
 def test_the_authors_tree_and_its_splits():
@@ -42,7 +42,7 @@ def test_the_authors_tree_and_its_splits():
         fit.Squeeze(0.3, 0.052, 7.0, 8.0),
     )
     states = ["full_open", "full_closed", "empty_open", "empty_open", "empty_closed"]
-    assert [fit.by_the_tree(one) for one in (long, hit, deep, weak, other)] == states
+    assert [fit.by_the_tree(squeeze) for squeeze in (long, hit, deep, weak, other)] == states
     sorted_by = fit.by_the_splits(states, (long, hit, deep, weak, other))
     # One of the two empty, open ones is deep and one is weak; the rest lies where it belongs.
     assert sorted_by == {
@@ -55,14 +55,14 @@ def test_the_authors_tree_and_its_splits():
 
 
 def test_targets_are_those_that_may_be_fitted_to():
-    found = fit.targets()
-    assert [name for name in found if name.startswith("table")] == [
+    targets = fit.targets()
+    assert [name for name in targets if name.startswith("table")] == [
         "table_2",
         *(f"table_3_{kind}" for kind in fit.TRIALS),
     ]
-    assert found["table_2"].rate == 215 / 229
-    assert fit.objective({name: target.rate for name, target in found.items()}) == 0.0
-    off = {name: target.rate + target.deviation for name, target in found.items()}
+    assert targets["table_2"].rate == 215 / 229
+    assert fit.objective({name: target.rate for name, target in targets.items()}) == 0.0
+    off = {name: target.rate + target.deviation for name, target in targets.items()}
     assert fit.objective(off) == pytest.approx(9.0)
     assert fit.objective(off, "tree") == pytest.approx(4.0)
 
@@ -75,8 +75,8 @@ def test_the_descent_finds_the_least_of_a_bowl_and_says_what_is_pinned():
         return a * a + b * b + 0.5 * a * b
 
     begun = {("a", "x"): 0.0, ("b", "x"): 0.0, ("c", "x"): 7.0}
-    found = fit.descend(cost, begun, {"x": (0.0, 1.0, 2.0, 4.0, 8.0)}, 3)
-    assert found.values == {**best, ("c", "x"): 7.0}
-    assert found.cost == 0.0
-    assert found.pinned(("c", "x"), 1.0) == (0.0, 8.0)
-    assert found.pinned(("b", "x"), 0.25) == (2.0, 2.0)
+    descent = fit.descend(cost, begun, {"x": (0.0, 1.0, 2.0, 4.0, 8.0)}, 3)
+    assert descent.values == {**best, ("c", "x"): 7.0}
+    assert descent.cost == 0.0
+    assert descent.pinned(("c", "x"), 1.0) == (0.0, 8.0)
+    assert descent.pinned(("b", "x"), 0.25) == (2.0, 2.0)

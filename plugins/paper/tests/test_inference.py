@@ -33,10 +33,10 @@ def test_quantiles_follow_the_weights() -> None:
 
 def test_contraction_compares_with_the_prior() -> None:
     sample = np.random.default_rng(1).normal(0.5, 0.5, 4000)
-    found = contraction(WIDE, sample, np.ones(4000))
-    assert found.contraction == pytest.approx(1.0 - 0.25 / 4.0, abs=0.01)
-    assert found.prior[2] == pytest.approx(3.92, abs=0.01)
-    assert found.posterior[1] == pytest.approx(0.5, abs=0.05)
+    contracted = contraction(WIDE, sample, np.ones(4000))
+    assert contracted.contraction == pytest.approx(1.0 - 0.25 / 4.0, abs=0.01)
+    assert contracted.prior[2] == pytest.approx(3.92, abs=0.01)
+    assert contracted.posterior[1] == pytest.approx(0.5, abs=0.05)
 
 
 def test_a_prior_needs_a_source() -> None:

@@ -50,12 +50,12 @@ def test_printed_matrices_have_the_truth_where_it_is_said_to_be():
     assert (paper.matrix("table_5").confusion.correct, paper.matrix("table_6").confusion.correct) == (89, 207)
 
 
-@pytest.mark.parametrize("one", published().rates, ids=lambda one: one.id)
-def test_a_printed_rate_is_its_counts_or_a_note_says_what_is_wrong(one):
-    if one.correct is None or abs(one.correct / one.n - one.printed) > 0.001:
-        assert one.note
-    low, high = one.interval or (0.0, 1.0)
-    assert low <= one.rate <= high
+@pytest.mark.parametrize("rate", published().rates, ids=lambda rate: rate.id)
+def test_a_printed_rate_is_its_counts_or_a_note_says_what_is_wrong(rate):
+    if rate.correct is None or abs(rate.correct / rate.n - rate.printed) > 0.001:
+        assert rate.note
+    low, high = rate.interval or (0.0, 1.0)
+    assert low <= rate.rate <= high
 
 
 def test_every_published_rate_has_an_experiment_with_a_case_for_it():
@@ -65,7 +65,7 @@ def test_every_published_rate_has_an_experiment_with_a_case_for_it():
         alone = read_experiment(rate.experiment)
         assert any(case.part == rate.experiment for case in planned.cases)
         assert any(
-            all(case.at.get(key) == value for key, value in rate.at.items())
+            all(case.at.get(key) == value for key, value in rate.settings.items())
             and rate.target in case.judge.targets
             for case in alone.cases
         )
@@ -73,7 +73,7 @@ def test_every_published_rate_has_an_experiment_with_a_case_for_it():
 
 def test_numbers_of_trials_are_the_papers():
     groups = {group.objects[0]: group for group in read_experiment("table_2").cases[0].data.groups}
-    assert {name: (one.total, one.instances) for name, one in groups.items()} == {
+    assert {name: (group.total, group.instances) for name, group in groups.items()} == {
         "odwalla": (66, 12),
         "naked": (41, 10),
         "can": (42, 12),
@@ -193,12 +193,12 @@ def test_each_bottle_may_be_used_in_one_state_only():
     plans = [plan_trials(case.settings, groups_of(case.data), 0) for case in (every, single)]
     assert sorted(plans[0].labels) == sorted(plans[1].labels)
     assert len(set(plans[1].instances)) == 50
-    of = [
+    labels_by_bottle = [
         {i: {b for a, b in zip(p.instances, p.labels, strict=True) if a == i} for i in p.instances}
         for p in plans
     ]
-    assert all(len(labels) == 1 for labels in of[1].values())
-    assert all(len(labels) >= 3 for labels in of[0].values())
+    assert all(len(labels) == 1 for labels in labels_by_bottle[1].values())
+    assert all(len(labels) >= 3 for labels in labels_by_bottle[0].values())
     with pytest.raises(ConfigError, match="3 instances cannot be in one of 4 states each"):
         Group(objects=("odwalla",), instances=3, states_per_instance="one").planned(
             simulated_objects(every.settings)
@@ -288,11 +288,11 @@ def test_four_unbroken_eggs_are_too_few_to_tell(broken, n, verdict):
     ],
 )
 def test_a_claim_that_depends_on_what_the_paper_does_not_say_cannot_be_told(verdicts, verdict):
-    found = [
-        Claim(id="x", says="", rule="", basis="fitted", verdict=one, number=str(k), n="")
-        for k, one in enumerate(verdicts)
+    claims = [
+        Claim(id="x", says="", rule="", basis="fitted", verdict=told, number=str(k), n="")
+        for k, told in enumerate(verdicts)
     ]
-    assert _merged(found).verdict == verdict
+    assert _merged(claims).verdict == verdict
 
 
 @given(
@@ -310,11 +310,11 @@ def test_a_wider_interval_never_tells_more(interval, limits, wider):
 @given(
     st.lists(st.floats(0, 10), min_size=1, max_size=12), st.lists(st.floats(0, 10), min_size=1, max_size=12)
 )
-def test_a_split_is_between_guessing_and_perfect_and_the_same_either_way(one, other):
-    share = split_by(one, other)
+def test_a_split_is_between_guessing_and_perfect_and_the_same_either_way(low, other):
+    share = split_by(low, other)
     assert 0.5 <= share <= 1.0
-    assert share == pytest.approx(split_by(other, one))
-    assert split_by(one, [11.0 + v for v in other]) == 1.0
+    assert share == pytest.approx(split_by(other, low))
+    assert split_by(low, [11.0 + v for v in other]) == 1.0
 
 
 FIGURE = """
@@ -370,11 +370,11 @@ def test_parts_are_done_as_if_alone_and_the_resolved_file_means_the_same_tasks(t
     assert {task.key for task in again.tasks()} == {task.key for task in planned.tasks()}
 
     summary = summarise(planned, results)
-    found = findings_of(summary)
-    row = next(one for one in rows(summary, published()) if one.published.id == "table_3_can")
+    findings = findings_of(summary)
+    row = next(compared for compared in rows(summary, published()) if compared.published.id == "table_3_can")
     assert isinstance(row, RateComparison)
     assert row.ours.n == 6
-    checked = {one["id"]: one for one in found.values["claims"]}
+    checked = {claim["id"]: claim for claim in findings.values["claims"]}
     assert "above in 0 of 1" in checked["fig_6_force"]["number"]
     assert checked["fig_6_force"]["verdict"] == "cannot be told"  # one grasp shows nothing
     assert checked["fig_6_force"]["n"] == "1 grasp"

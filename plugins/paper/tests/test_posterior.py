@@ -84,9 +84,11 @@ def test_pressure_changes_the_share_in_closed_containers_with_the_force():
 
 
 def test_later_squeezes_of_a_placement_are_better_centred():
-    first, second, third = (scene("can:full_open", force_n, order=0.75) for force_n in paper_model.FORCES_N)
-    assert second["offset_spread_m"] == pytest.approx(first["offset_spread_m"] / 2)
-    assert third["offset_spread_m"] == pytest.approx(first["offset_spread_m"] / 4)
+    at_17_n, at_20_n, at_23_n = (
+        scene("can:full_open", force_n, order=0.75) for force_n in paper_model.FORCES_N
+    )
+    assert at_20_n["offset_spread_m"] == pytest.approx(at_17_n["offset_spread_m"] / 2)
+    assert at_23_n["offset_spread_m"] == pytest.approx(at_17_n["offset_spread_m"] / 4)
     assert scene("can:full_open", 23.0)["offset_spread_m"] == VALUES["offset_spread_m"]
 
 
@@ -104,7 +106,9 @@ def test_pads_stiffen_only_where_that_explanation_is_present():
 
 def test_nonlinear_cells_show_other_forces_in_proportion_to_the_force():
     trace = trace_of_forces([0.0, 10.0, 20.0])
-    shown = paper_model.with_nonlinear_cells(lambda one: one.force_left_n.tolist(), 0.1)(trace)
+    shown = paper_model.with_nonlinear_cells(lambda shown_trace: shown_trace.force_left_n.tolist(), 0.1)(
+        trace
+    )
     assert shown == pytest.approx([0.0, 11.0, 24.0])
 
 
@@ -144,11 +148,11 @@ def test_an_inference_of_twenty_figures_finds_a_posterior_that_is_known(tmp_path
     np.random.seed(3)  # noqa: NPY002 (pyABC draws from it)
     names = [f"x{k}" for k in range(20)]
     wanted = {"a": (1.5, 0.5), "b": (-1.0, 0.5), "c": (2.0, 1.0)}
-    wanted = {name: paper_model.Observed(*one) for name, one in wanted.items()}
+    wanted = {name: paper_model.Observed(*figure) for name, figure in wanted.items()}
     depends = np.zeros((3, 20))
     depends[0, 0] = depends[1, 1] = depends[2, 0] = depends[2, 3] = 1.0
     depends[1, 2] = 0.5
-    errors = np.array([one.deviation for one in wanted.values()])
+    errors = np.array([figure.deviation for figure in wanted.values()])
 
     def simulate(scores):
         seen = depends @ [scores[name] for name in names] + errors * rng.normal(size=3)
@@ -162,20 +166,20 @@ def test_an_inference_of_twenty_figures_finds_a_posterior_that_is_known(tmp_path
         return seen
 
     abc = posterior.abc_of(recorded, names, wanted, 100)
-    abc.new(f"sqlite:///{tmp_path / 'abc.db'}", {name: one.value for name, one in wanted.items()})
+    abc.new(f"sqlite:///{tmp_path / 'abc.db'}", {name: figure.value for name, figure in wanted.items()})
     history = abc.run(minimum_epsilon=1.5, max_nr_populations=4)
-    found = posterior.nearest(done, history, names, wanted, 200)
-    scores, w = found.scores, found.weights / found.weights.sum()
+    sample = posterior.nearest(done, history, names, wanted, 200)
+    scores, w = sample.scores, sample.weights / sample.weights.sum()
     precision = np.eye(20) + depends.T @ np.diag(errors**-2.0) @ depends
     covariance = np.linalg.inv(precision)
-    mean = covariance @ depends.T @ (errors**-2.0 * [one.value for one in wanted.values()])
+    mean = covariance @ depends.T @ (errors**-2.0 * [figure.value for figure in wanted.values()])
     deviation = np.sqrt(np.diag(covariance))
     size = 1.0 / np.square(w).sum()
     assert size > 40.0
-    found = w @ scores
-    spread = np.sqrt(w @ (scores - found) ** 2)
+    centre = w @ scores
+    spread = np.sqrt(w @ (scores - centre) ** 2)
     # Four standard errors of a mean, of twenty.
-    assert np.abs((found - mean) / deviation).max() < 4.0 / np.sqrt(size)
+    assert np.abs((centre - mean) / deviation).max() < 4.0 / np.sqrt(size)
     assert spread / deviation == pytest.approx(1.0, abs=0.5)
 
 

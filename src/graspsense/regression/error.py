@@ -29,13 +29,15 @@ class RegressionError:
 
     def words(self, unit: str) -> str:
         """Return the mean absolute error as text, with its interval."""
-        of = counted(self.n, "trial") + (
+        counts = counted(self.n, "trial") + (
             "" if self.instances is None else f" of {counted(self.instances, 'instance')}"
         )
         if self.interval is None:
-            return f"{self.mean_absolute:.4g} {unit}".rstrip() + f" ({of}; no interval: {self.no_interval})"
+            return (
+                f"{self.mean_absolute:.4g} {unit}".rstrip() + f" ({counts}; no interval: {self.no_interval})"
+            )
         low, high = self.interval
-        return f"{self.mean_absolute:.4g} {unit}".rstrip() + f" (95 %: {low:.4g} to {high:.4g}; {of})"
+        return f"{self.mean_absolute:.4g} {unit}".rstrip() + f" (95 %: {low:.4g} to {high:.4g}; {counts})"
 
 
 def error_of(errors: Sequence[float], instances: Sequence[str] | None) -> RegressionError:
@@ -53,9 +55,9 @@ def error_of(errors: Sequence[float], instances: Sequence[str] | None) -> Regres
 
 
 def difference_of_errors(
-    first: Sequence[float], second: Sequence[float], instances: Sequence[str] | None
+    errors: Sequence[float], others: Sequence[float], instances: Sequence[str] | None
 ) -> Difference:
     """Return the mean absolute error of `first` minus that of `second`, on the same trials, with its 95 % interval."""
-    each = [abs(value) - abs(other) for value, other in zip(first, second, strict=True)]
+    each = [abs(value) - abs(other) for value, other in zip(errors, others, strict=True)]
     interval, reason = mean_interval(each, instances)
     return Difference(math.fsum(each) / len(each), interval, reason)

@@ -327,19 +327,19 @@ class _Evaluator:
             )
             return
         having = np.array(~np.isnan(control.table.values).all(axis=1))
-        n, of = int(having.sum()), len(having)
+        n, total = int(having.sum()), len(having)
         why = f": {control.missing}" if control.missing else ""
-        words = f"{n} of {counted(of, 'trial')} have such features{why}"
+        words = f"{n} of {counted(total, 'trial')} have such features{why}"
         folds = self.headline.folds[having]
         if n == 0 or len(np.unique(folds)) < 2:
             too_few = "; these are too few to learn from" if n else ""
             self.controls[name] = RegressionMeasurement(what=control.what, reason=f"{words}{too_few}")
             return
-        predicted = np.full(of, np.nan)
+        predicted = np.full(total, np.nan)
         predicted[having] = self._predicted(name, control.table.values[having], folds, self.values[having])
         rows = np.flatnonzero(having).tolist()
         self._errors[name] = (predicted - self.values, rows)
-        what = control.what if n == of else f"{control.what}; {words}"
+        what = control.what if n == total else f"{control.what}; {words}"
         self.controls[name] = self._against(what, predicted, self.headline, rows)
 
     def _in_order(self) -> None:

@@ -111,7 +111,7 @@ class RegressionModel:
             "version": VERSION,
             "estimator": self.estimator,
             "target_value": [self.target.name, self.target.unit],
-            "features": [list(one) for one in zip(self.table.names, self.table.units, strict=True)],
+            "features": [list(column) for column in zip(self.table.names, self.table.units, strict=True)],
             "provenance": json_ready(self.provenance),
             "interval": {
                 "coverage": COVERAGE,

@@ -84,9 +84,9 @@ class _Reader:
         if self._in_data:
             self._row(line)
             return
-        keyword, _, rest = line.partition(" ") if " " in line else line.partition("\t")
+        keyword, _, declaration = line.partition(" ") if " " in line else line.partition("\t")
         if keyword.lower() == "@attribute":
-            self._attribute(rest)
+            self._attribute(declaration)
         elif keyword.lower() == "@data":
             self._in_data = True
             if not self._attributes:
@@ -102,27 +102,31 @@ class _Reader:
         names = [attribute.name for attribute in self._attributes]
         if class_attribute is not None and class_attribute not in names:
             raise ArffError(f"{self._source}: no attribute {class_attribute!r}; there are {_listed(names)}")
-        at = len(names) - 1 if class_attribute is None else names.index(class_attribute)
-        classes = self._attributes[at].values
+        class_column = len(names) - 1 if class_attribute is None else names.index(class_attribute)
+        classes = self._attributes[class_column].values
         if classes is None:
             raise ArffError(
-                f"{self._source}: the class {names[at]!r} is numeric; name a nominal attribute as the class"
+                f"{self._source}: the class {names[class_column]!r} is numeric; name a nominal attribute as the class"
             )
         values = np.array(self._rows)
-        labels = np.where(np.isnan(values[:, at]), MISSING_CLASS, values[:, at]).astype(np.int64)
-        schema = Schema(tuple(a for i, a in enumerate(self._attributes) if i != at), classes)
+        labels = np.where(np.isnan(values[:, class_column]), MISSING_CLASS, values[:, class_column]).astype(
+            np.int64
+        )
+        schema = Schema(tuple(a for i, a in enumerate(self._attributes) if i != class_column), classes)
         try:
-            return make_table(schema, np.delete(values, at, axis=1), labels, np.array(self._weights))
+            return make_table(
+                schema, np.delete(values, class_column, axis=1), labels, np.array(self._weights)
+            )
         except ValueError as error:
             raise ArffError(f"{self._source}: {error}") from None
 
-    def _attribute(self, rest: str) -> None:
-        match = _TOKEN.match(rest)
+    def _attribute(self, declaration: str) -> None:
+        match = _TOKEN.match(declaration)
         if match is None:
             raise self._error(
                 "@attribute without a name; write @attribute NAME numeric or @attribute NAME {a, b}"
             )
-        name, kind = _text(match), rest[match.end() :].strip()
+        name, kind = _text(match), declaration[match.end() :].strip()
         if len(self._attributes) >= MOST_ATTRIBUTES:
             raise self._error(f"a table has at most {MOST_ATTRIBUTES} attributes, and this has more")
         if kind.startswith("{"):
@@ -149,16 +153,16 @@ class _Reader:
         weight = 1.0
         if line.startswith("{"):
             end = line.find("}")
-            cells, rest = (
+            cells, ending = (
                 self._sparse(line[1:end] if end > 0 else line[1:]),
                 line[end + 1 :] if end > 0 else "",
             )
         else:
             brace = re.search(r",\s*\{([^{}'\"]*)\}\s*$", line)
-            rest = line[brace.start() :] if brace else ""
+            ending = line[brace.start() :] if brace else ""
             cells = list(self._tokens(line[: brace.start()] if brace else line))
-        if rest.strip(" \t,"):
-            weight = self._number(rest.strip(" \t,{}"), "the weight")
+        if ending.strip(" \t,"):
+            weight = self._number(ending.strip(" \t,{}"), "the weight")
         if len(cells) != len(self._attributes):
             raise self._error(f"{len(cells)} values; there are {len(self._attributes)} attributes")
         self._rows.append([self._cell(i, cell) for i, cell in enumerate(cells)])
@@ -198,19 +202,19 @@ class _Reader:
             ) from None
 
     def _tokens(self, text: str) -> Iterator[str]:
-        at = 0
+        position = 0
         while True:
-            match = _TOKEN.match(text, at)
+            match = _TOKEN.match(text, position)
             if match is None:
-                wrong = text[at : at + LONGEST_SHOWN].strip()
+                wrong = text[position : position + LONGEST_SHOWN].strip()
                 raise self._error(f"cannot read {wrong!r} as a value; quote it, or write ? where missing")
             yield _text(match)
-            at = _after_space(text, match.end())
-            if text.startswith(",", at):
-                at = _after_space(text, at + 1)
-            elif text.startswith("%", at):
+            position = _after_space(text, match.end())
+            if text.startswith(",", position):
+                position = _after_space(text, position + 1)
+            elif text.startswith("%", position):
                 return
-            if at >= len(text):
+            if position >= len(text):
                 return
 
     def _error(self, message: str) -> ArffError:
@@ -222,9 +226,9 @@ def _listed(names: Sequence[str]) -> str:
     return ", ".join(name[:LONGEST_SHOWN] for name in names[:MOST_NAMED]) + more
 
 
-def _after_space(text: str, at: int) -> int:
-    found = _SPACE.match(text, at)
-    return at if found is None else found.end()
+def _after_space(text: str, position: int) -> int:
+    match = _SPACE.match(text, position)
+    return position if match is None else match.end()
 
 
 def _text(match: re.Match[str]) -> str:

@@ -24,21 +24,21 @@ def leaves_of_rows(splits: Splits, values: Reals, rows: Indices, nodes: Indices)
     result = nodes.astype(np.int64)
     for begin in range(0, len(rows), CHUNK):
         chunk = slice(begin, begin + CHUNK)
-        at: AnyArray = result[chunk].copy()
+        node: AnyArray = result[chunk].copy()
         offset = rows[chunk] * np.int64(width)
-        index = np.arange(len(at))
+        index = np.arange(len(node))
         while True:
-            feature = splits.feature[at]
+            feature = splits.feature[node]
             on_way = feature != LEAF
             if not on_way.all():
-                result[begin + index] = at
+                result[begin + index] = node
                 going = np.flatnonzero(on_way)
                 if not going.size:
                     break
-                at, offset, index, feature = at[going], offset[going], index[going], feature[going]
+                node, offset, index, feature = node[going], offset[going], index[going], feature[going]
             tested = flat[offset + feature]
-            slots = splits.slot(at, tested) if nominal else tested > splits.threshold[at]
-            at = splits.first_child[at] + slots
+            slots = splits.slot(node, tested) if nominal else tested > splits.threshold[node]
+            node = splits.first_child[node] + slots
     return result
 
 

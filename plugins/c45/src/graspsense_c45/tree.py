@@ -96,8 +96,8 @@ class Tree:
 
     def children(self, node: int) -> range:
         """Return the children of a node; a leaf has none."""
-        first = int(self.splits.first_child[node])
-        return range(first, first + int(self.splits.n_children[node]))
+        eldest = int(self.splits.first_child[node])
+        return range(eldest, eldest + int(self.splits.n_children[node]))
 
     def is_leaf(self, node: int) -> bool:
         """Return whether the node is a leaf."""
@@ -160,5 +160,5 @@ def finish(grown: GrowingTree, weight_bits: int, schema: Schema, laplace: bool) 
 
 def first_children(n_children: AnyArray) -> AnyArray:
     """Return the first child of each node of a tree that is numbered breadth first; 0 at leaves."""
-    first = 1 + np.cumsum(n_children) - n_children
-    return np.where(n_children > 0, first, 0).astype(np.int32)
+    eldest = 1 + np.cumsum(n_children) - n_children
+    return np.where(n_children > 0, eldest, 0).astype(np.int32)

@@ -59,9 +59,9 @@ def stratify(labels: Sequence[int], n_folds: int) -> list[int]:
     order = list(range(len(labels)))
     begin = 1
     while begin < len(order):
-        first = labels[order[begin - 1]]
+        label = labels[order[begin - 1]]
         for other in range(begin, len(order)):
-            if labels[order[other]] == first:
+            if labels[order[other]] == label:
                 order[begin], order[other] = order[other], order[begin]
                 begin += 1
         begin += 1
@@ -70,9 +70,9 @@ def stratify(labels: Sequence[int], n_folds: int) -> list[int]:
 
 def test_block(n_rows: int, n_folds: int, fold: int) -> range:
     """Return the places of the test rows of a fold: contiguous; the first folds are longer by one where needed."""
-    size, rest = divmod(n_rows, n_folds)
-    start = fold * size + min(fold, rest)
-    return range(start, start + size + (1 if fold < rest else 0))
+    size, remainder = divmod(n_rows, n_folds)
+    start = fold * size + min(fold, remainder)
+    return range(start, start + size + (1 if fold < remainder else 0))
 
 
 def hold_out(labels: ArrayLike, n_folds: int) -> Indices:

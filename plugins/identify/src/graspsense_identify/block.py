@@ -47,7 +47,7 @@ def lag_of_block(config: SimConfig, block: Sequence[RecordedSqueeze]) -> float:
     has no contact or too few measurements of the force.
     """
     ready = [prepared(squeeze, config.force_delay_s) for squeeze in block]
-    n = sum(len(one.force_n) for one in ready)
+    n = sum(len(squeeze.force_n) for squeeze in ready)
     own, lagging = (_fitted(ready, hardens=True, has_lag=has_lag) for has_lag in (False, True))
     gain = math.log(_error(own) / _error(lagging))
     shown = n * gain - 0.5 * math.log(n) > EVIDENCE and gain > -math.log(1.0 - LEAST_GAIN)
@@ -67,25 +67,29 @@ def with_fingertips_of_block(
     the delay of the settings. Raises ConfigError if a squeeze has no contact or too few measurements of the force.
     """
     ready = [prepared(squeeze, config.force_delay_s, FULL, lag_s) for squeeze in block]
-    ready = [evolve(one, force_n=one.force_n / part) for one, part in zip(ready, share, strict=True)]
+    ready = [
+        evolve(squeeze, force_n=squeeze.force_n / part) for squeeze, part in zip(ready, share, strict=True)
+    ]
     linear = _fitted(ready, hardens=False)
     fit = _fitted(ready, hardens=True)
     if fit.hardening_m is None or fit.residual > HARDENS_BELOW * linear.residual:
         fit = linear
     k = fit.stiffness_n_m
-    found = f"{k:.4g} N/m each"
+    stiffness = f"{k:.4g} N/m each"
     if len(ready) >= LEAST_SQUEEZES:
-        alone = np.log([_fitted([one], hardens=fit.hardening_m is not None).stiffness_n_m for one in ready])
+        alone = np.log(
+            [_fitted([squeeze], hardens=fit.hardening_m is not None).stiffness_n_m for squeeze in ready]
+        )
         scatter = float(np.std(alone, ddof=1)) / math.sqrt(len(alone))
         half = student(len(alone) - 1) * math.hypot(scatter, LAW_ERROR)
-        found += f" (90 %: {k * math.exp(-half):.4g} to {k * math.exp(half):.4g})"
-    found += (
+        stiffness += f" (90 %: {k * math.exp(-half):.4g} to {k * math.exp(half):.4g})"
+    stiffness += (
         ", linear"
         if fit.hardening_m is None
         else f", twice the linear force at {1e3 * fit.hardening_m:.2g} mm"
     )
     squeezes = "a squeeze" if len(ready) == 1 else f"{len(ready)} squeezes"
-    said = f"the fingertips follow from {squeezes} of the block: {found}; residual {fit.residual:.2%} of the peak; "
+    said = f"the fingertips follow from {squeezes} of the block: {stiffness}; residual {fit.residual:.2%} of the peak; "
     said += f"their force is late by {1e3 * (config.force_delay_s + lag_s):.3g} ms, "
     said += (
         "the delay of the settings" if lag_s == 0.0 else "which these squeezes show, and the settings do not"
@@ -105,13 +109,13 @@ def _fitted(squeezes: Sequence[Squeeze], *, hardens: bool, has_lag: bool = False
 
     peak = float(np.median([squeeze.peak_n for squeeze in squeezes]))
     depth = max(float(np.median([squeeze.depth_m for squeeze in squeezes])), 1e-6)
-    first = 2.0 * peak / depth
+    start_n_m = 2.0 * peak / depth
 
-    def residuals(at: np.ndarray) -> np.ndarray:
-        k, cubic = math.exp(at[0]), at[1] if hardens else 0.0
+    def residuals(point: np.ndarray) -> np.ndarray:
+        k, cubic = math.exp(point[0]), point[1] if hardens else 0.0
         parts = []
-        for squeeze, width in zip(squeezes, at[-len(squeezes) :], strict=True):
-            gap = squeeze.delayed(LAG_UNIT_S * at[1 + hardens]).gap_m if has_lag else squeeze.gap_m
+        for squeeze, width in zip(squeezes, point[-len(squeezes) :], strict=True):
+            gap = squeeze.delayed(LAG_UNIT_S * point[1 + hardens]).gap_m if has_lag else squeeze.gap_m
             x = np.maximum(squeeze.width_m + depth * width - gap, 0.0)
             parts.append(
                 (squeeze.at_samples(0.5 * k * x * (1.0 + cubic * (x / depth) ** 2)) - squeeze.force_n) / peak
@@ -119,7 +123,7 @@ def _fitted(squeezes: Sequence[Squeeze], *, hardens: bool, has_lag: bool = False
         return np.concatenate(parts)
 
     start = [
-        math.log(first),
+        math.log(start_n_m),
         *([0.1] if hardens else []),
         *([0.0] if has_lag else []),
         *([0.0] * len(squeezes)),

@@ -32,18 +32,21 @@ STATISTICS: Final = (
 
 
 def predictive_checks(
-    model: ForwardModel, fitted: Fitted, found: Uncertainty, squeezes: Sequence[Squeeze], seed: int = 1
+    model: ForwardModel, fitted: Fitted, intervals: Uncertainty, squeezes: Sequence[Squeeze], seed: int = 1
 ) -> tuple[PredictiveCheck, ...]:
     """Return a check of each statistic."""
     rng = np.random.default_rng(seed)
     used = list(squeezes[:MAX_SQUEEZES])
-    recorded = np.array([_statistics(one, one.force_n) for one in used])
+    recorded = np.array([_statistics(squeeze, squeeze.force_n) for squeeze in used])
     spread = math.hypot(
-        *(one if math.isfinite(one) else 0.0 for one in (found.between_objects, found.between_squeezes))
+        *(
+            spread if math.isfinite(spread) else 0.0
+            for spread in (intervals.between_objects, intervals.between_squeezes)
+        )
     )
     residual = float(np.sqrt(np.mean(fitted.residuals**2)))
     means, every = [], []
-    for draw in found.draws[:SETS]:
+    for draw in intervals.draws[:SETS]:
         rows = []
         for squeeze, width, factor in zip(used, fitted.widths_m, fitted.factors, strict=False):
             own = math.exp(spread * rng.standard_normal()) if len(used) > 1 else factor

@@ -88,15 +88,15 @@ def choose(
     ]
     if not candidates:
         raise ConfigError(f"no candidate for these squeezes has the terms {only}")
-    directly = in_threads(lambda one: fit(direct, one, squeezes), candidates, counter.done)
+    directly = in_threads(lambda candidate: fit(direct, candidate, squeezes), candidates, counter.done)
     least_directly = max(min(thread.rms for thread in directly), LEAST_ERROR)
     near = [thread for thread in directly if thread.rms <= WORTH_REFINING * least_directly]
-    fits = in_threads(lambda one: refined(model, one, squeezes), near, counter.done)
+    fits = in_threads(lambda fitted: refined(model, fitted, squeezes), near, counter.done)
     least = max(min(thread.rms for thread in fits), LEAST_ERROR)
     worth = [
         thread for thread in fits if thread.rms <= WORTH_TRYING * least and not _adds_nothing(thread, fits)
     ]
-    judged = in_threads(lambda one: _judged(model, one, squeezes), worth, counter.done)
+    judged = in_threads(lambda fitted: _judged(model, fitted, squeezes), worth, counter.done)
     best = _simplest(judged)
     converged = fit(
         model, best.fitted.candidate, squeezes, start=best.fitted, max_evaluations=MANY_EVALUATIONS
@@ -107,13 +107,13 @@ def choose(
     scores = [_score(thread, best, judged, fits) for thread in fits]
     dropped = [
         CandidateScore(
-            terms=one.candidate.name,
-            parameters=len(one.values),
+            terms=fitted.candidate.name,
+            parameters=len(fitted.values),
             error=math.nan,
-            fit_error=one.rms,
-            verdict=_dropped(one.rms / least_directly),
+            fit_error=fitted.rms,
+            verdict=_dropped(fitted.rms / least_directly),
         )
-        for one in only_directly
+        for fitted in only_directly
     ]
     ranked = (*sorted(scores, key=_rank), *sorted(dropped, key=_rank))
     return Choice(fitted=converged, refined=tuple(fits), scores=ranked)
@@ -128,16 +128,16 @@ def _rough(
 ) -> list[Fitted]:
     """Return the direct fit of each law without memory: alone, or with a branch if the squeezes show a memory."""
     alone = in_threads(
-        lambda one: fit(direct, with_corners(direct, one, squeezes), squeezes), statics, counter.done
+        lambda law: fit(direct, with_corners(direct, law, squeezes), squeezes), statics, counter.done
     )
     if not with_memory:
         return alone
     # From its own starts, and from the fit without a memory, which has found the corners of the law.
     roughly = [static.joined(with_memory[1]) for static in statics]
-    roughly += [one.starting_at(_values(own)) for one, own in zip(roughly, alone, strict=True)]
-    tried = in_threads(lambda one: fit(direct, one, squeezes), roughly, counter.done)
+    roughly += [law.starting_at(_values(own)) for law, own in zip(roughly, alone, strict=True)]
+    tried = in_threads(lambda law: fit(direct, law, squeezes), roughly, counter.done)
     pairs = zip(tried[: len(statics)], tried[len(statics) :], strict=True)
-    return [min(pair, key=lambda one: one.cost) for pair in pairs]
+    return [min(pair, key=lambda fitted: fitted.cost) for pair in pairs]
 
 
 def refined(model: ForwardModel, directly: Fitted, squeezes: Sequence[Squeeze]) -> Fitted:
@@ -150,7 +150,7 @@ def refined(model: ForwardModel, directly: Fitted, squeezes: Sequence[Squeeze]) 
     law = with_corners(model, directly.candidate, squeezes)
     if not law.more_starts:
         return fitted
-    return min(fitted, fit(model, law, squeezes), key=lambda one: one.cost)
+    return min(fitted, fit(model, law, squeezes), key=lambda either: either.cost)
 
 
 def _dropped(times: float) -> str:
@@ -177,9 +177,9 @@ def _kept(rough: Sequence[Fitted]) -> list[int]:
     """Return which laws are tried with every memory: those that fit best."""
     order = np.argsort([fitted.cost for fitted in rough], kind="stable").tolist()
     # A gas takes no other law's place: it resembles a spring that stiffens.
-    first = [k for k in order if GAS not in rough[k].candidate.slots][:STATIC_KEPT]
+    solid = [k for k in order if GAS not in rough[k].candidate.slots][:STATIC_KEPT]
     # The simplest law stays among the candidates, so that the table shows what it costs to leave the others out.
-    return sorted({0, *first, *order[:STATIC_KEPT]})
+    return sorted({0, *solid, *order[:STATIC_KEPT]})
 
 
 def _joined(static: CandidateLaw, with_memory: Sequence[CandidateLaw]) -> list[CandidateLaw]:
@@ -193,11 +193,11 @@ def _adds_nothing(fitted: Fitted, fits: Sequence[Fitted]) -> bool:
     A parameter more has to reduce the residual by more than it would reduce that of noise (Bayesian information
     criterion, Schwarz 1978), and by `LEAST_GAIN` where the terms of the simpler candidate are among those of this one.
     """
-    for one in fits:
-        more = len(fitted.values) - len(one.values)
-        if more > 0 and information(one) < information(fitted):
+    for simpler in fits:
+        more = len(fitted.values) - len(simpler.values)
+        if more > 0 and information(simpler) < information(fitted):
             return True
-        if _contains(fitted, one) and least_error(fitted) > (1.0 - LEAST_GAIN) * least_error(one):
+        if _contains(fitted, simpler) and least_error(fitted) > (1.0 - LEAST_GAIN) * least_error(simpler):
             return True
     return False
 
@@ -289,13 +289,13 @@ def _stretch_masks(squeeze: Squeeze) -> list[Mask]:
 
 def _simplest(judged: Sequence[_Judged]) -> _Judged:
     """Return the simplest candidate that is not worse than the best."""
-    best = min(judged, key=lambda one: float(np.mean(_logarithms(one))))
-    for one in sorted(judged, key=lambda one: len(one.fitted.values)):
-        difference = _logarithms(one) - _logarithms(best)
+    best = min(judged, key=lambda candidate: float(np.mean(_logarithms(candidate))))
+    for candidate in sorted(judged, key=lambda candidate: len(candidate.fitted.values)):
+        difference = _logarithms(candidate) - _logarithms(best)
         spread = float(np.std(difference, ddof=1)) if len(difference) > 1 else 0.0
         error = spread / math.sqrt(len(difference))
         if float(np.mean(difference)) <= max(error, LEAST_GAIN):
-            return one
+            return candidate
     return best
 
 
@@ -308,7 +308,7 @@ def _logarithms(judged: _Judged) -> NDArray[np.float64]:
 def _score(
     fitted: Fitted, best: _Judged, judged: Sequence[_Judged], fits: Sequence[Fitted]
 ) -> CandidateScore:
-    own = next((one for one in judged if one.fitted is fitted), None)
+    own = next((candidate for candidate in judged if candidate.fitted is fitted), None)
     error = math.nan if own is None else float(np.sqrt(np.mean(own.errors**2)))
     least = float(np.sqrt(np.mean(best.errors**2)))
     if own is best:

@@ -88,8 +88,8 @@ def _loading(model: ForwardModel, squeeze: Squeeze) -> _Load:
     """Return the compression of the object (m) and the force over its peak, from the contact to the deepest sample."""
     compression = squeeze.width_m - squeeze.gap_m[squeeze.sample] - model.compressed_m(squeeze.force_n)
     force = squeeze.force_n / squeeze.peak_n
-    first, deepest = int(np.argmax(force > CONTACT_SHARE)), int(np.argmax(compression))
-    part = slice(first, deepest + 1)
+    begin, deepest = int(np.argmax(force > CONTACT_SHARE)), int(np.argmax(compression))
+    part = slice(begin, deepest + 1)
     return _Load(compression[part], force[part])
 
 

@@ -126,7 +126,9 @@ def lag_beyond_settings(model: ForwardModel, refined: Sequence[Fitted], squeezes
     """
     if not shows_memory(squeezes):
         return Lag()
-    lagging = in_threads(lambda one: fit(model, one.candidate, squeezes, start=one, has_lag=True), refined)
+    lagging = in_threads(
+        lambda fitted: fit(model, fitted.candidate, squeezes, start=fitted, has_lag=True), refined
+    )
     best = min(lagging, key=information)
     own = refined[lagging.index(best)]
     gained = information(best) <= min(information(fitted) for fitted in refined) - EVIDENCE
@@ -134,7 +136,7 @@ def lag_beyond_settings(model: ForwardModel, refined: Sequence[Fitted], squeezes
     if not gained or not better or abs(best.lag_s) > 0.98 * MAX_LAG_S:
         return Lag()
     near = [thread for thread in lagging if information(thread) <= information(best) + PLAUSIBLE]
-    lags = [one.lag_s for one in near if not _is_dominated(one, near)]
+    lags = [fitted.lag_s for fitted in near if not _is_dominated(fitted, near)]
     return Lag(
         lag_s=best.lag_s,
         error_s=math.hypot(PATH_ERROR_S, max(abs(lag - best.lag_s) for lag in lags) / normal()),
@@ -165,7 +167,7 @@ def delay_of(
         return Delay(settings_s=settings_s, used_s=used_s)
     lagging = fit(model, fitted.candidate, squeezes, start=fitted, has_lag=True)
     again = refits(model, lagging, squeezes, np.random.default_rng(0), has_lag=True)
-    lags = np.array([one.lag_s for one in again.fits])
+    lags = np.array([fitted.lag_s for fitted in again.fits])
     scattered = again.factor * math.sqrt(again.scale * float(np.sum((lags - lags.mean()) ** 2)))
     # Where the motion does not show a lag, the fits stay where they begin and do not scatter.
     random = max(scattered, normal() * lagging.lag_error_s)

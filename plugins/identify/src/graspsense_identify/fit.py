@@ -117,7 +117,7 @@ class _Problem:
         self.of_squeeze = np.repeat(np.arange(self.n), sizes)
         kept = list(zip(squeezes, masks, strict=True))
         self.masks = masks
-        self.measured = np.concatenate([one.force_n[mask] for one, mask in kept])
+        self.measured = np.concatenate([squeeze.force_n[mask] for squeeze, mask in kept])
         self.peaks = np.repeat([squeeze.peak_n for squeeze in squeezes], sizes)
         self._last: tuple[Floats, Floats] | None = None
         """The last vector, and its residuals."""
@@ -239,7 +239,7 @@ def fit(
     best = None
     for x0 in _starts(problem, start):
         x0 = np.clip(x0, low + 1e-9, high - 1e-9)
-        found = least_squares(
+        solution = least_squares(
             problem.residuals,
             x0,
             problem.jacobian,
@@ -249,8 +249,8 @@ def fit(
             ftol=TOLERANCE,
             xtol=TOLERANCE,
         )
-        if best is None or found.cost < best.cost:
-            best = found
+        if best is None or solution.cost < best.cost:
+            best = solution
     assert best is not None
     values, widths, factors = problem.split(best.x)
     return Fitted(
@@ -318,10 +318,10 @@ def held_out_rms(
 
     limits = np.array([WIDTH_RANGE, FACTOR_RANGE][: 1 + own_stiffness])
     start, steps = np.zeros(len(limits)), [STEP] * len(limits)
-    found = least_squares(
+    solution = least_squares(
         residuals, start, bounds=(-limits, limits), max_nfev=15, diff_step=steps, ftol=TOLERANCE
     )
-    return float(np.sqrt(np.mean(found.fun**2)))
+    return float(np.sqrt(np.mean(solution.fun**2)))
 
 
 def _starts(problem: _Problem, start: Fitted | None) -> list[Floats]:
@@ -334,11 +334,11 @@ def _starts(problem: _Problem, start: Fitted | None) -> list[Floats]:
         lags = LAG_STARTS if start.lag_s == 0.0 else (start.lag_s / LAG_UNIT_S,)
         return [np.append(known, lag) for lag in lags]
     law = problem.candidate
-    vectors = [np.concatenate([np.log(one), own]) for one in law.starts()]
+    vectors = [np.concatenate([np.log(values), own]) for values in law.starts()]
     if len(vectors) > STARTS:
         costs = np.sum(problem.of_all(np.array(vectors)) ** 2, axis=1)
         vectors = [vectors[int(k)] for k in np.argsort(costs)[:STARTS]]
-    for one in law.more_starts:
-        wider = one.wider_m / problem.depths
-        vectors.append(np.concatenate([np.log(one.values), wider, own[problem.n :]]))
+    for point in law.more_starts:
+        wider = point.wider_m / problem.depths
+        vectors.append(np.concatenate([np.log(point.values), wider, own[problem.n :]]))
     return vectors

@@ -43,12 +43,12 @@ SHORTEST_S: Final = 1e-6
 
 
 class Paths(NamedTuple):
-    """The paths of several squeezes, one after another in each array; `first` is where each begins, and the end."""
+    """The paths of several squeezes, one after another in each array; `starts` is where each begins, and the end."""
 
     gap_m: Any
     speed_m_s: Any
     step_s: Any
-    first: Any
+    starts: Any
 
 
 class Runs(NamedTuple):
@@ -75,7 +75,7 @@ def forces_along(pads: PadCompliance, at_rest: ContactState, paths: Paths, runs:
     for r in range(len(runs.path)):
         width = float(runs.width_m[r])
         model = ObjectModel(width, 0.0, pads, terms_of(runs.active, runs.numbers, r), 0, 1, BALANCE_RTOL)
-        begin, end = paths.first[runs.path[r]], paths.first[runs.path[r] + 1]
+        begin, end = paths.starts[runs.path[r]], paths.starts[runs.path[r] + 1]
         now, touched = at_rest, 0
         for i in range(begin, end):
             closure, speed, h = (
@@ -165,15 +165,15 @@ class ForwardModel:
                 speed = speed - rate * np.interp(force, *self._compliance)
             gaps.append(gap)
             speeds.append(speed)
-        first = np.cumsum([0, *(len(one.t_s) for one in squeezes)])
-        steps = np.concatenate([one.step_s for one in squeezes])
-        return Paths(np.concatenate(gaps), np.concatenate(speeds), steps, first)
+        starts = np.cumsum([0, *(len(squeeze.t_s) for squeeze in squeezes)])
+        steps = np.concatenate([squeeze.step_s for squeeze in squeezes])
+        return Paths(np.concatenate(gaps), np.concatenate(speeds), steps, starts)
 
     def run(self, paths: Paths, runs: Runs) -> Floats:
         """Return the force (N) at the nodes of the path of each run, a row for each; NaN where a law has none."""
         follow, compiled = path_forces(self._hardens and not self.direct)
         pads = RIGID_PADS if self.direct else self.pads
-        out = np.zeros((len(runs.path), int(np.max(np.diff(paths.first)))))
+        out = np.zeros((len(runs.path), int(np.max(np.diff(paths.starts)))))
         if compiled:
             follow(pads, _at_rest(), paths, runs, out)
             return out

@@ -58,7 +58,7 @@ class FractureFit:
         """The identified parameters."""
         unit = "N" if self.name == "force_n" else "m"
         basis = f"{self.broken} of {self.broken + self.whole} squeezes broke the object"
-        found = [
+        identified = [
             IdentifiedParameter(
                 name=f"fracture.{self.name}",
                 unit=unit,
@@ -72,7 +72,7 @@ class FractureFit:
             ),
         ]
         if self.spread is not None:
-            found.append(
+            identified.append(
                 IdentifiedParameter(
                     name=f"fracture.{self.name}.spread",
                     unit="",
@@ -82,14 +82,14 @@ class FractureFit:
                     basis=basis,
                 )
             )
-        return found
+        return identified
 
     @property
     def undetermined(self) -> list[Undetermined]:
         """What the breaks leave open."""
-        found = []
+        open_ = []
         if self.broken < LEAST_BROKEN:
-            found.append(
+            open_.append(
                 Undetermined(
                     what="fracture by force or by compression, and its spread",
                     reason=f"{self.broken} squeezes broke the object",
@@ -97,7 +97,7 @@ class FractureFit:
                 )
             )
         if self.seen_again < self.broken:
-            found.append(
+            open_.append(
                 Undetermined(
                     what="whether the objects broke",
                     reason=f"{self.broken - self.seen_again} of {self.broken} falls of the force are in the last "
@@ -105,7 +105,7 @@ class FractureFit:
                     remedy="squeeze each object once more after the fall, labelled cup#1, cup#2, cup#3",
                 )
             )
-        return found
+        return open_
 
 
 def fracture_of(
@@ -211,13 +211,13 @@ def _lognormal(breaks: Floats, survived: Floats) -> tuple[float, float]:
     mean = float(np.mean(logs))
     if len(logs) < 2:
         return mean, 0.0
-    first = max(float(np.std(logs, ddof=1)), SMALLEST_SPREAD)
-    if not len(beyond) or float(np.max(beyond)) < mean - 4.0 * first:
-        return mean, first
+    deviation = max(float(np.std(logs, ddof=1)), SMALLEST_SPREAD)
+    if not len(beyond) or float(np.max(beyond)) < mean - 4.0 * deviation:
+        return mean, deviation
 
     def negative(x: Floats) -> float:
         spread = math.exp(x[1])
         return -float(np.sum(norm.logpdf(logs, x[0], spread)) + np.sum(norm.logsf(beyond, x[0], spread)))
 
-    found = minimize(negative, np.array([mean, math.log(first)]), method="Nelder-Mead")
-    return float(found.x[0]), math.exp(float(found.x[1]))
+    solution = minimize(negative, np.array([mean, math.log(deviation)]), method="Nelder-Mead")
+    return float(solution.x[0]), math.exp(float(solution.x[1]))

@@ -53,9 +53,9 @@ def parameters_of(combined: Mapping[str, Any], area_m2: float) -> dict[str, Any]
 
 def combinations(gas: Gas) -> dict[str, float]:
     """Return the combinations of the numbers of a gas without bulge."""
-    found = {STIFFNESS: gas.exponent * gas.pressure_pa * gas.area_m2**2 / gas.volume_m3}
+    combined = {STIFFNESS: gas.exponent * gas.pressure_pa * gas.area_m2**2 / gas.volume_m3}
     if gas.vent_m2 > 0.0:
-        found[RESISTANCE] = 0.5 * AIR_KG_M3 * gas.area_m2**3 / (DISCHARGE * gas.vent_m2) ** 2
+        combined[RESISTANCE] = 0.5 * AIR_KG_M3 * gas.area_m2**3 / (DISCHARGE * gas.vent_m2) ** 2
     else:
-        found[LENGTH] = gas.volume_m3 / gas.area_m2
-    return found
+        combined[LENGTH] = gas.volume_m3 / gas.area_m2
+    return combined

@@ -47,8 +47,8 @@ class Individual(NamedTuple):
         """Return the lag of the force beyond the settings."""
         if not self.varies:
             return lag_beyond_settings(model, self.choice.refined, squeezes)
-        first = in_threads(lambda one: _alone(model, one, squeezes[0], 0), self.choice.refined)
-        return lag_beyond_settings(model, first, squeezes[:1])
+        by_candidate = in_threads(lambda fitted: _alone(model, fitted, squeezes[0], 0), self.choice.refined)
+        return lag_beyond_settings(model, by_candidate, squeezes[:1])
 
     @property
     def of_each(self) -> Fitted:
@@ -57,12 +57,12 @@ class Individual(NamedTuple):
         fitted = self.choice.fitted
         if not self.varies:
             return fitted
-        values = np.log([one.values for one in self.fits])
+        values = np.log([fitted.values for fitted in self.fits])
         reference = reference_stiffness(fitted, values)
         logs = np.log(fitted.factors) if reference is None else values[:, reference]
         return evolve(
             fitted,
-            widths_m=tuple(one.widths_m[0] for one in self.fits),
+            widths_m=tuple(fitted.widths_m[0] for fitted in self.fits),
             factors=tuple(np.exp(logs - logs.mean()).tolist()),
         )
 
@@ -73,7 +73,7 @@ def simplest_alone(model: ForwardModel, choice: Choice, squeezes: Sequence[Squee
     if not own or _evidence(own) > _common_evidence(choice.fitted) - EVIDENCE:
         return Individual(choice, own, varies=False)
     simpler = [fitted for fitted in choice.refined if fitted.parameters < choice.fitted.parameters]
-    for fitted in sorted(simpler, key=lambda one: (one.parameters, one.cost)):
+    for fitted in sorted(simpler, key=lambda law: (law.parameters, law.cost)):
         fits = alone(model, fitted, squeezes)
         if _evidence(fits) < min(_evidence(own), _common_evidence(choice.fitted)) - EVIDENCE:
             chosen = chosen_instead(choice, fitted, "simpler, with values of each object")

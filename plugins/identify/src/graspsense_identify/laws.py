@@ -360,7 +360,7 @@ def memories(scale: DataScale) -> list[CandidateLaw]:
         )
 
     damper = scale.force_n / rate
-    one = branch(MAXWELL, 0.3, (0.2 * scale.memory_s, 0.03 * scale.memory_s))
+    single = branch(MAXWELL, 0.3, (0.2 * scale.memory_s, 0.03 * scale.memory_s))
     loss = CandidateLaw(
         free=(
             FreeParameter(
@@ -370,4 +370,4 @@ def memories(scale: DataScale) -> list[CandidateLaw]:
     )
     fast = branch(MAXWELL, 0.2, (0.04 * scale.memory_s,))
     slow = branch(SECOND, 0.2, (0.4 * scale.memory_s,))
-    return [loss, one, fast.joined(slow), one.joined(loss), _vented_gas(scale)]
+    return [loss, single, fast.joined(slow), single.joined(loss), _vented_gas(scale)]

@@ -34,16 +34,16 @@ SHORTEST: Final = 0.1
 
 
 def without_path_error(
-    model: ForwardModel, fitted: Fitted, found: Uncertainty, squeezes: Sequence[Squeeze]
+    model: ForwardModel, fitted: Fitted, intervals: Uncertainty, squeezes: Sequence[Squeeze]
 ) -> tuple[Fitted, Uncertainty]:
     """Return the fit and its uncertainty without the error of the path."""
     factors = np.exp(-path_bias(model, fitted, squeezes))
     values = tuple((np.array(fitted.values) * factors).tolist())
     return evolve(fitted, values=values), evolve(
-        found,
-        low=tuple((np.array(found.low) * factors).tolist()),
-        high=tuple((np.array(found.high) * factors).tolist()),
-        draws=found.draws * factors,
+        intervals,
+        low=tuple((np.array(intervals.low) * factors).tolist()),
+        high=tuple((np.array(intervals.high) * factors).tolist()),
+        draws=intervals.draws * factors,
     )
 
 
@@ -65,7 +65,7 @@ def path_bias(model: ForwardModel, fitted: Fitted, squeezes: Sequence[Squeeze]) 
             squeezes, finest, zip(fitted.widths_m, fitted.factors, strict=True), strict=True
         )
     ]
-    if not all(np.isfinite(one.force_n).all() for one in simulated):
+    if not all(np.isfinite(squeeze.force_n).all() for squeeze in simulated):
         return none
     back = fit(model, fitted.candidate, simulated, start=fitted)
     bias: Floats = np.log(back.values) - np.log(fitted.values)

@@ -116,8 +116,8 @@ class Squeeze:
         The mean of a force f over times of variance v is f + v f'' / 2, and f'' follows from the three nodes.
         """
         inner = (self.sample > 0) & (self.sample < len(self.t_s) - 1)
-        at = np.clip(self.sample, 1, len(self.t_s) - 2)
-        before_s, after_s = self.t_s[at] - self.t_s[at - 1], self.t_s[at + 1] - self.t_s[at]
+        centre = np.clip(self.sample, 1, len(self.t_s) - 2)
+        before_s, after_s = self.t_s[centre] - self.t_s[centre - 1], self.t_s[centre + 1] - self.t_s[centre]
         share = np.where(inner, self.averaged_s2 / (before_s + after_s), 0.0)
         return share / before_s, share / after_s
 
@@ -125,10 +125,10 @@ class Squeeze:
         """Return the mean force over the times of each sample, from forces at the nodes, in the last axis."""
         last = len(self.t_s) - 1
         here = forces[..., self.sample]
-        before = forces[..., np.maximum(self.sample - 1, 0)]
+        previous = forces[..., np.maximum(self.sample - 1, 0)]
         after = forces[..., np.minimum(self.sample + 1, last)]
         weight_before, weight_after = self.averaging
-        mean: Floats = here + weight_before * (before - here) + weight_after * (after - here)
+        mean: Floats = here + weight_before * (previous - here) + weight_after * (after - here)
         return mean
 
     @cached_property
@@ -188,16 +188,16 @@ def prepared(
     times, forces = _samples(squeeze.name, trace, delay_s, lag_s)
     peak = float(np.max(forces))
     noise, threshold, touching = _contact(squeeze.name, forces, peak)
-    first = int(touching[0])
-    begin = min(times[max(first - 1, 0)] - BEFORE_S, _begin(trace, times[first]))
+    onset = int(touching[0])
+    begin = min(times[max(onset - 1, 0)] - BEFORE_S, _begin(trace, times[onset]))
     last, broken = int(touching[-1]), None
     if may_break:
-        last, broken = _end(trace, times, forces, first, last)
+        last, broken = _end(trace, times, forces, onset, last)
     window = (times >= begin) & (np.arange(len(times)) <= last)
     after = times[:0] if broken is None else times[broken : broken + 1]
     broken_n = None if broken is None else float(forces[broken])
     progress = _progress(trace, np.append(times[window], after))
-    touched = int(np.searchsorted(np.flatnonzero(window), first))
+    touched = int(np.searchsorted(np.flatnonzero(window), onset))
     times, forces, averaged_s2 = _in_blocks(times[window], forces[window], touched, progress, parts.samples)
     nodes, sample = _nodes(np.append(times, after), progress, parts.nodes)
     sample = sample[: len(times)]
@@ -220,7 +220,7 @@ def prepared(
         width_m=width,
         noise_n=noise,
         pad_difference=_pad_difference(trace, begin, float(times[-1])) / peak,
-        stretches=_stretches(nodes, gap, width, has_approach=first > 1),
+        stretches=_stretches(nodes, gap, width, has_approach=onset > 1),
     )
 
 
@@ -228,8 +228,8 @@ def _contact(name: str, forces: Floats, peak: float) -> tuple[float, float, NDAr
     """Return the noise before the contact, the force from which on the object counts as touched, and the samples beyond
     it. Raises NoSqueeze."""
     scatter = SCATTER * float(np.median(np.abs(np.diff(forces)))) if len(forces) > MIN_SAMPLES else 0.0
-    first = int(np.argmax(forces > CONTACT_SHARE * peak))
-    noise = float(np.std(forces[: max(first - 2, 0)])) if first > 6 else 0.0
+    onset = int(np.argmax(forces > CONTACT_SHARE * peak))
+    noise = float(np.std(forces[: max(onset - 2, 0)])) if onset > 6 else 0.0
     threshold = max(CONTACT_SHARE * peak, NOISE_FACTOR * noise)
     touching = np.flatnonzero(forces > threshold)
     if peak <= NOISE_FACTOR * scatter or not len(touching):
@@ -283,26 +283,26 @@ def _begin(trace: Trace, touched_s: float) -> float:
 
     A force that rises slowly exceeds the threshold long after the contact.
     """
-    before = np.flatnonzero((trace.t_s <= touched_s) & np.isfinite(trace.gap_m))
-    if not len(before):
+    approach = np.flatnonzero((trace.t_s <= touched_s) & np.isfinite(trace.gap_m))
+    if not len(approach):
         return touched_s
-    gap = trace.gap_m[before]
+    gap = trace.gap_m[approach]
     wider = np.flatnonzero(gap > gap[-1] + BEFORE_SHARE * (gap[-1] - float(np.nanmin(trace.gap_m))))
-    return float(trace.t_s[before[wider[-1] if len(wider) else 0]])
+    return float(trace.t_s[approach[wider[-1] if len(wider) else 0]])
 
 
-def _end(trace: Trace, times: Floats, forces: Floats, first: int, last: int) -> tuple[int, int | None]:
+def _end(trace: Trace, times: Floats, forces: Floats, onset: int, last: int) -> tuple[int, int | None]:
     """Return the last sample of a squeeze, and the one after the break if the object broke there."""
     gap = np.interp(times, trace.t_s, trace.gap_m)
-    depth = float(gap[first]) - float(np.min(gap[first : last + 1]))
-    loaded = BREAK_SHARE * float(np.max(forces[first : last + 1]))
-    for i in range(first + MIN_SAMPLES, last + 1):
+    depth = float(gap[onset]) - float(np.min(gap[onset : last + 1]))
+    loaded = BREAK_SHARE * float(np.max(forces[onset : last + 1]))
+    for i in range(onset + MIN_SAMPLES, last + 1):
         begin = min(int(np.searchsorted(times, times[i] - BREAK_S)), i - 1)
         peak = begin + int(np.argmax(forces[begin:i]))
         within = gap[peak] - gap[i] <= BREAK_TRAVEL * depth or i == peak + 1
         within = within and gap[i] - gap[peak] <= OPENED_SHARE * depth
         falls = forces[i] < (1.0 - BREAK_SHARE) * forces[peak]
-        if falls and within and forces[peak] > loaded and peak >= first + MIN_SAMPLES:
+        if falls and within and forces[peak] > loaded and peak >= onset + MIN_SAMPLES:
             return peak, i
     return last, None
 

@@ -97,7 +97,7 @@ def own_spreads(
     tested = [
         i for i, parameter in enumerate(fitted.candidate.free) if i != reference and parameter.slot != GAS
     ]
-    found = []
+    spreads = []
     for i in tested:
         logs, variances = values[:, i], covariances[:, i, i]
         if i in stiff and reference is not None:
@@ -107,8 +107,8 @@ def own_spreads(
             variances = variances + force_scatter**2
         scatter = _of_objects(logs, variances, names, FALSE_CLAIMS / len(tested))
         if scatter is not None and not fitted.at_bound(i):
-            found.append(OwnSpread(i, scatter))
-    return found
+            spreads.append(OwnSpread(i, scatter))
+    return spreads
 
 
 def as_parameters(fitted: Fitted, spreads: Sequence[OwnSpread]) -> list[IdentifiedParameter]:

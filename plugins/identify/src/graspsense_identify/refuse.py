@@ -85,13 +85,13 @@ def shows_memory(squeezes: Sequence[Squeeze]) -> bool:
 
 
 def undetermined(
-    fitted: Fitted, found: Uncertainty, squeezes: Sequence[Squeeze], shares: Sequence[float], cells: bool
+    fitted: Fitted, intervals: Uncertainty, squeezes: Sequence[Squeeze], shares: Sequence[float], cells: bool
 ) -> list[Undetermined]:
     """Return what these squeezes leave open. `shares`: those of each squeeze, `cells`: whether cells measured them."""
     open_ = _memory(fitted, squeezes) if not shows_memory(squeezes) else []
-    open_ += _parameters(fitted, found, squeezes)
+    open_ += _parameters(fitted, intervals, squeezes)
     open_ += _falls(fitted, squeezes)
-    open_ += _spreads(found, squeezes)
+    open_ += _spreads(intervals, squeezes)
     if cells and not any(math.isfinite(share) for share in shares):
         open_.append(
             Undetermined(
@@ -121,16 +121,18 @@ def refusals(
 
     `held_out`: the errors of the squeezes predicted from others; none for a single one, which is judged by its fit.
     """
-    found = [f"{one.what} is not determined: {one.reason}; {one.remedy}" for one in open_ if one.in_scene]
+    reasons = [
+        f"{part.what} is not determined: {part.reason}; {part.remedy}" for part in open_ if part.in_scene
+    ]
     errors = held_out or [fit.residual for fit in fits]
     limit = max(CONFIRMS, repeatability(fits)) if held_out else CONFIRMS
     if not min(errors) <= limit:
         what = "held-out squeeze" if held_out else "squeeze"
-        found.append(
+        reasons.append(
             f"no {what} confirms the scene: the closest is predicted to {100.0 * min(errors):.1f} % of its peak, and "
             f"{100.0 * limit:.1f} % are needed"
         )
-    return tuple(found)
+    return tuple(reasons)
 
 
 def _gas(fitted: Fitted) -> Undetermined:

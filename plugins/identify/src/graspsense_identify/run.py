@@ -85,19 +85,19 @@ def identify(
         parts = _ready(config, recorded, [] if lag.lag_s else notes, cells=cells, lag_s=lag.lag_s)
         return Timed(*parts, _chosen(model, parts[1], progress, only), lag)
 
-    used, delay = with_delay(timed, lambda found: _delay(model, found, config.force_delay_s), model)
+    used, delay = with_delay(timed, lambda used: _delay(model, used, config.force_delay_s), model)
     progress("computing intervals", 0, 1)
     ready, shares, choice = used.ready, used.shares, used.individual.choice
     share_error = _share_error(config, ready) if cells else 0.0
-    fitted, found = _with_uncertainty(model, used, share_error, delay)
-    values, parameters = _values(fitted, found, shares if cells else (), share_error)
+    fitted, intervals = _with_uncertainty(model, used, share_error, delay)
+    values, parameters = _values(fitted, intervals, shares if cells else (), share_error)
     own, fracture = _between_objects(model, used.individual, ready, shares)
-    open_ = [*delay.undetermined, *undetermined(fitted, found, ready, shares, cells)]
+    open_ = [*delay.undetermined, *undetermined(fitted, intervals, ready, shares, cells)]
     open_ += fracture.undetermined if fracture else []
     parameters += [*delay.parameters, *as_parameters(fitted, own), *(fracture.parameters if fracture else [])]
     fits, held_out = _fits(model, fitted, ready), held_out_errors(model, choice.fitted, ready)
     facts = SceneFacts(
-        label=next((one.label for one in used.recorded if one.label), ""),
+        label=next((squeeze.label for squeeze in used.recorded if squeeze.label), ""),
         fitted=fitted,
         parameters=parameters,
         values=values,
@@ -106,7 +106,7 @@ def identify(
         squeezes=ready,
         candidates=choice.scores,
         undetermined=open_,
-        spreads={one.place: one.scatter.value for one in own},
+        spreads={spread.place: spread.scatter.value for spread in own},
         fracture=fracture,
     )
     return Identification(
@@ -118,8 +118,8 @@ def identify(
         fits=tuple(fits),
         held_out=held_out,
         refusals=refusals(open_, fits, held_out),
-        checks=predictive_checks(model, fitted, found, ready),
-        draws=found.draws,
+        checks=predictive_checks(model, fitted, intervals, ready),
+        draws=intervals.draws,
         notes=tuple(notes),
         seconds=time.monotonic() - begin,
     )
@@ -133,16 +133,16 @@ def _delay(model: ForwardModel, used: Timed, settings_s: float) -> Delay:
 
 def _distinct(squeezes: Sequence[RecordedSqueeze], notes: list[str]) -> list[RecordedSqueeze]:
     """Return the recordings without copies, which would confirm each other; a note names each copy."""
-    first: dict[bytes, RecordedSqueeze] = {}
+    by_content: dict[bytes, RecordedSqueeze] = {}
     for squeeze in squeezes:
         trace = squeeze.trace
         content = b"".join(
             column.tobytes() for column in (trace.t_s, trace.gap_m, trace.force_left_n, trace.force_right_n)
         )
-        if content in first:
-            notes.append(f"left out: {squeeze.name} is a copy of {first[content].name}")
-        first.setdefault(content, squeeze)
-    return list(first.values())
+        if content in by_content:
+            notes.append(f"left out: {squeeze.name} is a copy of {by_content[content].name}")
+        by_content.setdefault(content, squeeze)
+    return list(by_content.values())
 
 
 def _chosen(model: ForwardModel, squeezes: Sequence[Squeeze], progress: Progress, only: str) -> Individual:
@@ -163,8 +163,8 @@ def _with_uncertainty(
     """Return the chosen fit and its uncertainty, both without the error of the path."""
     fitted, scale = used.individual.choice.fitted, share_error / math.sqrt(len(used.ready))
     lag_error_s = math.hypot(used.lag.error_s, delay.error_s)
-    found = uncertainty(model, fitted, used.ready, scale, lag_error_s, used.individual.of_each)
-    return without_path_error(model, fitted, found, used.ready)
+    intervals = uncertainty(model, fitted, used.ready, scale, lag_error_s, used.individual.of_each)
+    return without_path_error(model, fitted, intervals, used.ready)
 
 
 def _ready(
@@ -187,7 +187,7 @@ def _ready(
     drive, _ = drive_and_pads(config)
     shares = _measured_shares(kept, ready, drive)
     share = _share(shares)
-    return kept, [_with_share(one, share) for one in ready], shares
+    return kept, [_with_share(squeeze, share) for squeeze in ready], shares
 
 
 def _fit_to_use(
@@ -208,7 +208,7 @@ def _fit_to_use(
         parts = resolution(len(squeezes))
         ready[i] = prepared(kept[i], config.force_delay_s, parts, lag_s, may_break=False)
     notes += [f"left out: {refusal}" for refusal in refusals]
-    apart = max(one.pad_difference for one in ready)
+    apart = max(squeeze.pad_difference for squeeze in ready)
     if apart > PADS_DIFFER:
         notes.append(
             f"the forces on the two pads differ by up to {apart:.0%} of the largest force. If the object is fixed off "
@@ -289,10 +289,10 @@ def _used(squeezes: Sequence[RecordedSqueeze], notes: list[str]) -> Sequence[Rec
     # The first squeeze of every object, then the second ones; among these evenly over the whole order.
     order = [i for _, i in sorted(turns)]
     last = turns[order[MAX_SQUEEZES - 1]][0]
-    first = [i for i in order if turns[i][0] < last]
+    earlier = [i for i in order if turns[i][0] < last]
     same = [i for i in order if turns[i][0] == last]
-    missing = MAX_SQUEEZES - len(first)
-    chosen = sorted(first + [same[k * len(same) // missing] for k in range(missing)])
+    missing = MAX_SQUEEZES - len(earlier)
+    chosen = sorted(earlier + [same[k * len(same) // missing] for k in range(missing)])
     notes.append(f"{MAX_SQUEEZES} of the {len(squeezes)} recordings are used, of as many objects as possible")
     return [squeezes[i] for i in chosen]
 
@@ -371,7 +371,7 @@ def _scale(squeezes: Sequence[Squeeze]) -> DataScale:
 
 
 def _values(
-    fitted: Fitted, found: Uncertainty, shares: Sequence[float], share_error: float
+    fitted: Fitted, intervals: Uncertainty, shares: Sequence[float], share_error: float
 ) -> tuple[dict[str, float], list[IdentifiedParameter]]:
     """Return the keys of the scene's object, and every identified parameter.
 
@@ -381,11 +381,15 @@ def _values(
     known = np.array([share for share in shares if math.isfinite(share)])
     parameters = [_mean("width_m", "m", widths)]
     values = {"width_m": float(widths.mean())}
-    width_spread = found.width_objects_m if math.isfinite(found.width_objects_m) else found.width_squeezes_m
+    width_spread = (
+        intervals.width_objects_m if math.isfinite(intervals.width_objects_m) else intervals.width_squeezes_m
+    )
     if math.isfinite(width_spread) and width_spread > 0.0:
         values["width_spread_m"] = width_spread
     # Without numbers of the objects, the spread is that between squeezes, whatever it comes from.
-    between = found.between_objects if math.isfinite(found.between_objects) else found.between_squeezes
+    between = (
+        intervals.between_objects if math.isfinite(intervals.between_objects) else intervals.between_squeezes
+    )
     if math.isfinite(between) and between > 0.0:
         values["stiffness_spread"] = between
     if len(known):
@@ -395,7 +399,7 @@ def _values(
         if beyond > 0.0:
             values["share_spread"] = beyond
     for i, parameter in enumerate(fitted.candidate.free):
-        ends = sorted((parameter.sign * found.low[i], parameter.sign * found.high[i]))
+        ends = sorted((parameter.sign * intervals.low[i], parameter.sign * intervals.high[i]))
         parameters.append(
             IdentifiedParameter(
                 name=parameter.label,
@@ -403,7 +407,7 @@ def _values(
                 value=parameter.sign * fitted.values[i],
                 low=ends[0],
                 high=ends[1],
-                basis=found.basis,
+                basis=intervals.basis,
             )
         )
     return values, parameters

@@ -32,11 +32,11 @@ def measured_share(trace: Trace, squeeze: Squeeze, drive: Drive) -> float:
     touched = np.flatnonzero((gap < squeeze.width_m) & (times >= squeeze.t_s[0]))
     if not len(touched) or not np.isfinite(trace.effort_n[touched]).all():
         return math.nan
-    first = int(touched[0])
-    last = first + int(np.argmin(gap[first : int(touched[-1]) + 1]))
+    onset = int(touched[0])
+    last = onset + int(np.argmin(gap[onset : int(touched[-1]) + 1]))
     # The fingers creep at the end, where friction lies anywhere between its limits.
-    moving = int(np.argmax(gap[first : last + 1] <= gap[last] + 0.02 * (gap[first] - gap[last])))
-    part = slice(first, first + max(moving, 2))
+    moving = int(np.argmax(gap[onset : last + 1] <= gap[last] + 0.02 * (gap[onset] - gap[last])))
+    part = slice(onset, onset + max(moving, 2))
     closing = -np.diff(gap[part])
     speed = closing / np.maximum(np.diff(times[part]), 1e-9)
     friction = drive.friction

@@ -85,20 +85,20 @@ def uncertainty(
     widths and factors, of which the spreads are.
     """
     rng = np.random.default_rng(0)
-    at = np.log(fitted.values)
+    fitted_logs = np.log(fitted.values)
     again = refits(model, fitted, squeezes, rng, has_lag=lag_error_s > 0.0)
-    table = np.log([one.values for one in again.fits])
+    table = np.log([refit.values for refit in again.fits])
     deviations = table - table.mean(axis=0)
     factor, basis = again.factor, again.basis
     linear = linear_covariance(model, fitted, squeezes, PATH_FORCE_ERROR)
     covariance = at_least(again.scale * deviations.T @ deviations, linear * (normal() / factor) ** 2)
-    own = _scale_errors(model, fitted, squeezes, force_scale) + PATH_ERROR**2 * np.eye(len(at))
+    own = _scale_errors(model, fitted, squeezes, force_scale) + PATH_ERROR**2 * np.eye(len(fitted_logs))
     own += np.diag(corner_errors(model, fitted, squeezes) ** 2)
     if lag_error_s > 0.0:
         later = fit(
             model, fitted.candidate, [squeeze.delayed(lag_error_s) for squeeze in squeezes], start=fitted
         )
-        shift = np.log(later.values) - at
+        shift = np.log(later.values) - fitted_logs
         own += np.outer(shift, shift)
     own += _area_errors(model, fitted, squeezes)
     covariance = covariance + own * (normal() / factor) ** 2
@@ -108,7 +108,7 @@ def uncertainty(
     values, vectors = np.linalg.eigh(covariance)
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     widening = factor / normal()
-    draws = best * _changed(widening * rng.standard_normal((DRAWS, len(at))) @ root.T)
+    draws = best * _changed(widening * rng.standard_normal((DRAWS, len(fitted_logs))) @ root.T)
     return Uncertainty(
         low=tuple(low.tolist()),
         high=tuple(high.tolist()),
@@ -154,8 +154,8 @@ def _scale_errors(
         value * more if parameter.is_force else value
         for parameter, value in zip(fitted.candidate.free, fitted.values, strict=True)
     ]
-    found = fit(model, fitted.candidate, stronger, start=evolve(fitted, values=tuple(scaled)))
-    shift = np.log(found.values) - np.log(fitted.values)
+    refit = fit(model, fitted.candidate, stronger, start=evolve(fitted, values=tuple(scaled)))
+    shift = np.log(refit.values) - np.log(fitted.values)
     return np.outer(shift, shift)
 
 
@@ -187,7 +187,7 @@ def refits(
         scale = BLOCKS / degrees / (BOOTSTRAPS - 1)
         return Refits(fits, scale, student(degrees), "within one squeeze; not between squeezes")
     kept = [[i for i in range(len(squeezes)) if i not in group] for group in groups]
-    fits = in_threads(lambda one: _refit(model, fitted, squeezes, one, has_lag=has_lag), kept)
+    fits = in_threads(lambda left: _refit(model, fitted, squeezes, left, has_lag=has_lag), kept)
     g = len(groups)
     what = "objects" if _instances(squeezes) >= LEAST_INSTANCES else "squeezes"
     basis = f"between {g} {what if g == len(groups) else 'groups'}"
@@ -295,7 +295,7 @@ def _bootstrapped(
         drawn = np.concatenate([residuals[s : s + length] for s in starts])[: len(residuals)]
         drawn_again.append(evolve(squeeze, force_n=clean - drawn * rng.choice((-1.0, 1.0))))
     return in_threads(
-        lambda one: fit(model, fitted.candidate, [one], start=fitted, has_lag=has_lag), drawn_again
+        lambda drawn: fit(model, fitted.candidate, [drawn], start=fitted, has_lag=has_lag), drawn_again
     )
 
 
@@ -314,7 +314,7 @@ def _spreads(fitted: Fitted, squeezes: Sequence[Squeeze]) -> dict[str, float]:
 
 def _components(values: Floats, names: Sequence[str]) -> tuple[float, float]:
     """Return the standard deviations between and within groups of these names (analysis of variance)."""
-    groups = [values[[i for i, one in enumerate(names) if one == name]] for name in sorted(set(names))]
+    groups = [values[[i for i, own in enumerate(names) if own == name]] for name in sorted(set(names))]
     degrees = sum(len(group) - 1 for group in groups)
     within = math.nan
     if degrees > 0:

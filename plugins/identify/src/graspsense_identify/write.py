@@ -71,8 +71,8 @@ def _spread(facts: SceneFacts, slot: int, intervals: Mapping[str, IdentifiedPara
     own = {free[place]: value for place, value in facts.spreads.items() if free[place].slot == slot}
     if not own:
         return []
-    values = ", ".join(f"{one.name} = {_number(value)}" for one, value in own.items())
-    known = ", ".join(_interval(intervals[f"{one.label}.spread"]) for one in own)
+    values = ", ".join(f"{parameter.name} = {_number(value)}" for parameter, value in own.items())
+    known = ", ".join(_interval(intervals[f"{parameter.label}.spread"]) for parameter in own)
     return [f"spread = {{ {values} }}  # {known}"]
 
 

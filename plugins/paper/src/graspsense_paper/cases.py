@@ -30,16 +30,16 @@ def condition_result(
     summary: Summary,
     experiment: str,
     target: str,
-    at: Mapping[str, Any] | None = None,
+    settings: Mapping[str, Any] | None = None,
     classifier: str = "c45",
 ) -> ConditionResult | None:
     """Return the condition of a case of an experiment, which may be part of another experiment; None if there is none.
 
-    `at` holds the swept values of the case, as `ExperimentCase.at`.
+    `settings` holds the swept values of the case, as `ExperimentCase.at`.
     """
     for condition in summary.conditions:
         if (
-            is_of(condition.case, summary, experiment, at)
+            is_of(condition.case, summary, experiment, settings)
             and condition.classifier == classifier
             and condition.target == target
         ):
@@ -48,10 +48,10 @@ def condition_result(
 
 
 def is_of(
-    case: ExperimentCase, summary: Summary, experiment: str, at: Mapping[str, Any] | None = None
+    case: ExperimentCase, summary: Summary, experiment: str, settings: Mapping[str, Any] | None = None
 ) -> bool:
     """Return whether a case belongs to this experiment and has these swept values."""
-    wanted = at or {}
+    wanted = settings or {}
     return (case.part or summary.planned.name) == experiment and all(
         case.at.get(key) == value for key, value in wanted.items()
     )

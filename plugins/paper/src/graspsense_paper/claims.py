@@ -107,25 +107,27 @@ def claims(summary: Summary) -> list[Claim]:
     return [claim for claim in merged if claim is not None]
 
 
-def _merged(found: Sequence[Claim | None]) -> Claim | None:
+def _merged(claims: Sequence[Claim | None]) -> Claim | None:
     """Return a claim from those under each protocol; None if no protocol has results.
 
     The paper does not say which protocol it used, so where they disagree, nothing can be told.
     """
-    of = [(words, claim) for words, claim in zip(PROTOCOLS.values(), found, strict=True) if claim is not None]
-    if not of:
+    by_protocol = [
+        (words, claim) for words, claim in zip(PROTOCOLS.values(), claims, strict=True) if claim is not None
+    ]
+    if not by_protocol:
         return None
-    first = of[0][1]
-    if len({claim.number for _, claim in of}) == 1:
-        return first
-    verdicts = {claim.verdict for _, claim in of}
+    headline = by_protocol[0][1]
+    if len({claim.number for _, claim in by_protocol}) == 1:
+        return headline
+    verdicts = {claim.verdict for _, claim in by_protocol}
     alone = len(verdicts) == 1
     return evolve(
-        first,
+        headline,
         verdict=verdicts.pop() if alone else UNTOLD,
         number="; ".join(
             f"each bottle in {words}: {claim.number}" + ("" if alone else f" ({claim.verdict})")
-            for words, claim in of
+            for words, claim in by_protocol
         ),
     )
 
@@ -267,7 +269,7 @@ def _longest(summary: Summary) -> Claim | None:
         summary,
         "table_4",
         {FORCE: PROBING_N},
-        lambda of: max(of, key=lambda s: statistics.median(of[s])) == "full_open",
+        lambda by_state: max(by_state, key=lambda s: statistics.median(by_state[s])) == "full_open",
         "delta_t",
     )
     if share is None:
@@ -287,15 +289,15 @@ def _longest(summary: Summary) -> Claim | None:
 def _seeds_where(
     summary: Summary,
     experiment: str,
-    at: Mapping[str, Any],
+    settings: Mapping[str, Any],
     holds: Callable[[Mapping[str, Sequence[float]]], bool],
     feature: str,
 ) -> tuple[int, int, str] | None:
     """Return the number of seeds in which `holds` is True, the number of seeds, and the medians over all seeds."""
     held, n = 0, 0
     every: dict[str, list[float]] = {}
-    for of in _by_label(summary, experiment, at, feature):
-        states = {label.partition(":")[2]: values for label, values in of.items()}
+    for by_label in _by_label(summary, experiment, settings, feature):
+        states = {label.partition(":")[2]: values for label, values in by_label.items()}
         n += 1
         held += holds(states)
         for state, values in states.items():
@@ -309,27 +311,27 @@ def _seeds_where(
 
 
 def _by_label(
-    summary: Summary, experiment: str, at: Mapping[str, Any], feature: str
+    summary: Summary, experiment: str, settings: Mapping[str, Any], feature: str
 ) -> Iterable[dict[str, list[float]]]:
     """Yield for each seed the values of a feature by label, without missing ones."""
-    names = _case_names(summary, experiment, at)
+    names = _case_names(summary, experiment, settings)
     for (name, _), result in summary.results.items():
         if name in names and isinstance(result, RecognitionResult) and result.trials is not None:
             yield result.trials.by_label(feature)
 
 
-def _case_names(summary: Summary, experiment: str, at: Mapping[str, Any] | None = None) -> set[str]:
+def _case_names(summary: Summary, experiment: str, settings: Mapping[str, Any] | None = None) -> set[str]:
     """Return the names of the cases of this experiment that differ in this."""
-    return {case.name for case in summary.planned.cases if is_of(case, summary, experiment, at)}
+    return {case.name for case in summary.planned.cases if is_of(case, summary, experiment, settings)}
 
 
-def split_by(one: Sequence[float], other: Sequence[float]) -> float:
+def split_by(group: Sequence[float], other: Sequence[float]) -> float:
     """Return the largest share that one threshold assigns correctly, with equal weight for both groups."""
-    values = sorted({*one, *other})
+    values = sorted({*group, *other})
     best = 0.5
     for low, high in itertools.pairwise(values):
         cut = 0.5 * (low + high)
-        share = 0.5 * (sum(v <= cut for v in one) / len(one) + sum(v > cut for v in other) / len(other))
+        share = 0.5 * (sum(v <= cut for v in group) / len(group) + sum(v > cut for v in other) / len(other))
         best = max(best, share, 1.0 - share)
     return best
 
@@ -337,18 +339,21 @@ def split_by(one: Sequence[float], other: Sequence[float]) -> float:
 def _split(
     summary: Summary,
     feature: str,
-    one: Callable[[str], bool],
-    other: Callable[[str], bool],
-    at: tuple[str, Mapping[str, Any]] = ("table_2", {}),
+    is_low: Callable[[str], bool],
+    is_high: Callable[[str], bool],
+    condition: tuple[str, Mapping[str, Any]] = ("table_2", {}),
 ) -> OverSeeds | None:
-    """Return how well a feature separates two groups of labels over the seeds; `at` is an experiment and its case."""
+    """Return how well a feature separates two groups of labels over the seeds.
+
+    `condition` is an experiment and its case.
+    """
     shares, n = [], 1
-    for of in _by_label(summary, *at, feature):
-        first = [v for label, values in of.items() if one(label) for v in values]
-        second = [v for label, values in of.items() if other(label) for v in values]
-        if first and second:
-            shares.append(split_by(first, second))
-            n = len(first) + len(second)
+    for by_label in _by_label(summary, *condition, feature):
+        lows = [v for label, values in by_label.items() if is_low(label) for v in values]
+        highs = [v for label, values in by_label.items() if is_high(label) for v in values]
+        if lows and highs:
+            shares.append(split_by(lows, highs))
+            n = len(lows) + len(highs)
     return OverSeeds(tuple(shares), n) if shares else None
 
 
@@ -364,9 +369,13 @@ AT_23_N: Final[tuple[str, Mapping[str, Any]]] = ("table_4", {FORCE: 23.0})
 def _f_steady(summary: Summary) -> Claim | None:
     split, by_time = (
         _split(
-            summary, one, lambda s: s == "odwalla:empty_open", lambda s: s == "odwalla:empty_closed", AT_23_N
+            summary,
+            feature,
+            lambda s: s == "odwalla:empty_open",
+            lambda s: s == "odwalla:empty_closed",
+            AT_23_N,
         )
-        for one in ("f_steady", "delta_t")
+        for feature in ("f_steady", "delta_t")
     )
     if split is None or by_time is None:
         return None
@@ -404,15 +413,15 @@ def _p_steady(summary: Summary) -> Claim | None:
 
 def _p_first(summary: Summary) -> Claim | None:
     classes = ("odwalla", "naked", "can", "water")
-    found: dict[str, OverSeeds] = {}
+    splits: dict[str, OverSeeds] = {}
     for i, a in enumerate(classes):
         for b in classes[i + 1 :]:
             split = _split(summary, "p_first", _of(a), _of(b))
             if split is None:
                 return None
-            found[f"{a}/{b}"] = split
-    alike = found.pop("odwalla/naked")
-    worst = min(found, key=lambda name: found[name].mean)
+            splits[f"{a}/{b}"] = split
+    alike = splits.pop("odwalla/naked")
+    worst = min(splits, key=lambda name: splits[name].mean)
     return Claim(
         id="p_first_splits",
         says="p_first separates the container classes, except Odwalla from Naked",
@@ -422,11 +431,11 @@ def _p_first(summary: Summary) -> Claim | None:
         verdict=every(
             [
                 within(alike.interval, high=SPLITS),
-                *(within(split.interval, low=SPLITS) for split in found.values()),
+                *(within(split.interval, low=SPLITS) for split in splits.values()),
             ]
         ),
         n=_grasps(alike),
-        number=f"lowest other pair {worst} {percent(found[worst].mean)} ({span(found[worst].interval)}); "
+        number=f"lowest other pair {worst} {percent(splits[worst].mean)} ({span(splits[worst].interval)}); "
         f"odwalla/naked {percent(alike.mean)} ({span(alike.interval)})",
     )
 
@@ -436,25 +445,25 @@ def _of(name: str) -> Callable[[str], bool]:
 
 
 def _f_steady_classes(summary: Summary) -> Claim | None:
-    found = _split(summary, "f_steady", _of("odwalla"), _of("naked"))
-    if found is None:
+    split = _split(summary, "f_steady", _of("odwalla"), _of("naked"))
+    if split is None:
         return None
     return Claim(
         id="f_steady_splits_classes",
         says="f_steady separates Odwalla from Naked",
         rule="the share of the two that one threshold assigns correctly at 20 N is above 90 %",
         basis=basis(summary, "table_2", "section_3f", "table_2"),
-        verdict=within(found.interval, low=SPLITS),
-        n=_grasps(found),
-        number=f"{percent(found.mean)} ({span(found.interval)})",
+        verdict=within(split.interval, low=SPLITS),
+        n=_grasps(split),
+        number=f"{percent(split.mean)} ({span(split.interval)})",
     )
 
 
 def grasps_of(
-    summary: Summary, experiment: str, at: Mapping[str, Any] | None = None, label: str = ""
+    summary: Summary, experiment: str, settings: Mapping[str, Any] | None = None, label: str = ""
 ) -> list[GraspRow]:
     """Return the rows of the grasps of a case of an experiment of kind `grasp`, of all seeds."""
-    names = _case_names(summary, experiment, at)
+    names = _case_names(summary, experiment, settings)
     return [
         row
         for name, _, result in grasp_results(summary)
@@ -496,13 +505,11 @@ def _one_finger_first(summary: Summary) -> Claim | None:
     rows = [row for row in grasps_of(summary, "one_finger_first") if row.lead_s is not None]
     if not rows:
         return None
-    first = [row for row in rows if row.lead_s]
-    steady = sum(row.outcome == "steady" for row in first)
+    leading = [row for row in rows if row.lead_s]
+    steady = sum(row.outcome == "steady" for row in leading)
     words = ""
-    if first:
-        words = (
-            f"; alone for {1e3 * statistics.median(row.lead_s or 0.0 for row in first):.0f} ms in the median"
-        )
+    if leading:
+        words = f"; alone for {1e3 * statistics.median(row.lead_s or 0.0 for row in leading):.0f} ms in the median"
     return Claim(
         id="one_finger_first",
         says="one fingertip may touch first; contact counts only once both do",
@@ -511,12 +518,12 @@ def _one_finger_first(summary: Summary) -> Claim | None:
         basis=basis(summary, "one_finger_first", "one_finger_first"),
         verdict=every(
             [
-                within(wilson(len(first), len(rows)), low=COUNTS),
-                within(wilson(steady, len(first)), low=MANY_TIMES) if first else UNTOLD,
+                within(wilson(len(leading), len(rows)), low=COUNTS),
+                within(wilson(steady, len(leading)), low=MANY_TIMES) if leading else UNTOLD,
             ]
         ),
         n=counted(len(rows), "grasp"),
-        number=f"one pad first in {_share(len(first), len(rows))} grasps{words}",
+        number=f"one pad first in {_share(len(leading), len(rows))} grasps{words}",
     )
 
 

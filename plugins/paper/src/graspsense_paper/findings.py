@@ -160,11 +160,16 @@ def _controls_table(summary: Summary, held: Sequence[RateComparison]) -> FoundTa
     """Return the controls of the rates of the paper; None if none was measured."""
     lines: list[tuple[str, ...]] = []
     for row in held:
-        one = row.published
-        condition = condition_result(of_protocol(summary, row.protocol), one.experiment, one.target, one.at)
-        if condition is None or not condition.controls or one.repeats:
+        published = row.published
+        condition = condition_result(
+            of_protocol(summary, row.protocol), published.experiment, published.target, published.settings
+        )
+        if condition is None or not condition.controls or published.repeats:
             continue
-        key = (one.experiment, one.what.partition(", ")[2] if one.class_ else one.what)
+        key = (
+            published.experiment,
+            published.what.partition(", ")[2] if published.class_ else published.what,
+        )
         line = (
             *key,
             PROTOCOLS[row.protocol],
@@ -203,15 +208,15 @@ def _matrix_tables(summary: Summary, paper: Published) -> list[FoundTable]:
             condition = condition_result(of_protocol(summary, protocol), id_, target)
             if condition is None or condition.case.data.states_per_instance != protocol:
                 continue
-            found, seeds = condition.confusion, len(condition.by_seed)
-            place = {label.rpartition(":")[2]: k for k, label in enumerate(found.labels)}
+            confusion, seeds = condition.confusion, len(condition.by_seed)
+            place = {label.rpartition(":")[2]: k for k, label in enumerate(confusion.labels)}
             if set(place) != set(theirs.labels):
                 continue
             ours += [
                 (
                     f"ours, {words}",
                     a.replace("_", " "),
-                    *(f"{found.counts[place[a]][place[b]] / seeds:.1f}" for b in theirs.labels),
+                    *(f"{confusion.counts[place[a]][place[b]] / seeds:.1f}" for b in theirs.labels),
                 )
                 for a in theirs.labels
             ]
@@ -231,26 +236,26 @@ def _matrix_tables(summary: Summary, paper: Published) -> list[FoundTable]:
 
 def _grasps_table(summary: Summary) -> FoundTable | None:
     """Return how the grasps of each case went, by object; None if no case is of kind `grasp`."""
-    found: list[tuple[str, ...]] = []
+    lines: list[tuple[str, ...]] = []
     for case in summary.planned.cases:
         rows = [row for name, _, result in grasp_results(summary) if name == case.name for row in result.rows]
         for label in dict.fromkeys(row.label for row in rows):
-            of = [row for row in rows if row.label == label]
-            outcomes = Counter(row.outcome for row in of)
-            found.append(
+            labelled = [row for row in rows if row.label == label]
+            outcomes = Counter(row.outcome for row in labelled)
+            lines.append(
                 (
                     case.name,
                     label,
-                    str(len(of)),
+                    str(len(labelled)),
                     ", ".join(f"{outcome} {n}" for outcome, n in outcomes.most_common()),
-                    _median([row.true_peak_force_n for row in of], 1.0, 1),
-                    f"{max(row.true_peak_force_n for row in of):.1f}",
-                    _median([row.speed_m_s for row in of], 1e3, 0),
-                    _median([row.features.get("delta_t") for row in of], 1.0, 2),
-                    str(sum(row.broken for row in of)),
+                    _median([row.true_peak_force_n for row in labelled], 1.0, 1),
+                    f"{max(row.true_peak_force_n for row in labelled):.1f}",
+                    _median([row.speed_m_s for row in labelled], 1e3, 0),
+                    _median([row.features.get("delta_t") for row in labelled], 1.0, 2),
+                    str(sum(row.broken for row in labelled)),
                 )
             )
-    if not found:
+    if not lines:
         return None
     return FoundTable(
         id="grasps",
@@ -266,7 +271,7 @@ def _grasps_table(summary: Summary) -> FoundTable | None:
             "median time to rest, s",
             "broken",
         ),
-        rows=tuple(found),
+        rows=tuple(lines),
         note="The true peak is the force in the model, which the pads may miss.",
         numbers=4,
     )
@@ -307,10 +312,10 @@ def _notes(paper: Published, held: Sequence[RateComparison]) -> tuple[str, ...]:
 
 
 def _sections(summary: Summary, paper: Published) -> list[Section]:
-    found = []
+    sections = []
     matrices = _matrices(summary, paper)
     if matrices:
-        found.append(Section(id="matrices", title="Confusion matrices, theirs and ours", body=matrices))
+        sections.append(Section(id="matrices", title="Confusion matrices, theirs and ours", body=matrices))
     drawn = [*_calibration(summary), *_courses(summary)]
     if drawn:
         body = paragraph(
@@ -318,9 +323,9 @@ def _sections(summary: Summary, paper: Published) -> list[Section]:
             "and then "
             "squeezes. The drawn forces are the pads' readings, every 41 ms; the true peak may lie between two of them."
         ) + panels(drawn)
-        found.append(Section(id="figures", title="The figures of the paper with our data", body=body))
-    found += _tree(summary, paper)
-    return found
+        sections.append(Section(id="figures", title="The figures of the paper with our data", body=body))
+    sections += _tree(summary, paper)
+    return sections
 
 
 def _matrices(summary: Summary, paper: Published) -> str:

@@ -114,11 +114,11 @@ def _at_contact(trace: Trace, closing: Any) -> dict[str, float]:
         return {}
     k = int(both[0])
     t = float(trace.t_s[k])
-    before = (trace.t_s >= t - BEFORE_CONTACT_S) & (trace.t_s <= t)
+    approach = (trace.t_s >= t - BEFORE_CONTACT_S) & (trace.t_s <= t)
     return {
         "contact_s": t - float(trace.t_s[0]),
         "lead_s": t - float(trace.t_s[int(either[0])]),
-        "speed_m_s": float(-trace.velocity_m_s[before].min()),
+        "speed_m_s": float(-trace.velocity_m_s[approach].min()),
         "effort_at_contact_n": float(trace.command[k]),
         "max_effort_n": float(np.nanmax(trace.command[k:])),
     }

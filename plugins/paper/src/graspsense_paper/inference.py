@@ -90,9 +90,9 @@ def contraction(prior: Prior, values: ArrayLike, weights: ArrayLike) -> Contract
     # Without bias also for few effective particles (variance of a sample with reliability weights).
     variance = float(np.average((v - mean) ** 2, weights=w)) / max(1.0 - float(np.square(w).sum()), 1e-12)
     low, middle, high = weighted_quantiles(v, w, levels)
-    before = [float(law.ppf(level)) for level in levels]
+    prior_quantiles = [float(law.ppf(level)) for level in levels]
     return Contraction(
-        prior=(before[0], before[1], before[2]),
+        prior=(prior_quantiles[0], prior_quantiles[1], prior_quantiles[2]),
         posterior=(low, middle, high),
         contraction=1.0 - variance / float(law.var()),
     )

@@ -25,7 +25,7 @@ class PublishedRate:
     """The results that it shares trials with; see `basis`."""
     experiment: str
     target: str
-    at: Mapping[str, Any] = field(factory=dict)
+    settings: Mapping[str, Any] = field(factory=dict)
     """The swept values that select the case of the experiment."""
     class_: str = ""
     correct: int | None = None
@@ -86,7 +86,7 @@ class Published:
 
     def matrix(self, id_: str) -> PublishedMatrix:
         """Return a matrix by its id."""
-        return next(one for one in self.matrices if one.id == id_)
+        return next(matrix for matrix in self.matrices if matrix.id == id_)
 
 
 @frozen(kw_only=True)
@@ -104,8 +104,8 @@ def published() -> Published:
     values: dict[str, Any] = tomllib.loads(
         files("graspsense_paper").joinpath("published.toml").read_text(encoding="utf-8")
     )
-    for one in values["rates"]:
-        if "class" in one:
-            one["class_"] = one.pop("class")
-    found: Published = structured(values, Published, "published.toml")
-    return found
+    for rate in values["rates"]:
+        if "class" in rate:
+            rate["class_"] = rate.pop("class")
+    content: Published = structured(values, Published, "published.toml")
+    return content

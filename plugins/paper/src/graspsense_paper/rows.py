@@ -133,17 +133,17 @@ HEADER = (
 
 def rows(summary: Summary, paper: Published) -> list[RateComparison]:
     """Return a comparison for each published rate and protocol that there are results for."""
-    found = []
+    compared = []
     for rate in paper.rates:
         for protocol in PROTOCOLS:
             condition = condition_result(
-                of_protocol(summary, protocol), rate.experiment, rate.target, rate.at
+                of_protocol(summary, protocol), rate.experiment, rate.target, rate.settings
             )
             if condition is None or condition.case.data.states_per_instance != protocol:
                 continue
             rates = of_class(condition, rate.class_) if rate.class_ else condition.rate
             if rates is not None:
-                found.append(
+                compared.append(
                     RateComparison(
                         published=rate,
                         ours=rates,
@@ -151,7 +151,7 @@ def rows(summary: Summary, paper: Published) -> list[RateComparison]:
                         basis=basis(summary, rate.experiment, *rate.about),
                     )
                 )
-    return found
+    return compared
 
 
 def of_class(condition: ConditionResult, name: str) -> OverSeeds | None:
@@ -170,22 +170,22 @@ def of_class(condition: ConditionResult, name: str) -> OverSeeds | None:
 def people_beside_robot(paper: Published, robots: Sequence[ConditionResult]) -> list[tuple[str, ...]]:
     """Return one row per state: people (Table VI), the robot of the paper (Table V), and ours at 23 N by protocol."""
     people, theirs = paper.matrix("table_6").confusion, paper.matrix("table_5").confusion
-    found: list[tuple[str, ...]] = []
+    lines: list[tuple[str, ...]] = []
     for i, state in enumerate(people.labels):
-        right, of = people.counts[i][i], sum(people.counts[i])
+        right, total = people.counts[i][i], sum(people.counts[i])
         k = theirs.labels.index(state)
         right2, of2 = theirs.counts[k][k], sum(theirs.counts[k])
         ours = [_of_state(robot, state) for robot in robots]
-        found.append(
+        lines.append(
             (
                 state.replace("_", " "),
-                f"{right}/{of} = {percent(right / of)} ({span(wilson(right, of))})",
+                f"{right}/{total} = {percent(right / total)} ({span(wilson(right, total))})",
                 f"{right2}/{of2} = {percent(right2 / of2)} ({span(wilson(right2, of2))})",
                 *(f"{percent(rates.mean)} ({span(rates.interval)})" for rates in ours),
             )
         )
     right, right2 = people.correct, theirs.correct
-    found.append(
+    lines.append(
         (
             "all",
             f"{right}/{people.n} = {percent(right / people.n)} ({span(wilson(right, people.n))})",
@@ -193,7 +193,7 @@ def people_beside_robot(paper: Published, robots: Sequence[ConditionResult]) -> 
             *(f"{percent(robot.rate.mean)} ({span(robot.rate.interval)})" for robot in robots),
         )
     )
-    return found
+    return lines
 
 
 def _of_state(condition: ConditionResult, state: str) -> OverSeeds:

@@ -29,6 +29,6 @@ def every(verdicts: Collection[Verdict]) -> Verdict:
 
 def counted(verdicts: Collection[Verdict]) -> str:
     """Return how many agree, differ, and cannot be told."""
-    agree, differ, untold = (sum(verdict == one for verdict in verdicts) for one in VERDICTS)
+    agree, differ, untold = (sum(verdict == kind for verdict in verdicts) for kind in VERDICTS)
     text = f"{agree} agree{'s' if agree == 1 else ''} and {differ} differ{'s' if differ == 1 else ''}"
     return text + (f", and {untold} cannot be told" if untold else "")

@@ -196,15 +196,15 @@ def partition(rows: RowIndices, values: Reals, begin: Integer, stop: Integer, wo
     """Move the rows that go left to the front of an interval; both parts keep their order."""
     goes_left, spare_rows, spare_values, _ = workspace
     # Every row is written to both arrays, and one counter advances: a branch would often be mispredicted.
-    at = begin
+    place = begin
     kept: Integer = 0
     for i in range(begin, stop):
         row, value = rows[i], values[i]
         left = np.int64(goes_left[row])
-        rows[at], values[at] = row, value
+        rows[place], values[place] = row, value
         spare_rows[kept], spare_values[kept] = row, value
-        at += left
+        place += left
         kept += 1 - left
     for i in range(kept):
-        rows[at + i] = spare_rows[i]
-        values[at + i] = spare_values[i]
+        rows[place + i] = spare_rows[i]
+        values[place + i] = spare_values[i]

@@ -78,17 +78,17 @@ def make_leaf(node: Integer, nodes: Nodes) -> None:
 
 def subtree(nodes: Nodes, root: Integer) -> Indices:
     """Return the nodes of the tree below a root, itself first and every parent before its children."""
-    found = [np.int64(root)]
+    inside = [np.int64(root)]
     stack = [np.int64(root)]
     while len(stack) > 0:
         node = stack.pop()
         if nodes.feature[node] != LEAF:
             child = np.int64(nodes.first_child[node])
-            found.append(child)
-            found.append(child + 1)
+            inside.append(child)
+            inside.append(child + 1)
             stack.append(child + 1)
             stack.append(child)
-    return np.array(found)
+    return np.array(inside)
 
 
 def leaf_below(nodes: Nodes, node: Integer, values: Reals, row: Integer) -> Integer:

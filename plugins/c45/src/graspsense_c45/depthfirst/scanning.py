@@ -68,9 +68,9 @@ def scan_unit(
     # No cut is admissible among the last rows, because the right side needs them.
     for i in range(begin, stop - limits.least_weight):
         k = labels[rows[i]]
-        before = passed[k]
-        passed[k] = before + 1
-        inside += steps[before] - steps[counts[k] - before - 1]
+        count = passed[k]
+        passed[k] = count + 1
+        inside += steps[count] - steps[counts[k] - count - 1]
         left = i + 1 - begin
         if left < limits.least_weight or not are_apart(values[i], values[i + 1]):
             continue
@@ -96,13 +96,13 @@ def scan_weighted(
     for i in range(begin, stop - 1):
         row = rows[i]
         k, weight = labels[row], weights[row]
-        before = passed[k]
-        rest = counts[k] - before
-        passed[k] = before + weight
+        low = passed[k]
+        high = counts[k] - low
+        passed[k] = low + weight
         left += weight
         right = total - left
-        inside += term(before + weight, scale) - term(before, scale)
-        inside += term(rest - weight, scale) - term(rest, scale)
+        inside += term(low + weight, scale) - term(low, scale)
+        inside += term(high - weight, scale) - term(high, scale)
         if left < limits.least_weight or right < limits.least_weight:
             continue
         if not are_apart(values[i], values[i + 1]):

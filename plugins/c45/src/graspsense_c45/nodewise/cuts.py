@@ -101,8 +101,8 @@ def _numerators(rows: SortedRows, totals: FixedPoint, left: FixedPoint, training
     of_class = of_passed + of_others
     change = of_class.copy()
     change[:, 1:] -= of_class[:, :-1]
-    first = _first_of_class(labels)
-    change[first] = (of_class - of_totals[each, labels])[first]
+    begins_class = _first_of_class(labels)
+    change[begins_class] = (of_class - of_totals[each, labels])[begins_class]
     steps = np.empty_like(change)
     steps[each, by_class] = change
     numerators: FixedPoint = steps.cumsum(axis=1) - of_left - of_right + of_known
@@ -110,6 +110,6 @@ def _numerators(rows: SortedRows, totals: FixedPoint, left: FixedPoint, training
 
 
 def _first_of_class(labels: SmallLabels) -> Mask:
-    first = np.ones(labels.shape, dtype=np.bool_)
-    first[:, 1:] = labels[:, 1:] != labels[:, :-1]
-    return first
+    begins_class = np.ones(labels.shape, dtype=np.bool_)
+    begins_class[:, 1:] = labels[:, 1:] != labels[:, :-1]
+    return begins_class

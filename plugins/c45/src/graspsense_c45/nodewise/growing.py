@@ -60,11 +60,11 @@ class _Grower:
                     for entries, weights in children
                 ]
             ).astype(np.int64)
-            first = nodes.split(node, (feature, threshold, category), child_counts)
+            eldest = nodes.split(node, (feature, threshold, category), child_counts)
             for child in range(len(children) - 1, -1, -1):
                 if self._is_open(child_counts[child]):
                     entries, weights = children[child]
-                    stack.append((first + child, rows.child(entries, weights, self._scratch)))
+                    stack.append((eldest + child, rows.child(entries, weights, self._scratch)))
         return nodes.tree()
 
     def _is_open(self, counts: FixedPoint) -> bool:

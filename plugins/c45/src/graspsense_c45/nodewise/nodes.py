@@ -50,12 +50,12 @@ class NodeList:
 
     def split(self, node: int, split: tuple[int, float, int], counts: AnyArray) -> int:
         """Split a node by feature, threshold and category; return the first of its children, which are leaves."""
-        first, number = len(self.counts), len(counts)
+        eldest, number = len(self.counts), len(counts)
         self.feature[node], self.threshold[node], self.category[node] = split
-        self.first_child[node], self.n_children[node] = first, number
+        self.first_child[node], self.n_children[node] = eldest, number
         self.counts.extend(counts)
         self._add_leaves(number)
-        return first
+        return eldest
 
     def tree(self) -> GrowingTree:
         """Return the nodes as a tree."""

@@ -46,9 +46,9 @@ def _one_against_the_others(nominal: _Nominal) -> Split:
         if value_weight < nominal.enough or rest_weight < nominal.enough:
             continue
         usable = True
-        rest = nominal.counts.sum(axis=0) - nominal.counts[value]
+        others = nominal.counts.sum(axis=0) - nominal.counts[value]
         rest_term, value_term = int(training.terms(rest_weight)), int(nominal.value_terms[value])
-        sides = int(nominal.terms[value]) - value_term + int(training.terms(rest).sum()) - rest_term
+        sides = int(nominal.terms[value]) - value_term + int(training.terms(others).sum()) - rest_term
         gain, ratio = nominal.gain_and_ratio(sides, value_term + rest_term)
         score, highest = (ratio, best.ratio) if by_ratio else (gain, best.gain)
         if value == 0 or score - highest > TOLERANCE:

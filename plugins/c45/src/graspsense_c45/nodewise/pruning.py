@@ -66,29 +66,29 @@ class _Pruner:
     def _descend(self, root: int, entries: Entries) -> list[int]:
         """Send rows down from a node, and return its subtree."""
         tree, raising = self._tree, self._training.options.subtree_raising
-        found, stack = [], [root]
+        inside, stack = [], [root]
         self._entries[root] = entries
         while stack:
             node = stack.pop()
-            found.append(node)
+            inside.append(node)
             if tree.feature[node] == LEAF:
                 continue
-            first, number = int(tree.first_child[node]), int(tree.n_children[node])
-            stack.extend(range(first, first + number))
+            eldest, number = int(tree.first_child[node]), int(tree.n_children[node])
+            stack.extend(range(eldest, eldest + number))
             if raising:
                 rows, weights = self._entries[node]
                 rows, weights, nodes = self._to_children(node, rows, weights)
-                for child in range(first, first + number):
+                for child in range(eldest, eldest + number):
                     here = nodes == child
                     self._entries[child] = (rows[here], weights[here])
-        return found
+        return inside
 
     def _to_children(
         self, node: int, rows: Indices, weights: FixedPoint
     ) -> tuple[Indices, FixedPoint, Indices]:
-        at = np.full(len(rows), node)
-        found, parts, nodes = to_children(self._tree, self._training.values, rows, weights, at)
-        return found, parts, nodes
+        start = np.full(len(rows), node)
+        entries, parts, nodes = to_children(self._tree, self._training.values, rows, weights, start)
+        return entries, parts, nodes
 
     def _set_counts(self, nodes: list[int]) -> None:
         """Set the counts and the estimates as leaves of these nodes from their rows."""
@@ -107,14 +107,14 @@ class _Pruner:
         as_tree[node] = as_leaf
         if tree.feature[node] == LEAF:
             return False
-        first, number = int(tree.first_child[node]), int(tree.n_children[node])
-        errors = sum(as_tree[first : first + number])
+        eldest, number = int(tree.first_child[node]), int(tree.n_children[node])
+        errors = sum(as_tree[eldest : eldest + number])
         as_tree[node] = errors
         if not self._training.options.subtree_raising:
             if criteria.is_no_worse(as_leaf, errors, self._limit):
                 self._make_leaf(node)
             return False
-        heavy = self._heaviest(first, number)
+        heavy = self._heaviest(eldest, number)
         as_branch = self._errors_as_branch(heavy, self._entries[node])
         if criteria.leaf_is_best(as_leaf, errors, as_branch, self._limit):
             self._make_leaf(node)
@@ -127,11 +127,11 @@ class _Pruner:
         self._tree.make_leaves(np.array([node]))
         self._as_tree[node] = self._as_leaf[node]
 
-    def _heaviest(self, first: int, number: int) -> int:
+    def _heaviest(self, eldest: int, number: int) -> int:
         """Return the heaviest of these children, the last of those within the tolerance."""
-        children = self._tree.counts[first : first + number].sum(axis=1)
-        best, chosen = 0.0, first
-        for child, weight in enumerate(self._training.real_weights(children).tolist(), first):
+        children = self._tree.counts[eldest : eldest + number].sum(axis=1)
+        best, chosen = 0.0, eldest
+        for child, weight in enumerate(self._training.real_weights(children).tolist(), eldest):
             if criteria.is_not_lighter(weight, best):
                 best, chosen = weight, child
         return chosen
@@ -167,6 +167,6 @@ class _Pruner:
             new = list(dict.fromkeys(pairs))
         if new:
             weights, errors = np.array(new, dtype=np.int64).T
-            found = np.asarray(estimate(weights, errors, self._estimation)).tolist()
-            self._known.update(zip(new, found, strict=True))
+            estimated = np.asarray(estimate(weights, errors, self._estimation)).tolist()
+            self._known.update(zip(new, estimated, strict=True))
         return [self._known[pair] for pair in pairs]
