@@ -8,12 +8,10 @@ from typing import get_args
 
 from graspsense_c45.options import Engine
 
-WORTH_COMPILING = 1_000_000
-"""Values (rows x attributes) of one table from which "auto" chooses the compiled engine."""
-WORTH_COMPILING_FOR_MANY = 500_000
-"""Values of all fits of a process from which it does so for small tables, each of which takes twenty times as long with
-numpy. An evaluation of 900 trials has 1.3 million. Compiling takes as long as four such evaluations save, once."""
-WORTH_LOADING_FOR_MANY = 60_000
+WORTH_COMPILING = 500_000
+"""Values (rows x attributes) of one table, or of all fits of a process, from which "auto" chooses the compiled engine:
+numpy takes as long for so many as compiling does. An evaluation of 900 trials has 1.3 million."""
+WORTH_LOADING = 60_000
 """The same where an earlier process has compiled it: loading takes a second."""
 
 _NEEDED = ("numba", "graspsense")
@@ -49,9 +47,9 @@ class Fits:
         if choose_fast(engine, n_values):
             return True
         self._n_values += n_values
-        if engine != "auto" or self._n_values < WORTH_LOADING_FOR_MANY or missing_for_fast():
+        if engine != "auto" or self._n_values < WORTH_LOADING or missing_for_fast():
             return False
-        return self._n_values >= WORTH_COMPILING_FOR_MANY or self._is_kept()
+        return self._n_values >= WORTH_COMPILING or self._is_kept()
 
     def _is_kept(self) -> bool:
         if self._kept is None:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from graspsense_c45.depthfirst import compiled
-from graspsense_c45.depthfirst.growing import Columns, Rules
-from graspsense_c45.depthfirst.nodes import Nodes, Rows
-from graspsense_c45.depthfirst.pruning import Pruning
+from graspsense_c45.depthfirst import compiled, growing, pruning
+from graspsense_c45.depthfirst.growing import Candidates, Columns, Rules
+from graspsense_c45.depthfirst.nodes import Nodes, Rows, empty_nodes
+from graspsense_c45.depthfirst.pruning import Errors, Pruning
 from graspsense_c45.estimates import prepare_estimation
 from graspsense_c45.splits import ALL_VALUES, LEAF, GrowingTree
 from graspsense_c45.training_set import TrainingSet
@@ -19,7 +19,7 @@ class DepthFirstTreeBuilder:
     def __init__(self, training: TrainingSet) -> None:
         self._training = training
         columns = _columns(training)
-        self._nodes = compiled.grow(columns, training.averaged, _rules(training))
+        self._nodes = _grown(columns, training)
         self._order = columns.rows[0].copy()
         self.tree = _as_tree(self._nodes)
 
@@ -30,7 +30,8 @@ class DepthFirstTreeBuilder:
 
     def collapse(self) -> None:
         """Make leaves of subtrees that hardly save training errors."""
-        compiled.collapse(self._nodes, self._training.weight_margin, self._training.collapse_slack)
+        errors = np.zeros(len(self._nodes.feature), dtype=np.int64)
+        compiled.collapse(self._nodes, errors, self._training.weight_margin, self._training.collapse_slack)
         self._mark_leaves()
 
     def prune_pessimistic(self) -> None:
@@ -42,11 +43,46 @@ class DepthFirstTreeBuilder:
             self._order, np.ascontiguousarray(training.values), training.small_labels(), training.weights
         )
         constants = Pruning(estimation, training.weight_margin, options.subtree_raising)
-        compiled.prune(self._nodes, rows, constants)
+        n_nodes, n_rows = len(self._nodes.feature), len(self._order)
+        errors = Errors(
+            np.zeros(n_nodes, dtype=np.int64),
+            np.zeros(n_nodes, dtype=np.int64),
+            np.zeros((n_nodes, training.n_classes + 1), dtype=np.int64),
+        )
+        workspace = pruning.Workspace(
+            np.empty(n_nodes, dtype=np.int64),
+            np.empty(n_nodes, dtype=np.int64),
+            np.empty(n_nodes, dtype=np.int64),
+            np.empty(n_rows, dtype=np.uint32),
+            np.empty(n_rows, dtype=np.int64),
+        )
+        compiled.prune(self._nodes, rows, constants, errors, workspace)
         self._mark_leaves()
 
     def _mark_leaves(self) -> None:
         self.tree.n_children[self.tree.feature == LEAF] = 0
+
+
+def _grown(columns: Columns, training: TrainingSet) -> Nodes:
+    """Return the nodes of the unpruned tree; sorts `columns` by leaf."""
+    n_attributes, n_rows = columns.rows.shape
+    nodes = empty_nodes(2 * n_rows, training.n_classes)
+    candidates = Candidates(
+        np.zeros(n_attributes, dtype=np.bool_),
+        np.zeros(n_attributes),
+        np.zeros(n_attributes),
+        np.zeros(n_attributes, dtype=np.int64),
+        training.averaged,
+    )
+    workspace = growing.Workspace(
+        np.zeros(n_rows, dtype=np.bool_),
+        np.empty(n_rows, dtype=np.uint32),
+        np.empty(n_rows),
+        np.zeros(training.n_classes, dtype=np.int64),
+        np.empty(2 * n_rows, dtype=np.int64),
+    )
+    n_nodes = compiled.grow(nodes, columns, _rules(training), candidates, workspace)
+    return Nodes._make(column[:n_nodes].copy() for column in nodes)
 
 
 def _columns(training: TrainingSet) -> Columns:

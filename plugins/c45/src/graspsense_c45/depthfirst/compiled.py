@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from graspsense.simulator_api import CompileOptions, Inlining, compile_function, is_on_disk
-from graspsense_c45 import arithmetic, criteria
-from graspsense_c45.arrays import Indices, Mask, Reals
-from graspsense_c45.depthfirst import growing, pruning, routing, scanning
-from graspsense_c45.depthfirst.growing import Columns, Rules
+from graspsense.simulator_api import CompileOptions, compile_function, is_on_disk
+from graspsense_c45 import arithmetic
+from graspsense_c45.arrays import FixedPoint, Indices, Integer, Reals
+from graspsense_c45.depthfirst import growing, pruning, routing
+from graspsense_c45.depthfirst.growing import Candidates, Columns, Rules
 from graspsense_c45.depthfirst.nodes import Nodes, Rows
-from graspsense_c45.depthfirst.pruning import Pruning
+from graspsense_c45.depthfirst.pruning import Errors, Pruning
 from graspsense_c45.splits import Splits
 
 
@@ -31,23 +31,10 @@ def _to_integer(x: float) -> Any:
 
 
 _OPTIONS = CompileOptions(
+    # No function makes an array or a list: numba compiles a whole library for those, for longer than these functions.
+    counts_references=False,
     # Division by zero gives inf or NaN, as in numpy.
     error_model="numpy",
-    inlining=Inlining(short_code=400, long_code=2000),
-    # These do not count references to their array arguments: that took an eighth of the time of growing.
-    uncounted=frozenset(
-        function.__code__
-        for function in (
-            criteria.choose_attribute,
-            arithmetic.first_maximum,
-            growing.best_split,
-            growing.best_cut,
-            growing.split,
-            growing.partition,
-            scanning.scan_unit,
-            scanning.scan_weighted,
-        )
-    ),
     replacements={
         arithmetic.select: _select,
         arithmetic.mantissa_and_exponent: _mantissa_and_exponent,
@@ -67,25 +54,27 @@ def kept() -> bool:
     return all(is_on_disk(function, _OPTIONS) for function in (growing.grow, pruning.collapse, pruning.prune))
 
 
-def grow(columns: Columns, averaged: Mask, rules: Rules) -> Nodes:
+def grow(
+    nodes: Nodes, columns: Columns, rules: Rules, candidates: Candidates, workspace: growing.Workspace
+) -> int:
     """Call `growing.grow` compiled."""
-    nodes: Nodes = _compiled(growing.grow)(columns, averaged, rules)
-    return nodes
+    return int(_compiled(growing.grow)(nodes, columns, rules, candidates, workspace))
 
 
-def collapse(nodes: Nodes, margin: int, slack: float) -> None:
+def collapse(nodes: Nodes, errors: FixedPoint, margin: Integer, slack: float) -> None:
     """Call `pruning.collapse` compiled."""
-    _compiled(pruning.collapse)(nodes, margin, slack)
+    _compiled(pruning.collapse)(nodes, errors, margin, slack)
 
 
-def prune(nodes: Nodes, rows: Rows, constants: Pruning) -> None:
+def prune(nodes: Nodes, rows: Rows, constants: Pruning, errors: Errors, workspace: pruning.Workspace) -> None:
     """Call `pruning.prune` compiled."""
-    _compiled(pruning.prune)(nodes, rows, constants)
+    _compiled(pruning.prune)(nodes, rows, constants, errors, workspace)
 
 
 def leaves_of_rows(splits: Splits, values: Reals) -> Indices:
-    """Return the leaf that each row comes to from the root; see `routing.leaves`."""
-    compiled = _compiled(routing.leaves)
-    return np.asarray(
-        compiled(splits.feature, splits.threshold, splits.first_child, np.ascontiguousarray(values))
+    """Return the leaf that each row comes to from the root; see `routing.find_leaves`."""
+    leaves = np.empty(len(values), dtype=np.int64)
+    _compiled(routing.find_leaves)(
+        splits.feature, splits.threshold, splits.first_child, np.ascontiguousarray(values), leaves
     )
+    return leaves

@@ -24,11 +24,8 @@ from graspsense_c45.criteria import (
     min_side_weight,
     ratio_of_cut,
 )
-from graspsense_c45.depthfirst.nodes import Nodes, RowIndices, empty_nodes, resized
+from graspsense_c45.depthfirst.nodes import Nodes, RowIndices, weight_of
 from graspsense_c45.depthfirst.scanning import Cut, Limits, Run, scan_unit, scan_weighted
-
-FIRST_CAPACITY = 256
-"""Capacity of the first arrays, in nodes. It is doubled when it does not suffice."""
 
 
 class Columns(NamedTuple):
@@ -69,51 +66,46 @@ class Candidates(NamedTuple):
 
 
 class Workspace(NamedTuple):
-    """Arrays that are written before they are read, for the rows of a node; `passed` has one entry per class."""
+    """Arrays that are written before they are read.
+
+    goes_left, rows, values: for the rows of a node. passed: one entry per class. waiting: the nodes to look at.
+    """
 
     goes_left: Mask
     rows: RowIndices
     values: Reals
     passed: FixedPoint
+    waiting: Indices
 
 
-def grow(columns: Columns, averaged: Mask, rules: Rules) -> Nodes:
-    """Return the nodes of the unpruned tree, whose thresholds are midpoints; sorts `columns` by leaf.
+def grow(
+    nodes: Nodes, columns: Columns, rules: Rules, candidates: Candidates, workspace: Workspace
+) -> Integer:
+    """Grow the unpruned tree, whose thresholds are midpoints; return its number of nodes, and sort `columns` by leaf.
+
+    nodes: leaves without rows, twice as many as there are rows, since each leaf of the tree has one or more.
 
     `nodewise.growing.grow` grows the same tree; `tests/test_engines.py` checks that both agree to the bit.
     """
-    n_attributes, n_rows = columns.rows.shape
-    nodes = empty_nodes(FIRST_CAPACITY, rules.n_classes)
+    n_rows = columns.rows.shape[1]
     for row in range(n_rows):
         nodes.counts[0, columns.labels[row]] += columns.weights[row]
     nodes.end[0] = n_rows
-    candidates = Candidates(
-        np.zeros(n_attributes, dtype=np.bool_),
-        np.zeros(n_attributes),
-        np.zeros(n_attributes),
-        np.zeros(n_attributes, dtype=np.int64),
-        averaged,
-    )
-    workspace = Workspace(
-        np.zeros(n_rows, dtype=np.bool_),
-        np.empty(n_rows, dtype=np.uint32),
-        np.empty(n_rows),
-        np.zeros(rules.n_classes, dtype=np.int64),
-    )
-    n_nodes = 1
-    stack = [np.int64(0)]
-    while len(stack) > 0:
-        node = stack.pop()
+    n_nodes = np.int64(1)
+    workspace.waiting[0] = 0
+    n_waiting = np.int64(1)
+    while n_waiting > 0:
+        n_waiting -= 1
+        node = workspace.waiting[n_waiting]
         chosen = best_split(node, nodes, columns, rules, candidates, workspace)
         if chosen < 0:
             continue
-        if n_nodes + 2 > len(nodes.feature):
-            nodes = resized(nodes, n_nodes, 2 * len(nodes.feature))
         split(node, chosen, candidates.place[chosen], n_nodes, nodes, columns, workspace)
-        stack.append(np.int64(n_nodes + 1))
-        stack.append(np.int64(n_nodes))
+        workspace.waiting[n_waiting] = n_nodes + 1
+        workspace.waiting[n_waiting + 1] = n_nodes
+        n_waiting += 2
         n_nodes += 2
-    return resized(nodes, n_nodes, n_nodes)
+    return n_nodes
 
 
 def best_split(
@@ -121,7 +113,7 @@ def best_split(
 ) -> Integer:
     """Return the attribute to split a node on, -1 if it stays a leaf; write the cuts to `candidates`."""
     counts = nodes.counts[node]
-    total = counts.sum()
+    total = weight_of(counts)
     weight = real_weight(total, rules.scale.weight_bits)
     majority = counts[first_maximum(counts, np.int64(0), rules.weight_margin)]
     if is_pure_or_small(weight, real_weight(majority, rules.scale.weight_bits), rules.min_objects):
@@ -158,7 +150,8 @@ def best_cut(
     run: Run, counts: FixedPoint, columns: Columns, rules: Rules, limits: Limits, passed: FixedPoint
 ) -> Cut:
     """Return the best cut of an attribute at a node."""
-    passed[:] = 0
+    for k in range(len(passed)):
+        passed[k] = 0
     if rules.unit:
         return scan_unit(run, counts, passed, columns.terms, columns.steps, limits)
     return scan_weighted(run, counts, passed, columns.weights, rules.scale, limits)
@@ -194,7 +187,7 @@ def split(
 
 def partition(rows: RowIndices, values: Reals, begin: Integer, stop: Integer, workspace: Workspace) -> None:
     """Move the rows that go left to the front of an interval; both parts keep their order."""
-    goes_left, spare_rows, spare_values, _ = workspace
+    goes_left, spare_rows, spare_values = workspace.goes_left, workspace.rows, workspace.values
     # Every row is written to both arrays, and one counter advances: a branch would often be mispredicted.
     place = begin
     kept: Integer = 0

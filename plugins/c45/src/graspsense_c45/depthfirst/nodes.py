@@ -50,49 +50,36 @@ def empty_nodes(capacity: int, n_classes: int) -> Nodes:
     )
 
 
-def resized(nodes: Nodes, n_nodes: int, capacity: int) -> Nodes:
-    """Return the first `n_nodes` nodes in arrays for `capacity` nodes."""
-    result = empty_nodes(capacity, nodes.counts.shape[1])
-    result.feature[:n_nodes] = nodes.feature[:n_nodes]
-    result.threshold[:n_nodes] = nodes.threshold[:n_nodes]
-    result.first_child[:n_nodes] = nodes.first_child[:n_nodes]
-    result.counts[:n_nodes] = nodes.counts[:n_nodes]
-    result.start[:n_nodes] = nodes.start[:n_nodes]
-    result.end[:n_nodes] = nodes.end[:n_nodes]
-    return result
-
-
-def no_nodes() -> list[np.int64]:
-    """Return an empty list of nodes."""
-    # Not by a comprehension: in a function that has one, numba 0.68 removes assignments to arrays inside named tuples
-    # that the function has made; it takes them for dead code.
-    nodes = [np.int64(0)]
-    nodes.pop()
-    return nodes
-
-
 def make_leaf(node: Integer, nodes: Nodes) -> None:
     """Make a node a leaf."""
     nodes.feature[node], nodes.threshold[node], nodes.first_child[node] = LEAF, np.nan, 0
 
 
-def subtree(nodes: Nodes, root: Integer) -> Indices:
-    """Return the nodes of the tree below a root, itself first and every parent before its children."""
-    inside = [np.int64(root)]
-    stack = [np.int64(root)]
-    while len(stack) > 0:
-        node = stack.pop()
+def list_subtree(nodes: Nodes, root: Integer, listed: Indices) -> Integer:
+    """Write the nodes of the tree below a root to `listed`, every parent before its children; return their number."""
+    listed[0] = root
+    number = np.int64(1)
+    i = np.int64(0)
+    while i < number:
+        node = listed[i]
         if nodes.feature[node] != LEAF:
-            child = np.int64(nodes.first_child[node])
-            inside.append(child)
-            inside.append(child + 1)
-            stack.append(child + 1)
-            stack.append(child)
-    return np.array(inside)
+            listed[number] = nodes.first_child[node]
+            listed[number + 1] = nodes.first_child[node] + 1
+            number += 2
+        i += 1
+    return number
+
+
+def weight_of(counts: FixedPoint) -> Integer:
+    """Return the weight of all classes."""
+    weight = np.int64(0)
+    for k in range(len(counts)):
+        weight += counts[k]
+    return weight
 
 
 def leaf_below(nodes: Nodes, node: Integer, values: Reals, row: Integer) -> Integer:
     """Return the leaf that a row comes to from a node."""
     while nodes.feature[node] != LEAF:
-        node = nodes.first_child[node] + (values[row, nodes.feature[node]] > nodes.threshold[node])
+        node = np.int64(nodes.first_child[node] + (values[row, nodes.feature[node]] > nodes.threshold[node]))
     return node

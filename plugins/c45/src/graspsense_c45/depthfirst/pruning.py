@@ -12,7 +12,15 @@ import numpy as np
 from graspsense_c45.arithmetic import first_maximum, real_weight
 from graspsense_c45.arrays import FixedPoint, Indices, Integer
 from graspsense_c45.criteria import collapses, is_no_worse, is_not_lighter, leaf_is_best
-from graspsense_c45.depthfirst.nodes import Nodes, Rows, leaf_below, make_leaf, no_nodes, subtree
+from graspsense_c45.depthfirst.nodes import (
+    Nodes,
+    RowIndices,
+    Rows,
+    leaf_below,
+    list_subtree,
+    make_leaf,
+    weight_of,
+)
 from graspsense_c45.estimates import Estimation, estimate
 from graspsense_c45.splits import LEAF
 
@@ -28,6 +36,20 @@ class Errors(NamedTuple):
     joining: FixedPoint
 
 
+class Workspace(NamedTuple):
+    """Arrays that are written before they are read; the first three have an entry per node, the others one per row.
+
+    listed: the nodes of a subtree. waiting: those to prune. joined: leaves that rows of another branch join.
+    rows, leaves: the rows of a subtree, and the leaf of each.
+    """
+
+    listed: Indices
+    waiting: Indices
+    joined: Indices
+    rows: RowIndices
+    leaves: Indices
+
+
 class Pruning(NamedTuple):
     """The constants of pessimistic pruning.
 
@@ -40,13 +62,14 @@ class Pruning(NamedTuple):
     raising: bool
 
 
-def collapse(nodes: Nodes, margin: Integer, slack: float) -> None:
+def collapse(nodes: Nodes, errors: FixedPoint, margin: Integer, slack: float) -> None:
     """Make a leaf of every node whose subtree makes hardly fewer training errors than the node as a leaf.
+
+    errors: written for each node.
 
     `nodewise.collapsing.collapse` does the same; `tests/test_engines.py` checks that both agree to the bit.
     """
     # Every node has a lower index than its children. Nodes below a new leaf are no longer reached.
-    errors = np.zeros(len(nodes.feature), dtype=np.int64)
     for node in range(len(nodes.feature) - 1, -1, -1):
         as_leaf = training_errors(nodes.counts[node], margin)
         errors[node] = as_leaf
@@ -57,34 +80,37 @@ def collapse(nodes: Nodes, margin: Integer, slack: float) -> None:
                 make_leaf(node, nodes)
 
 
-def prune(nodes: Nodes, rows: Rows, pruning: Pruning) -> None:
+def prune(nodes: Nodes, rows: Rows, pruning: Pruning, errors: Errors, workspace: Workspace) -> None:
     """Replace subtrees by leaves or by their heaviest branch where the estimated errors grow by no more than 0.1.
 
     `nodewise.pruning.prune_pessimistic` does the same; `tests/test_engines.py` checks that both agree to the bit.
     """
-    n_nodes, n_classes = nodes.counts.shape
-    errors = Errors(
-        np.zeros(n_nodes, dtype=np.int64),
-        np.zeros(n_nodes, dtype=np.int64),
-        np.zeros((n_nodes, n_classes + 1), dtype=np.int64),
-    )
-    stack = no_nodes()
-    for node in subtree(nodes, 0):
-        errors.as_leaf[node] = estimate_leaf(nodes.counts[node], pruning)
-        stack.append(node)
+    n_waiting = enter_subtree(np.int64(0), np.int64(0), nodes, pruning, errors, workspace)
     # Children are above their parents on the stack.
-    while len(stack) > 0:
-        node = stack.pop()
-        if prune_node(node, nodes, rows, pruning, errors):
+    while n_waiting > 0:
+        n_waiting -= 1
+        node = workspace.waiting[n_waiting]
+        if prune_node(node, nodes, rows, pruning, errors, workspace.joined):
             # The node has another split and other rows below it, so its whole subtree is pruned again.
-            again = subtree(nodes, node)
-            reassign_rows(again, nodes, rows)
-            for below in again:
-                errors.as_leaf[below] = estimate_leaf(nodes.counts[below], pruning)
-                stack.append(below)
+            reassign_rows(node, nodes, rows, workspace)
+            n_waiting = enter_subtree(node, n_waiting, nodes, pruning, errors, workspace)
 
 
-def prune_node(node: Integer, nodes: Nodes, rows: Rows, pruning: Pruning, errors: Errors) -> bool:
+def enter_subtree(
+    root: Integer, n_waiting: Integer, nodes: Nodes, pruning: Pruning, errors: Errors, workspace: Workspace
+) -> Integer:
+    """Estimate all nodes below a root as leaves, and add them to the waiting ones; return the number of these."""
+    number = list_subtree(nodes, root, workspace.listed)
+    for i in range(number):
+        node = workspace.listed[i]
+        errors.as_leaf[node] = estimate_leaf(nodes.counts[node], pruning)
+        workspace.waiting[n_waiting + i] = node
+    return n_waiting + number
+
+
+def prune_node(
+    node: Integer, nodes: Nodes, rows: Rows, pruning: Pruning, errors: Errors, joined: Indices
+) -> bool:
     """Prune a node whose children are pruned; return whether its heaviest child has replaced it."""
     as_leaf, as_tree, limit = errors.as_leaf, errors.as_tree, pruning.estimation.limit
     as_tree[node] = as_leaf[node]
@@ -98,7 +124,7 @@ def prune_node(node: Integer, nodes: Nodes, rows: Rows, pruning: Pruning, errors
             as_tree[node] = as_leaf[node]
         return False
     heavy = heaviest_child(left, nodes, pruning.estimation.weight_bits)
-    as_branch = as_tree[heavy] + increase(node, heavy, nodes, rows, pruning, errors)
+    as_branch = as_tree[heavy] + increase(node, heavy, nodes, rows, pruning, errors, joined)
     if leaf_is_best(as_leaf[node], as_tree[node], as_branch, limit):
         make_leaf(node, nodes)
         as_tree[node] = as_leaf[node]
@@ -113,13 +139,12 @@ def prune_node(node: Integer, nodes: Nodes, rows: Rows, pruning: Pruning, errors
 
 def training_errors(counts: FixedPoint, margin: Integer) -> Integer:
     """Return the weight outside the majority class."""
-    errors: Integer = counts.sum() - counts[first_maximum(counts, np.int64(0), margin)]
-    return errors
+    return weight_of(counts) - int(counts[first_maximum(counts, np.int64(0), margin)])
 
 
 def estimate_leaf(counts: FixedPoint, pruning: Pruning) -> Integer:
     """Return the estimated errors of a leaf with these counts."""
-    errors: Integer = estimate(counts.sum(), training_errors(counts, pruning.margin), pruning.estimation)
+    errors: Integer = estimate(weight_of(counts), training_errors(counts, pruning.margin), pruning.estimation)
     return errors
 
 
@@ -127,55 +152,65 @@ def heaviest_child(left: Integer, nodes: Nodes, weight_bits: Integer) -> Integer
     """Return the heavier one of the children `left` and `left + 1`, the second one of equals."""
     best, chosen = 0.0, left
     for child in range(left, left + 2):
-        weight = real_weight(nodes.counts[child].sum(), weight_bits)
+        weight = real_weight(weight_of(nodes.counts[child]), weight_bits)
         if is_not_lighter(weight, best):
             best, chosen = weight, child
     return chosen
 
 
 def increase(
-    node: Integer, heavy: Integer, nodes: Nodes, rows: Rows, pruning: Pruning, errors: Errors
+    node: Integer, heavy: Integer, nodes: Nodes, rows: Rows, pruning: Pruning, errors: Errors, joined: Indices
 ) -> Integer:
     """Return by how much the estimates of the heaviest child's leaves grow when the node's other rows join them."""
-    joining = errors.joining
-    touched = no_nodes()
+    joining, n_classes = errors.joining, nodes.counts.shape[1]
+    n_joined = np.int64(0)
     for part in range(2):
         begin = nodes.start[node] if part == 0 else nodes.end[heavy]
         stop = nodes.start[heavy] if part == 0 else nodes.end[node]
         for i in range(begin, stop):
             row = rows.order[i]
-            leaf = np.int64(leaf_below(nodes, heavy, rows.values, row))
+            leaf = leaf_below(nodes, heavy, rows.values, row)
             # A leaf is noted when the first weight joins it; a row of weight 0 changes nothing.
             if rows.weights[row] > 0:
-                if joining[leaf, -1] == 0:
-                    touched.append(leaf)
-                joining[leaf, -1] += rows.weights[row]
+                if joining[leaf, n_classes] == 0:
+                    joined[n_joined] = leaf
+                    n_joined += 1
+                joining[leaf, n_classes] += rows.weights[row]
                 joining[leaf, rows.labels[row]] += rows.weights[row]
     result = np.int64(0)
-    for leaf in touched:
-        result += estimate_leaf(nodes.counts[leaf] + joining[leaf, :-1], pruning) - errors.as_leaf[leaf]
-        joining[leaf, :] = 0
+    for i in range(n_joined):
+        leaf = joined[i]
+        counts = nodes.counts[leaf]
+        for k in range(n_classes):
+            counts[k] += joining[leaf, k]
+        result += estimate_leaf(counts, pruning) - errors.as_leaf[leaf]
+        for k in range(n_classes):
+            counts[k] -= joining[leaf, k]
+            joining[leaf, k] = 0
+        joining[leaf, n_classes] = 0
     return result
 
 
-def reassign_rows(below: Indices, nodes: Nodes, rows: Rows) -> None:
-    """Send the rows of the first of these nodes down to its leaves; set intervals and counts of all of them."""
-    begin, stop = nodes.start[below[0]], nodes.end[below[0]]
-    own = rows.order[begin:stop].copy()
-    leaf_of = np.empty(len(own), dtype=np.int64)
+def reassign_rows(root: Integer, nodes: Nodes, rows: Rows, workspace: Workspace) -> None:
+    """Send the rows of a node down to the leaves below it; set intervals and counts of all nodes on the way."""
+    begin, stop = nodes.start[root], nodes.end[root]
+    number, n_classes = list_subtree(nodes, root, workspace.listed), nodes.counts.shape[1]
+    below, own, leaf_of = workspace.listed[:number], workspace.rows, workspace.leaves
     for node in below:
         nodes.end[node] = 0
-        nodes.counts[node, :] = 0
-    for i in range(len(own)):
-        leaf = leaf_below(nodes, below[0], rows.values, own[i])
-        leaf_of[i] = leaf
+        for k in range(n_classes):
+            nodes.counts[node, k] = 0
+    for i in range(stop - begin):
+        row = rows.order[begin + i]
+        leaf = leaf_below(nodes, root, rows.values, row)
+        own[i], leaf_of[i] = row, leaf
         nodes.end[leaf] += 1
-        nodes.counts[leaf, rows.labels[own[i]]] += rows.weights[own[i]]
+        nodes.counts[leaf, rows.labels[row]] += rows.weights[row]
     lay_out(below, nodes, begin, stop)
     for node in below:
         if nodes.feature[node] == LEAF:
             nodes.end[node] = nodes.start[node]
-    for i in range(len(own)):
+    for i in range(stop - begin):
         leaf = leaf_of[i]
         rows.order[nodes.end[leaf]] = own[i]
         nodes.end[leaf] += 1
@@ -188,7 +223,8 @@ def lay_out(below: Indices, nodes: Nodes, begin: Integer, stop: Integer) -> None
         if nodes.feature[node] != LEAF:
             left = nodes.first_child[node]
             nodes.end[node] = nodes.end[left] + nodes.end[left + 1]
-            nodes.counts[node] = nodes.counts[left] + nodes.counts[left + 1]
+            for k in range(nodes.counts.shape[1]):
+                nodes.counts[node, k] = nodes.counts[left, k] + nodes.counts[left + 1, k]
     nodes.start[below[0]], nodes.end[below[0]] = begin, stop
     for node in below:
         if nodes.feature[node] != LEAF:

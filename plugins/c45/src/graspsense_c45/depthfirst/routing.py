@@ -8,15 +8,15 @@ from graspsense_c45.arrays import Indices, NodeColumn, Reals
 from graspsense_c45.splits import LEAF
 
 
-def leaves(feature: NodeColumn, threshold: Reals, first_child: NodeColumn, values: Reals) -> Indices:
-    """Return the leaf that each row comes to from the root; numeric tests only, no tested value missing.
+def find_leaves(
+    feature: NodeColumn, threshold: Reals, first_child: NodeColumn, values: Reals, leaves: Indices
+) -> None:
+    """Write the leaf that each row comes to from the root; numeric tests only, no tested value missing.
 
     `routing.leaves_of_rows` returns the same; `tests/test_engines.py` compares the two.
     """
-    result = np.empty(len(values), dtype=np.int64)
     for row in range(len(values)):
         node = np.int64(0)
         while feature[node] != LEAF:
-            node = first_child[node] + (values[row, feature[node]] > threshold[node])
-        result[row] = node
-    return result
+            node = np.int64(first_child[node] + (values[row, feature[node]] > threshold[node]))
+        leaves[row] = node

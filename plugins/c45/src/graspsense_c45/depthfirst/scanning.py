@@ -12,7 +12,7 @@ import numpy as np
 from graspsense_c45.arithmetic import Scale, term
 from graspsense_c45.arrays import FixedPoint, Integer, Reals, SmallLabels
 from graspsense_c45.criteria import are_apart, is_better_cut
-from graspsense_c45.depthfirst.nodes import RowIndices
+from graspsense_c45.depthfirst.nodes import RowIndices, weight_of
 
 
 class Run(NamedTuple):
@@ -86,7 +86,7 @@ def scan_weighted(
 ) -> Cut:
     """Return the best cut of a node whose rows have any fixed-point weights; otherwise as `scan_unit`."""
     rows, values, labels, begin, stop = run
-    total = counts.sum()
+    total = weight_of(counts)
     inside = term(total, scale)
     best: Integer = np.int64(0)
     cut_left: Integer = np.int64(0)
