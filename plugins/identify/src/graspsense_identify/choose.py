@@ -89,22 +89,22 @@ def choose(
     if not candidates:
         raise ConfigError(f"no candidate for these squeezes has the terms {only}")
     directly = in_threads(lambda candidate: fit(direct, candidate, squeezes), candidates, counter.done)
-    least_directly = max(min(thread.rms for thread in directly), LEAST_ERROR)
-    near = [thread for thread in directly if thread.rms <= WORTH_REFINING * least_directly]
+    least_directly = max(min(fitted.rms for fitted in directly), LEAST_ERROR)
+    near = [fitted for fitted in directly if fitted.rms <= WORTH_REFINING * least_directly]
     fits = in_threads(lambda fitted: refined(model, fitted, squeezes), near, counter.done)
-    least = max(min(thread.rms for thread in fits), LEAST_ERROR)
+    least = max(min(fitted.rms for fitted in fits), LEAST_ERROR)
     worth = [
-        thread for thread in fits if thread.rms <= WORTH_TRYING * least and not _adds_nothing(thread, fits)
+        fitted for fitted in fits if fitted.rms <= WORTH_TRYING * least and not _adds_nothing(fitted, fits)
     ]
     judged = in_threads(lambda fitted: _judged(model, fitted, squeezes), worth, counter.done)
     best = _simplest(judged)
     converged = fit(
         model, best.fitted.candidate, squeezes, start=best.fitted, max_evaluations=MANY_EVALUATIONS
     )
-    names = {thread.candidate.name for thread in fits}
-    only_directly = [thread for thread in directly if thread.candidate.name not in names]
+    names = {fitted.candidate.name for fitted in fits}
+    only_directly = [fitted for fitted in directly if fitted.candidate.name not in names]
     only_directly += [fitted for k, fitted in enumerate(rough) if k not in kept]
-    scores = [_score(thread, best, judged, fits) for thread in fits]
+    scores = [_score(fitted, best, judged, fits) for fitted in fits]
     dropped = [
         CandidateScore(
             terms=fitted.candidate.name,

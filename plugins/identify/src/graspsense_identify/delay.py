@@ -135,7 +135,7 @@ def lag_beyond_settings(model: ForwardModel, refined: Sequence[Fitted], squeezes
     better = least_error(best) <= (1.0 - LEAST_GAIN) * least_error(own)
     if not gained or not better or abs(best.lag_s) > 0.98 * MAX_LAG_S:
         return Lag()
-    near = [thread for thread in lagging if information(thread) <= information(best) + PLAUSIBLE]
+    near = [fitted for fitted in lagging if information(fitted) <= information(best) + PLAUSIBLE]
     lags = [fitted.lag_s for fitted in near if not _is_dominated(fitted, near)]
     return Lag(
         lag_s=best.lag_s,
