@@ -45,11 +45,11 @@ def stepped(law):
     return Stepped(law.config)
 
 
-def assert_identical(one, other):
-    assert one.outcome == other.outcome
-    assert one.trace.events == other.trace.events
+def assert_identical(left, other):
+    assert left.outcome == other.outcome
+    assert left.trace.events == other.trace.events
     for name in COLUMNS:
-        np.testing.assert_array_equal(getattr(one.trace, name), getattr(other.trace, name), err_msg=name)
+        np.testing.assert_array_equal(getattr(left.trace, name), getattr(other.trace, name), err_msg=name)
 
 
 # In the quick run each controller, and each sensor, once.
@@ -72,10 +72,10 @@ def test_a_grasp_with_free_motion_is_the_grasp_tick_by_tick(controller, sensor):
     leapt = run_grasp(fast, law, RunConfig(seed=3), sinks=[shown])
     every = run_grasp(slow, stepped(law), RunConfig(seed=3))
     assert_identical(leapt, every)
-    one, other = dict(fast.report()), dict(slow.report())
+    fast_report, other = dict(fast.report()), dict(slow.report())
     # Verified by trial grasps of each controller, whose approach is in steps over several ticks with free motion only.
-    selections = one.pop("selection"), other.pop("selection")
-    assert one == other
+    selections = fast_report.pop("selection"), other.pop("selection")
+    assert fast_report == other
     assert selections[0]["level"] == selections[1]["level"]
     assert selections[0]["steps"] == selections[1]["steps"]
     trace = leapt.trace
@@ -118,7 +118,9 @@ def test_free_motion_changes_no_bit_of_the_catalogue(controller, sensor):
 def test_settings_under_which_motion_is_not_free_give_the_same_too(settings):
     law = create("controller", "hybrid", closing_speed_m_s=0.03)
     config = SimConfig(**{"object": "block", "sensor": "ideal", **settings})
-    grasps = [run_grasp(SimBackend(config), one, RunConfig(seed=1)) for one in (law, stepped(law))]
+    grasps = [
+        run_grasp(SimBackend(config), controller, RunConfig(seed=1)) for controller in (law, stepped(law))
+    ]
     assert_identical(*grasps)
 
 

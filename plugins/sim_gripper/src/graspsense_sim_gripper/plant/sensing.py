@@ -271,13 +271,13 @@ def apply_tare(state: SensorState, pads: PadBuffers) -> SensorState:
 
 
 def _write_image(
-    params: SensorParams, pad: PadCells, force_n: float, noise: CellColumn, first: int, cells: CellColumn
+    params: SensorParams, pad: PadCells, force_n: float, noise: CellColumn, begin: int, cells: CellColumn
 ) -> None:
     """Write the counts of one fingertip under this force (N) to `cells`; its noise begins at `noise[first]`."""
     counts = force_n * params.share * PAD_COUNTS_PER_N
     spread = params.noise_counts
     for i in range(CELLS):
-        value = pad.offset[i] + spread * noise[first + i]
+        value = pad.offset[i] + spread * noise[begin + i]
         if i >= FIRST_PAD_CELL:
             weight = pad.weights[i - FIRST_PAD_CELL]
             value = value + counts * weight if weight > 0.0 else pad.offset[i]

@@ -203,28 +203,28 @@ class SimBackend(BatchBackend[SimConfig]):
             return None
         self._move_on(effort)
         self._moved_on = True
-        setup, table, first = self._setup, self._table, self._ticks
+        setup, table, begin = self._setup, self._table, self._ticks
         most = min(most, MOST_FREE_TICKS)
-        constants = GraspParams(setup.plant, setup.sensor, params, setup.dt_s, first + most)
-        at = LoopProgress(first, 0, effort, self._state, self._sensor, state)
-        at = self._free_ticks(constants, at, frame, table, self._phases)
-        if at.ticks == first:
+        constants = GraspParams(setup.plant, setup.sensor, params, setup.dt_s, begin + most)
+        progress = LoopProgress(begin, 0, effort, self._state, self._sensor, state)
+        progress = self._free_ticks(constants, progress, frame, table, self._phases)
+        if progress.ticks == begin:
             return FreeRun(0, [], [], state)
-        self._ticks, n, self._effort_n, self._state, self._sensor, state = at
+        self._ticks, n, self._effort_n, self._state, self._sensor, state = progress
         t, gap, velocity, efforts, left, right, edge_left, edge_right, commands = (row[:n] for row in table)
         columns = t, repeat(setup.dt_s), gap, velocity, efforts, left, right, edge_left, edge_right, repeat(0)
         frames = list(map(Frame._make, zip(*columns, strict=False)))
-        return FreeRun(self._ticks - first, frames, commands, state)
+        return FreeRun(self._ticks - begin, frames, commands, state)
 
     def _moved(self, effort_n: float) -> PlantState:
         """Return the plant after a tick. Raises TermFailed."""
-        setup, before = self._setup, self._state
+        setup, plant = self._setup, self._state
         try:
-            after = self._move(setup.plant, before, effort_n, setup.dt_s)
+            after = self._move(setup.plant, plant, effort_n, setup.dt_s)
         except LAW_ERRORS as error:
             raise TermFailed(raised_in_term(error, setup.kinds) or str(error)) from error
         if not is_finite(after):
-            raise TermFailed(not_finite_in_tick(setup.kinds, setup.plant, before, effort_n, setup.dt_s))
+            raise TermFailed(not_finite_in_tick(setup.kinds, setup.plant, plant, effort_n, setup.dt_s))
         return after
 
     def apply(self, command: Command) -> None:
@@ -288,9 +288,9 @@ class SimBackend(BatchBackend[SimConfig]):
     def perturbed(self, scenes: Sequence[str], share: float) -> Mapping[str, SimBackend]:
         """Return this gripper, and this gripper with each parameter larger by this share, see `perturbed`."""
         changed = {}
-        for name, one in perturbed(self.config, scenes, share).items():
-            changed[name] = SimBackend(one.config)
-            changed[name]._scaled = one.scaled
+        for name, variant in perturbed(self.config, scenes, share).items():
+            changed[name] = SimBackend(variant.config)
+            changed[name]._scaled = variant.scaled
         return changed
 
     def run_many(

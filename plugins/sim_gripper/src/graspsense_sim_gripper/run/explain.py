@@ -74,7 +74,7 @@ def _contribution(kind: str, params: TermParams, along: _Path, point: WorkingPoi
     state, force, work, work_to_peak = term.at_rest, 0.0, 0.0, 0.0
     forces: list[float] = []
     for i in range(len(path) - 1):
-        before = force
+        last_force = force
         # The mean rate over this tick and the next, if the object is still pressed in it.
         ticks = 2 if i + 2 < len(path) and pressed[i + 1] else 1
         speed = (path[i + ticks] - path[i]) / (ticks * dt_s)
@@ -82,7 +82,7 @@ def _contribution(kind: str, params: TermParams, along: _Path, point: WorkingPoi
         if not pressed[i]:
             force = 0.0
         else:
-            work += 0.5 * (before + force) * (path[i + 1] - path[i])
+            work += 0.5 * (last_force + force) * (path[i + 1] - path[i])
         forces.append(force)
         if i == peak:
             work_to_peak = work

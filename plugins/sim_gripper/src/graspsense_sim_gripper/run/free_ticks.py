@@ -37,20 +37,20 @@ can_glide: Callable[[PlantParams, PlantState, float], bool] = _cannot_glide
 
 
 def free_ticks(
-    params: GraspParams, at: LoopProgress, frame: Frame, columns: Table, phases: Any
+    params: GraspParams, progress: LoopProgress, frame: Frame, columns: Table, phases: Any
 ) -> LoopProgress:
-    """Run the ticks of free motion that follow that of `frame`, and return where they end: at `at` if there are none.
+    """Run the ticks of free motion after that of `frame`, and return where they end: at `progress` if there are none.
 
     In these ticks no force changes, no cell image is taken or arrives, and the controller follows a law that needs
     neither (see `graspsense.core.control.free_motion`). What they give is what `grasp` gives tick by tick, to the bit.
     """
-    free, now = free_from(params.controller, at.controller, frame)
-    if free.kind == CALLED or not _is_free(params, at, frame):
-        return at
-    dt_s, sensor, image_s = params.dt_s, params.sensor, next_image_s(params.sensor, at.sensor)
-    ticks, recorded, effort, plant = at.ticks, at.recorded, at.effort_n, at.plant
-    shown = (at.sensor.encoder_ticks, at.sensor.gap_m, at.sensor.velocity_m_s)
-    phase, capacity, t_s, n_steps = at.controller.phase, len(columns[0]), 0.0, 0
+    free, now = free_from(params.controller, progress.controller, frame)
+    if free.kind == CALLED or not _is_free(params, progress, frame):
+        return progress
+    dt_s, sensor, image_s = params.dt_s, params.sensor, next_image_s(params.sensor, progress.sensor)
+    ticks, recorded, effort, plant = progress.ticks, progress.recorded, progress.effort_n, progress.plant
+    shown = (progress.sensor.encoder_ticks, progress.sensor.gap_m, progress.sensor.velocity_m_s)
+    phase, capacity, t_s, n_steps = progress.controller.phase, len(columns[0]), 0.0, 0
     motion, contact = plant.motion, plant.contact
     while ticks < params.max_ticks and recorded < capacity:
         next_t_s = ticks * dt_s
@@ -75,14 +75,14 @@ def free_ticks(
             recorded += 1
         ticks += 1
         effort = command
-    if ticks == at.ticks:
-        return at
-    for row in range(at.recorded, recorded):
+    if ticks == progress.ticks:
+        return progress
+    for row in range(progress.recorded, recorded):
         columns[4][row], columns[5][row] = frame.force_left_n, frame.force_right_n
         columns[6][row], columns[7][row] = frame.edge_left_n, frame.edge_right_n
     plant = glided(plant, motion, contact, n_steps)
-    state = after_free(params.controller, at.controller, now, effort, t_s)
-    return LoopProgress(ticks, recorded, effort, plant, moved_sensor(at.sensor, shown), state)
+    state = after_free(params.controller, progress.controller, now, effort, t_s)
+    return LoopProgress(ticks, recorded, effort, plant, moved_sensor(progress.sensor, shown), state)
 
 
 def _is_free(params: GraspParams, progress: LoopProgress, frame: Frame) -> bool:
@@ -93,9 +93,9 @@ def _is_free(params: GraspParams, progress: LoopProgress, frame: Frame) -> bool:
 
 
 def approach_or_free_ticks(
-    params: GraspParams, at: LoopProgress, frame: Frame, columns: Table, phases: Any
+    params: GraspParams, progress: LoopProgress, frame: Frame, columns: Table, phases: Any
 ) -> LoopProgress:
     """Run what compiled code does: `approach_ticks` where steps may last several ticks, otherwise `free_ticks`."""
     if params.macro_steps == 1:
-        return approach_ticks(params, at, frame, columns, phases)
-    return free_ticks(params, at, frame, columns, phases)
+        return approach_ticks(params, progress, frame, columns, phases)
+    return free_ticks(params, progress, frame, columns, phases)

@@ -269,9 +269,9 @@ def grasp(params: GraspParams, progress: SimulationState, buffers: Buffers) -> S
             failed = 1
             break
         if single and same_phase and phase != SQUEEZE and phase != HOLD:
-            at = LoopProgress(ticks, recorded, effort, plant, sensor, state)
-            at = run_approach_ticks(params, at, frame, buffers.columns, buffers.phases)
-            ticks, recorded, effort, plant, sensor, state = at
+            advanced = LoopProgress(ticks, recorded, effort, plant, sensor, state)
+            advanced = run_approach_ticks(params, advanced, frame, buffers.columns, buffers.phases)
+            ticks, recorded, effort, plant, sensor, state = advanced
     ended = LoopState(ticks, recorded, phase, tare_from, effort, failed, macro)
     return SimulationState(ended, plant, sensor, state)
 

@@ -105,14 +105,14 @@ def _select_within_limit(problem: Problem, trial: TrialGrasps) -> Reduction:
     try:
         return _select(problem, trial)
     except TooMuchWork:
-        found = propose(problem, grip_of(problem))
+        reduction = propose(problem, grip_of(problem))
     limit = StepDecision(
         subject="trial grasps",
         decision="stopped at the limit: not verified",
         what="ticks and steps",
         number=float(MOST_WORK),
     )
-    return evolve(found, decisions=(*found.decisions, limit), unresolved=QUANTITIES)
+    return evolve(reduction, decisions=(*reduction.decisions, limit), unresolved=QUANTITIES)
 
 
 def _select(problem: Problem, trial: TrialGrasps) -> Reduction:
@@ -131,10 +131,10 @@ def _select(problem: Problem, trial: TrialGrasps) -> Reduction:
     if unverified.unresolved:
         return unverified
     finer = propose(problem, grip, _reference_scale(config, CONTROLLED[0]))
-    found = _felt(trial, finer, decides=True)
-    if found == _UNKNOWN:
+    felt = _felt(trial, finer, decides=True)
+    if felt == _UNKNOWN:
         return unverified
-    grip = grip_of(problem, *found)
+    grip = grip_of(problem, *felt)
     unverified = propose(problem, grip)
     return unverified if unverified.unresolved else _best(problem, grip, trial)
 
@@ -166,11 +166,11 @@ def _best(problem: Problem, grip: Grip, trial: TrialGrasps) -> Reduction:
     Raises ConfigError if no model is accepted.
     """
     accepted = _accepted(problem, grip, trial)
-    first = next(accepted)
-    if first.not_verified in ((), NOT_READ):
-        return first
+    fastest = next(accepted)
+    if fastest.not_verified in ((), NOT_READ):
+        return fastest
     further = islice(accepted, MOST_FOR_FEATURES)
-    return next((model for model in further if not model.not_verified), first)
+    return next((model for model in further if not model.not_verified), fastest)
 
 
 def _accepted(problem: Problem, grip: Grip, trial: TrialGrasps) -> Iterator[Reduction]:
@@ -179,19 +179,19 @@ def _accepted(problem: Problem, grip: Grip, trial: TrialGrasps) -> Iterator[Redu
     least, quantity, grasps, n_accepted = math.inf, "", 1, 0
     near_threshold: Sensitivity | None = None
     for scale in (PLAIN, *CONTROLLED):
-        if near_threshold and scale.at(config.accuracy).step_tol >= near_threshold.step_tol:
+        if near_threshold and scale.level(config.accuracy).step_tol >= near_threshold.step_tol:
             continue
         reduction = propose(problem, grip, scale)
         full = propose(problem, grip, _reference_scale(config, scale))
         expected = trial.record(full)
-        error, of = _off(trial, reduction, expected)
+        error, miss_of = _off(trial, reduction, expected)
         grasps += 1
         if error > _accepted_share(config) * config.accuracy:
             if error < least:
-                least, quantity = error, of
+                least, quantity = error, miss_of
             continue
         verification = Verification(
-            error=error, quantity=of, grasps=grasps, features=trial.features_beyond(reduction, full)
+            error=error, quantity=miss_of, grasps=grasps, features=trial.features_beyond(reduction, full)
         )
         if scale.plain == 1 and config.spread:
             # Which thresholds are near differs between instances.
@@ -271,7 +271,7 @@ def _accepted_for_instances(
     """
     force_n = reduction.force_n
     for setup in problem.examples():
-        trial = trial.of(setup)
+        trial = trial.with_setup(setup)
         try:
             grasp, expected = trial.record(reduction), trial.record(full)
         except Exception:
@@ -307,7 +307,7 @@ def _culprit(problem: Problem, grip: Grip, trial: TrialGrasps) -> str:
     fine, finer = pair
     errors = {}
     for i, kind in enumerate(trial.setup.kinds):
-        without = trial.of(without_term(trial.setup, i))
+        without = trial.with_setup(without_term(trial.setup, i))
         errors[kind] = deviation(*(without.record(steps) for steps in pair))[0]
     with_all, _ = deviation(trial.record(fine), trial.record(finer))
     term = min(errors, key=errors.__getitem__, default="")
@@ -329,12 +329,12 @@ def _undecided(problem: Problem, sensitivity: Sensitivity) -> str:
 
 
 def _refusal(problem: Problem, error: float, quantity: str, term: str) -> str:
-    found = f"{quantity} differs by {error:.2g}" if math.isfinite(error) else "even the outcome differs"
+    miss = f"{quantity} differs by {error:.2g}" if math.isfinite(error) else "even the outcome differs"
     cause = (
         f"the steps because of the term {term!r}" if term else "the steps, and not because of a single term"
     )
     return (
-        f"{_inaccurate(problem)}: with every term and the smallest steps, {found} between two step lengths. The grasp "
+        f"{_inaccurate(problem)}: with every term and the smallest steps, {miss} between two step lengths. The grasp "
         f"depends on {cause}; {_advice(2.0 * error / _accepted_share(problem.model_config))}"
     )
 

@@ -149,7 +149,7 @@ class TrialGrasps:
             return ()
         self.record(reduction)
         self.record(full)
-        grasp, expected = (self._features[one.steps] for one in (reduction, full))
+        grasp, expected = (self._features[model.steps] for model in (reduction, full))
         return beyond(grasp, expected, self.config.accuracy)
 
     def values(self, reduction: Reduction) -> dict[str, tuple[float, float]]:
@@ -196,7 +196,7 @@ class TrialGrasps:
             self._features[reduction.steps] = own_features(self.features, rows[:-1], rows[-1])
         return _record(end, rows, bias, setup.dt_s)
 
-    def of(self, setup: GraspSetup) -> TrialGrasps:
+    def with_setup(self, setup: GraspSetup) -> TrialGrasps:
         """Return trial grasps of another instance of the object, which begin near it and go on counting the work."""
         other = evolve(self, setup=setup, near=True)
         other.work, other._loops = self.work, self._loops
@@ -207,7 +207,7 @@ class TrialGrasps:
         most = math.ceil(min(MAX_SECONDS, seconds_at_most(self.controller.run)) / setup.dt_s)
         made = padded(setup, self.padding) if self.compiled else setup
         composed = composition(made.kinds, made.plant)
-        loop = self._loops.of(composed) if self.compiled else grasp_loop(composed, self.controller.step)
+        loop = self._loops.loop_of(composed) if self.compiled else grasp_loop(composed, self.controller.step)
         params = GraspParams(
             made.plant,
             made.sensor,
@@ -218,29 +218,32 @@ class TrialGrasps:
         )
         plant = _near(made) if self.near else made.state
         controller = first_state(self.controller.controller.init())
-        at = SimulationState(NOT_STARTED, plant, made.sensor_state, controller)
+        progress = SimulationState(NOT_STARTED, plant, made.sensor_state, controller)
         pads, rows = _ideal_buffers(self.compiled), []
-        while not has_ended(at.controller) and at.loop.ticks < most:
+        while not has_ended(progress.controller) and progress.loop.ticks < most:
             table: Any = np.zeros((len(COLUMNS), CAPACITY + ROWS_AT_ONCE))
             phases: Any = np.zeros(CAPACITY + ROWS_AT_ONCE, np.int64)
             if not self.compiled:
                 table, phases = table.tolist(), phases.tolist()
-            start, written = at._replace(loop=at.loop._replace(recorded=0)), Buffers(*pads, table, phases)
-            at = loop(params, start, written)
-            if at.loop.failed == 1:
-                before = before_failure(loop, params, start, written, at.loop.ticks)
+            start, written = (
+                progress._replace(loop=progress.loop._replace(recorded=0)),
+                Buffers(*pads, table, phases),
+            )
+            progress = loop(params, start, written)
+            if progress.loop.failed == 1:
+                last_plant = before_failure(loop, params, start, written, progress.loop.ticks)
                 raise TermFailed(
-                    not_finite_in_tick(made.kinds, made.plant, before, at.loop.effort_n, setup.dt_s)
+                    not_finite_in_tick(made.kinds, made.plant, last_plant, progress.loop.effort_n, setup.dt_s)
                 )
-            n = at.loop.recorded
+            n = progress.loop.recorded
             rows.append(np.vstack((np.asarray(table)[:, :n], np.asarray(phases)[:n])))
-            self._count(start, at)
-        return at, np.concatenate(rows, axis=1)
+            self._count(start, progress)
+        return progress, np.concatenate(rows, axis=1)
 
-    def _count(self, before: SimulationState, after: SimulationState) -> None:
+    def _count(self, start: SimulationState, end: SimulationState) -> None:
         """Count the work between two states. Raises TooMuchWork."""
-        self.work += after.loop.ticks - before.loop.ticks
-        self.work += after.plant.step.n_steps - before.plant.step.n_steps
+        self.work += end.loop.ticks - start.loop.ticks
+        self.work += end.plant.step.n_steps - start.plant.step.n_steps
         if self.work > MOST_WORK:
             raise TooMuchWork
         percent = 100 * self.work // MOST_WORK

@@ -242,8 +242,8 @@ class _Batch:
         part = self._part(which)
         done: dict[int, FinishedGrasp] = {}
         plain: list[int] = []
-        for i, one in enumerate(part):
-            grasp = self._compiled(*one)
+        for i, grasp_of in enumerate(part):
+            grasp = self._compiled(*grasp_of)
             if grasp is None:
                 plain.append(i)
             else:

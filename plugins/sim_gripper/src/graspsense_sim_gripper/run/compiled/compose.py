@@ -66,22 +66,22 @@ def _no_terms(
     return 0.0, ()
 
 
-first: Law = _no_terms
-rest: Law = _no_terms
+head: Law = _no_terms
+tail: Law = _no_terms
 
 
 def _sum_of_1(
     params: TermsParams, states: TermsStates, d0: float, d1: float, h: float, v1: float
 ) -> tuple[float, TermsStates]:
-    force, state = first(params[0], states[0], d0, d1, h, v1)
+    force, state = head(params[0], states[0], d0, d1, h, v1)
     return force, (state,)
 
 
 def _sum_of_more(
     params: TermsParams, states: TermsStates, d0: float, d1: float, h: float, v1: float
 ) -> tuple[float, TermsStates]:
-    force, state = first(params[0], states[0], d0, d1, h, v1)
-    total, others = rest(params[1:], states[1:], d0, d1, h, v1)
+    force, state = head(params[0], states[0], d0, d1, h, v1)
+    total, others = tail(params[1:], states[1:], d0, d1, h, v1)
     return force + total, (state, *others)
 
 
@@ -92,9 +92,9 @@ on_sum: SumLaw = switched_on_sum
 def _acted_on(
     params: TermsParams, states: TermsStates, d0: float, d1: float, h: float, v1: float
 ) -> tuple[float, TermsStates]:
-    total, before = summands(params[:-1], states[:-1], d0, d1, h, v1)
+    total, summed = summands(params[:-1], states[:-1], d0, d1, h, v1)
     force, state = on_sum(params[-1], states[-1], total, d1)
-    return force, (*before, state)
+    return force, (*summed, state)
 
 
 def sum_of(laws: Sequence[Law | OnSum]) -> Law:
@@ -113,8 +113,8 @@ def _summed(laws: Sequence[Any]) -> Law:
     if not laws:
         return _no_terms
     if len(laws) == 1:
-        return bind(_sum_of_1, first=laws[0])
-    return bind(_sum_of_more, first=laws[0], rest=_summed(laws[1:]))
+        return bind(_sum_of_1, head=laws[0])
+    return bind(_sum_of_more, head=laws[0], tail=_summed(laws[1:]))
 
 
 def sum_of_active(laws: Sequence[Law | OnSum]) -> Law:
@@ -176,8 +176,8 @@ def _phase_and_others(states: TermsStates) -> int:
 def phase_of_all(phases: Sequence[tuple[int, Phase]]) -> Phase:
     """Return one number for the phases of these terms, each given with its place among the states."""
     combined: Phase = _no_phase
-    for place, one in reversed(phases):
-        combined = bind(_phase_and_others, PLACE=place, phase=one, others=combined)
+    for place, term_phase in reversed(phases):
+        combined = bind(_phase_and_others, PLACE=place, phase=term_phase, others=combined)
     return combined
 
 
@@ -196,8 +196,8 @@ def _one_moves(states: TermsStates) -> bool:
 def any_moves(moving: Sequence[tuple[int, Moves]]) -> Moves:
     """Return whether one of these terms moves, each given with its place among the states."""
     combined: Moves = _no_move
-    for place, one in reversed(moving):
-        combined = bind(_one_moves, PLACE=place, moves=one, others_move=combined)
+    for place, term_moves in reversed(moving):
+        combined = bind(_one_moves, PLACE=place, moves=term_moves, others_move=combined)
     return combined
 
 
