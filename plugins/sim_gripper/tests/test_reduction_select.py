@@ -269,12 +269,12 @@ def test_it_matters_in_which_tick_this_threshold_is_met(stiff):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("off_n", [0.0, 1e-9, -1e-9])
-def test_a_threshold_that_is_met_within_rounding_at_a_tick_is_refused(stiff, off_n):
+def test_a_threshold_that_is_met_within_rounding_at_a_tick_is_met_in_it_or_in_the_next(stiff, off_n):
     config, met_n = stiff
-    with pytest.raises(ConfigError) as refused:
-        course(config, met_n + off_n)
-    for told in ("stiff.toml", "within", "df_dt", "gripper.open_gap_m", "gripper.accuracy", "reference"):
-        assert told in str(refused.value)
+    reference = evolve(config, fidelity="reference")
+    sides = [course(reference, met_n + side_n) for side_n in (-1e-4, 1e-4)]
+    grasp = course(config, met_n + off_n)
+    assert min(deviation(grasp, side)[0] for side in sides) <= config.accuracy
 
 
 @pytest.mark.slow

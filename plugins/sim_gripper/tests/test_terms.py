@@ -496,21 +496,12 @@ def test_every_term_stands_still_over_a_hold_of_a_million_seconds(name):
 
 
 @pytest.mark.parametrize("name", sorted(VARIANTS))
-def test_every_term_says_how_fast_it_is_and_how_much_it_matters(name):
+def test_every_term_says_how_fast_it_is(name):
     term, point = TERMS[name.split()[0]], WorkingPoint(0.005, 0.01, 2.0)
     rates = term.rates(VARIANTS[name], point)
     assert all(math.isfinite(rate.per_s) and rate.per_s > 0.0 for rate in rates)
     if not isinstance(term.at_rest, NoState) and name not in ("rigid", "gas", "snap", "fracture"):
         assert rates
-    # A term that acts on the sum of the others has no force of its own.
-    assert (term.importance(VARIANTS[name], point) > 0.0) == (term.on_sum is None)
-    assert term.importance(VARIANTS[name], WorkingPoint(0.0, 0.0, 1.0)) == 0.0
-
-
-def test_the_importance_of_a_spring_and_a_damper_is_their_force():
-    point = WorkingPoint(0.005, 0.01, 2.0)
-    assert TERMS["elastic"].importance(Elastic(2000.0, 0.0), point) == pytest.approx(10.0)
-    assert TERMS["loss"].importance(Loss(650.0), point) == pytest.approx(6.5)
 
 
 def test_a_term_that_does_not_fit_together_is_refused_where_it_is_declared():

@@ -23,7 +23,6 @@ def explain(setup: GraspSetup, compressions: Sequence[tuple[float, float]]) -> d
     - `at_peak_n` and `share`: its force (N) when the force of the object is largest, and its share of the sum of terms,
     - `work_j`: the work done on it until then (J),
     - `lost_j`: the work that it has not returned when the object separates (J),
-    - `expected_n`: the largest force (N) that `Term.importance` predicts for such a grasp,
     - `rates`: its rates (1/s).
     """
     if not compressions:
@@ -92,6 +91,5 @@ def _contribution(kind: str, params: TermParams, along: _Path, point: WorkingPoi
         "at_peak_n": forces[peak],
         "work_j": work_to_peak,
         "lost_j": work,
-        "expected_n": term.importance(params, point),
         "rates": [{"what": rate.what, "per_s": rate.per_s} for rate in term.rates(params, point)],
     }
