@@ -213,7 +213,7 @@ control: Callable[[TickParams, TickState, Reading], tuple[Command, TickState]] =
 begin_macro_step: Callable[..., Ahead] = _never_begins
 """`macro_ticks.begin_macro_step` where a step may last several ticks."""
 run_approach_ticks: Callable[[GraspParams, LoopProgress, Frame, Table, Any], LoopProgress] = _every_tick
-"""`approach.approach_ticks`, in the interpreter `free_ticks.approach_or_free_ticks`, where ticks are run at once."""
+"""`approach.approach_ticks` where ticks are run at once."""
 
 
 def grasp(params: GraspParams, progress: SimulationState, buffers: Buffers) -> SimulationState:

@@ -26,15 +26,13 @@ from graspsense_sim_gripper.plant.sensing import SensorState
 from graspsense_sim_gripper.plant.state import Contact, ContactState, Motion, Past, PlantState, StepState
 from graspsense_sim_gripper.run.approach import approach_ticks
 from graspsense_sim_gripper.run.binding import Constructors, bind_reachable
-from graspsense_sim_gripper.run.free_ticks import approach_or_free_ticks, free_ticks
-from graspsense_sim_gripper.run.loop import GraspParams, LoopProgress, SimulationState, grasp
+from graspsense_sim_gripper.run.loop import SimulationState, grasp
 from graspsense_sim_gripper.run.macro_ticks import begin_macro_step
 from graspsense_sim_gripper.run.problem import ControllerStep
 from graspsense_sim_gripper.scene.terms.registry import active_laws, find_term, laws_of, moving_of, phases_of
 from graspsense_sim_gripper.scene.terms.switchable import Switchable, switched_on_sum
 from graspsense_sim_gripper.scene.terms.term import LAW_ERRORS, Law, Moves, OnSum, Phase, SumLaw
 from graspsense_sim_gripper.solve.advance import advance, move
-from graspsense_sim_gripper.solve.coast import can_glide, glide
 from graspsense_sim_gripper.solve.converge import refine_until_converged
 from graspsense_sim_gripper.solve.scheme import Attempt, PlantParams, Start
 
@@ -329,17 +327,6 @@ def guarded_loop(composition: Composition, step: ControllerStep) -> Callable[...
     return _loop_of(composed_move(composition, interpreted=False), step, force, composition)
 
 
-@lru_cache(maxsize=64)
-def free_motion(
-    composition: Composition, step: ControllerStep
-) -> Callable[[GraspParams, LoopProgress, Frame, Any, Any], LoopProgress] | None:
-    """Return `free_ticks` for the interpreter; None where every tick needs the controller and all sensors."""
-    parts = free_parts(step)
-    if not parts or not _may_last_several_ticks(composition):
-        return None
-    return bind_reachable(free_ticks, {**parts, "can_glide": can_glide, "glide": glide}, INTERPRETED)
-
-
 def _may_last_several_ticks(composition: Composition) -> bool:
     """Return whether a step of this plant may last several ticks."""
     return not (composition.converges or composition.lags)
@@ -354,12 +341,7 @@ def _loop_of(
     if _may_last_several_ticks(composition):
         parts["begin_macro_step"] = bind_reachable(begin_macro_step, step_parts(composition))
         if law := free_parts(step):
-            glides = {"can_glide": can_glide, "glide": glide}
-            parts["run_approach_ticks"] = (
-                bind_reachable(approach_or_free_ticks, {**law, **glides}, INTERPRETED)
-                if force
-                else bind_reachable(approach_ticks, law)
-            )
+            parts["run_approach_ticks"] = bind_reachable(approach_ticks, law, INTERPRETED if force else None)
     loop = bind_reachable(grasp, parts)
     return bind_reachable(loop, {"object_force": force}, INTERPRETED) if force else loop
 
