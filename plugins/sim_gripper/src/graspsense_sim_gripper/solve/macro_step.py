@@ -144,7 +144,9 @@ def _moved(
     if contact.touched == 1 and contact.left.force_n <= 0.0:
         # A released object that recovers its shape, which is computed later, or one that a finger pushes.
         scale = max(abs(motion.speed_rev_s * motion.jacobian_m_rev) / SPEED_SCALE_M_S, 1.0)
-        coasting = PlantParams(drive, model, Steps(scale * steps.macro_tolerance))
+        # All values are given: with defaults, `coast` would be compiled twice.
+        limits = Steps(scale * steps.macro_tolerance, math.inf, 0.0, math.inf, math.inf, 0.0)
+        coasting = PlantParams(drive, model, limits)
         coasts, after = coast(coasting, state, effort_n, h)
         if coasts or contact.left_n + contact.right_n > 0.0:
             return 0.0 if coasts else math.inf, HALF, contact, after, UNKNOWN
