@@ -30,22 +30,45 @@ class LinkedLibrary(JITCodeLibrary):
         self._finalize_dynamic_globals()  # type: ignore[no-untyped-call]
         self._finalized = True
 
+    def own_module(self) -> Any:
+        """Return the code of this function alone."""
+        return super()._get_module_for_linking()  # type: ignore[no-untyped-call]
+
+    def _get_module_for_linking(self) -> Any:
+        """Return the code with all that it calls, for a function of numba's own that takes this one as an argument."""
+        module = self.own_module().clone()
+        for called in _all_called(self):
+            module.link_in(called, preserve=True)
+        return module
+
 
 class OutermostLibrary(JITCodeLibrary):
     """The code of a function that the interpreter calls, and of all that it calls."""
 
     def finalize(self) -> None:
         """Link each function in once, whoever calls it; then optimise, and make machine code."""
-        libraries = dict.fromkeys(self._linking_libraries)
-        waiting = list(libraries)
-        while waiting:
-            library = waiting.pop()
-            if isinstance(library, LinkedLibrary):
-                called = [other for other in library._linking_libraries if other not in libraries]
-                libraries.update(dict.fromkeys(called))
-                waiting += called
-        self._linking_libraries = list(libraries)
+        for called in _all_called(self):
+            self._final_module.link_in(called, preserve=True)
+        for library in self._linking_libraries:
+            self._reload_init.update(library._reload_init)
+        self._linking_libraries = []
         super().finalize()  # type: ignore[no-untyped-call]
+
+
+def _all_called(library: JITCodeLibrary) -> list[Any]:
+    """Return the code of every function that this one calls, and that these call, each once."""
+    libraries = dict.fromkeys(library._linking_libraries)
+    waiting = list(libraries)
+    while waiting:
+        called = waiting.pop()
+        if isinstance(called, LinkedLibrary):
+            further = [other for other in called._linking_libraries if other not in libraries]
+            libraries.update(dict.fromkeys(further))
+            waiting += further
+    return [
+        called.own_module() if isinstance(called, LinkedLibrary) else called._get_module_for_linking()
+        for called in libraries
+    ]
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)  # type: ignore[no-untyped-call]
@@ -98,7 +121,7 @@ def _with_lowering(passes: Any, lowering: type[NativeLowering]) -> list[Any]:
 
 def _keep_in(kind: type[JITCodeLibrary], state: Any) -> None:
     """Have the code of the function that is compiled put into a library of this kind."""
-    state.library = kind(state.targetctx.codegen(), state.func_id.func_qualname)  # type: ignore[no-untyped-call]
+    state.library = kind(state.targetctx.codegen(), state.func_id.func_qualname)
     state.library.enable_object_caching()
 
 
