@@ -224,6 +224,7 @@ def _largest(numbers):
 
 
 @pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:Cannot cache compiled function")
 def test_a_function_of_numba_calls_one_of_ours_with_all_that_it_calls(tmp_path, monkeypatch):
     pytest.importorskip("numba")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
