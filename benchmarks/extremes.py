@@ -240,18 +240,20 @@ def gas(volume_m3: float, **more: float) -> ObjectSpec:
     return object_of(SHELL, ("gas", {**GAS, "volume_m3": volume_m3, "bulge_m3_pa": BULGE, **more}))
 
 
-def tends(case: str, of: Callable[[float], ObjectSpec], limit: ObjectSpec, at: float, order: float) -> Row:
+def tends(
+    case: str, object_at: Callable[[float], ObjectSpec], limit: ObjectSpec, parameter: float, order: float
+) -> Row:
     """Return whether an object converges to a limit with this order as its parameter goes to 0 (order < 0: to inf).
 
-    The observed order follows from the differences of their traces at `at` and at half of it (order < 0: twice).
+    The observed order follows from the differences of their traces at `parameter` and at half of it (order < 0: twice).
     """
     expected, _, _ = press(CLOSE, limit)
     towards = 0.5 if order > 0.0 else 2.0
-    far, near = (rms_of(press(CLOSE, of(x))[0], expected) for x in (at, towards * at))
+    far, near = (rms_of(press(CLOSE, object_at(x))[0], expected) for x in (parameter, towards * parameter))
     seen = math.copysign(math.log2(far / near), order)
     return {
         "case": f"{case}, order of its limit",
-        "value": at,
+        "value": parameter,
         "difference": near,
         "order": seen,
         "finite": math.isfinite(near),
@@ -322,13 +324,13 @@ def energy(short: bool) -> Iterator[Row]:
             state = plant.setup.state
             motion = state.motion
             state = state._replace(motion=motion._replace(speed_rev_s=-0.05 / motion.jacobian_m_rev))
-            most, first = -math.inf, 0.5 * mass * 0.05**2
-            last = first
+            most, initial_j = -math.inf, 0.5 * mass * 0.05**2
+            last = initial_j
             for _ in range(400):
                 state = plant.move(plant.params, state, 0.0, plant.setup.dt_s)
                 speed, d = speed_of(state), state.contact.left.compression_m
                 now = 0.5 * (mass * speed * speed + k1 * d * d + 0.5 * k3 * d**4)
-                most, last = max(most, (now - last) / first), now
+                most, last = max(most, (now - last) / initial_j), now
             yield {
                 "case": "stored energy with the drive off",
                 "value": [k3, where, damping],
@@ -423,7 +425,7 @@ def approach(short: bool) -> Iterator[Row]:
                 "peak_error": error,
                 "holds": error <= (1e-3 if effort == 0.0 else 0.01),
             }
-    before = 0.0
+    last_over = 0.0
     for speed in speeds:
         damped = evolve(config, damping_n_s_m=1.2 * critical)
         _, state, _ = press(damped, spec, speed_m_s=speed, effort_n=20.0, seconds=1.0)
@@ -432,9 +434,9 @@ def approach(short: bool) -> Iterator[Row]:
             "case": "approach speed, peak over the static force",
             "value": speed,
             "over": over,
-            "holds": over >= before - 1e-3 and (speed > 1e-3 or abs(over) <= 1e-3),
+            "holds": over >= last_over - 1e-3 and (speed > 1e-3 or abs(over) <= 1e-3),
         }
-        before = over
+        last_over = over
 
 
 def ticks(short: bool) -> Iterator[Row]:
@@ -504,7 +506,7 @@ def hertz_energy(short: bool) -> Iterator[Row]:
         state = plant.setup.state
         motion = state.motion
         state = state._replace(motion=motion._replace(speed_rev_s=-speed / motion.jacobian_m_rev))
-        first = last = 0.5 * mass * speed**2
+        initial_j = last = 0.5 * mass * speed**2
         most = -math.inf
         for _ in range(400):
             state = plant.move(plant.params, state, 0.0, plant.setup.dt_s)
@@ -512,7 +514,7 @@ def hertz_energy(short: bool) -> Iterator[Row]:
             pressed = state.contact.left_n > 0.0
             depth = max(state.contact.left.compression_m, 0.0) if pressed else 0.0
             now = 0.5 * mass * speed_of(state) ** 2 + 0.4 * hertz * depth**2.5
-            most, last = max(most, (now - last) / first), now
+            most, last = max(most, (now - last) / initial_j), now
             if not pressed and speed_of(state) > 0.0:
                 # Thrown back: the end of travel would take the energy next.
                 break
@@ -520,11 +522,11 @@ def hertz_energy(short: bool) -> Iterator[Row]:
             "case": "stored energy of a Hertz contact",
             "value": hertz,
             "rise": most,
-            "lost": 1.0 - last / first,
+            "lost": 1.0 - last / initial_j,
             "finite": math.isfinite(last),
             "flagged": is_flagged(plant, state),
             # A tenth of the accuracy that is asked for.
-            "holds": most <= 1e-3 and abs(1.0 - last / first) <= 1e-3,
+            "holds": most <= 1e-3 and abs(1.0 - last / initial_j) <= 1e-3,
         }
 
 
@@ -637,7 +639,7 @@ def grasped(case: str, value: Any, config: SimConfig, spec: ObjectSpec, **contro
         done, said = whole_grasp(config, spec, law)
     except ConfigError as error:
         return {"case": case, "value": value, "refused": str(error), "flagged": True, "holds": True}
-    error, of = error_of(done, reference)
+    error, quantity = error_of(done, reference)
     peak = reference.state.peak_n
     return {
         "case": case,
@@ -645,7 +647,7 @@ def grasped(case: str, value: Any, config: SimConfig, spec: ObjectSpec, **contro
         "outcome": done.outcome.name,
         "peak_error": abs(done.state.peak_n - peak) / max(peak, 1.0),
         "error": error,
-        "of": of,
+        "of": quantity,
         "said": said,
         "flagged": bool(said),
         "finite": math.isfinite(done.state.peak_n),

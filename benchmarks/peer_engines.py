@@ -67,7 +67,7 @@ def _our_engine(config: SimConfig, setting: str) -> Engine:
     scenes.add(config.object, compiled=True)
     setup = scenes.setup(config.object, 0)
     composition = composition_of(setup)
-    loop = CompiledLoops(Law.step).of(composition)
+    loop = CompiledLoops(Law.step).loop_of(composition)
     storage = Storage()
     grasp_compiled(job, setup, loop, storage)
 
@@ -325,7 +325,7 @@ def scipy_engine(scene: PeerScene, method: str, rtol: float) -> Engine:
             value.terminal, value.direction = True, 1.0  # type: ignore[attr-defined]
             return value
 
-        found = solve_ivp(
+        solution = solve_ivp(
             rates,
             (t, TICK),
             s,
@@ -334,8 +334,8 @@ def scipy_engine(scene: PeerScene, method: str, rtol: float) -> Engine:
             atol=rtol * scene.scale,
             events=[guard(k) for k in range(scene.n_guards)],
         )
-        fired = [k for k, times in enumerate(found.t_events) if len(times)]
-        return found.t[-1], found.y[:, -1].copy(), fired[0] if fired else -1
+        fired = [k for k, times in enumerate(solution.t_events) if len(times)]
+        return solution.t[-1], solution.y[:, -1].copy(), fired[0] if fired else -1
 
     return Engine(
         name=f"SciPy {method}, restarted",
@@ -371,13 +371,13 @@ def cvode_engine(scene: PeerScene, method: str, rtol: float) -> Engine:
     def solve(s: Any, u: float, mode: Any, t: float) -> tuple[float, Any, int]:
         held["u"], held["mode"] = u, mode
         solver.init_step(t, s)
-        found = solver.step(TICK, tstop=TICK)
-        y = np.array(found.y)
-        if found.t >= TICK:
-            return found.t, y, -1
+        point = solver.step(TICK, tstop=TICK)
+        y = np.array(point.y)
+        if point.t >= TICK:
+            return point.t, y, -1
         # The root is a rounding error before or after the event.
         scene.guards(y, u, mode, g)
-        return found.t, y, int(np.argmax(g))
+        return point.t, y, int(np.argmax(g))
 
     return Engine(
         name=f"CVODE {method}, restarted", setting=f"rtol {rtol:g}", grasp=lambda: _piecewise(scene, solve)

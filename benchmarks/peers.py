@@ -102,10 +102,12 @@ def compared(scene: PeerScene, repeats: int, *, adaptive: bool) -> dict[str, Any
     return {"name": scene.name, "says": scene.says, "runs": rows, "ratios": dict(ratios(rows))}
 
 
-def row(engine: Engine, setup_s: float, found: list[tuple[Run, float]], reference: Run) -> dict[str, Any]:
+def row(
+    engine: Engine, setup_s: float, timed_runs: list[tuple[Run, float]], reference: Run
+) -> dict[str, Any]:
     """Return the figures of one engine."""
-    seconds = [one for _, one in found]
-    rms, peak = found[-1][0].error(reference)
+    seconds = [spent_s for _, spent_s in timed_runs]
+    rms, peak = timed_runs[-1][0].error(reference)
     return {
         "engine": engine.name,
         "setting": engine.setting,
@@ -122,10 +124,12 @@ def ratios(rows: list[dict[str, Any]]) -> Iterator[tuple[str, float]]:
     """Yield how many times as long the fastest setting of each engine takes as ours, at each bound on the error."""
     for bound in BOUNDS:
         fast: dict[str, float] = {}
-        for one in rows:
-            if one["rms"] <= bound:
-                name = one["engine"].split(",")[0] if "located" not in one["engine"] else one["engine"]
-                fast[name] = min(one["ms"], fast.get(name, math.inf))
+        for engine in rows:
+            if engine["rms"] <= bound:
+                name = (
+                    engine["engine"].split(",")[0] if "located" not in engine["engine"] else engine["engine"]
+                )
+                fast[name] = min(engine["ms"], fast.get(name, math.inf))
         mine = fast.pop("graspsense", None)
         if mine is not None:
             for name, ms in fast.items():
@@ -136,11 +140,11 @@ def table(measured: dict[str, Any]) -> Iterator[str]:
     """Yield the lines of a scene."""
     yield f"\n{measured['name']}: {measured['says']}"
     yield f"{'engine':<44}{'setting':<36}{'ms':>9}{'least':>9}{'greatest':>10}{'set-up s':>10}{'rms':>10}{'peak':>10}"
-    for one in measured["runs"]:
-        note = "  misses the scene" if not one["rms"] <= WRONG else ""
+    for figures in measured["runs"]:
+        note = "  misses the scene" if not figures["rms"] <= WRONG else ""
         yield (
-            f"{one['engine']:<44}{one['setting']:<36}{one['ms']:>9.3f}{one['ms_least']:>9.3f}{one['ms_greatest']:>10.3f}"
-            f"{one['setup_s']:>10.2f}{one['rms']:>10.1e}{one['peak']:>10.1e}{note}"
+            f"{figures['engine']:<44}{figures['setting']:<36}{figures['ms']:>9.3f}{figures['ms_least']:>9.3f}{figures['ms_greatest']:>10.3f}"
+            f"{figures['setup_s']:>10.2f}{figures['rms']:>10.1e}{figures['peak']:>10.1e}{note}"
         )
     for name, ratio in measured["ratios"].items():
         yield f"  {name:<60}{ratio:>10.2f} times our time"
@@ -178,10 +182,10 @@ def page(result: dict[str, Any]) -> Iterator[str]:
         yield ""
         yield "| engine | setting | ms | least to greatest | set-up, s | rms | peak |"
         yield "|---|---|---|---|---|---|---|"
-        for one in scene["runs"]:
+        for run in scene["runs"]:
             yield (
-                f"| {one['engine']} | {one['setting']} | {one['ms']:.3g} | {one['ms_least']:.3g} to "
-                f"{one['ms_greatest']:.3g} | {one['setup_s']:.2g} | {one['rms']:.1e} | {one['peak']:.1e} |"
+                f"| {run['engine']} | {run['setting']} | {run['ms']:.3g} | {run['ms_least']:.3g} to "
+                f"{run['ms_greatest']:.3g} | {run['setup_s']:.2g} | {run['rms']:.1e} | {run['peak']:.1e} |"
             )
         yield ""
         yield from ratios_at_errors(scene["ratios"])
@@ -191,17 +195,17 @@ def page(result: dict[str, Any]) -> Iterator[str]:
 
 def across_scenes(ratios: Sequence[dict[str, float]]) -> Iterator[str]:
     """Yield the table of the times over ours at an error of 1 %, from the least to the greatest of the scenes."""
-    found: dict[str, list[float]] = {}
+    by_engine: dict[str, list[float]] = {}
     for some in ratios:
         for name, ratio in some.items():
             engine, _, error = name.rpartition(" at ")
             if float(error) == max(BOUNDS):
-                found.setdefault(engine, []).append(ratio)
+                by_engine.setdefault(engine, []).append(ratio)
     yield f"Times over ours at an rms error of {max(BOUNDS):.0%}, each side with its fastest setting within the error:"
     yield ""
     yield "| engine | scenes | least | greatest |"
     yield "|---|---|---|---|"
-    for engine, some_ratios in found.items():
+    for engine, some_ratios in by_engine.items():
         yield f"| {engine} | {len(some_ratios)} | {min(some_ratios):.2g} | {max(some_ratios):.2g} |"
 
 
@@ -224,11 +228,11 @@ def sentence(text: str) -> str:
 
 def dominating(scene: dict[str, Any]) -> str:
     """Return the engines that are both faster and more exact than the simulator as it is shipped."""
-    shipped = next(one for one in scene["runs"] if one["setting"].startswith("as shipped"))
+    shipped = next(figures for figures in scene["runs"] if figures["setting"].startswith("as shipped"))
     return "; ".join(
-        f"{one['engine']}, {one['setting']}"
-        for one in scene["runs"]
-        if one["ms"] < shipped["ms"] and one["rms"] < shipped["rms"]
+        f"{figures['engine']}, {figures['setting']}"
+        for figures in scene["runs"]
+        if figures["ms"] < shipped["ms"] and figures["rms"] < shipped["rms"]
     )
 
 

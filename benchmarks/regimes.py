@@ -66,31 +66,43 @@ def scene_of(number: int) -> tuple[Scene, Row]:
     stiffness, speed, rate = log(1e2, 1e7), log(1e-3, 0.1), log(200.0, 5000.0)
     # A light plastic jaw to a large geared hand, as seen at the gap.
     mass = log(0.5, 300.0)
-    at: Row = {"stiffness_n_m": stiffness, "speed_m_s": speed, "tick_s": 1.0 / rate, "moving_mass_kg": mass}
+    quantities: Row = {
+        "stiffness_n_m": stiffness,
+        "speed_m_s": speed,
+        "tick_s": 1.0 / rate,
+        "moving_mass_kg": mass,
+    }
     terms: dict[str, dict[str, float]] = {"elastic": {"k1_n_m": stiffness}}
     if rng.random() < 0.2:
         terms = {"rigid": {"hertz_n_m15": (stiffness / 1.5) ** 1.5 / math.sqrt(20.0)}}
     if rng.random() < 0.5:
-        at["mass_ratio"] = ratio = log(1e-5, 10.0)
+        quantities["mass_ratio"] = ratio = log(1e-5, 10.0)
         terms["surface"] = {"mass_kg": mass * ratio, "k_n_m": max(stiffness * log(0.01, 1.0), 100.0)}
         critical = 2.0 * math.sqrt(terms["surface"]["k_n_m"] * mass * ratio)
         terms["surface"] |= {"damping_n_s_m": critical * log(0.01, 10.0), "contact_n_m": stiffness}
     if rng.random() < 0.5:
-        at["damping_ratio"] = share = log(1e-3, 30.0)
+        quantities["damping_ratio"] = share = log(1e-3, 30.0)
         terms["loss"] = {"damping_n_s_m": share * 2.0 * math.sqrt(stiffness * mass)}
     if rng.random() < 0.5:
-        at["relaxation_s"] = log(1e-6, 1e4)
-        terms["maxwell"] = {"k_n_m": stiffness * log(0.01, 3.0), "tau_s": at["relaxation_s"]}
+        quantities["relaxation_s"] = log(1e-6, 1e4)
+        terms["maxwell"] = {"k_n_m": stiffness * log(0.01, 3.0), "tau_s": quantities["relaxation_s"]}
     if rng.random() < 0.5:
-        at["head_space_m3"], at["vent_m2"] = log(1e-7, 2e-3), log(1e-11, 1e-4) if rng.random() < 0.7 else 0.0
-        terms["gas"] = {"area_m2": log(1e-4, 5e-3), "area_slope_m": 0.0, "volume_m3": at["head_space_m3"]}
+        quantities["head_space_m3"], quantities["vent_m2"] = (
+            log(1e-7, 2e-3),
+            log(1e-11, 1e-4) if rng.random() < 0.7 else 0.0,
+        )
+        terms["gas"] = {
+            "area_m2": log(1e-4, 5e-3),
+            "area_slope_m": 0.0,
+            "volume_m3": quantities["head_space_m3"],
+        }
         terms["gas"] |= {"pressure_pa": ATMOSPHERE_PA, "exponent": 1.4, "bulge_m3_pa": log(1e-11, 1e-9)}
-        terms["gas"] |= {"heat_s": log(1e-2, 1e2), "vent_m2": at["vent_m2"]}
+        terms["gas"] |= {"heat_s": log(1e-2, 1e2), "vent_m2": quantities["vent_m2"]}
     if rng.random() < 0.15:
-        at["slosh_hz"] = log(0.5, 2000.0)
+        quantities["slosh_hz"] = log(0.5, 2000.0)
         terms["slosh"] = {
             "mass_kg": log(1e-3, 1.0),
-            "frequency_hz": at["slosh_hz"],
+            "frequency_hz": quantities["slosh_hz"],
             "damping_ratio": log(1e-3, 2.0),
         }
     order = list(terms)
@@ -104,9 +116,9 @@ def scene_of(number: int) -> tuple[Scene, Row]:
     )
     straight = bool(rng.random() < 0.5)
     friction = log(0.1, 10.0)
-    at["sensor"] = "pads" if rng.random() < 0.3 else "ideal"
+    quantities["sensor"] = "pads" if rng.random() < 0.3 else "ideal"
     config = SimConfig(
-        sensor=at["sensor"],
+        sensor=quantities["sensor"],
         spread=False,
         rate_hz=rate,
         transmission="straight" if straight else "pr2",
@@ -123,8 +135,8 @@ def scene_of(number: int) -> tuple[Scene, Row]:
     )
     # Pads, and the object, in series.
     series = 1.0 / (1.0 / stiffness + 2.0 / config.pad_stiffness_n_m)
-    at["phase_rad"] = math.sqrt(series / (mass if straight else 100.0)) / rate
-    return Scene(number=number, spec=spec, config=config, speed_m_s=speed), at
+    quantities["phase_rad"] = math.sqrt(series / (mass if straight else 100.0)) / rate
+    return Scene(number=number, spec=spec, config=config, speed_m_s=speed), quantities
 
 
 class Interpreted(Bench):
@@ -162,8 +174,8 @@ def seconds_of(bench: Bench, job: Job, setup: GraspSetup) -> float:
 
 def measured(bench: Bench, number: int) -> Row:
     """Return the errors, decisions and times of a scene."""
-    scene, at = scene_of(number)
-    row: Row = {"scene": number, **at}
+    scene, quantities = scene_of(number)
+    row: Row = {"scene": number, **quantities}
     dt = 1.0 / scene.config.rate_hz
     try:
         reference, setup, reduction, _ = bench.grasp(scene, REFERENCE, "reference")
@@ -190,7 +202,7 @@ def _case(
         return {"error": math.inf, "refused": str(error)[:200]}
     except ArithmeticError as error:
         return {"error": math.inf, "refused": f"{type(error).__name__}: {error}"}
-    error, of = deviation(record_of(done, dt_s), record_of(reference, dt_s))
+    error, quantity = deviation(record_of(done, dt_s), record_of(reference, dt_s))
     state = done.state
     flags = []
     if reduction.unresolved:
@@ -201,7 +213,7 @@ def _case(
         flags.append("not verified")
     return {
         "error": error,
-        "of": of,
+        "of": quantity,
         "flags": flags,
         "chosen": reduction.decisions[0].decision,
         "steps": state.step.n_steps,
@@ -210,13 +222,13 @@ def _case(
     }
 
 
-def run(bench: Bench, file: Path, scenes: int, first: int) -> list[Row]:
+def run(bench: Bench, file: Path, scenes: int, first_scene: int) -> list[Row]:
     """Measure scenes until the file holds as many, and append them; return all rows.
 
     The file may be the rows of several runs, one after the other.
     """
     rows = [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
-    begin = rows[-1]["scene"] + 1 if rows else first
+    begin = rows[-1]["scene"] + 1 if rows else first_scene
     for number in range(begin, begin + scenes - len(rows)):
         row = measured(bench, number)
         rows.append(row)
@@ -227,11 +239,11 @@ def run(bench: Bench, file: Path, scenes: int, first: int) -> list[Row]:
     return rows
 
 
-def share_words(n: int, of: int) -> str:
+def share_words(n: int, total: int) -> str:
     """Return a number of scenes with the lower end of its 95 % interval."""
-    if of == 0:
+    if total == 0:
         return "-"
-    return f"{n} of {of} ({n / of:.1%}; at least {wilson(n, of)[0]:.1%})"
+    return f"{n} of {total} ({n / total:.1%}; at least {wilson(n, total)[0]:.1%})"
 
 
 def page(rows: Sequence[Row], picture: str | None) -> str:
@@ -303,9 +315,9 @@ def _is_kept(case: Row, accuracy: float) -> bool:
 def _numbers(rows: Sequence[Row]) -> str:
     """Return the seeds of the scenes in words, one range for each run of the program."""
     numbers = sorted(row["scene"] for row in rows)
-    first = [a for k, a in enumerate(numbers) if k == 0 or numbers[k - 1] < a - 1]
+    begins = [a for k, a in enumerate(numbers) if k == 0 or numbers[k - 1] < a - 1]
     last = [a for k, a in enumerate(numbers) if k == len(numbers) - 1 or numbers[k + 1] > a + 1]
-    return ", ".join(f"{a} to {b}" for a, b in zip(first, last, strict=True))
+    return ", ".join(f"{a} to {b}" for a, b in zip(begins, last, strict=True))
 
 
 def _confirmed(rows: Sequence[Row], what: str) -> str:
@@ -327,13 +339,13 @@ def _within(rows: Sequence[Row]) -> Iterator[str]:
         mine = [row[name] for row in rows]
         if not mine:
             continue
-        within = sum(one["error"] <= accuracy for one in mine)
-        refused = sum("refused" in one for one in mine)
-        flagged = sum(bool(one.get("flags")) for one in mine)
-        silent = [one["error"] / accuracy for one in mine if "refused" not in one and not one["flags"]]
-        kept = sum(_is_kept(one, accuracy) for one in mine)
-        ms = [one["ms"] for one in mine if "ms" in one]
-        selection = [one["selection_ms"] for one in mine if "ms" in one]
+        within = sum(case["error"] <= accuracy for case in mine)
+        refused = sum("refused" in case for case in mine)
+        flagged = sum(bool(case.get("flags")) for case in mine)
+        silent = [case["error"] / accuracy for case in mine if "refused" not in case and not case["flags"]]
+        kept = sum(_is_kept(case, accuracy) for case in mine)
+        ms = [case["ms"] for case in mine if "ms" in case]
+        selection = [case["selection_ms"] for case in mine if "ms" in case]
         yield (
             f"| {what} | {share_words(within, len(mine))} | {share_words(kept, len(mine))} | {flagged} | {refused} "
             f"| {max(silent, default=math.nan):.3g} | {_median(ms):.3g} | {_median(selection):.0f} |"
@@ -349,7 +361,9 @@ def _needed(rows: Sequence[Row]) -> Iterator[str]:
     yield "|---|---|"
     for accuracy in ACCURACIES:
         mine = [row[f"{accuracy:g}"] for row in rows if "refused" not in row[f"{accuracy:g}"]]
-        chosen = ", ".join(f"{name} {n}" for name, n in Counter(one["chosen"] for one in mine).most_common())
+        chosen = ", ".join(
+            f"{name} {n}" for name, n in Counter(case["chosen"] for case in mine).most_common()
+        )
         yield f"| {accuracy:.1%} | {chosen} |"
 
 
@@ -394,7 +408,7 @@ def _misses(rows: Sequence[Row]) -> Iterator[str]:
         return
     yield "| scene | accuracy | error | of | outcome of the reference | steps | error of fixed steps of 10 µs |"
     yield "|---|---|---|---|---|---|---|"
-    for _, accuracy, row in sorted(missed, key=lambda one: -one[0])[:20]:
+    for _, accuracy, row in sorted(missed, key=lambda miss: -miss[0])[:20]:
         case = row[f"{accuracy:g}"]
         yield (
             f"| {row['scene']} | {accuracy:g} | {case['error']:.3g} | {case['of']} | {row['outcome']} "
@@ -426,9 +440,9 @@ def draw(rows: Sequence[Row], file: Path) -> None:
         strict=True,
     ):
         looks: Sequence[tuple[str, str, Callable[[Row], bool]]] = (
-            ("C0", "no flag", lambda one: not one.get("flags") and "refused" not in one),
-            ("C1", "flagged", lambda one: bool(one.get("flags"))),
-            ("C3", "refused", lambda one: "refused" in one),
+            ("C0", "no flag", lambda case: not case.get("flags") and "refused" not in case),
+            ("C1", "flagged", lambda case: bool(case.get("flags"))),
+            ("C3", "refused", lambda case: "refused" in case),
         )
         for colour, label, has in looks:
             mine = [row for row in some if has(row[name])]
@@ -460,12 +474,12 @@ def main() -> None:
     parser.add_argument("--interpreter", action="store_true", help="compile nothing, for a few scenes")
     parser.add_argument("--short", action="store_true", help="least work, only to show that it runs")
     given = parser.parse_args()
-    first = given.first if given.first is not None else secrets.randbelow(2**31)
+    first_scene = given.first if given.first is not None else secrets.randbelow(2**31)
     if given.short:
-        given.scenes, first = 1, 1  # a scene drawn anew may take minutes
+        given.scenes, first_scene = 1, 1  # a scene drawn anew may take minutes
     with tempfile.TemporaryDirectory() as folder:
         bench = Interpreted() if given.short or given.interpreter else Bench()
-        rows = run(bench, given.rows or Path(folder) / "rows.jsonl", given.scenes, first)
+        rows = run(bench, given.rows or Path(folder) / "rows.jsonl", given.scenes, first_scene)
     if given.markdown:
         picture = given.markdown.with_suffix(".png")
         draw(rows, picture)

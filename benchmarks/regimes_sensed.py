@@ -133,22 +133,22 @@ def wasserstein(ours: NDArray[np.float64], theirs: NDArray[np.float64]) -> NDArr
 def distance(ours: NDArray[np.float64], theirs: NDArray[np.float64], unit: str) -> tuple[float, float, float]:
     """Return the distance of two paired samples, the upper end of its interval, and p if they are equal."""
     scale = max(float(np.sqrt(np.mean(theirs**2))), UNIT_SCALES[unit])
-    rng, found = np.random.default_rng(0), float(wasserstein(ours, theirs)) / scale
+    rng, relative = np.random.default_rng(0), float(wasserstein(ours, theirs)) / scale
     drawn = rng.integers(len(ours), size=(RESAMPLES, len(ours)))
     # The basic bootstrap interval: resampling adds to a distance what it is above the found one.
-    spread = np.quantile(wasserstein(ours[drawn], theirs[drawn]) / scale, 0.95) - found
+    spread = np.quantile(wasserstein(ours[drawn], theirs[drawn]) / scale, 0.95) - relative
     swap = rng.random((RESAMPLES, len(ours))) < 0.5
     swapped = wasserstein(np.where(swap, theirs, ours), np.where(swap, ours, theirs)) / scale
-    p = (1.0 + float(np.sum(swapped >= found))) / (1.0 + RESAMPLES)
-    return found, found + max(float(spread), 0.0), p
+    p = (1.0 + float(np.sum(swapped >= relative))) / (1.0 + RESAMPLES)
+    return relative, relative + max(float(spread), 0.0), p
 
 
 def compared(ours: Sequence[Features], theirs: Sequence[Features]) -> dict[str, Distance]:
     """Return the distance of each feature."""
-    values, expected = (np.array([one.values for one in some]) for some in (ours, theirs))
+    values, expected = (np.array([features.values for features in some]) for some in (ours, theirs))
     result = {}
     for k, (name, unit) in enumerate(zip(theirs[0].names, theirs[0].units, strict=True)):
-        has = [~np.isnan(one[:, k]) for one in (values, expected)]
+        has = [~np.isnan(feature_values[:, k]) for feature_values in (values, expected)]
         both = has[0] & has[1]
         if np.sum(both) < LEAST_PAIRS:
             relative, at_most, p = 0.0, 0.0, 1.0
@@ -194,30 +194,30 @@ def measured(bench: Bench | None, number: int, instances: int) -> Row:
     for way, settings in WAYS.items():
         try:
             grasps = Grasps(bench, scene, settings)
-            row[way] = found = against(best, grasps, 0, instances)
-            if largest(found) > ACCURACY and not found["doubts"]:
+            row[way] = compared = against(best, grasps, 0, instances)
+            if largest(compared) > ACCURACY and not compared["doubts"]:
                 fresh = against(best, grasps, instances, (1 + AGAIN) * instances)
-                row[way] = {**fresh, "before": largest(found)}
+                row[way] = {**fresh, "before": largest(compared)}
         except (ArithmeticError, ConfigError) as error:
             row[way] = {"refused": f"{type(error).__name__}: {error}"[:200]}
     return row
 
 
-def against(best: Grasps, grasps: Grasps, first: int, end: int) -> Row:
+def against(best: Grasps, grasps: Grasps, begin: int, end: int) -> Row:
     """Return the distances of these instances of a model from those of the best one."""
-    for one in (best, grasps):
-        one.extend(end)
-    pairs = zip(grasps.outcomes[first:end], best.outcomes[first:end], strict=True)
+    for model in (best, grasps):
+        model.extend(end)
+    pairs = zip(grasps.outcomes[begin:end], best.outcomes[begin:end], strict=True)
     return {
-        "features": compared(grasps.features[first:end], best.features[first:end]),
-        "outcomes": sum(one != other for one, other in pairs) / (end - first),
+        "features": compared(grasps.features[begin:end], best.features[begin:end]),
+        "outcomes": sum(outcome != other for outcome, other in pairs) / (end - begin),
         "doubts": sorted(grasps.doubts),
     }
 
 
 def largest(row: Row) -> float:
     """Return the largest distance of a feature, or difference of the shares that have it."""
-    return max(Distance(*one).largest for one in row["features"].values())
+    return max(Distance(*numbers).largest for numbers in row["features"].values())
 
 
 def differs(row: Row) -> bool:
@@ -225,8 +225,11 @@ def differs(row: Row) -> bool:
 
     The tests of the features together have the probability `DIFFERS` of an error (Bonferroni).
     """
-    some = [Distance(*one) for one in row["features"].values()]
-    return any(one.largest > ACCURACY and one.p < DIFFERS / len(some) for one in some)
+    some = [Distance(*numbers) for numbers in row["features"].values()]
+    return any(
+        feature_distance.largest > ACCURACY and feature_distance.p < DIFFERS / len(some)
+        for feature_distance in some
+    )
 
 
 def page(rows: Sequence[Row], instances: int) -> list[str]:
@@ -247,18 +250,18 @@ def page(rows: Sequence[Row], instances: int) -> list[str]:
     ]
     for way, words in (("selected", "selected for 1 %"), ("fixed", "fixed steps of 1 ms")):
         mine = [row[way] for row in done]
-        known = [one for one in mine if "refused" not in one]
-        worst = [(largest(one), one) for one in known]
-        upper = [max(max(u, gone) for _, u, gone, _ in one["features"].values()) for one in known]
-        different = sum(differs(one) and not one["doubts"] for one in known)
+        known = [case for case in mine if "refused" not in case]
+        worst = [(largest(case), case) for case in known]
+        upper = [max(max(u, gone) for _, u, gone, _ in case["features"].values()) for case in known]
+        different = sum(differs(case) and not case["doubts"] for case in known)
         within = sum(d <= ACCURACY for d, _ in worst)
-        told = sum(d <= ACCURACY or bool(one["doubts"]) for d, one in worst) + len(mine) - len(known)
-        silent = max((d for d, one in worst if not one["doubts"]), default=math.nan)
+        told = sum(d <= ACCURACY or bool(case["doubts"]) for d, case in worst) + len(mine) - len(known)
+        silent = max((d for d, case in worst if not case["doubts"]), default=math.nan)
         lines.append(
             f"| {words} | {share_words(within, len(mine))} | {share_words(told, len(mine))} "
             f"| {share_words(sum(u <= ACCURACY for u in upper), len(mine))} "
             f"| {share_words(len(mine) - different, len(mine))} "
-            f"| {sum(bool(one['doubts']) for one in known)} | {len(mine) - len(known)} | {silent:.2g} |"
+            f"| {sum(bool(case['doubts']) for case in known)} | {len(mine) - len(known)} | {silent:.2g} |"
         )
     lines += [
         "",
@@ -267,11 +270,13 @@ def page(rows: Sequence[Row], instances: int) -> list[str]:
     ]
     known = [row["selected"] for row in done if "refused" not in row["selected"]]
     for name in known[0]["features"] if known else ():
-        found = [one["features"][name][0] for one in known]
+        distances = [case["features"][name][0] for case in known]
         beyond = sum(
-            Distance(*one["features"][name]).largest > ACCURACY and not one["doubts"] for one in known
+            Distance(*case["features"][name]).largest > ACCURACY and not case["doubts"] for case in known
         )
-        lines.append(f"| `{name}` | {np.median(found):.1e} | {np.quantile(found, 0.95):.1e} | {beyond} |")
+        lines.append(
+            f"| `{name}` | {np.median(distances):.1e} | {np.quantile(distances, 0.95):.1e} | {beyond} |"
+        )
     return lines
 
 
@@ -285,16 +290,16 @@ def main() -> None:
     parser.add_argument("--rows", type=Path, help="JSON lines of the finished scenes, to go on with later")
     parser.add_argument("--short", action="store_true", help="least work, only to show that it runs")
     given = parser.parse_args()
-    first = given.first if given.first is not None else secrets.randbelow(2**31)
+    first_scene = given.first if given.first is not None else secrets.randbelow(2**31)
     if given.short:
-        given.scenes, given.instances, first = 1, 5, 1
+        given.scenes, given.instances, first_scene = 1, 5, 1
     with tempfile.TemporaryDirectory() as folder:
         file = given.rows or Path(folder) / "rows.jsonl"
         rows = [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
-        first = rows[0]["scene"] if rows else first
+        first_scene = rows[0]["scene"] if rows else first_scene
         known = {row["scene"] for row in rows}
         bench = None if given.short else Bench()
-        for number in range(first, first + given.scenes):
+        for number in range(first_scene, first_scene + given.scenes):
             if number in known:
                 continue
             rows.append(measured(bench, number, given.instances))

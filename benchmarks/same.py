@@ -85,15 +85,15 @@ class Probe:
         self._process.communicate()
 
     def send(self, request: Mapping[str, Any]) -> None:
-        to: IO[str] | None = self._process.stdin
-        assert to is not None
-        print(json.dumps(request), file=to, flush=True)
+        requests: IO[str] | None = self._process.stdin
+        assert requests is not None
+        print(json.dumps(request), file=requests, flush=True)
 
     def answer(self) -> dict[str, Any]:
         """Return the answer to the request before. Raises SystemExit where the process has ended."""
-        of: IO[str] | None = self._process.stdout
-        assert of is not None
-        line = of.readline()
+        answers: IO[str] | None = self._process.stdout
+        assert answers is not None
+        line = answers.readline()
         if not line:
             raise SystemExit(f"same: the process of {self.name} ended; its error is above")
         answer: dict[str, Any] = json.loads(line)
@@ -113,38 +113,38 @@ class Difference:
     largest: float = field(default=float("nan"))
 
 
-def difference(name: str, before: np.ndarray | None, after: np.ndarray | None) -> Difference | None:
+def difference(name: str, base: np.ndarray | None, here: np.ndarray | None) -> Difference | None:
     """Return how an array differs between the versions; None where every bit is the same."""
-    if before is None or after is None:
-        return Difference(name=name, what="only in BASE" if after is None else "only in this checkout")
-    if before.shape != after.shape:
-        return Difference(name=name, what=f"shape {before.shape} became {after.shape}")
-    if before.dtype.kind in "US" or after.dtype.kind in "US":
-        same = bool(np.array_equal(before, after))
-        return None if same else Difference(name=name, what=f"{before.tolist()} became {after.tolist()}")
-    old, new = before.astype(float), after.astype(float)
+    if base is None or here is None:
+        return Difference(name=name, what="only in BASE" if here is None else "only in this checkout")
+    if base.shape != here.shape:
+        return Difference(name=name, what=f"shape {base.shape} became {here.shape}")
+    if base.dtype.kind in "US" or here.dtype.kind in "US":
+        same = bool(np.array_equal(base, here))
+        return None if same else Difference(name=name, what=f"{base.tolist()} became {here.tolist()}")
+    old, new = base.astype(float), here.astype(float)
     unlike = (old.view(np.int64) != new.view(np.int64)) & ~(np.isnan(old) & np.isnan(new))
     if not unlike.any():
         return None
-    first = int(np.flatnonzero(unlike.ravel())[0])
+    unlike_at = int(np.flatnonzero(unlike.ravel())[0])
     largest = float(np.nanmax(np.abs(new - old)))
     what = (
-        f"{int(unlike.sum())} of {unlike.size} numbers, the first at index {first}: "
-        f"{old.ravel()[first]!r} became {new.ravel()[first]!r}"
+        f"{int(unlike.sum())} of {unlike.size} numbers, the first at index {unlike_at}: "
+        f"{old.ravel()[unlike_at]!r} became {new.ravel()[unlike_at]!r}"
     )
     return Difference(name=name, what=what, largest=largest)
 
 
-def differences(before: Path, after: Path) -> tuple[int, list[Difference]]:
+def differences(base: Path, here: Path) -> tuple[int, list[Difference]]:
     """Return how many arrays were compared and those that differ."""
-    with np.load(before) as old, np.load(after) as new:
+    with np.load(base) as old, np.load(here) as new:
         names = list(dict.fromkeys([*old.files, *new.files]))
         pairs = [
             (name, old[name] if name in old.files else None, new[name] if name in new.files else None)
             for name in names
         ]
     compared = [difference(name.replace("|", "/"), *pair) for name, *pair in pairs]
-    return len(names), [one for one in compared if one is not None]
+    return len(names), [unlike for unlike in compared if unlike is not None]
 
 
 def run(*words: str | Path, cwd: Path = ROOT) -> str:
@@ -229,8 +229,8 @@ def versions_of(version: Version) -> dict[str, str]:
         "import json, platform, importlib.metadata as m; "
         f"print(json.dumps({{'python': platform.python_version(), **{{n: m.version(n) for n in {PACKAGES!r}}}}}))"
     )
-    found: dict[str, str] = json.loads(run(version.python, "-c", code))
-    return found
+    versions: dict[str, str] = json.loads(run(version.python, "-c", code))
+    return versions
 
 
 def compare(
@@ -256,12 +256,12 @@ def time_in_turn(probes: Sequence[Probe], request: dict[str, Any], rounds: int) 
     rows = []
     for name in names:
         pairs = [[probe.ask({"time": name})["s"] for probe in probes] for _ in range(rounds)]
-        ratios = sorted(after / before for before, after in pairs)
+        ratios = sorted(here_s / base_s for base_s, here_s in pairs)
         rows.append(
             {
                 "timed": name,
-                "base_s": statistics.median(before for before, _ in pairs),
-                "here_s": statistics.median(after for _, after in pairs),
+                "base_s": statistics.median(base_s for base_s, _ in pairs),
+                "here_s": statistics.median(here_s for _, here_s in pairs),
                 "ratio": statistics.median(ratios),
                 "ratio_least": ratios[0],
                 "ratio_most": ratios[-1],
@@ -282,8 +282,8 @@ def text_of(result: Mapping[str, Any]) -> str:
     for group in result["groups"]:
         lines.append(f"{group['group']:<20} {group['compared']:>9} {len(group['different']):>9}")
     for group in result["groups"]:
-        for one in group["different"][:LISTED]:
-            lines.append(f"  {group['group']}: {one.name}: {one.what} (largest {one.largest:g})")
+        for unlike in group["different"][:LISTED]:
+            lines.append(f"  {group['group']}: {unlike.name}: {unlike.what} (largest {unlike.largest:g})")
         if len(group["different"]) > LISTED:
             lines.append(f"  {group['group']}: and {len(group['different']) - LISTED} more")
     if result["times"]:
@@ -351,7 +351,9 @@ def main() -> int:
     if given.json:
         from attrs import asdict
 
-        groups = [{**one, "different": [asdict(d) for d in one["different"]]} for one in result["groups"]]
+        groups = [
+            {**group, "different": [asdict(d) for d in group["different"]]} for group in result["groups"]
+        ]
         print(json.dumps({**result, "groups": groups}, indent=1))
     else:
         print(text_of(result))

@@ -70,12 +70,12 @@ def numbers(values: Sequence[Any]) -> np.ndarray:
     return np.array([float(v) for v in values if isinstance(v, int | float) and not isinstance(v, bool)])
 
 
-def recorded(name: str, trace: Any, outcome: Any, rest: Sequence[float] = ()) -> Arrays:
+def recorded(name: str, trace: Any, outcome: Any, figures: Sequence[float] = ()) -> Arrays:
     """Return a grasp as arrays: the columns of its trace, its outcome and further figures."""
     arrays = {f"{name}/{column}": np.asarray(getattr(trace, column)) for column in TRACE_COLUMNS}
     arrays[f"{name}/outcome"] = np.array([int(outcome)])
-    if len(rest):
-        arrays[f"{name}/figures"] = np.array([float(value) for value in rest])
+    if len(figures):
+        arrays[f"{name}/figures"] = np.array([float(value) for value in figures])
     return arrays
 
 
@@ -236,9 +236,9 @@ RECORDERS: Final[Mapping[str, Callable[[Mapping[str, Any]], Arrays]]] = {
 
 def timed(function: Callable[[], object]) -> float:
     """Return the processor time (s) of one call."""
-    before = time.process_time()
+    begun_s = time.process_time()
     function()
-    return time.process_time() - before
+    return time.process_time() - begun_s
 
 
 class Timings:

@@ -178,7 +178,7 @@ class Bench:
         composition = composition_of(setup, pad=False)
         if composition not in self.compiled:
             began = time.process_time()
-            loop = CompiledLoops(step).of(composition)
+            loop = CompiledLoops(step).loop_of(composition)
             controller = create("controller", "hybrid")
             short = RunConfig(grasp_timeout_s=0.01)
             job = Job(config=config, controller=controller, run=short, extract=None, traces=True)

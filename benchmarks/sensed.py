@@ -66,7 +66,7 @@ def main() -> None:
     form.add_argument("--table", action="store_true", help="Markdown")
     parser.add_argument("--short", action="store_true", help="least work, only to show that it runs")
     given = parser.parse_args()
-    first = given.first if given.first is not None else 1000 + secrets.randbelow(100_000)
+    first_seed = given.first if given.first is not None else 1000 + secrets.randbelow(100_000)
     objects: tuple[str, ...] = ()
     compiled = "always"
     if given.short:
@@ -92,7 +92,7 @@ def main() -> None:
         settings,
         objects=objects,
         instances=given.instances,
-        seeds=range(first, first + given.seeds),
+        seeds=range(first_seed, first_seed + given.seeds),
         variants=(reference, chosen),
     )
     if given.json:

@@ -78,7 +78,7 @@ def in_words(value: Any) -> str:
 
 
 def made() -> dict[str, Any]:
-    found: dict[str, Any] = {
+    measured: dict[str, Any] = {
         "date": date.today().isoformat(),
         "processor": processor(),
         "cores": os.cpu_count(),
@@ -88,10 +88,10 @@ def made() -> dict[str, Any]:
     }
     for name in ("numpy", "numba", "scipy", "mujoco", "scikit-sundae"):
         try:
-            found[name] = version(name)
+            measured[name] = version(name)
         except PackageNotFoundError:
-            found[name] = "not installed"
-    return found
+            measured[name] = "not installed"
+    return measured
 
 
 def processor() -> str:
@@ -195,18 +195,18 @@ def compiling() -> dict[str, Any]:
                 capture_output=True,
                 text=True,
             )
-            found = json.loads(done.stdout)
-            result[name] = found["processor"]
-            result[f"{name}_on_the_clock"] = found["wall"]
+            spent = json.loads(done.stdout)
+            result[name] = spent["processor"]
+            result[f"{name}_on_the_clock"] = spent["wall"]
     return result
 
 
 def finite(value: Any) -> Any:
     """Return the value with null for what JSON has no number for."""
     if isinstance(value, dict):
-        return {key: finite(one) for key, one in value.items()}
+        return {key: finite(part) for key, part in value.items()}
     if isinstance(value, list):
-        return [finite(one) for one in value]
+        return [finite(part) for part in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 

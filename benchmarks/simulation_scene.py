@@ -142,10 +142,10 @@ def exact(u_of: Callable[[int, float, float, float], float], ticks: int = TICKS)
     rates = {touching: _rates(touching) for touching in (False, True)}
     steps = {touching: expm(a * TICK / PIECES) for touching, a in rates.items()}
     powers = {}
-    for touching, one in steps.items():
+    for touching, piece in steps.items():
         power, rows = np.eye(6), []
         for _ in range(PIECES):
-            power = one @ power
+            power = piece @ power
             rows.append(power)
         powers[touching] = np.array(rows)
     state = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
@@ -164,18 +164,18 @@ def exact(u_of: Callable[[int, float, float, float], float], ticks: int = TICKS)
             if not len(turned):
                 if whole:
                     state = path[whole - 1]
-                rest = left - whole * TICK / PIECES
-                if rest > 1e-15:
-                    ahead = expm(rates[touching] * rest) @ state
+                remainder = left - whole * TICK / PIECES
+                if remainder > 1e-15:
+                    ahead = expm(rates[touching] * remainder) @ state
                     if (ahead[0] - ahead[2] > X0) != touching:
-                        spent, state = _turn(rates[touching], state, touching, rest)
-                        left, touching = rest - spent, not touching
+                        spent, state = _turn(rates[touching], state, touching, remainder)
+                        left, touching = remainder - spent, not touching
                         continue
                     state = ahead
                 break
             k = int(turned[0])
-            before = path[k - 1] if k else state
-            spent, state = _turn(rates[touching], before, touching, TICK / PIECES)
+            last_state = path[k - 1] if k else state
+            spent, state = _turn(rates[touching], last_state, touching, TICK / PIECES)
             left -= k * TICK / PIECES + spent
             touching = not touching
     return Run(x=xs, force=forces, u=us, what="exact")

@@ -209,6 +209,30 @@ def test_a_called_function_raises_with_values_as_soon_as_it_is_compiled(tmp_path
     assert compiled(2.0) == 4.0
 
 
+def _doubled(x):
+    return 2.0 * x
+
+
+def _descending(x):
+    return -_doubled(x)
+
+
+def _largest(numbers):
+    listed = list(numbers)
+    listed.sort(key=_descending)
+    return listed[0]
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:Cannot cache compiled function")
+def test_a_function_of_numba_calls_one_of_ours_with_all_that_it_calls(tmp_path, monkeypatch):
+    pytest.importorskip("numba")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    compiled = compile_function(_largest)
+    with first_call():
+        assert compiled(np.array([1.0, 3.0, 2.0])) == 3.0
+
+
 def test_no_garbage_is_collected_while_a_function_is_compiled():
     assert gc.isenabled()
     with first_call():

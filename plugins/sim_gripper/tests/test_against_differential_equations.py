@@ -315,10 +315,10 @@ class Half:
         return [0.0, 0.0, 0.0, *(value for term in self.terms for value in term.states)]
 
     def split(self, s):
-        at, groups = 3, []
+        begin, groups = 3, []
         for term in self.terms:
-            groups.append(s[at : at + len(term.states)])
-            at += len(term.states)
+            groups.append(s[begin : begin + len(term.states)])
+            begin += len(term.states)
         return groups
 
     def force(self, d, r, groups):
@@ -381,13 +381,13 @@ class Half:
         """Return the functions that become positive at an event, each with what then happens."""
         if self.mode == "apart":
             return [(closure, "pressed")]
-        found = [(closure - s[0] - s[1], "pressed")]
+        crossings = [(closure - s[0] - s[1], "pressed")]
         if self.mode == "pressed":
             # Below zero, since a surface that has left the pads exerts no force at all.
-            found = [(-self.pad_n(s, closure, closing) - 1e-10, "released")]
+            crossings = [(-self.pad_n(s, closure, closing) - 1e-10, "released")]
         for i, (term, group) in enumerate(zip(self.terms, self.split(s), strict=True)):
-            found += [(value, (i, part)) for value, part in term.changes(s[0], group, self.parts[i])]
-        return found
+            crossings += [(value, (i, part)) for value, part in term.changes(s[0], group, self.parts[i])]
+        return crossings
 
     def happen(self, what, s, closure):
         """Return the states after an event. Without a damper the compression may jump."""
@@ -560,22 +560,22 @@ class Gripper:
         self.direction = 0.0 if held else math.copysign(1.0, net)
 
     def events(self, t, s):
-        found = [
+        crossings = [
             (value, (half, what))
             for half, mine, closure in self.views(s)
             for value, what in half.events(mine, closure, -s[2])
         ]
         load = 0.5 * sum(self.pads_n(s))
         if self.direction:
-            found.append((-self.direction * s[2], "stop"))
+            crossings.append((-self.direction * s[2], "stop"))
         else:
-            found.append((abs(load - self.effort(t)) - self.breakaway - self.by_load * load, "slip"))
+            crossings.append((abs(load - self.effort(t)) - self.breakaway - self.by_load * load, "slip"))
         if self.table == "before":
-            found.append((self.width_m + 2.0 * abs(self.offset_m) - s[1], "pushing"))
+            crossings.append((self.width_m + 2.0 * abs(self.offset_m) - s[1], "pushing"))
         elif self.table == "against":
             _, mine, closure = next(self.views(s))
-            found.append((self.halves[0].pad_n(mine, closure, -s[2]) - self.table_n, "done"))
-        return found
+            crossings.append((self.halves[0].pad_n(mine, closure, -s[2]) - self.table_n, "done"))
+        return crossings
 
     def happen(self, what, t, s):
         """Return the state after an event."""
@@ -844,7 +844,10 @@ def test_the_reference_is_the_solution_of_the_equations_for_every_term(name, pla
     [
         (1e-3, 1e-3),
         # The error of worn shells and of masses behind a contact is not that of the steps alone.
-        *(pytest.param(one, max(one, 2e-4), marks=pytest.mark.long) for one in (0.1, 0.01, 1e-4)),
+        *(
+            pytest.param(accuracy, max(accuracy, 2e-4), marks=pytest.mark.long)
+            for accuracy in (0.1, 0.01, 1e-4)
+        ),
     ],
 )
 @pytest.mark.parametrize(("name", "place", "gripper"), marked(2, 1))

@@ -76,3 +76,11 @@ def test_the_speed_that_the_encoder_shows_scatters_as_tick_by_tick(law):
     _, _, expected = approach("pads", law, "odwalla:full_closed", **TICK_BY_TICK)
     assert np.std(velocity[300:]) == pytest.approx(np.std(expected[300:]), rel=0.01)
     assert np.mean(velocity[300:]) == pytest.approx(np.mean(expected[300:]), rel=1e-5)
+
+
+def test_a_subclass_with_another_step_does_not_inherit_the_law_of_free_motion():
+    class Gentler(type(HYBRID)):
+        step = staticmethod(lambda params, state, reading: type(HYBRID).step(params, state, reading))
+
+    assert type(HYBRID).step.free_motion is not None
+    assert getattr(Gentler.step, "free_motion", None) is None

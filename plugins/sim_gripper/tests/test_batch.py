@@ -68,7 +68,7 @@ class Largest:
     """Extracts two numbers of a trace in a form that can be compiled."""
 
     def compiled_extraction(self):
-        return CompiledExtraction(largest, (), lambda found: (type(found).__name__, *found))
+        return CompiledExtraction(largest, (), lambda measured: (type(measured).__name__, *measured))
 
 
 def bits(trace):
@@ -85,8 +85,8 @@ def mixed(n):
 @given(total=st.integers(0, 3000), workers=st.integers(1, 64))
 def test_slices_hold_every_grasp_once_in_order_and_leave_no_worker_idle(total, workers):
     slices = slices_of(total, workers)
-    assert [k for one in slices for k in one] == list(range(total))
-    assert all(1 <= len(one) <= SLICE for one in slices)
+    assert [k for part in slices for k in part] == list(range(total))
+    assert all(1 <= len(part) <= SLICE for part in slices)
     assert len(slices) >= min(2 * workers, total / 2)
 
 
@@ -94,11 +94,11 @@ def test_slices_hold_every_grasp_once_in_order_and_leave_no_worker_idle(total, w
 def test_the_number_of_workers_decides_nothing_to_the_bit():
     pytest.importorskip("numba", reason="the compiled loop needs the extra `fast`")
     scenes, seeds = mixed(3 * SLICE + 1)
-    one, two, five = (
+    with_1, with_2, with_5 = (
         run_many(SimConfig(), HYBRID, scenes, seeds, compiled=True, workers=w, extract=FEATURES.extract)
         for w in (1, 2, 5)
     )
-    for a, b, c in zip(one, two, five, strict=True):
+    for a, b, c in zip(with_1, with_2, with_5, strict=True):
         assert bits(a.trace) == bits(b.trace) == bits(c.trace)
         assert a.extracted == b.extracted == c.extracted or any(np.isnan(a.extracted.values))
         assert a.state == b.state == c.state
@@ -122,9 +122,9 @@ def test_what_is_drawn_may_keep_a_column_of_the_trace():
     )
     whole = run_many(SimConfig(), HYBRID, scenes, seeds, compiled=True)
 
-    for one, other in zip(kept, whole, strict=True):
-        assert one.kept is None
-        assert one.extracted.tobytes() == other.trace.gap_m.tobytes()
+    for grasp, other in zip(kept, whole, strict=True):
+        assert grasp.kept is None
+        assert grasp.extracted.tobytes() == other.trace.gap_m.tobytes()
 
 
 @pytest.mark.slow
@@ -143,15 +143,15 @@ def test_features_without_traces_are_those_of_the_traces():
             run_many(SimConfig(), HYBRID, scenes, seeds, compiled=True, extract=how, traces=False, **options)
             for how in (FEATURES.extract, from_traces)
         )
-        for one, other in zip(compiled, traced, strict=True):
-            assert repr(one.extracted.values) == repr(other.extracted.values)
-            assert one.extracted.reasons == other.extracted.reasons
-            assert (one.outcome, one.reason) == (other.outcome, other.reason)
-            assert one.report() == other.report()
+        for grasp, other in zip(compiled, traced, strict=True):
+            assert repr(grasp.extracted.values) == repr(other.extracted.values)
+            assert grasp.extracted.reasons == other.extracted.reasons
+            assert (grasp.outcome, grasp.reason) == (other.outcome, other.reason)
+            assert grasp.report() == other.report()
             # These features do not read the release, which is then not simulated where the object was held.
-            held = one.outcome == Outcome.STEADY and options is not settings[2]
-            assert (one.state != other.state) == held
-            assert not held or one.state.motion.gap_m < other.state.motion.gap_m
+            held = grasp.outcome == Outcome.STEADY and options is not settings[2]
+            assert (grasp.state != other.state) == held
+            assert not held or grasp.state.motion.gap_m < other.state.motion.gap_m
     assert len(built) == 36
 
 
@@ -169,8 +169,8 @@ def test_grasps_that_compiled_code_draws_are_those_of_their_setups(sensor, monke
     def told(workers):
         done = run_many(config, HYBRID, names, range(len(names)), workers=workers, **options)
         return [
-            (one.outcome, one.reason, repr(one.extracted), repr(one.state), one.report())
-            for one, name in zip(done, names, strict=True)
+            (grasp.outcome, grasp.reason, repr(grasp.extracted), repr(grasp.state), grasp.report())
+            for grasp, name in zip(done, names, strict=True)
         ]
 
     drawn = told(1)
@@ -249,8 +249,8 @@ def test_a_named_tuple_that_is_measured_comes_back_as_one():
         SimConfig(), HYBRID, ["block"] * 3, range(3), traces=False, compiled=True, extract=Largest()
     )
     traced = run_many(SimConfig(), HYBRID, ["block"] * 3, range(3), compiled=True)
-    for one, other in zip(done, traced, strict=True):
-        assert one.extracted == ("Found", max(other.trace.force_left_n), float(len(other.trace.t_s)))
+    for grasp, other in zip(done, traced, strict=True):
+        assert grasp.extracted == ("Found", max(other.trace.force_left_n), float(len(other.trace.t_s)))
 
 
 class Failing(NamedTuple):
@@ -292,7 +292,7 @@ class Raising:
     def compiled_extraction(self):
         measure = {"no ticks": mean_n, "measure": raising}.get(self.where, largest)
         return CompiledExtraction(
-            measure, (), raising_result if self.where == "result" else lambda found: found
+            measure, (), raising_result if self.where == "result" else lambda measured: measured
         )
 
 
@@ -309,7 +309,7 @@ def raising(params, ticks):
     return 0.0
 
 
-def raising_result(found):
+def raising_result(measured):
     raise RuntimeError("not these numbers")
 
 
@@ -408,8 +408,8 @@ def test_processes_end_held_grasps_with_their_hold_too_where_no_release_is_read(
         )
         for workers in (2, 1)
     )
-    assert [repr((one.state, one.extracted)) for one in apart] == [
-        repr((one.state, one.extracted)) for one in here
+    assert [repr((grasp.state, grasp.extracted)) for grasp in apart] == [
+        repr((grasp.state, grasp.extracted)) for grasp in here
     ]
 
 
@@ -452,7 +452,7 @@ def test_a_law_no_other_process_can_find_runs_here_and_the_warning_says_so(monke
     n = SLICE + 1
     with pytest.warns(UserWarning, match="on one core"):
         done = run_many(SimConfig(), law, ["none"] * n, range(n), run=run, compiled=False, workers=2)
-    assert [one.outcome for one in done] == [Outcome.ABORTED] * n
+    assert [grasp.outcome for grasp in done] == [Outcome.ABORTED] * n
 
 
 def plainly(job, scene, seed):
@@ -474,47 +474,47 @@ def test_odd_numbers_and_every_object_come_back_from_another_process_to_the_bit(
     with PlainProcess(Scenes(odd)) as process:
         apart = process.run(names, np.arange(len(names)))
     # Nothing is there: channels that were never felt are NaN, and so are the features drawn.
-    assert {one.outcome for one in apart} == {Outcome.ABORTED}
-    for name, seed, one in zip(names, range(len(names)), apart, strict=True):
+    assert {grasp.outcome for grasp in apart} == {Outcome.ABORTED}
+    for name, seed, grasp in zip(names, range(len(names)), apart, strict=True):
         here = plainly(odd, name, seed)
-        assert (one.outcome, one.reason) == (here.outcome, here.reason)
-        assert repr(one.state) == repr(here.state)
-        assert [type(part) for part in one.state.contact.left.states] == [
+        assert (grasp.outcome, grasp.reason) == (here.outcome, here.reason)
+        assert repr(grasp.state) == repr(here.state)
+        assert [type(part) for part in grasp.state.contact.left.states] == [
             type(part) for part in here.state.contact.left.states
         ]
-        assert bits(one.trace) == bits(here.trace)
+        assert bits(grasp.trace) == bits(here.trace)
 
 
 @pytest.mark.slow
 def test_no_trace_is_handed_over_where_nobody_wants_one():
     run = RunConfig(grasp_timeout_s=0.01, opening_timeout_s=0.1)
     with PlainProcess(Scenes(job(run=run, traces=False))) as process:
-        (one,) = process.run(["none"], [0])
-    assert one.kept is None
-    assert one.extracted is None
+        (grasp,) = process.run(["none"], [0])
+    assert grasp.kept is None
+    assert grasp.extracted is None
     told = []
     # A closure, which no other process could be handed: it is called here.
     with PlainProcess(
         Scenes(job(run=run, traces=False, extract=lambda trace: told.append(len(trace)) or "felt"))
     ) as process:
-        (one,) = process.run(["none"], [0])
-    assert (one.kept, one.extracted) == (None, "felt")
+        (grasp,) = process.run(["none"], [0])
+    assert (grasp.kept, grasp.extracted) == (None, "felt")
     assert told == [len(plainly(job(run=run), "none", 0).trace)]
 
 
 def test_a_process_that_is_killed_leaves_its_grasps_to_this_one(monkeypatch):
     class Doomed(PlainProcess):
         def __enter__(self):
-            found = super().__enter__()
+            process = super().__enter__()
             self._process.kill()
-            return found
+            return process
 
     monkeypatch.setattr(threads, "PlainProcess", Doomed)
     monkeypatch.setattr(threads, "WORTH_A_PROCESS", 1)
     run, n = RunConfig(grasp_timeout_s=0.01, opening_timeout_s=0.1), SLICE + 1
     with pytest.warns(UserWarning, match="on one core: the process for plain grasps has ended"):
         done = run_many(SimConfig(), HYBRID, ["none"] * n, range(n), run=run, compiled=False, workers=2)
-    assert [bits(one.trace) for one in done[:2]] == [
+    assert [bits(grasp.trace) for grasp in done[:2]] == [
         bits(plainly(job(run=run), "none", k).trace) for k in (0, 1)
     ]
     assert len(done) == n
@@ -592,8 +592,8 @@ def test_traces_are_kept_only_where_they_are_asked_for():
     done = backend.run_many(HYBRID, ["none"] * 40, range(40), run=run, extract=len)
     kept, _ = tracemalloc.get_traced_memory()
     tracemalloc.stop()
-    assert {one.trace for one in done} == {None}
-    assert all(one.extracted > 400 for one in done)
+    assert {grasp.trace for grasp in done} == {None}
+    assert all(grasp.extracted > 400 for grasp in done)
     # Forty traces of half a second would be 2 MB.
     assert kept < 1e6
 
@@ -607,7 +607,11 @@ def test_a_name_nobody_knows_is_refused_before_anything_runs():
     told = []
     with pytest.raises(UnknownName, match="no object named 'blok'"):
         run_many(
-            SimConfig(), HYBRID, ["block"] * 3 + ["blok"], range(4), progress=lambda *of: told.append(of)
+            SimConfig(),
+            HYBRID,
+            ["block"] * 3 + ["blok"],
+            range(4),
+            progress=lambda *counts: told.append(counts),
         )
     assert told == []
 

@@ -33,7 +33,7 @@ def pipeline():
         # Objects that it recognises in most trials; those of open bottles of water are confused with others.
         "odwalla:full_closed",
         "water:full_closed",
-        *(pytest.param(one, marks=pytest.mark.slow) for one in ("odwalla:full_open", "can:full_closed")),
+        *(pytest.param(name, marks=pytest.mark.slow) for name in ("odwalla:full_open", "can:full_closed")),
     ],
 )
 def test_object_and_state_are_named_at_once_with_the_reason(pipeline, name):
@@ -53,7 +53,7 @@ def test_object_and_state_are_named_at_once_with_the_reason(pipeline, name):
 
 
 @pytest.mark.parametrize(
-    "name", ["egg", *(pytest.param(one, marks=pytest.mark.slow) for one in ("block", "toy"))]
+    "name", ["egg", *(pytest.param(name, marks=pytest.mark.slow) for name in ("block", "toy"))]
 )
 @pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow)])
 def test_what_it_never_saw_is_unknown(pipeline, name, seed):
@@ -74,7 +74,7 @@ def test_nothing_there_is_unknown(pipeline):
 
 def test_its_sets_are_calibrated_for_each_label():
     assert KEPT["sets"]["unit"] == "instances"
-    assert {one["units"] for one in KEPT["sets"]["thresholds"].values()} == {1000}
+    assert {threshold_set["units"] for threshold_set in KEPT["sets"]["thresholds"].values()} == {1000}
 
 
 def test_a_grasp_has_predictions_while_it_goes_on_and_the_answer_of_the_whole_grasp(pipeline):
@@ -83,7 +83,7 @@ def test_a_grasp_has_predictions_while_it_goes_on_and_the_answer_of_the_whole_gr
     told = [event for event in events if event.source == "model"]
 
     assert [checkpoint.after_s for checkpoint in trial.checkpoints] == [
-        one["after_contact_s"] for one in KEPT["checkpoints"]
+        checkpoint["after_contact_s"] for checkpoint in KEPT["checkpoints"]
     ]
     assert [event.what for event in told] == [checkpoint.words for checkpoint in trial.checkpoints]
     assert all(
@@ -179,8 +179,8 @@ def test_its_command_makes_it_again(tmp_path: Path) -> None:
     nodes, kept = made["model"]["nodes"], KEPT["model"]["nodes"]
     for column in ("feature", "category", "n_children", "class_weights"):
         assert nodes[column] == kept[column]
-    for threshold, before in zip(nodes["threshold"], kept["threshold"], strict=True):
-        assert threshold == before or threshold == pytest.approx(before, rel=0.0, abs=1e-9)
+    for threshold, expected in zip(nodes["threshold"], kept["threshold"], strict=True):
+        assert threshold == expected or threshold == pytest.approx(expected, rel=0.0, abs=1e-9)
     for label, ends in KEPT["unknown"]["ranges"].items():
-        for one, before in zip(made["unknown"]["ranges"][label], ends, strict=True):
-            assert one == pytest.approx(before, rel=0.0, abs=1e-9)
+        for end, expected in zip(made["unknown"]["ranges"][label], ends, strict=True):
+            assert end == pytest.approx(expected, rel=0.0, abs=1e-9)

@@ -11,10 +11,10 @@ BENCHMARK = Path(__file__).parents[3] / "benchmarks" / "extremes.py"
 
 def module():
     spec = importlib.util.spec_from_file_location("extremes", BENCHMARK)
-    found = importlib.util.module_from_spec(spec)
-    sys.modules["extremes"] = found
-    spec.loader.exec_module(found)
-    return found
+    benchmark = importlib.util.module_from_spec(spec)
+    sys.modules["extremes"] = benchmark
+    spec.loader.exec_module(benchmark)
+    return benchmark
 
 
 extremes = module()

@@ -21,7 +21,7 @@ def grasp(controller, seed=0, **config):
 def peaks(name, force_n, scene, seeds):
     controller = create("controller", name, probing_force_n=force_n)
     done = run_many(SimConfig(), controller, [scene] * len(seeds), seeds)
-    return done, np.array([one.state.peak_n for one in done])
+    return done, np.array([grasp.state.peak_n for grasp in done])
 
 
 @pytest.mark.slow
@@ -48,11 +48,11 @@ def test_the_egg_survives_the_hybrid_and_not_pure_force(eggs):
     seeds = range(eggs)
     hybrid, gentle = peaks("hybrid", 20.0, "egg", seeds)
     slammed, _ = peaks("force", 20.0, "egg", seeds)
-    assert [one.state.contact.left.states[0].broken for one in hybrid] == [0] * eggs
-    assert [one.state.contact.left.states[0].broken for one in slammed] == [1] * eggs
+    assert [grasp.state.contact.left.states[0].broken for grasp in hybrid] == [0] * eggs
+    assert [grasp.state.contact.left.states[0].broken for grasp in slammed] == [1] * eggs
     # The margin: the weakest of these eggs breaks at 23 N, and no hybrid grasp goes over 22 N.
     assert gentle.max() < 22.0
-    assert {one.outcome for one in slammed} == {Outcome.CRUSHED}
+    assert {grasp.outcome for grasp in slammed} == {Outcome.CRUSHED}
 
 
 def test_velocity_control_on_its_own_raises_its_effort_after_contact_and_crushes():
@@ -119,7 +119,7 @@ def test_slow_approaches_stretch_their_time_out():
 def features(scene, seeds=range(5), **config):
     controller = create("controller", "hybrid", probing_force_n=23.0)
     done = run_many(SimConfig(**config), controller, [scene] * len(seeds), seeds)
-    return np.array([FEATURES.extract(one.trace).values for one in done])
+    return np.array([FEATURES.extract(grasp.trace).values for grasp in done])
 
 
 @pytest.mark.slow

@@ -21,19 +21,22 @@ def drawn(name, seed):
 
 
 def test_a_numbered_thing_is_the_same_in_every_trial_and_state_but_placed_anew():
-    first, again = drawn("odwalla:full_open#3", 1), drawn("odwalla:full_open#3", 2)
+    bottle, again = drawn("odwalla:full_open#3", 1), drawn("odwalla:full_open#3", 2)
     empty = drawn("odwalla:empty_open#3", 5)
 
-    assert first.width_m == again.width_m == empty.width_m
-    assert first.terms == again.terms
-    assert first.offset_m != again.offset_m
-    assert first.share != again.share
+    assert bottle.width_m == again.width_m == empty.width_m
+    assert bottle.terms == again.terms
+    assert bottle.offset_m != again.offset_m
+    assert bottle.share != again.share
 
 
 def test_other_numbers_and_kinds_are_other_things():
     widths = {drawn(f"odwalla:full_open#{k}", 1).width_m for k in range(20)}
     odwalla, naked = drawn("odwalla:full_open#3", 1), drawn("naked:full_open#3", 1)
-    deviation = [(one.width_m - one.spec.width_m) / one.spec.width_spread_m for one in (odwalla, naked)]
+    deviation = [
+        (instance.width_m - instance.spec.width_m) / instance.spec.width_spread_m
+        for instance in (odwalla, naked)
+    ]
 
     # Draws further out than two standard deviations are clipped to one width; the others all differ.
     assert len(widths) >= 18

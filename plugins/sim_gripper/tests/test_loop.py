@@ -31,8 +31,8 @@ def columns(trace):
 OTHERS = ("units", "signals", "events")
 
 
-def assert_same(one, other):
-    for name, column in columns(one).items():
+def assert_same(trace, other):
+    for name, column in columns(trace).items():
         np.testing.assert_allclose(columns(other)[name], column, rtol=1e-9, atol=1e-15, err_msg=name)
 
 
@@ -140,17 +140,17 @@ def test_a_law_that_cannot_be_compiled_runs_plain_and_the_warning_says_why():
     with pytest.warns(UserWarning, match=r"plain Python.*test_loop.py:\d+"):
         done = run_many(config, law, ["toy"] * 2, seeds, compiled=True)
     expected = run_many(config, HYBRID, ["toy"] * 2, seeds, compiled=False)
-    for one, other in zip(done, expected, strict=True):
-        assert_same(other.trace, one.trace)
+    for grasp, other in zip(done, expected, strict=True):
+        assert_same(other.trace, grasp.trace)
 
 
 # ------------------------------------------------------------------------------------------- sums of terms
 
 
 def test_compositions_of_terms_have_fingerprints_of_their_own():
-    one, two = sum_of([elastic, loss]), sum_of([loss, elastic])
-    assert fingerprint(one) == fingerprint(sum_of([elastic, loss]))
-    assert fingerprint(one) != fingerprint(two)
+    forward, two = sum_of([elastic, loss]), sum_of([loss, elastic])
+    assert fingerprint(forward) == fingerprint(sum_of([elastic, loss]))
+    assert fingerprint(forward) != fingerprint(two)
 
 
 def test_a_sum_of_many_terms_is_the_sum_of_each():

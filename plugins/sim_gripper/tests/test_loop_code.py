@@ -30,8 +30,8 @@ def state_after(images, *, ended):
     )
 
 
-def run(wanted, *, first=0, is_drawn=1):
-    """Run a grasp that takes `wanted` images and has `first` of them already; return how it ends, and its images."""
+def run(wanted, *, begin=0, is_drawn=1):
+    """Run a grasp that takes `wanted` images and has `begin` of them already; return how it ends, and its images."""
     drawn, seen = [], []
     images = np.full((MOST, 2, 1), 7.0)
 
@@ -47,7 +47,7 @@ def run(wanted, *, first=0, is_drawn=1):
 
     parts = {
         "grasp": grasp,
-        "tuples_of": lambda *given: ((), state_after(first, ended=0)),
+        "tuples_of": lambda *given: ((), state_after(begin, ended=0)),
         "store_numbers": lambda array, values: None,
         "draw_image_noise": lambda key, image, row: drawn.append(row),
     }
@@ -79,7 +79,7 @@ def test_a_grasp_that_takes_all_images_goes_on_in_longer_buffers():
 
 def test_a_grasp_that_goes_on_keeps_its_images_and_draws_no_noise_again():
     images_before = MOST - 1
-    done, images, seen = run(images_before, first=images_before, is_drawn=0)
+    done, images, seen = run(images_before, begin=images_before, is_drawn=0)
     assert done.ended == 1
     assert seen == [(MOST, 0)]
     # Not even the last one, which is NaN only before the first image.

@@ -269,9 +269,9 @@ def test_a_command_within_a_step_takes_effect_in_its_tick(compiled):
         for fidelity in ({"fidelity": "scene"}, {"fidelity": "fixed"})
     )
     assert many.model.reduction.steps.macro_tolerance > 0.0
-    first = int(np.argmax(many.trace.force_left_n > 3.0))
-    assert first == int(np.argmax(single.trace.force_left_n > 3.0))
-    rows = slice(first - 20, first + 20)
+    pressed_from = int(np.argmax(many.trace.force_left_n > 3.0))
+    assert pressed_from == int(np.argmax(single.trace.force_left_n > 3.0))
+    rows = slice(pressed_from - 20, pressed_from + 20)
     np.testing.assert_allclose(many.trace.force_left_n[rows], single.trace.force_left_n[rows], rtol=1e-3)
     # The peak is one that occurred, and not that of the step as it was begun.
     assert many.state.peak_n == pytest.approx(single.state.peak_n, rel=1e-3)

@@ -33,15 +33,15 @@ PATTERN = Outer(Inner(0, 0.0), (Inner(0, 0.0),), (), False)
 
 
 def numbers_of(values):
-    found = []
-    append(values, found, [])
-    return array("d", found)
+    numbers = []
+    append(values, numbers, [])
+    return array("d", numbers)
 
 
 def test_tuples_come_back_with_their_types():
-    found = TupleType.of(PATTERN).filled(numbers_of(VALUES))
-    assert found == VALUES
-    assert [type(value) for value in (found, found.halves[0], found.inner.steps, found.broken)] == [
+    values = TupleType.made_of(PATTERN).filled(numbers_of(VALUES))
+    assert values == VALUES
+    assert [type(value) for value in (values, values.halves[0], values.inner.steps, values.broken)] == [
         Outer,
         Inner,
         int,
@@ -50,13 +50,13 @@ def test_tuples_come_back_with_their_types():
 
 
 def test_a_number_by_itself_comes_back():
-    assert TupleType.of(1).filled(numbers_of(7)) == 7
+    assert TupleType.made_of(1).filled(numbers_of(7)) == 7
 
 
 @pytest.mark.parametrize("count", [3, 7])
 def test_another_number_of_numbers_is_refused(count):
     with pytest.raises(ValueError, match=f"{count} numbers for nested tuples of 5"):
-        TupleType.of(PATTERN).filled([0.0] * count)
+        TupleType.made_of(PATTERN).filled([0.0] * count)
 
 
 def test_places_count_the_numbers_and_leave_out_arrays():
@@ -75,8 +75,8 @@ def test_places_count_the_numbers_and_leave_out_arrays():
 
 
 def test_the_structure_tells_types_and_not_values():
-    one, other = (Outer(Inner(k, 0.1 * k), (), (), True) for k in (1, 2))
-    assert structure(one) == structure(other)
-    assert structure(one) != structure(one._replace(nothing=(1.0,)))
-    assert structure(one) != structure(one._replace(inner=Inner(1.0, 0.1)))
+    values, other = (Outer(Inner(k, 0.1 * k), (), (), True) for k in (1, 2))
+    assert structure(values) == structure(other)
+    assert structure(values) != structure(values._replace(nothing=(1.0,)))
+    assert structure(values) != structure(values._replace(inner=Inner(1.0, 0.1)))
     assert structure((np.zeros(2),)) == structure((np.zeros(3),)) != structure((np.zeros(3, int),))

@@ -55,12 +55,12 @@ def test_every_figure_has_its_reason():
                 else:
                     yield from figures(value)
             elif isinstance(value, list):
-                for one in value:
-                    yield from figures(one)
+                for part in value:
+                    yield from figures(part)
 
-    found = list(figures(tomllib.loads(text)))
-    assert len(found) > 100
-    assert all(len(figure["reason"]) >= 5 for figure in found)
+    all_figures = list(figures(tomllib.loads(text)))
+    assert len(all_figures) > 100
+    assert all(len(figure["reason"]) >= 5 for figure in all_figures)
 
 
 @pytest.mark.parametrize(
@@ -81,9 +81,9 @@ def test_an_unknown_object_or_state_is_answered_with_what_there_is(name, says):
 
 def test_the_same_seed_is_the_same_bottle_and_another_is_another():
     spec = find("odwalla:full_open")
-    one, again, other = (sample(spec, seed) for seed in (1, 1, 2))
-    assert one == again
-    assert one.terms != other.terms
+    instance, again, other = (sample(spec, seed) for seed in (1, 1, 2))
+    assert instance == again
+    assert instance.terms != other.terms
 
 
 def test_without_a_generator_it_is_the_catalogues_own_figures():

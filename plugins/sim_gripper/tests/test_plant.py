@@ -58,7 +58,7 @@ def thing(*terms, width=0.05, table=0.0, skins=inf):
     return ObjectModel(width, table, PadCompliance(skins), tuple(terms))
 
 
-def at(gap, states=(), offset=0.0, speed_m_s=0.0, link=LINK):
+def plant_at(gap, states=(), offset=0.0, speed_m_s=0.0, link=LINK):
     revolutions = revolutions_at(link, gap)
     gap, rate = gap_and_rate(link, revolutions)
     fresh = ContactState(0.0, 0.0, 0.0, states, 0.0, 0.0)
@@ -79,22 +79,22 @@ def run(params, state, effort, seconds, laws=(elastic,), dt=TICK):
 @pytest.mark.parametrize("effort", [-7.99, 0.0, 3.0, 7.99])
 def test_below_breakaway_nothing_moves_at_all(effort):
     params = PlantParams(drive(), thing(*SPRING), FINE)
-    before = at(0.06, (NoState(),))
-    after = run(params, before, effort, 100.0)
-    assert after.motion.revolutions == before.motion.revolutions
+    start = plant_at(0.06, (NoState(),))
+    after = run(params, start, effort, 100.0)
+    assert after.motion.revolutions == start.motion.revolutions
     assert after.motion.speed_rev_s == 0.0
 
 
 def test_above_breakaway_it_moves():
     params = PlantParams(drive(), thing(*SPRING), FINE)
-    assert run(params, at(0.06, (NoState(),)), 8.01, 1.0).motion.gap_m < 0.06 - 1e-5
+    assert run(params, plant_at(0.06, (NoState(),)), 8.01, 1.0).motion.gap_m < 0.06 - 1e-5
 
 
 def test_a_loaded_gripper_is_stuck_by_as_much_as_its_load_adds():
     # At 10 N on the pads breakaway is 8 + 0.5 * 10 = 13 N to either side of the balance.
     params = PlantParams(drive(), thing(*SPRING), FINE)
     pressed = ContactState(0.005, 10.0, 2000.0, (NoState(),))
-    loaded = at(0.045, (NoState(),))._replace(contact=Contact(10.0, 10.0, 0.0, 1, pressed, ()))
+    loaded = plant_at(0.045, (NoState(),))._replace(contact=Contact(10.0, 10.0, 0.0, 1, pressed, ()))
     for effort, moves in ((22.9, False), (23.1, True), (-2.9, False), (-3.1, True)):
         after = run(params, loaded, effort, 0.2)
         assert (after.motion.revolutions != loaded.motion.revolutions) == moves, effort
@@ -103,7 +103,7 @@ def test_a_loaded_gripper_is_stuck_by_as_much_as_its_load_adds():
 def test_a_free_drive_falls_as_newton_says():
     # Without friction: F t / m, with m = (2 pi / rate)^2 J, some 100 kg on the gap.
     params = PlantParams(drive(0.0, 0.0, 0.0, 0.0), thing(), FINE)
-    start = at(0.08, ())
+    start = plant_at(0.08, ())
     after = run(params, start, 10.0, 0.1, laws=())
     mass = drive().inertia / start.motion.jacobian_m_rev**2
     assert mass == pytest.approx(118.0, rel=0.01)
@@ -130,11 +130,11 @@ def test_friction_that_changes_from_its_greatest_within_a_tick_is_seen():
     numbers = drive()
     numbers = numbers._replace(friction=numbers.friction._replace(stribeck_m_s=5e-4))
     params = PlantParams(numbers, thing(), Steps(2e-4))
-    start = at(0.06, (), speed_m_s=-1e-7)
+    start = plant_at(0.06, (), speed_m_s=-1e-7)
     ends = [run(params, start, 60.0, TICK, laws=(), dt=dt) for dt in (TICK, 1e-6)]
-    one, fine = (end.motion.speed_rev_s * end.motion.jacobian_m_rev for end in ends)
+    tick_m_s, fine = (end.motion.speed_rev_s * end.motion.jacobian_m_rev for end in ends)
     assert abs(fine) > 4e-4
-    assert abs(one - fine) < 1e-6
+    assert abs(tick_m_s - fine) < 1e-6
 
 
 @pytest.mark.parametrize("effort", [8.5, 25.0, 0.0])
@@ -143,7 +143,7 @@ def test_halving_the_tick_quarters_the_error_of_a_way_in_the_free(effort):
     params, move = PlantParams(drive(), thing(width=-1.0), Steps(inf)), plant_move([])
 
     def end(dt):
-        state = at(0.05, (), speed_m_s=-3e-3)
+        state = plant_at(0.05, (), speed_m_s=-3e-3)
         for _ in range(round(0.016 / dt)):
             state = move(params, state, effort, dt)
         gap, rate = gap_and_rate(LINK, state.motion.revolutions)
@@ -183,15 +183,15 @@ def energy(params, state):
 )
 def test_with_the_drive_off_stored_energy_never_rises(stiffness, speed, coulomb, load):
     params = PlantParams(drive(coulomb, coulomb, load, 0.0), thing(Elastic(stiffness, 0.0)), FINE)
-    state = at(0.0503, (NoState(),), speed_m_s=-speed)
+    state = plant_at(0.0503, (NoState(),), speed_m_s=-speed)
     move = plant_move([elastic])
-    first = before = energy(params, state)
+    initial_j = least_j = energy(params, state)
     for _ in range(400):
         state = move(params, state, 0.0, TICK)
         now = energy(params, state)
         # A kick-drift-kick step lets the energy of an oscillation swing by (omega h)^2 / 8 of it, without drift.
-        assert now <= before + 2e-3 * first
-        before = min(before, now) if now < before else before
+        assert now <= least_j + 2e-3 * initial_j
+        least_j = min(least_j, now) if now < least_j else least_j
 
 
 @pytest.mark.slow
@@ -205,15 +205,18 @@ def test_without_friction_a_squeeze_and_the_letting_go_create_no_energy(stiffnes
     link, terms = straight_linkage(4e-4), (Elastic(stiffness, 0.0), Loss(damping))
     params = PlantParams(drive(0.0, 0.0, 0.0, 0.0, link), thing(*terms), FINE)
     params = params._replace(drive=params.drive._replace(inertia=100.0 * link.pitch_m**2))
-    state, move = at(0.0503, (NoState(), NoState()), speed_m_s=-speed, link=link), plant_move([elastic, loss])
-    first = before = 50.0 * speed * speed
+    state, move = (
+        plant_at(0.0503, (NoState(), NoState()), speed_m_s=-speed, link=link),
+        plant_move([elastic, loss]),
+    )
+    initial_j = least_j = 50.0 * speed * speed
     for _ in range(400):
         state = move(params, state, 0.0, TICK)
         now = 50.0 * (state.motion.speed_rev_s * state.motion.jacobian_m_rev) ** 2
         now += 0.5 * stiffness * state.contact.left.compression_m**2
         # The swing of a kick-drift-kick step, as above.
-        assert now <= before + 2e-3 * first
-        before = min(before, now)
+        assert now <= least_j + 2e-3 * initial_j
+        least_j = min(least_j, now)
 
 
 @pytest.mark.parametrize("damping", [1.0, 1e3, 1e6])
@@ -221,9 +224,9 @@ def test_what_is_let_go_at_first_comes_back_from_the_tick_on_in_which_it_was(dam
     law, params = sum_of([elastic, loss]), (Elastic(2e4, 1e9), Loss(damping))
     states = (NoState(), NoState())
     pressed, _ = law(params, states, 1e-3, 1e-3, 1e-3, 0.0)
-    before = ContactState(1e-3, pressed, 0.0, states, 0.0, 0.0)
+    pressed_state = ContactState(1e-3, pressed, 0.0, states, 0.0, 0.0)
     after, unbalanced = bind_reachable(solve_contact, {"object_force": law})(
-        ObjectModel(0.05, 0.0, PadCompliance(), params), before, -1e-4, -1.0, 1e-3
+        ObjectModel(0.05, 0.0, PadCompliance(), params), pressed_state, -1e-4, -1.0, 1e-3
     )
     assert unbalanced == 0
     assert after.force_n == 0.0
@@ -234,7 +237,7 @@ def test_what_is_let_go_at_first_comes_back_from_the_tick_on_in_which_it_was(dam
 
 def test_a_step_on_an_undamped_spring_overshoots_to_twice_its_rest():
     params = PlantParams(drive(0.0, 0.0, 0.0, 0.0), thing(Elastic(5e4, 0.0)), FINE)
-    state = at(0.05, (NoState(),))
+    state = plant_at(0.05, (NoState(),))
     move, peak = plant_move([elastic]), 0.0
     for _ in range(400):
         state = move(params, state, 20.0, TICK)
@@ -251,7 +254,7 @@ def test_the_slam_of_a_constant_effort_is_as_large_as_estimated(stiffness, speed
     at_contact = gap_and_rate(LINK, revolutions_at(LINK, 0.03))[1]
     numbers = drive(8.0, 8.0, 0.0, 10.0)._replace(inertia=100.0 * at_contact**2)
     params = PlantParams(numbers, thing(Elastic(stiffness, 0.0), width=0.03), FINE)
-    state = run(params, at(0.06, (NoState(),)), 23.0, 0.62)
+    state = run(params, plant_at(0.06, (NoState(),)), 23.0, 0.62)
     move, impact = plant_move([elastic]), 0.0
     for _ in range(600):
         impact = max(impact, -state.motion.speed_rev_s * state.motion.jacobian_m_rev)
@@ -264,7 +267,7 @@ def test_the_slam_of_a_constant_effort_is_as_large_as_estimated(stiffness, speed
 def test_halving_the_step_quarters_the_error_of_the_peak():
     def peak(steps):
         params = PlantParams(drive(), thing(Elastic(2e5, 0.0), Maxwell(3e4, 0.02)), Steps(inf, TICK / steps))
-        state = at(0.052, (NoState(), MaxwellState(0.0)), speed_m_s=-0.05)
+        state = plant_at(0.052, (NoState(), MaxwellState(0.0)), speed_m_s=-0.05)
         return run(params, state, 30.0, 0.15, (elastic, maxwell)).peak_n
 
     exact = peak(512)
@@ -276,7 +279,7 @@ def test_halving_the_step_quarters_the_error_of_the_peak():
 
 def test_covers_in_series_share_the_compression():
     params = PlantParams(drive(), thing(*SPRING, skins=2000.0), FINE)
-    state = run(params, at(0.0501, (NoState(),)), 30.0, 2.0)
+    state = run(params, plant_at(0.0501, (NoState(),)), 30.0, 2.0)
     squeezed = state.contact.left
     assert squeezed.force_n == pytest.approx(2000.0 * squeezed.compression_m, rel=1e-6)
     assert squeezed.compression_m == pytest.approx(0.5 * (0.05 - state.motion.gap_m), rel=1e-6)
@@ -284,7 +287,7 @@ def test_covers_in_series_share_the_compression():
 
 def test_nothing_pulls_when_the_fingers_open_faster_than_the_object_recovers():
     params = PlantParams(drive(), thing(Elastic(500.0, 0.0), Maxwell(3000.0, 0.5), skins=1e4), FINE)
-    state = run(params, at(0.0501, (NoState(), MaxwellState(0.0))), 40.0, 1.0, (elastic, maxwell))
+    state = run(params, plant_at(0.0501, (NoState(), MaxwellState(0.0))), 40.0, 1.0, (elastic, maxwell))
     move = plant_move([elastic, maxwell])
     for _ in range(500):
         state = move(params, state, -60.0, TICK)
@@ -299,17 +302,17 @@ def test_the_mass_of_a_surface_swings_on_when_the_shell_has_its_shape_again():
     kinds, swing = ("elastic", "surface"), Surface(2.0, 300.0, 2.0, 5e4)
     model = thing(*all_active([Elastic(2000.0, 0.0), swing]), skins=2e5)
     move = plant_move(laws_of(kinds), moving=moving_of(kinds))
-    params, squeezed = PlantParams(drive(), model, FINE), at(0.0501, uncompressed(kinds).states)
+    params, squeezed = PlantParams(drive(), model, FINE), plant_at(0.0501, uncompressed(kinds).states)
     for _ in range(500):
         squeezed = move(params, squeezed, 30.0, TICK)
     freed = squeezed
     while freed.contact.left.force_n > 0.0 or abs(freed.contact.left.compression_m) > 1e-12:
         freed = move(params, freed, -60.0, TICK)
-    before = freed.contact.left.states[1]
-    assert before.y_m > 1e-4
+    swinging = freed.contact.left.states[1]
+    assert swinging.y_m > 1e-4
     for k in range(1, 300):
         freed = move(params, freed, -60.0, TICK)
-        expected = moved(before, 0.5 * 2.0 / 2.0, 300.0 / 2.0, Forcing(0.0, 0.0, 0.0), k * TICK)
+        expected = moved(swinging, 0.5 * 2.0 / 2.0, 300.0 / 2.0, Forcing(0.0, 0.0, 0.0), k * TICK)
         if expected.y_m < 0.0:
             break
         assert freed.contact.left.states[1].y_m == pytest.approx(expected.y_m, rel=1e-6, abs=1e-9)
@@ -318,7 +321,7 @@ def test_the_mass_of_a_surface_swings_on_when_the_shell_has_its_shape_again():
 
 def test_the_finger_that_touches_first_pushes_with_the_tables_friction_until_both_touch():
     params = PlantParams(drive(), thing(*SPRING, table=1.5), FINE)
-    state, move = at(0.06, (NoState(),), offset=0.003), plant_move([elastic])
+    state, move = plant_at(0.06, (NoState(),), offset=0.003), plant_move([elastic])
     pushed = []
     while state.contact.left.force_n < 3.0:
         state = move(params, state, 12.0, TICK)
@@ -338,16 +341,16 @@ def test_the_finger_that_touches_first_pushes_with_the_tables_friction_until_bot
 
 def test_the_stops_hold_at_both_ends():
     params = PlantParams(drive(), thing(width=-1.0), FINE)
-    closed = run(params, at(0.01, ()), 100.0, 2.0, laws=())
+    closed = run(params, plant_at(0.01, ()), 100.0, 2.0, laws=())
     assert (closed.motion.gap_m, closed.motion.speed_rev_s) == (pytest.approx(0.0, abs=1e-9), 0.0)
-    opened = run(params, at(0.08, ()), -100.0, 2.0, laws=())
+    opened = run(params, plant_at(0.08, ()), -100.0, 2.0, laws=())
     assert (opened.motion.gap_m, opened.motion.speed_rev_s) == (pytest.approx(0.086, abs=1e-9), 0.0)
 
 
 @pytest.mark.parametrize("link", [LINK, STRAIGHT])
 def test_what_is_pressed_at_the_closed_end_is_pressed_as_far_as_the_travel_goes(link):
     params = PlantParams(drive(link=link), thing(Elastic(1e4, 0.0), width=0.002), Steps(1e-3, growth=4.0))
-    state = run(params, at(0.01, (NoState(),), speed_m_s=-0.15, link=link), 60.0, 0.3)
+    state = run(params, plant_at(0.01, (NoState(),), speed_m_s=-0.15, link=link), 60.0, 0.3)
     assert (state.motion.gap_m, state.motion.speed_rev_s) == (pytest.approx(0.0, abs=1e-9), 0.0)
     assert state.contact.left_n == pytest.approx(20.0, rel=1e-6)
     # Not for a moment was it pressed through the other finger.
@@ -359,7 +362,7 @@ def test_no_moving_mass_is_too_light_for_the_stops(mass_share):
     numbers = drive()._replace(inertia=drive().inertia * mass_share)
     params, move = PlantParams(numbers, thing(width=-1.0), FINE), plant_move([])
     for effort in (100.0, -100.0):
-        state = at(0.04, ())
+        state = plant_at(0.04, ())
         for _ in range(200):
             state = move(params, state, effort, TICK)
             assert -1e-9 <= state.motion.gap_m <= 0.086 + 1e-9
@@ -367,7 +370,7 @@ def test_no_moving_mass_is_too_light_for_the_stops(mass_share):
 
 def test_a_stuck_gripper_does_not_creep_over_a_long_hold():
     params = PlantParams(drive(), thing(Elastic(2000.0, 0.0), Maxwell(250.0, 0.4)), FINE)
-    state = run(params, at(0.0501, (NoState(), MaxwellState(0.0))), 23.0, 3.0, (elastic, maxwell))
+    state = run(params, plant_at(0.0501, (NoState(), MaxwellState(0.0))), 23.0, 3.0, (elastic, maxwell))
     after = run(params, state, 23.0, 1e6, (elastic, maxwell), dt=1e3)
     assert after.motion.revolutions == state.motion.revolutions
     assert after.contact.left.force_n == pytest.approx(2000.0 * state.contact.left.compression_m, rel=1e-9)
@@ -376,7 +379,7 @@ def test_a_stuck_gripper_does_not_creep_over_a_long_hold():
 def test_a_damper_in_the_contents_lengthens_the_squeeze():
     def until_still(*terms, laws, states):
         params = PlantParams(drive(), thing(*terms, skins=1.5e4), FINE)
-        state, move = at(0.0501, states), plant_move(laws)
+        state, move = plant_at(0.0501, states), plant_move(laws)
         for k in range(5000):
             state = move(params, state, 23.0, TICK)
             if state.contact.touched and abs(state.motion.speed_rev_s * state.motion.jacobian_m_rev) < 1e-4:
@@ -394,7 +397,7 @@ def test_steps_that_grow_slowly_see_what_rings_after_a_touch(tolerance):
     free = drive(coulomb=0.0, breakaway=0.0, load=0.0, damping=0.0, link=STRAIGHT)
     free = free._replace(inertia=100.0 * STRAIGHT.pitch_m**2)
     body = ObjectModel(0.05, 0.0, PadCompliance(1e4, 50.0), (Surface(0.5, 1e3, 1.0, 2e4),))
-    start = at(0.0501, (OscillatorState(0.0, 0.0),), speed_m_s=-0.1, link=STRAIGHT)
+    start = plant_at(0.0501, (OscillatorState(0.0, 0.0),), speed_m_s=-0.1, link=STRAIGHT)
 
     def force(steps):
         return plant_move([surface])(PlantParams(free, body, steps), start, 0.0, 5e-3).contact.left_n
@@ -409,7 +412,7 @@ def test_a_tick_that_is_to_settle_is_halved_even_where_no_error_asks_for_it():
     # Free flight under damping: one step of a loose tolerance takes the whole tick, and is off.
     free = drive(coulomb=0.0, breakaway=0.0, load=0.0, damping=3e4, link=STRAIGHT)
     free = free._replace(inertia=100.0 * STRAIGHT.pitch_m**2)
-    start = at(0.06, (NoState(),), speed_m_s=-0.05, link=STRAIGHT)
+    start = plant_at(0.06, (NoState(),), speed_m_s=-0.05, link=STRAIGHT)
     speeds = []
     for settle in (0.0, 1e-9):
         after = plant_move([elastic])(
@@ -426,7 +429,7 @@ def test_what_stands_is_looked_at_in_steps_no_longer_than_the_longest():
         0.05, 0.0, PadCompliance(1.5e4), (Elastic(2000.0, 0.0), Liquid(1e-3, 1e-3, 0.02, 1e-11))
     )
     laws, states = [elastic, liquid], (NoState(), OscillatorState(0.0, 0.0))
-    start = run(PlantParams(drive(), body, FINE), at(0.0499, states, speed_m_s=-0.05), 15.0, 0.5, laws)
+    start = run(PlantParams(drive(), body, FINE), plant_at(0.0499, states, speed_m_s=-0.05), 15.0, 0.5, laws)
     assert start.motion.speed_rev_s == 0.0
     left = start.contact.left._replace(states=(NoState(), OscillatorState(0.0, 0.05)))
     start = start._replace(contact=start.contact._replace(left=left))
@@ -443,17 +446,17 @@ def test_a_pushed_object_is_pressed_only_from_when_the_second_finger_meets_it():
     body = ObjectModel(0.05, 0.1, PadCompliance(4e4, 50.0), SPRING)
     coarse, fine = (PlantParams(free, body, Steps(6e-6, longest_s=longest)) for longest in (inf, 1e-5))
     for begun in range(8):
-        start = at(0.0505 + 5e-6 * begun, (NoState(),), offset=2.4e-4, speed_m_s=-0.1)
-        one, other = (run(params, start, 0.0, 0.006) for params in (coarse, fine))
+        start = plant_at(0.0505 + 5e-6 * begun, (NoState(),), offset=2.4e-4, speed_m_s=-0.1)
+        end, other = (run(params, start, 0.0, 0.006) for params in (coarse, fine))
         assert other.contact.left_n > 0.0
-        assert one.contact.left_n == pytest.approx(other.contact.left_n, abs=2e-3)
+        assert end.contact.left_n == pytest.approx(other.contact.left_n, abs=2e-3)
 
 
 def test_what_a_touch_begins_with_is_not_rounding_however_fine_the_steps():
     # Where the second finger touches, a strong damper makes 0.1 N of what rounding leaves of a rate over a picosecond.
     free = drive(coulomb=0.0, breakaway=0.0, load=0.0, damping=0.0)
     body = ObjectModel(0.05, 0.0, PadCompliance(8e3), (Elastic(200.0, 0.0), Loss(3e5)), held=1)
-    start = at(0.0521, (NoState(), NoState()), offset=1e-3, speed_m_s=-0.1)
+    start = plant_at(0.0521, (NoState(), NoState()), offset=1e-3, speed_m_s=-0.1)
     after = run(PlantParams(free, body, Steps(1e-10)), start, 0.0, 0.0425, [elastic, loss])
     assert after.contact.left_n > 0.0
     assert after.peak_n == pytest.approx(max(after.contact.left_n, after.contact.right_n), rel=1e-5)
@@ -500,7 +503,7 @@ def test_covers_and_object_carry_one_force_however_stiff_they_are(stiffness, ski
 def test_a_stuck_gripper_does_not_creep_whatever_it_holds(name, params):
     term = TERMS[name]
     params = PlantParams(drive(), thing(Elastic(2000.0, 0.0), params, skins=1.5e4), FINE)
-    state = run(params, at(0.0501, (NoState(), term.at_rest)), 23.0, 3.0, (elastic, term.law))
+    state = run(params, plant_at(0.0501, (NoState(), term.at_rest)), 23.0, 3.0, (elastic, term.law))
     assert state.motion.speed_rev_s == 0.0
     after = run(params, state, 23.0, 1e6, (elastic, term.law), dt=1e3)
     assert after.motion.revolutions == state.motion.revolutions
@@ -508,7 +511,7 @@ def test_a_stuck_gripper_does_not_creep_whatever_it_holds(name, params):
 
 
 def a_step_per_tick():
-    return steps_for(PLAIN.at(0.01), TICK)._replace(macro_tolerance=0.0)
+    return steps_for(PLAIN.level(0.01), TICK)._replace(macro_tolerance=0.0)
 
 
 @cache
@@ -516,7 +519,7 @@ def pressed_again(steps):
     """Return the force in each tick after the fingers meet an object again, and its compression at the end."""
     body = ObjectModel(0.05, 0.0, PadCompliance(1e4, 50.0), (Elastic(500.0, 0.0), Maxwell(3000.0, 0.5)))
     params, laws = PlantParams(drive(), body, steps), (elastic, maxwell)
-    state = run(params, at(0.0501, (NoState(), MaxwellState(0.0))), 40.0, 0.5, laws)
+    state = run(params, plant_at(0.0501, (NoState(), MaxwellState(0.0))), 40.0, 0.5, laws)
     opened = run(params, state, -60.0, 0.215, laws)
     state, move, result = run(params, opened, 90.0, 0.29, laws), plant_move(laws), []
     assert opened.contact.left.force_n == state.contact.left.force_n == 0.0
@@ -537,18 +540,21 @@ def pressed_again(steps):
 )
 def test_fingers_meet_an_object_that_has_not_recovered_its_shape_where_it_ends(steps):
     # Without this event the dampers of the pads acted over the whole tick: 0.37 N too much where the force is 0.46 N.
-    (found, _), (expected, deep) = pressed_again(steps), pressed_again(Steps(inf, 5e-6))
+    (forces, _), (expected, deep) = pressed_again(steps), pressed_again(Steps(inf, 5e-6))
     # It is pressed again while it is still 6 mm deep.
     assert expected[0] == 0.0 < expected[-1]
     assert deep > 0.006
-    np.testing.assert_allclose(found, expected, atol=0.012)
+    np.testing.assert_allclose(forces, expected, atol=0.012)
 
 
 def test_steps_are_short_after_a_contact_and_whole_ticks_soon_afterwards():
     body = thing(Elastic(2000.0, 0.0), Loss(100.0), skins=1.5e4)
 
     def in_each_tick(steps):
-        params, state = PlantParams(drive(), body, steps), at(0.0502, (NoState(), NoState()), speed_m_s=-0.05)
+        params, state = (
+            PlantParams(drive(), body, steps),
+            plant_at(0.0502, (NoState(), NoState()), speed_m_s=-0.05),
+        )
         move, counts = plant_move((elastic, loss)), []
         while len(counts) < 8:
             after = move(params, state, 30.0, TICK)
@@ -570,7 +576,7 @@ def test_the_steps_from_a_contact_that_is_off_by_rounding_are_those_from_the_con
     terms, laws = (Elastic(4e4, 0.0), Surface(30.0, 410.0, 11.0, 4e4)), (elastic, surface)
     body = ObjectModel(0.05, 0.4, PadCompliance(1e5), terms)
     params = PlantParams(drive(), body, Steps(3.4e-5, growth=1.03))
-    start = at(0.05 + before_m, (NoState(), OscillatorState(0.0, 0.0)), speed_m_s=-0.038)
+    start = plant_at(0.05 + before_m, (NoState(), OscillatorState(0.0, 0.0)), speed_m_s=-0.038)
     after = run(params, start, 2.0, 3.4e-3, laws, dt=3.4e-3)
     fine = run(params._replace(steps=Steps(inf, 1e-6)), start, 2.0, 3.4e-3, laws, dt=3.4e-3)
     assert after.step.n_steps < 250

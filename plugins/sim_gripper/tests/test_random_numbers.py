@@ -76,9 +76,9 @@ def test_grasps_of_neighbouring_seeds_are_independent():
 
 
 @given(SEEDS, st.integers(0, 50), st.integers(1, 60), st.sampled_from([4, 9, 44]))
-def test_a_row_is_the_same_whatever_is_drawn_with_it(seed, first, count, width):
-    rows = normal_rows(key_of(seed), NOISE, first, count, width)
-    alone = normal_rows(key_of(seed), NOISE, first + count - 1, 1, width)
+def test_a_row_is_the_same_whatever_is_drawn_with_it(seed, begin, count, width):
+    rows = normal_rows(key_of(seed), NOISE, begin, count, width)
+    alone = normal_rows(key_of(seed), NOISE, begin + count - 1, 1, width)
     assert rows[-1].tobytes() == alone[0].tobytes()
 
 

@@ -56,10 +56,10 @@ def again(config=CONFIG, spec=None, **settings):
 
 @pytest.mark.slow
 def test_memory_finds_a_model_by_content_and_not_by_object(trials):
-    first = select()
+    model = select()
     # Another object of Python with the same content, and other settings that no model depends on.
-    assert again(spec=shell()) is again(evolve(CONFIG, noise_counts=9.0)) is first
-    assert again(spec=shell(2001.0)) is not first
+    assert again(spec=shell()) is again(evolve(CONFIG, noise_counts=9.0)) is model
+    assert again(spec=shell(2001.0)) is not model
     assert len(trials) == 2
 
 
@@ -80,10 +80,10 @@ def test_the_next_process_finds_what_was_selected(trials, folder):
 
 @pytest.mark.slow
 def test_another_object_accuracy_or_controller_is_tried_by_itself(trials):
-    first = select()
+    model = select()
     others = select(spec=shell(2001.0)), select(evolve(CONFIG, accuracy=0.03)), select(probing_force_n=19.0)
     assert len(trials) == 4
-    assert first not in others
+    assert model not in others
 
 
 def test_what_decides_nothing_of_the_model_finds_it_too(trials):

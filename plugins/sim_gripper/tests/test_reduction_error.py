@@ -47,8 +47,8 @@ def test_the_quantities_are_those_of_the_motion_whatever_the_clock():
 
 @pytest.mark.parametrize("late", [1e-4, 3.7e-4, 9e-4])
 def test_when_the_clock_ticks_hardly_matters(late):
-    one, other = squeeze(late=late).quantities, squeeze().quantities
-    for name, value in one.items():
+    delayed, other = squeeze(late=late).quantities, squeeze().quantities
+    for name, value in delayed.items():
         assert value == pytest.approx(other[name], rel=2e-4), name
 
 

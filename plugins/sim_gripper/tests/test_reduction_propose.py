@@ -49,9 +49,9 @@ def test_a_contact_too_stiff_for_the_tick_is_said_to_be():
 def test_instances_share_the_steps_of_their_kind():
     problem = problem_of(SimConfig(sensor="ideal"), find("odwalla:empty_open"))
     model = propose(problem, grip_of(problem))
-    one, other = (instantiate(problem, model, seed) for seed in (1, 2))
-    assert one.plant.steps == other.plant.steps == model.steps
-    assert one.terms != other.terms
+    setup, other = (instantiate(problem, model, seed) for seed in (1, 2))
+    assert setup.plant.steps == other.plant.steps == model.steps
+    assert setup.terms != other.terms
 
 
 def test_run_reports_each_decision_with_its_number():
@@ -60,7 +60,7 @@ def test_run_reports_each_decision_with_its_number():
     report = json.loads(done.stdout)["report"]
     selection = report["selection"]
     assert (selection["accuracy"], selection["fidelity"], report["resolved"]) == (0.01, "scene", True)
-    assert selection["level"] == PLAIN.at(0.01)._asdict()
+    assert selection["level"] == PLAIN.level(0.01)._asdict()
     assert selection["verified"]["error"] <= 0.005
     # The probing force less friction, and what the controller is set to.
     assert 10.0 < selection["expected_force_n"] < 25.0

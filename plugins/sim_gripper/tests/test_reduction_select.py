@@ -158,11 +158,11 @@ def test_features_at_checkpoints_are_verified_as_those_of_the_whole_grasp():
 @pytest.mark.parametrize("name", ["toy", "can:empty_open"])
 def test_the_model_of_a_single_instance_is_as_accurate_as_requested(name):
     config, law = SimConfig(object=name, spread=False, sensor="ideal"), create("controller", "hybrid")
-    one, other = (
+    model, other = (
         run_many(evolve(config, fidelity=fidelity), law, [name], [0], compiled=False)[0]
         for fidelity in ("scene", "reference")
     )
-    error, quantity = error_of(one, other)
+    error, quantity = error_of(model, other)
     assert error <= config.accuracy, quantity
 
 
@@ -269,12 +269,12 @@ def test_it_matters_in_which_tick_this_threshold_is_met(stiff):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("off_n", [0.0, 1e-9, -1e-9])
-def test_a_threshold_that_is_met_within_rounding_at_a_tick_is_refused(stiff, off_n):
+def test_a_threshold_that_is_met_within_rounding_at_a_tick_is_met_in_it_or_in_the_next(stiff, off_n):
     config, met_n = stiff
-    with pytest.raises(ConfigError) as refused:
-        course(config, met_n + off_n)
-    for told in ("stiff.toml", "within", "df_dt", "gripper.open_gap_m", "gripper.accuracy", "reference"):
-        assert told in str(refused.value)
+    reference = evolve(config, fidelity="reference")
+    sides = [course(reference, met_n + side_n) for side_n in (-1e-4, 1e-4)]
+    grasp = course(config, met_n + off_n)
+    assert min(deviation(grasp, side)[0] for side in sides) <= config.accuracy
 
 
 @pytest.mark.slow
@@ -291,10 +291,8 @@ def test_every_object_of_the_catalogue_has_a_model_of_ordinary_steps():
         for config in (CONFIG, evolve(CONFIG, spread=True)):
             model = selected(config, spec, hybrid())
             assert model.verification is not None, spec.name
-            ordinary = [scale.at(config.accuracy) for scale in (PLAIN, CONTROLLED[0])]
-            # The nominal one comes to rest so near to a tick that a tenth of the step tolerance has to tell which.
-            near_a_tick = spec.name == "odwalla_worn:full_open" and not config.spread
-            assert (model.level in ordinary) != near_a_tick, spec.name
+            ordinary = [scale.level(config.accuracy) for scale in (PLAIN, CONTROLLED[0])]
+            assert model.level in ordinary, spec.name
 
 
 @pytest.mark.slow
@@ -304,7 +302,7 @@ def test_with_spread_a_step_per_tick_is_chosen_if_it_suffices_for_several_instan
     config = evolve(CONFIG, spread=True, accuracy=1e-3, pad_stiffness_n_m=math.inf)
     model = selected(config, spec, hybrid())
     # The nominal object passes; with a wide spread, an instance does not.
-    assert model.level == (PLAIN if stiffness_spread == 0.0 else CONTROLLED[0]).at(1e-3)
+    assert model.level == (PLAIN if stiffness_spread == 0.0 else CONTROLLED[0]).level(1e-3)
     assert model.verification.error <= 0.5e-3
 
 
@@ -312,7 +310,7 @@ def test_with_spread_a_step_per_tick_is_chosen_if_it_suffices_for_several_instan
 def test_a_step_per_tick_is_chosen_where_it_is_accurate_enough_and_not_where_it_is_not():
     stiff = thing(("elastic", {"k1_n_m": 5e5}), ("maxwell", {"k_n_m": 2e5, "tau_s": 0.01}))
     tight = selected(evolve(CONFIG, accuracy=1e-4), thing(SHELL), hybrid())
-    assert tight.level == PLAIN.at(1e-4)
+    assert tight.level == PLAIN.level(1e-4)
     assert tight.verification.error <= 0.8e-4
     controlled = selected(evolve(CONFIG, accuracy=1e-4, pad_stiffness_n_m=math.inf), stiff, hybrid())
     assert controlled.steps.tolerance < math.inf
@@ -324,7 +322,7 @@ def test_a_step_per_tick_is_chosen_where_it_is_accurate_enough_and_not_where_it_
 def test_a_step_per_tick_that_a_damper_makes_unstable_is_not_chosen():
     config = evolve(CONFIG, pad_stiffness_n_m=math.inf)
     model = selected(config, thing(SHELL, ("loss", {"damping_n_s_m": 3e5})), hybrid())
-    assert model.level == CONTROLLED[0].at(config.accuracy)
+    assert model.level == CONTROLLED[0].level(config.accuracy)
     assert model.verification.error <= 0.8 * config.accuracy
 
 
@@ -361,13 +359,13 @@ def test_gas_that_is_spent_is_reported(tmp_path):
         "area_slope_m = 0.0\nvolume_m3 = 2e-6\npressure_pa = 101325.0\nexponent = 1.4\nbulge_m3_pa = 2e-9\n"
         "vent_m2 = 1e-5\n"
     )
-    found = []
+    beyond = []
     for force in (2.0, 20.0):
         config = evolve(CONFIG, object=str(scene), open_gap_m=0.055, step_s=1e-3)
         law = create("controller", "hybrid", probing_force_n=force)
-        found.append(run_grasp(SimBackend(config), law, RunConfig()).report["beyond"])
-    assert found[0] == ""
-    assert found[1].startswith("gas: more than its volume was displaced")
+        beyond.append(run_grasp(SimBackend(config), law, RunConfig()).report["beyond"])
+    assert beyond[0] == ""
+    assert beyond[1].startswith("gas: more than its volume was displaced")
 
 
 def test_trial_grasps_end_at_a_limit_of_work_and_the_grasp_runs(monkeypatch):

@@ -42,8 +42,8 @@ def test_a_grasp_of_linear_contact_has_the_accuracy_that_is_asked_for():
     run, accuracy = RunConfig(hold_s=0.0), CONFIG.accuracy
     done = run_many(CONFIG, Law(None), [CONFIG.object], [0], compiled=False, run=run)[0]
     force = exact_closed().force
-    found = done.trace.force_left_n[: len(force)]
+    simulated = done.trace.force_left_n[: len(force)]
     peak = force.max()
-    assert np.sqrt(np.mean((found - force) ** 2)) < accuracy * peak
+    assert np.sqrt(np.mean((simulated - force) ** 2)) < accuracy * peak
     assert done.state.peak_n == pytest.approx(peak, rel=accuracy)
     assert done.report()["not_verified"] == []

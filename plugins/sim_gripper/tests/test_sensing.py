@@ -93,11 +93,11 @@ def test_the_ideal_sensor_sees_contact_when_it_happens_the_pads_up_to_an_image_l
     # From wider apart the contact falls into another phase of the pads' clock: 41 ms at 10 mm/s is 0.41 mm.
     delays = []
     for k in range(8):
-        first = []
+        contact_s = []
         for sensor in ("ideal", "pads"):
             trace = grasp(sensor=sensor, spread=False, open_gap_m=0.086 + k * 0.41e-3 / 8).trace
-            first.append(trace.t_s[trace.phase == Phase.SQUEEZE][0] - trace.t_s[0])
-        delays.append(first[1] - first[0])
+            contact_s.append(trace.t_s[trace.phase == Phase.SQUEEZE][0] - trace.t_s[0])
+        delays.append(contact_s[1] - contact_s[0])
     # tau_1 is met on the cells when a bottle's 42 % share of the force has grown that far: some 30 ms later still.
     assert 0.0 < min(delays) < 0.060
     assert max(delays) - min(delays) == pytest.approx(0.041, abs=0.008)
@@ -113,10 +113,10 @@ def test_other_tick_rates_feel_the_same_bottle(rate_hz):
 
 
 def test_the_same_seed_is_the_same_grasp_to_the_bit():
-    one, again, other = grasp(seed=4), grasp(seed=4), grasp(seed=5)
-    assert np.array_equal(one.trace.force_left_n, again.trace.force_left_n)
-    assert not np.array_equal(one.trace.gap_m[:100], other.trace.gap_m[:100]) or (
-        not np.array_equal(one.trace.pad_left[0], other.trace.pad_left[0])
+    grasped, again, other = grasp(seed=4), grasp(seed=4), grasp(seed=5)
+    assert np.array_equal(grasped.trace.force_left_n, again.trace.force_left_n)
+    assert not np.array_equal(grasped.trace.gap_m[:100], other.trace.gap_m[:100]) or (
+        not np.array_equal(grasped.trace.pad_left[0], other.trace.pad_left[0])
     )
 
 
@@ -126,8 +126,8 @@ def test_cells_that_are_not_there_read_their_offset_and_the_others_as_before():
     )
     moved = np.ptp(middle.pad_left[:, 7:], axis=0) > 0
     assert np.flatnonzero(moved).tolist() == [6, 7, 8]  # the middle row, across the line of contact
-    before = whole.pad_left[whole.pad_t_s < 2.0]
-    assert np.array_equal(middle.pad_left[middle.pad_t_s < 2.0][:, 13:16], before[:, 13:16])
+    early = whole.pad_left[whole.pad_t_s < 2.0]
+    assert np.array_equal(middle.pad_left[middle.pad_t_s < 2.0][:, 13:16], early[:, 13:16])
 
 
 def test_pads_can_report_more_often_or_less():

@@ -91,7 +91,7 @@ def test_the_example_of_many_grasps_runs():
     names = {}
     few = code.replace("* 500", "* 1").replace("range(1000)", "range(2)")
     exec(compile(few, "simulator.md", "exec"), names)
-    assert [one.outcome.words for one in names["done"]] == ["steady", "steady"]
+    assert [grasp.outcome.words for grasp in names["done"]] == ["steady", "steady"]
 
 
 def test_the_example_of_a_scene_is_one(tmp_path):

@@ -51,8 +51,8 @@ def explained(scene):
 
 def features_of(scene):
     grasp = run_grasp(SimBackend(config_of(scene)), create("controller", "hybrid"), RunConfig())
-    found = create("feature-set", "chitta").extract(grasp.trace).as_dict()
-    return {**found, "peak": grasp.report["true_peak_force_n"]}
+    extracted = create("feature-set", "chitta").extract(grasp.trace).as_dict()
+    return {**extracted, "peak": grasp.report["true_peak_force_n"]}
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -93,4 +93,6 @@ def test_changes_are_those_of_the_pipelines_own_features():
     (row,) = [row for row in grasp.report["model"]["without"] if row["term"] == "maxwell"]
     names = {feature.name for feature in create("feature-set", "curve").features}
     assert {"peak"} < set(row["changes"]) <= names | {"peak"}
-    assert all(math.isfinite(one["change"]) for one in row["changes"].values() if one["change"] is not None)
+    assert all(
+        math.isfinite(change["change"]) for change in row["changes"].values() if change["change"] is not None
+    )

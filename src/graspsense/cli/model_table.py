@@ -31,12 +31,11 @@ def print_model(model: Mapping[str, Any]) -> None:
             f"{row['share']:.1%}",
             f"{row['work_j'] * 1e3:.2f} mJ",
             f"{row['lost_j'] * 1e3:.2f} mJ",
-            f"{row['expected_n']:.3f} N",
             _times(row["rates"]),
         )
         for row in model["terms"]
     ]
-    header = ("TERM", "PEAK", "AT PEAK", "SHARE", "WORK", "LOST", "EXPECTED", "TIME CONSTANTS")
+    header = ("TERM", "PEAK", "AT PEAK", "SHARE", "WORK", "LOST", "TIME CONSTANTS")
     echo_table(header, rows)
 
 

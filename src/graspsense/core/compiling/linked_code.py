@@ -20,15 +20,55 @@ from numba.core.typed_passes import NativeLowering
 
 
 class LinkedLibrary(JITCodeLibrary):
-    """The code of a function, to be linked into that of its callers."""
+    """The code of a function, to be linked into that of the outermost one."""
 
-    def _optimize_final_module(self) -> None:
-        """Leave it to the callers."""
-
-    def _finalize_final_module(self) -> None:
-        """Make no machine code."""
+    def finalize(self) -> None:
+        """Link nothing and make no machine code: the outermost function does both, once for all."""
+        self._raise_if_finalized()  # type: ignore[no-untyped-call]
+        for library in self._linking_libraries:
+            self._reload_init.update(library._reload_init)
         self._finalize_dynamic_globals()  # type: ignore[no-untyped-call]
         self._finalized = True
+
+    def own_module(self) -> Any:
+        """Return the code of this function alone."""
+        return super()._get_module_for_linking()  # type: ignore[no-untyped-call]
+
+    def _get_module_for_linking(self) -> Any:
+        """Return the code with all that it calls, for a function of numba's own that takes this one as an argument."""
+        module = self.own_module().clone()
+        for called in _all_called(self):
+            module.link_in(called, preserve=True)
+        return module
+
+
+class OutermostLibrary(JITCodeLibrary):
+    """The code of a function that the interpreter calls, and of all that it calls."""
+
+    def finalize(self) -> None:
+        """Link each function in once, whoever calls it; then optimise, and make machine code."""
+        for called in _all_called(self):
+            self._final_module.link_in(called, preserve=True)
+        for library in self._linking_libraries:
+            self._reload_init.update(library._reload_init)
+        self._linking_libraries = []
+        super().finalize()  # type: ignore[no-untyped-call]
+
+
+def _all_called(library: JITCodeLibrary) -> list[Any]:
+    """Return the code of every function that this one calls, and that these call, each once."""
+    libraries = dict.fromkeys(library._linking_libraries)
+    waiting = list(libraries)
+    while waiting:
+        called = waiting.pop()
+        if isinstance(called, LinkedLibrary):
+            further = [other for other in called._linking_libraries if other not in libraries]
+            libraries.update(dict.fromkeys(further))
+            waiting += further
+    return [
+        called.own_module() if isinstance(called, LinkedLibrary) else called._get_module_for_linking()
+        for called in libraries
+    ]
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)  # type: ignore[no-untyped-call]
@@ -79,16 +119,19 @@ def _with_lowering(passes: Any, lowering: type[NativeLowering]) -> list[Any]:
     return [passes]
 
 
+def _keep_in(kind: type[JITCodeLibrary], state: Any) -> None:
+    """Have the code of the function that is compiled put into a library of this kind."""
+    state.library = kind(state.targetctx.codegen(), state.func_id.func_qualname)
+    state.library.enable_object_caching()
+
+
 class LinkedCompiler(Compiler):
     """The compiler of a function that only compiled code calls."""
 
     def define_pipelines(self) -> list[Any]:
         """Return the passes of numba, with `LinkedLowering` in place of its own lowering."""
-        state = self.state
-        state.flags.no_compile = True
-        codegen, name = state.targetctx.codegen(), state.func_id.func_qualname
-        state.library = LinkedLibrary(codegen, name)  # type: ignore[no-untyped-call]
-        state.library.enable_object_caching()
+        self.state.flags.no_compile = True
+        _keep_in(LinkedLibrary, self.state)
         (passes,) = super().define_pipelines()  # type: ignore[no-untyped-call]
         return _with_lowering(passes, LinkedLowering)
 
@@ -98,6 +141,7 @@ class OutermostCompiler(Compiler):
 
     def define_pipelines(self) -> list[Any]:
         """Return the passes of numba, with `OutermostLowering` in place of its own lowering."""
+        _keep_in(OutermostLibrary, self.state)
         (passes,) = super().define_pipelines()  # type: ignore[no-untyped-call]
         return _with_lowering(passes, OutermostLowering)
 

@@ -187,14 +187,14 @@ def is_pressed(contact: Contact) -> bool:
     return contact.left.force_n > 0.0 or right_of(contact.left, contact.right).force_n > 0.0
 
 
-def has_event(before: Contact, after: Contact) -> bool:
+def has_event(earlier: Contact, later: Contact) -> bool:
     """Return whether a term of the object has an event between these contacts (see `Term.phase`)."""
-    return object_phase(before.left.states) != object_phase(after.left.states) or object_phase(
-        right_of(before.left, before.right).states
-    ) != object_phase(right_of(after.left, after.right).states)
+    return object_phase(earlier.left.states) != object_phase(later.left.states) or object_phase(
+        right_of(earlier.left, earlier.right).states
+    ) != object_phase(right_of(later.left, later.right).states)
 
 
-def no_event(before: Contact, after: Contact) -> bool:
+def no_event(earlier: Contact, later: Contact) -> bool:
     """Return False: `has_event` of an object whose terms have no events."""
     return False
 
@@ -310,17 +310,17 @@ def _press_through_pads(
 ) -> tuple[ContactState, int]:
     """Return the object behind compliant pads: pressed or separated, whichever of the two is consistent."""
     pads = model.pads
-    d0, force0, slope, _, pad0, branch0, (rate0, change0, span, before) = now
+    d0, force0, slope, _, pad0, branch0, (rate0, change0, span, previous_span) = now
     pressed = force0 > 0.0
     over, base = h, d0
     if pressed:
         ahead = h / (h + span)
         over = h / (1.0 + ahead)
         base += over * ahead * rate0
-        if h <= MAX_GROWTH * span and before < math.inf:
-            third = h / (h + span + before)
-            over = h / (1.0 + ahead + third)
-            base = d0 + over * ((ahead + third) * rate0 + 0.5 * third * (h + span) * change0)
+        if h <= MAX_GROWTH * span and previous_span < math.inf:
+            two_back = h / (h + span + previous_span)
+            over = h / (1.0 + ahead + two_back)
+            base = d0 + over * ((ahead + two_back) * rate0 + 0.5 * two_back * (h + span) * change0)
     stiffness, push, creep = pads.stiffness_n_m, pads.stiffness_n_m * closure_m, _NO_CREEP
     creeps = pads.damping_n_s_m > 0.0 or pads.branch_n_m > 0.0
     if creeps:

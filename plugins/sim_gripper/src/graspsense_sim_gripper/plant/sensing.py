@@ -38,19 +38,6 @@ CellColumn = Any
 """A number for each cell: an array in compiled code, a list or tuple in the interpreter."""
 
 
-class Bias(NamedTuple):
-    """An error added to the ideal sensor, to test how sensitive a grasp is to errors this small."""
-
-    force_n: float
-    """Added to the force on a pad that touches the object."""
-    travel_share: float
-    """Relative error of the distance that the fingers have moved beyond `from_m`."""
-    from_m: float
-
-
-UNBIASED: Final = Bias(0.0, 0.0, 0.0)
-
-
 class ImageClock(NamedTuple):
     """When cell images are taken, and when they arrive."""
 
@@ -83,8 +70,6 @@ class SensorParams(NamedTuple):
     """Standard deviation of the noise of a cell."""
     left: PadCells
     right: PadCells
-    bias: Bias = UNBIASED
-    """Errors of the ideal sensor."""
 
 
 class PadBuffers(NamedTuple):
@@ -199,10 +184,6 @@ def read_frame(
     encoder_ticks, gap, velocity, count, image_t, forces, pending = state
     encoder_ticks, gap, velocity = sense_motion(params, (encoder_ticks, gap, velocity), motion, dt_s)
     if params.ideal == 1:
-        force_error_n = params.bias.force_n
-        if force_error_n != 0.0:
-            left_n += force_error_n if left_n > 0.0 else 0.0
-            right_n += force_error_n if right_n > 0.0 else 0.0
         return Frame(t_s, dt_s, gap, velocity, effort_n, left_n, right_n, 0.0, 0.0, 0), state
     left_n, right_n, left_edge_n, right_edge_n = forces
     frame = Frame(t_s, dt_s, gap, velocity, effort_n, left_n, right_n, left_edge_n, right_edge_n, 0)
@@ -215,10 +196,7 @@ def sense_motion(
     """Return the ticks of the encoder, the gap (m) and its rate (m/s) that the sensors show, given the last ones."""
     encoder_ticks, gap, velocity = last
     if params.ideal == 1:
-        gap, velocity = motion.gap_m, motion.speed_rev_s * motion.jacobian_m_rev
-        if params.bias.force_n != 0.0:
-            gap += params.bias.travel_share * min(gap - params.bias.from_m, 0.0)
-        return encoder_ticks, gap, velocity
+        return encoder_ticks, motion.gap_m, motion.speed_rev_s * motion.jacobian_m_rev
     # A division for all ticks, which a compiler takes out of the loop. Few operations wait for the motion, which is
     # known last; `math.floor` would convert to an integer and back.
     share = 1.0 / (VELOCITY_FILTER_S + dt_s)
@@ -271,13 +249,13 @@ def apply_tare(state: SensorState, pads: PadBuffers) -> SensorState:
 
 
 def _write_image(
-    params: SensorParams, pad: PadCells, force_n: float, noise: CellColumn, first: int, cells: CellColumn
+    params: SensorParams, pad: PadCells, force_n: float, noise: CellColumn, begin: int, cells: CellColumn
 ) -> None:
     """Write the counts of one fingertip under this force (N) to `cells`; its noise begins at `noise[first]`."""
     counts = force_n * params.share * PAD_COUNTS_PER_N
     spread = params.noise_counts
     for i in range(CELLS):
-        value = pad.offset[i] + spread * noise[first + i]
+        value = pad.offset[i] + spread * noise[begin + i]
         if i >= FIRST_PAD_CELL:
             weight = pad.weights[i - FIRST_PAD_CELL]
             value = value + counts * weight if weight > 0.0 else pad.offset[i]

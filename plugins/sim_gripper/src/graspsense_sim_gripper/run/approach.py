@@ -57,23 +57,27 @@ class Approach(NamedTuple):
 
 
 def approach_ticks(
-    params: GraspParams, at: LoopProgress, frame: Frame, columns: Table, phases: Any
+    params: GraspParams, progress: LoopProgress, frame: Frame, columns: Table, phases: Any
 ) -> LoopProgress:
-    """Run the ticks of an approach after that of `frame`; return where they end: at `at` if there are none."""
-    contact, motion = at.plant.contact, at.plant.motion
+    """Run the ticks of an approach after that of `frame`; return where they end: at `progress` if there are none."""
+    contact, motion = progress.plant.contact, progress.plant.motion
     if params.macro_steps != 1 or motion.speed_rev_s == 0.0 or not _closes_freely(params, contact, frame):
-        return at
-    free, now = free_from(params.controller, at.controller, frame)
+        return progress
+    free, now = free_from(params.controller, progress.controller, frame)
     nearest = _nearest(params, contact)
-    n = _most_ticks(params, at, max(nearest, free.limits.gap_m), free.limits) if free.kind == CLOSES else 0
+    n = (
+        _most_ticks(params, progress, max(nearest, free.limits.gap_m), free.limits)
+        if free.kind == CLOSES
+        else 0
+    )
     if n < MIN_TICKS:
-        return at
+        return progress
     dt_s = params.dt_s
     way = _approach(params, motion, 0.5 * (contact.left_n + contact.right_n), n)
-    shown = at.sensor.encoder_ticks, at.sensor.gap_m, at.sensor.velocity_m_s
-    first_m_s, effort, i = motion.speed_rev_s * motion.jacobian_m_rev, at.effort_n, 0
+    shown = progress.sensor.encoder_ticks, progress.sensor.gap_m, progress.sensor.velocity_m_s
+    first_m_s, effort, i = motion.speed_rev_s * motion.jacobian_m_rev, progress.effort_n, 0
     while i < n:
-        t_s = (at.ticks + i) * dt_s
+        t_s = (progress.ticks + i) * dt_s
         next_shown = sense_motion(params.sensor, shown, motion, dt_s)
         command, next_now = free_tick(params.controller, free, now, t_s, dt_s, next_shown[1], next_shown[2])
         moved = _after_tick(way, motion, command, dt_s)
@@ -83,18 +87,18 @@ def approach_ticks(
         if not change <= way.speed_change_m_s or moved.gap_m <= nearest or beyond:
             break
         shown, now, motion = next_shown, next_now, moved
-        row = (at.recorded + i) & NOT_NEGATIVE
+        row = (progress.recorded + i) & NOT_NEGATIVE
         columns[0][row], columns[1][row], columns[2][row] = t_s, shown[1], shown[2]
-        columns[3][row], columns[8][row], phases[row] = effort, command, at.controller.phase
+        columns[3][row], columns[8][row], phases[row] = effort, command, progress.controller.phase
         columns[4][row], columns[5][row] = frame.force_left_n, frame.force_right_n
         columns[6][row], columns[7][row] = frame.edge_left_n, frame.edge_right_n
         effort = command
         i += 1
     if i == 0:
-        return at
-    state = after_free(params.controller, at.controller, now, effort, (at.ticks + i - 1) * dt_s)
+        return progress
+    state = after_free(params.controller, progress.controller, now, effort, (progress.ticks + i - 1) * dt_s)
     gap, jacobian = gap_and_rate(params.plant.drive.link, motion.revolutions)
-    _, _, (next_s, n_steps, unresolved), given, peak = at.plant
+    _, _, (next_s, n_steps, unresolved), given, peak = progress.plant
     plant = PlantState(
         Motion(motion.revolutions, motion.speed_rev_s, gap, jacobian),
         _pushed(contact, gap - params.plant.object.width_m),
@@ -102,7 +106,9 @@ def approach_ticks(
         given,
         peak,
     )
-    return LoopProgress(at.ticks + i, at.recorded + i, effort, plant, moved_sensor(at.sensor, shown), state)
+    return LoopProgress(
+        progress.ticks + i, progress.recorded + i, effort, plant, moved_sensor(progress.sensor, shown), state
+    )
 
 
 def _closes_freely(params: GraspParams, contact: Contact, frame: Frame) -> bool:

@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import repeat
 from typing import Any, Final, Unpack
 
 from attrs import evolve
 
 from graspsense.gripper_api import no_pads, tare
 from graspsense.plugin_api import (
-    HOLD,
-    SQUEEZE,
     Channel,
     Command,
     Controller,
     DeviceInfo,
     FeatureSet,
-    Frame,
     ObjectKind,
     Pads,
     Reading,
@@ -26,12 +22,9 @@ from graspsense.plugin_api import (
 from graspsense.simulator_api import (
     BatchBackend,
     BatchOptions,
-    FreeRun,
     Grasped,
     RunConfig,
     SimulationVariant,
-    TickParams,
-    TickState,
     maker,
 )
 from graspsense_sim_gripper.config import SimConfig
@@ -48,9 +41,8 @@ from graspsense_sim_gripper.run.accuracy.probe import FORCE_N, SPEED_M_S
 from graspsense_sim_gripper.run.accuracy.select import select
 from graspsense_sim_gripper.run.binding import bind_reachable
 from graspsense_sim_gripper.run.build import EFFORT_LIMIT_N, build, device_info, instantiate
-from graspsense_sim_gripper.run.compiled.compose import INTERPRETED, composed_move, composition, free_motion
+from graspsense_sim_gripper.run.compiled.compose import INTERPRETED, composed_move, composition
 from graspsense_sim_gripper.run.explain import explain
-from graspsense_sim_gripper.run.loop import COLUMNS, GraspParams, LoopProgress
 from graspsense_sim_gripper.run.model_report import accuracy_report, model_report
 from graspsense_sim_gripper.run.perturbed import perturbed
 from graspsense_sim_gripper.run.problem import IMAGES_PER_BLOCK, GraspController
@@ -61,10 +53,6 @@ from graspsense_sim_gripper.scene.scaled import ScaledParameter
 from graspsense_sim_gripper.scene.terms.term import LAW_ERRORS
 
 SIDES: Final = ("left", "right")
-
-
-MOST_FREE_TICKS: Final = 1024
-"""Largest number of ticks of free motion that are run at once."""
 
 
 _sense = bind_reachable(sense, {}, INTERPRETED)
@@ -141,12 +129,7 @@ class SimBackend(BatchBackend[SimConfig]):
             self._reduction = select(problem, self._controller or default_controller(self.config))
         setup = instantiate(problem, self._reduction, seed)
         self._setup = setup = evolve(setup, sensor=with_listed_cells(setup.sensor))
-        composed = composition(setup.kinds, setup.plant)
-        self._move = composed_move(composed)
-        self._free_ticks = None if self._controller is None else free_motion(composed, self._controller.step)
-        self._table = [[0.0] * MOST_FREE_TICKS for _ in COLUMNS]
-        self._phases = [0] * MOST_FREE_TICKS
-        self._moved_on = False
+        self._move = composed_move(composition(setup.kinds, setup.plant))
         self._state, self._sensor = setup.state, setup.sensor_state
         self._ticks = 0
         zero = (CELL_OFFSET[0],) * CELLS
@@ -165,8 +148,6 @@ class SimBackend(BatchBackend[SimConfig]):
         dt = setup.dt_s
         if effort is None:
             effort = 0.0
-        elif self._moved_on:
-            self._moved_on = False
         else:
             self._move_on(effort)
         buffers = self._buffers
@@ -193,38 +174,15 @@ class SimBackend(BatchBackend[SimConfig]):
             half = max(contact.left, right_of(contact.left, contact.right), key=lambda half: half.force_n)
             self._compressions.append((half.compression_m, half.force_n))
 
-    def free_ticks(self, params: TickParams, state: TickState, frame: Frame, most: int) -> FreeRun | None:
-        """Run ticks of free motion. Raises TermFailed."""
-        effort = self._effort_n
-        contact = self._state.contact
-        pressed = contact.left.force_n > 0.0 or right_of(contact.left, contact.right).force_n > 0.0
-        squeezes = state.phase in (SQUEEZE, HOLD)
-        if self._free_ticks is None or self._explains or pressed or squeezes or effort is None:
-            return None
-        self._move_on(effort)
-        self._moved_on = True
-        setup, table, first = self._setup, self._table, self._ticks
-        most = min(most, MOST_FREE_TICKS)
-        constants = GraspParams(setup.plant, setup.sensor, params, setup.dt_s, first + most)
-        at = LoopProgress(first, 0, effort, self._state, self._sensor, state)
-        at = self._free_ticks(constants, at, frame, table, self._phases)
-        if at.ticks == first:
-            return FreeRun(0, [], [], state)
-        self._ticks, n, self._effort_n, self._state, self._sensor, state = at
-        t, gap, velocity, efforts, left, right, edge_left, edge_right, commands = (row[:n] for row in table)
-        columns = t, repeat(setup.dt_s), gap, velocity, efforts, left, right, edge_left, edge_right, repeat(0)
-        frames = list(map(Frame._make, zip(*columns, strict=False)))
-        return FreeRun(self._ticks - first, frames, commands, state)
-
     def _moved(self, effort_n: float) -> PlantState:
         """Return the plant after a tick. Raises TermFailed."""
-        setup, before = self._setup, self._state
+        setup, plant = self._setup, self._state
         try:
-            after = self._move(setup.plant, before, effort_n, setup.dt_s)
+            after = self._move(setup.plant, plant, effort_n, setup.dt_s)
         except LAW_ERRORS as error:
             raise TermFailed(raised_in_term(error, setup.kinds) or str(error)) from error
         if not is_finite(after):
-            raise TermFailed(not_finite_in_tick(setup.kinds, setup.plant, before, effort_n, setup.dt_s))
+            raise TermFailed(not_finite_in_tick(setup.kinds, setup.plant, plant, effort_n, setup.dt_s))
         return after
 
     def apply(self, command: Command) -> None:
@@ -288,9 +246,9 @@ class SimBackend(BatchBackend[SimConfig]):
     def perturbed(self, scenes: Sequence[str], share: float) -> Mapping[str, SimBackend]:
         """Return this gripper, and this gripper with each parameter larger by this share, see `perturbed`."""
         changed = {}
-        for name, one in perturbed(self.config, scenes, share).items():
-            changed[name] = SimBackend(one.config)
-            changed[name]._scaled = one.scaled
+        for name, variant in perturbed(self.config, scenes, share).items():
+            changed[name] = SimBackend(variant.config)
+            changed[name]._scaled = variant.scaled
         return changed
 
     def run_many(

@@ -150,6 +150,6 @@ def draw_image_noise(key: Word, image: int, numbers: Any) -> None:
     draw_normals(key, NOISE, NOISE_NUMBERS * image, NOISE_NUMBERS, numbers)
 
 
-def image_noise(key: Word, first: int, count: int) -> NDArray[np.float64]:
-    """Return the noise (count, 44) of the cells in the images of a grasp from image `first` on."""
-    return normal_rows(key, NOISE, first, count, NOISE_NUMBERS)
+def image_noise(key: Word, begin: int, count: int) -> NDArray[np.float64]:
+    """Return the noise (count, 44) of the cells in the images of a grasp from image `begin` on."""
+    return normal_rows(key, NOISE, begin, count, NOISE_NUMBERS)

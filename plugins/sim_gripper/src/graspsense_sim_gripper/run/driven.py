@@ -220,14 +220,14 @@ def _at(model: ObjectModel, contact: Contact, gap_m: float, speed_m_s: float, h:
 
 def _until_event(model: ObjectModel, contact: Contact, gap_m: float, speed_m_s: float, h: float) -> float:
     """Return the time within `h` at which a term has an event."""
-    before, after = 0.0, h
-    while after - before > MIN_STEP_S:
-        middle = 0.5 * (before + after)
+    lower, upper = 0.0, h
+    while upper - lower > MIN_STEP_S:
+        middle = 0.5 * (lower + upper)
         if has_event(contact, _at(model, contact, gap_m - speed_m_s * middle, speed_m_s, middle)):
-            after = middle
+            upper = middle
         else:
-            before = middle
-    return after
+            lower = middle
+    return upper
 
 
 @lru_cache(maxsize=64)

@@ -23,7 +23,6 @@ def explain(setup: GraspSetup, compressions: Sequence[tuple[float, float]]) -> d
     - `at_peak_n` and `share`: its force (N) when the force of the object is largest, and its share of the sum of terms,
     - `work_j`: the work done on it until then (J),
     - `lost_j`: the work that it has not returned when the object separates (J),
-    - `expected_n`: the largest force (N) that `Term.importance` predicts for such a grasp,
     - `rates`: its rates (1/s).
     """
     if not compressions:
@@ -74,7 +73,7 @@ def _contribution(kind: str, params: TermParams, along: _Path, point: WorkingPoi
     state, force, work, work_to_peak = term.at_rest, 0.0, 0.0, 0.0
     forces: list[float] = []
     for i in range(len(path) - 1):
-        before = force
+        last_force = force
         # The mean rate over this tick and the next, if the object is still pressed in it.
         ticks = 2 if i + 2 < len(path) and pressed[i + 1] else 1
         speed = (path[i + ticks] - path[i]) / (ticks * dt_s)
@@ -82,7 +81,7 @@ def _contribution(kind: str, params: TermParams, along: _Path, point: WorkingPoi
         if not pressed[i]:
             force = 0.0
         else:
-            work += 0.5 * (before + force) * (path[i + 1] - path[i])
+            work += 0.5 * (last_force + force) * (path[i + 1] - path[i])
         forces.append(force)
         if i == peak:
             work_to_peak = work
@@ -92,6 +91,5 @@ def _contribution(kind: str, params: TermParams, along: _Path, point: WorkingPoi
         "at_peak_n": forces[peak],
         "work_j": work_to_peak,
         "lost_j": work,
-        "expected_n": term.importance(params, point),
         "rates": [{"what": rate.what, "per_s": rate.per_s} for rate in term.rates(params, point)],
     }

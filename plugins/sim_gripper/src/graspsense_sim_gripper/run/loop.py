@@ -213,7 +213,7 @@ control: Callable[[TickParams, TickState, Reading], tuple[Command, TickState]] =
 begin_macro_step: Callable[..., Ahead] = _never_begins
 """`macro_ticks.begin_macro_step` where a step may last several ticks."""
 run_approach_ticks: Callable[[GraspParams, LoopProgress, Frame, Table, Any], LoopProgress] = _every_tick
-"""`approach.approach_ticks`, in the interpreter `free_ticks.approach_or_free_ticks`, where ticks are run at once."""
+"""`approach.approach_ticks` where ticks are run at once."""
 
 
 def grasp(params: GraspParams, progress: SimulationState, buffers: Buffers) -> SimulationState:
@@ -269,9 +269,9 @@ def grasp(params: GraspParams, progress: SimulationState, buffers: Buffers) -> S
             failed = 1
             break
         if single and same_phase and phase != SQUEEZE and phase != HOLD:
-            at = LoopProgress(ticks, recorded, effort, plant, sensor, state)
-            at = run_approach_ticks(params, at, frame, buffers.columns, buffers.phases)
-            ticks, recorded, effort, plant, sensor, state = at
+            advanced = LoopProgress(ticks, recorded, effort, plant, sensor, state)
+            advanced = run_approach_ticks(params, advanced, frame, buffers.columns, buffers.phases)
+            ticks, recorded, effort, plant, sensor, state = advanced
     ended = LoopState(ticks, recorded, phase, tare_from, effort, failed, macro)
     return SimulationState(ended, plant, sensor, state)
 

@@ -65,7 +65,7 @@ class StoredReport(NamedTuple):
     is broken."""
     checked: tuple[_CheckedTerm, ...]
 
-    def of(self, numbers: NDArray[np.float64]) -> dict[str, Any]:
+    def report(self, numbers: NDArray[np.float64]) -> dict[str, Any]:
         """Return the report of a grasp that ended in the state of these numbers."""
         peak_n, unresolved, unbalanced, *broken = numbers[self.places].tolist()
         beyond = [
@@ -82,18 +82,20 @@ def stored_report(plant: TupleType, layout: PaddedLayout, kinds: tuple[str, ...]
     `kinds`: those of the object's own terms.
     """
     padded = plant.filled([0.0] * plant.count)
-    at = with_places(padded)
+    places_of = with_places(padded)
     states = zip(
-        (padded.contact.left, *padded.contact.right), (at.contact.left, *at.contact.right), strict=True
+        (padded.contact.left, *padded.contact.right),
+        (places_of.contact.left, *places_of.contact.right),
+        strict=True,
     )
     of_kinds = [(kind, check, layout.places[i]) for i, kind, check in _checked(kinds)]
     checked = tuple(
-        _CheckedTerm(kind, check, TupleType.of(half.states[place]), first_place(places.states[place]))
+        _CheckedTerm(kind, check, TupleType.made_of(half.states[place]), first_place(places.states[place]))
         for half, places in states
         for kind, check, place in of_kinds
     )
-    broken = tuple(state.broken for state in at.contact.left.states if hasattr(state, "broken"))
-    places = at.peak_n, at.step.unresolved, at.contact.unbalanced, *broken
+    broken = tuple(state.broken for state in places_of.contact.left.states if hasattr(state, "broken"))
+    places = places_of.peak_n, places_of.step.unresolved, places_of.contact.unbalanced, *broken
     return StoredReport(np.array(places, np.int64), checked)
 
 

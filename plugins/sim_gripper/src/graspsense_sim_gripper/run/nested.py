@@ -20,7 +20,7 @@ class TupleType:
     """Number of numbers."""
 
     @classmethod
-    def of(cls, pattern: Any) -> TupleType:
+    def made_of(cls, pattern: Any) -> TupleType:
         """Return the type of these nested tuples; `pattern` may also be a number."""
         return cls(pattern, count_numbers(pattern))
 
@@ -74,7 +74,7 @@ def like(pattern: Any, values: Any) -> Any:
     """
     if not isinstance(pattern, tuple):
         return values
-    parts = [like(*one) for one in zip(pattern, values, strict=True)]
+    parts = [like(*part) for part in zip(pattern, values, strict=True)]
     return type(pattern)(*parts) if hasattr(pattern, "_fields") else tuple(parts)
 
 

@@ -67,9 +67,9 @@ class GraspSetup:
     dt_s: float
     seed: int
 
-    def noise(self, first: int, count: int) -> NDArray[np.float64]:
-        """Return the noise of the cell images from image `first` on: normal numbers (count, 2 CELLS)."""
-        return image_noise(key_of(self.seed), first, count)
+    def noise(self, begin: int, count: int) -> NDArray[np.float64]:
+        """Return the noise of the cell images from image `begin` on: normal numbers (count, 2 CELLS)."""
+        return image_noise(key_of(self.seed), begin, count)
 
 
 @frozen(kw_only=True)

@@ -98,9 +98,9 @@ def _linearised(setup: GraspSetup, controller: GraspController) -> Array | None:
     given = np.array([gap_m, 0.0, *_numbers(memory)])
 
     def out(values: Array) -> Array:
-        gap, speed, *rest = values.tolist()
-        before = tuple(rest) if isinstance(memory, tuple) else rest[0]
-        effort, after = free.command(params, before, gap, speed, setup.dt_s)
+        gap, speed, *remembered = values.tolist()
+        memory_now = tuple(remembered) if isinstance(memory, tuple) else remembered[0]
+        effort, after = free.command(params, memory_now, gap, speed, setup.dt_s)
         return np.array([effort, *_numbers(after)])
 
     steps = DIFFERENCE * np.eye(len(given))

@@ -28,23 +28,27 @@ def raised_in_term(error: BaseException, kinds: Sequence[str]) -> str:
     }
     for frame, _ in walk_tb(error.__traceback__):
         if frame.f_code in names:
-            at = frame.f_locals.get("d1")
-            where = f" at a compression of {at * 1e3:.3g} mm" if isinstance(at, float) else ""
+            compression_m = frame.f_locals.get("d1")
+            where = (
+                f" at a compression of {compression_m * 1e3:.3g} mm"
+                if isinstance(compression_m, float)
+                else ""
+            )
             return f"term {names[frame.f_code]!r} raised {type(error).__name__}: {error}{where}"
     return ""
 
 
 def not_finite_in_tick(
-    kinds: Sequence[str], plant: PlantParams, before: PlantState, effort_n: float, dt_s: float
+    kinds: Sequence[str], plant: PlantParams, state: PlantState, effort_n: float, dt_s: float
 ) -> str:
-    """Return in words which term gives no finite force in the tick that begins with `before`."""
+    """Return in words which term gives no finite force in the tick that begins with `state`."""
     laws = [
         OnSum(_checked_on_sum(kind, law.law)) if isinstance(law, OnSum) else _checked(kind, law)
         for kind, law in zip(kinds, active_laws(kinds), strict=True)
     ]
     move = plant_move(laws, phases_of(kinds), hardens=hardens(plant.object))
     try:
-        move(plant, before, effort_n, dt_s)
+        move(plant, state, effort_n, dt_s)
     except TermFailed as error:
         return str(error)
     except LAW_ERRORS as error:

@@ -53,7 +53,7 @@ def check_identified(entry: Any, problems: list[str]) -> None:
         else:
             fits, form = _TABLES[key]
             problems += [
-                f"identified.{key}.{name}: {one!r} is not {form}"
-                for name, one in value.items()
-                if not fits(one)
+                f"identified.{key}.{name}: {number!r} is not {form}"
+                for name, number in value.items()
+                if not fits(number)
             ]

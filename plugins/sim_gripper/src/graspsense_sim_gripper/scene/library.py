@@ -81,12 +81,12 @@ def object_kinds() -> tuple[ObjectKind, ...]:
     kinds = [
         ObjectKind(
             name=name,
-            states=tuple(of),
+            states=tuple(object_states),
             default=name in CONTAINERS,
             fitted_to=fitted_to[name],
             gives=given[name],
         )
-        for name, of in states.items()
+        for name, object_states in states.items()
     ]
     return (*kinds, *(ObjectKind(name=name) for name in shipped_scenes() if name not in states))
 

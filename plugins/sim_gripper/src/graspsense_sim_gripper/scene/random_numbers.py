@@ -123,12 +123,12 @@ def draw_normals(key: Word, stream: Word, begin: int, count: int, numbers: Any) 
     make_normal(numbers, count)
 
 
-def normal_rows(key: Word, stream: Word, first: int, count: int, width: int) -> NDArray[np.float64]:
-    """Return rows (count, width) of standard normal numbers from row `first` of a stream on.
+def normal_rows(key: Word, stream: Word, begin: int, count: int, width: int) -> NDArray[np.float64]:
+    """Return rows (count, width) of standard normal numbers from row `begin` of a stream on.
 
     Each row has whole blocks, so that it is the same whatever rows are drawn with it.
     """
     blocked = width + -width % BLOCK
     numbers = np.empty(count * blocked)
-    draw_normals(key, stream, first * blocked, len(numbers), numbers)
+    draw_normals(key, stream, begin * blocked, len(numbers), numbers)
     return np.ascontiguousarray(numbers.reshape(count, blocked)[:, :width])

@@ -297,16 +297,16 @@ def parse_term(
     missing = [key for key in names if key not in table and key not in term.params._field_defaults]
     if missing:
         problems.append(f"{label}: missing {', '.join(missing)}")
-    before = len(problems)
+    n_problems = len(problems)
     values = {key: number(f"{prefix}{key}", table[key], key in term.signed) for key in given if key in names}
     spread = _spread(table.get("spread", {}), label, names, problems)
-    if len(problems) == before:
+    if len(problems) == n_problems:
         problems += [
             f"{label} {key}: must be greater than 0"
             for key in values
             if key in term.positive and values[key] <= 0.0
         ]
-    if len(problems) == before and not missing:
+    if len(problems) == n_problems and not missing:
         reason = term.refusal(term.params(**values))
         problems += [f"{label}: {reason}"] if reason else []
     return ParsedTerm(kind, values, spread)

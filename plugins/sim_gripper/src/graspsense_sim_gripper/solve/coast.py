@@ -14,7 +14,6 @@ from graspsense.gripper_api import gap_and_rate
 from graspsense_sim_gripper.plant.contact import ObjectModel, offset_of_pushed
 from graspsense_sim_gripper.plant.drive import ARREST_M_S, is_held, stribeck_excess
 from graspsense_sim_gripper.plant.state import Contact, Motion, PlantState, StepState, right_of
-from graspsense_sim_gripper.solve.control import fits_a_step
 from graspsense_sim_gripper.solve.scheme import SPEED_SCALE_M_S, PlantParams
 
 SHAPE_SCALE_M: Final = 1e-3
@@ -23,18 +22,16 @@ SHAPE_SCALE_M: Final = 1e-3
 
 def coast(params: PlantParams, state: PlantState, effort_n: float, h: float) -> tuple[bool, PlantState]:
     """Return whether a tick of `h` is of this kind, and the plant after it."""
-    coasts, motion, contact = glide(params, state.motion, state.contact, effort_n, h)
-    n_steps = 0 if state.motion.speed_rev_s == 0.0 else 1
-    return coasts, glided(state, motion, contact, n_steps) if coasts else state
+    coasts, motion, contact = _glide(params, state.motion, state.contact, effort_n, h)
+    if not coasts:
+        return False, state
+    _, _, (next_s, n_steps, unresolved), given, peak = state
+    if state.motion.speed_rev_s != 0.0:
+        n_steps += 1
+    return True, PlantState(motion, contact, StepState(next_s, n_steps, unresolved), given, peak)
 
 
-def can_glide(params: PlantParams, state: PlantState, dt: float) -> bool:
-    """Return whether `glide` may advance this plant in ticks of `dt`, as long as it can."""
-    left, right = state.contact.left, right_of(state.contact.left, state.contact.right)
-    return fits_a_step(params.steps, state.step, dt) and left.force_n == 0.0 and right.force_n == 0.0
-
-
-def glide(
+def _glide(
     params: PlantParams, motion: Motion, contact: Contact, effort_n: float, h: float
 ) -> tuple[bool, Motion, Contact]:
     """Return whether a tick of `h` is of this kind, or the fingers rest in it; and motion and contact after it.
@@ -65,7 +62,7 @@ def glide(
 def _rested(
     params: PlantParams, motion: Motion, contact: Contact, effort_n: float, h: float
 ) -> tuple[bool, Motion, Contact]:
-    """Return what `glide` does for fingers that stand still."""
+    """Return what `_glide` does for fingers that stand still."""
     if not is_held(params.drive, motion, contact, effort_n):
         return False, motion, contact
     if contact.touched == 0:
@@ -75,12 +72,6 @@ def _rested(
         return False, motion, contact
     recovers, _, pending = _free_until(params, contact, motion, h)
     return recovers, motion, Contact(left_n, right_n, offset, touched, left, right, pending, unbalanced)
-
-
-def glided(state: PlantState, motion: Motion, contact: Contact, n_steps: int) -> PlantState:
-    """Return the plant after `glide` has given this motion and contact, in so many steps."""
-    _, _, (next_s, n, unresolved), given, peak = state
-    return PlantState(motion, contact, StepState(next_s, n + n_steps, unresolved), given, peak)
 
 
 def _free_until(params: PlantParams, contact: Contact, motion: Motion, h: float) -> tuple[bool, float, float]:

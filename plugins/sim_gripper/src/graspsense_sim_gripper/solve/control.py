@@ -75,11 +75,11 @@ def relative_error(tolerance: float, start: Start, attempt: Attempt) -> float:
     """Return the error of a step relative to the tolerance, 0 if no error is estimated."""
     if attempt.speed_error_m_s + attempt.force_error_n <= 0.0:
         return 0.0
-    before, after = start.motion, attempt.motion
+    motion0, motion1 = start.motion, attempt.motion
     load0 = 0.5 * (start.contact.left_n + start.contact.right_n)
     load1 = 0.5 * (attempt.contact.left_n + attempt.contact.right_n)
-    speed0 = abs(before.speed_rev_s * before.jacobian_m_rev)
-    speed1 = abs(after.speed_rev_s * after.jacobian_m_rev)
+    speed0 = abs(motion0.speed_rev_s * motion0.jacobian_m_rev)
+    speed1 = abs(motion1.speed_rev_s * motion1.jacobian_m_rev)
     return (
         max(
             attempt.speed_error_m_s / max(speed0, speed1, SPEED_SCALE_M_S),
@@ -116,8 +116,8 @@ def contact_step_s(steps: Steps) -> float:
     if steps.growth == math.inf:
         return math.inf
     estimated = steps.tolerance < math.inf
-    first = CONTACT_STEP_S * steps.tolerance if estimated else CONTACT_SHARE * steps.longest_s
-    return max(first, MIN_CONTACT_STEP_S)
+    contact_s = CONTACT_STEP_S * steps.tolerance if estimated else CONTACT_SHARE * steps.longest_s
+    return max(contact_s, MIN_CONTACT_STEP_S)
 
 
 def after_contact(steps: Steps, step: StepState) -> StepState:

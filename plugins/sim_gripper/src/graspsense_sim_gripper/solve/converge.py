@@ -31,26 +31,26 @@ def refine_until_converged(params: PlantParams, state: PlantState, effort_n: flo
         if rests(drive, state, effort_n):
             return state
     elif steps.settle <= 0.0 and fits_a_step(steps, state.step, dt):
-        coasts, after = coast(params, state, effort_n, dt)
+        coasts, finer = coast(params, state, effort_n, dt)
         if coasts:
-            return after
-    before = after = state
+            return finer
+    coarser = finer = state
     n_before = n_halvings = 0
     while True:
-        after, n = take_steps(PlantParams(drive, model, steps), state, effort_n, dt)
-        if steps.settle <= 0.0 or (after.contact.touched == 0 and after.motion.speed_rev_s == 0.0):
-            return after
+        finer, n = take_steps(PlantParams(drive, model, steps), state, effort_n, dt)
+        if steps.settle <= 0.0 or (finer.contact.touched == 0 and finer.motion.speed_rev_s == 0.0):
+            return finer
         # The steps of the next attempt are the same if half of the tick was their limit already.
-        if n > n_before > 0 and _alike(before, after, steps.settle):
-            return after
+        if n > n_before > 0 and _alike(coarser, finer, steps.settle):
+            return finer
         # Steps of half the length would be too many, and too short to be of use.
         too_many = 4 * n > MAX_STEPS
         if too_many or n_halvings >= MAX_HALVINGS:
-            converged = n_halvings > 0 and _alike(before, after, LOOSE * steps.settle)
+            converged = n_halvings > 0 and _alike(coarser, finer, LOOSE * steps.settle)
             if converged or too_many or n_halvings >= LAST_HALVING:
-                return after if converged else _unresolved(after)
+                return finer if converged else _unresolved(finer)
         steps = _halved(steps, dt)
-        before, n_before, n_halvings = after, n, n_halvings + 1
+        coarser, n_before, n_halvings = finer, n, n_halvings + 1
 
 
 def _unresolved(state: PlantState) -> PlantState:
@@ -61,17 +61,17 @@ def _unresolved(state: PlantState) -> PlantState:
     )
 
 
-def _alike(before: PlantState, after: PlantState, share: float) -> bool:
+def _alike(coarser: PlantState, finer: PlantState, share: float) -> bool:
     """Return whether speed, force and shapes agree within this relative tolerance."""
-    speed0 = before.motion.speed_rev_s * before.motion.jacobian_m_rev
-    speed1 = after.motion.speed_rev_s * after.motion.jacobian_m_rev
-    force0 = before.contact.left_n + before.contact.right_n
-    force1 = after.contact.left_n + after.contact.right_n
+    speed0 = coarser.motion.speed_rev_s * coarser.motion.jacobian_m_rev
+    speed1 = finer.motion.speed_rev_s * finer.motion.jacobian_m_rev
+    force0 = coarser.contact.left_n + coarser.contact.right_n
+    force1 = finer.contact.left_n + finer.contact.right_n
     # The shape of a released object affects no force until the object touches the fingers again.
-    left0, left1 = before.contact.left.compression_m, after.contact.left.compression_m
+    left0, left1 = coarser.contact.left.compression_m, finer.contact.left.compression_m
     right0, right1 = (
-        right_of(before.contact.left, before.contact.right).compression_m,
-        right_of(after.contact.left, after.contact.right).compression_m,
+        right_of(coarser.contact.left, coarser.contact.right).compression_m,
+        right_of(finer.contact.left, finer.contact.right).compression_m,
     )
     return (
         abs(speed1 - speed0) <= share * max(abs(speed1), SPEED_SCALE_M_S)

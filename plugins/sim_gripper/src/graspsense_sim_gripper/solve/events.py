@@ -1,7 +1,7 @@
 """Events that end a step: a contact, an end of the travel, a reversal, the release of the object, a contact after it.
 
 The equation of motion changes at an event, so no step goes beyond it. The path of a Verlet step is known in advance,
-and it ends at the event (`drift`). For a macro-step, `first` returns the fraction of the step at which the event lies.
+and it ends at the event (`drift`). For a macro-step, `event_share` returns the fraction of it at which the event lies.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def drift(params: PlantParams, start: Start, h: float) -> tuple[Motion, float]:
     return Motion(revolutions1, speed + rate * t, gap1, jacobian1), t
 
 
-def first(params: PlantParams, start: Start, attempt: Attempt) -> float:
+def event_share(params: PlantParams, start: Start, attempt: Attempt) -> float:
     """Return the fraction of a macro-step at which an event lies, by the secant; 0 if there is none."""
     revolutions, speed, gap, jacobian = start.motion
     revolutions1, speed1, gap1, jacobian1 = attempt.motion
@@ -75,18 +75,21 @@ def parting(params: PlantParams, start: Start, attempt: Attempt) -> float:
     gap, gap1 = start.motion.gap_m, attempt.motion.gap_m
     if gap1 <= gap:
         return 0.0
-    before, after = start.contact, attempt.contact
-    left = before.left.force_n > 0.0 and after.left.force_n == 0.0
+    contact0, contact1 = start.contact, attempt.contact
+    left = contact0.left.force_n > 0.0 and contact1.left.force_n == 0.0
     right = (
-        right_of(before.left, before.right).force_n > 0.0 and right_of(after.left, after.right).force_n == 0.0
+        right_of(contact0.left, contact0.right).force_n > 0.0
+        and right_of(contact1.left, contact1.right).force_n == 0.0
     )
     if not (left or right):
         return 0.0
     model = params.object
-    shift = 2.0 * after.offset_m if model.held == 1 else 0.0
-    beyond = _gap_beyond(after.left, gap1 - model.width_m + shift) if left else 0.0
+    shift = 2.0 * contact1.offset_m if model.held == 1 else 0.0
+    beyond = _gap_beyond(contact1.left, gap1 - model.width_m + shift) if left else 0.0
     if right:
-        beyond = max(beyond, _gap_beyond(right_of(after.left, after.right), gap1 - model.width_m - shift))
+        beyond = max(
+            beyond, _gap_beyond(right_of(contact1.left, contact1.right), gap1 - model.width_m - shift)
+        )
     if beyond <= CONTACT_TOL_M:
         return 0.0
     return min(max(1.0 - beyond / (gap1 - gap), MIN_FRACTION), MAX_FRACTION)
@@ -98,17 +101,17 @@ def pressing(params: PlantParams, start: Start, attempt: Attempt) -> float:
     0 if none does. A step that begins at this contact is the first after it, and no longer than that.
     """
     gap, gap1 = start.motion.gap_m, attempt.motion.gap_m
-    before, after = start.contact, attempt.contact
-    if before.touched == 0 or gap1 >= gap:
+    contact0, contact1 = start.contact, attempt.contact
+    if contact0.touched == 0 or gap1 >= gap:
         return 0.0
-    right0, right1 = right_of(before.left, before.right), right_of(after.left, after.right)
-    left = before.left.force_n <= 0.0 < after.left.force_n
+    right0, right1 = right_of(contact0.left, contact0.right), right_of(contact1.left, contact1.right)
+    left = contact0.left.force_n <= 0.0 < contact1.left.force_n
     right = right0.force_n <= 0.0 < right1.force_n
     if not (left or right):
         return 0.0
     model, h = params.object, attempt.duration_s
-    shift = 2.0 * before.offset_m if model.held == 1 else 0.0
-    half = before.left if left else right0
+    shift = 2.0 * contact0.offset_m if model.held == 1 else 0.0
+    half = contact0.left if left else right0
     apart = _gap_beyond(half, gap - model.width_m + (shift if left else -shift))
     if apart <= CONTACT_TOL_M:
         first_s = contact_step_s(params.steps)

@@ -30,7 +30,7 @@ from graspsense_sim_gripper.solve.control import (
     SMALL_ERROR,
     relative_error,
 )
-from graspsense_sim_gripper.solve.events import first, parting
+from graspsense_sim_gripper.solve.events import event_share, parting
 from graspsense_sim_gripper.solve.polynomial import Cubic, derivative, hermite, parabola, value
 from graspsense_sim_gripper.solve.scheme import (
     FORCE_SCALE_N,
@@ -144,7 +144,9 @@ def _moved(
     if contact.touched == 1 and contact.left.force_n <= 0.0:
         # A released object that recovers its shape, which is computed later, or one that a finger pushes.
         scale = max(abs(motion.speed_rev_s * motion.jacobian_m_rev) / SPEED_SCALE_M_S, 1.0)
-        coasting = PlantParams(drive, model, Steps(scale * steps.macro_tolerance))
+        # All values are given: with defaults, `coast` would be compiled twice.
+        limits = Steps(scale * steps.macro_tolerance, math.inf, 0.0, math.inf, math.inf, 0.0)
+        coasting = PlantParams(drive, model, limits)
         coasts, after = coast(coasting, state, effort_n, h)
         if coasts or contact.left_n + contact.right_n > 0.0:
             return 0.0 if coasts else math.inf, HALF, contact, after, UNKNOWN
@@ -208,16 +210,16 @@ def _event_share(params: PlantParams, start: Start, middle: Contact, attempt: At
 
     The motion ends, a finger meets or leaves the object, or a term has an event. `middle` is the contact half-way.
     """
-    before, after = start.contact, attempt.contact
-    if _has_event(before, middle) or _has_event(before, after):
+    contact0, contact1 = start.contact, attempt.contact
+    if _has_event(contact0, middle) or _has_event(contact0, contact1):
         return HALF
     share = parting(params, start, attempt)
     if share == 0.0:
-        share = first(params, start, attempt)
+        share = event_share(params, start, attempt)
     if share == 0.0 and (
         attempt.motion.speed_rev_s * start.direction <= 0.0
         or start.motion.gap_m > start.meeting_m >= attempt.motion.gap_m
-        or not _pressed_halves(before) == _pressed_halves(middle) == _pressed_halves(after)
+        or not _pressed_halves(contact0) == _pressed_halves(middle) == _pressed_halves(contact1)
     ):
         share = HALF
     return share
@@ -227,8 +229,8 @@ def _pressed_halves(contact: Contact) -> tuple[bool, bool]:
     return contact.left.force_n > 0.0, right_of(contact.left, contact.right).force_n > 0.0
 
 
-def _has_event(before: Contact, after: Contact) -> bool:
-    return before.touched == 1 and has_event(before, after)
+def _has_event(earlier: Contact, later: Contact) -> bool:
+    return earlier.touched == 1 and has_event(earlier, later)
 
 
 def _load(contact: Contact) -> float:
@@ -246,11 +248,11 @@ def next_ticks(n: int, error: float, event_share: float) -> int:
     return min(max(int(n * min(max(factor, MIN_FACTOR), GROWTH)), 1), MAX_TICKS)
 
 
-def dense_output(before: PlantState, middle: Contact, after: PlantState, h: float) -> DenseOutput:
+def dense_output(state0: PlantState, middle: Contact, state1: PlantState, h: float) -> DenseOutput:
     """Return the polynomials between two states; `middle` is the contact after half of the time."""
-    revolutions, speed, gap, jacobian = before.motion
-    revolutions1, speed1, gap1, jacobian1 = after.motion
-    contact, contact1 = before.contact, after.contact
+    revolutions, speed, gap, jacobian = state0.motion
+    revolutions1, speed1, gap1, jacobian1 = state1.motion
+    contact, contact1 = state0.contact, state1.contact
     return DenseOutput(
         h,
         hermite(revolutions, revolutions1, h * speed, h * speed1),

@@ -53,11 +53,11 @@ def _against_table(contact: Contact, most_n: float) -> Contact:
 
 def _until_event(params: PlantParams, contact: Contact, gap_m: float, h: float) -> tuple[float, Contact]:
     """Return the time within `h` at which a term has an event while the fingers stand still, and the contact then."""
-    before, after = 0.0, h
-    while after - before > MIN_STEP_S:
-        middle = 0.5 * (before + after)
+    lower, upper = 0.0, h
+    while upper - lower > MIN_STEP_S:
+        middle = 0.5 * (lower + upper)
         if has_event(contact, pad_forces(params.object, contact, gap_m, 0.0, middle, True)):
-            after = middle
+            upper = middle
         else:
-            before = middle
-    return after, restarted(pad_forces(params.object, contact, gap_m, 0.0, after, True))
+            lower = middle
+    return upper, restarted(pad_forces(params.object, contact, gap_m, 0.0, upper, True))

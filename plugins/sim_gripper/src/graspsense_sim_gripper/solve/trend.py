@@ -35,8 +35,8 @@ class StepErrors(NamedTuple):
 
 def change_to_middle(trend: Trend, h: float) -> TrendChange:
     """Return the change in the first half of a step of `h`; none if the trend is not known."""
-    _, first, second = trend
-    return TrendChange(0.5 * h * first, 0.125 * h * h * second)
+    _, slope, curvature = trend
+    return TrendChange(0.5 * h * slope, 0.125 * h * h * curvature)
 
 
 def speed_for_end(

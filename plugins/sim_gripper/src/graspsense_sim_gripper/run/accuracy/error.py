@@ -73,21 +73,21 @@ class GraspRecord:
         """The six features and the peak force, by the names of `SCALES`; NaN for an undefined feature."""
         values = dict.fromkeys(SCALES, math.nan)
         values["peak"] = self.peak_n
-        first = self._contact()
-        if first is None:
+        touch = self._contact()
+        if touch is None:
             return values
-        values["p_first"] = _at(self.gap_m, first)
-        rest = self._rest(first)
-        if rest is None:
+        values["p_first"] = _at(self.gap_m, touch)
+        still = self._rest(touch)
+        if still is None:
             return values
-        steady, moved = rest
+        steady, moved = still
         values["p_steady"] = _at(self.gap_m, steady)
         force = self.force_n
         values["f_steady"] = _at(force, max(steady + REST_WINDOW_S / self.dt_s, self._shown_from()))
-        values["delta_t"] = (steady - first) * self.dt_s
+        values["delta_t"] = (steady - touch) * self.dt_s
         if moved:
             values["dp_dt"] = (values["p_steady"] - values["p_first"]) / values["delta_t"]
-            values["df_dt"] = (values["f_steady"] - _at(force, first)) / values["delta_t"]
+            values["df_dt"] = (values["f_steady"] - _at(force, touch)) / values["delta_t"]
         return values
 
     @cached_property
@@ -113,7 +113,7 @@ class GraspRecord:
         i = int(over[0])
         return float(i) if i == 0 else i - float(felt[i] / (felt[i] - felt[i - 1]))
 
-    def _rest(self, first: float) -> tuple[float, bool] | None:
+    def _rest(self, touch: float) -> tuple[float, bool] | None:
         """Return the interpolated row at which the fingers come to rest, and whether they moved since the contact.
 
         None if they do not rest for REST_WINDOW_S. The row of the contact does not count as motion, as in the feature
@@ -122,21 +122,21 @@ class GraspRecord:
         """
         speed = np.abs(self.speed_m_s[: self.n_rows]) - REST_SPEED_M_S
         window = round(REST_WINDOW_S / self.dt_s)
-        begin = math.ceil(first)
+        begin = math.ceil(touch)
         moving = np.concatenate(([begin - 1], begin + np.flatnonzero(speed[begin:] > 0.0), [self.n_rows]))
         rests = np.flatnonzero((np.diff(moving) > window) & (moving[1:] > self._shown_from()))
         if not len(rests):
             return None
         i = int(moving[rests[0]])
-        stops = i + float(speed[i] / (speed[i] - speed[i + 1])) if speed[i] > 0.0 else first
-        return max(stops, first), i >= begin
+        stops = i + float(speed[i] / (speed[i] - speed[i + 1])) if speed[i] > 0.0 else touch
+        return max(stops, touch), i >= begin
 
 
 def _at(column: NDArray[np.float64], place: float) -> float:
     """Return the value of a column at a row with a fraction, by linear interpolation; at its ends beyond them."""
     i = min(max(math.floor(place), 0), len(column) - 1)
-    before, after = float(column[i]), float(column[min(i + 1, len(column) - 1)])
-    return before + min(max(place - i, 0.0), 1.0) * (after - before)
+    lower, upper = float(column[i]), float(column[min(i + 1, len(column) - 1)])
+    return lower + min(max(place - i, 0.0), 1.0) * (upper - lower)
 
 
 def _rms(values: NDArray[np.float64]) -> float:

@@ -49,7 +49,7 @@ class LevelScale(NamedTuple):
     """As in `Level`, like the next one."""
     plain: int = 0
 
-    def at(self, accuracy: float) -> Level:
+    def level(self, accuracy: float) -> Level:
         """Return the level for this accuracy."""
         return Level(accuracy / self.refinement, self.min_steps, self.plain)
 

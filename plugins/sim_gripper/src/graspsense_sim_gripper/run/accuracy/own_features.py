@@ -85,19 +85,22 @@ def beyond(grasp: OwnFeatures | None, expected: OwnFeatures | None, accuracy: fl
     except Exception:
         return NOT_READ
     names, values = expected.features.names, expected.features.values
-    found, later = (dict(zip(one.names, one.values, strict=True)) for one in (grasp.features, half_later))
+    values_by_name, later = (
+        dict(zip(extracted.names, extracted.values, strict=True))
+        for extracted in (grasp.features, half_later)
+    )
     return tuple(
         name
         for name, value, unit in zip(names, values, expected.features.units, strict=True)
-        if _differs(found[name], value, later[name], accuracy, UNIT_SCALES.get(unit, 0.0))
+        if _differs(values_by_name[name], value, later[name], accuracy, UNIT_SCALES.get(unit, 0.0))
     )
 
 
-def _differs(found: float, value: float, later: float, accuracy: float, scale: float) -> bool:
+def _differs(measured: float, value: float, later: float, accuracy: float, scale: float) -> bool:
     if math.isnan(value) != math.isnan(later):
         # Within half a tick of not being defined, or of being.
         return False
-    if math.isnan(value) or math.isnan(found):
-        return math.isnan(value) != math.isnan(found)
+    if math.isnan(value) or math.isnan(measured):
+        return math.isnan(value) != math.isnan(measured)
     allowed = accuracy * max(abs(value), scale) + 2.0 * abs(later - value) + ROUNDING
-    return abs(found - value) > allowed
+    return abs(measured - value) > allowed

@@ -52,9 +52,9 @@ def grip_of(problem: Problem, force_n: float | None = None, speed_m_s: float | N
     model = model._replace(balance_rtol=MAX_BALANCE_RTOL)
     press, untouched = contact_solver(setup.kinds, hardens(model)), uncompressed(setup.kinds)
     force = config.expected_force_n or force_n or FORCE_N
-    contact, before, closure, largest = untouched, 0.0, FIRST_M, 0.0
+    contact, last_closure, closure, largest = untouched, 0.0, FIRST_M, 0.0
     while closure < MAX_DEPTH * model.width_m and contact.force_n < force:
-        contact, _ = press(model, contact, closure, (closure - before) / POINT_S, POINT_S)
+        contact, _ = press(model, contact, closure, (closure - last_closure) / POINT_S, POINT_S)
         rests, further = (
             press(model, contact, closure * share, 0.0, setup.dt_s)[0].force_n
             for share in (1.0, 1.0 + FURTHER)
@@ -62,7 +62,7 @@ def grip_of(problem: Problem, force_n: float | None = None, speed_m_s: float | N
         rise = (further - rests) / (FURTHER * closure)
         if isfinite(rise):  # a law without a finite force ends the grasp, with its own reason
             largest = max(largest, rise)
-        before, closure = closure, GROWTH * closure
+        last_closure, closure = closure, GROWTH * closure
     touch, _ = press(model, untouched, FIRST_M, 0.0, 0.0)
     _, jacobian = gap_and_rate(
         drive.link, revolutions_at(drive.link, min(max(model.width_m, 0.0), config.open_gap_m))

@@ -56,7 +56,7 @@ def propose(problem: Problem, grip: Grip | None, scale: LevelScale = CONTROLLED[
     """
     config, setup = problem.model_config, nominal(problem)
     kinds, model, dt_s = setup.kinds, setup.plant.object, setup.dt_s
-    level = scale.at(config.accuracy)
+    level = scale.level(config.accuracy)
     angle = min(math.sqrt(SWING_SHARE * level.step_tol), MAX_SWING_RAD)
     swings = _frequencies(kinds, model)
     too_fast: dict[int, float] = {}

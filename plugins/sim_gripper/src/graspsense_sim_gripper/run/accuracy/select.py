@@ -1,22 +1,20 @@
 """Selecting the steps of the grasps of an object: the first level whose trial grasp is accurate enough.
 
-Trial grasps with a step per tick and with finer steps give the peak force and the speed at the contact. Then the steps
-of one level after another are compared with finer ones: first a step per tick, since it costs least, then steps whose
-error is controlled, for the accuracy, a tenth and a hundredth of it.
+A trial grasp in finer steps gives the peak force and the speed at the contact. Then the steps of one level after
+another are compared with finer ones: first a step per tick, since it costs least, then steps whose error is controlled,
+for the accuracy, a tenth and a hundredth of it.
 
-Steps that pass are tried twice more, with a controller that reads slightly larger and slightly smaller values of force
-and travel. This finds a threshold that is met so closely that an error of this size makes the grasp continue a tick
-earlier or later. Both compared grasps may then be on the wrong side of the threshold, and a level with smaller steps is
-tried. If the last level fails as well, no steps have the accuracy, and ConfigError says so.
+Steps that pass are compared with still finer ones too. A controller may meet a threshold so closely that two grasps are
+on the wrong side of it together, which steps with a tenth of their error show. If no level passes, no steps have the
+accuracy, and ConfigError says so.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from contextlib import suppress
 from itertools import islice
-from typing import Final, NamedTuple
+from typing import Final
 
 from attrs import evolve
 
@@ -31,7 +29,6 @@ from graspsense_sim_gripper.run.accuracy.probe import Grip, grip_of
 from graspsense_sim_gripper.run.accuracy.propose import propose
 from graspsense_sim_gripper.run.accuracy.verify import (
     MOST_WORK,
-    Sensitivity,
     TooMuchWork,
     TrialGrasps,
     trial_grasps,
@@ -46,8 +43,6 @@ ACCEPTED_WITH_SPREAD: Final = 0.5
 ACCEPTED: Final = 0.8
 """Steps are accepted if the trial grasps differ by at most this share of the accuracy. With spread, the rest allows
 for the differences between instances. Without spread, it allows for pad sensors and the errors of the trial grasps."""
-COARSE: Final = 0.03
-"""From this accuracy upwards, a threshold that is met too closely is examined again with a tenth of the accuracy."""
 FINE: Final = 0.003
 """Down from this accuracy, the grasp to compare with takes twice as many steps per tick, because one of two grasps may
 resolve a short contact that the other misses."""
@@ -105,14 +100,14 @@ def _select_within_limit(problem: Problem, trial: TrialGrasps) -> Reduction:
     try:
         return _select(problem, trial)
     except TooMuchWork:
-        found = propose(problem, grip_of(problem))
+        reduction = propose(problem, grip_of(problem))
     limit = StepDecision(
         subject="trial grasps",
         decision="stopped at the limit: not verified",
         what="ticks and steps",
         number=float(MOST_WORK),
     )
-    return evolve(found, decisions=(*found.decisions, limit), unresolved=QUANTITIES)
+    return evolve(reduction, decisions=(*reduction.decisions, limit), unresolved=QUANTITIES)
 
 
 def _select(problem: Problem, trial: TrialGrasps) -> Reduction:
@@ -121,39 +116,29 @@ def _select(problem: Problem, trial: TrialGrasps) -> Reduction:
     usual = grip_of(problem)
     unverified = propose(problem, usual)
     prescribed = config.has_forced_steps or config.fidelity == "reference"
-    if prescribed or unverified.unresolved == QUANTITIES:
+    if prescribed or unverified.unresolved:
         return unverified
-    grip = grip_of(problem, *_felt(trial, propose(problem, usual, PLAIN)))
-    if propose(problem, grip).unresolved:
-        # A step per tick may be unstable, and what is felt in it then means nothing.
-        grip = usual
-    unverified = propose(problem, grip)
-    if unverified.unresolved:
+    finer = propose(problem, usual, _reference_scale(config, CONTROLLED[0]))
+    felt = _felt(trial, finer)
+    if felt == _UNKNOWN:
         return unverified
-    finer = propose(problem, grip, _reference_scale(config, CONTROLLED[0]))
-    found = _felt(trial, finer, decides=True)
-    if found == _UNKNOWN:
-        return unverified
-    grip = grip_of(problem, *found)
+    grip = grip_of(problem, *felt)
     unverified = propose(problem, grip)
     return unverified if unverified.unresolved else _best(problem, grip, trial)
 
 
-def _felt(
-    trial: TrialGrasps, reduction: Reduction, *, decides: bool = False
-) -> tuple[float | None, float | None]:
+def _felt(trial: TrialGrasps, reduction: Reduction) -> tuple[float | None, float | None]:
     """Return the peak force and the speed at the contact of a trial grasp in these steps, to two digits.
 
     They suffice: similar grasps then get the same proposals. `_UNKNOWN` if the grasp fails; a controller that raises
-    does so in the grasp of the run as well, and is reported there. Raises TooMuchWork, and what a term raises if this
-    grasp `decides`.
+    does so in the grasp of the run as well, and is reported there. Raises TooMuchWork, and what a term raises.
     """
     try:
         grasp = trial.record(reduction)
     except TooMuchWork:
         raise
     except Exception as error:
-        if decides and isinstance(error, LAW_ERRORS) and raised_in_term(error, trial.setup.kinds):
+        if isinstance(error, LAW_ERRORS) and raised_in_term(error, trial.setup.kinds):
             raise
         return _UNKNOWN
     force_n, speed_m_s = (float(f"{value:.1e}") for value in (grasp.peak_n, grasp.contact_speed_m_s()))
@@ -166,53 +151,38 @@ def _best(problem: Problem, grip: Grip, trial: TrialGrasps) -> Reduction:
     Raises ConfigError if no model is accepted.
     """
     accepted = _accepted(problem, grip, trial)
-    first = next(accepted)
-    if first.not_verified in ((), NOT_READ):
-        return first
+    fastest = next(accepted)
+    if fastest.not_verified in ((), NOT_READ):
+        return fastest
     further = islice(accepted, MOST_FOR_FEATURES)
-    return next((model for model in further if not model.not_verified), first)
+    return next((model for model in further if not model.not_verified), fastest)
 
 
 def _accepted(problem: Problem, grip: Grip, trial: TrialGrasps) -> Iterator[Reduction]:
     """Yield the models that trial grasps accept, the fastest first. Raises ConfigError if there is none."""
     config = problem.model_config
-    least, quantity, grasps, n_accepted = math.inf, "", 1, 0
-    near_threshold: Sensitivity | None = None
+    share, least, grasps, n_accepted = _accepted_share(config), (math.inf, ""), 1, 0
     for scale in (PLAIN, *CONTROLLED):
-        if near_threshold and scale.at(config.accuracy).step_tol >= near_threshold.step_tol:
-            continue
         reduction = propose(problem, grip, scale)
         full = propose(problem, grip, _reference_scale(config, scale))
-        expected = trial.record(full)
-        error, of = _off(trial, reduction, expected)
+        error, quantity = _off(trial, reduction, trial.record(full))
         grasps += 1
-        if error > _accepted_share(config) * config.accuracy:
-            if error < least:
-                least, quantity = error, of
-            continue
-        verification = Verification(
-            error=error, quantity=of, grasps=grasps, features=trial.features_beyond(reduction, full)
-        )
-        if scale.plain == 1 and config.spread:
-            # Which thresholds are near differs between instances.
-            accepted = _accepted_for_instances(problem, reduction, full, trial, verification)
+        if error <= share * config.accuracy:
+            features = trial.features_beyond(reduction, full)
+            verification = Verification(error=error, quantity=quantity, grasps=grasps, features=features)
+            if scale.plain == 1 and config.spread:
+                accepted = _accepted_for_instances(problem, reduction, full, trial, verification)
+            else:
+                error, quantity = _confirmed(problem, grip, trial, reduction, scale)
+                fits = error <= config.accuracy
+                accepted = evolve(reduction, verification=verification) if fits else None
             if accepted:
                 n_accepted += 1
                 yield accepted
-            continue
-        sensitivity = trial.sensitivity(reduction, expected)
-        near = error + sensitivity.change > config.accuracy
-        if scale.plain == 1:
-            # Steps whose error is controlled may still tell on which side of a threshold the grasp is.
-            near = near or not sensitivity.covers
-        else:
-            near_threshold = sensitivity
-        grasps += 2
-        if not near and _is_confirmed(problem, grip, trial, reduction, scale):
-            n_accepted += 1
-            yield evolve(reduction, verification=evolve(verification, grasps=grasps))
+                continue
+        least = min(least, (error, quantity))
     if n_accepted == 0:
-        yield _with_finer_steps(problem, grip, trial, near_threshold, _Miss(least, quantity))
+        raise ConfigError(_refusal(problem, *least, _culprit(problem, grip, trial)))
 
 
 def _off(trial: TrialGrasps, reduction: Reduction, expected: GraspRecord) -> tuple[float, str]:
@@ -223,42 +193,13 @@ def _off(trial: TrialGrasps, reduction: Reduction, expected: GraspRecord) -> tup
         return math.inf, "outcome"
 
 
-def _is_confirmed(
+def _confirmed(
     problem: Problem, grip: Grip, trial: TrialGrasps, reduction: Reduction, scale: LevelScale
-) -> bool:
-    """Return whether the grasp also agrees with one in still smaller steps.
-
-    A grasp that meets a threshold closely may be on one side of it in both grasps that were compared, and on the other
-    in the exact grasp.
-    """
+) -> tuple[float, str]:
+    """Return how far the grasp is from one in still smaller steps than those that it was compared with."""
     finer = scale._replace(refinement=min(10.0 * scale.refinement, max(REFERENCE_SCALES)))
     exact = trial.record(propose(problem, grip, _reference_scale(problem.model_config, finer)))
-    return deviation(trial.record(reduction), exact)[0] <= problem.model_config.accuracy
-
-
-class _Miss(NamedTuple):
-    """The least error of the models that were not accepted, and the quantity that has it."""
-
-    error: float
-    quantity: str
-
-
-def _with_finer_steps(
-    problem: Problem, grip: Grip, trial: TrialGrasps, near_threshold: Sensitivity | None, miss: _Miss
-) -> Reduction:
-    """Return a model for a tenth of the accuracy, where steps for the accuracy itself decide no threshold.
-
-    Raises ConfigError if there is none, or if the reason is no threshold.
-    """
-    config = problem.model_config
-    if near_threshold is None:
-        raise ConfigError(_refusal(problem, *miss, _culprit(problem, grip, trial)))
-    if config.accuracy >= COARSE:
-        # With steps this coarse, the trial grasps cannot tell on which side of the threshold the grasp is.
-        finer = evolve(problem, model_config=evolve(config, accuracy=0.1 * config.accuracy))
-        with suppress(ConfigError):
-            return evolve(_select(finer, evolve(trial)), accuracy=config.accuracy)
-    raise ConfigError(_undecided(problem, near_threshold))
+    return deviation(trial.record(reduction), exact)
 
 
 def _accepted_for_instances(
@@ -271,7 +212,7 @@ def _accepted_for_instances(
     """
     force_n = reduction.force_n
     for setup in problem.examples():
-        trial = trial.of(setup)
+        trial = trial.with_setup(setup)
         try:
             grasp, expected = trial.record(reduction), trial.record(full)
         except Exception:
@@ -307,34 +248,20 @@ def _culprit(problem: Problem, grip: Grip, trial: TrialGrasps) -> str:
     fine, finer = pair
     errors = {}
     for i, kind in enumerate(trial.setup.kinds):
-        without = trial.of(without_term(trial.setup, i))
+        without = trial.with_setup(without_term(trial.setup, i))
         errors[kind] = deviation(*(without.record(steps) for steps in pair))[0]
     with_all, _ = deviation(trial.record(fine), trial.record(finer))
     term = min(errors, key=errors.__getitem__, default="")
     return term if term and errors[term] < CULPRIT * with_all else ""
 
 
-def _undecided(problem: Problem, sensitivity: Sensitivity) -> str:
-    changes = (
-        f"{sensitivity.quantity} by {sensitivity.change:.2g}"
-        if math.isfinite(sensitivity.change)
-        else "the outcome"
-    )
-    return (
-        f"{_inaccurate(problem)}: the controller compares with a threshold that is met at a tick within "
-        f"{sensitivity.force_n:.1g} N, or {sensitivity.travel:.1g} of the travel, so that the grasp may continue a "
-        f"tick earlier or later, which changes {changes}. Change where the ticks fall (gripper.open_gap_m, or the "
-        f"controller's speed or threshold), or {_advice(2.0 * sensitivity.change)}"
-    )
-
-
 def _refusal(problem: Problem, error: float, quantity: str, term: str) -> str:
-    found = f"{quantity} differs by {error:.2g}" if math.isfinite(error) else "even the outcome differs"
+    miss = f"{quantity} differs by {error:.2g}" if math.isfinite(error) else "even the outcome differs"
     cause = (
         f"the steps because of the term {term!r}" if term else "the steps, and not because of a single term"
     )
     return (
-        f"{_inaccurate(problem)}: with every term and the smallest steps, {found} between two step lengths. The grasp "
+        f"{_inaccurate(problem)}: with every term and the smallest steps, {miss} between two step lengths. The grasp "
         f"depends on {cause}; {_advice(2.0 * error / _accepted_share(problem.model_config))}"
     )
 

@@ -8,14 +8,14 @@ from __future__ import annotations
 import logging
 import math
 import time
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 from attrs import define, evolve, field
 from numpy.typing import NDArray
 
 from graspsense.gripper_api import gap_and_rate, revolutions_at
-from graspsense.plugin_api import CONTACT_FORCE_N, HOLD, FeatureSet
+from graspsense.plugin_api import HOLD, FeatureSet
 from graspsense.simulator_api import (
     NotCompilable,
     TickParams,
@@ -25,9 +25,9 @@ from graspsense.simulator_api import (
 )
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant.fingertip import CELLS
-from graspsense_sim_gripper.plant.sensing import Bias, PadBuffers
+from graspsense_sim_gripper.plant.sensing import PadBuffers
 from graspsense_sim_gripper.plant.state import Motion, PlantState
-from graspsense_sim_gripper.run.accuracy.error import SCALES, UNIT_SCALES, GraspRecord, deviation
+from graspsense_sim_gripper.run.accuracy.error import SCALES, UNIT_SCALES, GraspRecord
 from graspsense_sim_gripper.run.accuracy.model import Reduction
 from graspsense_sim_gripper.run.accuracy.own_features import OwnFeatures, beyond, own_features
 from graspsense_sim_gripper.run.accuracy.probe import nominal
@@ -64,34 +64,10 @@ MOST_WORK: Final = 1_000_000
 counts work and not time, so that the model that is chosen does not depend on the machine."""
 PROGRESS_S: Final = 3.0
 """Trial grasps that take longer report how far they are, and again after as long."""
-SENSITIVITY: Final = 10.0
-MIN_FORCE_ERROR_N: Final = 0.01
-MAX_FORCE_ERROR_N: Final = 1.0
-"""The assumed error of the forces that the controller reads: SENSITIVITY times the difference of two models at the
-contact, limited to between MIN_FORCE_ERROR_N and MAX_FORCE_ERROR_N times the step tolerance of the level."""
-TRAVEL_ERROR: Final = 0.025
-"""The assumed relative error of the distance since the contact is this times the step tolerance of the level."""
 
 
 class TooMuchWork(Exception):
     """The trial grasps would take more than `MOST_WORK` ticks and steps."""
-
-
-class Sensitivity(NamedTuple):
-    """How much a grasp changes if its controller reads slightly wrong values."""
-
-    force_n: float
-    """Error of the forces that are read (N)."""
-    travel: float
-    """Relative error of the distance since the contact that is read."""
-    change: float
-    """The largest relative change of a quantity, see `error.deviation`."""
-    quantity: str
-    """The quantity with that change."""
-    step_tol: float
-    """The `step_tol` of the level."""
-    covers: bool
-    """Whether the error of the forces is as large as the difference of the two models."""
 
 
 @define(eq=False)
@@ -129,15 +105,15 @@ class TrialGrasps:
     def _new_loops(self) -> CompiledLoops:
         return CompiledLoops(self.controller.step)
 
-    def record(self, reduction: Reduction, force_n: float = 0.0, travel: float = 0.0) -> GraspRecord:
-        """Return the grasp in these steps; the controller reads values with these errors (see `Sensitivity`)."""
-        key = (reduction.steps, reduction.left_out, force_n, travel)
+    def record(self, reduction: Reduction) -> GraspRecord:
+        """Return the grasp in these steps."""
+        key = (reduction.steps, reduction.left_out)
         if key not in self._records:
             try:
-                self._records[key] = self._grasp(reduction, force_n, travel)
+                self._records[key] = self._grasp(reduction)
             except NotCompilable:
                 self.compiled = False
-                self._records[key] = self._grasp(reduction, force_n, travel)
+                self._records[key] = self._grasp(reduction)
         return self._records[key]
 
     def features_beyond(self, reduction: Reduction, full: Reduction) -> tuple[str, ...]:
@@ -149,7 +125,7 @@ class TrialGrasps:
             return ()
         self.record(reduction)
         self.record(full)
-        grasp, expected = (self._features[one.steps] for one in (reduction, full))
+        grasp, expected = (self._features[model.steps] for model in (reduction, full))
         return beyond(grasp, expected, self.config.accuracy)
 
     def values(self, reduction: Reduction) -> dict[str, tuple[float, float]]:
@@ -167,36 +143,18 @@ class TrialGrasps:
             "peak": (record.peak_n, SCALES["peak"])
         }
 
-    def sensitivity(self, reduction: Reduction, expected: GraspRecord) -> Sensitivity:
-        """Return the change of the grasp if the controller reads values that are as wrong as the model may be.
-
-        `expected` is the grasp in finer steps. The grasp is simulated twice, with errors of either sign.
-        """
-        exact, scale = self.record(reduction), reduction.level.step_tol
-        difference_n = _force_difference_n(exact, expected)
-        force_n = max(SENSITIVITY * difference_n, MIN_FORCE_ERROR_N * scale)
-        force_n, travel = min(force_n, MAX_FORCE_ERROR_N * scale), TRAVEL_ERROR * scale
-        others = [self.record(reduction, sign * force_n, sign * travel) for sign in (-1.0, 1.0)]
-        change, quantity = max(deviation(other, exact) for other in others)
-        return Sensitivity(force_n, travel, change, quantity, scale, difference_n <= force_n)
-
-    def _grasp(self, reduction: Reduction, force_n: float, travel: float) -> GraspRecord:
+    def _grasp(self, reduction: Reduction) -> GraspRecord:
         """Simulate what `record` returns. Raises NotCompilable."""
-        bias = Bias(force_n, travel, self.setup.plant.object.width_m)
-        setup = evolve(
-            self.setup,
-            plant=reduction.applied_to(self.setup.plant),
-            sensor=self.setup.sensor._replace(bias=bias),
-        )
+        setup = evolve(self.setup, plant=reduction.applied_to(self.setup.plant))
         end, rows = self._run(setup)
         if not self.near and not has_ended(end.controller):
             self.near = True
             end, rows = self._run(setup)
-        if self.features is not None and force_n == 0.0:
+        if self.features is not None:
             self._features[reduction.steps] = own_features(self.features, rows[:-1], rows[-1])
-        return _record(end, rows, bias, setup.dt_s)
+        return _record(end, rows, setup.dt_s)
 
-    def of(self, setup: GraspSetup) -> TrialGrasps:
+    def with_setup(self, setup: GraspSetup) -> TrialGrasps:
         """Return trial grasps of another instance of the object, which begin near it and go on counting the work."""
         other = evolve(self, setup=setup, near=True)
         other.work, other._loops = self.work, self._loops
@@ -207,7 +165,7 @@ class TrialGrasps:
         most = math.ceil(min(MAX_SECONDS, seconds_at_most(self.controller.run)) / setup.dt_s)
         made = padded(setup, self.padding) if self.compiled else setup
         composed = composition(made.kinds, made.plant)
-        loop = self._loops.of(composed) if self.compiled else grasp_loop(composed, self.controller.step)
+        loop = self._loops.loop_of(composed) if self.compiled else grasp_loop(composed, self.controller.step)
         params = GraspParams(
             made.plant,
             made.sensor,
@@ -218,29 +176,32 @@ class TrialGrasps:
         )
         plant = _near(made) if self.near else made.state
         controller = first_state(self.controller.controller.init())
-        at = SimulationState(NOT_STARTED, plant, made.sensor_state, controller)
+        progress = SimulationState(NOT_STARTED, plant, made.sensor_state, controller)
         pads, rows = _ideal_buffers(self.compiled), []
-        while not has_ended(at.controller) and at.loop.ticks < most:
+        while not has_ended(progress.controller) and progress.loop.ticks < most:
             table: Any = np.zeros((len(COLUMNS), CAPACITY + ROWS_AT_ONCE))
             phases: Any = np.zeros(CAPACITY + ROWS_AT_ONCE, np.int64)
             if not self.compiled:
                 table, phases = table.tolist(), phases.tolist()
-            start, written = at._replace(loop=at.loop._replace(recorded=0)), Buffers(*pads, table, phases)
-            at = loop(params, start, written)
-            if at.loop.failed == 1:
-                before = before_failure(loop, params, start, written, at.loop.ticks)
+            start, written = (
+                progress._replace(loop=progress.loop._replace(recorded=0)),
+                Buffers(*pads, table, phases),
+            )
+            progress = loop(params, start, written)
+            if progress.loop.failed == 1:
+                last_plant = before_failure(loop, params, start, written, progress.loop.ticks)
                 raise TermFailed(
-                    not_finite_in_tick(made.kinds, made.plant, before, at.loop.effort_n, setup.dt_s)
+                    not_finite_in_tick(made.kinds, made.plant, last_plant, progress.loop.effort_n, setup.dt_s)
                 )
-            n = at.loop.recorded
+            n = progress.loop.recorded
             rows.append(np.vstack((np.asarray(table)[:, :n], np.asarray(phases)[:n])))
-            self._count(start, at)
-        return at, np.concatenate(rows, axis=1)
+            self._count(start, progress)
+        return progress, np.concatenate(rows, axis=1)
 
-    def _count(self, before: SimulationState, after: SimulationState) -> None:
+    def _count(self, start: SimulationState, end: SimulationState) -> None:
         """Count the work between two states. Raises TooMuchWork."""
-        self.work += after.loop.ticks - before.loop.ticks
-        self.work += after.plant.step.n_steps - before.plant.step.n_steps
+        self.work += end.loop.ticks - start.loop.ticks
+        self.work += end.plant.step.n_steps - start.plant.step.n_steps
         if self.work > MOST_WORK:
             raise TooMuchWork
         percent = 100 * self.work // MOST_WORK
@@ -288,39 +249,21 @@ def _ideal_buffers(on_arrays: bool) -> tuple[PadBuffers, Any]:
     return PadBuffers(left, right, noise.tolist(), images.tolist()), [0.0]
 
 
-def _record(end: SimulationState, columns: NDArray[np.float64], bias: Bias, dt_s: float) -> GraspRecord:
-    """Return the record of a grasp with these rows, from which the errors of the readings are subtracted."""
-    phases = np.mod(columns[-1], 1 << EVENT_SHIFT)
-    gap_m, left_n, right_n = (
-        columns[COLUMNS.index(name)] for name in ("gap_m", "force_left_n", "force_right_n")
-    )
-    if bias.travel_share != 0.0:
-        share = bias.travel_share
-        gap_m = gap_m + (bias.from_m - np.minimum(gap_m, bias.from_m)) * share / (1.0 + share)
-    if bias.force_n != 0.0:
-        left_n, right_n = (np.where(force != 0.0, force - bias.force_n, 0.0) for force in (left_n, right_n))
+def _record(end: SimulationState, rows: NDArray[np.float64], dt_s: float) -> GraspRecord:
+    """Return the record of a grasp with these rows: the columns, and last the phases."""
+    phases = np.mod(rows[-1], 1 << EVENT_SHIFT)
+    columns = dict(zip(COLUMNS, rows, strict=False))
     return GraspRecord(
         outcome=int(end.controller.law.outcome) if end.controller.guard.stopped == 0 else -1,
         dt_s=dt_s,
-        gap_m=gap_m,
-        speed_m_s=columns[COLUMNS.index("velocity_m_s")],
-        left_n=left_n,
-        right_n=right_n,
+        gap_m=columns["gap_m"],
+        speed_m_s=columns["velocity_m_s"],
+        left_n=columns["force_left_n"],
+        right_n=columns["force_right_n"],
         n_rows=int(np.sum(phases <= HOLD)),
         hold_from=int(np.sum(phases < HOLD)),
         peak_n=end.plant.peak_n,
     )
-
-
-def _force_difference_n(grasp: GraspRecord, expected: GraspRecord) -> float:
-    """Return the difference (N) of the forces of two grasps at the tick of the contact and at the tick before it.
-
-    The force is that of the pad with the smaller one.
-    """
-    forces, others = (np.minimum(record.left_n, record.right_n) for record in (grasp, expected))
-    i = min(int(np.argmax(force >= CONTACT_FORCE_N)) for force in (forces, others))
-    there = slice(max(i - 1, 0), i + 1)
-    return float(np.max(np.abs(forces[there] - others[there])))
 
 
 def without_term(setup: GraspSetup, i: int) -> GraspSetup:

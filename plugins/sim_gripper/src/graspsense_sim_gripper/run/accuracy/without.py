@@ -53,14 +53,14 @@ def _changes(
     without = other.values(reduction)
     changes: dict[str, dict[str, float | None]] = {}
     for name, (value, scale) in trial.values(reduction).items():
-        found = without[name][0] if name in without else math.nan
-        if math.isnan(value) and math.isnan(found):
+        other_value = without[name][0] if name in without else math.nan
+        if math.isnan(value) and math.isnan(other_value):
             continue
-        known = math.isfinite(value - found)
+        known = math.isfinite(value - other_value)
         largest = max(abs(value), scale)
         changes[name] = {
             "value": None if math.isnan(value) else value,
-            "without": None if math.isnan(found) else found,
-            "change": (found - value) / largest if known and largest > 0.0 else None,
+            "without": None if math.isnan(other_value) else other_value,
+            "change": (other_value - value) / largest if known and largest > 0.0 else None,
         }
     return changes

@@ -73,14 +73,14 @@ class CompiledGrasps:
             composition = instances.scene.composition
             if not self.is_compiled(composition):
                 return None
-            done = self._drawn(self._drawing, instances, seed, self.loops.of(composition))
+            done = self._drawn(self._drawing, instances, seed, self.loops.loop_of(composition))
             if done is not None:
                 return done
         setup = self.scenes.setup(scene, seed)
         composition = composition_of(setup)
         if not self.is_compiled(composition):
             return None
-        return grasp_compiled(self.job, setup, self.loops.of(composition), self.storage, self.measure)
+        return grasp_compiled(self.job, setup, self.loops.loop_of(composition), self.storage, self.measure)
 
     def _drawn(
         self, drawing: Drawing, instances: DrawnInstances, seed: int, loop: CompiledLoop

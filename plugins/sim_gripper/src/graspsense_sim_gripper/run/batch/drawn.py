@@ -119,13 +119,13 @@ class StartLayout(NamedTuple):
     """What the grasps of a composition have in common at their beginning."""
 
     types: LoopTypes
-    at: Any
+    places: Any
     """Parameters and state, in which each number is its place among all numbers."""
     cells: tuple[int, ...]
     """The places of the weights and offsets of the left and of the right cells among all arrays."""
 
     @classmethod
-    def of(cls, params: GraspParams, state: SimulationState) -> StartLayout:
+    def made_of(cls, params: GraspParams, state: SimulationState) -> StartLayout:
         """Return that of a grasp with these parameters and this first state."""
         # Other arrays in their stead are told apart, while both fingertips may share theirs.
         left, right = (PadCells(np.zeros(0), np.zeros(0)) for _ in range(2))
@@ -137,7 +137,7 @@ class StartLayout(NamedTuple):
             return next(i for i, array in enumerate(arrays) if array is wanted)
 
         return cls(
-            LoopTypes.of(params, state),
+            LoopTypes.made_of(params, state),
             with_places((params, state)),
             tuple(place(array) for array in (*left, *right)),
         )
@@ -214,9 +214,9 @@ def drawn_scene(
     layout, config = layout_of(example), problem.config
     composition = composition_of(example)
     if composition not in layouts:
-        layouts[composition] = StartLayout.of(*begun)
+        layouts[composition] = StartLayout.made_of(*begun)
     known = layouts[composition]
-    start, places = loop_start(*begun, known.types), _places(known.at, layout, spec)
+    start, places = loop_start(*begun, known.types), _places(known.places, layout, spec)
     return DrawnScene(
         config=config,
         spec=spec,
@@ -230,9 +230,9 @@ def drawn_scene(
     )
 
 
-def _places(at: Any, layout: PaddedLayout, spec: ObjectSpec) -> Places:
-    """Return where the numbers are that a seed decides; `at`: parameters and state with the place of each number."""
-    params, state = at
+def _places(known: Any, layout: PaddedLayout, spec: ObjectSpec) -> Places:
+    """Return where the numbers are that a seed decides; `known`: parameters and state with the place of each number."""
+    params, state = known
     friction, model = params.plant.drive.friction, params.plant.object
     of_params: list[int] = []
     for position in layout.places:

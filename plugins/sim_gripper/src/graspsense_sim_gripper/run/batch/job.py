@@ -112,7 +112,7 @@ class FinishedGrasp:
         """Return the `model_report` of the grasp, with what its model does not verify."""
         kinds, reduction, unstable_loop = self.model
         if isinstance(self.end, Stored) and self.layout is not None:
-            report = stored_report(self.end.type, self.layout, kinds).of(self.end.numbers)
+            report = stored_report(self.end.type, self.layout, kinds).report(self.end.numbers)
         else:
             report = model_report(self.state, kinds)
         if reduction is not None:
@@ -255,9 +255,9 @@ def grasp_once(
         outcome = Outcome.ABORTED
         effort_n = state().loop.effort_n
         # Once and now: the loop runs again for it, in buffers that the next grasp uses.
-        before = plant()
-        plant = partial(_same, before)
-        reason = not_finite_in_tick(setup.kinds, setup.plant, before, effort_n, setup.dt_s)
+        last_plant = plant()
+        plant = partial(_same, last_plant)
+        reason = not_finite_in_tick(setup.kinds, setup.plant, last_plant, effort_n, setup.dt_s)
     elif ending.ended == 0:
         outcome, reason = Outcome.ABORTED, overdue(job.run)
     done = EndedGrasp(outcome, reason, plant, layout, ending)
@@ -344,8 +344,8 @@ def _run(job: Job, setup: GraspSetup, loop: GraspLoop, storage: Storage) -> tupl
     while True:
         end = run(params, progress, buffers)
         if end.ending.failed == 1:
-            before = partial(before_failure, loop, params, progress, buffers, end.ending.ticks)
-            return end._replace(plant=before), buffers
+            last_plant = partial(before_failure, loop, params, progress, buffers, end.ending.ticks)
+            return end._replace(plant=last_plant), buffers
         if end.ending.ended == 1 or end.ending.ticks >= most_ticks:
             return end, buffers
         progress = end.state()

@@ -11,9 +11,9 @@ import math
 import os
 import threading
 import warnings
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import ExitStack
 from importlib.util import find_spec
 from operator import index
@@ -52,8 +52,8 @@ SLICE: Final = 32
 SLICES_PER_WORKER: Final = 4
 """Number of slices of a worker in a batch too small for slices of `SLICE` grasps. With fewer, some workers would wait
 for the last ones."""
-MAX_AHEAD: Final = 8
-"""Number of slices per worker that may be ahead of the earliest unfinished slice."""
+SLICES_AHEAD: Final = 8
+"""Number of slices per worker that are given to the workers at once: few results wait for earlier ones."""
 PROGRESS_S: Final = 0.2
 """Time between two calls of the progress callback."""
 
@@ -156,33 +156,25 @@ class _Batch:
 
         Results are not collected here, so that a caller that keeps little needs little memory.
         """
-        total = len(self.scenes)
+        total, finished = len(self.scenes), 0
         self._plan()
         workers = max(1, min(self.workers, math.ceil(total / WORTH_A_WORKER)))
-        running: dict[Future[list[FinishedGrasp]], int] = {}
-        ready: dict[int, list[FinishedGrasp]] = {}
-        asked = given = finished = 0
+        slices, running = deque(slices_of(total, workers)), deque[tuple[range, Future[list[FinishedGrasp]]]]()
         with self.processes, ThreadPoolExecutor(max_workers=workers) as pool:
-            slices = slices_of(total, workers)
             try:
-                while True:
-                    # Two slices per worker, one in reserve: few results wait, and an interruption takes effect soon.
-                    while len(running) < 2 * workers and asked < min(
-                        len(slices), given + MAX_AHEAD * workers
-                    ):
-                        running[pool.submit(self._slice, slices[asked])] = asked
-                        asked += 1
+                while slices or running:
+                    while slices and len(running) < SLICES_AHEAD * workers:
+                        which = slices.popleft()
+                        running.append((which, pool.submit(self._slice, which)))
                     if progress is not None:
                         progress(finished, total)
-                    if not running:
-                        break
-                    for future in wait(running, PROGRESS_S, FIRST_COMPLETED).done:
-                        k = running.pop(future)
-                        ready[k] = future.result()
-                        finished += len(slices[k])
-                    while given in ready:
-                        yield from self._with_models(ready.pop(given), slices[given])
-                        given += 1
+                    which, future = running[0]
+                    if wait([future], PROGRESS_S).done:
+                        yield from self._with_models(future.result(), which)
+                        finished += len(which)
+                        running.popleft()
+                if progress is not None:
+                    progress(finished, total)
             except BaseException:
                 pool.shutdown(wait=False, cancel_futures=True)
                 # This ends the processes, so that no thread keeps waiting for one.
@@ -242,8 +234,8 @@ class _Batch:
         part = self._part(which)
         done: dict[int, FinishedGrasp] = {}
         plain: list[int] = []
-        for i, one in enumerate(part):
-            grasp = self._compiled(*one)
+        for i, grasp_of in enumerate(part):
+            grasp = self._compiled(*grasp_of)
             if grasp is None:
                 plain.append(i)
             else:

@@ -96,15 +96,17 @@ class PlainProcess:
         Raises NotHandedOver if the process has ended, and if a grasp raises an exception in it. The caller then runs
         the grasps itself, which raises the original exception.
         """
-        to, of = self._process.stdin, self._process.stdout
-        assert to is not None
-        assert of is not None
+        requests, answers = self._process.stdin, self._process.stdout
+        assert requests is not None
+        assert answers is not None
         try:
-            to.write(self._greeting + _line({"scenes": list(scenes), "seeds": [int(seed) for seed in seeds]}))
-            to.flush()
+            requests.write(
+                self._greeting + _line({"scenes": list(scenes), "seeds": [int(seed) for seed in seeds]})
+            )
+            requests.flush()
             self._greeting = b""
-            answer = _read_line(of)
-            traces = io.BytesIO(_read(of, answer["bytes"]))
+            answer = _read_line(answers)
+            traces = io.BytesIO(_read(answers, answer["bytes"]))
         except (OSError, EOFError) as error:
             raise NotHandedOver(f"the process for plain grasps has ended ({error})") from error
         if "refused" in answer:
@@ -228,11 +230,11 @@ def _read(stream: IO[bytes], n: int) -> bytes:
     return data
 
 
-def _write_trace(to: IO[bytes], trace: Trace) -> None:
+def _write_trace(stream: IO[bytes], trace: Trace) -> None:
     for name in _ARRAYS:
-        np.lib.format.write_array(to, getattr(trace, name), allow_pickle=False)
+        np.lib.format.write_array(stream, getattr(trace, name), allow_pickle=False)
 
 
-def _read_trace(of: IO[bytes]) -> Trace:
-    parts: dict[str, Any] = {name: np.lib.format.read_array(of, allow_pickle=False) for name in _ARRAYS}
+def _read_trace(stream: IO[bytes]) -> Trace:
+    parts: dict[str, Any] = {name: np.lib.format.read_array(stream, allow_pickle=False) for name in _ARRAYS}
     return Trace(**parts)

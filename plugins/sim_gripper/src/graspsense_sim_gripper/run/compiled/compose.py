@@ -26,15 +26,13 @@ from graspsense_sim_gripper.plant.sensing import SensorState
 from graspsense_sim_gripper.plant.state import Contact, ContactState, Motion, Past, PlantState, StepState
 from graspsense_sim_gripper.run.approach import approach_ticks
 from graspsense_sim_gripper.run.binding import Constructors, bind_reachable
-from graspsense_sim_gripper.run.free_ticks import approach_or_free_ticks, free_ticks
-from graspsense_sim_gripper.run.loop import GraspParams, LoopProgress, SimulationState, grasp
+from graspsense_sim_gripper.run.loop import SimulationState, grasp
 from graspsense_sim_gripper.run.macro_ticks import begin_macro_step
 from graspsense_sim_gripper.run.problem import ControllerStep
 from graspsense_sim_gripper.scene.terms.registry import active_laws, find_term, laws_of, moving_of, phases_of
 from graspsense_sim_gripper.scene.terms.switchable import Switchable, switched_on_sum
 from graspsense_sim_gripper.scene.terms.term import LAW_ERRORS, Law, Moves, OnSum, Phase, SumLaw
 from graspsense_sim_gripper.solve.advance import advance, move
-from graspsense_sim_gripper.solve.coast import can_glide, glide
 from graspsense_sim_gripper.solve.converge import refine_until_converged
 from graspsense_sim_gripper.solve.scheme import Attempt, PlantParams, Start
 
@@ -66,22 +64,22 @@ def _no_terms(
     return 0.0, ()
 
 
-first: Law = _no_terms
-rest: Law = _no_terms
+head: Law = _no_terms
+tail: Law = _no_terms
 
 
 def _sum_of_1(
     params: TermsParams, states: TermsStates, d0: float, d1: float, h: float, v1: float
 ) -> tuple[float, TermsStates]:
-    force, state = first(params[0], states[0], d0, d1, h, v1)
+    force, state = head(params[0], states[0], d0, d1, h, v1)
     return force, (state,)
 
 
 def _sum_of_more(
     params: TermsParams, states: TermsStates, d0: float, d1: float, h: float, v1: float
 ) -> tuple[float, TermsStates]:
-    force, state = first(params[0], states[0], d0, d1, h, v1)
-    total, others = rest(params[1:], states[1:], d0, d1, h, v1)
+    force, state = head(params[0], states[0], d0, d1, h, v1)
+    total, others = tail(params[1:], states[1:], d0, d1, h, v1)
     return force + total, (state, *others)
 
 
@@ -92,9 +90,9 @@ on_sum: SumLaw = switched_on_sum
 def _acted_on(
     params: TermsParams, states: TermsStates, d0: float, d1: float, h: float, v1: float
 ) -> tuple[float, TermsStates]:
-    total, before = summands(params[:-1], states[:-1], d0, d1, h, v1)
+    total, summed = summands(params[:-1], states[:-1], d0, d1, h, v1)
     force, state = on_sum(params[-1], states[-1], total, d1)
-    return force, (*before, state)
+    return force, (*summed, state)
 
 
 def sum_of(laws: Sequence[Law | OnSum]) -> Law:
@@ -113,8 +111,8 @@ def _summed(laws: Sequence[Any]) -> Law:
     if not laws:
         return _no_terms
     if len(laws) == 1:
-        return bind(_sum_of_1, first=laws[0])
-    return bind(_sum_of_more, first=laws[0], rest=_summed(laws[1:]))
+        return bind(_sum_of_1, head=laws[0])
+    return bind(_sum_of_more, head=laws[0], tail=_summed(laws[1:]))
 
 
 def sum_of_active(laws: Sequence[Law | OnSum]) -> Law:
@@ -176,8 +174,8 @@ def _phase_and_others(states: TermsStates) -> int:
 def phase_of_all(phases: Sequence[tuple[int, Phase]]) -> Phase:
     """Return one number for the phases of these terms, each given with its place among the states."""
     combined: Phase = _no_phase
-    for place, one in reversed(phases):
-        combined = bind(_phase_and_others, PLACE=place, phase=one, others=combined)
+    for place, term_phase in reversed(phases):
+        combined = bind(_phase_and_others, PLACE=place, phase=term_phase, others=combined)
     return combined
 
 
@@ -196,8 +194,8 @@ def _one_moves(states: TermsStates) -> bool:
 def any_moves(moving: Sequence[tuple[int, Moves]]) -> Moves:
     """Return whether one of these terms moves, each given with its place among the states."""
     combined: Moves = _no_move
-    for place, one in reversed(moving):
-        combined = bind(_one_moves, PLACE=place, moves=one, others_move=combined)
+    for place, term_moves in reversed(moving):
+        combined = bind(_one_moves, PLACE=place, moves=term_moves, others_move=combined)
     return combined
 
 
@@ -329,17 +327,6 @@ def guarded_loop(composition: Composition, step: ControllerStep) -> Callable[...
     return _loop_of(composed_move(composition, interpreted=False), step, force, composition)
 
 
-@lru_cache(maxsize=64)
-def free_motion(
-    composition: Composition, step: ControllerStep
-) -> Callable[[GraspParams, LoopProgress, Frame, Any, Any], LoopProgress] | None:
-    """Return `free_ticks` for the interpreter; None where every tick needs the controller and all sensors."""
-    parts = free_parts(step)
-    if not parts or not _may_last_several_ticks(composition):
-        return None
-    return bind_reachable(free_ticks, {**parts, "can_glide": can_glide, "glide": glide}, INTERPRETED)
-
-
 def _may_last_several_ticks(composition: Composition) -> bool:
     """Return whether a step of this plant may last several ticks."""
     return not (composition.converges or composition.lags)
@@ -354,12 +341,7 @@ def _loop_of(
     if _may_last_several_ticks(composition):
         parts["begin_macro_step"] = bind_reachable(begin_macro_step, step_parts(composition))
         if law := free_parts(step):
-            glides = {"can_glide": can_glide, "glide": glide}
-            parts["run_approach_ticks"] = (
-                bind_reachable(approach_or_free_ticks, {**law, **glides}, INTERPRETED)
-                if force
-                else bind_reachable(approach_ticks, law)
-            )
+            parts["run_approach_ticks"] = bind_reachable(approach_ticks, law, INTERPRETED if force else None)
     loop = bind_reachable(grasp, parts)
     return bind_reachable(loop, {"object_force": force}, INTERPRETED) if force else loop
 

@@ -128,7 +128,7 @@ class LoopTypes(NamedTuple):
     """Number of numbers of both."""
 
     @classmethod
-    def of(cls, params: GraspParams, state: SimulationState) -> LoopTypes:
+    def made_of(cls, params: GraspParams, state: SimulationState) -> LoopTypes:
         """Return the types of these parameters and of this state."""
         begun = params, state
         key = structure(begun)
@@ -136,7 +136,7 @@ class LoopTypes(NamedTuple):
         if known is None:
             if len(_TYPES) >= MOST_TYPES:
                 _TYPES.clear()
-            types = TupleType.of(state), TupleType.of(state.plant)
+            types = TupleType.made_of(state), TupleType.made_of(state.plant)
             known = cls(Pattern(begun), *types, count_numbers(state.loop), count_numbers(begun))
             _TYPES[key] = known
         return known
@@ -152,7 +152,7 @@ def loop_start(params: GraspParams, state: SimulationState, types: LoopTypes | N
 
     Raises NotCompilable if something in it is neither a number nor an array, TypeError if it is not of these types.
     """
-    numbers, arrays, types = array("d"), list[NDArray[Any]](), types or LoopTypes.of(params, state)
+    numbers, arrays, types = array("d"), list[NDArray[Any]](), types or LoopTypes.made_of(params, state)
     try:
         append((params, state), numbers, arrays)
     except TypeError as error:
@@ -208,7 +208,7 @@ class CompiledLoops:
         self._step = step
         self._loops: dict[Composition, CompiledLoop] = {}
 
-    def of(self, composition: Composition) -> CompiledLoop:
+    def loop_of(self, composition: Composition) -> CompiledLoop:
         """Return the loop of a composition. Raises NotCompilable."""
         if composition not in self._loops:
             # Threads wait for each other, so that the functions of a loop are not found twice.

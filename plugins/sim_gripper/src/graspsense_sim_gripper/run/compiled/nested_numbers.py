@@ -18,10 +18,10 @@ from graspsense_sim_gripper.run.nested import Pattern
 class PatternType(types.Type):
     """The type of a `Pattern` in compiled code, which knows the types in the pattern but none of its values."""
 
-    def __init__(self, of: Any) -> None:
+    def __init__(self, values_type: Any) -> None:
         """Take the type of the nested tuples."""
-        self.of = of
-        super().__init__(name=f"Pattern({of})")
+        self.values_type = values_type
+        super().__init__(name=f"Pattern({values_type})")
 
 
 @typeof_impl.register(Pattern)
@@ -51,11 +51,11 @@ def tuples_of(typing_context: Any, pattern: Any, numbers: Any, arrays: Any) -> A
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         data = context.make_array(signature.args[1])(context, builder, arguments[1]).data
-        places = iter(range(count_numbers(pattern.of)))
+        places = iter(range(count_numbers(pattern.values_type)))
         given = iter(builder.extract_value(arguments[2], i) for i in range(len(signature.args[2])))
-        return _made(context, builder, pattern.of, data, places, given)
+        return _made(context, builder, pattern.values_type, data, places, given)
 
-    return pattern.of(pattern, numbers, arrays), generate
+    return pattern.values_type(pattern, numbers, arrays), generate
 
 
 def _made(
@@ -102,8 +102,8 @@ def numbers_in(builder: Any, kind: Any, value: Any) -> list[tuple[Any, Any]]:
     """Return the numbers in nested tuples of compiled code, each with its type."""
     if not isinstance(kind, types.BaseTuple):
         return [(kind, value)]
-    found: list[tuple[Any, Any]] = []
+    numbers: list[tuple[Any, Any]] = []
     parts: Any = kind
     for i, part in enumerate(parts):
-        found += numbers_in(builder, part, builder.extract_value(value, i))
-    return found
+        numbers += numbers_in(builder, part, builder.extract_value(value, i))
+    return numbers

@@ -110,14 +110,14 @@ def unpadded(state: PlantState, layout: PaddedLayout) -> PlantState:
     return _with_term_states(state, lambda states: tuple([states[i] for i in layout.places]))
 
 
-def _with_term_states(state: PlantState, of: Callable[[TermStates], TermStates]) -> PlantState:
+def _with_term_states(state: PlantState, change: Callable[[TermStates], TermStates]) -> PlantState:
     """Return the state of the plant with `of(states)` in place of the states of the terms, in each half."""
     motion, contact, step, effort_n, peak_n = state
     left_n, right_n, offset_m, touched, left, right, pending_s, unbalanced = contact
     halves = []
     for half in (left, *right):
         compression_m, force_n, slope_n_m, states, pad_m, branch_n, past = half
-        halves.append(ContactState(compression_m, force_n, slope_n_m, of(states), pad_m, branch_n, past))
+        halves.append(ContactState(compression_m, force_n, slope_n_m, change(states), pad_m, branch_n, past))
     contact = Contact(left_n, right_n, offset_m, touched, halves[0], tuple(halves[1:]), pending_s, unbalanced)
     return PlantState(motion, contact, step, effort_n, peak_n)
 

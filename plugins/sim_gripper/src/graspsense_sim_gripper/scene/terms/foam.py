@@ -50,7 +50,7 @@ def foam(
     return force + force1 + force2, FoamState(force1, force2)
 
 
-def rates(params: Foam, at: WorkingPoint) -> tuple[Rate, ...]:
+def rates(params: Foam, point: WorkingPoint) -> tuple[Rate, ...]:
     """Return 1 / tau of each branch."""
     arms = ((params.arm1_n_m, params.tau1_s), (params.arm2_n_m, params.tau2_s))
     return tuple(Rate("relaxes", 1.0 / tau) for stiffness, tau in arms if stiffness > 0.0)

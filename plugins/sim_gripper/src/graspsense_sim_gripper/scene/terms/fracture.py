@@ -36,9 +36,9 @@ def fracture(
     return force_n, state
 
 
-def rates(params: Fracture, at: WorkingPoint) -> tuple[Rate, ...]:
+def rates(params: Fracture, point: WorkingPoint) -> tuple[Rate, ...]:
     """Return no rates: the state changes once at most."""
-    del params, at
+    del params, point
     return ()
 
 

@@ -87,7 +87,7 @@ def gas(params: Gas, state: GasState, d0: float, d1: float, h: float, v1: float)
         heated = _heated(volume, warmth, half, kept, exponent)
     steep = exponent * (pressure + middle)
     stiff = steep / (volume + bulge * steep)
-    before = rise
+    last_rise = rise
     if opening > 0.0:
         x = h * through * stiff
         decay = math.exp(-x)
@@ -99,7 +99,7 @@ def gas(params: Gas, state: GasState, d0: float, d1: float, h: float, v1: float)
     if rise < lowest:
         rise = lowest
     if warm:
-        taken = heated - volume / steep * (rise - before)
+        taken = heated - volume / steep * (rise - last_rise)
         warmth = warmth * kept - (exponent - 1.0) * (1.0 + half) * taken / volume
     if whole - swept1 + bulge * rise <= LEAST_M3:
         spent = 1
@@ -120,23 +120,23 @@ def _heated(volume_m3: float, warmth: float, half: float, kept: float, exponent:
     return volume_m3 * warmth * (kept - 1.0) / ((1.0 + half) * exponent)
 
 
-def rates(params: Gas, at: WorkingPoint) -> tuple[Rate, ...]:
+def rates(params: Gas, point: WorkingPoint) -> tuple[Rate, ...]:
     """Return the rates at which the vent and the walls relax the gas; the vent's at the pressure that builds up."""
     sealed = params._replace(vent_m2=0.0, heat_s=math.inf)
-    force, _ = gas(sealed, GasState(0.0), 0.0, at.compression_m, 1.0, 0.0)
-    area = params.area_m2 + params.area_slope_m * at.compression_m
+    force, _ = gas(sealed, GasState(0.0), 0.0, point.compression_m, 1.0, 0.0)
+    area = params.area_m2 + params.area_slope_m * point.compression_m
     rise = abs(force) / area if area > 0.0 else 0.0
-    found = []
+    relaxes = []
     if params.vent_m2 > 0.0:
         # The pressure is bounded by the one that drives the swept volume out.
-        through = area * at.speed_m_s
+        through = area * point.speed_m_s
         for _ in range(60):
             rise = min(rise, through / conductance(params.vent_m2, rise))
         give = _give(params.volume_m3, params.pressure_pa, params.exponent) + params.bulge_m3_pa
-        found.append(Rate("relaxes", conductance(params.vent_m2, rise) / give))
+        relaxes.append(Rate("relaxes", conductance(params.vent_m2, rise) / give))
     if params.heat_s < math.inf:
-        found.append(Rate("relaxes", 1.0 / params.heat_s))
-    return tuple(found)
+        relaxes.append(Rate("relaxes", 1.0 / params.heat_s))
+    return tuple(relaxes)
 
 
 def beyond(state: GasState) -> str:

@@ -58,7 +58,7 @@ def liquid(
     return wall * (d1 - state.y_m), state
 
 
-def rates(params: Liquid, at: WorkingPoint) -> tuple[Rate, ...]:
+def rates(params: Liquid, point: WorkingPoint) -> tuple[Rate, ...]:
     """Return the natural frequency of the column behind the wall, and the decay rate of its motion."""
     mass, k, damping, wall = _seen(params)
     return (Rate("swings", math.sqrt((k + wall) / mass)), Rate("relaxes", 0.5 * damping / mass))

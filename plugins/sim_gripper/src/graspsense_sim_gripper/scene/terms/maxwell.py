@@ -33,7 +33,7 @@ def maxwell(
     return force, MaxwellState(force)
 
 
-def rates(params: Maxwell, at: WorkingPoint) -> tuple[Rate, ...]:
+def rates(params: Maxwell, point: WorkingPoint) -> tuple[Rate, ...]:
     """Return 1 / tau."""
     return (Rate("relaxes", 1.0 / params.tau_s),)
 

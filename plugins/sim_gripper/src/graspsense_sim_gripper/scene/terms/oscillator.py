@@ -40,14 +40,14 @@ def moved(now: OscillatorState, damping: float, square: float, forcing: Forcing,
     slope = (forcing.u1 - 4.0 * a * bend) / w2
     offset = (forcing.u0 - 2.0 * a * slope - 2.0 * bend) / w2
     y, v = now.y_m - offset, now.v_m_s - slope
-    rest = w2 - a * a
-    if rest > 1e-12 * w2:
-        w = math.sqrt(rest)
+    discriminant = w2 - a * a
+    if discriminant > 1e-12 * w2:
+        w = math.sqrt(discriminant)
         decay = math.exp(-a * h)
         even = decay * math.cos(w * h)
         odd = decay * math.sin(w * h) / w
-    elif rest < -1e-12 * w2:
-        w = math.sqrt(-rest)
+    elif discriminant < -1e-12 * w2:
+        w = math.sqrt(-discriminant)
         # The slow root as a quotient: a difference would lose it by cancellation.
         slow, fast = math.exp(-w2 / (a + w) * h), math.exp(-(a + w) * h)
         even = 0.5 * (slow + fast)
@@ -65,13 +65,13 @@ def _by_series(now: OscillatorState, a: float, w2: float, forcing: Forcing, h: f
     """Return what `moved` returns, by the power series of the motion in `h`."""
     u0, u1, u2 = forcing
     # The coefficients times h^(n - 1); their recurrence is the differential equation.
-    before, last = now.v_m_s, 0.5 * h * (u0 - 2.0 * a * now.v_m_s - w2 * now.y_m)
-    moved_m_s, speed = before + last, before + 2.0 * last
+    previous, last = now.v_m_s, 0.5 * h * (u0 - 2.0 * a * now.v_m_s - w2 * now.y_m)
+    moved_m_s, speed = previous + last, previous + 2.0 * last
     drives = (u1 * h * h, u2 * h * h * h)
     for n in range(3, SERIES_ORDER + 1):
         drive = drives[n - 3] if n < 5 else 0.0
-        term = (drive - 2.0 * a * h * (n - 1) * last - w2 * h * h * before) / (n * (n - 1))
+        term = (drive - 2.0 * a * h * (n - 1) * last - w2 * h * h * previous) / (n * (n - 1))
         moved_m_s += term
         speed += n * term
-        before, last = last, term
+        previous, last = last, term
     return OscillatorState(now.y_m + h * moved_m_s, speed)

@@ -33,5 +33,5 @@ def phi_1_2(x: float) -> tuple[float, float]:
             1.0 - 0.5 * x * (1.0 - x / 3.0 * (1.0 - 0.25 * x)),
             0.5 - x / 6.0 * (1.0 - 0.25 * x * (1.0 - 0.2 * x)),
         )
-    first = (1.0 - math.exp(-x)) / x
-    return first, (1.0 - first) / x
+    phi1_x = (1.0 - math.exp(-x)) / x
+    return phi1_x, (1.0 - phi1_x) / x

@@ -38,20 +38,20 @@ HOOK: Final = "graspsense_sim_terms"
 @cache
 def _foreign() -> dict[str, Term]:
     """Return the terms of plugins by qualified name, sorted."""
-    found: dict[str, Term] = {}
+    by_name: dict[str, Term] = {}
     for distribution, terms in collect(HOOK):
         try:
             given = list(terms)
         except TypeError:
             given = [terms]
-        for one in given:
-            if not isinstance(one, Term):
-                warnings.warn(f"{HOOK} of {distribution} gave {one!r}, which is not a Term", stacklevel=2)
-            elif f"{distribution}/{one.name}" in found:
-                warnings.warn(f"{HOOK} of {distribution} gave two terms {one.name!r}", stacklevel=2)
+        for term in given:
+            if not isinstance(term, Term):
+                warnings.warn(f"{HOOK} of {distribution} gave {term!r}, which is not a Term", stacklevel=2)
+            elif f"{distribution}/{term.name}" in by_name:
+                warnings.warn(f"{HOOK} of {distribution} gave two terms {term.name!r}", stacklevel=2)
             else:
-                found[f"{distribution}/{one.name}"] = one
-    return dict(sorted(found.items()))
+                by_name[f"{distribution}/{term.name}"] = term
+    return dict(sorted(by_name.items()))
 
 
 def find_term(name: str) -> tuple[str, Term]:

@@ -41,9 +41,9 @@ def rigid(
     return force, state
 
 
-def rates(params: Rigid, at: WorkingPoint) -> tuple[Rate, ...]:
+def rates(params: Rigid, point: WorkingPoint) -> tuple[Rate, ...]:
     """Return no rates: the state changes once at most."""
-    del params, at
+    del params, point
     return ()
 
 

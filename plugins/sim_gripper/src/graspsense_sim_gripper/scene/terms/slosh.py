@@ -35,7 +35,7 @@ def slosh(
     return params.mass_kg * (square * (d1 - state.y_m) + 2.0 * a * (v1 - state.v_m_s)), state
 
 
-def rates(params: Slosh, at: WorkingPoint) -> tuple[Rate, ...]:
+def rates(params: Slosh, point: WorkingPoint) -> tuple[Rate, ...]:
     """Return the frequency and the decay rate of the mode."""
     w = 2.0 * math.pi * params.frequency_hz
     return (Rate("swings", w), Rate("relaxes", params.damping_ratio * w))

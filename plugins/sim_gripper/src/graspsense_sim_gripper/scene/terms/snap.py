@@ -42,9 +42,9 @@ def snap(
     return peak - drop + k2 * (d1 - critical - fall), SnapState(2)
 
 
-def rates(params: Snap, at: WorkingPoint) -> tuple[Rate, ...]:
+def rates(params: Snap, point: WorkingPoint) -> tuple[Rate, ...]:
     """Return no rates: the state follows from the compression."""
-    del params, at
+    del params, point
     return ()
 
 

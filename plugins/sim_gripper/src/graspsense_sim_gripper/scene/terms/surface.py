@@ -99,7 +99,7 @@ def moves(state: OscillatorState) -> bool:
     return abs(state.y_m) > STILL_M or abs(state.v_m_s) > STILL_M_S
 
 
-def rates(params: Surface, at: WorkingPoint) -> tuple[Rate, ...]:
+def rates(params: Surface, point: WorkingPoint) -> tuple[Rate, ...]:
     """Return the natural frequencies in contact and separated."""
     return (
         Rate("swings", math.sqrt((params.k_n_m + params.contact_n_m) / params.mass_kg)),

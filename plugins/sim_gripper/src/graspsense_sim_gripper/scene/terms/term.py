@@ -23,7 +23,6 @@ SumLaw = Callable[[TermParams, TermState, float, float], tuple[float, TermState]
 
 LAW_ERRORS: Final = (ArithmeticError, ValueError)
 """What a law may raise where it has no value, such as a division by zero or the root of a negative number."""
-PIECES: Final = 256
 
 
 class OnSum(NamedTuple):
@@ -52,9 +51,9 @@ class Rate(NamedTuple):
     per_s: float
 
 
-def no_rates(params: TermParams, at: WorkingPoint) -> tuple[Rate, ...]:
+def no_rates(params: TermParams, point: WorkingPoint) -> tuple[Rate, ...]:
     """Return the rates of a term that declares none: unknown if it has a state."""
-    del params, at
+    del params, point
     return ()
 
 
@@ -152,21 +151,3 @@ class Term:
         strangers = {*self.positive, *self.signed, *self.stiffnesses} - set(fields)
         if strangers:
             raise TypeError(f"term {self.name!r}: {self.params.__name__} has no field {sorted(strangers)}")
-
-    def importance(self, params: TermParams, at: WorkingPoint) -> float:
-        """Return the largest force (N) of the law on a path to this working point.
-
-        The compression increases at the rate of the working point, and is then held for the rest of its duration.
-        """
-        if at.compression_m <= 0.0 or at.speed_m_s <= 0.0:
-            return 0.0
-        state, most, seconds = self.at_rest, 0.0, at.compression_m / at.speed_m_s
-        for k in range(PIECES):
-            d0, d1 = at.compression_m * k / PIECES, at.compression_m * (k + 1) / PIECES
-            force, state = self.law(params, state, d0, d1, seconds / PIECES, at.speed_m_s)
-            most = max(most, abs(force))
-        rest = at.seconds - seconds
-        if rest > 0.0:
-            force, state = self.law(params, state, at.compression_m, at.compression_m, rest, 0.0)
-            most = max(most, abs(force))
-        return most

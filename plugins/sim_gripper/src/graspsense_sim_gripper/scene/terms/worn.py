@@ -38,21 +38,21 @@ def worn(
     params: Worn, state: WornState, d0: float, d1: float, h: float, v1: float
 ) -> tuple[float, WornState]:
     """Return the force of the shell with the damage at the end of the step; of second order, by Heun's method."""
-    before = work = state.work_j
+    earlier_j = work = state.work_j
     force = _force(params, work, d1)
     if d1 > d0:
         for _ in range(2):
             # First with the damage before the step, then with that after it.
-            work = before + max(0.5 * (state.force_n + force) * (d1 - d0), 0.0)
+            work = earlier_j + max(0.5 * (state.force_n + force) * (d1 - d0), 0.0)
             force = _force(params, work, d1)
     return force, WornState(work, force)
 
 
 def _force(params: Worn, work_j: float, d: float) -> float:
-    before = math.exp(-params.earlier_j / params.wear_j)
-    after = before * math.exp(-work_j / params.wear_j)
-    pressed = d - params.set_m * (before - after)
-    left = 1.0 - min(params.softening, 1.0) * (1.0 - after)
+    strength = math.exp(-params.earlier_j / params.wear_j)
+    strength_now = strength * math.exp(-work_j / params.wear_j)
+    pressed = d - params.set_m * (strength - strength_now)
+    left = 1.0 - min(params.softening, 1.0) * (1.0 - strength_now)
     return left * shell_force(params.k1_n_m, params.k3_n_m3, pressed)
 
 
@@ -61,10 +61,10 @@ def dent(params: Worn) -> float:
     return params.set_m * (1.0 - math.exp(-params.earlier_j / params.wear_j))
 
 
-def rates(params: Worn, at: WorkingPoint) -> tuple[Rate, ...]:
+def rates(params: Worn, point: WorkingPoint) -> tuple[Rate, ...]:
     """Return the rate of wear: the work per second over `wear_j`."""
-    force, _ = worn(params, WornState(0.0, 0.0), 0.0, at.compression_m, 1.0, 0.0)
-    return (Rate("wears", max(force, 0.0) * at.speed_m_s / params.wear_j),)
+    force, _ = worn(params, WornState(0.0, 0.0), 0.0, point.compression_m, 1.0, 0.0)
+    return (Rate("wears", max(force, 0.0) * point.speed_m_s / params.wear_j),)
 
 
 def refusal(params: Worn) -> str:
