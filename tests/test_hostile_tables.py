@@ -332,7 +332,7 @@ def test_thousands_of_unknown_keys_are_told_in_a_few_lines(tmp_path):
 
 def test_merging_many_keys_takes_linear_time():
     merged = Merged()
-    layer = Layer.of({"table": {f"k{i}": i for i in range(20_000)}}, "file")
+    layer = Layer.without_file({"table": {f"k{i}": i for i in range(20_000)}}, "file")
     merged.add((), layer.values, layer)
     assert merged.owner_of(("table", "k7")) is layer
     merged.add((), {"table": 3}, layer)

@@ -419,7 +419,7 @@ class Finding:
     """What was examined."""
     state: Literal["ok", "note", "problem"] = field(validator=_a_state)
     """`ok`, `note` (not wrong, but worth knowing) or `problem`."""
-    found: str = field(validator=instance_of(str))
+    words: str = field(validator=instance_of(str))
     """What was found, in words."""
     advice: str = field(default="", validator=instance_of(str))
     """What to do about a problem."""

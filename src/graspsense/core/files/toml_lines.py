@@ -120,14 +120,14 @@ class _Scanner:
             self.at += 1
 
     def skip(self, pattern: re.Pattern[str]) -> str:
-        found = pattern.match(self.text, self.at)
-        assert found is not None, f"no TOML at character {self.at}"
-        self.at = found.end()
-        return found.group()
+        match = pattern.match(self.text, self.at)
+        assert match is not None, f"no TOML at character {self.at}"
+        self.at = match.end()
+        return match.group()
 
     def line(self) -> int:
-        before, count = self.counted
-        self.counted = (self.at, count + self.text.count("\n", before, self.at))
+        start, count = self.counted
+        self.counted = (self.at, count + self.text.count("\n", start, self.at))
         return self.counted[1]
 
 

@@ -453,9 +453,9 @@ class _Grasp:
         if self.stop_reason and not failed:
             return Outcome.RECOGNISED, self.stop_reason
         if self.state.law.outcome != RUNNING and failed:
-            before, unknown = ended_by_itself(0, self.state.law.outcome)
+            own_ending, unknown = ended_by_itself(0, self.state.law.outcome)
             if not unknown:
-                ending = ending[0], f"{ending[1]} (after the grasp had ended: {before.words})"
+                ending = ending[0], f"{ending[1]} (after the grasp had ended: {own_ending.words})"
         return ending
 
     def seconds(self) -> float:
@@ -551,12 +551,12 @@ class _Grasp:
         offers = type(self.backend).free_ticks is not SensorBackend.free_ticks
         return offers and self.info.harmless and self.info.clock == "virtual"
 
-    def _leap(self, phase: int, before: Reading, most: int) -> int:
+    def _leap(self, phase: int, reading: Reading, most: int) -> int:
         """Let the gripper run ticks of this phase at once, record and show them, and return their number.
 
         The cell image of all of them is that of the reading before.
         """
-        free = self.backend.free_ticks(self.params, self.state, before.frame, most)
+        free = self.backend.free_ticks(self.params, self.state, reading.frame, most)
         if free is None:
             return 0
         limited, self.state = free.state.guard.acted - self.state.guard.acted, free.state
@@ -567,7 +567,7 @@ class _Grasp:
         if self.sinks:
             sent = free.sent or (Command(EFFORT, effort_n, inf, inf) for effort_n in free.commands)
             for frame, command in zip(free.frames, sent, strict=True):
-                self._show(Reading(frame, before.pads), phase, command)
+                self._show(Reading(frame, reading.pads), phase, command)
         return free.n_ticks
 
     def _show(self, reading: Reading, phase: int, command: Command) -> None:
@@ -607,11 +607,11 @@ class _Grasp:
         phase = Phase(max(self.state.phase, Phase.OPENING))
         self._event(t_s, phase, f"{'fault' if fault.ends else 'warning'}: {fault.told}")
 
-    def _guard_event(self, frame: Frame, before: GuardState, now: GuardState) -> GuardState:
+    def _guard_event(self, frame: Frame, earlier: GuardState, now: GuardState) -> GuardState:
         """Log an action of the guard at its first time, and return its state."""
-        if now.stopped and not before.stopped:
+        if now.stopped and not earlier.stopped:
             self._event(frame.t_s, Phase(self.state.phase), "guard: the controller commanded NaN")
-        elif now.acted and not before.acted:
+        elif now.acted and not earlier.acted:
             self._event(frame.t_s, Phase(self.state.phase), "guard: a command was limited")
         return now
 

@@ -35,16 +35,16 @@ class SizeLimit:
             )
         return int(given)
 
-    def exceeded(self, found: int) -> str:
+    def exceeded(self, number: int) -> str:
         """Return in words that so many are too many, and how to raise the limit; an empty text if they are not.
 
         Raises ConfigError if the environment variable is malformed.
         """
         most = self.most
-        if found <= most:
+        if number <= most:
             return ""
         return (
-            f"{found} {self.what}, and at most {most} are accepted. If that many are intended, set the environment "
+            f"{number} {self.what}, and at most {most} are accepted. If that many are intended, set the environment "
             f"variable {self.variable} to a larger number"
         )
 

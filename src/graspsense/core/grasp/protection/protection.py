@@ -166,8 +166,8 @@ class Protection:
             return
         if phase == RELEASE and fault.ends and not fault.relaxes:
             fault = evolve(fault, ends=False)
-        before = self._told.get(fault.name)
-        if before is None or (fault.ends and not before.ends):
+        told = self._told.get(fault.name)
+        if told is None or (fault.ends and not told.ends):
             self._told[fault.name] = fault
             self._tell(fault)
         if fault.ends and self.ending is None:
