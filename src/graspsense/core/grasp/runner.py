@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from math import ceil, inf
-from typing import Any, Final, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, Final, Protocol, runtime_checkable
 
 from attrs import evolve, frozen
 
@@ -39,7 +39,6 @@ from graspsense.core.control.tick import (
 )
 from graspsense.core.grasp.interrupts import Interrupts
 from graspsense.core.grasp.losses import Losses, lost_in_words
-from graspsense.core.grasp.protection.protection import LIMITED, Protection
 from graspsense.core.values.channel import Channel
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import (
@@ -51,7 +50,7 @@ from graspsense.core.values.errors import (
     named,
 )
 from graspsense.core.values.events import EventSource, GraspEvent, event_name
-from graspsense.core.values.faults import Fault
+from graspsense.core.values.faults import LIMITED, Fault
 from graspsense.core.values.features import Prediction
 from graspsense.core.values.fingers import fingers_in_words, fingers_of
 from graspsense.core.values.signals import (
@@ -69,6 +68,9 @@ from graspsense.core.values.signals import (
     Reading,
 )
 from graspsense.core.values.trace import SI_UNITS, Trace, TraceRecorder
+
+if TYPE_CHECKING:
+    from graspsense.core.grasp.protection.protection import Protection
 
 Tell = Callable[[float, int, str, Prediction | None], None]
 """Called with the time, the phase, a sentence and the prediction; None where there is none, for the reason told."""
@@ -394,7 +396,7 @@ class _Grasp:
         self.controller, self.step = controller, type(controller).step
         self.event_names = type(controller).events
         self.params = tick_params(info, controller, run)
-        self.protection = None if info.harmless else Protection(info, controller, run, self._fault_seen)
+        self.protection = None if info.harmless else self._protection()
         self.delivered = Delivered(info.channels)
         # The times of a recording are those of its own devices.
         self.losses = Losses(info.rate_hz) if info.opening is not None else None
@@ -405,6 +407,12 @@ class _Grasp:
         self.failed_sinks: list[str] = []
         self.first_t_s: float | None = None
         self.last: Frame | None = None
+
+    def _protection(self) -> Protection:
+        # Imported here: a pure model, as most grasps are of, needs none.
+        from graspsense.core.grasp.protection.protection import Protection
+
+        return Protection(self.info, self.controller, self.run, self._fault_seen)
 
     def watch_with(self, watcher: Watcher) -> None:
         """Let this watcher see the ticks from the contact on."""

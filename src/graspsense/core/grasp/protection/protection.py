@@ -28,7 +28,7 @@ from graspsense.core.grasp.protection.status import StatusWatch
 from graspsense.core.grasp.protection.stuck_force import StuckForce
 from graspsense.core.grasp.protection.touch import Touch
 from graspsense.core.values.device import DeviceInfo
-from graspsense.core.values.faults import Fault
+from graspsense.core.values.faults import LIMITED, Fault
 from graspsense.core.values.signals import (
     APPROACH,
     EFFORT,
@@ -42,8 +42,6 @@ from graspsense.core.values.signals import (
 )
 
 RELEASE: Final = int(Phase.RELEASE)
-LIMITED: Final = "squeeze limited"
-"""The warning of a squeeze that is not the one that the controller commanded."""
 
 
 class Protection:
