@@ -27,7 +27,7 @@ from graspsense.core.components.config import (
     toml_value,
 )
 from graspsense.core.components.registry import IsolatedPlugins
-from graspsense.core.files.toml_lines import key_lines
+from graspsense.core.files.toml_text import key_lines
 from graspsense.core.values.errors import ConfigError, UnknownName
 
 PARTS = """

@@ -13,8 +13,7 @@ _TABLE: Final[Table] = {
     "Declaring kinds of experiments": {
         "core.components.entries": ("ExperimentKindEntry", "ExperimentEntry"),
         "experiments.experiment": ("ExperimentCase",),
-        "core.components.figure_origins": ("ORIGINS",),
-        "core.components.setting": ("fitted_defaults",),
+        "core.components.setting": ("ORIGINS", "fitted_defaults"),
         "core.components.config": ("settings_from",),
         "core.components.strict": ("structured",),
     },

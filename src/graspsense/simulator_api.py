@@ -27,7 +27,7 @@ _TABLE: Final[Table] = {
         "core.components.registry": ("collect",),
     },
     "Where figures come from": {
-        "core.components.figure_origins": ("fitted_results", "given_claims", "gives"),
+        "core.components.setting": ("fitted_results", "given_claims", "gives"),
     },
     "Identifying an object from recorded squeezes": {
         "core.components.entries": ("IdentifierEntry",),

@@ -40,7 +40,7 @@ from graspsense.core.components.strict import (
     shown,
     structured,
 )
-from graspsense.core.files.toml_lines import KeyPath
+from graspsense.core.files.toml_text import KeyPath
 from graspsense.core.values.errors import ConfigError, PluginUnavailable, UnknownName
 
 if TYPE_CHECKING:

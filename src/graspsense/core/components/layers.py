@@ -16,8 +16,7 @@ from graspsense.core.components.registry import Plugins
 from graspsense.core.components.strict import InvalidValue, shown
 from graspsense.core.components.toml_kinds import KINDS, refuse_other_kind
 from graspsense.core.files.regular_file import first_bytes
-from graspsense.core.files.toml_lines import KeyPath, key_lines
-from graspsense.core.files.toml_text import TomlError, toml_values
+from graspsense.core.files.toml_text import KeyPath, TomlError, key_lines, toml_values
 from graspsense.core.values.errors import ConfigError, UnknownName
 from graspsense.core.values.limits import SETTINGS_BYTES
 

@@ -20,8 +20,7 @@ from attrs import frozen
 
 from graspsense.core.components.nearest_key import did_you_mean
 from graspsense.core.components.setting import declared, implausible
-from graspsense.core.files.toml_lines import KeyPath
-from graspsense.core.files.toml_text import LARGEST_INTEGER
+from graspsense.core.files.toml_text import LARGEST_INTEGER, KeyPath
 from graspsense.core.values.errors import FAILURES, suggestion
 
 ConfigT = TypeVar("ConfigT")

@@ -22,8 +22,7 @@ from graspsense.core.components.run_config import RunConfig
 from graspsense.core.control.binding import bind, maker
 from graspsense.core.control.contact import RestState, at_rest, update_rest
 from graspsense.core.control.garbage_collection import no_collection
-from graspsense.core.control.guard import GuardParams, GuardState, guard
-from graspsense.core.control.plain_command import with_plain_commands
+from graspsense.core.control.guard import GuardParams, GuardState, guard, with_plain_commands
 from graspsense.core.control.tick import (
     OPEN_SPEED_M_S,
     OPEN_WINDOW_S,

@@ -65,21 +65,3 @@ RECORDINGS: Final = SizeLimit("GRASPSENSE_MAX_RECORDINGS", 20_000, "recordings o
 CLASSES: Final = SizeLimit("GRASPSENSE_MAX_CLASSES", 100, "different labels")
 FEATURES: Final = SizeLimit("GRASPSENSE_MAX_FEATURES", 5000, "features of a trial")
 CHECKPOINTS: Final = SizeLimit("GRASPSENSE_MAX_CHECKPOINTS", 100, "checkpoints of a grasp")
-
-LIMITS: Final = (
-    TEXT_BYTES,
-    LINE_CHARACTERS,
-    COLUMNS,
-    CELLS,
-    SAMPLES,
-    SETTINGS_BYTES,
-    CHANNEL_NUMBERS,
-    ENTRIES,
-    MODEL_BYTES,
-    CASES,
-    RECORDINGS,
-    CLASSES,
-    FEATURES,
-    CHECKPOINTS,
-)
-"""All limits on text files, tables, settings and training data."""

@@ -31,6 +31,7 @@ from graspsense.plugins.features.contact_curve import (
     contact_curve,
     first_crossing,
     samples_of,
+    units_in,
     without_gap,
 )
 from graspsense.plugins.features.contact_threshold import ContactThreshold
@@ -212,7 +213,7 @@ class CurveFeatures(FeatureSet[CurveConfig]):
         features = Features(
             names=NAMES,
             values=tuple(measured.values.get(name, float("nan")) for name in NAMES),
-            units=_units(trace),
+            units=units_in(trace, _FEATURES),
             reasons=measured.reasons,
         )
         return without_gap(trace, features, OF_GAP)
@@ -394,11 +395,3 @@ class _Loading:
     force: Floats
     peak_n: float
     end_s: float
-
-
-def _units(trace: Trace) -> tuple[str, ...]:
-    """Return the units of the features, given those of the trace: a recording can count time in frames."""
-    t, gap, force = trace.units["t"], trace.units["gap"], trace.units["force_left"]
-    joule = "J" if (gap, force) == ("m", "N") else f"{force} {gap}"
-    unit_of = {"m": gap, "N": force, "s": t, "J": joule, "N/m": f"{force}/{gap}", "1": "1"}
-    return tuple(unit_of[feature.unit] for feature in _FEATURES)

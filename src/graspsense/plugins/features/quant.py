@@ -22,6 +22,7 @@ from attrs import frozen
 
 from graspsense.gripper_api import NO_GAP
 from graspsense.plugin_api import APPROACH, Channel, Feature, Features, FeatureSet
+from graspsense.plugins.features.contact_curve import units_in
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -141,7 +142,7 @@ class QuantFeatures(FeatureSet[QuantConfig]):
             quantiles[lost] = np.nan
             reasons |= {own[i]: why for i in np.flatnonzero(lost).tolist()}
             values += quantiles.tolist()
-        return Features(names=names, values=tuple(values), units=_units(trace), reasons=reasons)
+        return Features(names=names, values=tuple(values), units=units_in(trace, _FEATURES), reasons=reasons)
 
 
 def interval_quantiles(series: Floats, step_s: float = 1.0) -> Floats:
@@ -188,12 +189,3 @@ def _samples(trace: Trace) -> tuple[Floats, tuple[Floats, Floats, Floats]]:
     ticks = ticks[later]
     left, right = trace.force_left_n[ticks], trace.force_right_n[ticks]
     return trace.t_s[ticks], (trace.gap_m[ticks], np.fmax(left, right), np.fmin(left, right))
-
-
-def _units(trace: Trace) -> tuple[str, ...]:
-    """Return the units of the features, given those of the trace."""
-    t, gap, force = trace.units["t"], trace.units["gap"], trace.units["force_left"]
-    unit_of = {"s": t}
-    for unit, own in (("m", gap), ("N", force)):
-        unit_of |= {unit: own, f"{unit}/s": f"{own}/{t}", f"{unit}/s2": f"{own}/{t}2"}
-    return tuple(unit_of[feature.unit] for feature in _FEATURES)

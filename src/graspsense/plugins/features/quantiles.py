@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from graspsense.plugin_api import Channel, Feature, Features, FeatureSet, missing
-from graspsense.plugins.features.contact_curve import contact_curve, samples_of, without_gap
+from graspsense.plugins.features.contact_curve import contact_curve, samples_of, units_in, without_gap
 from graspsense.plugins.features.contact_threshold import ContactThreshold
 
 if TYPE_CHECKING:
@@ -95,7 +95,7 @@ class QuantileFeatures(FeatureSet[ContactThreshold]):
         features = Features(
             names=tuple(feature.name for feature in self.features),
             values=(*values, *absent),
-            units=_units(trace),
+            units=units_in(trace, self.features),
             reasons=reasons,
         )
         return without_gap(trace, features, _OF_GAP)
@@ -129,10 +129,3 @@ def _quantiles(samples: CurveSamples, start_s: float, end_s: float) -> Floats:
     ]
     result: Floats = np.concatenate(parts)
     return result
-
-
-def _units(trace: Trace) -> tuple[str, ...]:
-    """Return the units of the features, given those of the trace: a recording can count time in frames."""
-    t, gap, force = trace.units["t"], trace.units["gap"], trace.units["force_left"]
-    unit_of = {"m": gap, "N": force, "s": t, "m/s": f"{gap}/{t}", "N/s": f"{force}/{t}"}
-    return tuple(unit_of[feature.unit] for feature in (*_CONTACT, *_QUANTILES))
