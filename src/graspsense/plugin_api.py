@@ -114,7 +114,3 @@ def __getattr__(name: str) -> Any:
 
         refuse_moved(name)
     return PUBLIC.load(name)
-
-
-def __dir__() -> list[str]:
-    return __all__

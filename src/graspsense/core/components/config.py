@@ -320,21 +320,18 @@ def _follow(
     return frozenset(given)
 
 
-def without_followers(
-    values: Mapping[str, Mapping[str, Any]], plugins: Plugins | None = None
-) -> dict[str, dict[str, Any]]:
+def without_followers(values: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
     """Return complete tables without the keys that follow another one and have its value.
 
     Settings that are resolved from these tables and an option for the key that is followed are consistent again.
     """
-    plugins = installed() if plugins is None else plugins
     kept = {table: dict(keys) for table, keys in values.items()}
     for table, keys in kept.items():
         role, name = _ROLE_OF_TABLE.get(table), keys.get("type")
         if role is None or not isinstance(name, str):
             continue
         with suppress(UnknownName, PluginUnavailable):
-            for key, path in followed_settings(plugins.find(role, name).config_class()).items():
+            for key, path in followed_settings(installed().find(role, name).config_class()).items():
                 owner, _, followed_key = path.partition(".")
                 if key in keys and values.get(owner, {}).get(followed_key) == keys[key]:
                     del keys[key]

@@ -603,13 +603,12 @@ def write_json_lines(path: Path, content: Mapping[str, Any]) -> None:
     write_whole(path, ("{\n" + ",\n".join(lines) + "\n}\n").encode())
 
 
-def load_model(name: str, plugins: Plugins, component: Component | None = None) -> Model:
+def load_model(name: str, plugins: Plugins) -> Model:
     """Return a model from a `.json` file, or by the name of a model that a plugin ships.
 
-    `component` is the classifier that the pipeline selects, if any. Raises ConfigError if the file is missing or
-    another classifier made it, DataDamaged if its content is not a model.
+    Raises ConfigError if the file is missing, DataDamaged if its content is not a model.
     """
-    return _model_from(_text(name, plugins), name, plugins, component)
+    return _model_from(_text(name, plugins), name, plugins, None)
 
 
 @lru_cache(maxsize=MODELS_KEPT)
