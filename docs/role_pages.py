@@ -565,7 +565,8 @@ def _text(thing: Any) -> str:
 
 def _entry(cls: Any) -> list[str]:
     lines = ["| field | type | default | meaning |", "|---|---|---|---|"]
-    body = ast.parse(inspect.getsource(cls)).body[0].body  # type: ignore[attr-defined]
+    sources = [ast.parse(inspect.getsource(base)) for base in reversed(cls.__mro__[:-1])]
+    body = [node for source in sources for node in source.body[0].body]  # type: ignore[attr-defined]
     meanings = {
         ast.unparse(one.target): " ".join(ast.literal_eval(text.value).split())
         for one, text in pairwise(body)

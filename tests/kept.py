@@ -112,4 +112,4 @@ def keep(
     record = evolve(record, labels={**record.labels, **(labels or {})})
     path = store.new_recording(record.made_at)
     write_recording(path, ticks, record, grasp=grasp)
-    return store.add(record, RecordingInfo.of(path, ticks, 3), complete=complete)
+    return store.add(record, RecordingInfo.hashed(path, ticks, 3), complete=complete)

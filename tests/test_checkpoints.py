@@ -18,7 +18,6 @@ from graspsense.core.learn.checkpoints import (
     contact_of,
     reaches,
     split_checkpoints,
-    until_checkpoint,
     used,
 )
 from graspsense.core.learn.labelled import Labelled
@@ -117,7 +116,7 @@ def test_the_features_of_a_checkpoint_are_those_of_the_trace_up_to_it(traces, tr
     part = split_checkpoints(trials, CHECKPOINTS)[1]
     assert part.after_s == 0.05
     for k, (_, trace) in enumerate(traces):
-        cut = until_checkpoint(trace, contact_of(trace), 0.05)
+        cut = trace.until(contact_of(trace) + 0.05)
         assert cut.phase.max() < Phase.RELEASE
         assert np.array_equal(part.labelled.table.values[k], curve().extract(cut).values, equal_nan=True)
         assert part.used_s[k] == pytest.approx(0.05, abs=0.0011)
@@ -148,7 +147,7 @@ def test_predictions_in_the_loop_are_those_of_the_same_part_afterwards(model, tm
     assert [prediction.after_s for prediction in anytime.predictions] == list(CHECKPOINTS)
     contact = contact_of(grasp.trace)
     for (after_s, part), made in zip(model.checkpoints, anytime.predictions, strict=True):
-        features = curve().extract(until_checkpoint(grasp.trace, contact, after_s))
+        features = curve().extract(grasp.trace.until(contact + after_s))
         assert made.features.values == pytest.approx(features.values, nan_ok=True, rel=1e-12)
         assert made.prediction.label == part.predict(features).label
     told = [event.what for event in grasp.events if event.source == "model"]

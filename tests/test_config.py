@@ -27,7 +27,7 @@ from graspsense.core.components.config import (
     toml_value,
 )
 from graspsense.core.components.registry import IsolatedPlugins
-from graspsense.core.files.toml_lines import key_lines
+from graspsense.core.files.toml_text import key_lines
 from graspsense.core.values.errors import ConfigError, UnknownName
 
 PARTS = """
@@ -191,7 +191,7 @@ def test_every_leaf_has_an_origin_and_every_origin_a_leaf(plugins, write):
 
 
 def test_an_experiment_lies_between_the_file_and_the_options(plugins, write):
-    layer = Layer.of({"controller": {"force_n": 15, "speed_m_s": 0.5}}, "experiment paper")
+    layer = Layer.without_file({"controller": {"force_n": 15, "speed_m_s": 0.5}}, "experiment paper")
 
     settings = resolve(write(BASE), experiment=layer, options=["controller.speed_m_s=0.25"])
 

@@ -9,8 +9,8 @@ import sys
 import pytest
 
 from graspsense.cli.plugins import _rows
-from graspsense.core.components.disabling import config_file, disabled_in_config, write_disabled
 from graspsense.core.components.registry import Plugins, builtin_source, installed_sources
+from graspsense.core.components.registry.discovery import config_file, disabled_in_config, write_disabled
 from graspsense.core.values.errors import ConfigError
 
 FEATURES = """

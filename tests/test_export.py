@@ -193,7 +193,7 @@ def a_store_of_everything(folder):
         alone = evolve(first, result=evolve(first.result, features=FeatureValues(**other)))
         path = store.new_recording(first.made_at)
         write_recording(path, 5, alone)
-        store.add(alone, RecordingInfo.of(path, 5, 1))
+        store.add(alone, RecordingInfo.hashed(path, 5, 1))
         for k in range(24):
             label, origin = ("can:full", "can:empty")[k % 2], ("import", "collect")[k % 3 == 0]
             keep(store, label, f"can#{k // 2}", values=(0.05 + 0.001 * k, (k * 7) % 5 + k % 2), origin=origin, ticks=9,

@@ -237,7 +237,7 @@ def test_hook_graspsense_diagnose():
 
     assert (failed.findings, failed.error) == ((), "PermissionError: cannot list the bus")
     assert (found.findings[0].state, found.findings[0].numbers) == ("problem", {"baud": 115200})
-    assert told.findings[0].found == "these settings for 0.25 s"
+    assert told.findings[0].words == "these settings for 0.25 s"
 
 
 def test_a_finding_is_in_one_of_three_states():
@@ -267,10 +267,10 @@ def test_hook_graspsense_probe_devices():
 
     failed, found, timed = plugins.probe_devices(0.25)
 
-    assert (failed.distribution, failed.found) == ("lab-a", ())
+    assert (failed.distribution, failed.devices) == ("lab-a", ())
     assert failed.error == "PermissionError: cannot list the bus"
-    assert (found.error, found.found[0].advice) == ("", "add yourself to the group dialout")
-    assert timed.found[0].serial == "0.25"
+    assert (found.error, found.devices[0].advice) == ("", "add yourself to the group dialout")
+    assert timed.devices[0].serial == "0.25"
 
 
 def test_a_probe_that_gives_something_else_is_reported_as_failed():

@@ -33,7 +33,7 @@ def settings(*options):
 
 
 def test_a_pose_is_in_metres_and_radians_whatever_it_was_written_in():
-    assert Mounting.of(THUMB) == Mounting(
+    assert Mounting.parse(THUMB) == Mounting(
         position_m=(0.0, 0.02, 0.095), rpy_rad=(0.0, 0.0, pi / 2), parent="tool"
     )
 
@@ -55,7 +55,7 @@ def test_the_mounting_of_the_settings_is_kept_with_the_trial_replayed_and_export
     replayed = grasp_with(settings("gripper.type=replay", f"gripper.recording={path}"), installed())
     WRITERS[".csv"](tmp_path / "grasp.csv", recorded)
 
-    wanted = {"tool": Mounting.of(TOOL), "thumb": Mounting.of(THUMB)}
+    wanted = {"tool": Mounting.parse(TOOL), "thumb": Mounting.parse(THUMB)}
     assert trial.device.mounting == recorded.device.mounting == wanted
     assert replayed.device.mounting == wanted
     assert read_exported(str(tmp_path / "grasp.csv")).mounting == wanted
@@ -72,7 +72,7 @@ def test_the_settings_add_to_the_mounting_that_a_gripper_declares():
 
     grasp = run_grasp(gripper, chosen.controller.create(), chosen.run)
 
-    assert grasp.device.mounting == {"palm": palm, "tool": Mounting.of(TOOL)}
+    assert grasp.device.mounting == {"palm": palm, "tool": Mounting.parse(TOOL)}
 
 
 def test_a_trial_without_a_mounting_is_stored_as_before_there_was_one():

@@ -11,13 +11,11 @@ from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.protection.cells import Fingertips
 from graspsense.core.grasp.protection.drift import PadDrift
 from graspsense.core.grasp.protection.effort_ceiling import effort_ceiling_n, limited
-from graspsense.core.grasp.protection.felt_force import FeltForce
-from graspsense.core.grasp.protection.free_effort import FreeEffort
-from graspsense.core.grasp.protection.gap_speed import GapSpeed
-from graspsense.core.grasp.protection.motor import Motor
+from graspsense.core.grasp.protection.motor import FeltForce, FreeEffort, Motor
+from graspsense.core.grasp.protection.pad_forces import StuckForce
 from graspsense.core.grasp.protection.reports import Reports
+from graspsense.core.grasp.protection.speed import GapSpeed
 from graspsense.core.grasp.protection.status import StatusWatch
-from graspsense.core.grasp.protection.stuck_force import StuckForce
 from graspsense.core.grasp.protection.touch import Touch
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.faults import StatusBit

@@ -310,7 +310,7 @@ def test_the_warnings_of_a_trial_are_on_its_page(tmp_path):
         result = evolve(record.result, details={"warnings": ["left fingertip stuck: check its cable"]})
         path = store.new_recording(record.made_at)
         kept.write_recording(path, 120, evolve(record, result=result))
-        store.add(evolve(record, result=result), RecordingInfo.of(path, 120, 3), complete=True)
+        store.add(evolve(record, result=result), RecordingInfo.hashed(path, 120, 3), complete=True)
     page = store_page(str(tmp_path / "trials")).html()
 
     assert '<ul class="warning"><li>left fingertip stuck: check its cable</li></ul>' in page

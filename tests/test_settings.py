@@ -248,6 +248,8 @@ def test_a_recorded_threshold_follows_an_option_too():
     recorded = without_followers(resolve(options=["controller.contact_force_n=1.25"]).values)
     assert "contact_force_n" not in recorded["features"]
     again = resolve(
-        experiment=Layer.of(recorded, "a recording"), options=["controller.contact_force_n=0.25"], force=True
+        experiment=Layer.without_file(recorded, "a recording"),
+        options=["controller.contact_force_n=0.25"],
+        force=True,
     )
     assert again.values["features"]["contact_force_n"] == 0.25

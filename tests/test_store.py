@@ -54,12 +54,9 @@ def test_numbers_are_kept_to_the_last_bit(store):
 
 def test_a_page_holds_the_newest_that_fit_newest_first(store):
     for k in range(7):
-        keep(store, "can:full_open" if k % 2 else "can:empty_open", outcome="slipped" if k == 4 else "steady")
+        keep(store, "can:full_open" if k % 2 else "can:empty_open")
     assert [one.id for one in store.page(limit=3)] == [7, 6, 5]
-    assert [one.id for one in store.page(limit=3, before=5)] == [4, 3, 2]
     assert [one.id for one in store.page(label="can:empty_open")] == [7, 5, 3, 1]
-    assert [one.id for one in store.page(outcome="slipped")] == [5]
-    assert store.page(since="2027-01-01") == []
 
 
 def test_what_is_set_aside_stays_but_does_not_count(store):
@@ -76,7 +73,7 @@ def test_only_complete_grasps_that_ended_by_themselves_count(store):
         keep(store, outcome=outcome)
     path = store.new_recording(ended().made_at)
     write_recording(path, 5, ended())
-    store.add(ended(), RecordingInfo.of(path, 5, 1), complete=False)
+    store.add(ended(), RecordingInfo.hashed(path, 5, 1), complete=False)
     assert store.counts() == {("can:full_open", None): 2}
 
 
@@ -120,7 +117,7 @@ def test_writers_wait_for_one_another(store):
 def test_a_recording_gets_one_row_whoever_writes_it(store):
     path = store.new_recording(ended().made_at)
     write_recording(path, 5, ended())
-    info = RecordingInfo.of(path, 5, 1)
+    info = RecordingInfo.hashed(path, 5, 1)
     assert store.add(ended(), info) == store.add(ended(), info) == 1
     assert len(store.page()) == 1
 

@@ -71,7 +71,7 @@ def test_a_label_is_restored_as_it_was_recorded_also_none(store):
     assert graspsense("trials", "relabel", f"{store.folder}#1", f"{store.folder}#2", "--as-recorded")[0] == 0
 
     assert [store.trial(number).record for number in (1, 2)] == before
-    assert [(change.before, change.after) for change in changes.history(store, 2)] == [
+    assert [(change.old, change.new) for change in changes.history(store, 2)] == [
         (None, "toy"),
         ("toy", "can:empty_open#9"),
         ("can:empty_open#9", None),

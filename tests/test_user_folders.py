@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from graspsense.core.components.disabling import disabled_in_config, write_disabled
+from graspsense.core.components.registry.discovery import disabled_in_config, write_disabled
 from graspsense.core.files.user_folders import cache_folder, config_folder, data_folder
 from graspsense.core.grasp.calibration_files import calibration_path, calibrations_of
 from graspsense.core.values.errors import ConfigError

@@ -5,7 +5,7 @@ These are the names for users. A name is imported when it is first used; importi
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Final
 
 from graspsense.core.components.lazy_names import LazyNames
 from graspsense.core.values.display import drawn_by
@@ -45,11 +45,3 @@ PUBLIC: Final = LazyNames(
 )
 
 __all__ = ["__version__", *PUBLIC.names]
-
-
-def __getattr__(name: str) -> Any:
-    return PUBLIC.load(name)
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)

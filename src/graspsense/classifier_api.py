@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Final
 
 from graspsense.core.components.lazy_names import LazyNames, Table
 
@@ -33,11 +33,3 @@ _TABLE: Final[Table] = {
 PUBLIC: Final = LazyNames("graspsense.classifier_api", _TABLE)
 
 __all__ = PUBLIC.names
-
-
-def __getattr__(name: str) -> Any:
-    return PUBLIC.load(name)
-
-
-def __dir__() -> list[str]:
-    return __all__

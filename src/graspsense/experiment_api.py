@@ -5,7 +5,7 @@ A kind computes its tasks from a source of trials, and reports a `Summary` of th
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Final
 
 from graspsense.core.components.lazy_names import LazyNames, Table
 
@@ -13,8 +13,7 @@ _TABLE: Final[Table] = {
     "Declaring kinds of experiments": {
         "core.components.entries": ("ExperimentKindEntry", "ExperimentEntry"),
         "experiments.experiment": ("ExperimentCase",),
-        "core.components.figure_origins": ("ORIGINS",),
-        "core.components.setting": ("fitted_defaults",),
+        "core.components.setting": ("ORIGINS", "fitted_defaults"),
         "core.components.config": ("settings_from",),
         "core.components.strict": ("structured",),
     },
@@ -56,11 +55,3 @@ _TABLE: Final[Table] = {
 PUBLIC: Final = LazyNames("graspsense.experiment_api", _TABLE)
 
 __all__ = PUBLIC.names
-
-
-def __getattr__(name: str) -> Any:
-    return PUBLIC.load(name)
-
-
-def __dir__() -> list[str]:
-    return __all__

@@ -13,7 +13,6 @@ from __future__ import annotations
 from typing import Any, Final
 
 from graspsense.core.components.lazy_names import LazyNames, Table
-from graspsense.core.components.moved_names import refuse_moved
 
 _TABLE: Final[Table] = {
     "Declaring what a plugin brings": {
@@ -109,10 +108,9 @@ __all__ = PUBLIC.names
 
 
 def __getattr__(name: str) -> Any:
-    if name not in PUBLIC.names:
+    # An import statement asks for __path__, of a module that is no package too.
+    if name not in PUBLIC.names and not name.startswith("__"):
+        from graspsense.core.components.moved_names import refuse_moved
+
         refuse_moved(name)
     return PUBLIC.load(name)
-
-
-def __dir__() -> list[str]:
-    return __all__

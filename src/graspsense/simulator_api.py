@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Final
 
 from graspsense.core.components.lazy_names import LazyNames, Table
 
@@ -27,7 +27,7 @@ _TABLE: Final[Table] = {
         "core.components.registry": ("collect",),
     },
     "Where figures come from": {
-        "core.components.figure_origins": ("fitted_results", "given_claims", "gives"),
+        "core.components.setting": ("fitted_results", "given_claims", "gives"),
     },
     "Identifying an object from recorded squeezes": {
         "core.components.entries": ("IdentifierEntry",),
@@ -95,11 +95,3 @@ _TABLE: Final[Table] = {
 PUBLIC: Final = LazyNames("graspsense.simulator_api", _TABLE)
 
 __all__ = PUBLIC.names
-
-
-def __getattr__(name: str) -> Any:
-    return PUBLIC.load(name)
-
-
-def __dir__() -> list[str]:
-    return __all__

@@ -26,9 +26,9 @@ from graspsense.core.components.entries import ConformanceCheckEntry as Conforma
 from graspsense.core.components.registry import collect as collect
 
 # Where figures come from
-from graspsense.core.components.figure_origins import fitted_results as fitted_results
-from graspsense.core.components.figure_origins import given_claims as given_claims
-from graspsense.core.components.figure_origins import gives as gives
+from graspsense.core.components.setting import fitted_results as fitted_results
+from graspsense.core.components.setting import given_claims as given_claims
+from graspsense.core.components.setting import gives as gives
 
 # Identifying an object from recorded squeezes
 from graspsense.core.components.entries import IdentifierEntry as IdentifierEntry

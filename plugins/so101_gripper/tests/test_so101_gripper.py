@@ -329,7 +329,7 @@ def test_doctor_tells_the_gripper_from_another_motor_from_a_silent_bus_and_from_
         finding = next(iter(diagnose(config, PATIENT_S)))
         found[port, motor] = finding.state
         if motor == 9:
-            assert "answer: 1, 2, 3, 4, 5, 6" in finding.found
+            assert "answer: 1, 2, 3, 4, 5, 6" in finding.words
     assert list(found.values()) == ["ok", "problem", "problem", "problem"]
     assert not arm.state()["torque"]
 

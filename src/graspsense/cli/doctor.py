@@ -135,7 +135,10 @@ def _as_json(diagnosis: Diagnosis) -> dict[str, Any]:
     return {
         "distribution": diagnosis.distribution,
         "error": diagnosis.error,
-        "findings": [attrs.asdict(finding) for finding in diagnosis.findings],
+        "findings": [
+            {"found" if name == "words" else name: value for name, value in attrs.asdict(finding).items()}
+            for finding in diagnosis.findings
+        ],
     }
 
 
@@ -145,7 +148,7 @@ def _print(diagnosis: Diagnosis) -> None:
         echo_entry("  PROBLEM", f"could not look: {diagnosis.error}", Style.BAD, width=_MARK)
     for finding in diagnosis.findings:
         style = None if finding.state == "ok" else state_style(finding.state)
-        echo_entry(f"  {MARKS[finding.state]}", f"{finding.subject}: {finding.found}", style, width=_MARK)
+        echo_entry(f"  {MARKS[finding.state]}", f"{finding.subject}: {finding.words}", style, width=_MARK)
         if finding.state != "ok" and finding.advice:
             if "\n" in finding.advice:
                 for line in filter(None, finding.advice.split("\n")):

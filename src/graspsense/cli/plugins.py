@@ -214,9 +214,9 @@ def _write_gripper_file(name: str, roles: tuple[str, ...], folder: Path, model: 
 @click.argument("distribution")
 def disable(distribution: str) -> None:
     """Switch the plugins of a distribution off: they are no longer imported."""
-    from graspsense.core.components.disabling import disabled_in_config, write_disabled
     from graspsense.core.components.firstparty import DISTRIBUTION
     from graspsense.core.components.registry import canonical, installed_sources
+    from graspsense.core.components.registry.discovery import disabled_in_config, write_disabled
     from graspsense.core.values.errors import UnknownName, suggestion
 
     name = canonical(distribution)
@@ -234,8 +234,8 @@ def disable(distribution: str) -> None:
 @click.argument("distribution")
 def enable(distribution: str) -> None:
     """Switch the plugins of a distribution on again."""
-    from graspsense.core.components.disabling import disabled_in_config, write_disabled
     from graspsense.core.components.registry import canonical
+    from graspsense.core.components.registry.discovery import disabled_in_config, write_disabled
     from graspsense.core.values.errors import UnknownName
 
     name, names = canonical(distribution), {canonical(one) for one in disabled_in_config()}

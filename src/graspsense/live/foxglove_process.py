@@ -120,7 +120,7 @@ class FoxgloveViewer:
     def on_subscribe(self, client: Any, channel: Any) -> None:
         """Send what there is of a topic, and from now on what comes."""
         with self._grasp.lock:
-            number = [one.id() for one in self._channels].index(channel.id)
+            number = [known.id() for known in self._channels].index(channel.id)
             for message in self._grasp.history:
                 if message[0] == number:
                     self._log(message)
@@ -129,7 +129,7 @@ class FoxgloveViewer:
     def on_unsubscribe(self, client: Any, channel: Any) -> None:
         """Send no more of a topic."""
         with self._grasp.lock:
-            self._subscribed.discard([one.id() for one in self._channels].index(channel.id))
+            self._subscribed.discard([known.id() for known in self._channels].index(channel.id))
 
     def take(self, message: Logged) -> None:
         """Send a message if its topic is subscribed to."""
@@ -211,8 +211,8 @@ class Gate:
     async def _shake(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         with suppress(*LOST):
             async with asyncio.timeout(SHAKE_TIMEOUT_S):
-                first, headers = _head(await reader.readuntil(b"\r\n\r\n"))
-            refusal = self._refusal(first, headers)
+                request, headers = _head(await reader.readuntil(b"\r\n\r\n"))
+            refusal = self._refusal(request, headers)
             if refusal is not None:
                 status, reason = refusal
                 text = f"HTTP/1.1 {status.value} {status.phrase}\r\nContent-Type: text/plain\r\n"
@@ -230,10 +230,10 @@ class Gate:
                 # It waits until its connection has ended, which this loop has to see.
                 await asyncio.to_thread(viewer.server.stop)
 
-    def _refusal(self, first: Sequence[str], headers: Message) -> Refusal | None:
-        if len(first) != 3 or first[0] != "GET":
+    def _refusal(self, request: Sequence[str], headers: Message) -> Refusal | None:
+        if len(request) != 3 or request[0] != "GET":
             return HTTPStatus.BAD_REQUEST, "this is an address for Foxglove\n"
-        refusal = self.address.refusal(first[1].strip("/"), headers)
+        refusal = self.address.refusal(request[1].strip("/"), headers)
         if refusal is not None:
             return refusal
         if _protocol(headers) is None or not _KEY.fullmatch(headers.get("Sec-WebSocket-Key", "")):
@@ -260,8 +260,8 @@ class Gate:
 
 def _head(data: bytes) -> tuple[list[str], Message]:
     """Return the words of the first line of a head of HTTP, and its headers. Raises HTTPException for other data."""
-    line, _, rest = data.partition(b"\r\n")
-    return line.decode("latin-1").split(" "), parse_headers(BytesIO(rest))
+    line, _, header_lines = data.partition(b"\r\n")
+    return line.decode("latin-1").split(" "), parse_headers(BytesIO(header_lines))
 
 
 def _protocol(headers: Message) -> str | None:

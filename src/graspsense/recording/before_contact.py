@@ -68,15 +68,15 @@ def before_contact_compiled(contact_force_n: float) -> CompiledExtraction:
 
 def measure(params: tuple[float], ticks: TickColumns) -> Before:
     """Return what `before_contact` measures, from the columns of a grasp; it can be compiled."""
-    n, first = len(ticks.phase), 0
-    while first < n and ticks.phase[first] != APPROACH:
-        first += 1
-    if first == n:
+    n, start = len(ticks.phase), 0
+    while start < n and ticks.phase[start] != APPROACH:
+        start += 1
+    if start == n:
         return Before(NO_APPROACH, math.nan, math.nan, math.nan, math.nan, math.nan)
     last = n - 1
     while ticks.phase[last] != APPROACH:
         last -= 1
-    start_s = ticks.t_s[first]
+    start_s = ticks.t_s[start]
     if ticks.t_s[last] < start_s + SPAN_S:
         return Before(SHORT, math.nan, math.nan, math.nan, math.nan, math.nan)
     count, velocity, effort, left, right = 0, 0.0, 0.0, 0.0, 0.0
@@ -91,7 +91,7 @@ def measure(params: tuple[float], ticks: TickColumns) -> Before:
             effort += ticks.effort_n[i]
             left += ticks.force_left_n[i]
             right += ticks.force_right_n[i]
-    return Before(FREE, ticks.gap_m[first], velocity / count, effort / count, left / count, right / count)
+    return Before(FREE, ticks.gap_m[start], velocity / count, effort / count, left / count, right / count)
 
 
 def _seen(trace: Trace, contact_force_n: float) -> Before:
@@ -113,8 +113,8 @@ def _seen(trace: Trace, contact_force_n: float) -> Before:
     return Before(FREE, float(trace.gap_m[span[0]]), *means)
 
 
-def _features(before: Any) -> Features:
-    seen, *values = before
+def _features(measured: Any) -> Features:
+    seen, *values = measured
     if seen != FREE:
         return _missing(_WHY_MISSING[seen])
     lacking = [name for name, value in zip(NAMES, values, strict=True) if math.isnan(value)]

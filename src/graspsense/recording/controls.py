@@ -72,31 +72,31 @@ def controls(
     )
 
 
-def without_constant_gap(found: Controls, gaps: Iterable[Iterable[float]]) -> Controls:
+def without_constant_gap(known_controls: Controls, gaps: Iterable[Iterable[float]]) -> Controls:
     """Return controls without the width of the object if the gap does not change in any recording.
 
     `gaps` has those of each recording; none is read after one that changes.
     """
-    width = found["width"]
+    width = known_controls["width"]
     if width is None or bool((width.table.values != width.table.values).all()):
-        return found  # there is none in any trial
+        return known_controls  # there is none in any trial
     known = False
     for gap in gaps:
         values = {value for value in gap if not math.isnan(value)}
         if len(values) > 1:
-            return found
+            return known_controls
         known = known or bool(values)
     if not known:
-        return found
+        return known_controls
     why = "the gap does not change in any recording, so it tells no width"
-    return Controls(**{**found, "width": None, "no_width": why})
+    return Controls(**{**known_controls, "width": None, "no_width": why})
 
 
-def _is_gap_at_start(width: FeatureTable, before: FeatureTable) -> bool:
+def _is_gap_at_start(width: FeatureTable, opening: FeatureTable) -> bool:
     """Return whether the gap at the contact is exactly that at the start in every trial with an approach."""
-    if NAMES[0] not in before.names:
+    if NAMES[0] not in opening.names:
         return False
-    start, gap = before.columns([NAMES[0]]).values, width.values
+    start, gap = opening.columns([NAMES[0]]).values, width.values
     known = (start == start) & (gap == gap)
     return bool(known.any()) and bool((start[known] == gap[known]).all())
 

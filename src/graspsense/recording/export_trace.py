@@ -169,7 +169,7 @@ def _declared(grasp: RecordedGrasp) -> dict[str, Any]:
         "units": recording.units,
         "has_release": recording.has_release,
         "channels": [as_json(channel) for channel in recording.channels],
-        "mounting": {name: one.as_json() for name, one in recording.mounting.items()},
+        "mounting": {name: mounting.as_json() for name, mounting in recording.mounting.items()},
     }
 
 

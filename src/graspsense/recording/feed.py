@@ -104,26 +104,26 @@ class Feed:
     def take(self, reading: Reading, phase: int, command: Command) -> None:
         """Pass on one tick, with its images and samples if those are new."""
         frame, pads, signals = reading
-        at = 0
+        offset = 0
         if signals:
             if self._signals is None:
                 self._signals = [(self._announce(topic), source) for topic, source in signal_topics(signals)]
             for channel, source in self._signals:
                 numbers = source(reading)
                 if numbers is not None:
-                    channel.pack_into(self._buffer, at, *channel.head, *numbers)
-                    at += channel.size
+                    channel.pack_into(self._buffer, offset, *channel.head, *numbers)
+                    offset += channel.size
         if pads.counter != self._counter:
             self._counter = pads.counter
             if self._pads is None:
                 self._pads = self._announce(pads_topic(len(pads.left)))
             channel = self._pads
             t_s, counter, left, right = pads
-            channel.pack_into(self._buffer, at, *channel.head, t_s, counter, *left, *right)
-            at += channel.size
-        _pack_tick(self._buffer, at, IS_TICK, *frame, phase, *command)
-        data = self._view[: at + TICK_WIRE.size]
-        if self._waiting or at > _MOST_BEFORE_A_TICK:
+            channel.pack_into(self._buffer, offset, *channel.head, t_s, counter, *left, *right)
+            offset += channel.size
+        _pack_tick(self._buffer, offset, IS_TICK, *frame, phase, *command)
+        data = self._view[: offset + TICK_WIRE.size]
+        if self._waiting or offset > _MOST_BEFORE_A_TICK:
             self._send(data)
         elif not self._broken:
             # As `_send`, without the two calls.
@@ -189,13 +189,13 @@ class Feed:
         """Write data that the pipe may take in part: what it does not take is written first with the next tick."""
         written = os.write(self._fd, data)
         if written < len(data):
-            rest = bytes(data[written:])
+            unwritten = bytes(data[written:])
             if self._waiting and self._waiting[0] is data:
-                self._waiting[0] = rest
+                self._waiting[0] = unwritten
                 self._waiting_bytes -= written
                 return False
-            self._waiting.appendleft(rest)
-            self._waiting_bytes += len(rest)
+            self._waiting.appendleft(unwritten)
+            self._waiting_bytes += len(unwritten)
         return True
 
     def _drain(self, last: bytes, timeout_s: float) -> None:

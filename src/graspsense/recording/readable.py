@@ -88,10 +88,10 @@ def each_readable(source: str, read: Callable[[], Iterable[T]]) -> Iterator[T | 
 
 def error_of_all(unreadable: Sequence[UnreadableRecording]) -> GraspsenseError:
     """Return the error for a set of which no recording can be read: the first, and how many there are."""
-    first = unreadable[0].error
+    error = unreadable[0].error
     if len(unreadable) == 1:
-        return first
-    return type(first)(f"none of {len(unreadable)} recordings can be read. The first: {unreadable[0].line}")
+        return error
+    return type(error)(f"none of {len(unreadable)} recordings can be read. The first: {unreadable[0].line}")
 
 
 def note_on(unreadable: Sequence[UnreadableRecording], total: int) -> list[str]:

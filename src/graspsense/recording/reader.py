@@ -71,11 +71,11 @@ def largest_record() -> int:
 
 @frozen(kw_only=True, eq=False)
 class TopicRows:
-    """The messages of a topic, one row each, in the order of writing. Row `i` precedes the tick `before[i]`."""
+    """The messages of a topic, one row each, in the order of writing. Row `i` precedes tick `next_tick[i]`."""
 
     topic: Topic
     rows: NDArray[np.void]
-    before: tuple[int, ...]
+    next_tick: tuple[int, ...]
 
     def numbers(self, i: int) -> tuple[Any, ...]:
         """Return the numbers of row `i`, as `Topic.wire` packs them."""
@@ -122,8 +122,8 @@ class RecordedGrasp:
     @property
     def pads(self) -> NDArray[np.void]:
         """The images of the fingertips, one row each: `t_s`, `counter`, and the cells of both."""
-        found = self.topics.get(PADS_TOPIC)
-        return np.empty(0, _row_type(pads_topic(0))) if found is None else found.rows
+        topic = self.topics.get(PADS_TOPIC)
+        return np.empty(0, _row_type(pads_topic(0))) if topic is None else topic.rows
 
     @property
     def images(self) -> int:
@@ -180,7 +180,7 @@ class RecordedGrasp:
         with readable(f"the list of events of the recording {self.path}"):
             result = self.record().result
             listed = self._events_as_told() if result is None else result.details.get("events", ())
-            return tuple(event_from_json(one) for one in listed if one.get("source") == "controller")
+            return tuple(event_from_json(event) for event in listed if event.get("source") == "controller")
 
     def labelled_events(self) -> dict[str, tuple[GraspEvent, ...]]:
         """Return the events that others labelled in an imported recording, by their names; of a damaged one, none."""
@@ -190,7 +190,9 @@ class RecordedGrasp:
             return {}
         details = {} if result is None else result.details
         names = str((details.get("report") or {}).get(LABELLED, ""))
-        events = [event_from_json(one) for one in details.get("events") or () if one.get("source") == "label"]
+        events = [
+            event_from_json(event) for event in details.get("events") or () if event.get("source") == "label"
+        ]
         return {
             name: tuple(event for event in events if event.what == name) for name in names.split(", ") if name
         }
@@ -223,7 +225,7 @@ class RecordedGrasp:
         """Return the readings of the gripper, one per tick, each with what was new then or before."""
         images = self._images()
         image = no_pads(len(images[0].left) if images else 0)
-        pads_before = self.topics[PADS_TOPIC].before if images else ()
+        pads_before = self.topics[PADS_TOPIC].next_tick if images else ()
         signals, following = self._signals(), 0
         readings: list[Reading] = []
         for k, row in enumerate(self.ticks.tolist()):
@@ -233,12 +235,12 @@ class RecordedGrasp:
         return tuple(readings)
 
     def _images(self) -> list[Pads]:
-        found = self.topics.get(PADS_TOPIC)
-        if found is None:
+        topic = self.topics.get(PADS_TOPIC)
+        if topic is None:
             return []
         images = []
-        for i in range(len(found.rows)):
-            t_s, counter, *cells = found.numbers(i)
+        for i in range(len(topic.rows)):
+            t_s, counter, *cells = topic.numbers(i)
             half = len(cells) // 2
             images.append(Pads(t_s, counter, tuple(cells[:half]), tuple(cells[half:])))
         return images
@@ -261,8 +263,8 @@ class RecordedGrasp:
         values: list[Any] = [nothing] * len(self.ticks)
         names = topic.rows.dtype.names or ()
         last = nothing
-        for at, row in zip(topic.before, topic.rows, strict=True):
-            if at >= len(values):
+        for tick, row in zip(topic.next_tick, topic.rows, strict=True):
+            if tick >= len(values):
                 break
             if scalar:
                 last = float(row[names.index(channel.name)])
@@ -272,14 +274,14 @@ class RecordedGrasp:
                 rows = row["values"].reshape(declared_shape(channel)).tolist()
                 new = min(max(int(row["new"]), 0), len(rows))
                 last = Samples(float(row["t_s"]), int(row["counter"]), new, tuple(map(tuple, rows)))
-            values[at] = last
+            values[tick] = last
         # An image stays until the next one; samples are new in one tick only.
         for k in range(1, len(values)):
             if values[k] is nothing and values[k - 1] is not nothing:
-                before = values[k - 1]
-                if isinstance(before, Samples):
-                    before = Samples(before.t_s, before.counter, 0, nothing.values)
-                values[k] = before
+                value = values[k - 1]
+                if isinstance(value, Samples):
+                    value = Samples(value.t_s, value.counter, 0, nothing.values)
+                values[k] = value
         return values
 
     def _rate_of_ticks(self) -> float:
@@ -376,7 +378,7 @@ class _PartialGrasp:
         self.schemas: dict[int, Schema] = {}
         self.bodies: dict[str, list[bytes]] = {TICK_TOPIC: []}
         self.next_number = dict.fromkeys(self.bodies, 0)
-        self.before: dict[str, list[int]] = {}
+        self.next_tick: dict[str, list[int]] = {}
         self.metadata: dict[str, dict[str, str]] = {}
         self.lost = 0
         self.base_ns: int | None = None
@@ -451,7 +453,7 @@ class _PartialGrasp:
                 name: TopicRows(
                     topic=topic,
                     rows=np.frombuffer(b"".join(self.bodies[name]), dtype=_row_type(topic)),
-                    before=tuple(self.before[name]),
+                    next_tick=tuple(self.next_tick[name]),
                 )
                 for name, topic in self.layouts.items()
                 if self.bodies[name]
@@ -490,7 +492,7 @@ class _PartialGrasp:
             if not known:
                 raise ValueError(f"the fields of {name} are not those of this version")
             self.bodies.setdefault(name, [])
-            self.before.setdefault(name, [])
+            self.next_tick.setdefault(name, [])
             self.next_number.setdefault(name, 0)
             self.topics[record.id] = name
         elif isinstance(record, Message):
@@ -504,7 +506,7 @@ class _PartialGrasp:
             self.lost += (record.sequence - self.next_number[topic]) & 0xFFFFFFFF
             self.next_number[topic] = (record.sequence + 1) & 0xFFFFFFFF
             if topic != TICK_TOPIC:
-                self.before[topic].append(len(self.bodies[TICK_TOPIC]))
+                self.next_tick[topic].append(len(self.bodies[TICK_TOPIC]))
             if self.base_ns is None:
                 (t_s,) = struct.unpack_from("<d", record.data, len(CDR_HEADER))
                 self.base_ns = record.log_time - round(t_s * 1e9)

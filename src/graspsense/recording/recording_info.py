@@ -32,7 +32,7 @@ class RecordingInfo:
         return {name: value for name, value in asdict(self).items() if name not in ("path", "sha256", "size")}
 
     @classmethod
-    def of(cls, path: Path, ticks: int, images: int) -> RecordingInfo:
+    def hashed(cls, path: Path, ticks: int, images: int) -> RecordingInfo:
         """Hash a recording that is already on the disk. Raises OSError."""
         with path.open("rb") as file:
             sha256 = hashlib.file_digest(file, "sha256").hexdigest()

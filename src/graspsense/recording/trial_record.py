@@ -58,7 +58,7 @@ class FeatureValues:
     reasons: Mapping[str, str] = field(factory=dict)
 
     @classmethod
-    def of(cls, features: Features) -> FeatureValues:
+    def extracted(cls, features: Features) -> FeatureValues:
         """Return the values of extracted features."""
         return cls(
             features=tuple(zip(features.names, features.units, strict=True)),
@@ -125,7 +125,7 @@ class DeviceRecord:
     mounting: Mapping[str, Mounting] = field(factory=dict)
 
     @classmethod
-    def of(cls, device: DeviceInfo) -> DeviceRecord:
+    def described(cls, device: DeviceInfo) -> DeviceRecord:
         """Return the record of an open gripper."""
         values = {name: getattr(device, name) for name in cls.__annotations__}
         arrays = tuple(
@@ -144,7 +144,7 @@ class DeviceRecord:
         """Return canonical JSON."""
         values = {name: getattr(self, name) for name in DeviceRecord.__annotations__}
         values["channels"] = [as_json(channel) for channel in self.channels]
-        values["mounting"] = {name: one.as_json() for name, one in self.mounting.items()}
+        values["mounting"] = {name: mounting.as_json() for name, mounting in self.mounting.items()}
         if not self.mounting:
             del values["mounting"]
         return json_text(values)
@@ -189,14 +189,14 @@ class TrialResult:
     details: Mapping[str, Any] = field(factory=dict)
 
     @classmethod
-    def of(cls, trial: Trial) -> TrialResult:
+    def finished(cls, trial: Trial) -> TrialResult:
         """Return the result of a trial."""
         printed = trial_as_json(trial)
         return cls(
             outcome=trial.outcome.words,
             reason=trial.reason,
-            features=FeatureValues.of(trial.features),
-            before_contact=FeatureValues.of(
+            features=FeatureValues.extracted(trial.features),
+            before_contact=FeatureValues.extracted(
                 before_contact(trial.trace, contact_force_of(trial.run.settings))
             ),
             details={key: printed[key] for key in DETAILS},
@@ -233,11 +233,11 @@ class TrialRecord:
 
     def with_device(self, device: DeviceInfo) -> TrialRecord:
         """Return the record with its gripper."""
-        return evolve(self, device=DeviceRecord.of(device))
+        return evolve(self, device=DeviceRecord.described(device))
 
     def with_result(self, trial: Trial) -> TrialRecord:
         """Return the record with its result."""
-        return evolve(self, result=TrialResult.of(trial))
+        return evolve(self, result=TrialResult.finished(trial))
 
     @property
     def simulated(self) -> bool:

@@ -56,8 +56,8 @@ class Unpacked:
     def expect(self, size: int) -> None:
         """Raise TooLarge if so many bytes more would pass the limit."""
         if self.total + size > self._limit + self.allowance:
-            found = f"{(self.total + size) / _MB:,.0f} MB".replace(",", " ")
-            raise TooLarge(f"{self.source} unpacks to {found} or more; {limit_words()}")
+            unpacked = f"{(self.total + size) / _MB:,.0f} MB".replace(",", " ")
+            raise TooLarge(f"{self.source} unpacks to {unpacked} or more; {limit_words()}")
 
     def add(self, size: int) -> None:
         """Count so many bytes. Raises TooLarge."""

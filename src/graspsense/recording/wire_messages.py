@@ -18,28 +18,28 @@ from graspsense.recording.layout import (
 
 def complete_messages(buffer: bytearray) -> Iterator[tuple[bytes, int, bytes]]:
     """Remove every complete message from the buffer, and yield its kind, the number of its topic (or 0), its body."""
-    at, end = 0, len(buffer)
+    offset, end = 0, len(buffer)
     try:
-        while at < end:
-            kind, number = bytes(buffer[at : at + 1]), 0
+        while offset < end:
+            kind, number = bytes(buffer[offset : offset + 1]), 0
             if kind == IS_END:
-                start, length = at + 1, 0
+                start, length = offset + 1, 0
             elif kind == IS_TICK:
-                start, length = at + 1, TICK_WIRE.size - 1
+                start, length = offset + 1, TICK_WIRE.size - 1
             elif kind == IS_SIGNAL:
-                start = at + SIGNAL_WIRE.size
+                start = offset + SIGNAL_WIRE.size
                 if start > end:
                     break
-                _, length, number = SIGNAL_WIRE.unpack_from(buffer, at)
+                _, length, number = SIGNAL_WIRE.unpack_from(buffer, offset)
             else:
                 assert kind in (IS_METADATA, IS_TOPIC)
-                start = at + LENGTH_WIRE.size
+                start = offset + LENGTH_WIRE.size
                 if start > end:
                     break
-                length = LENGTH_WIRE.unpack_from(buffer, at)[1]
+                length = LENGTH_WIRE.unpack_from(buffer, offset)[1]
             if start + length > end:
                 break
-            at = start + length
-            yield kind, number, bytes(buffer[start:at])
+            offset = start + length
+            yield kind, number, bytes(buffer[start:offset])
     finally:
-        del buffer[:at]
+        del buffer[:offset]

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any, Final, Literal
 
-from attrs import asdict, evolve, fields_dict, frozen
+from attrs import astuple, evolve, frozen
 
 from graspsense.core.learn.target_value import name_and_unit
 from graspsense.core.values.errors import ConfigError
@@ -28,38 +28,37 @@ if TYPE_CHECKING:
 Action = Literal["relabel", "value", "aside", "restore"]
 
 
-@frozen(kw_only=True)
+@frozen
 class Change:
     """One change of a trial.
 
-    `before` and `after` are labels as they are typed (`can:full_open#2`), or numbers to predict (`fill [ml]=250`), None
-    where there is none.
-    `made_at` is empty for a trial that an earlier version of graspsense set aside.
+    `old` and `new` are labels as they are typed (`can:full_open#2`), or numbers to predict (`fill [ml]=250`), None
+    where there is none. `made_at` is empty for a trial that an earlier version of graspsense set aside.
     """
 
     id: int
     trial: int
     made_at: str
     action: Action
-    before: str | None
-    after: str | None
+    old: str | None
+    new: str | None
     why: str
 
     @property
     def words(self) -> str:
         """The change in words."""
         if self.action == "relabel":
-            return f"relabelled from {self.before or 'no label'} to {self.after or 'no label'}"
+            return f"relabelled from {self.old or 'no label'} to {self.new or 'no label'}"
         if self.action == "value":
-            return f"number changed from {self.before or 'none'} to {self.after or 'none'}"
+            return f"number changed from {self.old or 'none'} to {self.new or 'none'}"
         return "set aside" if self.action == "aside" else "brought back"
 
     def as_json(self) -> dict[str, Any]:
-        """Return the fields as JSON values."""
-        return asdict(self)
+        """Return the columns of the change as JSON values."""
+        return dict(zip(COLUMNS, astuple(self), strict=True))
 
 
-COLUMNS: Final = ", ".join(f'"{name}"' for name in fields_dict(Change))
+COLUMNS: Final = ("id", "trial", "made_at", "action", "before", "after", "why")
 
 
 def history(store: Store, number: int | None = None) -> list[Change]:
@@ -68,8 +67,9 @@ def history(store: Store, number: int | None = None) -> list[Change]:
         store.summary(number)
     where = "" if number is None else "WHERE trial = ? "
     values = () if number is None else (number,)
-    rows = store.query(f"SELECT {COLUMNS} FROM change {where}ORDER BY id", values)
-    return [Change(**dict(zip(fields_dict(Change), row, strict=True))) for row in rows]
+    columns = ", ".join(f'"{name}"' for name in COLUMNS)
+    rows = store.query(f"SELECT {columns} FROM change {where}ORDER BY id", values)
+    return [Change(*row) for row in rows]
 
 
 def set_aside(store: Store, numbers: Sequence[int], why: str) -> None:
@@ -122,8 +122,8 @@ def relabel(store: Store, numbers: Sequence[int], labels: Mapping[str, str] | No
             "UPDATE trial SET label = ?, instance = ?, sha256 = ? WHERE id = ?",
             (label, instance, changed.sha256, trial.id),
         )
-        before, after = word_of(trial.label, trial.instance), word_of(label, instance)
-        _keep(connection, trial.id, "relabel", before, after, why)
+        old, new = word_of(trial.label, trial.instance), word_of(label, instance)
+        _keep(connection, trial.id, "relabel", old, new, why)
 
     _for_each(store, numbers, change)
 
@@ -142,11 +142,11 @@ def set_number(store: Store, numbers: Sequence[int], heading: str, cell: str | N
         _refuse_another_unit(heading, [labels for number, labels in current.items() if number not in chosen])
 
     def change(connection: sqlite3.Connection, trial: TrialSummary) -> None:
-        before = _number_named(current[trial.id], name)
-        after = _number_named(recorded[trial.id], name) if cell is None else f"{heading}={cell}"
-        if before == after:
-            raise ConfigError(f"trial {trial.id} has {after or f'no {name}'} already")
-        _keep(connection, trial.id, "value", before, after, why)
+        old = _number_named(current[trial.id], name)
+        new = _number_named(recorded[trial.id], name) if cell is None else f"{heading}={cell}"
+        if old == new:
+            raise ConfigError(f"trial {trial.id} has {new or f'no {name}'} already")
+        _keep(connection, trial.id, "value", old, new, why)
 
     _for_each(store, numbers, change)
 
@@ -172,12 +172,12 @@ def _refuse_another_unit(heading: str, others: Iterable[Mapping[str, str]]) -> N
     """Raise ConfigError if these labels have the number of this name, but none in its unit."""
     name, unit = name_and_unit(heading)
     pairs = {name_and_unit(other) for labels in others for other in labels}
-    units = {of for known, of in pairs if known == name}
+    units = {other for known, other in pairs if known == name}
     if units and unit not in units:
-        (first, *_) = sorted(units)
+        (other, *_) = sorted(units)
         raise ConfigError(
-            f"{name} of other trials is in {first or 'no unit'}, and {heading!r} cannot be compared with them: "
-            f"write {f'{name} [{first}]' if first else name}=NUMBER, or change all of them with graspsense trials value"
+            f"{name} of other trials is in {other or 'no unit'}, and {heading!r} cannot be compared with them: "
+            f"write {f'{name} [{other}]' if other else name}=NUMBER, or change all of them with graspsense trials value"
         )
 
 
@@ -187,16 +187,16 @@ def with_changed_numbers(
     """Return the labels of these trials with the numbers to predict that were changed after recording."""
     changed: dict[int, list[tuple[str | None, str | None]]] = {}
     rows = store.query("""SELECT trial, "before", "after" FROM change WHERE "action" = 'value' ORDER BY id""")
-    for trial, before, after in rows:
-        changed.setdefault(trial, []).append((before, after))
+    for trial, old, new in rows:
+        changed.setdefault(trial, []).append((old, new))
     current: list[Mapping[str, str]] = []
     for trial, label in zip(trials, labels, strict=True):
         values = dict(label)
-        for before, after in changed.get(trial, ()):
-            if before is not None:
-                values.pop(before.rpartition("=")[0], None)
-            if after is not None:
-                heading, _, cell = after.rpartition("=")
+        for old, new in changed.get(trial, ()):
+            if old is not None:
+                values.pop(old.rpartition("=")[0], None)
+            if new is not None:
+                heading, _, cell = new.rpartition("=")
                 values[heading] = cell
         current.append(values)
     return current
@@ -204,7 +204,9 @@ def with_changed_numbers(
 
 def _number_named(labels: Mapping[str, str], name: str) -> str | None:
     """Return the number of this name as it is typed, None if the trial has none."""
-    return next((f"{one}={cell}" for one, cell in labels.items() if name_and_unit(one)[0] == name), None)
+    return next(
+        (f"{heading}={cell}" for heading, cell in labels.items() if name_and_unit(heading)[0] == name), None
+    )
 
 
 def inconsistencies(store: Store) -> dict[int, str]:
@@ -213,7 +215,7 @@ def inconsistencies(store: Store) -> dict[int, str]:
     aside: dict[int, bool] = {}
     for change in history(store):
         if change.action == "relabel":
-            labels[change.trial] = change.after
+            labels[change.trial] = change.new
         elif change.action != "value":
             aside[change.trial] = change.action == "aside"
     problems = {}
@@ -222,8 +224,8 @@ def inconsistencies(store: Store) -> dict[int, str]:
     )
     for number, label, instance, why, recorded in rows:
         try:
-            first = json.loads(recorded)
-            expected = labels.get(number, word_of(first.get("label"), first.get("instance")))
+            grasped = json.loads(recorded)
+            expected = labels.get(number, word_of(grasped.get("label"), grasped.get("instance")))
         except (ValueError, AttributeError, TypeError):
             problems[number] = "its recorded labels cannot be read"
             continue
@@ -247,12 +249,12 @@ def _keep(
     connection: sqlite3.Connection,
     trial: int,
     action: Action,
-    before: str | None,
-    after: str | None,
+    old: str | None,
+    new: str | None,
     why: str,
 ) -> None:
     made_at = datetime.now(UTC).isoformat(timespec="milliseconds")
     connection.execute(
         'INSERT INTO change (trial, made_at, "action", "before", "after", why) VALUES (?, ?, ?, ?, ?, ?)',
-        (trial, made_at, action, before, after, why),
+        (trial, made_at, action, old, new, why),
     )

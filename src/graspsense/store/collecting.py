@@ -205,12 +205,12 @@ class Collection:
         return None if self.changed else newest_grasp(self.store)
 
     def _check_settings(self) -> None:
-        before = self._before()
-        if before is not None:
+        earlier = self._before()
+        if earlier is not None:
             settings = self.settings_for(self.wanted.words[0], self.wanted.seed)
-            check_settings(self.store, before, settings)
+            check_settings(self.store, earlier, settings)
 
     def _check_device(self, device: DeviceInfo) -> None:
-        before = self._before()
-        if before is not None:
-            check_device(self.store, before, device)
+        earlier = self._before()
+        if earlier is not None:
+            check_device(self.store, earlier, device)

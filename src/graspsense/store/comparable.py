@@ -33,12 +33,12 @@ def newest_grasp(store: Store) -> StoredTrial | None:
     return store.trial(max(trial.id for trial in newest)) if newest else None
 
 
-def check_settings(store: Store, before: StoredTrial, settings: Settings) -> None:
+def check_settings(store: Store, stored: StoredTrial, settings: Settings) -> None:
     """Raise ConfigError that lists what differs if these settings are not those of a stored trial.
 
     What is grasped, the seed, the classifier, and settings that change no result may differ.
     """
-    now, then = recipe(without_none(settings.values)), before.recipe
+    now, then = recipe(without_none(settings.values)), stored.recipe
     differences = []
     for table in dict.fromkeys((*then, *now)):
         was, is_now = then.get(table, {}), now.get(table, {})
@@ -53,24 +53,24 @@ def check_settings(store: Store, before: StoredTrial, settings: Settings) -> Non
             if before_value != value and key not in passive:
                 differences.append(_difference(f"{table}.{key}", before_value, value))
     if differences:
-        raise ConfigError(_refusal("settings", store, before, differences))
+        raise ConfigError(_refusal("settings", store, stored, differences))
 
 
-def check_device(store: Store, before: StoredTrial, device: DeviceInfo) -> None:
+def check_device(store: Store, stored: StoredTrial, device: DeviceInfo) -> None:
     """Raise ConfigError that lists what differs if this gripper is not that of a stored trial."""
-    then, now = before.record.device, DeviceRecord.of(device)
+    then, now = stored.record.device, DeviceRecord.described(device)
     differences = [
         _difference(name, getattr(then, name), getattr(now, name))
         for name in _COMPARED
         if getattr(then, name) != getattr(now, name)
     ]
     if differences:
-        raise ConfigError(_refusal("gripper", store, before, differences))
+        raise ConfigError(_refusal("gripper", store, stored, differences))
 
 
 def _passive(settings: Settings, table: str) -> frozenset[str]:
     """Return the keys of a table that change no result."""
-    configs = {one.component.table: one.config for one in settings.chosen} | {"run": settings.run}
+    configs = {part.component.table: part.config for part in settings.chosen} | {"run": settings.run}
     return settings_marked(type(configs[table]), CHANGES_NO_RESULT) if table in configs else frozenset()
 
 
@@ -82,9 +82,9 @@ def _shown(value: Any) -> str:
     return "not set" if value is None else repr(value)
 
 
-def _refusal(what: str, store: Store, before: StoredTrial, differences: Sequence[str]) -> str:
+def _refusal(what: str, store: Store, stored: StoredTrial, differences: Sequence[str]) -> str:
     lines = "".join(f"\n  {line}" for line in differences)
     return (
-        f"the {what} differ from trial {before.summary.id} of the store in {store.folder}:{lines}\n"
+        f"the {what} differ from trial {stored.summary.id} of the store in {store.folder}:{lines}\n"
         f"  Restore them, use another store, or add {option('changed', python='changed=True')} if this is intended"
     )

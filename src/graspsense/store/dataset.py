@@ -118,27 +118,27 @@ def labelled_store(
             extracted = extract_again(
                 store, rows.id, options, flags=flags, checkpoints_s=checkpoints_s, progress=progress
             )
-            before = rows.id
+            asked = rows.id
             rows, tables = _tables_again(rows, extracted, changed, notes)
             if target is not None:
-                known = dict(zip(before, target.values, strict=True))
+                known = dict(zip(asked, target.values, strict=True))
                 target = evolve(target, values=tuple(known[number] for number in rows.id))
             settings, components = _with_gripper(extracted, settings, components)
         else:
             tables = _stored_tables(store, folder, rows, feature_set)
-        found = _controls(store, rows, tables)
+        known_controls = _controls(store, rows, tables)
         content, unused = _contents(store, rows), _unused(store)
     order, no_order = order_recorded(rows.made_at, rows.origin, rows.labels)
     return Labelled(
         source=f"store:{folder}",
         table=tables.features,
         labels=tuple(label or "" for label in rows.label),
-        instances=None if None in rows.instance else tuple(str(one) for one in rows.instance),
+        instances=None if None in rows.instance else tuple(str(instance) for instance in rows.instance),
         no_instances=f"{counted(rows.instance.count(None), 'trial')} without the individual object (can:full_open#2)",
         order=order,
         no_order=no_order,
         content=content,
-        **found,
+        **known_controls,
         value=target,
         notes=(*notes, *_notes(len(set(rows.recipe)), sum(rows.simulated), len(rows)), *unused),
         provenance=_provenance(folder, rows, newest.summary.id, settings, components),
@@ -151,8 +151,8 @@ def _contents(store: Store, rows: _Rows) -> tuple[str, ...]:
     A recovered copy has the same contact as the recording that was damaged, so that only such recordings are compared.
     """
     alike: dict[tuple[int, bytes], list[int]] = {}
-    for i, before in enumerate(zip(rows.before_set, rows.before_contact, strict=True)):
-        alike.setdefault(before, []).append(i)
+    for i, opening in enumerate(zip(rows.before_set, rows.before_contact, strict=True)):
+        alike.setdefault(opening, []).append(i)
     contents = [""] * len(rows)
     for group in alike.values():
         curves: dict[int, bytes] = {}
@@ -213,19 +213,19 @@ class _Tables:
     """The features of the trials, and those from before contact (None if trials differ in their names)."""
 
     features: FeatureTable
-    before: FeatureTable | None
+    before_contact: FeatureTable | None
     before_missing: str
 
 
 def _controls(store: Store, rows: _Rows, tables: _Tables) -> Controls:
-    found = controls(
+    known_controls = controls(
         tables.features,
-        tables.before,
+        tables.before_contact,
         no_before="the trials do not have the same features from before contact",
         before_missing=tables.before_missing,
         first_line=first_lines(store, rows.recording, rows.origin),
     )
-    return without_constant_gap(found, imported_gaps(store, rows.recording, rows.origin))
+    return without_constant_gap(known_controls, imported_gaps(store, rows.recording, rows.origin))
 
 
 def _read_rows(store: Store, wanted: str, feature_set: int | None) -> _Rows:
@@ -287,7 +287,7 @@ def _stored_tables(store: Store, folder: str, rows: _Rows, feature_set: int) -> 
     same_before = len(set(rows.before_set)) == 1
     return _Tables(
         features=_unpacked_table(folder, sets[feature_set], rows.values),
-        before=_unpacked_table(folder, sets[rows.before_set[0]], rows.before_contact)
+        before_contact=_unpacked_table(folder, sets[rows.before_set[0]], rows.before_contact)
         if same_before
         else None,
         before_missing=_most_frequent_reason([decoded(folder, text) for text in rows.missing_before]),
@@ -320,7 +320,7 @@ def _tables_again(
     same_before = all(trial.before_contact.features == before_names for trial in kept)
     return rows.picked(same), _Tables(
         features=_table([trial.features for trial in kept]),
-        before=_table([trial.before_contact for trial in kept]) if same_before else None,
+        before_contact=_table([trial.before_contact for trial in kept]) if same_before else None,
         before_missing=_most_frequent_reason([trial.before_contact.reasons for trial in kept]),
     )
 

@@ -99,8 +99,8 @@ def trial_table(folder: str | Path) -> TrialTable:
         aside = f" that is not set aside ({set_aside} are)" if set_aside else ""
         raise ConfigError(f"the store in {folder} has no trial to export{aside}")
     columns |= {name: tuple(label.get(name) for label in labels) for name in (RECORDED_AT, ORDER)}
-    before = _unpacked(folder, sets, columns["before_set"], columns["before_contact"])
-    parts = [(BEFORE, before), (FIRST, first_line), (VALUE, _numbers_to_predict(numbers))]
+    opening = _unpacked(folder, sets, columns["before_set"], columns["before_contact"])
+    parts = [(BEFORE, opening), (FIRST, first_line), (VALUE, _numbers_to_predict(numbers))]
     return TrialTable(
         about={name: list(columns[name]) for name in ABOUT},
         features=_unpacked(folder, sets, columns["feature_set"], columns["values"]),

@@ -81,7 +81,7 @@ def extract_again(
     _refuse_other_tables(options)
     resolved: dict[str, Settings] = {}
     refused: dict[str, ConfigError] = {}
-    found: dict[int, ExtractedAgain] = {}
+    extracted: dict[int, ExtractedAgain] = {}
     unreadable: list[UnreadableRecording] = []
     settings = None
     for done, number in enumerate(numbers):
@@ -96,7 +96,7 @@ def extract_again(
                     raise refused[text]
                 if text not in resolved:
                     resolved[text] = _resolved(own, recording, options, flags)
-                found[number] = _extracted(resolved[text], recording, trial, checkpoints_s)
+                extracted[number] = _extracted(resolved[text], recording, trial, checkpoints_s)
                 settings = resolved[text]
         except (ConfigError, DataDamaged) as error:
             if isinstance(error, ConfigError) and text not in resolved:
@@ -105,14 +105,14 @@ def extract_again(
         if progress is not None:
             progress(done + 1, len(numbers))
     if settings is None:
-        if unreadable and all(isinstance(one.error, ConfigError) for one in unreadable):
+        if unreadable and all(isinstance(recording.error, ConfigError) for recording in unreadable):
             raise unreadable[0].error  # a mistake in the options, not in the recordings
         if unreadable:
             raise error_of_all(unreadable)
         raise ConfigError(f"the store in {store.folder} has no trial to extract features from")
     return ExtractedTrials(
-        trials=tuple(found.values()),
-        numbers=tuple(found),
+        trials=tuple(extracted.values()),
+        numbers=tuple(extracted),
         unreadable=tuple(unreadable),
         settings=dict(settings.values),
         components=dict(settings.components),
@@ -131,7 +131,7 @@ def _refuse_other_tables(options: Sequence[str]) -> None:
         if table not in CHANGEABLE:
             raise ConfigError(
                 f"{set_option(option)}: {_meant(option)}a stored grasp can be evaluated again with other keys of "
-                f"{', '.join(f'[{one}]' for one in CHANGEABLE)} only; its gripper is the recording"
+                f"{', '.join(f'[{table}]' for table in CHANGEABLE)} only; its gripper is the recording"
             )
 
 
@@ -143,7 +143,7 @@ def _resolved(
     # The settings of the recording have been accepted when it was made.
     return resolve(
         "default",
-        experiment=Layer.of(values, "the recording"),
+        experiment=Layer.without_file(values, "the recording"),
         options=options,
         flags=(*flags, *replay),
         force=True,
@@ -169,6 +169,8 @@ def _extracted(
         ) from error
     return ExtractedAgain(
         outcome=grasp.outcome.words,
-        features=FeatureValues.of(features),
-        before_contact=FeatureValues.of(before_contact(grasp.trace, contact_force_of(settings.values))),
+        features=FeatureValues.extracted(features),
+        before_contact=FeatureValues.extracted(
+            before_contact(grasp.trace, contact_force_of(settings.values))
+        ),
     )

@@ -67,7 +67,7 @@ def is_new(folder: Path) -> bool:
         return True
     if len(header) < _HEADER_BYTES or not header.startswith(_MAGIC):
         raise DataDamaged(f"{path} is not an SQLite file. {_REPAIR.format(folder=folder)}")
-    version, application = (int.from_bytes(header[at : at + 4], "big") for at in (60, 68))
+    version, application = (int.from_bytes(header[offset : offset + 4], "big") for offset in (60, 68))
     _check_version(folder, version, application)
     return False
 

@@ -121,14 +121,14 @@ def write_copy(grasp: RecordedGrasp, path: Path) -> RecordingInfo:
             if name in grasp.metadata:
                 file.metadata(name, grasp.metadata[name])
         messages: list[tuple[int, int, TopicRows, int]] = []
-        for found in grasp.topics.values():
-            number = file.topic(found.topic)
-            messages += [(before, number, found, i) for i, before in enumerate(found.before)]
+        for topic in grasp.topics.values():
+            number = file.topic(topic.topic)
+            messages += [(tick, number, topic, i) for i, tick in enumerate(topic.next_tick)]
         messages.sort(key=lambda message: message[0], reverse=True)
         for k, row in enumerate(grasp.ticks.tolist()):
             while messages and messages[-1][0] <= k:
-                _, number, found, i = messages.pop()
-                file.signal(number, found.topic.wire.pack(*found.numbers(i)))
+                _, number, topic, i = messages.pop()
+                file.signal(number, topic.topic.wire.pack(*topic.numbers(i)))
             file.tick(row[0], TICK.pack(*row))
         for name in grasp.metadata:
             if name not in (START, DEVICE):
@@ -187,7 +187,7 @@ def _add_row(store: Store, path: Path) -> Recovered:
             record = evolve(record, result=_aborted(grasp, record))
         if record.device is None:
             record = evolve(record, device=grasp.device)
-        number = store.add(record, RecordingInfo.of(path, len(grasp), len(grasp.pads)), complete=complete)
+        number = store.add(record, RecordingInfo.hashed(path, len(grasp), len(grasp.pads)), complete=complete)
     except SaveFailed:
         raise
     except GraspsenseError as error:
@@ -208,7 +208,7 @@ def _aborted(grasp: RecordedGrasp, record: TrialRecord) -> TrialResult:
         outcome="aborted",
         reason=why,
         features=_features(trace, record, why),
-        before_contact=FeatureValues.of(before_contact(trace, contact_force_of(record.settings))),
+        before_contact=FeatureValues.extracted(before_contact(trace, contact_force_of(record.settings))),
     )
 
 
@@ -221,7 +221,7 @@ def _features(trace: Trace, record: TrialRecord, why: str) -> FeatureValues:
     except FAILURES as error:
         reason = f"{why}; its features cannot be extracted here: {error}"
         return FeatureValues(features=(), values=(), reasons={"": reason})
-    return FeatureValues.of(extracted)
+    return FeatureValues.extracted(extracted)
 
 
 def _beside(path: Path) -> Path:

@@ -182,8 +182,8 @@ class Store:
         """Return the summary of a trial. Raises ConfigError if there is no trial of this number."""
         rows = self.query(f"SELECT {SUMMARY_COLUMNS} FROM trial WHERE id = ?", (number,))
         if not rows:
-            ((first, last),) = self.query("SELECT min(id), max(id) FROM trial")
-            have = "it is empty" if last is None else f"its trials are {first} to {last}"
+            ((oldest, newest),) = self.query("SELECT min(id), max(id) FROM trial")
+            have = "it is empty" if newest is None else f"its trials are {oldest} to {newest}"
             raise ConfigError(f"the store in {self.folder} has no trial {number}: {have}")
         return TrialSummary.from_row(rows[0])
 
@@ -218,27 +218,15 @@ class Store:
         self,
         *,
         label: str | None = None,
-        outcome: str | None = None,
         origin: str | None = None,
-        since: str | None = None,
         set_aside: bool | None = False,
-        before: int | None = None,
         limit: int = 50,
     ) -> list[TrialSummary]:
         """Return the newest trials that match, newest first.
 
-        `since` is a time in ISO 8601. `before` is the number of the trial that the page ends before. `set_aside`
-        selects trials that were set aside or not; None selects both.
+        `set_aside` selects trials that were set aside or not; None selects both.
         """
-        where, values = _filter(
-            {
-                "label = ?": label,
-                "outcome = ?": outcome,
-                "origin = ?": origin,
-                "made_at >= ?": since,
-                "id < ?": before,
-            }
-        )
+        where, values = _filter({"label = ?": label, "origin = ?": origin})
         if set_aside is not None:
             where.append("set_aside IS NOT NULL" if set_aside else "set_aside IS NULL")
         query = f"SELECT {SUMMARY_COLUMNS} FROM trial" + (f" WHERE {' AND '.join(where)}" if where else "")

@@ -25,14 +25,14 @@ def order_recorded(
     made. An imported one says so in its labels, by `recorded_at`, or all of them by `order`.
     """
     stated = [_labels(text) for text in labels]
-    if set(origins) == {"import"} and all(ORDER in one and RECORDED_AT not in one for one in stated):
-        numbers = [plain_number(str(one[ORDER])) for one in stated]
+    if set(origins) == {"import"} and all(ORDER in label and RECORDED_AT not in label for label in stated):
+        numbers = [plain_number(str(label[ORDER])) for label in stated]
         known = [number for number in numbers if number is not None]
         if len(known) == len(numbers):
             return _positions(known), ""
     times = [
-        _time(one.get(RECORDED_AT, "")) if origin == "import" else _time(made)
-        for made, origin, one in zip(made_at, origins, stated, strict=True)
+        _time(label.get(RECORDED_AT, "")) if origin == "import" else _time(made)
+        for made, origin, label in zip(made_at, origins, stated, strict=True)
     ]
     known_times = [time for time in times if time is not None]
     if len(known_times) < len(times):

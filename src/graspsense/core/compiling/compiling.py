@@ -292,12 +292,12 @@ def _cache_folder(numba: types.ModuleType, function: types.FunctionType) -> Iter
         yield False
         return
     # Set for this function alone, since other packages in this process keep their own compiled code elsewhere.
-    before = config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES
+    previous = config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES
     config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES = str(folder.parent), "UserProvidedCacheLocator"
     try:
         yield True
     finally:
-        config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES = before
+        config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES = previous
 
 
 def _set_by_program(config: Any) -> str:

@@ -114,7 +114,10 @@ class OutermostLowering(NativeLowering):
 
 def _with_lowering(passes: Any, lowering: type[NativeLowering]) -> list[Any]:
     """Return the pipeline with this lowering in place of that of numba."""
-    passes.passes = [(lowering if one is NativeLowering else one, name) for one, name in passes.passes]
+    passes.passes = [
+        (lowering if compiler_pass is NativeLowering else compiler_pass, name)
+        for compiler_pass, name in passes.passes
+    ]
     passes.finalize()
     return [passes]
 
@@ -156,16 +159,16 @@ class KeptCode(FunctionCache):
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return the code for arguments of these types, or None."""
-        found = None
+        code = None
         try:
-            found = super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+            code = super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
         except Exception:
             # Another version of a plugin kept it, for arguments of a type that is gone: pickle raises many exceptions.
             self.flush()  # type: ignore[no-untyped-call]
-        if found is None and not self._is_prepared:
+        if code is None and not self._is_prepared:
             self._prepare()
             self._is_prepared = True
-        return found
+        return code
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep the code in files that nobody else can write to, whatever the mask of the user is."""

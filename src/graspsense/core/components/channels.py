@@ -130,7 +130,7 @@ def from_json(value: Mapping[str, Any]) -> Channel:
     cls = KINDS[given.pop("kind")]
     for name, listed in given.items():
         if isinstance(listed, list):
-            given[name] = tuple(_place(one) if isinstance(one, list) else one for one in listed)
+            given[name] = tuple(_place(member) if isinstance(member, list) else member for member in listed)
     channel: Channel = cls(**given)
     return channel
 

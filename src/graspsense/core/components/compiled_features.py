@@ -99,8 +99,8 @@ def compiled_extraction(extract: Callable[[Trace], Any] | None) -> CompiledExtra
     """
     own = getattr(extract, "compiled_extraction", None)
     if own is not None:
-        found: CompiledExtraction | None = own()
-        return found
+        extraction: CompiledExtraction | None = own()
+        return extraction
     return _of_method(extract) if isinstance(extract, MethodType) else None
 
 
@@ -109,16 +109,16 @@ def columns_of_ticks(trace: Trace) -> TickColumns:
     return TickColumns(*(getattr(trace, name) for name in TickColumns._fields))
 
 
-def both(one: CompiledExtraction, other: CompiledExtraction) -> CompiledExtraction:
+def both(left: CompiledExtraction, right: CompiledExtraction) -> CompiledExtraction:
     """Return the form of a function that returns a pair: the results of both."""
 
     def result(measured: Numbers) -> tuple[Any, Any]:
-        first, second = measured
-        return one.result(first), other.result(second)
+        left_measured, right_measured = measured
+        return left.result(left_measured), right.result(right_measured)
 
-    measure = bind(_measure_both, measure_one=one.measure, measure_other=other.measure)
+    measure = bind(_measure_both, measure_one=left.measure, measure_other=right.measure)
     return CompiledExtraction(
-        measure, (one.params, other.params), result, one.reads_release or other.reads_release
+        measure, (left.params, right.params), result, left.reads_release or right.reads_release
     )
 
 

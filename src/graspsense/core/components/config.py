@@ -40,7 +40,7 @@ from graspsense.core.components.strict import (
     shown,
     structured,
 )
-from graspsense.core.files.toml_lines import KeyPath
+from graspsense.core.files.toml_text import KeyPath
 from graspsense.core.values.errors import ConfigError, PluginUnavailable, UnknownName
 
 if TYPE_CHECKING:
@@ -116,19 +116,22 @@ class Settings:
     def chosen(self) -> tuple[SelectedComponent, ...]:
         """Gripper, controller, features, and the classifier if there is one."""
         return tuple(
-            one for one in (self.gripper, self.controller, self.features, self.classifier) if one is not None
+            part
+            for part in (self.gripper, self.controller, self.features, self.classifier)
+            if part is not None
         )
 
     def keys(self, table: str) -> dict[str, dict[str, Any]]:
         """Return what each key of a table declares, as `keys_of` does."""
-        selected = next((one for one in self.chosen if one.component.table == table), None)
+        selected = next((part for part in self.chosen if part.component.table == table), None)
         return keys_of(type(self.run if selected is None else selected.config))
 
     @property
     def components(self) -> dict[str, str]:
         """The `distribution/name version` of each component, by table."""
         return {
-            one.component.table: f"{one.component.qualified} {one.component.version}" for one in self.chosen
+            part.component.table: f"{part.component.qualified} {part.component.version}"
+            for part in self.chosen
         }
 
 
@@ -172,11 +175,12 @@ def settings_from(values: Mapping[str, Any], called: str, plugins: Plugins | Non
     `called` is their name in errors. Raises ConfigError.
     """
     given = {
-        table: {key: one for key, one in keys.items() if one is not None} for table, keys in values.items()
+        table: {key: value for key, value in keys.items() if value is not None}
+        for table, keys in values.items()
     }
     plugins = installed() if plugins is None else plugins
     # These values have been accepted before.
-    return _resolved_layers(called, [Layer.of(given, called)], [], plugins, force=True)
+    return _resolved_layers(called, [Layer.without_file(given, called)], [], plugins, force=True)
 
 
 def _resolved_layers(
@@ -199,10 +203,10 @@ def _resolved_layers(
             component, cls, called = None, RunConfig, "[run]"
             merged, followed = _merged(layers, table, None), frozenset[str]()
         else:
-            found = _component(layers, table, plugins, complaints)
-            if found is None:
+            selected = _component(layers, table, plugins, complaints)
+            if selected is None:
                 continue
-            (component, cls), called = found, found[0].qualified
+            (component, cls), called = selected, selected[0].qualified
             merged = _merged(layers, table, component)
             if table == "controller" and "gripper" in chosen:
                 _choose_sent_kind(merged, component, chosen["gripper"])
@@ -211,7 +215,7 @@ def _resolved_layers(
         try:
             config: Any = structured({k: v for k, v in merged.values.items() if k != "type"}, cls, called)
         except ValidationFailed as misfit:
-            complaints += [(merged.owner_of(one.path), one) for one in misfit.under(table)]
+            complaints += [(merged.owner_of(problem.path), problem) for problem in misfit.under(table)]
             continue
         if not force:
             doubted = (value for value in implausible_values(config) if value.path[0] not in followed)
@@ -295,7 +299,7 @@ def _choose_sent_kind(merged: Merged, controller: Component, gripper: SelectedCo
     kind = next((name for name in (*entry.commands, *entry.alternatives) if name in accepted), None)
     if kind is not None and kind not in entry.commands:
         merged.values["sends"] = kind
-        merged.owner[controller.table, "sends"] = Layer.of(
+        merged.owner[controller.table, "sends"] = Layer.without_file(
             {}, f"{gripper.component.qualified} accepts {kind}"
         )
 
@@ -311,28 +315,25 @@ def _follow(
         value = values.get(owner, {}).get(name)
         if key not in merged.values and value is not None and value != defaults[key]:
             merged.values[key] = value
-            merged.owner[table, key] = Layer.of({}, path)
+            merged.owner[table, key] = Layer.without_file({}, path)
             given.add(key)
     return frozenset(given)
 
 
-def without_followers(
-    values: Mapping[str, Mapping[str, Any]], plugins: Plugins | None = None
-) -> dict[str, dict[str, Any]]:
+def without_followers(values: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
     """Return complete tables without the keys that follow another one and have its value.
 
     Settings that are resolved from these tables and an option for the key that is followed are consistent again.
     """
-    plugins = installed() if plugins is None else plugins
     kept = {table: dict(keys) for table, keys in values.items()}
     for table, keys in kept.items():
         role, name = _ROLE_OF_TABLE.get(table), keys.get("type")
         if role is None or not isinstance(name, str):
             continue
         with suppress(UnknownName, PluginUnavailable):
-            for key, path in followed_settings(plugins.find(role, name).config_class()).items():
-                owner, _, of = path.partition(".")
-                if key in keys and values.get(owner, {}).get(of) == keys[key]:
+            for key, path in followed_settings(installed().find(role, name).config_class()).items():
+                owner, _, followed_key = path.partition(".")
+                if key in keys and values.get(owner, {}).get(followed_key) == keys[key]:
                     del keys[key]
     return kept
 
@@ -394,7 +395,7 @@ def recipe_of(role: Role, part: Any) -> tuple[str, dict[str, Any]]:
         except PluginUnavailable:
             same = False
         if same:
-            values = {key: one for key, one in plain(part.config).items() if one is not None}
+            values = {key: value for key, value in plain(part.config).items() if value is not None}
             if plain(build(component, values)) != plain(part.config):
                 raise ConfigError(f"{component.qualified}: its settings are not all plain values")
             return component.qualified, values
@@ -407,7 +408,7 @@ def to_toml(settings: Settings, origins: bool = False) -> str:
     With `origins`, comments tell the meaning, unit, range and default of each key, and the origin of its value.
     """
     lines = [f"# Resolved by graspsense {__version__} from the pipeline {json.dumps(settings.pipeline)}."]
-    versions = {one.component.table: one.component.version for one in settings.chosen}
+    versions = {part.component.table: part.component.version for part in settings.chosen}
     for table, values in settings.values.items():
         lines += ["", f"[{table}]"]
         declarations = settings.keys(table) if origins else {}
@@ -434,10 +435,10 @@ def to_toml(settings: Settings, origins: bool = False) -> str:
 def _comments(declaration: Mapping[str, Any], name: str = "") -> list[str]:
     """Return what a key declares as comment lines, also what the keys of a table declare."""
     facts = "; ".join(key_facts(declaration))
-    text = " ".join(one for one in (name, declaration["meaning"], f"[{facts}]" if facts else "") if one)
+    text = " ".join(fact for fact in (name, declaration["meaning"], f"[{facts}]" if facts else "") if fact)
     lines = wrap(text, 98, initial_indent="# ", subsequent_indent="#   ") if text else []
-    for inner, one in declaration.get("keys", {}).items():
-        lines += _comments(one, f"{inner}:")
+    for inner, inner_declaration in declaration.get("keys", {}).items():
+        lines += _comments(inner_declaration, f"{inner}:")
     return lines
 
 
@@ -475,10 +476,12 @@ def toml_value(value: Any) -> str:
     if isinstance(value, int | float):
         return repr(value)
     if isinstance(value, Mapping):
-        inner = (f"{toml_key(key)} = {toml_value(one)}" for key, one in value.items() if one is not None)
+        inner = (
+            f"{toml_key(key)} = {toml_value(member)}" for key, member in value.items() if member is not None
+        )
         return "{ " + ", ".join(inner) + " }" if value else "{}"
     if isinstance(value, list | tuple):
-        return "[" + ", ".join(toml_value(one) for one in value) + "]"
+        return "[" + ", ".join(toml_value(member) for member in value) + "]"
     raise TypeError(f"{value!r} is not a TOML value")
 
 
@@ -515,7 +518,7 @@ def _component(
     users = [layer for layer in layers if table in layer.values]
     if setter is None:
         if users or table != "classifier":
-            names = ", ".join(one.name for one in plugins.components(role)) or "none"
+            names = ", ".join(component.name for component in plugins.components(role)) or "none"
             where = f"{users[-1].where((table,))}: " if users else ""
             kind = role.replace("-", " ")
             complaints.append(f"{where}{table}.type is not given: name a {kind}. Known: {names}")

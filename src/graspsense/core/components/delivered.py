@@ -32,7 +32,11 @@ class Delivered:
         }
         self._declared = tuple(self._forms)
         self._names: tuple[str, ...] | None = None
-        arrays = [one.cells for one in channels if one.name == "pads" and isinstance(one, TactileArray)]
+        arrays = [
+            channel.cells
+            for channel in channels
+            if channel.name == "pads" and isinstance(channel, TactileArray)
+        ]
         self._cells = arrays[0] if arrays else None
         self._pads: Pads | None = None
         self._counter = 0

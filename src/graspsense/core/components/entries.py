@@ -68,19 +68,41 @@ _ARE_CHANNELS: Final = optional(
 
 
 @frozen
-class SensorBackendEntry:
-    """A gripper with its sensors. Its class declares its `channels`, and the kinds of command that it `accepts`."""
+class _CodeEntry:
+    """A name, and the code behind it."""
 
     name: str = field(validator=IS_NAME)
     """The name by which it is selected, without spaces."""
     target: str = field(validator=_IS_TARGET)
-    """The import string of the class, as in `"lab_hand.backend:LabHand"`."""
+    """Its import string, as in `"lab_hand.backend:LabHand"`."""
     summary: str = field(validator=instance_of(str))
-    """What it is, in one line, for `plugins list`."""
+    """What it is, in one line."""
     needs: str = ""
     """What to install or do if the target cannot be imported."""
+
+
+@frozen
+class _ComponentEntry(_CodeEntry):
+    """A component; its target is a class."""
+
     config: str = field(default="", validator=_IS_TARGET_OR_EMPTY, kw_only=True)
     """The import string of the config class; empty where the class names it as the parameter of its base class."""
+
+
+@frozen
+class _FileEntry:
+    """A name, and a file shipped inside a package."""
+
+    name: str = field(validator=IS_NAME)
+    """The name by which it is selected, without spaces."""
+    resource: str = field(validator=_IS_RESOURCE)
+    """The file in its package: `"package:path/inside/it.toml"`."""
+
+
+@frozen
+class SensorBackendEntry(_ComponentEntry):
+    """A gripper with its sensors. Its class declares its `channels`, and the kinds of command that it `accepts`."""
+
     channels: tuple[Channel, ...] | None = field(default=None, validator=_ARE_CHANNELS, kw_only=True)
     """The channels that `read` delivers; None where the class declares them."""
     accepts: tuple[str, ...] | None = field(default=None, validator=_ARE_KINDS, kw_only=True)
@@ -90,19 +112,9 @@ class SensorBackendEntry:
 
 
 @frozen
-class ControllerEntry:
+class ControllerEntry(_ComponentEntry):
     """A control law. Its class declares the channels that it `requires`, and the kinds of `commands` that it sends."""
 
-    name: str = field(validator=IS_NAME)
-    """The name by which it is selected, without spaces."""
-    target: str = field(validator=_IS_TARGET)
-    """The import string of the class, as in `"lab_hand.backend:LabHand"`."""
-    summary: str = field(validator=instance_of(str))
-    """What it is, in one line, for `plugins list`."""
-    needs: str = ""
-    """What to install or do if the target cannot be imported."""
-    config: str = field(default="", validator=_IS_TARGET_OR_EMPTY, kw_only=True)
-    """The import string of the config class; empty where the class names it as the parameter of its base class."""
     requires: tuple[Channel, ...] | None = field(default=None, validator=_ARE_CHANNELS, kw_only=True)
     """The channels that it needs; None where the class declares them."""
     commands: tuple[str, ...] | None = field(default=None, validator=_ARE_KINDS, kw_only=True)
@@ -145,19 +157,9 @@ def _distinct_features(entry: object, attribute: Attribute[Any], features: tuple
 
 
 @frozen
-class FeatureSetEntry:
+class FeatureSetEntry(_ComponentEntry):
     """A set of features. Its class declares the channels that it `requires`, and the `features` that it returns."""
 
-    name: str = field(validator=IS_NAME)
-    """The name by which it is selected, without spaces."""
-    target: str = field(validator=_IS_TARGET)
-    """The import string of the class, as in `"lab_hand.backend:LabHand"`."""
-    summary: str = field(validator=instance_of(str))
-    """What it is, in one line, for `plugins list`."""
-    needs: str = ""
-    """What to install or do if the target cannot be imported."""
-    config: str = field(default="", validator=_IS_TARGET_OR_EMPTY, kw_only=True)
-    """The import string of the config class; empty where the class names it as the parameter of its base class."""
     requires: tuple[Channel, ...] | None = field(default=None, validator=_ARE_CHANNELS, kw_only=True)
     """The channels that it needs; None where the class declares them."""
     features: tuple[Feature, ...] | None = field(
@@ -174,29 +176,14 @@ class FeatureSetEntry:
 
 
 @frozen
-class ClassifierEntry:
+class ClassifierEntry(_ComponentEntry):
     """A classifier: it learns from a table of features, and predicts the object and its state."""
-
-    name: str = field(validator=IS_NAME)
-    """The name by which it is selected, without spaces."""
-    target: str = field(validator=_IS_TARGET)
-    """The import string of the class, as in `"lab_hand.backend:LabHand"`."""
-    summary: str = field(validator=instance_of(str))
-    """What it is, in one line, for `plugins list`."""
-    needs: str = ""
-    """What to install or do if the target cannot be imported."""
-    config: str = field(default="", validator=_IS_TARGET_OR_EMPTY, kw_only=True)
-    """The import string of the config class; empty where the class names it as the parameter of its base class."""
 
 
 @frozen
-class PipelineEntry:
-    """A pipeline file shipped inside a package: `resource` is `"package:path/inside/it.toml"`."""
+class PipelineEntry(_FileEntry):
+    """A pipeline file shipped inside a package, which `--pipeline` names."""
 
-    name: str = field(validator=IS_NAME)
-    """The name of the pipeline, for `--pipeline`."""
-    resource: str = field(validator=_IS_RESOURCE)
-    """The file in its package: `"package:path/inside/it.toml"`."""
     summary: str = field(validator=instance_of(str))
     """What the pipeline is for, in one line."""
     better: str = field(default="", validator=instance_of(str), kw_only=True)
@@ -204,13 +191,9 @@ class PipelineEntry:
 
 
 @frozen
-class ModelEntry:
-    """A trained model shipped inside a package: `resource` is `"package:path/inside/it.json"`."""
+class ModelEntry(_FileEntry):
+    """A trained model shipped inside a package, which `classifier.model` names; its file ends with `.json`."""
 
-    name: str = field(validator=IS_NAME)
-    """The name of the model, for `classifier.model`."""
-    resource: str = field(validator=_IS_RESOURCE)
-    """The file in its package: `"package:path/inside/it.json"`."""
     summary: str = field(validator=instance_of(str))
     """What the model was trained on, in one line."""
 
@@ -247,33 +230,18 @@ class DatasetEntry:
 
 
 @frozen
-class CommandEntry:
-    """A further subcommand of `graspsense`: `target` is a click command."""
-
-    name: str = field(validator=IS_NAME)
-    """The name of the subcommand."""
-    target: str = field(validator=_IS_TARGET)
-    """The import string of the click command, as in `"lab_tool.cli:tool"`."""
-    summary: str = field(validator=instance_of(str))
-    """What the command does, in one line, for `graspsense --help`."""
-    needs: str = ""
-    """What to install or do if the target cannot be imported."""
+class CommandEntry(_CodeEntry):
+    """A further subcommand of `graspsense`: `target` is a click command. `graspsense --help` prints `summary`."""
 
 
 @frozen
-class EmulatorEntry:
+class EmulatorEntry(_CodeEntry):
     """A device that software emulates on this machine: `graspsense emulate NAME`.
 
     `target` is a function `emulate(config, wire, seed)` that returns an `EmulatedDevice`; `config` is that of the
     backend in the pipeline that the user names.
     """
 
-    name: str = field(validator=IS_NAME)
-    """The name that the user gives."""
-    target: str = field(validator=_IS_TARGET)
-    """The import string of the function `emulate(config, wire, seed)`."""
-    summary: str = field(validator=instance_of(str))
-    """What is emulated, in one line."""
     wires: tuple[str, ...] = field(validator=deep_iterable(and_(*IS_NAME), instance_of(tuple)))
     """The interfaces of the operating system that it can use, for `--wire`; the best one first."""
     options: tuple[str, ...] = ()
@@ -285,25 +253,16 @@ class EmulatorEntry:
 
 
 @frozen
-class LiveObserverEntry:
+class LiveObserverEntry(_CodeEntry):
     """A function that receives grasps while they go on, in a process of its own: `--live`.
 
     `target` is a function `observe(batches)`. `batches` yields a list of messages about 30 times a second, until the
     command ends; docs/live.md lists them. What the function does, and how long it takes, cannot disturb a grasp.
     """
 
-    name: str = field(validator=IS_NAME)
-    """The name of the observer."""
-    target: str = field(validator=_IS_TARGET)
-    """The import string of the function `observe(batches)`."""
-    summary: str = field(validator=instance_of(str))
-    """What it does with a grasp, in one line."""
-    needs: str = ""
-    """What to install or do if the target cannot be imported."""
-
 
 @frozen
-class IdentifierEntry:
+class IdentifierEntry(_CodeEntry):
     """A function that identifies an object from recorded squeezes, as a scene of a simulator: `graspsense identify`.
 
     `name` is the sensor backend that simulates the scene. `target` is a function `identify(config, squeezes, progress,
@@ -312,18 +271,9 @@ class IdentifierEntry:
     it is. It raises ConfigError if the squeezes determine no object.
     """
 
-    name: str = field(validator=IS_NAME)
-    """The sensor backend that simulates the scene."""
-    target: str = field(validator=_IS_TARGET)
-    """The import string of the function `identify(config, squeezes, progress, block)`."""
-    summary: str = field(validator=instance_of(str))
-    """What is identified, in one line."""
-    needs: str = ""
-    """What to install or do if the target cannot be imported."""
-
 
 @frozen
-class ConformanceCheckEntry:
+class ConformanceCheckEntry(_CodeEntry):
     """A check of what other plugins return from a hook that this plugin owns.
 
     `hook` is the name of that hook. `target` is a function that takes a list of everything that the hook of one
@@ -331,10 +281,6 @@ class ConformanceCheckEntry:
     `graspsense plugins check` for each distribution that implements the hook.
     """
 
-    name: str = field(validator=IS_NAME)
-    """The id of the check."""
-    target: str = field(validator=_IS_TARGET)
-    """The import string of the function that yields the defects."""
     hook: str = field(validator=instance_of(str))
     """The name of the hook whose results are checked."""
     summary: str = field(validator=instance_of(str))
@@ -375,13 +321,9 @@ class ExperimentKindEntry:
 
 
 @frozen
-class ExperimentEntry:
-    """An experiment file shipped inside a package: `resource` is `"package:path/inside/it.toml"`."""
+class ExperimentEntry(_FileEntry):
+    """An experiment file shipped inside a package, which `graspsense experiment` names."""
 
-    name: str = field(validator=IS_NAME)
-    """The name of the experiment, for `graspsense experiment`."""
-    resource: str = field(validator=_IS_RESOURCE)
-    """The file in its package: `"package:path/inside/it.toml"`."""
     seconds_per_trial: float | None = field(default=None, validator=optional(ge(0.0)))
     """Processor time per trial, from which the duration is estimated; None for that of its kind."""
 
@@ -419,7 +361,7 @@ class Finding:
     """What was examined."""
     state: Literal["ok", "note", "problem"] = field(validator=_a_state)
     """`ok`, `note` (not wrong, but worth knowing) or `problem`."""
-    found: str = field(validator=instance_of(str))
+    words: str = field(validator=instance_of(str))
     """What was found, in words."""
     advice: str = field(default="", validator=instance_of(str))
     """What to do about a problem."""

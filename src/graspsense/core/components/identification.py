@@ -111,11 +111,13 @@ def repeatability(fits: Sequence[SqueezeFit]) -> float:
     if len(fits) < 2:
         return math.nan
     deepest = min(float(np.max(fit.compression_m)) for fit in fits)
-    at = np.linspace(LEAST_COMPRESSION * deepest, deepest, COMPARED)
+    compression_m = np.linspace(LEAST_COMPRESSION * deepest, deepest, COMPARED)
     forces = []
     for fit in fits:
         load = slice(0, int(np.argmax(fit.compression_m)) + 1)
-        forces.append(np.interp(at, np.maximum.accumulate(fit.compression_m[load]), fit.measured_n[load]))
+        forces.append(
+            np.interp(compression_m, np.maximum.accumulate(fit.compression_m[load]), fit.measured_n[load])
+        )
     deviation = float(np.sqrt(np.mean(np.var(forces, axis=0, ddof=1))))
     return deviation / float(np.mean([fit.peak_n for fit in fits]))
 

@@ -16,8 +16,7 @@ from graspsense.core.components.registry import Plugins
 from graspsense.core.components.strict import InvalidValue, shown
 from graspsense.core.components.toml_kinds import KINDS, refuse_other_kind
 from graspsense.core.files.regular_file import first_bytes
-from graspsense.core.files.toml_lines import KeyPath, key_lines
-from graspsense.core.files.toml_text import TomlError, toml_values
+from graspsense.core.files.toml_text import KeyPath, TomlError, key_lines, toml_values
 from graspsense.core.values.errors import ConfigError, UnknownName
 from graspsense.core.values.limits import SETTINGS_BYTES
 
@@ -38,7 +37,7 @@ class Layer:
     final: bool = False
 
     @classmethod
-    def of(cls, values: Mapping[str, Any], label: str) -> Layer:
+    def without_file(cls, values: Mapping[str, Any], label: str) -> Layer:
         """Return a layer of values that are not from a file."""
         return cls(label=label, values=values)
 
@@ -96,7 +95,7 @@ class Merged:
                 into[key] = value
                 self.owner[here] = layer
                 if was_table:
-                    for below in [one for one in self.owner if one[: len(here)] == here and one != here]:
+                    for below in [path for path in self.owner if path[: len(here)] == here and path != here]:
                         del self.owner[below]
 
     def owner_of(self, path: KeyPath) -> Layer | None:
@@ -123,7 +122,7 @@ def pipeline_layers(pipeline: str, plugins: Plugins) -> list[Layer]:
     while True:
         source, label, base = _located(asked, base, asker, plugins)
         identity = source.resolve() if isinstance(source, Path) else str(source)
-        if identity in (one for one, _ in seen):
+        if identity in (earlier for earlier, _ in seen):
             names = " -> ".join([*(name for _, name in seen), label])
             raise ConfigError(f"{asker}extends forms a circle: {names}")
         seen.append((identity, label))

@@ -25,7 +25,7 @@ A module is one of graspsense: `core.values.trace`.
 
 
 class LazyNames:
-    """The names that the module `module` offers."""
+    """The names that the module `module` offers. The module gets the functions by which Python finds and lists them."""
 
     def __init__(self, module: str, table: Table) -> None:
         self.module, self.table = module, table
@@ -33,6 +33,8 @@ class LazyNames:
             name: home for homes in table.values() for home, names in homes.items() for name in names
         }
         self.names: Final = sorted(self._home_of)
+        attributes = vars(sys.modules[module])
+        attributes |= {"__getattr__": self.load, "__dir__": lambda: sorted(attributes["__all__"])}
 
     def load(self, name: str) -> Any:
         """Import a name, and keep it in the module. Raises AttributeError if the module does not offer it."""

@@ -21,21 +21,21 @@ def key_paths(declarations: Mapping[str, Mapping[str, Any]], table: str) -> Iter
         yield from key_paths(declaration.get("keys", {}), path)
 
 
-def nearest_path(found: str, known: Iterable[str]) -> str:
-    """Return the known dotted path that `found` most probably means, the first of equals; empty if none is similar.
+def nearest_path(wrong: str, known: Iterable[str]) -> str:
+    """Return the known dotted path that `wrong` most probably means, the first of equals; empty if none is similar.
 
     >>> nearest_path("probing_force_n", ["gripper.type", "controller.probing_force_n"])
     'controller.probing_force_n'
     """
-    if len(found) > _LONGEST_KEY:
+    if len(wrong) > _LONGEST_KEY:
         return ""
-    name = found.rpartition(".")[2]
+    name = wrong.rpartition(".")[2]
 
     def likeness(path: str) -> float:
         last = path.rpartition(".")[2]
-        whole = SequenceMatcher(None, found, path).ratio()
+        whole = SequenceMatcher(None, wrong, path).ratio()
         if last == name:
-            return 1.0 + whole * ("." in found)
+            return 1.0 + whole * ("." in wrong)
         return SequenceMatcher(None, name, last).ratio() + 0.01 * whole
 
     known = list(known)

@@ -15,7 +15,7 @@ from graspsense.core.values.mounting import Mounting
 def _are_mountings(_config: object, _attribute: Attribute[Any], values: Mapping[str, str]) -> None:
     for name, text in values.items():
         try:
-            Mounting.of(text)
+            Mounting.parse(text)
         except ValueError as error:
             raise ValueError(f"{name}: {error}") from None
 
@@ -102,4 +102,4 @@ class RunConfig:
 
     def mountings(self) -> dict[str, Mounting]:
         """Return where the frames of `mounting` are."""
-        return {name: Mounting.of(text) for name, text in self.mounting.items()}
+        return {name: Mounting.parse(text) for name, text in self.mounting.items()}

@@ -26,11 +26,11 @@ def found_converters(
     ports: Iterable[SerialPort], backend: str, usb_numbers: Collection[tuple[int, int]], words: str
 ) -> list[FoundDevice]:
     """Return the ports with one of these USB numbers (vendor, product); `words` say what they may be."""
-    found = []
+    converters = []
     for port in ports:
         if (port.vid, port.pid) in usb_numbers:
             ready = os.access(port.device, os.R_OK | os.W_OK)
-            found.append(
+            converters.append(
                 FoundDevice(
                     backend=backend,
                     serial=port.serial_number or "",
@@ -39,14 +39,14 @@ def found_converters(
                     advice=words if ready else NO_PERMISSION,
                 )
             )
-    return found
+    return converters
 
 
-def converter_findings(found: Sequence[FoundDevice], backend: str, gripper: str) -> Iterator[Finding]:
+def converter_findings(converters: Sequence[FoundDevice], backend: str, gripper: str) -> Iterator[Finding]:
     """Return the findings of `graspsense doctor` about these converters of a gripper."""
-    if not found:
+    if not converters:
         yield Finding(backend, "note", f"no USB converter of {gripper}")
-    for device in found:
+    for device in converters:
         words = f"a converter at {device.where}"
         yield Finding(backend, "ok" if device.ready else "problem", words, device.advice)
 

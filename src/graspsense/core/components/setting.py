@@ -21,12 +21,19 @@ from typing import Any, Final, Literal, cast, get_args, get_origin
 import attrs
 from attrs import frozen, validators
 
-from graspsense.core.components.figure_origins import fitted_results
-from graspsense.core.components.figure_origins import gives as _gives
-
 _DECLARATION: Final = "graspsense.setting"
 _EFFECT: Final = "graspsense.effect"
 _FOLLOWS: Final = "graspsense.follows"
+_GIVES: Final = "graspsense.gives"
+
+ORIGINS: Final = ("measured", "datasheet", "published elsewhere", "assumed")
+"""The possible origins of a number of a model, besides a fit.
+
+What is compared with the paper follows these origins: a result that a number was fitted to is not predicted. Nor is a
+claim that a number gives by itself, such as static friction that a commanded force below it moves nothing.
+"""
+FITTED_TO: Final = "fitted to "
+"""Begins the origin of a fitted number; the ids of the results follow, separated by commas."""
 
 CHANGES_NO_RESULT: Final[Mapping[str, Any]] = {_EFFECT: "changes no result"}
 """Effect of a setting that changes what is reported, or how fast, but not the result beyond its stated accuracy."""
@@ -64,7 +71,7 @@ class Declaration:
     allowed: str = ""
     plausible: tuple[float, float] | None = None
     origin: str = ""
-    """Where the default of a number of a model comes from, as in `figure_origins`; empty for other settings."""
+    """Where the default of a number of a model comes from, as `fitted_results` takes it; empty for other settings."""
 
     @property
     def plausible_words(self) -> str:
@@ -132,7 +139,7 @@ def setting(
     )
     _check_plausible(declaration, default)
     metadata = {_DECLARATION: declaration, **(effect or {}), **({_FOLLOWS: follows} if follows else {})}
-    metadata |= _gives(gives) if gives else {}
+    metadata |= {_GIVES: gives} if gives else {}
     if factory is not None:
         return attrs.field(factory=factory, validator=check, metadata=metadata)
     return attrs.field(default=default, validator=check, metadata=metadata)
@@ -226,6 +233,42 @@ def settings_marked(config_class: type, effect: Mapping[str, Any]) -> frozenset[
     wanted = effect[_EFFECT]
     return frozenset(
         field.name for field in attrs.fields(config_class) if field.metadata.get(_EFFECT) == wanted
+    )
+
+
+def fitted_results(origin: str) -> tuple[str, ...]:
+    """Return the ids of the results that a number of this origin was fitted to; none if it was not fitted.
+
+    Raises ValueError with the known origins if the text is not one.
+
+    >>> fitted_results("fitted to table_2, table_3")
+    ('table_2', 'table_3')
+    >>> fitted_results("assumed")
+    ()
+    """
+    if origin in ORIGINS:
+        return ()
+    results = tuple(origin.removeprefix(FITTED_TO).split(", "))
+    if not origin.startswith(FITTED_TO) or not all(result.isidentifier() for result in results):
+        raise ValueError(
+            f"{origin!r} is not an origin. Known: {', '.join(ORIGINS)}, or {FITTED_TO}the ids of published results"
+        )
+    return results
+
+
+def gives(claim: str) -> Mapping[str, str]:
+    """Return the metadata of the attrs field of a number which, unless it is 0, gives this claim by itself."""
+    return {_GIVES: claim}
+
+
+def given_claims(values: Any) -> frozenset[str]:
+    """Return the ids of the claims that numbers of this attrs instance give by themselves; none for other values."""
+    if not attrs.has(type(values)):
+        return frozenset()
+    return frozenset(
+        field.metadata[_GIVES]
+        for field in attrs.fields(type(values))
+        if _GIVES in field.metadata and getattr(values, field.name) != 0
     )
 
 

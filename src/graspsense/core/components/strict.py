@@ -20,8 +20,7 @@ from attrs import frozen
 
 from graspsense.core.components.nearest_key import did_you_mean
 from graspsense.core.components.setting import declared, implausible
-from graspsense.core.files.toml_lines import KeyPath
-from graspsense.core.files.toml_text import LARGEST_INTEGER
+from graspsense.core.files.toml_text import LARGEST_INTEGER, KeyPath
 from graspsense.core.values.errors import FAILURES, suggestion
 
 ConfigT = TypeVar("ConfigT")
@@ -81,7 +80,7 @@ def structured(values: Mapping[str, Any], cls: type[ConfigT], called: str) -> Co
     with all problems.
     """
     attrs.resolve_types(cls)  # type: ignore[type-var]
-    fields = {one.alias: one for one in attrs.fields(cls) if one.init}  # type: ignore[arg-type]
+    fields = {field.alias: field for field in attrs.fields(cls) if field.init}  # type: ignore[arg-type]
     unknown = [key for key in values if key not in fields]
     names = tuple(sorted(fields))
     problems = [
@@ -153,16 +152,16 @@ def keys_of(cls: type) -> dict[str, dict[str, Any]]:
 
 def implausible_values(config: object) -> list[InvalidValue]:
     """Return the values of this config, also in its tables, that are outside of their plausible ranges."""
-    found = []
+    problems = []
     for field in attrs.fields(type(config)):  # type: ignore[arg-type]
         if not field.init:
             continue
         value = getattr(config, field.name)
         if attrs.has(type(value)):
-            found += [one.under(field.alias) for one in implausible_values(value)]
+            problems += [problem.under(field.alias) for problem in implausible_values(value)]
         elif value != field.default and (reason := implausible(declared(field), value)):
-            found.append(InvalidValue((field.alias,), reason))
-    return found
+            problems.append(InvalidValue((field.alias,), reason))
+    return problems
 
 
 def _kind_words(kind: Any) -> str:
@@ -175,9 +174,9 @@ def _plain(value: Any) -> Any:
     if attrs.has(type(value)):
         return plain(value)
     if isinstance(value, Mapping):
-        return {str(key): _plain(one) for key, one in value.items()}
+        return {str(key): _plain(member) for key, member in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(one) for one in value]
+        return [_plain(member) for member in value]
     if isinstance(value, Enum):
         return _plain(value.value)
     return str(value) if isinstance(value, Path) else value
@@ -286,12 +285,14 @@ def _none(value: object, _: object) -> None:
 
 
 def _choice(value: object, cls: Any) -> Any:
-    allowed = [one.value for one in cls] if _is_enum(cls) else list(get_args(cls))
-    for one in allowed:
-        if type(one) is type(value) and one == value:
-            return cls(value) if _is_enum(cls) else one
+    allowed = [member.value for member in cls] if _is_enum(cls) else list(get_args(cls))
+    for member in allowed:
+        if type(member) is type(value) and member == value:
+            return cls(value) if _is_enum(cls) else member
     near = (
-        suggestion(value, (one for one in allowed if isinstance(one, str))) if isinstance(value, str) else ""
+        suggestion(value, (member for member in allowed if isinstance(member, str)))
+        if isinstance(value, str)
+        else ""
     )
     raise _expected(f"one of {', '.join(map(repr, allowed))}", value, near and "." + near)
 
@@ -340,9 +341,9 @@ def _sequence(value: object, cls: Any) -> Any:
         members = [members[0] if members else Any] * len(value)
     problems: list[InvalidValue] = []
     items = []
-    for index, (one, member) in enumerate(zip(value, members, strict=True)):
+    for index, (inner, member) in enumerate(zip(value, members, strict=True)):
         try:
-            items.append(_CONVERTER.structure(one, member))
+            items.append(_CONVERTER.structure(inner, member))
         except ValidationFailed as misfit:
             problems += misfit.under(index)
             if len(problems) >= MOST_UNKNOWN:
@@ -358,9 +359,9 @@ def _mapping(value: object, cls: Any) -> Any:
     member = get_args(cls)[1] if get_args(cls) else Any
     problems: list[InvalidValue] = []
     items = {}
-    for key, one in value.items():
+    for key, inner in value.items():
         try:
-            items[key] = _CONVERTER.structure(one, member)
+            items[key] = _CONVERTER.structure(inner, member)
         except ValidationFailed as misfit:
             problems += misfit.under(key)
             if len(problems) >= MOST_UNKNOWN:

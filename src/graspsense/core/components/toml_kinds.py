@@ -69,9 +69,9 @@ def toml_kind(values: Mapping[str, Any], expected: str = "") -> str:
 
 def refuse_other_kind(values: Mapping[str, Any], expected: str, file: str) -> None:
     """Raise ConfigError if the content of a TOML file is that of another kind than expected."""
-    found = toml_kind(values, expected)
-    if found != expected:
-        kind = KINDS[found]
+    kind_found = toml_kind(values, expected)
+    if kind_found != expected:
+        kind = KINDS[kind_found]
         raise ConfigError(
             f"{file} is {kind.called}, not {KINDS[expected].place}. Use it as in: {kind.use.format(file=file)}"
         )

@@ -7,10 +7,12 @@ or lowers a limit that the command gives.
 
 from __future__ import annotations
 
+import operator
+from collections.abc import Callable
 from math import inf
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from graspsense.core.values.signals import EFFORT, FORCE, POSITION, VELOCITY, Command, Frame
+from graspsense.core.values.signals import EFFORT, FORCE, POSITION, VELOCITY, Command, Frame, Reading
 
 
 class GuardParams(NamedTuple):
@@ -99,3 +101,38 @@ def guard(
     if contact_seen != state.contact_seen or acted != state.acted:
         state = GuardState(contact_seen, acted, 0)
     return Command(kind, value, effort_limit, speed_limit), state
+
+
+Step = Callable[[Any, Any, Reading], tuple[Command, Any]]
+
+
+def with_plain_commands(step: Step) -> Step:
+    """Return the step of a controller, run by the interpreter, with commands of plain numbers for the guard to compare.
+
+    A controller is the code of others. A subclass of float, as numpy has one, can define what `<` means. The step
+    raises TypeError or ValueError where a command is not made of numbers.
+    """
+
+    def plain_step(params: Any, state: Any, reading: Reading) -> tuple[Command, Any]:
+        command, state = step(params, state, reading)
+        kind, value, effort_limit, speed_limit = command
+        if (
+            type(command) is Command
+            and type(kind) is int
+            and type(value) is float
+            and type(effort_limit) is float
+            and type(speed_limit) is float
+        ):
+            return command, state
+        return Command(_integer(kind), _number(value), _number(effort_limit), _number(speed_limit)), state
+
+    return plain_step
+
+
+def _integer(value: Any) -> int:
+    return int.__int__(value) if isinstance(value, int) else operator.index(value)
+
+
+def _number(value: Any) -> float:
+    # The method of float itself, since that of a subclass can return anything.
+    return float.__float__(value) if isinstance(value, float) else float(value)

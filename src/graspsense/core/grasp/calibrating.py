@@ -125,7 +125,7 @@ def breakaways(rig: Rig, gaps_m: Sequence[float], most_n: float) -> list[Breakaw
     than `most_n`, or if a pad is touched.
     """
     rig.open()
-    found = []
+    frictions = []
     push_n = most_n
     for gap_m in sorted(gaps_m, reverse=True):
         _move_to(rig, gap_m, push_n)
@@ -135,8 +135,8 @@ def breakaways(rig: Rig, gaps_m: Sequence[float], most_n: float) -> list[Breakaw
         opening = _ramp(rig, -1.0, most_n)
         rig.let_go()
         push_n = min(most_n, closing * 1.5)
-        found.append(Breakaway(at_m, closing, opening))
-    return found
+        frictions.append(Breakaway(at_m, closing, opening))
+    return frictions
 
 
 def _move_to(rig: Rig, gap_m: float, effort_n: float) -> None:

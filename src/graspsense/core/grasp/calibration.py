@@ -29,13 +29,13 @@ LARGEST_COUNT: Final = 65535.0
 Cells = tuple[float, ...]
 
 
-def pad_force(cells: Cells, zero: Cells, counts_per_n: float, first: int) -> float:
-    """Return the force (N) on the cells of the gripping face, which are all from number `first` on.
+def pad_force(cells: Cells, zero: Cells, counts_per_n: float, first_cell: int) -> float:
+    """Return the force (N) on the cells of the gripping face, which are all from number `first_cell` on.
 
     `counts_per_n` is the number of counts of their sum under one newton.
     """
     total = 0.0
-    for i in range(first, len(cells)):
+    for i in range(first_cell, len(cells)):
         total += cells[i] - zero[i]
     return total / counts_per_n
 
@@ -82,12 +82,12 @@ def zero_of(images: Sequence[Cells]) -> Cells:
 def tare(
     images: Sequence[Pads],
     counts_per_n: float,
-    first: int,
+    first_cell: int,
     stored: tuple[Cells, Cells] | None = None,
 ) -> tuple[Cells, Cells]:
     """Return the zero of the left and of the right fingertip from images taken with nothing touching.
 
-    The cells of the gripping face are those from `first` on. The zero of a cell is the mean over the images in
+    The cells of the gripping face are those from `first_cell` on. The zero of a cell is the mean over the images in
     which it works, or 0 if it works in none. `stored` is the zero of an earlier tare of unloaded pads. Raises
     TareRefused if there is no image, if a value is NaN, if all cells of a fingertip are dead, if the sum of a pad
     varies by more than `TARE_SPREAD_N` over the images (something touches it or moves), or if it differs by more
@@ -108,7 +108,7 @@ def tare(
                 raise TareRefused(
                     f"all cells of the {side} fingertip read 0 or {LARGEST_COUNT:.0f}: it may not be connected"
                 )
-        forces = [pad_force(masked(image, zero)[0], zero, counts_per_n, first) for image in cells]
+        forces = [pad_force(masked(image, zero)[0], zero, counts_per_n, first_cell) for image in cells]
         spread = max(forces) - min(forces)
         if spread > TARE_SPREAD_N:
             raise TareRefused(
@@ -116,7 +116,7 @@ def tare(
                 "take everything out of the gripper, wait until it is still, and try again"
             )
         if stored is not None:
-            load = pad_force(masked(zero, stored[i])[0], stored[i], counts_per_n, first)
+            load = pad_force(masked(zero, stored[i])[0], stored[i], counts_per_n, first_cell)
             if abs(load) > TARE_DRIFT_N:
                 raise TareRefused(
                     f"the {side} pad is {load:+.2f} N off its stored tare, and {TARE_DRIFT_N} N is allowed: take "
@@ -164,13 +164,13 @@ def counts_per_newton(readings: Iterable[tuple[int, float, float]], cells: int) 
     return gains
 
 
-def cells_force(cells: Cells, zero: Cells, counts_per_n: Cells, first: int) -> float:
-    """Return the force (N) on the cells of the gripping face, which are all from number `first` on.
+def cells_force(cells: Cells, zero: Cells, counts_per_n: Cells, first_cell: int) -> float:
+    """Return the force (N) on the cells of the gripping face, which are all from number `first_cell` on.
 
     `counts_per_n` has the counts under one newton of each cell, as `stored_gain` returns them.
     """
     total = 0.0
-    for i in range(first, len(cells)):
+    for i in range(first_cell, len(cells)):
         total += (cells[i] - zero[i]) / counts_per_n[i]
     return total
 
@@ -201,8 +201,8 @@ def load_table(readings: Iterable[tuple[float, float]]) -> LoadTable:
     for pad in sorted(sums):
         load, pads = sum(sums[pad]) / len(sums[pad]), [pad]
         while pools and pools[-1][0] > load:
-            before, more = pools.pop()
-            load = (before * len(more) + load * len(pads)) / (len(more) + len(pads))
+            earlier_load, more = pools.pop()
+            load = (earlier_load * len(more) + load * len(pads)) / (len(more) + len(pads))
             pads = more + pads
         pools.append((load, pads))
     pad_n = [pad for _, pads in pools for pad in pads]

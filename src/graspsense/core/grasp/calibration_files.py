@@ -154,7 +154,7 @@ def calibrations_of(folder: str | Path, serial: str, device: Mapping[str, Any]) 
             "  calibrate this device into it:  graspsense calibrate tare\n"
             f"  run without:                    {set_option('gripper.calibration=none')}"
         )
-    found: dict[str, Calibration] = {}
+    calibrations: dict[str, Calibration] = {}
     for kind in KINDS:
         path = calibration_path(folder, serial, kind)
         _refuse_open(path)
@@ -177,8 +177,8 @@ def calibrations_of(folder: str | Path, serial: str, device: Mapping[str, Any]) 
                 f"  calibrate this device:  graspsense calibrate {kind} --replace\n"
                 f"  run without:            {set_option('gripper.calibration=none')}"
             )
-        found[kind] = calibration
-    return found
+        calibrations[kind] = calibration
+    return calibrations
 
 
 def _refuse_open(path: Path) -> None:

@@ -53,16 +53,16 @@ def gap_resolution(times_s: NDArray[np.float64], gaps_m: NDArray[np.float64], co
 
     with np.errstate(invalid="ignore"):
         moved = gaps_m[1:] - gaps_m[:-1]
-        at = np.flatnonzero(np.abs(moved) > ROUNDING * np.abs(gaps_m[1:])) + 1
+        changes_at = np.flatnonzero(np.abs(moved) > ROUNDING * np.abs(gaps_m[1:])) + 1
     step_m, period_s = 0.0, 0.0
-    if len(at) > 1:
-        closing = moved[at - 1] < 0.0
-        if bool(((np.diff(at) > 1) & closing[1:] & closing[:-1]).any()):
-            step_m = float(np.abs(moved[at - 1]).min())
-        before = at[at <= contact]
-        changes = len(before) - 1
-        if len(before) >= LEAST_CHANGES and before[-1] - before[0] > HELD * changes:
-            period_s = float((times_s[before[-1]] - times_s[before[0]]) / changes)
+    if len(changes_at) > 1:
+        closing = moved[changes_at - 1] < 0.0
+        if bool(((np.diff(changes_at) > 1) & closing[1:] & closing[:-1]).any()):
+            step_m = float(np.abs(moved[changes_at - 1]).min())
+        free_changes = changes_at[changes_at <= contact]
+        changes = len(free_changes) - 1
+        if len(free_changes) >= LEAST_CHANGES and free_changes[-1] - free_changes[0] > HELD * changes:
+            period_s = float((times_s[free_changes[-1]] - times_s[free_changes[0]]) / changes)
     return GapResolution(step_m, period_s)
 
 
@@ -70,22 +70,22 @@ def gap_resolution_by_sample(
     times_s: NDArray[np.float64], gaps_m: NDArray[np.float64], contact: int, end: int
 ) -> GapResolution:
     """Return what `gap_resolution` does for the samples before `end`, one by one, so that it can be compiled."""
-    step_m, coarse, before, was_closing = 0.0, False, 0, False
-    first_s, last_s, first, last, changes = 0.0, 0.0, 0, 0, 0
+    step_m, coarse, last_change, was_closing = 0.0, False, 0, False
+    first_s, last_s, first_free, last_free, changes = 0.0, 0.0, 0, 0, 0
     for i in range(1, end):
         moved = gaps_m[i] - gaps_m[i - 1]
         if not abs(moved) > ROUNDING * abs(gaps_m[i]):
             continue
         closing = moved < 0.0
-        if before > 0 and i - before > 1 and closing and was_closing:
+        if last_change > 0 and i - last_change > 1 and closing and was_closing:
             coarse = True
-        step_m = abs(moved) if before == 0 else min(step_m, abs(moved))
-        before, was_closing = i, closing
+        step_m = abs(moved) if last_change == 0 else min(step_m, abs(moved))
+        last_change, was_closing = i, closing
         if i <= contact:
             if changes == 0:
-                first, first_s = i, times_s[i]
-            changes, last, last_s = changes + 1, i, times_s[i]
+                first_free, first_s = i, times_s[i]
+            changes, last_free, last_s = changes + 1, i, times_s[i]
     period_s = 0.0
-    if changes >= LEAST_CHANGES and last - first > HELD * (changes - 1):
+    if changes >= LEAST_CHANGES and last_free - first_free > HELD * (changes - 1):
         period_s = (last_s - first_s) / (changes - 1)
     return GapResolution(step_m if coarse else 0.0, period_s)

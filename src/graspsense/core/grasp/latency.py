@@ -68,12 +68,12 @@ def latency_findings(
     """Return the median and the largest latencies, compared with what the gripper declares. Raises as above."""
     measured = measured_latency(backend, accepts, info, run, repetitions)
     # A motion shows late on a coarse gap and heavy fingers, so that it says nothing of a delay of the commands.
-    found = [_finding("command to first motion", measured.motion_s, 0.0, info)]
+    findings = [_finding("command to first motion", measured.motion_s, 0.0, info)]
     if measured.no_force:
-        found.append(Finding("command to first force", "note", "not measured", measured.no_force))
+        findings.append(Finding("command to first force", "note", "not measured", measured.no_force))
     else:
-        found.append(_finding("command to first force", measured.force_s, backend.command_delay_s, info))
-    return tuple(found)
+        findings.append(_finding("command to first force", measured.force_s, backend.command_delay_s, info))
+    return tuple(findings)
 
 
 def _finding(subject: str, latencies_s: tuple[float, ...], declared_s: float, info: DeviceInfo) -> Finding:
@@ -129,9 +129,9 @@ class _Meter:
         quiet = [self.rig.relax().frame]
         while quiet[-1].t_s - quiet[0].t_s < QUIET_S:
             quiet.append(self.rig.relax().frame)
-        before = quiet[-1]
+        start = quiet[-1]
         self._moved_m = max(_noise(frame.gap_m for frame in quiet), LEAST_M)
-        return self._until(force_n, before, lambda frame: before.gap_m - frame.gap_m > self._moved_m)
+        return self._until(force_n, start, lambda frame: start.gap_m - frame.gap_m > self._moved_m)
 
     def force_s(self) -> tuple[float, str]:
         """Return the time until a larger force shows on what the fingers have met, and why there is none."""
@@ -144,15 +144,15 @@ class _Meter:
         quiet = self._until_they_stand(light_n)
         if not quiet:
             return inf, f"the fingers did not come to rest in {CLOSING_S:g} s"
-        before = quiet[-1]
-        if before.gap_m < CLOSED_M:
+        start = quiet[-1]
+        if start.gap_m < CLOSED_M:
             return inf, "there is nothing between the fingers: put a block there"
         noise_n = _noise(map(_force_n, quiet))
         level_n = max(map(_force_n, quiet))
-        found = self._until(more_n, before, lambda frame: _force_n(frame) - level_n > max(noise_n, LEAST_N))
-        if found is None:
+        answer_s = self._until(more_n, start, lambda frame: _force_n(frame) - level_n > max(noise_n, LEAST_N))
+        if answer_s is None:
             return inf, f"no force followed within {ANSWER_S:g} s: raise run.first_effort_n"
-        return found, ""
+        return answer_s, ""
 
     def _closing(self, force_n: float) -> Command:
         value = {EFFORT: force_n, VELOCITY: -self._speed_m_s, POSITION: 0.0, FORCE: force_n}[self._kind]
@@ -171,13 +171,13 @@ class _Meter:
                 return quiet
         return []
 
-    def _until(self, force_n: float, before: Frame, seen: Callable[[Frame], bool]) -> float | None:
-        """Return the time from `before` to the frame in which it is seen, None if that takes too long."""
+    def _until(self, force_n: float, start: Frame, seen: Callable[[Frame], bool]) -> float | None:
+        """Return the time from `start` to the frame in which it is seen, None if that takes too long."""
         while True:
             frame = self.rig.tick(self._closing(force_n)).frame
             if seen(frame):
-                return frame.t_s - before.t_s
-            if frame.t_s - before.t_s > ANSWER_S:
+                return frame.t_s - start.t_s
+            if frame.t_s - start.t_s > ANSWER_S:
                 return None
 
 

@@ -32,8 +32,8 @@ class Losses:
         if pads is not last.pads and last.pads.counter:
             self._add("pads", pads.counter - last.pads.counter - 1)
         if signals is not last.signals:
-            for name, before, now in zip(signals._fields, last.signals, signals, strict=True):
-                self._add(name, _missing(before, now))
+            for name, earlier, now in zip(signals._fields, last.signals, signals, strict=True):
+                self._add(name, _missing(earlier, now))
 
     def _add(self, name: str, count: int) -> None:
         if count > 0:
@@ -44,9 +44,9 @@ class Losses:
         return {f"lost_{name}": count for name, count in self.lost.items()}
 
 
-def _missing(before: Any, now: Any) -> int:
+def _missing(earlier: Any, now: Any) -> int:
     """Return the number of images or samples between two values of a channel that were lost."""
-    counter = getattr(before, "counter", 0)
+    counter = getattr(earlier, "counter", 0)
     if not counter or now.counter == counter:
         return 0
     return int(now.counter - counter - (now.new if isinstance(now, Samples) else 1))

@@ -215,7 +215,7 @@ class _Running(Generic[T]):
 
 
 def run_pair(
-    first: Callable[[Member], tuple[T, str]], second: Callable[[Member], tuple[T, str]]
+    grasp_here: Callable[[Member], tuple[T, str]], grasp_beside: Callable[[Member], tuple[T, str]]
 ) -> tuple[T, T]:
     """Run two grasps at the same time and return their results.
 
@@ -226,7 +226,7 @@ def run_pair(
     changed = Condition()
     members = Member(changed), Member(changed)
     members[0].other, members[1].other = members[1], members[0]
-    running = _Running(members[0], first), _Running(members[1], second)
+    running = _Running(members[0], grasp_here), _Running(members[1], grasp_beside)
     thread = Thread(target=running[1].run, name="second gripper")
     thread.start()
     running[0].run()
@@ -237,7 +237,7 @@ def run_pair(
         except KeyboardInterrupt:
             interrupted = True
             members[0].fails("was interrupted")
-    errors = [one.error for one in running if one.error is not None]
+    errors = [grasp.error for grasp in running if grasp.error is not None]
     for error in sorted(errors, key=lambda error: isinstance(error, OtherGripperFailed)):
         raise error
     if interrupted:

@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from math import ceil, inf
-from typing import Any, Final, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, Final, Protocol, runtime_checkable
 
 from attrs import evolve, frozen
 
@@ -22,8 +22,7 @@ from graspsense.core.components.run_config import RunConfig
 from graspsense.core.control.binding import bind, maker
 from graspsense.core.control.contact import RestState, at_rest, update_rest
 from graspsense.core.control.garbage_collection import no_collection
-from graspsense.core.control.guard import GuardParams, GuardState, guard
-from graspsense.core.control.plain_command import with_plain_commands
+from graspsense.core.control.guard import GuardParams, GuardState, guard, with_plain_commands
 from graspsense.core.control.tick import (
     OPEN_SPEED_M_S,
     OPEN_WINDOW_S,
@@ -39,7 +38,6 @@ from graspsense.core.control.tick import (
 )
 from graspsense.core.grasp.interrupts import Interrupts
 from graspsense.core.grasp.losses import Losses, lost_in_words
-from graspsense.core.grasp.protection.protection import LIMITED, Protection
 from graspsense.core.values.channel import Channel
 from graspsense.core.values.device import DeviceInfo
 from graspsense.core.values.errors import (
@@ -51,7 +49,7 @@ from graspsense.core.values.errors import (
     named,
 )
 from graspsense.core.values.events import EventSource, GraspEvent, event_name
-from graspsense.core.values.faults import Fault
+from graspsense.core.values.faults import LIMITED, Fault
 from graspsense.core.values.features import Prediction
 from graspsense.core.values.fingers import fingers_in_words, fingers_of
 from graspsense.core.values.signals import (
@@ -69,6 +67,9 @@ from graspsense.core.values.signals import (
     Reading,
 )
 from graspsense.core.values.trace import SI_UNITS, Trace, TraceRecorder
+
+if TYPE_CHECKING:
+    from graspsense.core.grasp.protection.protection import Protection
 
 Tell = Callable[[float, int, str, Prediction | None], None]
 """Called with the time, the phase, a sentence and the prediction; None where there is none, for the reason told."""
@@ -394,7 +395,7 @@ class _Grasp:
         self.controller, self.step = controller, type(controller).step
         self.event_names = type(controller).events
         self.params = tick_params(info, controller, run)
-        self.protection = None if info.harmless else Protection(info, controller, run, self._fault_seen)
+        self.protection = None if info.harmless else self._protection()
         self.delivered = Delivered(info.channels)
         # The times of a recording are those of its own devices.
         self.losses = Losses(info.rate_hz) if info.opening is not None else None
@@ -405,6 +406,12 @@ class _Grasp:
         self.failed_sinks: list[str] = []
         self.first_t_s: float | None = None
         self.last: Frame | None = None
+
+    def _protection(self) -> Protection:
+        # Imported here: a pure model, as most grasps are of, needs none.
+        from graspsense.core.grasp.protection.protection import Protection
+
+        return Protection(self.info, self.controller, self.run, self._fault_seen)
 
     def watch_with(self, watcher: Watcher) -> None:
         """Let this watcher see the ticks from the contact on."""
@@ -453,9 +460,9 @@ class _Grasp:
         if self.stop_reason and not failed:
             return Outcome.RECOGNISED, self.stop_reason
         if self.state.law.outcome != RUNNING and failed:
-            before, unknown = ended_by_itself(0, self.state.law.outcome)
+            own_ending, unknown = ended_by_itself(0, self.state.law.outcome)
             if not unknown:
-                ending = ending[0], f"{ending[1]} (after the grasp had ended: {before.words})"
+                ending = ending[0], f"{ending[1]} (after the grasp had ended: {own_ending.words})"
         return ending
 
     def seconds(self) -> float:
@@ -551,12 +558,12 @@ class _Grasp:
         offers = type(self.backend).free_ticks is not SensorBackend.free_ticks
         return offers and self.info.harmless and self.info.clock == "virtual"
 
-    def _leap(self, phase: int, before: Reading, most: int) -> int:
+    def _leap(self, phase: int, reading: Reading, most: int) -> int:
         """Let the gripper run ticks of this phase at once, record and show them, and return their number.
 
         The cell image of all of them is that of the reading before.
         """
-        free = self.backend.free_ticks(self.params, self.state, before.frame, most)
+        free = self.backend.free_ticks(self.params, self.state, reading.frame, most)
         if free is None:
             return 0
         limited, self.state = free.state.guard.acted - self.state.guard.acted, free.state
@@ -567,7 +574,7 @@ class _Grasp:
         if self.sinks:
             sent = free.sent or (Command(EFFORT, effort_n, inf, inf) for effort_n in free.commands)
             for frame, command in zip(free.frames, sent, strict=True):
-                self._show(Reading(frame, before.pads), phase, command)
+                self._show(Reading(frame, reading.pads), phase, command)
         return free.n_ticks
 
     def _show(self, reading: Reading, phase: int, command: Command) -> None:
@@ -607,11 +614,11 @@ class _Grasp:
         phase = Phase(max(self.state.phase, Phase.OPENING))
         self._event(t_s, phase, f"{'fault' if fault.ends else 'warning'}: {fault.told}")
 
-    def _guard_event(self, frame: Frame, before: GuardState, now: GuardState) -> GuardState:
+    def _guard_event(self, frame: Frame, earlier: GuardState, now: GuardState) -> GuardState:
         """Log an action of the guard at its first time, and return its state."""
-        if now.stopped and not before.stopped:
+        if now.stopped and not earlier.stopped:
             self._event(frame.t_s, Phase(self.state.phase), "guard: the controller commanded NaN")
-        elif now.acted and not before.acted:
+        elif now.acted and not earlier.acted:
             self._event(frame.t_s, Phase(self.state.phase), "guard: a command was limited")
         return now
 

@@ -55,8 +55,8 @@ class Certainty:
     def class_of(self, support: NDArray[np.float64]) -> NDArray[np.int64]:
         """Return the number of the class of support of each answer. NaN is an answer without support."""
         bounds = [support_class.least for support_class in self.classes[1:]]
-        found = np.searchsorted(np.array(bounds) - _ROUNDING, np.nan_to_num(support, nan=0.0), side="right")
-        return np.asarray(found, dtype=np.int64)
+        numbers = np.searchsorted(np.array(bounds) - _ROUNDING, np.nan_to_num(support, nan=0.0), side="right")
+        return np.asarray(numbers, dtype=np.int64)
 
     def rate(self, probability: NDArray[np.float64], support: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the rate of right answers among those with this probability and support."""

@@ -2,7 +2,8 @@
 
 A model of whole grasps is wrong for a part of one: the features of the rest are missing, and those of the squeeze have
 other values. A model therefore has a further model for each checkpoint, which was trained and calibrated on the same
-part of the training grasps. Training and a grasp that goes on cut the trace by the same rule, `until_checkpoint`.
+part of the training grasps. Training and a grasp that goes on cut the trace by the same rule:
+`trace.until(contact_s + after_s)`.
 """
 
 from __future__ import annotations
@@ -35,11 +36,6 @@ def contact_of(trace: Trace) -> float | None:
     """Return the time at which the controller saw the contact of both pads, None if it did not."""
     squeezed = (trace.phase >= SQUEEZE) & (trace.phase <= HOLD)
     return float(trace.t_s[int(squeezed.argmax())]) if squeezed.any() else None
-
-
-def until_checkpoint(trace: Trace, contact_s: float, after_s: float) -> Trace:
-    """Return the trace up to a time (s) after the contact."""
-    return trace.until(contact_s + after_s)
 
 
 def reaches(trace: Trace, contact_s: float, after_s: float) -> bool:
@@ -113,7 +109,7 @@ class CheckpointFeatures(FeatureSet[Any]):
             if contact_s is not None:
                 cost = used(trace, contact_s, after_s)
                 if after_s is not None and reaches(trace, contact_s, after_s):
-                    part = self._feature_set.extract(until_checkpoint(trace, contact_s, after_s))
+                    part = self._feature_set.extract(trace.until(contact_s + after_s))
             if after_s is not None:
                 names += [_at(name, after_s) for name in whole.names]
                 units += whole.units

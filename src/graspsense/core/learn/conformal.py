@@ -72,8 +72,8 @@ def units_lacking(
     for (label, instance), n in counts.items():
         named.setdefault(label, set()).add(instance)
         trials[label] = trials.get(label, 0) + n
-    by_instance = all(None not in of and len(of) > 1 for of in named.values())
-    have = {label: len(of) for label, of in named.items()} if by_instance else trials
+    by_instance = all(None not in instances and len(instances) > 1 for instances in named.values())
+    have = {label: len(instances) for label, instances in named.items()} if by_instance else trials
     needed = units_needed(coverage)
     lacking = {label: max(needed - n, 0) for label, n in sorted(have.items())}
     return ("instances" if by_instance else "trials"), lacking
@@ -259,5 +259,5 @@ def calibrated_threshold(scores: NDArray[np.float64], units: NDArray[np.str_], c
     weights = 1.0 / ((len(trials_of_unit) + 1) * trials_of_unit[unit_of])
     order = np.argsort(-scores, kind="stable")
     reached = np.cumsum(weights[order])
-    first = int(np.searchsorted(reached, coverage - _ROUNDING))
-    return float(scores[order[min(first, len(order) - 1)]])
+    cut = int(np.searchsorted(reached, coverage - _ROUNDING))
+    return float(scores[order[min(cut, len(order) - 1)]])

@@ -56,9 +56,9 @@ def without_copies(labelled: Labelled) -> Labelled:
         notes.append(_left_out(labelled, left_out, original))
     edited = [] if by_chance else _edited_copies(with_codes(labelled.table)[1][kept])
     if edited:
-        before, copy = (int(kept[k]) + 1 for k in edited[0])
+        row, copy = (int(kept[k]) + 1 for k in edited[0])
         notes.append(
-            f"trials that differ from another one in a single feature: {len(edited)} (trial {copy} from trial {before})"
+            f"trials that differ from another one in a single feature: {len(edited)} (trial {copy} from trial {row})"
             ". They count: make sure that they are no copies with a value that was changed"
         )
     if len(notes) == len(labelled.notes):
@@ -135,8 +135,8 @@ def _originals(table: FeatureTable, content: Sequence[str] | None) -> tuple[NDAr
 def _edited_copies(values: NDArray[np.float64]) -> list[tuple[int, int]]:
     """Return the trials that differ in a single feature from one before, each behind that one, if chance makes none."""
     columns = [np.unique(column[~np.isnan(column)]) for column in values.T]
-    cells = np.array([1.0 if len(one) < _FEW else cells_in_range(one) for one in columns])
-    found: dict[int, int] = {}
+    cells = np.array([1.0 if len(column) < _FEW else cells_in_range(column) for column in columns])
+    copies: dict[int, int] = {}
     for left_out in range(values.shape[1]):
         combinations = np.delete(cells, left_out)
         if (combinations > 1.0).sum() < 2:
@@ -144,12 +144,12 @@ def _edited_copies(values: NDArray[np.float64]) -> list[tuple[int, int]]:
         seen: dict[bytes, int] = {}
         pairs = {}
         for i, row in enumerate(np.delete(values, left_out, axis=1)):
-            before = seen.setdefault(row.tobytes(), i)
-            if before != i:
-                pairs[i] = before
+            earlier = seen.setdefault(row.tobytes(), i)
+            if earlier != i:
+                pairs[i] = earlier
         if len(pairs) > _SURE_OF_ALL * len(values) ** 2 / (2.0 * math.prod(combinations.tolist())):
-            found |= pairs
-    return [(before, i) for i, before in sorted(found.items())]
+            copies |= pairs
+    return [(earlier, i) for i, earlier in sorted(copies.items())]
 
 
 def _known_to_differ(content: Sequence[str] | None, i: int, k: int) -> bool:
@@ -213,7 +213,7 @@ def _can_be_chance(distinct: NDArray[np.float64], repeated: int) -> bool:
         return True
     different = [np.unique(column[~np.isnan(column)]) for column in distinct.T]
     combinations = math.prod(
-        len(one) if len(one) < _FEW else cells_in_range(one) for one in different if len(one)
+        len(column) if len(column) < _FEW else cells_in_range(column) for column in different if len(column)
     )
     trials = len(distinct) + repeated
     if _SURE_OF_ALL * trials**2 / (2.0 * combinations) >= repeated:

@@ -93,10 +93,10 @@ def leaf_reason(with_label: float, trials: float, label: str) -> Reason:
     return Reason(words=f"{with_label:.4g} of the {trials:.4g} training trials in this leaf were {label}")
 
 
-def _of_range(one: FeatureRange) -> Reason:
+def _of_range(feature_range: FeatureRange) -> Reason:
     return Reason(
-        words=one.words,
-        features=(FeatureValue(one.feature, one.value, one.unit),),
-        above=one.low if math.isfinite(one.low) else None,
-        up_to=one.high if math.isfinite(one.high) else None,
+        words=feature_range.words,
+        features=(FeatureValue(feature_range.feature, feature_range.value, feature_range.unit),),
+        above=feature_range.low if math.isfinite(feature_range.low) else None,
+        up_to=feature_range.high if math.isfinite(feature_range.high) else None,
     )

@@ -135,14 +135,14 @@ class Labelled:
         """Return the trials of one class. Raises ConfigError if there are none."""
         import numpy as np
 
-        of = np.array([class_of(label) == name for label in self.labels])
-        if not of.any():
+        chosen = np.array([class_of(label) == name for label in self.labels])
+        if not chosen.any():
             known = sorted({class_of(label) for label in self.labels})
             raise ConfigError(
                 f"no trial of class {name!r} in {self.source}. Known: {', '.join(known)}."
                 + suggestion(name, known)
             )
-        return self.rows(np.flatnonzero(of))
+        return self.rows(np.flatnonzero(chosen))
 
     def aimed(self, target: str) -> Labelled:
         """Return the trials with one of `TARGETS` as labels.

@@ -113,7 +113,7 @@ class Model:
         """The classifier and its training data, in one line."""
         kind = "simulated grasps" if self.simulated else f"trials of {self.provenance.get('source', '?')}"
         settings = self.provenance.get("settings", {}).get("controller") or {}
-        at = [
+        grasp_settings = [
             worded(key, settings[key])[1]
             for key in ("probing_force_n", "closing_speed_m_s")
             if key in settings
@@ -121,7 +121,7 @@ class Model:
         number = self.provenance.get("trials", "?")
         return (
             f"{self.name}: {self.component} trained on {number} {kind}"
-            + (f" at {', '.join(at)}" if at else "")
+            + (f" at {', '.join(grasp_settings)}" if grasp_settings else "")
             + (f", {self.after_s:g} s after the contact" if self.after_s is not None else "")
         )
 
@@ -530,7 +530,7 @@ def _config_class(table: str, name: Any) -> type:
     """Return the config class of an installed component; `object`, which has no settings, if there is none."""
     from graspsense.core.components.registry import installed
 
-    role = next(role for role, one in TABLE_OF_ROLE.items() if one == table)
+    role = next(role for role, known_table in TABLE_OF_ROLE.items() if known_table == table)
     try:
         return installed().find(role, str(name)).config_class()
     except ConfigError:
@@ -603,13 +603,12 @@ def write_json_lines(path: Path, content: Mapping[str, Any]) -> None:
     write_whole(path, ("{\n" + ",\n".join(lines) + "\n}\n").encode())
 
 
-def load_model(name: str, plugins: Plugins, component: Component | None = None) -> Model:
+def load_model(name: str, plugins: Plugins) -> Model:
     """Return a model from a `.json` file, or by the name of a model that a plugin ships.
 
-    `component` is the classifier that the pipeline selects, if any. Raises ConfigError if the file is missing or
-    another classifier made it, DataDamaged if its content is not a model.
+    Raises ConfigError if the file is missing, DataDamaged if its content is not a model.
     """
-    return _model_from(_text(name, plugins), name, plugins, component)
+    return _model_from(_text(name, plugins), name, plugins, None)
 
 
 @lru_cache(maxsize=MODELS_KEPT)
@@ -722,15 +721,15 @@ def _how_to_train(settings: Settings, out: str) -> str:
     """Return the commands that make a model for these settings: of simulated trials where the gripper is simulated."""
     assert settings.classifier is not None
     name = settings.classifier.component.name
-    of = f"--gripper {settings.gripper.component.name}"
+    selection = f"--gripper {settings.gripper.component.name}"
     if settings.pipeline.endswith(".toml"):
-        of = f"--pipeline {shlex.quote(settings.pipeline)}"
+        selection = f"--pipeline {shlex.quote(settings.pipeline)}"
     if settings.origins.get("features.type", "").startswith("-o"):
-        of += f" -o features.type={settings.features.component.name}"
+        selection += f" -o features.type={settings.features.component.name}"
     if settings.gripper.create().objects():
-        return f"  train one: graspsense train simulated {of} --classifier {name} --out {out}"
+        return f"  train one: graspsense train simulated {selection} --classifier {name} --out {out}"
     return (
-        f"  collect trials of this gripper: graspsense collect {of} --labels can:full,can:empty --save trials\n"
+        f"  collect trials of this gripper: graspsense collect {selection} --labels can:full,can:empty --save trials\n"
         f"  then train: graspsense train store:trials --classifier {name} --out {out}"
     )
 
@@ -764,11 +763,11 @@ def _json(value: Any) -> str:
 def _chosen(features: Features, names: Sequence[str]) -> Features:
     if features.names == tuple(names):
         return features
-    at = [features.names.index(name) for name in names]
+    places = [features.names.index(name) for name in names]
     return Features(
         names=tuple(names),
-        values=tuple(features.values[i] for i in at),
-        units=tuple(features.units[i] for i in at),
+        values=tuple(features.values[i] for i in places),
+        units=tuple(features.units[i] for i in places),
         reasons={name: why for name, why in features.reasons.items() if name in names},
     )
 
@@ -783,7 +782,7 @@ def _bounded(features: Features) -> Features:
 
 def worded(key: str, value: Any) -> tuple[str, str]:
     """Return a key and its value in words: `probing_force_n`, 20 as `probing force`, `20 N`."""
-    ending = next((one for one in UNIT_OF_ENDING if key.endswith(one)), "")
+    ending = next((ending for ending in UNIT_OF_ENDING if key.endswith(ending)), "")
     if not ending or isinstance(value, bool) or not isinstance(value, int | float):
         return without_underscores(key), str(value)
     unit, factor = display_unit(UNIT_OF_ENDING[ending])

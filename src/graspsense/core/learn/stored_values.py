@@ -100,11 +100,11 @@ class StoredValues:
             raise self.refusal(key, f"expected one of {', '.join(allowed)}, found {_shown(value)}")
         return value
 
-    def whole(self, key: str, least: int = 0, most: int = _LARGEST_WHOLE) -> int:
-        """Return a whole number in this range."""
+    def whole(self, key: str, most: int = _LARGEST_WHOLE) -> int:
+        """Return a whole number from 0 to `most`."""
         value = self.value(key)
-        if type(value) is not int or not least <= value <= most:
-            raise self.refusal(key, f"expected a whole number from {least} to {most}, found {_shown(value)}")
+        if type(value) is not int or not 0 <= value <= most:
+            raise self.refusal(key, f"expected a whole number from 0 to {most}, found {_shown(value)}")
         return value
 
     def number(self, key: str, least: float = -LARGEST_VALUE, most: float = LARGEST_VALUE) -> float:
@@ -124,16 +124,13 @@ class StoredValues:
             self._refuse_repeated(key, given)
         return tuple(given)
 
-    def wholes(
-        self, key: str, count: int | None = None, least: int = 0, most: int = _LARGEST_WHOLE
-    ) -> list[int]:
-        """Return a list of whole numbers in this range, of this length."""
+    def wholes(self, key: str) -> list[int]:
+        """Return a list of whole numbers, 0 or larger."""
         given = self.items(key)
-        self._refuse_length(key, given, count)
         for i, value in enumerate(given):
-            if type(value) is not int or not least <= value <= most:
+            if type(value) is not int or not 0 <= value <= _LARGEST_WHOLE:
                 raise self.refusal(
-                    f"{key}.{i}", f"expected a whole number from {least} to {most}, found {_shown(value)}"
+                    f"{key}.{i}", f"expected a whole number of 0 or more, found {_shown(value)}"
                 )
         return list(given)
 

@@ -52,9 +52,9 @@ def temperature_of(probabilities: NDArray[np.float64], truth: NDArray[np.int64])
     right = np.eye(probabilities.shape[1])[truth]
 
     def brier(log_temperature: float) -> float:
-        at = at_temperature(probabilities, math.exp(log_temperature))
-        return float(np.nansum((at - right) ** 2, axis=1).mean())
+        tempered = at_temperature(probabilities, math.exp(log_temperature))
+        return float(np.nansum((tempered - right) ** 2, axis=1).mean())
 
     least, most = RANGE
-    found: Any = minimize_scalar(brier, bounds=(math.log(least), math.log(most)), method="bounded")
-    return math.exp(float(found.x))
+    optimum: Any = minimize_scalar(brier, bounds=(math.log(least), math.log(most)), method="bounded")
+    return math.exp(float(optimum.x))

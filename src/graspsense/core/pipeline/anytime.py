@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Any, Final
 
 from graspsense.core.components.caller import set_option
 from graspsense.core.grasp.runner import Tell
-from graspsense.core.learn.checkpoints import until_checkpoint
 from graspsense.core.values.errors import FAILURES, ConfigError, named
 from graspsense.core.values.features import CheckpointPrediction
 from graspsense.core.values.signals import HOLD, SQUEEZE
@@ -118,7 +117,7 @@ class Anytime:
         n, m = len(recorder.frames), len(recorder.images)
 
         def compute() -> tuple[Features, Prediction]:
-            trace = until_checkpoint(recorder.first_ticks(n, m), contact_s, after_s)
+            trace = recorder.first_ticks(n, m).until(contact_s + after_s)
             features = self._feature_set.extract(trace)
             return features, model.predict(features, self._settings, self._info)
 

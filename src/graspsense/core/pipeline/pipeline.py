@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import nan
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from attrs import frozen
 
@@ -13,7 +13,6 @@ from graspsense.core.components.config import Flag, Settings, resolve
 from graspsense.core.components.registry import Plugins, installed
 from graspsense.core.components.roles import Controller, FeatureSet, SensorBackend
 from graspsense.core.control.garbage_collection import no_collection
-from graspsense.core.grasp.pair import Member
 from graspsense.core.grasp.runner import Grasp, Sink, run_grasp
 from graspsense.core.learn.model import Model, model_for
 from graspsense.core.pipeline.anytime import Anytime, anytime_of
@@ -24,6 +23,9 @@ from graspsense.core.values.events import GraspEvent
 from graspsense.core.values.features import UNKNOWN, Features, Prediction, missing
 from graspsense.core.values.signals import Outcome
 from graspsense.core.values.trial import RunInfo, Trial
+
+if TYPE_CHECKING:
+    from graspsense.core.grasp.pair import Member
 
 
 class GraspInterrupted(KeyboardInterrupt):

@@ -16,15 +16,15 @@ OF_IMAGES: Final = ("force_left", "force_right", "edge_left", "edge_right")
 """Channels of the frame that can come from the last image, which is older than the frame."""
 
 
-def apart_s(trace: Trace, report: Mapping[str, Any], one: str, other: str) -> float:
+def apart_s(trace: Trace, report: Mapping[str, Any], channel: str, other: str) -> float:
     """Return by how much (s) the times of these channels can be apart at most; inf where the gripper does not tell.
 
     A source that `report` names by `NAME_channels` has its `NAME_uncertainty_s`. A number that comes from an image has
     the time of its frame, and is as old as the image. The shortest delay of a device cannot be told from an offset of
     its clock, and is not in it.
     """
-    sources = [_source(report, name) for name in (one, other)]
-    ages_s = [_age_s(trace, name) for name in (one, other)]
+    sources = [_source(report, name) for name in (channel, other)]
+    ages_s = [_age_s(trace, name) for name in (channel, other)]
     if sources[0] == sources[1]:
         return 0.0 if ages_s[0] == ages_s[1] else max(ages_s)
     return sum(float(report.get(f"{source}_uncertainty_s", inf)) for source in sources) + sum(ages_s)

@@ -89,12 +89,12 @@ def named(error: BaseException) -> str:
     return f"{type(error).__name__}: {error}"
 
 
-def suggestion(found: str, allowed: Iterable[str]) -> str:
+def suggestion(word: str, allowed: Iterable[str]) -> str:
     """Return `" Did you mean 'x'?"` for the nearest allowed name, or an empty string."""
-    if len(found) > _LONGEST_NAME:
+    if len(word) > _LONGEST_NAME:
         return ""
     comparable = sorted(islice((name for name in allowed if len(name) <= _LONGEST_NAME), _MOST_COMPARED))
-    near = get_close_matches(found, comparable, n=1, cutoff=0.5)
+    near = get_close_matches(word, comparable, n=1, cutoff=0.5)
     return f" Did you mean {near[0]!r}?" if near else ""
 
 

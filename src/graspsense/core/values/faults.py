@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from math import inf
+from typing import Final
 
 from attrs import field, frozen
 from attrs.validators import ge, gt, instance_of
 
 from graspsense.core.values.signals import Outcome
+
+LIMITED: Final = "squeeze limited"
+"""The name of the warning of a squeeze that is not the one that the controller commanded."""
 
 
 @frozen(kw_only=True)

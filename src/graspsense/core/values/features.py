@@ -125,10 +125,10 @@ class FeatureRows:
 
     def add(self, features: Features) -> None:
         """Add a trial. Raises ValueError if its features differ from those of the first one in names or units."""
-        first = self._first = self._first or features
-        if features.names != first.names or features.units != first.units:
+        model = self._first = self._first or features
+        if features.names != model.names or features.units != model.units:
             raise ValueError(
-                f"trials disagree: {features.names} in {features.units} beside {first.names} in {first.units}"
+                f"trials disagree: {features.names} in {features.units} beside {model.names} in {model.units}"
             )
         self._values.extend(features.values)
         self._n += 1
@@ -211,7 +211,7 @@ class Prediction:
             about = percent(self.certainty)
             return (about if about.startswith("over") else f"about {about}") + (f": {rests}" if rests else "")
         why = f"no certainty: {self.no_certainty}" if self.no_certainty else ""
-        return "; ".join(one for one in (rests, why) if one)
+        return "; ".join(part for part in (rests, why) if part)
 
     def as_json(self) -> dict[str, Any]:
         """Return label, probabilities, set and reasons as `--json` prints them."""
@@ -258,9 +258,9 @@ class CheckpointPrediction:
 
         Of a set with more than three labels, only the first is named, so that it stays one line in a terminal.
         """
-        first, *others = self.prediction.prediction_set or (self.prediction.label,)
+        likeliest, *others = self.prediction.prediction_set or (self.prediction.label,)
         if len(others) > 2 and self.prediction.coverage is not None:
-            said = f"{first} or one of {len(others)} others, {percent(self.prediction.coverage)}"
+            said = f"{likeliest} or one of {len(others)} others, {percent(self.prediction.coverage)}"
         else:
             said = self.prediction.set_in_words or self.prediction.label
         return f"{self.after_s:g} s after the contact: {said}"

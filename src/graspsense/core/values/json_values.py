@@ -25,9 +25,9 @@ def json_ready(value: Any) -> Any:
     if value is None or isinstance(value, str | int):
         return value
     if isinstance(value, Mapping):
-        return {str(key): json_ready(one) for key, one in value.items()}
+        return {str(key): json_ready(member) for key, member in value.items()}
     if isinstance(value, list | tuple):
-        return [json_ready(one) for one in value]
+        return [json_ready(member) for member in value]
     return value
 
 
@@ -55,5 +55,5 @@ def _read(value: Any, declared: Any) -> Any:
     if isinstance(value, str) and float in alternatives and str not in alternatives:
         return _INFINITE.get(value, value)
     if isinstance(value, list):
-        return [_read(one, alternatives[0]) for one in value]
+        return [_read(member, alternatives[0]) for member in value]
     return value

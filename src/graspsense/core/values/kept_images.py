@@ -58,10 +58,10 @@ class KeptImages:
                 self._fd, path = tempfile.mkstemp(prefix="graspsense-images-")
                 weakref.finalize(self, os.close, self._fd)
                 os.unlink(path)
-            data, at = cells.data.cast("B"), self._written * self._bytes
+            data, offset = cells.data.cast("B"), self._written * self._bytes
             while data:
-                done = os.pwrite(self._fd, data, at)
-                data, at = data[done:], at + done
+                done = os.pwrite(self._fd, data, offset)
+                data, offset = data[done:], offset + done
         except OSError:
             return False
         self._written += 1

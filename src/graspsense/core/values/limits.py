@@ -35,16 +35,16 @@ class SizeLimit:
             )
         return int(given)
 
-    def exceeded(self, found: int) -> str:
+    def exceeded(self, number: int) -> str:
         """Return in words that so many are too many, and how to raise the limit; an empty text if they are not.
 
         Raises ConfigError if the environment variable is malformed.
         """
         most = self.most
-        if found <= most:
+        if number <= most:
             return ""
         return (
-            f"{found} {self.what}, and at most {most} are accepted. If that many are intended, set the environment "
+            f"{number} {self.what}, and at most {most} are accepted. If that many are intended, set the environment "
             f"variable {self.variable} to a larger number"
         )
 
@@ -65,21 +65,3 @@ RECORDINGS: Final = SizeLimit("GRASPSENSE_MAX_RECORDINGS", 20_000, "recordings o
 CLASSES: Final = SizeLimit("GRASPSENSE_MAX_CLASSES", 100, "different labels")
 FEATURES: Final = SizeLimit("GRASPSENSE_MAX_FEATURES", 5000, "features of a trial")
 CHECKPOINTS: Final = SizeLimit("GRASPSENSE_MAX_CHECKPOINTS", 100, "checkpoints of a grasp")
-
-LIMITS: Final = (
-    TEXT_BYTES,
-    LINE_CHARACTERS,
-    COLUMNS,
-    CELLS,
-    SAMPLES,
-    SETTINGS_BYTES,
-    CHANNEL_NUMBERS,
-    ENTRIES,
-    MODEL_BYTES,
-    CASES,
-    RECORDINGS,
-    CLASSES,
-    FEATURES,
-    CHECKPOINTS,
-)
-"""All limits on text files, tables, settings and training data."""

@@ -47,10 +47,10 @@ class Mounting:
             raise ValueError(f"link {self.link!r} of model {self.model!r}: give both, or neither and a pose")
 
     @classmethod
-    def of(cls, text: str) -> Mounting:
+    def parse(cls, text: str) -> Mounting:
         """Return the mounting that a text says. Raises ValueError.
 
-        >>> Mounting.of("tool0 of arm.urdf").link, Mounting.of("0 0 120 mm in flange").position_m
+        >>> Mounting.parse("tool0 of arm.urdf").link, Mounting.parse("0 0 120 mm in flange").position_m
         ('tool0', (0.0, 0.0, 0.12))
         """
         words = " ".join(text.split())

@@ -14,7 +14,7 @@ _ACTING: Final = re.compile(
 
 def printable(text: str) -> str:
     r"""Return a text of several lines in which every character that acts is written as in JSON: `\u001b`."""
-    return _ACTING.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
+    return _ACTING.sub(lambda match: f"\\u{ord(match[0]):04x}", text)
 
 
 def in_one_line(text: str) -> str:

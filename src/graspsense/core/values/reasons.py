@@ -128,10 +128,10 @@ def contribution_reasons(
         for features, value in shown
     ]
     if others:
-        rest = tuple(dict.fromkeys(feature for features, _ in others for feature in features))
+        smaller = tuple(dict.fromkeys(feature for features, _ in others for feature in features))
         value = math.fsum(value for _, value in others)
-        reasons.append(reason(f"{len(others)} smaller contributions together", rest, value))
-    before = Contribution(start, scale, label, against)
-    words = f"{100 * start:.1f} % for {label}" if scale == "probability" else before.words
-    reasons.append(Reason(words=f"before any feature: {words}", contribution=before))
+        reasons.append(reason(f"{len(others)} smaller contributions together", smaller, value))
+    base = Contribution(start, scale, label, against)
+    words = f"{100 * start:.1f} % for {label}" if scale == "probability" else base.words
+    reasons.append(Reason(words=f"before any feature: {words}", contribution=base))
     return tuple(reasons)

@@ -255,11 +255,11 @@ class TraceRecorder:
         for begin in range(start, stop, BLOCK):
             end = min(begin + BLOCK, stop)
             parts: list[Floats] = []
-            for first, table in self._tables:
-                if first < end and first + len(table) > begin:
-                    parts += _blocks_of(self.frames[begin:first])
-                    parts.append(table.rows[max(begin - first, 0) : end - first])
-                    begin = min(first + len(table), end)
+            for first_tick, table in self._tables:
+                if first_tick < end and first_tick + len(table) > begin:
+                    parts += _blocks_of(self.frames[begin:first_tick])
+                    parts.append(table.rows[max(begin - first_tick, 0) : end - first_tick])
+                    begin = min(first_tick + len(table), end)
             parts += _blocks_of(self.frames[begin:end])
             yield parts[0] if len(parts) == 1 else np.concatenate(parts)
 

@@ -65,16 +65,16 @@ class Trial:
     def _repr_html_(self) -> str:
         return html(self)
 
-    def apart_s(self, one: str, other: str) -> float:
+    def apart_s(self, channel: str, other: str) -> float:
         """Return by how much (s) the times of two channels can be apart at most; inf where the gripper does not tell.
 
         Channels of one device are measured together. Raises UnknownName for a channel that the gripper does not have.
         """
-        known = tuple(channel.name for channel in self.device.channels)
-        for name in (one, other):
+        known = tuple(declared.name for declared in self.device.channels)
+        for name in (channel, other):
             if name not in known:
                 raise UnknownName(f"no channel {name!r}: the gripper has {', '.join(known)}")
-        return apart_s(self.trace, self.report, one, other)
+        return apart_s(self.trace, self.report, channel, other)
 
 
 def trial_as_json(trial: Trial) -> dict[str, Any]:
@@ -107,7 +107,7 @@ def trial_as_json(trial: Trial) -> dict[str, Any]:
             "rate_hz": device.rate_hz,
             "calibration": dict(device.calibration),
             "notes": list(device.notes),
-            "mounting": {name: one.as_json() for name, one in device.mounting.items()},
+            "mounting": {name: mounting.as_json() for name, mounting in device.mounting.items()},
         },
         "report": dict(trial.report),
         "counts": dict(trial.counts),

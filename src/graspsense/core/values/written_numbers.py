@@ -256,15 +256,15 @@ def _notations(cell: str) -> int:
     if _OTHER_GROUPS.fullmatch(cell):
         return COMMA if "," in cell else POINT if "." in cell else POINT | COMMA
     if match := _WITH_POINT.fullmatch(cell):
-        found = POINT
+        forms = POINT
         if len(match["whole"] or "") <= 3:  # a thousand would have a comma
-            found |= THOUSANDS
+            forms |= THOUSANDS
         if "." not in cell or _POINT_GROUPS.fullmatch(cell):
-            found |= COMMA
-        return found
-    found = 0
+            forms |= COMMA
+        return forms
+    forms = 0
     if _WITH_COMMA.fullmatch(cell) or _POINT_GROUPS.fullmatch(cell):
-        found |= COMMA
+        forms |= COMMA
     if _COMMA_GROUPS.fullmatch(cell):
-        found |= THOUSANDS
-    return found or (_EVERY if _INFINITE.fullmatch(cell) else 0)
+        forms |= THOUSANDS
+    return forms or (_EVERY if _INFINITE.fullmatch(cell) else 0)

@@ -10,7 +10,7 @@ from attrs import field, frozen
 from attrs.validators import max_len
 
 from graspsense.core.components.strict import structured
-from graspsense.core.learn.checkpoints import contact_of, until_checkpoint
+from graspsense.core.learn.checkpoints import contact_of
 from graspsense.core.values.features import Features, table_of
 from graspsense.core.values.signals import Phase
 from graspsense.experiments.task_results import ClassifierResult, RecognitionResult
@@ -65,7 +65,7 @@ def early(params: Mapping[str, Any], seed: int) -> RecognitionResult:
         end = float(trace.t_s[ended[0]]) if len(ended) else float(trace.t_s[-1])
         contact = end if touched is None else touched
         for moment in moments:
-            rows[moment].append(feature_set.extract(until_checkpoint(trace, contact, moment)))
+            rows[moment].append(feature_set.extract(trace.until(contact + moment)))
             used_s[moment].append(min(moment, end - contact))
 
     data = simulated(settings, groups=trial_groups(params), seed=seed, on_trace=cut)

@@ -88,7 +88,7 @@ class EbmTerm:
     cuts: tuple[NDArray[np.float64], ...]
     scores: NDArray[np.float64]
 
-    def of(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def scores_of(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the scores of trials, shape (trials, labels)."""
         import numpy as np
 
@@ -96,8 +96,8 @@ class EbmTerm:
         for k, cuts in zip(self.features, self.cuts, strict=True):
             column = values[:, k]
             where.append(np.where(np.isnan(column), 0, np.searchsorted(cuts, column, side="right") + 1))
-        found: NDArray[np.float64] = self.scores[tuple(where)]
-        return found
+        scores: NDArray[np.float64] = self.scores[tuple(where)]
+        return scores
 
 
 @frozen(eq=False)
@@ -116,7 +116,7 @@ class AdditiveModel:
 
         total = np.tile(self.start, (len(values), 1))
         for term in self.terms:
-            total += term.of(values)
+            total += term.scores_of(values)
         return total
 
 
@@ -177,31 +177,35 @@ class Ebm(Classifier[EbmConfig]):
         total = model.log_odds(row)[0]
         powers = np.exp(total - total.max())
         shares = dict(zip(model.labels, (powers / powers.sum()).tolist(), strict=True))
-        first, second = np.argsort(-total, kind="stable")[:2].tolist()
+        likeliest, runner_up = np.argsort(-total, kind="stable")[:2].tolist()
         given = [
             FeatureValue(name, None if math.isnan(value) else value, unit)
             for name, unit, value in zip(model.names, model.units, values, strict=True)
         ]
         parts = []
         for term in model.terms:
-            scores = term.of(row)[0]
-            parts.append((tuple(given[k] for k in term.features), float(scores[first] - scores[second])))
+            scores = term.scores_of(row)[0]
+            parts.append(
+                (tuple(given[k] for k in term.features), float(scores[likeliest] - scores[runner_up]))
+            )
         missing = [
-            missing_feature(one.name, one.unit, f": {features.reasons.get(one.name, 'no reason given')}")
-            for one in given
-            if one.value is None
+            missing_feature(
+                feature.name, feature.unit, f": {features.reasons.get(feature.name, 'no reason given')}"
+            )
+            for feature in given
+            if feature.value is None
         ]
         return Prediction(
-            label=model.labels[first],
+            label=model.labels[likeliest],
             probabilities=shares,
             because=(
                 *missing,
                 *contribution_reasons(
                     parts,
-                    float(model.start[first] - model.start[second]),
+                    float(model.start[likeliest] - model.start[runner_up]),
                     scale="log-odds",
-                    label=model.labels[first],
-                    against=model.labels[second],
+                    label=model.labels[likeliest],
+                    against=model.labels[runner_up],
                 ),
             ),
         )
@@ -210,7 +214,7 @@ class Ebm(Classifier[EbmConfig]):
         """Return the bounds and the scores."""
         model = self._model()
         return {
-            "features": [list(one) for one in zip(model.names, model.units, strict=True)],
+            "features": [list(name_and_unit) for name_and_unit in zip(model.names, model.units, strict=True)],
             "labels": list(model.labels),
             "start": model.start.tolist(),
             "terms": [

@@ -207,8 +207,8 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
         fitted = self._model()
         values = [features[name] for name in fitted.table.names]
         row = fitted.ready(np.array([values]))
-        found = self.shares(fitted, row)[0].tolist()
-        shares = dict(zip(self.classes(), found, strict=True))
+        probabilities = self.shares(fitted, row)[0].tolist()
+        shares = dict(zip(self.classes(), probabilities, strict=True))
         ranked = dict(sorted(shares.items(), key=lambda item: -item[1]))
         given = [
             FeatureValue(name, None if math.isnan(value) else value, unit)
@@ -216,16 +216,16 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
         ]
         filled = [
             missing_feature(
-                one.name,
-                one.unit,
-                f" ({features.reasons.get(one.name, 'no reason given')}): the median in training, "
-                f"{in_words(float(fill), one.unit)}, stands for it",
+                feature.name,
+                feature.unit,
+                f" ({features.reasons.get(feature.name, 'no reason given')}): the median in training, "
+                f"{in_words(float(fill), feature.unit)}, stands for it",
             )
-            for one, fill in zip(given, fitted.fill, strict=True)
-            if one.value is None
+            for feature, fill in zip(given, fitted.fill, strict=True)
+            if feature.value is None
         ]
         return Prediction(
-            label=self.classes()[int(np.argmax(found))],
+            label=self.classes()[int(np.argmax(probabilities))],
             probabilities=shares,
             because=(*filled, *self.reasons(fitted, row, given, ranked)),
             warnings=self._version_warnings(),
@@ -240,7 +240,10 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
         kept: dict[str, Any] = {
             "made_with": self._made_with or f"scikit-learn {sklearn.__version__}",
             "seed": fitted.seed,
-            "features": [list(one) for one in zip(fitted.table.names, fitted.table.units, strict=True)],
+            "features": [
+                list(name_and_unit)
+                for name_and_unit in zip(fitted.table.names, fitted.table.units, strict=True)
+            ],
         }
         if getattr(self.config, "kept_as", "trials") == "skops":
             from graspsense.plugins.classifiers.skops_text import as_text

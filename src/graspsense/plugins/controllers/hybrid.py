@@ -109,11 +109,11 @@ class HybridState(NamedTuple):
 def step(params: HybridParams, state: HybridState, reading: Reading) -> tuple[Command, HybridState]:
     """Control the velocity until both pads touch, then the force."""
     frame = reading.frame
-    before = state.progress
+    progress_so_far = state.progress
     sent = state.sent
     if params.kind == POSITION and rises(sent, params.force.probing_force_n):
-        before = not_resting(before, frame)
-    progress = supervise(params.supervision, before, frame)
+        progress_so_far = not_resting(progress_so_far, frame)
+    progress = supervise(params.supervision, progress_so_far, frame)
     _, _, _, integral, force_effort, approach_effort, contact_t, _, _ = state
     if progress.phase == APPROACH:
         effort, integral = closing_effort(params.velocity, integral, frame.velocity_m_s, frame.dt_s)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from math import inf, nan
-from typing import ClassVar, Literal, NamedTuple
+from typing import Any, ClassVar, Literal, NamedTuple
 
 from attrs import frozen
 
@@ -36,11 +36,9 @@ from graspsense.plugin_api import (
 )
 from graspsense.plugins.controllers.own_loop import (
     STEPS,
-    OwnLoop,
     OwnLoopConfig,
     Raised,
     approaching,
-    own_loop,
     raised,
     rises,
 )
@@ -116,35 +114,18 @@ class SendAndWatchState(NamedTuple):
     still: RestState
 
 
-class SendAndWatchParams(NamedTuple):
-    """Numbers of the law; `kind` is the command kind that it sends, `pads` is 0 or 1."""
-
-    own: OwnLoop
-    kind: int
-    closing_speed_m_s: float
-    probing_force_n: float
-    pads: int
-    contact_force_n: float
-    rest_speed_m_s: float
-    rest_window_s: float
-    closed_gap_m: float
-    timeout_s: float
-
-
-def command_of(params: SendAndWatchParams, sent: Raised) -> Command:
-    """Return the command that closes, or stops at a gap, with this force."""
+def command_of(params: Any, sent: Raised) -> Command:
+    """Return the command that closes, or stops at a gap, with this force; `params` has the numbers of the config."""
     force_n, _, stop_gap_m = sent
     stops = stop_gap_m == stop_gap_m
-    if params.kind == FORCE:
+    if params.sends == FORCE:
         return Command(FORCE, force_n, inf, params.closing_speed_m_s)
-    if params.kind == VELOCITY:
+    if params.sends == VELOCITY:
         return Command(VELOCITY, 0.0 if stops else -params.closing_speed_m_s, force_n, inf)
     return Command(POSITION, stop_gap_m if stops else 0.0, force_n, params.closing_speed_m_s)
 
 
-def step(
-    params: SendAndWatchParams, state: SendAndWatchState, reading: Reading
-) -> tuple[Command, SendAndWatchState]:
+def step(params: Any, state: SendAndWatchState, reading: Reading) -> tuple[Command, SendAndWatchState]:
     """Approach, stop at the contact, raise the force in steps, and hold when the fingers are at rest."""
     frame = reading.frame
     phase, outcome, began, began_gap, sent, still = state
@@ -167,7 +148,7 @@ def step(
         if frame.gap_m <= params.closed_gap_m:
             outcome = NOTHING_THERE
         elif rises(sent, params.probing_force_n):
-            sent = raised(params.own, sent, frame.t_s, params.probing_force_n)
+            sent = raised(params, sent, frame.t_s, params.probing_force_n)
             if sent.since_t_s == frame.t_s:
                 still = RestState(frame.t_s, frame.gap_m)
         elif rests:
@@ -215,24 +196,6 @@ class SendAndWatchController(Controller[SendAndWatchConfig]):
         """Return the contact force (N)."""
         return float(self.config.contact_force_n)
 
-    def params(self) -> SendAndWatchParams:
-        """Return the parameters of the law."""
-        config = self.config
-        return SendAndWatchParams(
-            own=own_loop(config),
-            kind={"position": POSITION, "force": FORCE, "velocity": VELOCITY}[config.sends],
-            closing_speed_m_s=float(config.closing_speed_m_s),
-            probing_force_n=float(config.probing_force_n),
-            pads=1 if config.pads else 0,
-            contact_force_n=float(config.contact_force_n),
-            rest_speed_m_s=float(config.rest_speed_m_s),
-            rest_window_s=float(config.rest_window_s),
-            closed_gap_m=float(config.closed_gap_m),
-            timeout_s=float(config.timeout_s),
-        )
-
     def init(self) -> SendAndWatchState:
         """Return the state before the first tick."""
-        return SendAndWatchState(
-            APPROACH, RUNNING, nan, nan, approaching(own_loop(self.config)), RestState(0.0, 0.0)
-        )
+        return SendAndWatchState(APPROACH, RUNNING, nan, nan, approaching(self.params()), RestState(0.0, 0.0))

@@ -198,11 +198,11 @@ EVENTS: Final = ("contact", "slip")
 """The events that every control law of this package tells: both pads touch; the object slipped out."""
 
 
-def events_of(before: GraspProgress, after: GraspProgress) -> int:
+def events_of(earlier: GraspProgress, later: GraspProgress) -> int:
     """Return the bits of the `EVENTS` between two ticks."""
-    if after.phase != APPROACH and before.phase == APPROACH:
+    if later.phase != APPROACH and earlier.phase == APPROACH:
         return 1
-    if after.outcome == SLIPPED and before.outcome != SLIPPED:
+    if later.outcome == SLIPPED and earlier.outcome != SLIPPED:
         return 2
     return 0
 

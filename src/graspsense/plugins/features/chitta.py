@@ -184,26 +184,26 @@ def reached_without_contact(params: ChittaParams, ticks: TickColumns) -> float:
 def measure(params: ChittaParams, ticks: TickColumns) -> Measured:
     """Return what `ChittaFeatures` measures, from the columns of a grasp; it can be compiled."""
     phase, left, right, gap, t = ticks.phase, ticks.force_left_n, ticks.force_right_n, ticks.gap_m, ticks.t_s
-    n, tau_1, first = len(phase), params.contact_force_n, 0
-    while first < n and not (
-        both_touch(left[first], right[first], tau_1)
-        and APPROACH <= phase[first] <= HOLD
-        and gap[first] == gap[first]
+    n, tau_1, contact = len(phase), params.contact_force_n, 0
+    while contact < n and not (
+        both_touch(left[contact], right[contact], tau_1)
+        and APPROACH <= phase[contact] <= HOLD
+        and gap[contact] == gap[contact]
     ):
-        first += 1
-    if first == n:
+        contact += 1
+    if contact == n:
         reached = reached_without_contact(params, ticks)
         return Measured(reached, math.nan, math.nan, math.nan, math.nan, math.nan, math.nan, 0.0, 0.0)
-    end, holds = first, False
+    end, holds = contact, False
     while end < n and phase[end] <= HOLD:
         holds = holds or phase[end] == HOLD
         end += 1
-    p_first, after_contact = gap[first], t[end - 1] - t[first]
-    resolution = gap_resolution_by_sample(t, gap, first, end)
+    p_first, after_contact = gap[contact], t[end - 1] - t[contact]
+    resolution = gap_resolution_by_sample(t, gap, contact, end)
     window_s = window_of_rest(resolution, params.rest_speed_m_s, params.rest_window_s)
-    still, since = RestState(t[first], gap[first]), first
-    for i in range(first, end):
-        if i > first:
+    still, since = RestState(t[contact], gap[contact]), contact
+    for i in range(contact, end):
+        if i > contact:
             state = update_rest(still, t[i], gap[i], params.rest_speed_m_s, window_s)
             if state.since_t_s != still.since_t_s or state.gap_m != still.gap_m:
                 since = i
@@ -211,10 +211,10 @@ def measure(params: ChittaParams, ticks: TickColumns) -> Measured:
         # A controller can wait for more than rest, such as a force. The rest in its hold phase is then the one meant.
         shows = phase[i] == HOLD or not holds
         if shows and gap[since] == gap[since] and at_rest(still, t[i], window_s):
-            f_first = pad_force(params.force, left[first], right[first])
+            f_first = pad_force(params.force, left[contact], right[contact])
             f_steady = pad_force(params.force, left[i], right[i])
-            delta_t = t[since] - t[first]
-            blind_s = blind_time(t[first - 1] if first else t[first], t[first], f_first, f_steady)
+            delta_t = t[since] - t[contact]
+            blind_s = blind_time(t[contact - 1] if contact else t[contact], t[contact], f_first, f_steady)
             return Measured(
                 REST, p_first, after_contact, gap[since], delta_t, f_first, f_steady, window_s, blind_s
             )
@@ -298,27 +298,27 @@ class ChittaFeatures(FeatureSet[ChittaConfig]):
 
     def _measured(self, trace: Trace) -> Measured:
         """Return what `measure` does, in less time in the interpreter."""
-        first = self._first(trace)
-        if first is None:
+        contact = self._first(trace)
+        if contact is None:
             return Measured(self._no_contact(trace), math.nan, math.nan)
-        p_first = float(trace.gap_m[first])
-        end = _released(trace, first)
-        after_contact = float(trace.t_s[end - 1] - trace.t_s[first])
-        window_s = self._window_s(trace, first, end)
-        rest = self._rest(trace, first, end, window_s)
-        if rest is None:
+        p_first = float(trace.gap_m[contact])
+        end = _released(trace, contact)
+        after_contact = float(trace.t_s[end - 1] - trace.t_s[contact])
+        window_s = self._window_s(trace, contact, end)
+        rest_ticks = self._rest(trace, contact, end, window_s)
+        if rest_ticks is None:
             return Measured(CONTACT, p_first, after_contact, window_s=window_s)
-        steady, shown = rest
-        p_steady, delta_t = float(trace.gap_m[steady]), float(trace.t_s[steady] - trace.t_s[first])
-        forces = self._force(trace, first), self._force(trace, shown)
-        blind_s = blind_time(float(trace.t_s[max(first - 1, 0)]), float(trace.t_s[first]), *forces)
+        steady, shown = rest_ticks
+        p_steady, delta_t = float(trace.gap_m[steady]), float(trace.t_s[steady] - trace.t_s[contact])
+        forces = self._force(trace, contact), self._force(trace, shown)
+        blind_s = blind_time(float(trace.t_s[max(contact - 1, 0)]), float(trace.t_s[contact]), *forces)
         return Measured(REST, p_first, after_contact, p_steady, delta_t, *forces, window_s, blind_s)
 
-    def _window_s(self, trace: Trace, first: int, end: int) -> float:
+    def _window_s(self, trace: Trace, contact: int, end: int) -> float:
         """Return the window in which a rest shows; where time is counted in frames, that of the settings."""
         if trace.units["t"] != "s":
             return self.config.rest_window_s
-        resolution = gap_resolution(trace.t_s[:end], trace.gap_m[:end], first)
+        resolution = gap_resolution(trace.t_s[:end], trace.gap_m[:end], contact)
         return window_of_rest(resolution, self.config.rest_speed_m_s, self.config.rest_window_s)
 
     def _force(self, trace: Trace, tick: int) -> float:
@@ -331,18 +331,18 @@ class ChittaFeatures(FeatureSet[ChittaConfig]):
         touch &= _closing(trace) & (trace.gap_m == trace.gap_m)
         return int(touch.argmax()) if touch.any() else None
 
-    def _rest(self, trace: Trace, first: int, end: int, window_s: float) -> tuple[int, int] | None:
+    def _rest(self, trace: Trace, contact: int, end: int, window_s: float) -> tuple[int, int] | None:
         """Return the tick at which rest begins and the one at which its window ends, both before `end`, or None."""
         # A controller can wait for more than rest, such as a force. The rest in its hold phase is then the one meant.
-        held = trace.phase[first:end] == HOLD
-        found = first_rest(
-            trace.t_s[first:end],
-            trace.gap_m[first:end],
+        held = trace.phase[contact:end] == HOLD
+        offsets = first_rest(
+            trace.t_s[contact:end],
+            trace.gap_m[contact:end],
             held if held.any() else ~held,
             self.config.rest_speed_m_s,
             window_s,
         )
-        return None if found is None else (first + found[0], first + found[1])
+        return None if offsets is None else (contact + offsets[0], contact + offsets[1])
 
     def _no_contact(self, trace: Trace) -> float:
         """Return how far a grasp without contact came."""
@@ -374,10 +374,10 @@ class ChittaFeatures(FeatureSet[ChittaConfig]):
         return f"no pad felt {tau_1:g} N while the fingers closed"
 
 
-def _released(trace: Trace, first: int) -> int:
+def _released(trace: Trace, contact: int) -> int:
     """Return the first tick of the release after that of the contact, or the number of ticks."""
-    released = trace.phase[first:] > HOLD
-    return first + (int(released.argmax()) if released.any() else len(released))
+    released = trace.phase[contact:] > HOLD
+    return contact + (int(released.argmax()) if released.any() else len(released))
 
 
 def _closing(trace: Trace) -> NDArray[np.bool_]:

@@ -7,7 +7,7 @@ numbers and reach the contact force; where only one pad does, it is the force of
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from math import nan
 from typing import TYPE_CHECKING, Final
 
@@ -15,7 +15,7 @@ import numpy as np
 from attrs import evolve, frozen
 
 from graspsense.gripper_api import NO_GAP
-from graspsense.plugin_api import APPROACH, HOLD, RELEASE, Features, missing
+from graspsense.plugin_api import APPROACH, HOLD, RELEASE, Feature, Features, missing
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -49,6 +49,17 @@ def without_gap(trace: Trace, features: Features, names: Collection[str]) -> Fea
     return evolve(features, values=values, reasons=reasons)
 
 
+def units_in(trace: Trace, features: Iterable[Feature]) -> tuple[str, ...]:
+    """Return the units of features, given those of the trace: a recording can count time in frames."""
+    t, gap, force = trace.units["t"], trace.units["gap"], trace.units["force_left"]
+    joule = "J" if (gap, force) == ("m", "N") else f"{force} {gap}"
+    unit_of = {"m": gap, "N": force, "s": t, "J": joule, "N/m": f"{force}/{gap}", "1": "1"}
+    unit_of |= {
+        f"{unit}/{time}": f"{unit_of[unit]}/{t}{time[1:]}" for unit in ("m", "N") for time in ("s", "s2")
+    }
+    return tuple(unit_of[feature.unit] for feature in features)
+
+
 @frozen(kw_only=True, eq=False)
 class CurveSamples:
     """The samples of a trace that have a gap and a force: arrays (n,); `pads` has a row for each pad that is used."""
@@ -80,17 +91,19 @@ def samples_of(trace: Trace, contact_force_n: float) -> CurveSamples | str:
     known = usable & np.isfinite(trace.gap_m) & np.isfinite(trace.t_s)
     for force in pads:
         known &= np.isfinite(force)
-    at = np.flatnonzero(known)
-    if not len(at):
+    ticks = np.flatnonzero(known)
+    if not len(ticks):
         return "no sample has both a gap and a force"
-    t_s = trace.t_s[at]
-    later = np.ones(len(at), dtype=np.bool_)
+    t_s = trace.t_s[ticks]
+    later = np.ones(len(ticks), dtype=np.bool_)
     later[1:] = t_s[1:] > np.maximum.accumulate(t_s[:-1])
-    at = at[later]
-    forces = np.array([force[at] for force in pads])
-    new = _new_forces(trace.t_s[at], forces)
-    at = at[new]
-    return CurveSamples(t_s=trace.t_s[at], gap_m=trace.gap_m[at], pads=forces[:, new], phase=trace.phase[at])
+    ticks = ticks[later]
+    forces = np.array([force[ticks] for force in pads])
+    new = _new_forces(trace.t_s[ticks], forces)
+    ticks = ticks[new]
+    return CurveSamples(
+        t_s=trace.t_s[ticks], gap_m=trace.gap_m[ticks], pads=forces[:, new], phase=trace.phase[ticks]
+    )
 
 
 def _new_forces(t_s: Floats, pads: Floats) -> NDArray[np.int64] | slice:
@@ -172,18 +185,18 @@ def contact_curve(samples: CurveSamples, contact_force_n: float) -> ContactCurve
         if len(samples.pads) == 1:
             return f"the pad never felt {contact_force_n:g} N"
         return f"the pads never felt {contact_force_n:g} N at the same time"
-    first = int(touch.argmax())
-    t_s, gap = samples.t_s[first:], samples.gap_m[first:]
-    pads, phase = samples.pads[:, first:], samples.phase[first:]
-    if first and lowest[first - 1] < contact_force_n < lowest[first]:
+    contact = int(touch.argmax())
+    t_s, gap = samples.t_s[contact:], samples.gap_m[contact:]
+    pads, phase = samples.pads[:, contact:], samples.phase[contact:]
+    if contact and lowest[contact - 1] < contact_force_n < lowest[contact]:
         # The contact is between two samples: where it is seen must not depend on their spacing.
-        share = (contact_force_n - lowest[first - 1]) / (lowest[first] - lowest[first - 1])
-        at = [
-            column[..., first - 1] + share * (column[..., first] - column[..., first - 1])
+        share = (contact_force_n - lowest[contact - 1]) / (lowest[contact] - lowest[contact - 1])
+        seen_between = [
+            column[..., contact - 1] + share * (column[..., contact] - column[..., contact - 1])
             for column in (samples.t_s, samples.gap_m, samples.pads)
         ]
-        t_s, gap = np.concatenate(([at[0]], t_s)), np.concatenate(([at[1]], gap))
-        pads = np.concatenate((at[2][:, np.newaxis], pads), axis=1)
+        t_s, gap = np.concatenate(([seen_between[0]], t_s)), np.concatenate(([seen_between[1]], gap))
+        pads = np.concatenate((seen_between[2][:, np.newaxis], pads), axis=1)
         phase = np.concatenate((phase[:1], phase))
     force = pads.mean(axis=0)
     compression = gap[0] - gap

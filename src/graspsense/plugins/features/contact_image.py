@@ -148,7 +148,7 @@ class ContactImages(NamedTuple):
     """The images of an array in a grasp, read one by one: those of a camera do not fit into memory as floats."""
 
     cells: NDArray[Any]
-    before: int
+    unpressed: int
     """Number of images before the squeeze; 1 of a recording without phases, whose first image counts as that."""
     last: int
     """Number of images until the release."""
@@ -157,14 +157,14 @@ class ContactImages(NamedTuple):
 
     def places(self) -> range:
         """Return the numbers of the images in the squeeze."""
-        return range(self.before, self.last)
+        return range(self.unpressed, self.last)
 
     def zero(self) -> Floats:
         """Return the mean of the images before the squeeze."""
         total = np.zeros(self.shape)
-        for i in range(self.before):
+        for i in range(self.unpressed):
             total += self._image(i)
-        return total / self.before
+        return total / self.unpressed
 
     def change(self, i: int, zero: Floats) -> Floats:
         """Return image `i` less `zero`, shape (rows, columns, components); a cell without a number did not change."""
@@ -252,22 +252,22 @@ class ContactImageFeatures(FeatureSet[ContactImageConfig]):
             t_s, cells, components = signal.t_s, signal.cells, own.components
         grasping, squeezing = np.flatnonzero(trace.phase <= HOLD), np.flatnonzero(trace.phase >= SQUEEZE)
         last = int(np.searchsorted(t_s, trace.t_s[grasping[-1]], side="right")) if len(grasping) else 0
-        before = int(np.searchsorted(t_s, trace.t_s[squeezing[0]])) if len(squeezing) else 1
-        before = max(before, 1)
-        if last <= before:
+        unpressed = int(np.searchsorted(t_s, trace.t_s[squeezing[0]])) if len(squeezing) else 1
+        unpressed = max(unpressed, 1)
+        if last <= unpressed:
             return f"there is no image of {name!r} before the squeeze with one in it"
         numbers = cells[0].size
         if numbers % components:
             return f"an image of {name!r} has {numbers} numbers, and features.components is {components}"
         grid = self._grid if numbers == own.rows * own.columns * components else (1, numbers // components)
-        return ContactImages(cells, before, last, (*grid, components))
+        return ContactImages(cells, unpressed, last, (*grid, components))
 
     def _measured(self, images: ContactImages) -> dict[str, float]:
         """Return the quantities that these images show."""
         zero, share = images.zero(), self.config.least_share
         totals = np.array([np.sum(self._pressed(images.change(i, zero))) for i in images.places()])
         peak = int(np.argmax(totals))
-        change = images.change(images.before + peak, zero)
+        change = images.change(images.unpressed + peak, zero)
         pressed = self._pressed(change)
         values = {"total": float(totals[peak]), "largest": float(np.max(pressed))}
         if self._has_shear:
@@ -285,7 +285,7 @@ class ContactImageFeatures(FeatureSet[ContactImageConfig]):
                 "angle": contact.angle,
             }
             for percent in PERCENT:
-                begun = images.before + int(np.argmax(totals >= 0.01 * percent * totals[peak]))
+                begun = images.unpressed + int(np.argmax(totals >= 0.01 * percent * totals[peak]))
                 earlier = moments(self._pressed(images.change(begun, zero)), share)
                 if earlier is not None:
                     now, then = (*contact.centre, *contact.axes), (*earlier.centre, *earlier.axes)

@@ -31,6 +31,7 @@ from graspsense.plugins.features.contact_curve import (
     contact_curve,
     first_crossing,
     samples_of,
+    units_in,
     without_gap,
 )
 from graspsense.plugins.features.contact_threshold import ContactThreshold
@@ -203,78 +204,78 @@ class CurveFeatures(FeatureSet[CurveConfig]):
         contact_force_n = self.config.contact_force_n
         samples = samples_of(trace, contact_force_n)
         curve = samples if isinstance(samples, str) else contact_curve(samples, contact_force_n)
-        found = _Found()
+        measured = _Found()
         if isinstance(curve, str):
-            found.reasons = missing(NAMES, curve)
+            measured.reasons = missing(NAMES, curve)
         else:
-            found.add("contact_gap", curve.contact_gap_m, "the gap is not a number")
-            self._squeeze(curve, found)
+            measured.add("contact_gap", curve.contact_gap_m, "the gap is not a number")
+            self._squeeze(curve, measured)
         features = Features(
             names=NAMES,
-            values=tuple(found.values.get(name, float("nan")) for name in NAMES),
-            units=_units(trace),
-            reasons=found.reasons,
+            values=tuple(measured.values.get(name, float("nan")) for name in NAMES),
+            units=units_in(trace, _FEATURES),
+            reasons=measured.reasons,
         )
         return without_gap(trace, features, OF_GAP)
 
-    def _squeeze(self, curve: ContactCurve, found: _Found) -> None:
+    def _squeeze(self, curve: ContactCurve, measured: _Found) -> None:
         """Add everything after the contact."""
-        before = curve.t_s <= curve.end_s
-        if np.count_nonzero(before) < LEAST_SAMPLES:
-            found.reasons |= missing(NAMES[1:], "fewer than three samples from the contact to the release")
+        gripped = curve.t_s <= curve.end_s
+        if np.count_nonzero(gripped) < LEAST_SAMPLES:
+            measured.reasons |= missing(NAMES[1:], "fewer than three samples from the contact to the release")
             return
-        t_s = curve.t_s[before]
+        t_s = curve.t_s[gripped]
         force = curve.mean_force(t_s, self.config.window_s)
         peak = float(force.max())
         loaded_s = first_crossing(t_s, force, LOADED * peak)
         if loaded_s is None or not loaded_s > t_s[0]:
-            found.reasons |= missing(NAMES[1:], "the force does not rise after the contact")
+            measured.reasons |= missing(NAMES[1:], "the force does not rise after the contact")
             return
         loading = _Loading(curve=curve, t_s=t_s, force=force, peak_n=peak, end_s=loaded_s)
-        self._loading(loading, found)
-        self._hold(loading, found)
-        self._release(loading, found)
+        self._loading(loading, measured)
+        self._hold(loading, measured)
+        self._release(loading, measured)
 
-    def _loading(self, loading: _Loading, found: _Found) -> None:
+    def _loading(self, loading: _Loading, measured: _Found) -> None:
         curve, start, end = loading.curve, loading.t_s[0], loading.end_s
         travel = curve.compression(end)
         duration = end - start
-        found.values |= {
+        measured.values |= {
             "peak_force": loading.peak_n,
             "compression": travel,
             "loading_time": float(duration),
             "loading_work": float(curve.work(np.array([end]))[0]),
         }
-        self._shape(loading, travel, found)
-        self._difference(loading, found)
+        self._shape(loading, travel, measured)
+        self._difference(loading, measured)
         if travel < self.config.least_travel_m:
             why = f"the fingers closed by {travel * 1e3:.2g} mm only, below least_travel_m"
-            found.reasons |= missing(TRAVEL_NAMES, why)
+            measured.reasons |= missing(TRAVEL_NAMES, why)
             return
-        first, last = np.interp((start, end), curve.t_s, curve.force_n)
-        above = found.values["loading_work"] - first * travel
-        straight = 0.5 * (last - first) * travel
-        found.add(
+        start_n, end_n = np.interp((start, end), curve.t_s, curve.force_n)
+        above = measured.values["loading_work"] - start_n * travel
+        straight = 0.5 * (end_n - start_n) * travel
+        measured.add(
             "curvature",
             1.0 - above / straight if straight > 0.0 else None,
             "the force does not rise in the loading",
         )
-        self._stiffness(loading, found)
+        self._stiffness(loading, measured)
 
-    def _shape(self, loading: _Loading, travel: float, found: _Found) -> None:
+    def _shape(self, loading: _Loading, travel: float, measured: _Found) -> None:
         """Add the forces at shares of the time and of the compression of the loading."""
         curve, start = loading.curve, loading.t_s[0]
-        at = {f"load_t{100 * q:.0f}": float(start + q * (loading.end_s - start)) for q in LOADS}
+        times_s = {f"load_t{100 * q:.0f}": float(start + q * (loading.end_s - start)) for q in LOADS}
         if travel >= self.config.least_travel_m:
             compression = curve.compression_m[: len(loading.t_s)]
             for q in LOADS:
                 reached = first_crossing(loading.t_s, compression, q * travel)
                 assert reached is not None, "the compression at the end of the loading is larger"
-                at[f"load_x{100 * q:.0f}"] = reached
-        forces = curve.mean_force(np.array(list(at.values())), self.config.window_s)
-        found.values |= dict(zip(at, forces.tolist(), strict=True))
+                times_s[f"load_x{100 * q:.0f}"] = reached
+        forces = curve.mean_force(np.array(list(times_s.values())), self.config.window_s)
+        measured.values |= dict(zip(times_s, forces.tolist(), strict=True))
 
-    def _stiffness(self, loading: _Loading, found: _Found) -> None:
+    def _stiffness(self, loading: _Loading, measured: _Found) -> None:
         """Add the slope of force over compression around each share of the largest force."""
         low, high = (
             [
@@ -285,7 +286,7 @@ class CurveFeatures(FeatureSet[CurveConfig]):
         )
         slopes = self._slopes(loading.curve, low, high)
         for q, (slope, reason) in zip(LOADS, slopes, strict=True):
-            found.add(f"stiffness_{100 * q:.0f}", slope, reason)
+            measured.add(f"stiffness_{100 * q:.0f}", slope, reason)
 
     def _slopes(
         self, curve: ContactCurve, starts: Sequence[float | None], ends: Sequence[float | None]
@@ -310,71 +311,75 @@ class CurveFeatures(FeatureSet[CurveConfig]):
                 results.append((slope, ""))
         return results
 
-    def _difference(self, loading: _Loading, found: _Found) -> None:
+    def _difference(self, loading: _Loading, measured: _Found) -> None:
         curve = loading.curve
         if len(curve.pads) < 2:
-            found.reasons["pad_difference"] = "only one pad touched, or gives numbers"
+            measured.reasons["pad_difference"] = "only one pad touched, or gives numbers"
             return
         t_s = loading.t_s[loading.t_s <= loading.end_s]
         pads = curve.pads[:, : len(t_s)]
         left, right = (0.5 * (pads[:, 1:] + pads[:, :-1]) * np.diff(t_s)).sum(axis=1).tolist()
         total = left + right
-        found.add(
+        measured.add(
             "pad_difference",
             abs(left - right) / total if total > 0.0 else None,
             "the pads felt nothing in the loading",
         )
 
-    def _hold(self, loading: _Loading, found: _Found) -> None:
+    def _hold(self, loading: _Loading, measured: _Found) -> None:
         curve, window = loading.curve, self.config.window_s
         duration = curve.end_s - loading.end_s
         if duration < 2.0 * window:
             after = "the release" if curve.released else "the end of the trace"
             why = f"no hold: {after} follows {max(duration, 0.0):.3g} s after the loading"
-            found.reasons |= missing(_names(_HOLD), why)
+            measured.reasons |= missing(_names(_HOLD), why)
             return
-        at = loading.end_s + np.array((*LOADS, 1.0)) * duration
-        *held, last = curve.mean_force(at, window).tolist()
+        times_s = loading.end_s + np.array((*LOADS, 1.0)) * duration
+        *held, last = curve.mean_force(times_s, window).tolist()
         for q, value in zip(LOADS, held, strict=True):
-            found.values[f"hold_t{100 * q:.0f}"] = value
+            measured.values[f"hold_t{100 * q:.0f}"] = value
         lost = loading.peak_n - last
-        found.values["relaxation"] = lost / loading.peak_n
-        found.values["creep"] = curve.compression(curve.end_s) - curve.compression(loading.end_s)
+        measured.values["relaxation"] = lost / loading.peak_n
+        measured.values["creep"] = curve.compression(curve.end_s) - curve.compression(loading.end_s)
         if lost < RELAXED * loading.peak_n:
-            found.reasons["relaxation_time"] = f"the force lost less than {RELAXED:.0%} of its largest value"
+            measured.reasons["relaxation_time"] = (
+                f"the force lost less than {RELAXED:.0%} of its largest value"
+            )
             return
         top = int(loading.force.argmax())
         t_s = np.append(loading.t_s[top:], curve.end_s)
         above = np.append(loading.force[top:], last) - last
-        found.values["relaxation_time"] = float((0.5 * (above[1:] + above[:-1]) * np.diff(t_s)).sum() / lost)
+        measured.values["relaxation_time"] = float(
+            (0.5 * (above[1:] + above[:-1]) * np.diff(t_s)).sum() / lost
+        )
 
-    def _release(self, loading: _Loading, found: _Found) -> None:
+    def _release(self, loading: _Loading, measured: _Found) -> None:
         curve, names = loading.curve, _names(_RELEASE)
         if not curve.released:
-            found.reasons |= missing(names, "the trace ends before the release")
+            measured.reasons |= missing(names, "the trace ends before the release")
             return
         after = curve.t_s >= curve.end_s
         t_s = curve.t_s[after]
         let_go = first_crossing(t_s, -curve.lowest_n[after], -self.config.contact_force_n)
         if let_go is None:
-            found.reasons |= missing(names, "the trace ends before the pads lose contact in the release")
+            measured.reasons |= missing(names, "the trace ends before the pads lose contact in the release")
             return
-        done, rest = curve.work(np.array([curve.end_s, let_go])).tolist()
+        done, left = curve.work(np.array([curve.end_s, let_go])).tolist()
         why = "no work was done on the object"
-        found.add("hysteresis", rest / done if done > 0.0 else None, why)
-        found.values["residual_compression"] = curve.compression(let_go)
-        first = float(np.interp(curve.end_s, curve.t_s, curve.force_n))
-        high = first_crossing(t_s, -curve.force_n[after], -LOADS[2] * first)
-        low = first_crossing(t_s, -curve.force_n[after], -LOADS[0] * first)
+        measured.add("hysteresis", left / done if done > 0.0 else None, why)
+        measured.values["residual_compression"] = curve.compression(let_go)
+        begin_n = float(np.interp(curve.end_s, curve.t_s, curve.force_n))
+        high = first_crossing(t_s, -curve.force_n[after], -LOADS[2] * begin_n)
+        low = first_crossing(t_s, -curve.force_n[after], -LOADS[0] * begin_n)
         ((slope, reason),) = self._slopes(curve, [high], [low])
-        found.add("unloading_stiffness", slope, reason)
+        measured.add("unloading_stiffness", slope, reason)
         begin = curve.compression(curve.end_s)
         for q in LOADS:
             reached = None
             if begin >= self.config.least_travel_m:
                 reached = first_crossing(t_s, -curve.compression_m[after], -q * begin)
             force = None if reached is None else float(np.interp(reached, curve.t_s, curve.force_n))
-            found.add(
+            measured.add(
                 f"release_x{100 * q:.0f}",
                 force,
                 "the fingers did not open so far, or were not closed further",
@@ -390,11 +395,3 @@ class _Loading:
     force: Floats
     peak_n: float
     end_s: float
-
-
-def _units(trace: Trace) -> tuple[str, ...]:
-    """Return the units of the features, given those of the trace: a recording can count time in frames."""
-    t, gap, force = trace.units["t"], trace.units["gap"], trace.units["force_left"]
-    joule = "J" if (gap, force) == ("m", "N") else f"{force} {gap}"
-    of = {"m": gap, "N": force, "s": t, "J": joule, "N/m": f"{force}/{gap}", "1": "1"}
-    return tuple(of[feature.unit] for feature in _FEATURES)

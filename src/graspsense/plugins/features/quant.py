@@ -22,6 +22,7 @@ from attrs import frozen
 
 from graspsense.gripper_api import NO_GAP
 from graspsense.plugin_api import APPROACH, Channel, Feature, Features, FeatureSet
+from graspsense.plugins.features.contact_curve import units_in
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -69,17 +70,17 @@ class Interval:
 
 def intervals_of(points: int) -> list[Interval]:
     """Return the intervals of a series of this many points."""
-    found: list[Interval] = []
+    intervals: list[Interval] = []
     for depth in range(DEPTH):
         parts = 2**depth
         ends = np.linspace(0, points, parts + 1).astype(int)
         shifted = ends[:-1] + np.diff(ends) // 2
         for suffix, words, bounds in (("", "", ends), ("shifted", ", shifted by half of a part", shifted)):
-            found += [
+            intervals += [
                 Interval(f"{k}of{parts}{suffix}", f"part {k} of {parts}{words}", start, end)
                 for k, (start, end) in enumerate(pairwise(bounds.tolist()), 1)
             ]
-    return found
+    return intervals
 
 
 _INTERVALS: Final = {points: intervals_of(points) for *_, points in SERIES}
@@ -124,18 +125,24 @@ class QuantFeatures(FeatureSet[QuantConfig]):
             known = np.isfinite(column)
             own = names[1 + k * A_CHANNEL : 1 + (k + 1) * A_CHANNEL]
             if k == 0 and trace.units.get("gap") == NO_GAP:
-                found, why = np.full(A_CHANNEL, np.nan), "no gap was recorded"
+                quantiles, why = np.full(A_CHANNEL, np.nan), "no gap was recorded"
             elif np.count_nonzero(known) < LEAST_SAMPLES:
-                found, why = np.full(A_CHANNEL, np.nan), f"fewer than three samples of the {CHANNELS[k][2]}"
+                quantiles, why = (
+                    np.full(A_CHANNEL, np.nan),
+                    f"fewer than three samples of the {CHANNELS[k][2]}",
+                )
             else:
-                at = np.linspace(0.0, duration, POINTS)
-                series = np.interp(at, t_s[known] - t_s[0], column[known])
-                found, why = interval_quantiles(series[np.newaxis], at[1])[0], "its numbers are too large"
-            lost = ~np.isfinite(found)
-            found[lost] = np.nan
+                grid_s = np.linspace(0.0, duration, POINTS)
+                series = np.interp(grid_s, t_s[known] - t_s[0], column[known])
+                quantiles, why = (
+                    interval_quantiles(series[np.newaxis], grid_s[1])[0],
+                    "its numbers are too large",
+                )
+            lost = ~np.isfinite(quantiles)
+            quantiles[lost] = np.nan
             reasons |= {own[i]: why for i in np.flatnonzero(lost).tolist()}
-            values += found.tolist()
-        return Features(names=names, values=tuple(values), units=_units(trace), reasons=reasons)
+            values += quantiles.tolist()
+        return Features(names=names, values=tuple(values), units=units_in(trace, _FEATURES), reasons=reasons)
 
 
 def interval_quantiles(series: Floats, step_s: float = 1.0) -> Floats:
@@ -175,19 +182,10 @@ def _of_intervals(values: Floats) -> Floats:
 
 def _samples(trace: Trace) -> tuple[Floats, tuple[Floats, Floats, Floats]]:
     """Return the times from the approach on, increasing, and gap, larger and smaller force at them."""
-    at = np.flatnonzero((trace.phase >= APPROACH) & np.isfinite(trace.t_s))
-    t_s = trace.t_s[at]
-    later = np.ones(len(at), dtype=np.bool_)
+    ticks = np.flatnonzero((trace.phase >= APPROACH) & np.isfinite(trace.t_s))
+    t_s = trace.t_s[ticks]
+    later = np.ones(len(ticks), dtype=np.bool_)
     later[1:] = t_s[1:] > np.maximum.accumulate(t_s[:-1])
-    at = at[later]
-    left, right = trace.force_left_n[at], trace.force_right_n[at]
-    return trace.t_s[at], (trace.gap_m[at], np.fmax(left, right), np.fmin(left, right))
-
-
-def _units(trace: Trace) -> tuple[str, ...]:
-    """Return the units of the features, given those of the trace."""
-    t, gap, force = trace.units["t"], trace.units["gap"], trace.units["force_left"]
-    of = {"s": t}
-    for unit, own in (("m", gap), ("N", force)):
-        of |= {unit: own, f"{unit}/s": f"{own}/{t}", f"{unit}/s2": f"{own}/{t}2"}
-    return tuple(of[feature.unit] for feature in _FEATURES)
+    ticks = ticks[later]
+    left, right = trace.force_left_n[ticks], trace.force_right_n[ticks]
+    return trace.t_s[ticks], (trace.gap_m[ticks], np.fmax(left, right), np.fmin(left, right))

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from graspsense.plugin_api import Channel, Feature, Features, FeatureSet, missing
-from graspsense.plugins.features.contact_curve import contact_curve, samples_of, without_gap
+from graspsense.plugins.features.contact_curve import contact_curve, samples_of, units_in, without_gap
 from graspsense.plugins.features.contact_threshold import ContactThreshold
 
 if TYPE_CHECKING:
@@ -95,7 +95,7 @@ class QuantileFeatures(FeatureSet[ContactThreshold]):
         features = Features(
             names=tuple(feature.name for feature in self.features),
             values=(*values, *absent),
-            units=_units(trace),
+            units=units_in(trace, self.features),
             reasons=reasons,
         )
         return without_gap(trace, features, _OF_GAP)
@@ -116,11 +116,11 @@ def _contact(samples: CurveSamples, contact_force_n: float) -> tuple[float, floa
 
 def _quantiles(samples: CurveSamples, start_s: float, end_s: float) -> Floats:
     """Return the quantiles in the order of their features."""
-    at = np.linspace(start_s, end_s, POINTS)
+    grid_s = np.linspace(start_s, end_s, POINTS)
     pads = samples.pads
     columns = (samples.gap_m, pads.max(axis=0), pads.min(axis=0))
-    values = np.array([np.interp(at, samples.t_s, column) for column in columns])
-    rates = np.diff(values, axis=1) / (at[1] - at[0])
+    values = np.array([np.interp(grid_s, samples.t_s, column) for column in columns])
+    rates = np.diff(values, axis=1) / (grid_s[1] - grid_s[0])
     shares = np.linspace(0.0, 1.0, len(QUANTILES))
     parts = [
         np.quantile(series[:, part], shares, axis=1).T.ravel()
@@ -129,10 +129,3 @@ def _quantiles(samples: CurveSamples, start_s: float, end_s: float) -> Floats:
     ]
     result: Floats = np.concatenate(parts)
     return result
-
-
-def _units(trace: Trace) -> tuple[str, ...]:
-    """Return the units of the features, given those of the trace: a recording can count time in frames."""
-    t, gap, force = trace.units["t"], trace.units["gap"], trace.units["force_left"]
-    of = {"m": gap, "N": force, "s": t, "m/s": f"{gap}/{t}", "N/s": f"{force}/{t}"}
-    return tuple(of[feature.unit] for feature in (*_CONTACT, *_QUANTILES))

@@ -64,21 +64,23 @@ class UnionFeatures(FeatureSet[UnionConfig]):
         """The channels that all sets need, with the largest rate; a set that lacks others has no features."""
         parts = [{channel.name: channel for channel in part.requires} for part in self._parts.values()]
         common = [name for name in parts[0] if all(name in part for part in parts)]
-        return tuple(max((part[name] for part in parts), key=lambda one: one.rate_hz) for name in common)
+        return tuple(
+            max((part[name] for part in parts), key=lambda channel: channel.rate_hz) for name in common
+        )
 
     @property
     def features(self) -> tuple[Feature, ...]:  # type: ignore[override]
         """The features of all sets; the first width among them is the width."""
-        found: dict[str, Feature] = {}
+        features: dict[str, Feature] = {}
         has_width = False
         for set_name, part in self._parts.items():
             for feature in part.features:
-                name = _distinct(feature.name, set_name, found)
+                name = _distinct(feature.name, set_name, features)
                 width = feature.width and not has_width
                 has_width |= width
                 same = (name, width) == (feature.name, feature.width)
-                found[name] = feature if same else evolve(feature, name=name, width=width)
-        return tuple(found.values())
+                features[name] = feature if same else evolve(feature, name=name, width=width)
+        return tuple(features.values())
 
     def extract(self, trace: Trace) -> Features:
         """Return the features of all sets."""
@@ -87,12 +89,12 @@ class UnionFeatures(FeatureSet[UnionConfig]):
         units: list[str] = []
         reasons: dict[str, str] = {}
         for set_name, part in self._parts.items():
-            found = part.extract(trace)
-            own = {name: _distinct(name, set_name, names) for name in found.names}
+            features = part.extract(trace)
+            own = {name: _distinct(name, set_name, names) for name in features.names}
             names |= dict.fromkeys(own.values())
-            values += found.values
-            units += found.units
-            reasons |= {own[name]: why for name, why in found.reasons.items()}
+            values += features.values
+            units += features.units
+            reasons |= {own[name]: why for name, why in features.reasons.items()}
         return Features(names=tuple(names), values=tuple(values), units=tuple(units), reasons=reasons)
 
     @cached_property

@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import importlib
+import json
 import os
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from importlib.metadata import Distribution, distributions
+from pathlib import Path
 from typing import Final
 
 from attrs import define
 
 from graspsense import __version__
-from graspsense.core.components.disabling import config_file
 from graspsense.core.components.firstparty import BUILTIN_MODULE, DISTRIBUTION
 from graspsense.core.components.hookspecs import ENTRY_POINT_GROUP
 from graspsense.core.components.registry.parts import canonical
-from graspsense.core.values.errors import suggestion
+from graspsense.core.files.toml_text import TomlError, toml_values
+from graspsense.core.files.user_folders import NOWHERE, config_folder
+from graspsense.core.files.whole_file import write_whole
+from graspsense.core.values.errors import ConfigError, suggestion
 
 ALLOWED_VARIABLE: Final = "GRASPSENSE_PLUGINS"
 """If this environment variable is set, only the distributions that it lists are loaded."""
@@ -72,6 +76,50 @@ def reason_not_to_load(distribution: str, environ: Mapping[str, str], disabled: 
     if distribution in disabled:
         return f"in {config_file()} (graspsense plugins enable {distribution})"
     return ""
+
+
+def config_file() -> Path | None:
+    """Return the file with the disabled plugins, whether or not it exists; None for a user without a home folder."""
+    folder = config_folder()
+    return None if folder is None else folder / "plugins.toml"
+
+
+def disabled_in_config() -> tuple[str, ...]:
+    """Return the distributions listed under `disabled`, as they are written there.
+
+    Raises ConfigError if the file is not `disabled = ["NAME", ...]`.
+    """
+    path = config_file()
+    if path is None:
+        return ()
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (FileNotFoundError, NotADirectoryError):
+        return ()
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{path} cannot be read: {error}") from error
+    try:
+        values = toml_values(text)
+    except TomlError as error:
+        raise ConfigError(f'{path}: {error}. It holds one line, disabled = ["NAME", ...]') from error
+    names = values.pop("disabled", [])
+    if values or not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        what = f"the unknown key {next(iter(values))!r}" if values else f"disabled = {names!r}"
+        raise ConfigError(f'{path}: found {what}. It holds one line, disabled = ["NAME", ...]')
+    return tuple(names)
+
+
+def write_disabled(names: Iterable[str]) -> Path:
+    """Write the list and return its file; an empty list removes it. Raises ConfigError without a home folder."""
+    path, wanted = config_file(), sorted(set(names))
+    if path is None:
+        raise ConfigError(NOWHERE.format("XDG_CONFIG_HOME"))
+    if not wanted:
+        path.unlink(missing_ok=True)
+        return path
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_whole(path, f"disabled = {json.dumps(wanted)}\n".encode())
+    return path
 
 
 def unknown_names(installed: set[str], environ: Mapping[str, str]) -> tuple[str, ...]:

@@ -149,10 +149,10 @@ class HookCalls:
     def _trace_calls(self) -> None:
         started: list[float] = []
 
-        def before(hook: str, implementations: Sequence[Any], arguments: Mapping[str, Any]) -> None:
+        def started_call(hook: str, implementations: Sequence[Any], arguments: Mapping[str, Any]) -> None:
             started.append(time.perf_counter())
 
-        def after(
+        def ended_call(
             outcome: pluggy.Result[Any],
             hook: str,
             implementations: Sequence[Any],
@@ -164,7 +164,7 @@ class HookCalls:
             line = f"hook {hook}({', '.join(arguments)}) of {names} {ended} in {took_ms:.2f} ms"
             print(printable(line), file=sys.stderr)  # noqa: T201 (the user asked for it, on stderr)
 
-        self._manager.add_hookcall_monitoring(before, after)
+        self._manager.add_hookcall_monitoring(started_call, ended_call)
 
 
 class ImportCost(NamedTuple):

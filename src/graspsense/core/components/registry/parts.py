@@ -305,7 +305,7 @@ class Probe:
     """The devices that one plugin found; `error` is the reason if it could not search."""
 
     distribution: str
-    found: tuple[FoundDevice, ...] = ()
+    devices: tuple[FoundDevice, ...] = ()
     error: str = ""
 
 

@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Any, Final, Literal, TypeVar
 
 from attrs import evolve
 
-from graspsense.core.components.disabling import disabled_in_config
 from graspsense.core.components.entries import (
     ENTRY_OF_ROLE,
     TABLE_OF_ROLE,
@@ -47,6 +46,7 @@ from graspsense.core.components.firstparty import (
 from graspsense.core.components.registry.discovery import (
     PluginSource,
     builtin_source,
+    disabled_in_config,
     installed_sources,
     reason_not_to_load,
     unknown_names,

@@ -94,8 +94,8 @@ class Fingertip:
             ", ..." if len(stopped) > NAMED else ""
         )
         if len(stopped) > MOST_FROZEN_SHARE * len(self._cells):
-            found = f"{len(stopped)} of {len(self._cells)} cells stand still ({names})"
-            return Fault(f"{self.side} fingertip stuck", f"{found}: check its cable", ends=True)
+            stuck = f"{len(stopped)} of {len(self._cells)} cells stand still ({names})"
+            return Fault(f"{self.side} fingertip stuck", f"{stuck}: check its cable", ends=True)
         never = self._changes == 0
         if never.all() and other.noise.size and frozen(np.median(other.noise), self._still).all():
             return Fault(
@@ -150,5 +150,5 @@ class Fingertips:
     def faults(self) -> list[Fault]:
         """Return the faults that the last images show."""
         left, right = self._tips
-        found = (left.fault(right), right.fault(left))
-        return [fault for fault in found if fault is not None]
+        faults = (left.fault(right), right.fault(left))
+        return [fault for fault in faults if fault is not None]

@@ -108,8 +108,8 @@ class Drift:
             return []
         self._t_s = frame.t_s
         left, right = self._pads
-        found = (
+        faults = (
             left.see(frame.force_left_n, frame.gap_m, image.left if image.counter else ()),
             right.see(frame.force_right_n, frame.gap_m, image.right if image.counter else ()),
         )
-        return [fault for fault in found if fault is not None]
+        return [fault for fault in faults if fault is not None]

@@ -1,4 +1,8 @@
-"""Whether the motor does what it is commanded: as much, not more, and in the right direction."""
+"""Whether the motor does what it is commanded: as much, not more, and in the right direction.
+
+A motor that is too strong may report what it was told. What the pads feel shows it, and fingers that move with less
+effort than their friction takes.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +10,8 @@ from collections import deque
 from math import nan
 from typing import Final, NamedTuple
 
+from graspsense.core.grasp.protection.effort_ceiling import asked_effort_n
+from graspsense.core.grasp.protection.recent_mean import RecentMean
 from graspsense.core.values.faults import Fault
 from graspsense.core.values.signals import APPROACH, EFFORT, FORCE, POSITION, Command, Frame
 
@@ -27,6 +33,17 @@ WEAK_S: Final = 0.5
 """Time for which a motor may answer less than its command, which crushes nothing, before the grasp ends."""
 WRONG_WAY_M: Final = 0.003
 """Travel against the command from which on the motor turns the wrong way round."""
+RESTS_M_S: Final = 0.0005
+"""Speed below which the fingers rest: while they are braked, their mass presses too."""
+MEAN_S: Final = 0.2
+"""Time over which the effort is averaged."""
+FREE_TRAVEL_M: Final = 0.005
+"""Travel before the effort is judged: the fingers start with more than they then need."""
+MOVES_M_S: Final = 0.001
+"""Speed from which on the fingers move."""
+EASY_WARNS: Final = 0.6
+EASY_ENDS: Final = 0.4
+"""Shares of the friction below which the effort is told, and ends the grasp: what moves needs less than what starts."""
 
 
 class Asked(NamedTuple):
@@ -143,4 +160,72 @@ class Motor:
             f"the fingers {moved} by {travel_m * 1e3:.1f} mm under a {commanded} command: check its wiring",
             ends=True,
             relaxes=True,
+        )
+
+
+class FeltForce:
+    """Compares the smaller force of the pads with the largest effort that was allowed so far in the closing.
+
+    The largest one, since fingers whose drive holds by itself press on with it. `pads_hz` is the rate of the forces, 0
+    if it is not known. The friction of the drive (N; 0: it is not known) keeps what an impact has pressed; without it,
+    no force ends a grasp.
+    """
+
+    def __init__(self, rate_hz: float, pads_hz: float, friction_n: float = 0.0) -> None:
+        self._lasts_s = max(STRONG_S, PERIODS / rate_hz, 2.0 / pads_hz if pads_hz > 0.0 else 0.0)
+        self._friction_n = friction_n
+        self._allowed_n = nan
+        self._more_s = self._strong_s = 0.0
+
+    def apply(self, command: Command) -> None:
+        """Take a command that closes, after its limits."""
+        allowed_n = asked_effort_n(command)
+        if not allowed_n <= self._allowed_n:
+            self._allowed_n = allowed_n
+
+    def see(self, frame: Frame) -> Fault | None:
+        """Take the frame of a tick while the fingers close or hold, and return a force that no command explains.
+
+        Only fingers that rest are judged, so a gripper without a velocity is not.
+        """
+        felt_n, allowed_n = min(frame.force_left_n, frame.force_right_n), self._allowed_n
+        rests = abs(frame.velocity_m_s) < RESTS_M_S
+        held_n = felt_n - self._friction_n
+        more = rests and held_n > (1.0 + ALLOWED_SHARE) * allowed_n + ALLOWED_N
+        strong = rests and self._friction_n > 0.0 and held_n > (1.0 + STRONG_SHARE) * allowed_n + STRONG_N
+        self._more_s = lasting(self._more_s, more, frame.dt_s)
+        self._strong_s = lasting(self._strong_s, strong, frame.dt_s)
+        if self._more_s <= self._lasts_s:
+            return None
+        return Fault(
+            "stronger than commanded",
+            f"both pads feel {felt_n:.1f} N, and the motor was told {allowed_n:.1f} N at most: check the scale of the "
+            "motor, and the calibration of the pads",
+            ends=self._strong_s > self._lasts_s,
+        )
+
+
+class FreeEffort:
+    """Compares the effort of an approach in free air with the friction of the drive (N; 0: it is not known)."""
+
+    def __init__(self, friction_n: float) -> None:
+        self._friction_n = friction_n
+        self._mean_n = RecentMean(MEAN_S)
+        self._travel_m = 0.0
+
+    def see(self, frame: Frame, applied: Command) -> Fault | None:
+        """Take the frame of a tick of the approach in which nothing is felt, and the command that is applied."""
+        if applied.kind != EFFORT or not -frame.velocity_m_s > MOVES_M_S:
+            return None
+        self._travel_m -= frame.velocity_m_s * frame.dt_s
+        self._mean_n.add(asked_effort_n(applied), frame.dt_s)
+        mean_n = self._mean_n.value
+        if self._travel_m < FREE_TRAVEL_M or not mean_n < EASY_WARNS * self._friction_n:
+            return None
+        return Fault(
+            "moves too easily",
+            f"the fingers move with {mean_n:.1f} N, and their friction is {self._friction_n:.1f} N: the motor may "
+            "press with more than it reports; check its scale, or measure the friction again (graspsense calibrate "
+            "friction)",
+            ends=mean_n < EASY_ENDS * self._friction_n,
         )

@@ -17,18 +17,14 @@ from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.protection.cells import Fingertips
 from graspsense.core.grasp.protection.drift import Drift
 from graspsense.core.grasp.protection.effort_ceiling import asked_effort_n, effort_ceiling_n, limited
-from graspsense.core.grasp.protection.felt_force import FeltForce
-from graspsense.core.grasp.protection.free_effort import FreeEffort
-from graspsense.core.grasp.protection.gap_speed import GapSpeed
-from graspsense.core.grasp.protection.motor import Motor
-from graspsense.core.grasp.protection.pad_balance import PadBalance
+from graspsense.core.grasp.protection.motor import FeltForce, FreeEffort, Motor
+from graspsense.core.grasp.protection.pad_forces import PadBalance, StuckForce
 from graspsense.core.grasp.protection.reports import Reports
-from graspsense.core.grasp.protection.rush import Rush
+from graspsense.core.grasp.protection.speed import GapSpeed, Rush
 from graspsense.core.grasp.protection.status import StatusWatch
-from graspsense.core.grasp.protection.stuck_force import StuckForce
 from graspsense.core.grasp.protection.touch import Touch
 from graspsense.core.values.device import DeviceInfo
-from graspsense.core.values.faults import Fault
+from graspsense.core.values.faults import LIMITED, Fault
 from graspsense.core.values.signals import (
     APPROACH,
     EFFORT,
@@ -42,8 +38,6 @@ from graspsense.core.values.signals import (
 )
 
 RELEASE: Final = int(Phase.RELEASE)
-LIMITED: Final = "squeeze limited"
-"""The warning of a squeeze that is not the one that the controller commanded."""
 
 
 class Protection:
@@ -166,8 +160,8 @@ class Protection:
             return
         if phase == RELEASE and fault.ends and not fault.relaxes:
             fault = evolve(fault, ends=False)
-        before = self._told.get(fault.name)
-        if before is None or (fault.ends and not before.ends):
+        told = self._told.get(fault.name)
+        if told is None or (fault.ends and not told.ends):
             self._told[fault.name] = fault
             self._tell(fault)
         if fault.ends and self.ending is None:
