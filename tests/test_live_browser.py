@@ -164,11 +164,11 @@ def test_fifty_channels_do_not_grow_the_page_or_its_process(browser, feed, ticks
             pages = Path(f"/proc/{feed._process.pid}/statm").read_text().split()[1]
             kept.append((used["usedSize"] + used.get("backingStorageSize", 0), int(pages) * PAGE_BYTES))
     assert browser.run("series.size") == 52
-    assert browser.run("[...series.values()].every((one) => one.n === 30000)")
+    assert browser.run("[...series.values()].every((curve) => curve.n === 30000)")
     assert browser.run("series.get('channel channel_49').last()") == ticks - 1 + 49
     assert feed.dropped == 0
     page, process = zip(*kept, strict=True)
     assert max(page) < page[0] + (4 << 20), kept
-    # What waits to be sent comes and goes with the machine's load; what is never given back raises the least as well.
-    halves = process[: len(process) // 2], process[len(process) // 2 :]
-    assert min(halves[1]) < min(halves[0]) + (4 << 20), kept
+    # A tick is some 470 bytes of text, so keeping every tick adds 250 MB in ten minutes. What waits to be sent, and what
+    # the allocator does not give back, comes and goes by some 10 MB with the load of the machine.
+    assert max(process) < process[0] + (32 << 20), kept
