@@ -85,15 +85,15 @@ def collect(
     from graspsense.store.store import Store
 
     wanted = Wanted(
-        words=tuple(one.strip() for one in labels.split(",") if one.strip()),
+        words=tuple(word.strip() for word in labels.split(",") if word.strip()),
         each=each,
         seed=seed or 0,
         labels={**({"operator": operator} if operator else {}), **dict(map(value_label, values))},
     )
-    first = settings_of(pipeline, gripper, object_name, options, seed, force)
-    check(first)
-    options = options if _has_model(first) else (*options, *GRIPPER_ALONE)
-    selects = _label_selects_object(first, wanted.words, names_object(object_name, options))
+    settings = settings_of(pipeline, gripper, object_name, options, seed, force)
+    check(settings)
+    options = options if _has_model(settings) else (*options, *GRIPPER_ALONE)
+    selects = _label_selects_object(settings, wanted.words, names_object(object_name, options))
 
     def settings_for(word: str, number: int) -> Settings:
         return settings_of(pipeline, gripper, word if selects else object_name, options, number, force)

@@ -99,12 +99,14 @@ def _ended_by_signals() -> Iterator[None]:
     def end(number: int, frame: FrameType | None) -> None:
         raise _Ended
 
-    before = {one: signal.signal(one, end) for one in (signal.SIGINT, signal.SIGTERM)}
+    handlers = {
+        signal_number: signal.signal(signal_number, end) for signal_number in (signal.SIGINT, signal.SIGTERM)
+    }
     try:
         yield
     finally:
-        for one, handler in before.items():
-            signal.signal(one, handler)
+        for signal_number, handler in handlers.items():
+            signal.signal(signal_number, handler)
 
 
 def _serve(device: EmulatedDevice, as_json: bool) -> None:
@@ -137,8 +139,8 @@ def _do(device: EmulatedDevice, word: str, as_json: bool) -> None:
     from graspsense.core.values.errors import suggestion
 
     if word == "help":
-        for one, what in device.words.items():
-            talk(f"  {one:<10}{what}")
+        for command, what in device.words.items():
+            talk(f"  {command:<10}{what}")
     elif word == "state" or word in device.words:
         if word != "state":
             device.tell(word)

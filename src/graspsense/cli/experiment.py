@@ -107,14 +107,14 @@ def experiment(
         return
     with shown_live(live) as shown:
         account = _run(planned, results, make, resume, shown)
-        found = summarise(planned, results)
-        page, problem = _written_page(found, results)
-        more = findings_of(found)
-        shown.told("progress", {"text": answer(found) if more is None else more.answer})
+        summary = summarise(planned, results)
+        page, problem = _written_page(summary, results)
+        more = findings_of(summary)
+        shown.told("progress", {"text": answer(summary) if more is None else more.answer})
     if as_json:
-        _print_json(found, more, page, _counts(account, problem))
+        _print_json(summary, more, page, _counts(account, problem))
     else:
-        _print(found, more, account, f"none: {problem}" if problem else str(page))
+        _print(summary, more, account, f"none: {problem}" if problem else str(page))
     if account.stopped == "interrupted":
         raise click.exceptions.Exit(EXIT_INTERRUPTED)
     if problem or not account.complete:
@@ -172,18 +172,18 @@ def _list(known: Iterable[str], as_json: bool) -> None:
 
     cores = os.cpu_count() or 1
     planned = {name: read_experiment(name) for name in known}
-    efforts = {name: effort_of(one) for name, one in planned.items()}
+    efforts = {name: effort_of(experiment) for name, experiment in planned.items()}
     if as_json:
         echo_json(
             [
-                {"name": name, "title": one.experiment.title, **_effort_as_json(efforts[name])}
-                for name, one in planned.items()
+                {"name": name, "title": experiment.experiment.title, **_effort_as_json(efforts[name])}
+                for name, experiment in planned.items()
             ]
         )
         return
     rows = [
-        (name, efforts[name].time_on(cores), str(efforts[name].tasks), one.experiment.title)
-        for name, one in planned.items()
+        (name, efforts[name].time_on(cores), str(efforts[name].tasks), experiment.experiment.title)
+        for name, experiment in planned.items()
     ]
     echo_table(("EXPERIMENT", "TIME", "TASKS", "WHAT"), rows)
     echo(f"\nTIME is for {cores} cores, {measured_on()}.")

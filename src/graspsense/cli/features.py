@@ -44,7 +44,7 @@ def features(source: str, options: tuple[str, ...], keep: str | None, overwrite:
     from graspsense.store.naming import STORE
 
     check_outputs(keep, overwrite=overwrite)
-    before = labelled_store(source)
+    stored = labelled_store(source)
     with ProgressLine() as progress:
         after = labelled_store(
             source, options, progress=lambda done, total: progress("extracting features", done, total)
@@ -53,7 +53,7 @@ def features(source: str, options: tuple[str, ...], keep: str | None, overwrite:
         from graspsense.sources.features_csv import write_labelled
 
         write_labelled(Path(keep), after)
-    rows = _rows(before, after)
+    rows = _rows(stored, after)
     if as_json:
         echo_json(
             {
@@ -69,7 +69,7 @@ def features(source: str, options: tuple[str, ...], keep: str | None, overwrite:
     echo_table(
         ("FEATURE", "UNIT", "TRIALS BEFORE", "NOW", "MEDIAN BEFORE", "NOW"),
         [
-            (row["name"], row["unit"], _count(row["trials_before"], before), _count(row["trials"], after),
+            (row["name"], row["unit"], _count(row["trials_before"], stored), _count(row["trials"], after),
              _number(row["median_before"]), _number(row["median"]))
             for row in rows
         ],
@@ -81,7 +81,7 @@ def features(source: str, options: tuple[str, ...], keep: str | None, overwrite:
         echo_entry("written", keep)
 
 
-def _rows(before: Labelled, after: Labelled) -> list[dict[str, Any]]:
+def _rows(stored: Labelled, after: Labelled) -> list[dict[str, Any]]:
     """Return for each feature in how many trials it is defined, and its median, before and now."""
     import numpy as np
 
@@ -92,13 +92,13 @@ def _rows(before: Labelled, after: Labelled) -> list[dict[str, Any]]:
         return values[~np.isnan(values)]
 
     rows = []
-    names = dict.fromkeys((*after.table.names, *before.table.names))
+    names = dict.fromkeys((*after.table.names, *stored.table.names))
     units = {
-        **dict(zip(before.table.names, before.table.units, strict=True)),
+        **dict(zip(stored.table.names, stored.table.units, strict=True)),
         **dict(zip(after.table.names, after.table.units, strict=True)),
     }
     for name in names:
-        was, now = known(before, name), known(after, name)
+        was, now = known(stored, name), known(after, name)
         rows.append(
             {
                 "name": name,

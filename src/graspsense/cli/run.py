@@ -348,15 +348,15 @@ def _kept(
 
     labels = {} if label is None else labels_of(label)
     with Store.open(save) as store:
-        before = None if changed else newest_grasp(store)
-        if before is not None:
-            check_settings(store, before, settings)
+        earlier = None if changed else newest_grasp(store)
+        if earlier is not None:
+            check_settings(store, earlier, settings)
 
         def opened(device: DeviceInfo) -> None:
             if label is not None:
                 check_label(settings, device)
-            if before is not None:
-                check_device(store, before, device)
+            if earlier is not None:
+                check_device(store, earlier, device)
 
         grasp = record_grasp(
             store, settings, installed(), labels=labels, origin="run", sinks=sinks, on_open=opened
@@ -397,13 +397,13 @@ def print_trial(trial: Trial, *, events: bool = True) -> None:
         echo_entry("note", note)
     counts = trial.counts
     if counts.get("guarded"):
-        first = ""
+        why_limited = ""
         if trial.device.clock == "device" and counts["guarded"] > MANY_GUARDED * counts["ticks"]:
-            first = ": until a contact, run.first_speed_m_s and run.first_effort_n limit this gripper"
+            why_limited = ": until a contact, run.first_speed_m_s and run.first_effort_n limit this gripper"
             channels = {channel.name for channel in trial.device.channels}
             if channels and not channels & {"force_left", "force_right"}:
-                first += ", which has no pads to feel one"
-        echo_entry("note", f"the guard limited {counts['guarded']} of {counts['ticks']} ticks{first}")
+                why_limited += ", which has no pads to feel one"
+        echo_entry("note", f"the guard limited {counts['guarded']} of {counts['ticks']} ticks{why_limited}")
     if counts.get("late"):
         echo_entry("note", f"{counts['late']} of {counts['ticks']} frames came late")
     if trial.seconds_simulated is not None:

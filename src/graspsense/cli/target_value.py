@@ -51,13 +51,13 @@ def evaluate_value(
     with ProgressLine() as progress:
         labelled = _trials(source, estimator, progress, given)
         _keep(keep, labelled)
-        found = evaluate_regression(
+        evaluation = evaluate_regression(
             estimator or DEFAULT_ESTIMATOR, labelled, folds=folds, seed=given["seed"], progress=progress
         )
     if as_json:
-        echo_json(to_json(found))
+        echo_json(to_json(evaluation))
     else:
-        _print_evaluation(found)
+        _print_evaluation(evaluation)
 
 
 def train_value(
@@ -240,11 +240,15 @@ def _print_evaluation(evaluation: RegressionEvaluation) -> None:
     unit = f" [{evaluation.unit}]" if evaluation.unit else ""
     echo_table(
         ("PROTOCOL OR CONTROL", f"ERROR{unit}", "95 %", "TRIALS", "LARGER BY", "WHAT"),
-        [_row(name, one, evaluation.headline.n) for name, one in all_of.items() if one.error is not None],
+        [
+            _row(name, measured, evaluation.headline.n)
+            for name, measured in all_of.items()
+            if measured.error is not None
+        ],
     )
-    for name, one in all_of.items():
-        if one.error is None:
-            echo(f"{name}: not measured ({one.reason})", indent=2)
+    for name, measured in all_of.items():
+        if measured.error is None:
+            echo(f"{name}: not measured ({measured.reason})", indent=2)
 
 
 def _row(name: str, measured: RegressionMeasurement, trials: int) -> tuple[str, ...]:
@@ -258,14 +262,14 @@ def _row(name: str, measured: RegressionMeasurement, trials: int) -> tuple[str, 
         larger = f"{by.value:+.3g}"
         if by.interval is not None:
             larger += f" ({by.interval[0]:+.3g} to {by.interval[1]:+.3g})"
-    of = f" (compared with {measured.difference_of})" if measured.difference_of else ""
+    compared = f" (compared with {measured.difference_of})" if measured.difference_of else ""
     return (
         name,
         f"{error.mean_absolute:.4g}",
         interval,
         f"{error.n} of {trials}",
         larger,
-        f"{measured.what}{of}",
+        f"{measured.what}{compared}",
     )
 
 

@@ -84,11 +84,11 @@ def condition(
     if markdown:
         write_text(markdown, conditions_markdown(measured))
     if as_json:
-        echo_json([one.as_values() for one in measured])
+        echo_json([trade.as_values() for trade in measured])
         return
     echo(f"simulated: {', '.join(wanted)}, {seeds} seeds each")
-    for one in measured:
-        print_conditions(one)
+    for trade in measured:
+        print_conditions(trade)
 
 
 @tradeoff.command(short_help="Accuracy of the simulator against its run time.")
@@ -154,28 +154,28 @@ def simulation(
 
     settings = settings_of(pipeline, gripper, object_name, options, seed, force)
     wanted = scenes or ((object_name,) if object_name else SCENES)
-    first = settings.run.seed
+    first_seed = settings.run.seed
     with ProgressLine() as progress:
-        found = trade_simulation(
-            settings, scenes=wanted, seeds=range(first, first + seeds), progress=progress
+        trade = trade_simulation(
+            settings, scenes=wanted, seeds=range(first_seed, first_seed + seeds), progress=progress
         )
         sensed = None
         if recognition_seeds:
-            numbers = range(first, first + recognition_seeds)
+            numbers = range(first_seed, first_seed + recognition_seeds)
             sensed = sensed_trade(settings, instances=instances, seeds=numbers, progress=progress)
     # What may have taken an hour is printed before a file can fail to be written.
     if as_json:
-        echo_json(found.as_json() if sensed is None else {**found.as_json(), "recognition": asdict(sensed)})
+        echo_json(trade.as_json() if sensed is None else {**trade.as_json(), "recognition": asdict(sensed)})
     else:
-        made = ", ".join(f"{key} {value}" for key, value in found.made.items())
-        echo(f"{found.gripper}, simulated: {', '.join(found.scenes)}, {len(found.seeds)} seeds each")
+        made = ", ".join(f"{key} {value}" for key, value in trade.made.items())
+        echo(f"{trade.gripper}, simulated: {', '.join(trade.scenes)}, {len(trade.seeds)} seeds each")
         echo(f"{made}\n")
-        echo_table(*simulation_rows(found))
+        echo_table(*simulation_rows(trade))
         if sensed is not None:
             echo(f"\n{about(sensed)}")
             echo(f"{conclusion(sensed)}\n")
             echo_table(*sensed_rows(sensed))
-    _write_files(png, markdown, found, sensed)
+    _write_files(png, markdown, trade, sensed)
 
 
 def _write_files(

@@ -110,32 +110,32 @@ def train(
         train_value(source, classifier, out, keep, as_json, given)
         return
     _refuse_single_scene(source)
-    found, held_out = (
+    trained, held_out = (
         chosen(source, classifier, given, partial(_with_target, target=target)) if choose else None,
         None,
     )
-    if found is not None:
-        learner, labelled = found.learner, found.labelled
+    if trained is not None:
+        learner, labelled = trained.learner, trained.labelled
     else:
         learner = learner_of(source, classifier, given)
         labelled, held_out = _trials(source, given, times, target, calibration_instances)
-    notes = list(labelled.notes) if found is None else []  # those of a choice are printed with it
+    notes = list(labelled.notes) if trained is None else []  # those of a choice are printed with it
     with gathered_warnings(notes):
         made = _maker(learner, Path(out).stem, target, given["seed"])
         labelled, model = _made(made, learner, labelled, held_out, times, given["seed"])
     write_model(Path(out), model)
-    if found is not None and pipeline is not None:
-        write_whole(Path(pipeline), pipeline_text(found, out).encode())
+    if trained is not None and pipeline is not None:
+        write_whole(Path(pipeline), pipeline_text(trained, out).encode())
     _keep(keep, labelled)
     for note in notes:
         talk(f"note: {note}")
     if as_json:
-        choice = {} if found is None else {"pipeline": pipeline, "choice": found.as_values()}
+        choice = {} if trained is None else {"pipeline": pipeline, "choice": trained.as_values()}
         echo_json({"model": out, **_as_values(model), "trials": len(labelled), **choice})
         return
     _say_trained(out, model)
-    if found is not None:
-        say_chosen(found, pipeline)
+    if trained is not None:
+        say_chosen(trained, pipeline)
     else:
         _say_how_good(default=classifier is None and not given["options"])
 

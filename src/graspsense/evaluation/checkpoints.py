@@ -95,12 +95,12 @@ def early_recognition(
     """
     whole = parts[-1].labelled
     instances = exchangeable_instances(whole)
-    of = (
+    fold_of = (
         stratified(whole.labels, min(folds, len(whole)), seed)
         if instances is None
         else instance_held_out(whole.labels, instances, folds, seed)
     )
-    answers = [_answers(learner, part, instances, of, seed) for part in parts]
+    answers = [_answers(learner, part, instances, fold_of, seed) for part in parts]
     ended = answers[-1].predicted
     rows = []
     for part, answer in zip(parts, answers, strict=True):
@@ -135,12 +135,12 @@ def _answers(
     learner: SelectedComponent,
     part: CheckpointTrials,
     instances: Sequence[str] | None,
-    of: Folds,
+    fold_of: Folds,
     seed: int,
 ) -> _Answers:
-    labels, numbers, n = part.labelled.labels, part.rows.tolist(), len(of)
+    labels, numbers, n = part.labelled.labels, part.rows.tolist(), len(fold_of)
     own = None if instances is None else [instances[i] for i in numbers]
-    groups, folds = [np.arange(len(labels))], [of[part.rows]]
+    groups, folds = [np.arange(len(labels))], [fold_of[part.rows]]
     pooled = cross_validate(learner, part.labelled.table, labels, groups, folds, seed=seed)
     predicted = [""] * n
     for i, label in zip(numbers, pooled.predicted, strict=True):

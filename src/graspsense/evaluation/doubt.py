@@ -158,15 +158,17 @@ def calibrated_by(model: Model, labelled: Labelled) -> Model:
 def _with_calibration(
     model: Model, pooled: Pooled, labels: Sequence[str], instances: Sequence[str] | None
 ) -> Model:
-    found = _calibration(pooled, labels, instances, np.arange(len(labels)))
-    if isinstance(found, str):
+    calibration = _calibration(pooled, labels, instances, np.arange(len(labels)))
+    if isinstance(calibration, str):
         unit = "trials" if instances is None else "instances"
-        return evolve(model, sets=PredictionSets(coverage=COVERAGE, unit=unit, thresholds={}, reason=found))
+        return evolve(
+            model, sets=PredictionSets(coverage=COVERAGE, unit=unit, thresholds={}, reason=calibration)
+        )
     return evolve(
         model,
-        certainty=found.certainty,
-        temperature=found.temperature,
-        sets=evolve(found.sets, unknown=int(pooled.unlike.sum()), trials=len(labels)),
+        certainty=calibration.certainty,
+        temperature=calibration.temperature,
+        sets=evolve(calibration.sets, unknown=int(pooled.unlike.sum()), trials=len(labels)),
     )
 
 
@@ -228,13 +230,13 @@ def held_out_members(
     The sets of a fold are calibrated with the predictions of the other folds.
     """
     inside = np.zeros(pooled.scores.shape, dtype=np.bool_)
-    for rows, of in zip(groups, folds, strict=True):
-        for fold in np.unique(of).tolist():
-            test = rows[of == fold]
-            found = _calibration(pooled, labels, instances, rows[of != fold])
-            if isinstance(found, str) or not found.sets.thresholds:
-                return found if isinstance(found, str) else found.sets.reason
-            inside[test] = found.sets.members(found.answers(pooled, test), pooled.classes)
+    for rows, fold_of in zip(groups, folds, strict=True):
+        for fold in np.unique(fold_of).tolist():
+            test = rows[fold_of == fold]
+            calibration = _calibration(pooled, labels, instances, rows[fold_of != fold])
+            if isinstance(calibration, str) or not calibration.sets.thresholds:
+                return calibration if isinstance(calibration, str) else calibration.sets.reason
+            inside[test] = calibration.sets.members(calibration.answers(pooled, test), pooled.classes)
     return inside
 
 
@@ -280,12 +282,12 @@ def held_out_probabilities(
 ) -> NDArray[np.float64]:
     """Return the probabilities of held-out trials as a model gives them: calibrated with the trials of other folds."""
     probabilities = pooled.probabilities.copy()
-    for rows, of in zip(groups, folds, strict=True):
-        for fold in np.unique(of).tolist():
-            test = rows[of == fold]
-            found = _calibration(pooled, labels, instances, rows[of != fold])
-            if not isinstance(found, str):
-                probabilities[test] = found.probabilities(pooled, test)
+    for rows, fold_of in zip(groups, folds, strict=True):
+        for fold in np.unique(fold_of).tolist():
+            test = rows[fold_of == fold]
+            calibration = _calibration(pooled, labels, instances, rows[fold_of != fold])
+            if not isinstance(calibration, str):
+                probabilities[test] = calibration.probabilities(pooled, test)
     return probabilities
 
 
@@ -301,13 +303,13 @@ def reliability(
     truth = np.array(labels)[:, np.newaxis] == np.array(pooled.classes)
     right = pooled.right(labels)
     given = np.nan_to_num(held_out_probabilities(pooled, labels, instances, groups, folds), nan=0.0)
-    before = _bins(np.nan_to_num(pooled.probabilities, nan=0.0), right, rate_of)
+    uncalibrated = _bins(np.nan_to_num(pooled.probabilities, nan=0.0), right, rate_of)
     curve = _bins(given, right, rate_of)
     return Reliability(
         brier=float(((given - truth) ** 2).sum(axis=1).mean()),
         calibration_error=_calibration_error(curve),
         curve=curve,
-        uncalibrated_error=_calibration_error(before),
+        uncalibrated_error=_calibration_error(uncalibrated),
     )
 
 

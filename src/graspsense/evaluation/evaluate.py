@@ -228,7 +228,7 @@ class _Evaluator:
         rows: dict[str, list[int]] = {}
         for i, label in enumerate(self.labels):
             rows.setdefault(class_of(label), []).append(i)
-        return {name: self.rate_among(right, of) for name, of in sorted(rows.items())}
+        return {name: self.rate_among(right, of_class) for name, of_class in sorted(rows.items())}
 
     def unknown(self, pooled: Pooled) -> RecognitionRate:
         """Return the share of trials that the model of their fold calls unknown, or that have no feature at all."""
@@ -267,9 +267,9 @@ class _Evaluator:
         right = pooled.right(self.labels)
         chosen = {"with features": ~self._featureless, "without any feature": self._featureless}
         return {
-            name: self.rate_among(right, np.flatnonzero(of).tolist())
-            for name, of in chosen.items()
-            if of.any()
+            name: self.rate_among(right, np.flatnonzero(chosen_trials).tolist())
+            for name, chosen_trials in chosen.items()
+            if chosen_trials.any()
         }
 
     def rate_among(self, right: Sequence[bool], rows: Sequence[int] | None = None) -> RecognitionRate:
@@ -283,14 +283,14 @@ class _Evaluator:
         )
 
     def _difference(
-        self, first: Sequence[bool], second: Sequence[bool], rows: Sequence[int] | None = None
+        self, minuend: Sequence[bool], subtrahend: Sequence[bool], rows: Sequence[int] | None = None
     ) -> Difference:
         """Return the difference of two rates on these trials (default: all)."""
         instances = self.trials.instances
-        rows = range(len(first)) if rows is None else rows
+        rows = range(len(minuend)) if rows is None else rows
         return difference(
-            [first[i] for i in rows],
-            [second[i] for i in rows],
+            [minuend[i] for i in rows],
+            [subtrahend[i] for i in rows],
             None if instances is None else [instances[i] for i in rows],
         )
 
@@ -356,7 +356,7 @@ class _Evaluator:
         of_label: dict[str, set[str]] = {}
         for instance, label in zip(instances, self.labels, strict=True):
             of_label.setdefault(label, set()).add(instance)
-        single = sorted(label for label, of in of_label.items() if len(of) == 1)
+        single = sorted(label for label, objects in of_label.items() if len(objects) == 1)
         if single:
             reason = f"labels with a single instance, which cannot be held out: {', '.join(single)}"
             return None, Measurement(what, reason=reason)
@@ -399,9 +399,9 @@ class _Evaluator:
         if control is None:
             return Measurement(default, reason=reason or "these trials have no such features")
         having: NDArray[np.bool_] = np.array(~np.isnan(control.table.values).all(axis=1))
-        n, of = int(having.sum()), len(having)
+        n, total = int(having.sum()), len(having)
         why = f": {control.missing}" if control.missing else ""
-        having_words = f"{n} of {counted(of, 'trial')} have such features{why}"
+        having_words = f"{n} of {counted(total, 'trial')} have such features{why}"
         if n == 0:
             return Measurement(control.what, reason=having_words)
         groups, folds = _among(having, self.groups, headline.folds)
@@ -413,7 +413,7 @@ class _Evaluator:
             return Measurement(control.what, reason=str(refusal))
         rows = np.sort(np.concatenate(list(groups))).tolist()
         self.predicted_by_control[name] = (pooled, rows)
-        what = control.what if len(rows) == of else f"{control.what}; {having_words}"
+        what = control.what if len(rows) == total else f"{control.what}; {having_words}"
         return self._against(what, pooled, headline.pooled, headline.protocol, rows)
 
     def _first_line(self, headline: _Headline) -> dict[str, Measurement]:

@@ -77,18 +77,18 @@ class MeanDifference:
 
 
 def mean_difference(
-    first: Sequence[float], second: Sequence[float], n: int, comparisons: int = 1
+    minuend: Sequence[float], subtrahend: Sequence[float], n: int, comparisons: int = 1
 ) -> MeanDifference:
-    """Return the mean of `first` minus `second`, paired by seed.
+    """Return the mean of `minuend` minus `subtrahend`, paired by seed.
 
     Rates of `n` trials have steps of 1/n, so the standard deviation between seeds is taken as at least 1/n. Raises
     ValueError if the lengths differ or there are fewer than two seeds.
     """
     from scipy.special import stdtr
 
-    if len(first) != len(second) or len(first) < 2:
-        raise ValueError(f"{len(first)} and {len(second)} rates: give two or more, of the same seeds")
-    each = [value - other for value, other in zip(first, second, strict=True)]
+    if len(minuend) != len(subtrahend) or len(minuend) < 2:
+        raise ValueError(f"{len(minuend)} and {len(subtrahend)} rates: give two or more, of the same seeds")
+    each = [value - other for value, other in zip(minuend, subtrahend, strict=True)]
     mean = math.fsum(each) / len(each)
     error = max(_deviation(each), 1 / n) / math.sqrt(len(each))
     half = _t(len(each) - 1, comparisons) * error

@@ -85,7 +85,7 @@ def recognise(params: Mapping[str, Any], seed: int) -> RecognitionResult:
         simulated=bool(data.provenance.get("simulated", False)),
         notes=data.notes,
         provenance=data.provenance,
-        trials=TrialValues.of(data),
+        trials=TrialValues.from_trials(data),
         classifiers=tuple(results),
         grasps=tuple(curves.curves),
     )
@@ -185,7 +185,7 @@ def _on_other_trials(
     predicted: list[str] = []
     told: list[str] = []
     for class_name in sorted(classes):
-        training, tested = (one.of_class(class_name) if class_name else one for one in (data, test))
+        training, tested = (trials.of_class(class_name) if class_name else trials for trials in (data, test))
         if target == "class":
             training, tested = training.aimed("class"), tested.aimed("class")
         classifier = learner.create()
@@ -199,7 +199,7 @@ def _on_other_trials(
         f"trained on {counted(len(data), 'trial')} of {data.source}, tested on {len(true)} of {test.source}"
     )
     notes = (note, *test.notes, *told)
-    return ClassifierResult.of(name, target, OTHER_TRIALS, true, predicted, notes=notes, tree=tree)
+    return ClassifierResult.from_answers(name, target, OTHER_TRIALS, true, predicted, notes=notes, tree=tree)
 
 
 def _tree(

@@ -29,7 +29,7 @@ LEAST_DISTANCE: Final = 1e-4
 
 def sensed_rows(trade: SensedTrade) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Return the header and one row for each variant; of a distance, the upper end of its interval is in brackets."""
-    features = tuple(one.feature.upper() for one in trade.points[0].distances)
+    features = tuple(distance.feature.upper() for distance in trade.points[0].distances)
     rows = [
         (
             point.method,
@@ -63,7 +63,7 @@ def conclusion(trade: SensedTrade) -> str:
         return "With one seed, no test of equivalence is possible: give two seeds or more."
     margin, least = f"{100 * tests[0].margin:g} points", min(test.power for test in tests)
     best = trade.coarsest
-    found = (
+    sentence = (
         f"Take {best.name}, {1e3 * best.seconds:.3g} ms a grasp: its recognition is equivalent to that of the "
         f"reference within {margin}. No equivalent variant is faster by more than {100 * (TIME_MARGIN - 1):.0f} %, "
         "below which times are not told apart, and of those it is the nearest to the reference."
@@ -71,7 +71,7 @@ def conclusion(trade: SensedTrade) -> str:
         else f"With {len(trade.seeds)} seeds, no variant is shown to be equivalent to the reference within {margin}."
     )
     return (
-        f"{found} The power of the weakest test is {least:.2g}: with this probability it shows that equal rates are "
+        f"{sentence} The power of the weakest test is {least:.2g}: with this probability it shows that equal rates are "
         "equivalent."
     )
 

@@ -96,7 +96,7 @@ def _words(trial: Trial) -> list[str]:
         lines += [f"   set: {prediction.set_in_words}"]
     lines += ["", "because", *(f"   {reason.words}" for reason in prediction.because)]
     if prediction.warnings:
-        lines += ["", *(f"Warning: {one}" for one in prediction.warnings)]
+        lines += ["", *(f"Warning: {warning}" for warning in prediction.warnings)]
     if trial.report.get("simulated"):
         lines += ["", "simulated gripper and object"]
     return lines

@@ -50,7 +50,7 @@ def traces_by_class(grasps: Sequence[GraspCurve]) -> str:
             if gap is not None and t is not None and t >= min(grasp.shown_times)
         ],
     )
-    return panels([_traces(name, of, axes) for name, of in sorted(classes.items())])
+    return panels([_traces(name, curves, axes) for name, curves in sorted(classes.items())])
 
 
 @frozen
@@ -201,22 +201,22 @@ def _feature(
 ) -> str:
     shown, factor = display_unit(unit)
     title = f"{name}, {shown}" if shown else name
-    of: dict[str, list[float]] = {label: [] for label in sorted(set(labels))}
+    by_label: dict[str, list[float]] = {label: [] for label in sorted(set(labels))}
     for label, value in zip(labels, column, strict=True):
         if value is not None:
-            of[label].append(factor * value)
+            by_label[label].append(factor * value)
     missing = sum(value is None for value in column)
-    left = 12 + 6.1 * max(len(line) for label in of for line in _label_lines(label))
-    pitch = 19 if all(len(label) <= LABEL for label in of) else 24
-    bottom = 34.0 + pitch * len(of)
+    left = 12 + 6.1 * max(len(line) for label in by_label for line in _label_lines(label))
+    pitch = 19 if all(len(label) <= LABEL for label in by_label) else 24
+    bottom = 34.0 + pitch * len(by_label)
     picture = Picture(bottom + 34)
-    scale = reaching([v for values in of.values() for v in values], min(left, 165), picture.width - 12)
+    scale = reaching([v for values in by_label.values() for v in values], min(left, 165), picture.width - 12)
     picture.text(2, 14, title, bold=True, size=13)
     picture.x_axis(scale, 24, bottom, shown or "value")
-    classes = list(dict.fromkeys(map(class_of, of)))
+    classes = list(dict.fromkeys(map(class_of, by_label)))
     rows = [
         _feature_row(picture, scale, 38.0 + pitch * k, label, sorted(values), classes.index(class_of(label)))
-        for k, (label, values) in enumerate(of.items())
+        for k, (label, values) in enumerate(by_label.items())
     ]
     medians = "; ".join(f"{row[0]} {row[3]}" for row in rows if row[3])
     absent = f" Missing in {missing} of {counted(len(column), 'trial')}." if missing else ""
@@ -237,7 +237,7 @@ def _feature_row(
             scale.start - 6,
             y + 4 + 10 * (k - (len(lines) - 1) / 2),
             line,
-            at="end",
+            anchor="end",
             size=SIZE - len(lines) + 1,
         )
     if not values:

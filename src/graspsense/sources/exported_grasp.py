@@ -59,7 +59,7 @@ def read_exported(name: str) -> Recording:
     foreign = ". Arrays of other programs are imported by a manifest (docs/import.md)"
     with readable(path, "a grasp of `graspsense export`", foreign):
         about = json.loads(declared)
-        channels = tuple(from_json(one) for one in about["channels"])
+        channels = tuple(from_json(channel) for channel in about["channels"])
         return Recording(
             name=f"export {path.name} of {about['device']}",
             readings=tuple(_readings(arrays, further(channels))),
@@ -84,7 +84,7 @@ def _readings(arrays: Arrays, channels: tuple[Channel, ...]) -> list[Reading]:
     images = [
         Pads(t_s, k, tuple(left), tuple(right))
         for k, (t_s, left, right) in enumerate(
-            zip(*(arrays[f"pad_{one}"].tolist() for one in ("t_s", "left", "right")), strict=True), 1
+            zip(*(arrays[f"pad_{column}"].tolist() for column in ("t_s", "left", "right")), strict=True), 1
         )
     ]
     pads = _latest(times, arrays["pad_t_s"], images, no_pads(cells))

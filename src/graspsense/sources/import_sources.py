@@ -62,11 +62,11 @@ def recordings_to_import(
     good: list[ImportedRecording] = []
     bad: list[UnreadableRecording] = []
     for source in sources:
-        for one in each_readable(source, partial(_named_by, source, columns, label)):
-            if isinstance(one, UnreadableRecording):
-                bad.append(one)
+        for recording in each_readable(source, partial(_named_by, source, columns, label)):
+            if isinstance(recording, UnreadableRecording):
+                bad.append(recording)
             else:
-                good.append(one)
+                good.append(recording)
     if bad and not good:
         raise error_of_all(bad)
     return good, bad

@@ -115,7 +115,7 @@ def frames_are_numbers(subject: Subject) -> None:
         )
         for side in (pads.left, pads.right):
             demand(
-                isinstance(side, tuple) and len(side) == cells and all(type(one) is float for one in side),
+                isinstance(side, tuple) and len(side) == cells and all(type(cell) is float for cell in side),
                 f"an image of a fingertip has the cells {side!r:.80}: give a tuple of {cells} floats, as many as the "
                 "channel 'pads' declares (NaN for a cell without a value)",
             )
@@ -139,7 +139,7 @@ def _cells(subject: Subject) -> int:
 def channels_are_those_declared(subject: Subject) -> None:
     """A declared channel has numbers; a channel that is not declared is always NaN."""
     session = subject.session
-    declared = {one.name for one in subject.entry.channels}
+    declared = {channel.name for channel in subject.entry.channels}
     recording = session.info.opening is None
     for name, channel in CHANNELS_OF_FIELD.items():
         values = [getattr(frame, name) for frame in session.frames]
@@ -173,10 +173,10 @@ def signals_are_those_declared(subject: Subject) -> None:
     nothing = no_signals(channels)
     names = ", ".join(getattr(nothing, "_fields", ())) or "none"
     for reading in session.readings:
-        found = getattr(reading.signals, "_fields", ())
+        fields = getattr(reading.signals, "_fields", ())
         demand(
-            found == getattr(nothing, "_fields", ()),
-            f"the further channels declared are {names}, and read delivers {', '.join(found) or 'none'}: fill "
+            fields == getattr(nothing, "_fields", ()),
+            f"the further channels declared are {names}, and read delivers {', '.join(fields) or 'none'}: fill "
             "signal_type(self.channels) with a value for each, in this order",
         )
         for channel, empty, value in zip(channels, nothing, reading.signals, strict=True):
@@ -200,7 +200,7 @@ def signals_are_those_declared(subject: Subject) -> None:
             numbers = [number for value in values for row in value.values[: value.new] for number in row]
         else:
             numbers = values
-        wrong = next((one for one in numbers if type(one) is not float or _infinite(one)), None)
+        wrong = next((number for number in numbers if type(number) is not float or _infinite(number)), None)
         demand(wrong is None, f"{channel.name!r} has the value {wrong!r}: give finite floats, or NaN")
         demand(
             not all(map(isnan, numbers)),
@@ -226,11 +226,11 @@ def images_stay_as_they_were_delivered(subject: Subject) -> None:
     if all(declared_dtype(channel) == FLOATS for channel in further(subject.entry.channels)):
         raise CheckSkipped("this gripper has no images that are numpy arrays")
     problem, session = Delivered(subject.entry.channels).problem, subject.session
-    for reading, before in zip(session.readings, session.sums, strict=True):
-        found = problem(reading)
-        demand(not found, f"a reading is not as declared: {found}")
+    for reading, sums in zip(session.readings, session.sums, strict=True):
+        fault = problem(reading)
+        demand(not fault, f"a reading is not as declared: {fault}")
         demand(
-            sums_of(reading) == before,
+            sums_of(reading) == sums,
             "an image was changed after it was delivered, and laws and recordings refer to it: fill a new array for "
             "each image",
         )
@@ -239,19 +239,19 @@ def images_stay_as_they_were_delivered(subject: Subject) -> None:
 def signals_have_no_gaps_or_repeats(subject: Subject) -> None:
     """Images and samples of further channels are counted: each once, and what is lost shows in the counter."""
     channels = further(subject.entry.channels)
-    counted = [one for one in channels if isinstance(one, TactileArray | FastChannel)]
+    counted = [channel for channel in channels if isinstance(channel, TactileArray | FastChannel)]
     if not counted:
         raise CheckSkipped("this gripper has no further arrays or fast channels")
     for channel in counted:
         values = [getattr(reading.signals, channel.name) for reading in subject.session.readings]
         taken = last_s = 0.0
-        for before, now in pairwise(values):
-            came = now.counter - before.counter
+        for earlier, now in pairwise(values):
+            came = now.counter - earlier.counter
             if isinstance(now, Samples):
                 taken += came
                 demand(
                     0 <= now.new <= channel.samples and came >= now.new,  # type: ignore[union-attr]
-                    f"{channel.name!r} has {now.new} new samples while its counter goes from {before.counter} to "
+                    f"{channel.name!r} has {now.new} new samples while its counter goes from {earlier.counter} to "
                     f"{now.counter}: count every sample that the sensor has taken, also those that were lost",
                 )
                 demand(
@@ -261,13 +261,13 @@ def signals_have_no_gaps_or_repeats(subject: Subject) -> None:
             else:
                 taken += came
                 demand(
-                    came >= 0 and (came > 0 or _is_same(now, before)),
+                    came >= 0 and (came > 0 or _is_same(now, earlier)),
                     f"an image of {channel.name!r} changes while its counter stays at {now.counter}: count up",
                 )
             if came:
                 demand(
-                    now.t_s > before.t_s or before.counter == 0,
-                    f"{channel.name!r} goes from {before.t_s} to {now.t_s} s: what is new is later",
+                    now.t_s > earlier.t_s or earlier.counter == 0,
+                    f"{channel.name!r} goes from {earlier.t_s} to {now.t_s} s: what is new is later",
                 )
                 last_s = now.t_s
         first_s = next((value.t_s for value in values if value.counter), 0.0)
@@ -279,10 +279,10 @@ def signals_have_no_gaps_or_repeats(subject: Subject) -> None:
             )
 
 
-def _is_same(now: Image, before: Image) -> bool:
+def _is_same(now: Image, earlier: Image) -> bool:
     if dtype_of(now) == FLOATS:
-        return repr(now) == repr(before)
-    return now[:2] == before[:2] and np.array_equal(now.cells, before.cells, equal_nan=True)
+        return repr(now) == repr(earlier)
+    return now[:2] == earlier[:2] and np.array_equal(now.cells, earlier.cells, equal_nan=True)
 
 
 def channels_follow_from_the_settings(subject: Subject) -> None:
@@ -290,10 +290,10 @@ def channels_follow_from_the_settings(subject: Subject) -> None:
     if not subject.component.channels_vary():
         return
     backend, again = subject.create(), subject.create()
-    before = backend.channels
+    declared = backend.channels
     demand(
-        isinstance(before, tuple) and all(isinstance(channel, Channel) for channel in before),
-        f"`channels` returns {before!r:.80}: return a tuple of Channel",
+        isinstance(declared, tuple) and all(isinstance(channel, Channel) for channel in declared),
+        f"`channels` returns {declared!r:.80}: return a tuple of Channel",
     )
     try:
         backend.open(0)
@@ -302,8 +302,8 @@ def channels_follow_from_the_settings(subject: Subject) -> None:
             (backend.channels, "once it is open"),
         ):
             demand(
-                other == before,
-                f"`channels` are {_named(before)}, and {_named(other)} {when}: make them depend on self.config only",
+                other == declared,
+                f"`channels` are {_named(declared)}, and {_named(other)} {when}: make them depend on self.config only",
             )
     finally:
         backend.close()
@@ -321,11 +321,11 @@ def time_runs_forward(subject: Subject) -> None:
     """`t_s` increases from frame to frame, and `dt_s` is the difference."""
     session = subject.session
     demand(all(isfinite(frame.t_s) for frame in session.frames), "t_s of a frame is not a number")
-    for before, now in pairwise(session.frames):
-        passed = now.t_s - before.t_s
+    for earlier, now in pairwise(session.frames):
+        passed = now.t_s - earlier.t_s
         demand(
             passed > 0.0,
-            f"t_s goes from {before.t_s} to {now.t_s} s: a frame is given once, and each is later than the last",
+            f"t_s goes from {earlier.t_s} to {now.t_s} s: a frame is given once, and each is later than the last",
         )
         demand(
             abs(now.dt_s - passed) <= 0.5 * passed + 1e-9,
@@ -336,7 +336,7 @@ def time_runs_forward(subject: Subject) -> None:
 def rate_is_as_declared(subject: Subject) -> None:
     """Frames come at `rate_hz`, and no channel is declared with a higher rate."""
     info, frames = subject.session.info, subject.session.frames
-    passed = [now.t_s - before.t_s for before, now in pairwise(frames)]
+    passed = [now.t_s - earlier.t_s for earlier, now in pairwise(frames)]
     demand(bool(passed), "only one frame came")
     rate = 1.0 / median(passed)
     if info.units.get("t", "s") == "s":
@@ -358,10 +358,10 @@ def images_count_up(subject: Subject) -> None:
     """The counter increases with each new image, by more where some were lost; no image is later than its frame."""
     if not subject.session.images:
         raise CheckSkipped("this gripper has no cells")
-    for before, now in pairwise(subject.session.images):
+    for earlier, now in pairwise(subject.session.images):
         demand(
-            now.counter > before.counter and now.t_s > before.t_s,
-            f"after image {before.counter} of {before.t_s} s comes image {now.counter} of {now.t_s} s: count up by one",
+            now.counter > earlier.counter and now.t_s > earlier.t_s,
+            f"after image {earlier.counter} of {earlier.t_s} s comes image {now.counter} of {now.t_s} s: count by one",
         )
     shown: dict[int, Pads] = {}
     for frame, pads, _ in subject.session.readings:
@@ -405,7 +405,7 @@ def forces_are_in_newtons(subject: Subject) -> None:
 
 def velocity_is_the_rate_of_the_gap(subject: Subject) -> None:
     """The sum of `velocity_m_s` over time is the change of the gap; closing is negative."""
-    closing = [one.frame for one in subject.session.stages.get("closing", [])]
+    closing = [reading.frame for reading in subject.session.stages.get("closing", [])]
     if not closing or isnan(closing[0].velocity_m_s) or isnan(closing[0].gap_m):
         raise CheckSkipped("this gripper has no velocity and gap of its own, or is a recording")
     moved = closing[-1].gap_m - closing[0].gap_m
@@ -424,7 +424,7 @@ def closing_closes(subject: Subject) -> None:
     stages = subject.session.stages
     if "closing" not in stages:
         raise CheckSkipped("a recording cannot be commanded")
-    closing = [one.frame.gap_m for one in stages["closing"]]
+    closing = [reading.frame.gap_m for reading in stages["closing"]]
     if all(map(isnan, closing)):
         raise CheckSkipped("this gripper has no gap")
     kind = KINDS[kind_of(subject.entry.accepts)]
@@ -433,7 +433,7 @@ def closing_closes(subject: Subject) -> None:
         f"under a closing {kind} command the gap goes from {closing[0]:.4g} to {closing[-1]:.4g} m: an "
         "effort or force above 0, a velocity below 0 and a smaller position close the fingers",
     )
-    opened = [one.frame.gap_m for one in stages["open again"]]
+    opened = [reading.frame.gap_m for reading in stages["open again"]]
     demand(
         max(opened) - opened[0] > 1e-3,
         f"under the opening command {subject.session.info.opening} the gap goes from {opened[0] * 1e3:.4g} to "
@@ -454,9 +454,11 @@ def _stays_within_its_limits(subject: Subject, kind: int) -> None:
     least = {"effort_n": backend.least_force_n, "velocity_m_s": backend.least_speed_m_s}
     try:
         info = backend.open(0)
-        first = limits_of(info)
+        first_limits = limits_of(info)
         # The limits of a first use apply after a contact too.
-        limits = first._replace(effort_limit_n=first.first_effort_n, speed_limit_m_s=first.first_speed_m_s)
+        limits = first_limits._replace(
+            effort_limit_n=first_limits.first_effort_n, speed_limit_m_s=first_limits.first_speed_m_s
+        )
         watcher = GuardState(0, 0, 0)
         greatest = {VELOCITY: -1e6, POSITION: 0.0, FORCE: 1e6, EFFORT: 1e6}[kind]
         command = Command(kind, greatest, inf, inf)
@@ -469,10 +471,10 @@ def _stays_within_its_limits(subject: Subject, kind: int) -> None:
                 ("effort_n", limits.first_effort_n, 1.1),
                 ("velocity_m_s", limits.first_speed_m_s, 3.0),
             ):
-                found = abs(getattr(frame, name))
+                reached = abs(getattr(frame, name))
                 demand(
-                    not found > grace * max(limit, least[name]),
-                    f"{name} reaches {found:.3g} under {KINDS[kind]} commands limited to {limit:g}: apply "
+                    not reached > grace * max(limit, least[name]),
+                    f"{name} reaches {reached:.3g} under {KINDS[kind]} commands limited to {limit:g}: apply "
                     "`effort_limit_n` and `speed_limit_m_s` of each command",
                 )
             allowed, watcher = guard(limits, watcher, frame, command)

@@ -126,16 +126,16 @@ class ConformanceReport:
     @property
     def failures(self) -> list[str]:
         """Return the reasons why the components do not conform."""
-        found = [
+        failures = [
             f"{result.subject}: {result.check}: {result.text}"
             for result in self.results
             if result.state == "failed"
         ]
         for subject, role in dict.fromkeys((result.subject, result.role) for result in self.results):
             text = self.too_few_ran(subject, role)
-            if text and not any(one.startswith(f"{subject}: ") for one in found):
-                found.append(f"{subject}: {text}")
-        return found
+            if text and not any(failure.startswith(f"{subject}: ") for failure in failures):
+                failures.append(f"{subject}: {text}")
+        return failures
 
     def too_few_ran(self, subject: str, role: str) -> str:
         """Return a message if too few checks of a component ran, else an empty string."""

@@ -115,7 +115,7 @@ def defaults_are_what_their_types_say(subject: Subject) -> None:
 def settings_survive_a_file(subject: Subject) -> None:
     """Settings written as TOML and read again are the same settings."""
     config = subject.config()
-    values = {key: one for key, one in plain(config).items() if one is not None}
+    values = {key: value for key, value in plain(config).items() if value is not None}
     text = "\n".join(f"{toml_key(key)} = {toml_value(value)}" for key, value in values.items())
     again = build(subject.component, tomllib.loads(text))
     demand(
@@ -188,9 +188,9 @@ class _Watched:
         if not _Watched._hooked:
             sys.addaudithook(_Watched._heard)
             _Watched._hooked = True
-        found: list[str] = []
-        _Watched._seen = found
-        return found
+        touched: list[str] = []
+        _Watched._seen = touched
+        return touched
 
     def __exit__(self, *_: object) -> None:
         _Watched._seen = None

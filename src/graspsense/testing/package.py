@@ -69,7 +69,7 @@ def plugin_modules_are_light(package: Package) -> None:
         "took = max([s.import_s for s in mine] or [0.0])\n"
         "print(json.dumps({'heavy': sorted(p.HEAVY & set(sys.modules)), 'took': took}))"
     )
-    environ = {**os.environ, "PYTHONPATH": os.pathsep.join(one for one in sys.path if one)}
+    environ = {**os.environ, "PYTHONPATH": os.pathsep.join(place for place in sys.path if place)}
     environ |= {"GRASPSENSE_PLUGINS": package.distribution}
     environ.pop("GRASPSENSE_TRACE_PLUGINS", None)
     ran = subprocess.run(
@@ -80,15 +80,15 @@ def plugin_modules_are_light(package: Package) -> None:
         check=False,
     )
     demand(ran.returncode == 0, f"listing it in a fresh interpreter failed: {ran.stderr.strip()[-300:]}")
-    found = json.loads(ran.stdout.splitlines()[-1])
+    listed = json.loads(ran.stdout.splitlines()[-1])
     demand(
-        not found["heavy"],
-        f"listing it imports {', '.join(found['heavy'])}: in the module of the entry point import "
+        not listed["heavy"],
+        f"listing it imports {', '.join(listed['heavy'])}: in the module of the entry point import "
         "graspsense.plugin_api and its like only; name classes by import strings, and import what is heavy inside them",
     )
     demand(
-        found["took"] <= 5.0 * SLOW_IMPORT_S,
-        f"importing it takes {found['took'] * 1e3:.0f} ms of processor time: do less in the module of the entry point",
+        listed["took"] <= 5.0 * SLOW_IMPORT_S,
+        f"importing it takes {listed['took'] * 1e3:.0f} ms of processor time: do less in the module of the entry point",
     )
 
 
@@ -147,7 +147,7 @@ def observers_change_nothing(package: Package) -> None:
         raise CheckSkipped("it observes nothing")
     trial = a_trial()
     run, event = trial.run, an_event()
-    before = copy.deepcopy((run.settings, run.components, run.labels))
+    given = copy.deepcopy((run.settings, run.components, run.labels))
     column = trial.trace.gap_m.tobytes()
     arguments: dict[str, dict[str, Any]] = {
         OBSERVERS[0]: {"run": run},
@@ -168,7 +168,7 @@ def observers_change_nothing(package: Package) -> None:
                 ) from error
             demand(not results, f"{hook} returned {results}: an observer returns nothing")
     demand(
-        (run.settings, run.components, run.labels) == before and trial.trace.gap_m.tobytes() == column,
+        (run.settings, run.components, run.labels) == given and trial.trace.gap_m.tobytes() == column,
         "an observer changed its arguments: work on a copy",
     )
 
@@ -256,9 +256,9 @@ def _sources(package: Package) -> Iterator[Path]:
         folders = [folder]
     elif not folders:
         yield from (Path(spec.origin) for spec in specs if spec.origin)
-    for one in folders:
-        for path in sorted(one.rglob("*.py")):
-            inside = path.relative_to(one).parts
+    for place in folders:
+        for path in sorted(place.rglob("*.py")):
+            inside = path.relative_to(place).parts
             if "site-packages" not in inside and not any(part.startswith(".") for part in inside):
                 yield path
 

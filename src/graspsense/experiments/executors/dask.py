@@ -154,12 +154,12 @@ class DaskCluster:
 
         Raises ExecutorLost if there is no worker for too long.
         """
-        before: set[str] = set()
+        known: set[str] = set()
         while True:
             now = set(self._client.nthreads())
-            if now and now == before:
+            if now and now == known:
                 return
-            before = now
+            known = now
             self._watch()
             time.sleep(SETTLING_S)
 
@@ -168,8 +168,8 @@ class DaskCluster:
         distributed = self._distributed
         while True:
             with suppress(TimeoutError, distributed.TimeoutError):
-                found = distributed.wait(list(futures), timeout=LOOKING_S, return_when="FIRST_COMPLETED")
-                return next(iter(found.done))
+                waited = distributed.wait(list(futures), timeout=LOOKING_S, return_when="FIRST_COMPLETED")
+                return next(iter(waited.done))
             self._watch()
 
     def _watch(self) -> None:
@@ -206,7 +206,9 @@ class DaskCluster:
             ) from error
         there = self._client.run(versions)
         differs = [
-            f"{worker}: {line}" for worker, found in there.items() for line in differences(versions(), found)
+            f"{worker}: {line}"
+            for worker, installed in there.items()
+            for line in differences(versions(), installed)
         ]
         if differs:
             raise ConfigError(

@@ -79,7 +79,7 @@ def early(params: Mapping[str, Any], seed: int) -> RecognitionResult:
                 predicted = predictions(learner, table_of(features), data.labels, target, folds, seed)
                 cost = float(np.mean(used_s[moment]))
                 results.append(
-                    ClassifierResult.of(
+                    ClassifierResult.from_answers(
                         f"{moment:g} s{suffix}", target, STRATIFIED, true, predicted, cost=cost
                     )
                 )

@@ -32,13 +32,16 @@ class ModelErrorSettings(CostSettings):
     """The keys of `[judge]`."""
 
     error: float = field(default=0.0, validator=ge(-0.9))
-    """Relative error of the gripper settings named in `of`, in the model for training."""
-    of: tuple[str, ...] = (
-        "coulomb_n",
-        "breakaway_n",
-        "load_friction_coefficient",
-        "rotor_kg_m2",
-        "pad_stiffness_n_m",
+    """Relative error of the gripper settings named in `wrong`, in the model for training."""
+    wrong: tuple[str, ...] = field(
+        default=(
+            "coulomb_n",
+            "breakaway_n",
+            "load_friction_coefficient",
+            "rotor_kg_m2",
+            "pad_stiffness_n_m",
+        ),
+        alias="of",
     )
     learned_on: Mapping[str, Any] = field(factory=dict)
     """Further gripper settings of the model for training, such as `accuracy`."""
@@ -55,13 +58,13 @@ def physics(params: Mapping[str, Any], seed: int) -> RecognitionResult:
     for name, learner in classifiers_of(params).items():
         for target in settings.targets:
             true, predicted = _predictions(learner, training, test, target, seed)
-            results.append(ClassifierResult.of(name, target, PROTOCOL, true, predicted, cost=cost))
+            results.append(ClassifierResult.from_answers(name, target, PROTOCOL, true, predicted, cost=cost))
     return simulated_result(test, results)
 
 
 def _wrong_model(params: Mapping[str, Any], settings: ModelErrorSettings) -> Any:
     wrong = {table: dict(keys) for table, keys in params["settings"].items()}
-    for key in settings.of:
+    for key in settings.wrong:
         try:
             wrong["gripper"][key] *= 1.0 + settings.error
         except (KeyError, TypeError):

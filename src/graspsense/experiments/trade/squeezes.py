@@ -55,7 +55,7 @@ def squeezes(params: Mapping[str, Any], seed: int) -> RecognitionResult:
         raise ConfigError(
             f"{len(data)} trials are not a multiple of judge.most = {settings.most} squeezes: set data.trials to it"
         )
-    one_s = mean_seconds(params["settings"], TrialValues.of(data))
+    one_s = mean_seconds(params["settings"], TrialValues.from_trials(data))
     results = []
     for name, learner in classifiers_of(params).items():
         suffix = f", {name}" if len(params["learners"]) > 1 else ""
@@ -64,7 +64,9 @@ def squeezes(params: Mapping[str, Any], seed: int) -> RecognitionResult:
             for k, labels in predicted.items():
                 title = f"{counted(k, 'squeeze')}{suffix}"
                 results.append(
-                    ClassifierResult.of(title, target, INSTANCE_HELD_OUT, true, labels, cost=k * one_s)
+                    ClassifierResult.from_answers(
+                        title, target, INSTANCE_HELD_OUT, true, labels, cost=k * one_s
+                    )
                 )
     return simulated_result(data, results)
 

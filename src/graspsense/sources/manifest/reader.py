@@ -60,10 +60,10 @@ def tables_of(manifest: ReadManifest, file: NamedFile) -> list[ColumnTable]:
     for name in texts_of(manifest.keys.beside):
         tables = _joined(manifest, tables, file.path.parent / name)
     if file.rows is not None:
-        first, last = file.rows
-        if last > len(tables[0]):
-            raise DataDamaged(f"{file.path} has {len(tables[0])} rows, and the list names row {last}")
-        tables = [tables[0].rows(slice(first - 1, last), f"rows {first} to {last}")]
+        begin, end = file.rows
+        if end > len(tables[0]):
+            raise DataDamaged(f"{file.path} has {len(tables[0])} rows, and the list names row {end}")
+        tables = [tables[0].rows(slice(begin - 1, end), f"rows {begin} to {end}")]
     split = manifest.keys.split
     if split == "rows":
         if too_many := RECORDINGS.exceeded(sum(map(len, tables))):
@@ -189,7 +189,7 @@ def _bag(manifest: ReadManifest) -> Callable[[Path], list[ColumnTable]]:
 
     texts = [part.text for parts in manifest.expressions.values() for part in parts]
     further = (*manifest.channels.values(), *manifest.values.values(), *manifest.events.values())
-    texts += [one.text for one in further]
+    texts += [text.text for text in further]
     topics = {match[1] for text in texts for match in re.finditer(r"['\"](/[^.'\"*?]+)\.", text)}
     return lambda path: read_bag(path, topics)
 
