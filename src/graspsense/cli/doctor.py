@@ -62,14 +62,14 @@ def doctor(timeout_s: float, repetitions: int | None, as_json: bool, **asked: An
         diagnoses = [Diagnosis("graspsense", _ourselves(plugins)), *plugins.diagnose(config, timeout_s)]
         if repetitions is not None:
             diagnoses.append(_latency(settings, repetitions))
-    problems = sum(diagnose.error != "" for diagnose in diagnoses) + sum(
-        finding.state == "problem" for diagnose in diagnoses for finding in diagnose.findings
+    problems = sum(diagnosis.error != "" for diagnosis in diagnoses) + sum(
+        finding.state == "problem" for diagnosis in diagnoses for finding in diagnosis.findings
     )
     if as_json:
-        echo_json({"problems": problems, "diagnoses": [_as_json(diagnose) for diagnose in diagnoses]})
+        echo_json({"problems": problems, "diagnoses": [_as_json(diagnosis) for diagnosis in diagnoses]})
     else:
-        for diagnose in diagnoses:
-            _print(diagnose)
+        for diagnosis in diagnoses:
+            _print(diagnosis)
         echo(f"{problems} problem(s)", Style.BAD) if problems else echo("no problem found", Style.GOOD)
     if problems:
         raise click.exceptions.Exit(EXIT_PROBLEM)

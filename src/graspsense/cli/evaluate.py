@@ -7,13 +7,16 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from graspsense.cli.output import check_outputs, echo_json, file_to_write, file_to_write_as, page_to_write
+from graspsense.cli.options import target_option
+from graspsense.cli.output import check_outputs, echo_json, file_to_write_as, page_to_write
 from graspsense.cli.sources import (
     SOURCES,
     checkpoints_option,
     classifier_option,
     command_line,
     folds_option,
+    keep_features,
+    keep_option,
     learner_of,
     source_argument,
     source_options,
@@ -42,21 +45,13 @@ if TYPE_CHECKING:
     {SOURCES}""",
 )
 @source_argument
-@click.option(
-    "--target",
-    type=click.Choice(["both", "class", "state"]),
-    default="both",
-    show_default=True,
-    help="What is recognised: whole labels, classes, or the states within each class.",
-)
+@target_option("What is recognised: whole labels, classes, or the states within each class.")
 @folds_option
 @click.option(
     "--png", metavar="FILE.png", callback=file_to_write_as(".png"), help="Draw the confusion matrix."
 )
 @click.option("--report", metavar="DIR", help="Write the page DIR/report.html as well.")
-@click.option(
-    "--keep", metavar="FILE", callback=file_to_write, help="Write the features of all trials as a CSV file."
-)
+@keep_option
 @click.option("--overwrite", is_flag=True, help="Replace the file of --keep if it exists.")
 @checkpoints_option
 @click.option(
@@ -111,8 +106,7 @@ def evaluate(
     with ProgressLine() as progress:
         labelled = trials_of(source, progress, given, times, folds)
         labelled, parts = _parts(labelled, times, target)
-        if keep:
-            _keep(keep, labelled)
+        keep_features(keep, labelled)
         evaluation, early = _measured(learner, labelled, parts, target, folds, given["seed"], progress)
     if png:
         _draw(evaluation, Path(png))
@@ -152,12 +146,6 @@ def _measured(
         progress=progress,
     )
     return evaluation, early_recognition(learner, parts, folds=folds, seed=seed) if parts else None
-
-
-def _keep(keep: str, labelled: Labelled) -> None:
-    from graspsense.sources.features_csv import write_labelled
-
-    write_labelled(Path(keep), labelled)
 
 
 def _draw(evaluation: Evaluation, path: Path) -> None:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from graspsense.cli.live import Live, LiveOptions, live_options, shown_live
-from graspsense.cli.options import force_option
+from graspsense.cli.options import force_option, keys_option
 from graspsense.cli.output import echo_json
 from graspsense.cli.terminal import Style, echo, echo_entry, echo_table, talk
 from graspsense.core.values.errors import counted
@@ -56,13 +56,7 @@ class ExperimentCommand(click.Command):
     help="serial, processes, dask, or dask:ADDRESS.  [default: processes; serial on one core]",
 )
 @click.option("--workers", type=int, help="Number of processes or local workers.  [default: number of cores]")
-@click.option(
-    "-o",
-    "options",
-    metavar="KEY=VALUE",
-    multiple=True,
-    help="Set a key of the file: -o seeds=3, -o data.trials=2. Can be repeated.",
-)
+@keys_option("Set a key of the file: -o seeds=3, -o data.trials=2.", "KEY=VALUE")
 @force_option
 @live_options
 @click.option("--dry-run", is_flag=True, help="Print what would be done, and do nothing.")

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from graspsense.cli.output import check_outputs, echo_json, file_to_write
-from graspsense.cli.sources import named_store
+from graspsense.cli.options import keys_option
+from graspsense.cli.output import check_outputs, echo_json
+from graspsense.cli.sources import keep_features, keep_option, named_store
 from graspsense.cli.terminal import echo, echo_entry, echo_table
 
 if TYPE_CHECKING:
@@ -20,17 +20,10 @@ if TYPE_CHECKING:
 
 @click.command(short_help="Extract the features of a store again.")
 @click.argument("source", metavar="DIR", callback=named_store)
-@click.option(
-    "-o",
-    "options",
-    metavar="TABLE.KEY=VALUE",
-    multiple=True,
-    required=True,
-    help="Change a key of [features], [controller] or [run]: -o controller.contact_force_n=0.1. Can be repeated.",
+@keys_option(
+    "Change a key of [features], [controller] or [run]: -o controller.contact_force_n=0.1.", required=True
 )
-@click.option(
-    "--keep", metavar="FILE", callback=file_to_write, help="Write the features of all trials as a CSV file."
-)
+@keep_option
 @click.option("--overwrite", is_flag=True, help="Replace the file of --keep if it exists.")
 @click.option("--json", "as_json", is_flag=True, help="Print the comparison as JSON.")
 def features(source: str, options: tuple[str, ...], keep: str | None, overwrite: bool, as_json: bool) -> None:
@@ -49,10 +42,7 @@ def features(source: str, options: tuple[str, ...], keep: str | None, overwrite:
         after = labelled_store(
             source, options, progress=lambda done, total: progress("extracting features", done, total)
         )
-    if keep:
-        from graspsense.sources.features_csv import write_labelled
-
-        write_labelled(Path(keep), after)
+    keep_features(keep, after)
     rows = _rows(stored, after)
     if as_json:
         echo_json(

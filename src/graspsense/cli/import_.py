@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 from attrs import frozen
 
+from graspsense.cli.options import keys_option
 from graspsense.cli.output import echo_json, file_to_write_as
 from graspsense.cli.sources import named_source
 from graspsense.cli.terminal import Style, echo, echo_as_it_is, echo_entry, echo_table
@@ -65,13 +66,7 @@ FEW: Final = 3
     default="default",
     help="Pipeline that computes the features.  [default: default]",
 )
-@click.option(
-    "-o",
-    "options",
-    metavar="TABLE.KEY=VALUE",
-    multiple=True,
-    help="Set a key of the pipeline: -o controller.probing_force_n=17. Can be repeated.",
-)
+@keys_option("Set a key of the pipeline: -o controller.probing_force_n=17.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def import_(
     sources: tuple[str, ...],

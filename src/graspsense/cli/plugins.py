@@ -46,8 +46,8 @@ def list_plugins(as_json: bool) -> None:
     advice += loaded.unknown_names
     if advice:
         echo("\nTo be done:", Style.CAUTION)
-        for fromkey in advice:
-            echo(f"  {fromkey}", indent=2)
+        for sentence in advice:
+            echo(f"  {sentence}", indent=2)
 
 
 @plugins.command()

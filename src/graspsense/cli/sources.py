@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import click
 
-from graspsense.cli.options import SEED, force_option
+from graspsense.cli.options import SEED, force_option, keys_option
+from graspsense.cli.output import file_to_write
 
 if TYPE_CHECKING:
     from graspsense.cli.progress import ProgressLine
@@ -81,13 +83,7 @@ _OPTIONS: Final = (
         metavar="CLASS",
         help="Use only the trials of this class (the part of a label before the colon).",
     ),
-    click.option(
-        "-o",
-        "options",
-        metavar="TABLE.KEY=VALUE",
-        multiple=True,
-        help="Set a key of a component: -o controller.probing_force_n=17. Can be repeated.",
-    ),
+    keys_option("Set a key of a component: -o controller.probing_force_n=17."),
     click.option("--seed", type=SEED, default=0, show_default=True, help="Seed of all random numbers."),
     force_option,
 )
@@ -148,6 +144,24 @@ def folds_option(command: CommandT) -> CommandT:
     return click.option(
         "--folds", type=click.IntRange(min=2), default=10, show_default=True, help="Number of folds."
     )(command)
+
+
+def keep_option(command: CommandT) -> CommandT:
+    """Add --keep, the file that `keep_features` writes."""
+    return click.option(
+        "--keep",
+        metavar="FILE",
+        callback=file_to_write,
+        help="Write the features of all trials as a CSV file.",
+    )(command)
+
+
+def keep_features(keep: str | None, labelled: Labelled) -> None:
+    """Write the trials as a table of features, if a file is named."""
+    if keep:
+        from graspsense.sources.features_csv import write_labelled
+
+        write_labelled(Path(keep), labelled)
 
 
 def checkpoints_option(command: CommandT) -> CommandT:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from graspsense.cli.output import echo_json
-from graspsense.cli.sources import command_line, is_csv, trials_of
+from graspsense.cli.sources import command_line, is_csv, keep_features, trials_of
 from graspsense.cli.terminal import Style, echo, echo_as_it_is, echo_entry, echo_table, talk
 from graspsense.core.values.errors import counted
 
@@ -50,7 +50,7 @@ def evaluate_value(
     refuse_options_for_labels(given["options"])
     with ProgressLine() as progress:
         labelled = _trials(source, estimator, progress, given)
-        _keep(keep, labelled)
+        keep_features(keep, labelled)
         evaluation = evaluate_regression(
             estimator or DEFAULT_ESTIMATOR, labelled, folds=folds, seed=given["seed"], progress=progress
         )
@@ -83,7 +83,7 @@ def train_value(
             provenance={"command": command_line(("keep", "overwrite", "as_json"))},
         )
     write_regression(Path(out), model)
-    _keep(keep, labelled)
+    keep_features(keep, labelled)
     for note in notes:
         talk(f"note: {note}")
     if as_json:
@@ -156,13 +156,6 @@ def _trials(source: str, estimator: str | None, progress: ProgressLine, given: M
     if estimator is not None:
         check_estimator(estimator)
     return trials_of(source, progress, given)
-
-
-def _keep(keep: str | None, labelled: Labelled) -> None:
-    if keep:
-        from graspsense.sources.features_csv import write_labelled
-
-        write_labelled(Path(keep), labelled)
 
 
 def _to_predict(

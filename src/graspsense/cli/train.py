@@ -8,13 +8,16 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from graspsense.cli.choosing import chosen, pipeline_beside, pipeline_text, refuse_with_choice, say_chosen
-from graspsense.cli.output import check_outputs, echo_json, file_to_write, file_to_write_as
+from graspsense.cli.options import target_option
+from graspsense.cli.output import check_outputs, echo_json, file_to_write_as
 from graspsense.cli.sources import (
     SOURCES,
     checkpoints_option,
     classifier_option,
     command_line,
     is_csv,
+    keep_features,
+    keep_option,
     learner_of,
     source_argument,
     source_options,
@@ -52,17 +55,9 @@ _NOT_EVALUATED: Final = ("out", "keep", "overwrite", "as_json", "calibration_ins
 @click.option(
     "--out", metavar="FILE.json", callback=file_to_write_as(".json"), required=True, help="File of the model."
 )
-@click.option(
-    "--keep", metavar="FILE", callback=file_to_write, help="Write the features of all trials as a CSV file."
-)
+@keep_option
 @click.option("--overwrite", is_flag=True, help="Replace the files of --out and --keep if they exist.")
-@click.option(
-    "--target",
-    type=click.Choice(["both", "class", "state"]),
-    default="both",
-    show_default=True,
-    help="What the model predicts; state needs --only CLASS.",
-)
+@target_option("What the model predicts; state needs --only CLASS.")
 @checkpoints_option
 @classifier_option
 @click.option(
@@ -126,7 +121,7 @@ def train(
     write_model(Path(out), model)
     if trained is not None and pipeline is not None:
         write_whole(Path(pipeline), pipeline_text(trained, out).encode())
-    _keep(keep, labelled)
+    keep_features(keep, labelled)
     for note in notes:
         talk(f"note: {note}")
     if as_json:
@@ -212,14 +207,6 @@ def _trials(
         # A seed that neither another training nor an evaluation is likely to have.
         others = {"instances": calibration_instances, "seed": (given["seed"] + 2**31) % 2**32}
         return labelled, trials_of(source, progress, {**given, **others}, times).aimed(target)
-
-
-def _keep(keep: str | None, labelled: Labelled) -> None:
-    """Write the trials as a table of features, if a file is named."""
-    if keep:
-        from graspsense.sources.features_csv import write_labelled
-
-        write_labelled(Path(keep), labelled)
 
 
 def _as_values(model: Model) -> dict[str, Any]:

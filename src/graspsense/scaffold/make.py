@@ -152,7 +152,7 @@ def words_of(name: str, roles: Sequence[str]) -> dict[str, str]:
         "import_effort": "    EFFORT,\n" if kind == "effort" else "",
         "import_velocity": "    VELOCITY,\n" if kind == "velocity" else "",
         "command": command,
-        "needs": "".join(f', "{fromkey}"' for fromkey in needs),
+        "needs": "".join(f', "{need}"' for need in needs),
         "tests": ", ".join(f'"{test}"' for test in tests),
         "core": _compatible(__version__),
         "imports": _imports([*sorted(entries), "hookimpl"]),
