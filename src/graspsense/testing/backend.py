@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Sequence
+from contextlib import closing, suppress
 from itertools import pairwise
 from math import inf, isfinite, isnan, nan
 from statistics import fmean, median
@@ -40,7 +41,7 @@ from graspsense.core.values.signals import (
     Samples,
 )
 from graspsense.testing import component, fingers, protection, recorded
-from graspsense.testing.checks import CheckFailed, CheckSkipped, checks_of, demand
+from graspsense.testing.checks import CheckFailed, CheckSkipped, checks_of, demand, raises_nothing
 from graspsense.testing.gentle import EFFORT_N, FORCE_N, GentleController, kind_of
 from graspsense.testing.model_gripper import CHANNELS_OF_FIELD
 from graspsense.testing.session import TIMEOUT_S, limits_of, readings_of, sums_of
@@ -247,8 +248,8 @@ def signals_have_no_gaps_or_repeats(subject: Subject) -> None:
         taken = last_s = 0.0
         for earlier, now in pairwise(values):
             came = now.counter - earlier.counter
+            taken += came
             if isinstance(now, Samples):
-                taken += came
                 demand(
                     0 <= now.new <= channel.samples and came >= now.new,  # type: ignore[union-attr]
                     f"{channel.name!r} has {now.new} new samples while its counter goes from {earlier.counter} to "
@@ -259,7 +260,6 @@ def signals_have_no_gaps_or_repeats(subject: Subject) -> None:
                     f"{channel.name!r} has numbers behind its {now.new} new samples: they repeat old ones; give NaN",
                 )
             else:
-                taken += came
                 demand(
                     came >= 0 and (came > 0 or _is_same(now, earlier)),
                     f"an image of {channel.name!r} changes while its counter stays at {now.counter}: count up",
@@ -289,13 +289,13 @@ def channels_follow_from_the_settings(subject: Subject) -> None:
     """The declared channels follow from the settings alone, and opening the gripper does not change them."""
     if not subject.component.channels_vary():
         return
-    backend, again = subject.create(), subject.create()
-    declared = backend.channels
-    demand(
-        isinstance(declared, tuple) and all(isinstance(channel, Channel) for channel in declared),
-        f"`channels` returns {declared!r:.80}: return a tuple of Channel",
-    )
-    try:
+    again = subject.create()
+    with closing(subject.create()) as backend:
+        declared = backend.channels
+        demand(
+            isinstance(declared, tuple) and all(isinstance(channel, Channel) for channel in declared),
+            f"`channels` returns {declared!r:.80}: return a tuple of Channel",
+        )
         backend.open(0)
         for other, when in (
             (again.channels, "with the same settings"),
@@ -305,8 +305,6 @@ def channels_follow_from_the_settings(subject: Subject) -> None:
                 other == declared,
                 f"`channels` are {_named(declared)}, and {_named(other)} {when}: make them depend on self.config only",
             )
-    finally:
-        backend.close()
 
 
 def _named(channels: Sequence[Channel]) -> str:
@@ -349,8 +347,7 @@ def rate_is_as_declared(subject: Subject) -> None:
         demand(
             channel.rate_hz <= most * info.rate_hz * (1.0 + FORGIVEN),
             f"channel {channel.name!r} is declared at {channel.rate_hz:g} Hz, the gripper gives "
-            f"{info.rate_hz:g} frames "
-            "a second: declare the rate at which its value is new",
+            f"{info.rate_hz:g} frames a second: declare the rate at which its value is new",
         )
 
 
@@ -361,7 +358,8 @@ def images_count_up(subject: Subject) -> None:
     for earlier, now in pairwise(subject.session.images):
         demand(
             now.counter > earlier.counter and now.t_s > earlier.t_s,
-            f"after image {earlier.counter} of {earlier.t_s} s comes image {now.counter} of {now.t_s} s: count by one",
+            f"after image {earlier.counter} of {earlier.t_s} s comes image {now.counter} of {now.t_s} s: "
+            "count up by one",
         )
     shown: dict[int, Pads] = {}
     for frame, pads, _ in subject.session.readings:
@@ -405,11 +403,11 @@ def forces_are_in_newtons(subject: Subject) -> None:
 
 def velocity_is_the_rate_of_the_gap(subject: Subject) -> None:
     """The sum of `velocity_m_s` over time is the change of the gap; closing is negative."""
-    closing = [reading.frame for reading in subject.session.stages.get("closing", [])]
-    if not closing or isnan(closing[0].velocity_m_s) or isnan(closing[0].gap_m):
+    frames = [reading.frame for reading in subject.session.stages.get("closing", [])]
+    if not frames or isnan(frames[0].velocity_m_s) or isnan(frames[0].gap_m):
         raise CheckSkipped("this gripper has no velocity and gap of its own, or is a recording")
-    moved = closing[-1].gap_m - closing[0].gap_m
-    summed = sum(frame.velocity_m_s * frame.dt_s for frame in closing[1:])
+    moved = frames[-1].gap_m - frames[0].gap_m
+    summed = sum(frame.velocity_m_s * frame.dt_s for frame in frames[1:])
     if max(abs(moved), abs(summed)) < 2e-3:
         raise CheckSkipped(f"the gap moved by {abs(moved) * 1e3:.2g} mm only")
     demand(
@@ -424,13 +422,13 @@ def closing_closes(subject: Subject) -> None:
     stages = subject.session.stages
     if "closing" not in stages:
         raise CheckSkipped("a recording cannot be commanded")
-    closing = [reading.frame.gap_m for reading in stages["closing"]]
-    if all(map(isnan, closing)):
+    gaps = [reading.frame.gap_m for reading in stages["closing"]]
+    if all(map(isnan, gaps)):
         raise CheckSkipped("this gripper has no gap")
     kind = KINDS[kind_of(subject.entry.accepts)]
     demand(
-        closing[0] - closing[-1] > 1e-3,
-        f"under a closing {kind} command the gap goes from {closing[0]:.4g} to {closing[-1]:.4g} m: an "
+        gaps[0] - gaps[-1] > 1e-3,
+        f"under a closing {kind} command the gap goes from {gaps[0]:.4g} to {gaps[-1]:.4g} m: an "
         "effort or force above 0, a velocity below 0 and a smaller position close the fingers",
     )
     opened = [reading.frame.gap_m for reading in stages["open again"]]
@@ -450,9 +448,8 @@ def stays_within_its_limits(subject: Subject) -> None:
 
 
 def _stays_within_its_limits(subject: Subject, kind: int) -> None:
-    backend = subject.create()
-    least = {"effort_n": backend.least_force_n, "velocity_m_s": backend.least_speed_m_s}
-    try:
+    with closing(subject.create()) as backend:
+        least = {"effort_n": backend.least_force_n, "velocity_m_s": backend.least_speed_m_s}
         info = backend.open(0)
         first_limits = limits_of(info)
         # The limits of a first use apply after a contact too.
@@ -479,8 +476,6 @@ def _stays_within_its_limits(subject: Subject, kind: int) -> None:
                 )
             allowed, watcher = guard(limits, watcher, frame, command)
             backend.apply(allowed)
-    finally:
-        backend.close()
 
 
 def says_what_commands_become(subject: Subject) -> None:
@@ -502,9 +497,8 @@ def says_what_commands_become(subject: Subject) -> None:
 
 def accepts_every_declared_kind(subject: Subject) -> None:
     """Each kind in `accepts` can be applied, and frames continue to come."""
-    backend = subject.create()
     demand(bool(subject.entry.accepts), "`accepts` is empty: a gripper takes at least one kind of command")
-    try:
+    with closing(subject.create()) as backend:
         info = backend.open(0)
         for name in subject.entry.accepts:
             kind = KINDS.index(name)
@@ -515,21 +509,14 @@ def accepts_every_declared_kind(subject: Subject) -> None:
                 FORCE: FORCE_N,
             }[kind]
             backend.read(TIMEOUT_S)
-            try:
+            advice = f" on a {name} command, which `accepts` says it takes: take it, or take {name!r} out of `accepts`"
+            with raises_nothing("apply", advice):
                 backend.apply(Command(kind, value, min(EFFORT_N, info.effort_limit_n), 0.01))
-            except Exception as error:
-                raise CheckFailed(
-                    f"apply raised {named(error)} on a {name} command, which `accepts` "
-                    "says it takes: take it, or take "
-                    f"{name!r} out of `accepts`"
-                ) from error
             demand(
                 any(backend.read(TIMEOUT_S) is not None for _ in range(10)),
                 f"after a {name} command no frame came",
             )
         backend.apply(info.relaxed)
-    finally:
-        backend.close()
 
 
 def read_returns_within_its_timeout(subject: Subject) -> None:
@@ -549,17 +536,13 @@ def pads_can_be_zeroed(subject: Subject) -> None:
     info, declared = subject.session.info, {channel.name for channel in subject.entry.channels}
     if not info.tare_images or not declared & {"force_left", "force_right"}:
         raise CheckSkipped("this gripper is not tared")
-    backend = subject.create()
-    try:
+    with closing(subject.create()) as backend:
         info = backend.open(0)
-        try:
+        with (
+            raises_nothing("a tare without images", ": raise TareRefused with what to do"),
+            suppress(TareRefused),
+        ):
             backend.tare([])
-        except TareRefused:
-            pass
-        except Exception as error:
-            raise CheckFailed(
-                f"a tare without images raised {named(error)}: raise TareRefused with what to do"
-            ) from error
         images: list[Pads] = []
         for _ in range(int(5.0 * info.rate_hz)):
             reading = backend.read(TIMEOUT_S)
@@ -583,12 +566,9 @@ def pads_can_be_zeroed(subject: Subject) -> None:
         known = [force for force in forces if not isnan(force)]
         demand(
             bool(known) and abs(fmean(known)) < 0.6,
-            f"after the tare the unloaded pads feel {fmean(known or [nan]):.3g} N: subtract the zero, "
-            "then divide by the "
-            "counts of a newton",
+            f"after the tare the unloaded pads feel {fmean(known or [nan]):.3g} N: subtract the zero, then divide by "
+            "the counts of a newton",
         )
-    finally:
-        backend.close()
 
 
 def closes_in_any_state(subject: Subject) -> None:
@@ -627,18 +607,13 @@ def same_seed_same_frames(subject: Subject) -> None:
         raise CheckSkipped("a device clock: measurements are never the same twice")
     texts = []
     for _ in range(2):
-        backend = subject.create()
-        try:
+        readings: list[str] = []
+        with closing(subject.create()) as backend, suppress(RecordingEnded):
             info = backend.open(3)
-            readings: list[str] = []
             for _ in range(100):
                 readings.append(repr(backend.read(TIMEOUT_S)))
                 backend.apply(info.opening or info.relaxed)
-            texts.append(readings)
-        except RecordingEnded:
-            texts.append(readings)
-        finally:
-            backend.close()
+        texts.append(readings)
     demand(
         texts[0] == texts[1],
         "two openings with one seed give other frames: draw everything from the seed that `open` is given",
@@ -649,24 +624,17 @@ def expect_accepts_any_controller(subject: Subject) -> None:
     """`expect` accepts any controller before `open`, and `expect_features` any set; both raise and open nothing."""
     controller, run = GentleController(kind_of(subject.entry.accepts)), RunConfig()
     feature_set = create("feature-set", "chitta")
-    backend = subject.create(**(subject.absent or {}))
-    try:
+    advice = ": store the arguments, open nothing, and raise in `open` instead"
+    with (
+        closing(subject.create(**(subject.absent or {}))) as backend,
+        raises_nothing("expect or expect_features", advice),
+    ):
         backend.expect(controller, run)
         backend.expect_features(feature_set)
-    except Exception as error:
-        raise CheckFailed(
-            f"expect or expect_features raised {named(error)}: store the arguments, open nothing, and raise in `open` "
-            "instead"
-        ) from error
-    finally:
-        backend.close()
-    backend = subject.create()
-    try:
+    with closing(subject.create()) as backend:
         backend.expect(controller, run)
         backend.expect_features(feature_set)
         backend.open(0)
-    finally:
-        backend.close()
 
 
 def objects_can_be_grasped(subject: Subject) -> None:
@@ -690,16 +658,11 @@ def objects_can_be_grasped(subject: Subject) -> None:
     demand(not twice, f"objects() gives {', '.join(sorted(twice))} twice: give each full name once")
     for kind in kinds:
         name = kind.full_names[0]
-        try:
-            backend = subject.create().with_object(name)
-            try:
-                simulated = backend.open(0).simulated
-            finally:
-                backend.close()
-        except Exception as error:
-            raise CheckFailed(
-                f"with_object({name!r}) cannot be opened: {named(error)}. objects() gives that name"
-            ) from error
+        with (
+            raises_nothing(f"the opening of with_object({name!r})", ", although objects() gives that name"),
+            closing(subject.create().with_object(name)) as backend,
+        ):
+            simulated = backend.open(0).simulated
         demand(
             simulated,
             f"objects() gives {name!r}, but the opened gripper is not simulated: give DeviceInfo(simulated=True, ...), "
@@ -749,20 +712,13 @@ def performs_a_whole_grasp(subject: Subject) -> None:
 
 def reports_plain_values(subject: Subject) -> None:
     """`report` returns numbers, text and booleans that JSON represents, while it is open and after it was closed."""
-    backend = subject.create()
-    try:
+    with closing(subject.create()) as backend:
         backend.open(0)
         reports = [backend.report()]
-    finally:
-        backend.close()
     reports.append(backend.report())
     for report in reports:
-        try:
+        with raises_nothing(f"JSON, given the report {report!r},", ": numbers, text and booleans only"):
             json.dumps(dict(report))
-        except (TypeError, ValueError) as error:
-            raise CheckFailed(
-                f"report gave {report!r}: numbers, text and booleans only ({named(error)})"
-            ) from error
 
 
 def dry_run_accepts_the_same_commands(subject: Subject) -> None:
@@ -774,15 +730,13 @@ def dry_run_accepts_the_same_commands(subject: Subject) -> None:
         isinstance(other, SensorBackend),
         f"dry_run_backend returned {other!r}: return a SensorBackend or None",
     )
-    try:
+    with closing(other):
         info = other.open(0)
         demand(
             info.opening is None or KINDS[info.opening.kind] in subject.entry.accepts,
             f"the gripper of a dry run opens with {info.opening}, of a kind that the real one does not accept",
         )
         _first_frame(other)
-    finally:
-        other.close()
 
 
 def reports_a_lost_device(subject: Subject) -> None:
@@ -791,12 +745,9 @@ def reports_a_lost_device(subject: Subject) -> None:
         raise CheckSkipped(
             "no settings were given under which it vanishes (--unplugged, or `unplugged` in a test)"
         )
-    backend = subject.create(**subject.unplugged)
-    try:
+    with closing(subject.create(**subject.unplugged)) as backend:
         info = backend.open(0)
         text = _lost(backend, info.relaxed, info.rate_hz)
-    finally:
-        backend.close()
     demand(len(text) > 10, f"DeviceLost says {text!r}: say which gripper, and what to look at")
     grasp = run_uninterrupted(
         subject.create(**subject.unplugged), GentleController(kind_of(subject.entry.accepts)), RunConfig()
@@ -810,21 +761,17 @@ def reports_a_lost_device(subject: Subject) -> None:
 def _lost(backend: SensorBackend[Any], relaxed: Command, rate_hz: float) -> str:
     until = time.perf_counter() + 3.0 * VANISHING_S + GRACE_S
     for _ in range(int(4.0 * VANISHING_S * rate_hz) + 50):
-        try:
-            backend.read(TIMEOUT_S)
-            backend.apply(relaxed)
-        except DeviceLost as lost:
-            return str(lost)
-        except Exception as error:
-            raise CheckFailed(
-                f"unplugged, it raised {named(error)}: turn what the driver raises into DeviceLost"
-            ) from error
+        with raises_nothing("unplugged, it", ": turn what the driver raises into DeviceLost"):
+            try:
+                backend.read(TIMEOUT_S)
+                backend.apply(relaxed)
+            except DeviceLost as lost:
+                return str(lost)
         if time.perf_counter() > until:
             break
     raise CheckFailed(
-        f"unplugged, it never raised DeviceLost within {VANISHING_S:g} s of its clock: raise it where "
-        "read or apply finds "
-        "the gripper gone"
+        f"unplugged, it never raised DeviceLost within {VANISHING_S:g} s of its clock: raise it where read or apply "
+        "finds the gripper gone"
     )
 
 
@@ -834,20 +781,16 @@ def reports_a_missing_device(subject: Subject) -> None:
         raise CheckSkipped(
             "no settings were given under which it is not there (--absent, or `absent` in a test)"
         )
-    backend = subject.create(**subject.absent)
     began = time.perf_counter()
-    try:
-        backend.open(0)
-    except NoDevice as error:
-        text = str(error)
-    except Exception as error:
-        raise CheckFailed(
-            f"not there, open raised {named(error)}: raise NoDevice with what to try"
-        ) from error
-    else:
-        raise CheckFailed("open succeeded where no gripper is: raise NoDevice if nothing answers")
-    finally:
-        backend.close()
+    with (
+        closing(subject.create(**subject.absent)) as backend,
+        raises_nothing("not there, open", ": raise NoDevice with what to try"),
+    ):
+        try:
+            backend.open(0)
+            raise CheckFailed("open succeeded where no gripper is: raise NoDevice if nothing answers")
+        except NoDevice as error:
+            text = str(error)
     took = time.perf_counter() - began
     demand(took < 10.0, f"it took {took:.1f} s to say so: `open` is bounded in time")
     demand(len(text) > 20, f"NoDevice says {text!r}: say what was searched for, where, and what to try")

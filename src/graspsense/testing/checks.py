@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any, Final, Literal, Protocol
 
 from attrs import define, field, frozen
@@ -79,6 +80,17 @@ def demand(holds: bool, text: str) -> None:
     """Raise CheckFailed with this text unless `holds`."""
     if not holds:
         raise CheckFailed(text)
+
+
+@contextmanager
+def raises_nothing(what: str, advice: str) -> Iterator[None]:
+    """Raise CheckFailed for what is raised in this context: `what` raised it, and the advice."""
+    try:
+        yield
+    except CheckFailed:
+        raise
+    except Exception as error:
+        raise CheckFailed(f"{what} raised {named(error)}{advice}") from error
 
 
 def outcome_of(check: Check, subject: Named, expected: Mapping[str, str]) -> Result:

@@ -5,16 +5,17 @@ from __future__ import annotations
 import json
 import math
 import random
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from contextlib import suppress
 from typing import Any, Final
 
 import numpy as np
 from attrs import evolve
 
-from graspsense.core.values.errors import DataDamaged, named
+from graspsense.core.values.errors import DataDamaged
 from graspsense.core.values.features import FeatureTable, Prediction
 from graspsense.testing import component
-from graspsense.testing.checks import CheckFailed, checks_of, demand
+from graspsense.testing.checks import CheckFailed, checks_of, demand, raises_nothing
 from graspsense.testing.damage import damaged_at, paths
 from graspsense.testing.samples import sample_table
 from graspsense.testing.subject import Subject
@@ -24,18 +25,15 @@ LEAST_RIGHT: Final = 0.9
 MOST_PLACES: Final = 40
 """Number of values of a model that are changed, chosen at random."""
 DAMAGES_EACH: Final = 4
+REFUSALS: Final = (KeyError, TypeError, ValueError, DataDamaged)
+"""What `from_json` raises for values that are no model."""
 
 
 def _fitted(subject: Subject, table: FeatureTable, labels: Sequence[str]) -> Any:
     classifier = subject.create()
-    try:
+    trials = f" on {len(labels)} trials of {len(set(labels))} labels"
+    with raises_nothing("fit", f"{trials}: learn from them; a NaN in the table is missing"):
         classifier.fit(table, labels, SEED)
-    except Exception as error:
-        raise CheckFailed(
-            f"fit raised {named(error)} on {len(labels)} trials of {len(set(labels))} labels: learn "
-            "from them; a NaN in "
-            "the table is missing"
-        ) from error
     return classifier
 
 
@@ -46,14 +44,9 @@ def _learned(subject: Subject) -> tuple[Any, FeatureTable, list[str]]:
 
 def _json(fitted: Any) -> Any:
     model = fitted.to_json()
-    try:
+    advice = ": give lists, dicts, text, numbers, true, false, None; a NaN as None"
+    with raises_nothing("to_json gives what JSON cannot hold: it", advice):
         return json.loads(json.dumps(model, allow_nan=False))
-    except (TypeError, ValueError) as error:
-        raise CheckFailed(
-            f"to_json gives what JSON cannot hold ({named(error)}): lists, dicts, text, numbers, "
-            "true, false, None; a NaN "
-            "as None"
-        ) from error
 
 
 def _again(subject: Subject, fitted: Any) -> Any:
@@ -165,13 +158,14 @@ def one_label_is_refused_or_certain(subject: Subject) -> None:
     """With one training label, `fit` raises ValueError, or that label has probability 1."""
     table, labels = sample_table()
     classifier = subject.create()
-    try:
-        classifier.fit(table, ["can:full"] * len(labels), SEED)
-    except ValueError as error:
-        demand(bool(str(error)), "fit on one label raised ValueError without a message: say what is lacking")
-        return
-    except Exception as error:
-        raise CheckFailed(f"fit on one label raised {named(error)}: raise ValueError, or learn it") from error
+    with raises_nothing("fit on one label", ": raise ValueError, or learn it"):
+        try:
+            classifier.fit(table, ["can:full"] * len(labels), SEED)
+        except ValueError as error:
+            demand(
+                bool(str(error)), "fit on one label raised ValueError without a message: say what is lacking"
+            )
+            return
     given = classifier.probabilities(table)
     demand(
         classifier.classes() == ("can:full",) and bool((given == 1.0).all()),
@@ -190,23 +184,17 @@ def few_trials_are_refused_or_learned(subject: Subject) -> None:
     ):
         few = table.rows(np.array(rows))
         classifier = subject.create()
-        try:
-            classifier.fit(few, [labels[i] for i in rows], SEED)
-        except ValueError as error:
-            demand(
-                bool(str(error)), f"fit on {what} raised ValueError without a message: say what is lacking"
-            )
-            continue
-        except Exception as error:
-            raise CheckFailed(
-                f"fit on {what} raised {named(error)}: raise ValueError, or learn from them"
-            ) from error
-        try:
+        with raises_nothing(f"fit on {what}", ": raise ValueError, or learn from them"):
+            try:
+                classifier.fit(few, [labels[i] for i in rows], SEED)
+            except ValueError as error:
+                demand(
+                    bool(str(error)),
+                    f"fit on {what} raised ValueError without a message: say what is lacking",
+                )
+                continue
+        with raises_nothing(f"trained on {what}, probabilities", ": raise ValueError in fit, or answer"):
             probabilities = classifier.probabilities(table)
-        except Exception as error:
-            raise CheckFailed(
-                f"trained on {what}, probabilities raised {named(error)}: raise ValueError in fit, or answer"
-            ) from error
         demand(
             probabilities.shape == (len(table), len(classifier.classes()))
             and bool(np.isfinite(probabilities).all())
@@ -234,8 +222,7 @@ def explains_its_predictions(subject: Subject) -> None:
             demand(
                 type(share) is float and abs(share - shares.get(label, math.nan)) <= 1e-9,
                 f"explain gives {label!r} the probability {share!r} of type {type(share).__name__}; "
-                "probabilities gives "
-                f"{shares.get(label)}: write float(...)",
+                f"probabilities gives {shares.get(label)}: write float(...)",
             )
         demand(
             len(said.because) > 0 and all(reason.words for reason in said.because),
@@ -259,23 +246,16 @@ def refuses_an_invalid_model(subject: Subject) -> None:
     """`from_json` raises KeyError, TypeError, ValueError or DataDamaged for values that are not its model."""
     good = _json(_learned(subject)[0])
     demand(isinstance(good, dict) and bool(good), f"to_json gives {good!r:.80}: a dict")
-    bad: list[Mapping[str, Any]] = [{}, {"nonsense": 1}]
-    bad += [
-        {key: value for key, value in good.items() if key != lacking} for lacking in _vital(subject, good)
-    ]
-    for model in bad:
-        try:
-            subject.create().from_json(model)
-        except (KeyError, TypeError, ValueError, DataDamaged):
-            continue
-        except Exception as error:
-            raise CheckFailed(
-                f"from_json raised {named(error)} on a model with the keys "
-                f"{', '.join(model) or 'none'}: raise ValueError"
-            ) from error
+    largest = max(good, key=lambda key: len(json.dumps(good[key])))
+    for model in ({}, {"nonsense": 1}, {key: value for key, value in good.items() if key != largest}):
+        what = f"a model with the keys {', '.join(model) or 'none'}"
+        with raises_nothing("from_json", f" on {what}: raise ValueError"):
+            try:
+                subject.create().from_json(model)
+            except REFUSALS:
+                continue
         raise CheckFailed(
-            f"from_json takes a model with the keys {', '.join(model) or 'none'}: look at what is given, and raise "
-            "ValueError if it is no model"
+            f"from_json takes {what}: look at what is given, and raise ValueError if it is no model"
         )
 
 
@@ -288,22 +268,13 @@ def a_damaged_model_raises_a_documented_error(subject: Subject) -> None:
         for damaged in rng.sample(list(damaged_at(good, place)), DAMAGES_EACH):
             if not isinstance(damaged, dict):
                 continue
-            try:
+            advice = (
+                f" on a model that was changed at {'.'.join(map(str, place))}: read it by "
+                "graspsense.plugin_api.StoredValues, which checks types, ranges and sizes before anything is made of "
+                "them"
+            )
+            with raises_nothing("from_json", advice), suppress(*REFUSALS):
                 subject.create().from_json(damaged)
-            except (KeyError, TypeError, ValueError, DataDamaged):
-                continue
-            except Exception as error:
-                raise CheckFailed(
-                    f"from_json raised {named(error)} on a model that was changed at "
-                    f"{'.'.join(map(str, place))}: read it by graspsense.plugin_api.StoredValues, which checks types, "
-                    "ranges and sizes before anything is made of them"
-                ) from error
-
-
-def _vital(subject: Subject, good: Mapping[str, Any]) -> list[str]:
-    """Return the key with the largest content, without which a model is invalid."""
-    del subject
-    return [max(good, key=lambda key: len(json.dumps(good[key])))]
 
 
 CHECKS: Final = (

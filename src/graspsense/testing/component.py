@@ -20,8 +20,7 @@ from graspsense.testing.subject import Subject
 
 ADVICE_ON_IMPORTS: Final = (
     "is the name right? what has to be installed goes into `dependencies` of its pyproject.toml, or, "
-    "where that is not for "
-    "everybody, into `needs` of the entry, in words"
+    "where that is not for everybody, into `needs` of the entry, in words"
 )
 
 
@@ -164,8 +163,7 @@ def making_one_does_nothing(subject: Subject) -> None:
     demand(
         not seen,
         f"the constructor of {subject.component.entry.target} does {', '.join(dict.fromkeys(seen))}: keep the "
-        "config only, and do "
-        "that where it is first needed (a gripper in `open`)",
+        "config only, and do that where it is first needed (a gripper in `open`)",
     )
 
 

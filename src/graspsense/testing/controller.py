@@ -17,7 +17,6 @@ from graspsense.core.control.free_motion import FreeMotion, free_motion_of
 from graspsense.core.grasp.protection.effort_ceiling import MARGIN
 from graspsense.core.grasp.runner import run_uninterrupted
 from graspsense.core.values.channel import Channel
-from graspsense.core.values.errors import named
 from graspsense.core.values.signals import (
     APPROACH,
     EFFORT,
@@ -35,7 +34,7 @@ from graspsense.core.values.signals import (
     no_pads,
 )
 from graspsense.testing import component
-from graspsense.testing.checks import CheckFailed, checks_of, demand
+from graspsense.testing.checks import checks_of, demand, raises_nothing
 from graspsense.testing.model_gripper import CELLS, CHANNELS_OF_FIELD, OBJECTS, model_gripper
 from graspsense.testing.subject import Subject
 
@@ -84,14 +83,12 @@ def fresh_ticks(
         if from_tick and k == from_tick:
             state, params = _made_again(state), _made_again(params)
         reading = gripper.read(0.1)
-        frame = reading.frame
-        try:
+        advice = (
+            f" at t = {reading.frame.t_s:.3f} s with {object_name} between the fingers: a law answers every frame with "
+            "a command and a state; a channel that the gripper lacks is NaN"
+        )
+        with raises_nothing("step", advice):
             command, after = step(params, state, reading)
-        except Exception as error:
-            raise CheckFailed(
-                f"step raised {named(error)} at t = {frame.t_s:.3f} s with {object_name} between the fingers: a law "
-                "answers every frame with a command and a state; a channel that the gripper lacks is NaN"
-            ) from error
         ticks.append(Tick(state, reading, command, after))
         state = after
         if getattr(after, "outcome", RUNNING) != RUNNING:
@@ -102,10 +99,6 @@ def fresh_ticks(
 
 def _all_channels(subject: Subject) -> set[str | Channel]:
     return {*CHANNELS_OF_FIELD.values(), "pads", *further(subject.entry.requires)}
-
-
-def _required(subject: Subject) -> set[Channel]:
-    return set(subject.entry.requires)
 
 
 def _made_again(value: Any) -> Any:
@@ -151,8 +144,7 @@ def _demand_numbers(value: Any, what: str) -> None:
             annotated not in (float, int) or type(leaf) is annotated,
             f"{path} is annotated {getattr(annotated, '__name__', annotated)} and is {leaf!r}, of type "
             f"{type(leaf).__name__}: write {getattr(annotated, '__name__', 'float')}(...). A compiler "
-            "takes another type "
-            "for another law",
+            "takes another type for another law",
         )
 
 
@@ -163,8 +155,7 @@ def step_is_a_plain_function(subject: Subject) -> None:
     demand(
         isinstance(raw, staticmethod),
         f"step of {cls.__name__} is not a static method: write a module function `step(params, state, "
-        "reading)` and in "
-        "the class `step = staticmethod(step)`",
+        "reading)` and in the class `step = staticmethod(step)`",
     )
     demand(
         len(inspect.signature(cls.step).parameters) == 3,
@@ -207,8 +198,7 @@ def types_do_not_change(subject: Subject) -> None:
             demand(
                 type(a) is type(b) and getattr(a, "dtype", "") == getattr(b, "dtype", ""),
                 f"{path} goes from {a!r} ({type(a).__name__}) to {b!r} ({type(b).__name__}) at t = "
-                f"{tick.frame.t_s:.3f} "
-                "s: keep one type throughout",
+                f"{tick.frame.t_s:.3f} s: keep one type throughout",
             )
 
 
@@ -242,8 +232,7 @@ def commands_are_of_declared_kinds(subject: Subject) -> None:
             demand(
                 name in subject.entry.commands,
                 f"it commands {name} at t = {tick.frame.t_s:.3f} s with {object_name} between the fingers; "
-                "its entry declares "
-                f"{', '.join(subject.entry.commands) or 'none'}: add it to `commands`",
+                f"its entry declares {', '.join(subject.entry.commands) or 'none'}: add it to `commands`",
             )
 
 
@@ -304,11 +293,12 @@ def grasps_are_independent(subject: Subject) -> None:
 
 def requires_what_it_reads(subject: Subject) -> None:
     """The channels in `requires` suffice: without the others, the commands are the same."""
-    full, own = ticks_of(subject), fresh_ticks(subject, channels=_required(subject))
+    required = set(subject.entry.requires)
+    full, own = ticks_of(subject), fresh_ticks(subject, channels=required)
     demand(
         [repr(tick.command) for tick in full] == [repr(tick.command) for tick in own],
         "on a gripper that has only the channels it declares "
-        f"({', '.join(sorted(channel.name for channel in _required(subject))) or 'none'}) it commands something else: "
+        f"({', '.join(sorted(channel.name for channel in required)) or 'none'}) it commands something else: "
         "add what it reads to `requires`",
     )
 
@@ -319,12 +309,8 @@ def handles_frames_of_nan(subject: Subject) -> None:
     step, params, state = type(law).step, law.params(), law.init()
     silent = Frame(0.001, 0.001, *(nan,) * 7, 0)
     reading = Reading(silent, no_pads(CELLS), no_signals(subject.entry.requires))
-    try:
+    with raises_nothing("step", " on a frame of NaN: write comparisons so that NaN gives the safe result"):
         command, _ = step(params, state, reading)
-    except Exception as error:
-        raise CheckFailed(
-            f"step raised {named(error)} on a frame of NaN: write comparisons so that NaN gives the safe result"
-        ) from error
     demand(isinstance(command, Command), f"step returned {command!r} on a frame of NaN")
 
 
@@ -458,8 +444,7 @@ def ends_every_grasp(subject: Subject) -> None:
         demand(
             grasp.outcome not in (Outcome.ABORTED, Outcome.DEVICE_LOST, Outcome.RUNNING),
             f"with {object_name} between the fingers the grasp ended as {grasp.outcome.words}: "
-            f"{grasp.reason}. Let the state's "
-            f"`outcome` leave RUNNING, after {LONGEST_S:g} s at the latest",
+            f"{grasp.reason}. Let the state's `outcome` leave RUNNING, after {LONGEST_S:g} s at the latest",
         )
 
 

@@ -10,12 +10,11 @@ import numpy as np
 from attrs import evolve
 
 from graspsense.core.components.compiled_features import columns_of_ticks, compiled_extraction
-from graspsense.core.values.errors import named
 from graspsense.core.values.features import Features
 from graspsense.core.values.signals import Phase
 from graspsense.core.values.trace import Trace
 from graspsense.testing import component
-from graspsense.testing.checks import CheckFailed, checks_of, demand
+from graspsense.testing.checks import checks_of, demand, raises_nothing
 from graspsense.testing.samples import (
     COLUMNS_OF_CHANNEL,
     an_event,
@@ -33,13 +32,9 @@ CUTS: Final = 48
 
 
 def _features(subject: Subject, trace: Trace, which: str = "a whole grasp") -> Features:
-    try:
+    advice = f" on {which}: return NaN with a reason in `reasons` where a feature is not defined"
+    with raises_nothing("extract", advice):
         features: Features = subject.create().extract(trace)
-    except Exception as error:
-        raise CheckFailed(
-            f"extract raised {named(error)} on {which}: return NaN with a reason in `reasons` where a "
-            "feature is not defined"
-        ) from error
     demand(
         isinstance(features, Features),
         f"extract returned {features!r}: return graspsense.plugin_api.Features",
@@ -68,11 +63,8 @@ def _own(subject: Subject) -> Trace:
 
 
 def _same(a: Features, b: Features) -> bool:
-    return repr(a.as_dict()) == repr(b.as_dict()) and (a.names, a.units, a.reasons) == (
-        b.names,
-        b.units,
-        b.reasons,
-    )
+    same = (a.names, a.units, a.reasons) == (b.names, b.units, b.reasons)
+    return same and repr(a.as_dict()) == repr(b.as_dict())
 
 
 def returns_the_declared_features(subject: Subject) -> None:
@@ -208,15 +200,12 @@ def compiled_features_are_those_of_extract(subject: Subject) -> None:
     )
     for which, trace in _all(subject).items():
         extracted = set_.extract(trace)
-        try:
+        advice = f" on {which}: return the same tuple of floats for every grasp"
+        with raises_nothing("`compiled`", advice):
             measured = form.measure(form.params, columns_of_ticks(trace))
             numbers = map(float, measured)
             named_tuple = getattr(measured, "_make", tuple)
             features: Features = form.result(named_tuple(numbers))
-        except Exception as error:
-            raise CheckFailed(
-                f"`compiled` raised {named(error)} on {which}: return the same tuple of floats for every grasp"
-            ) from error
         demand(
             _same(features, extracted),
             f"on {which} `compiled` gives {features.as_dict()} with the reasons {dict(features.reasons)}, "

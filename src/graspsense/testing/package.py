@@ -23,9 +23,9 @@ from graspsense.core.components.config import resolve
 from graspsense.core.components.entries import ConformanceCheckEntry, PipelineEntry
 from graspsense.core.components.registry import SLOW_IMPORT_S, Resource
 from graspsense.core.pipeline.wiring import check as check_wiring
-from graspsense.core.values.errors import GraspsenseError, named
+from graspsense.core.values.errors import GraspsenseError
 from graspsense.testing import reader
-from graspsense.testing.checks import Check, CheckFailed, CheckSkipped, checks_of, demand
+from graspsense.testing.checks import Check, CheckFailed, CheckSkipped, checks_of, demand, raises_nothing
 from graspsense.testing.component import ADVICE_ON_IMPORTS
 from graspsense.testing.old_imports import old_imports
 from graspsense.testing.samples import a_trial, an_event
@@ -33,6 +33,7 @@ from graspsense.testing.subject import Package
 
 OBSERVERS: Final = ("graspsense_run_starting", "graspsense_grasp_event", "graspsense_run_finished")
 PROBE_S: Final = 1.0
+_ADVICE_ON_OBSERVERS: Final = ": an observer that raises is passed over from then on; catch what may go wrong"
 
 
 def plugins_load(package: Package) -> None:
@@ -158,14 +159,8 @@ def observers_change_nothing(package: Package) -> None:
         for hook in OBSERVERS:
             if hook not in status.hooks:
                 continue
-            try:
+            with raises_nothing(f"{hook} of {status.entry_point}", _ADVICE_ON_OBSERVERS):
                 results = package.plugins.called(status, hook, **arguments[hook])
-            except Exception as error:
-                raise CheckFailed(
-                    f"{hook} of {status.entry_point} raised {named(error)}: an observer that raises "
-                    "is passed over from "
-                    "then on; catch what may go wrong"
-                ) from error
             demand(not results, f"{hook} returned {results}: an observer returns nothing")
     demand(
         (run.settings, run.components, run.labels) == given and trial.trace.gap_m.tobytes() == column,
@@ -175,7 +170,7 @@ def observers_change_nothing(package: Package) -> None:
 
 def probe_returns_in_time(package: Package) -> None:
     """The search for devices ends in time and raises nothing, whatever is connected."""
-    if not any("graspsense_probe_devices" in statuse.hooks for statuse in package.statuses):
+    if not any("graspsense_probe_devices" in status.hooks for status in package.statuses):
         raise CheckSkipped("it looks for no devices")
     began = time.perf_counter()
     probes = [
@@ -225,9 +220,8 @@ def wheel_is_complete(package: Package) -> None:
 
 
 _ADVICE: Final = (
-    "it is in the folder but is not packed; in pyproject.toml, with hatchling, "
-    "[tool.hatch.build.targets.wheel] packages "
-    '= ["src/PACKAGE"] takes every file of it that .gitignore does not leave out'
+    "it is in the folder but is not packed; in pyproject.toml, with hatchling, [tool.hatch.build.targets.wheel] "
+    'packages = ["src/PACKAGE"] takes every file of it that .gitignore does not leave out'
 )
 
 
@@ -294,16 +288,17 @@ def _built(folder: Path, scratch: Path) -> Path:
         str(project.get("build-system", {}).get("build-backend", "")).partition(":")[0].partition(".")[0]
     )
     here = bool(backend) and importlib.util.find_spec(backend) is not None
-    command = [sys.executable, "-P", "-m", "pip", "wheel"]
-    command += [
+    command = [
+        sys.executable,
+        "-P",
+        "-m",
+        "pip",
+        "wheel",
         "--quiet",
         "--no-deps",
         "--disable-pip-version-check",
-        "--wheel-dir",
-        str(scratch),
-        *(["--no-build-isolation"] if here else []),
-        str(folder),
     ]
+    command += ["--wheel-dir", str(scratch), *(["--no-build-isolation"] if here else []), str(folder)]
     ran = subprocess.run(command, capture_output=True, text=True, check=False)
     if "No module named pip" in ran.stderr:
         raise CheckSkipped(
