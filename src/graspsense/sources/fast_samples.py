@@ -1,8 +1,9 @@
-"""Samples with times of their own as blocks of a fast channel, one block a tick."""
+"""Values with times of their own: the last of them in each tick, and samples as blocks of a fast channel."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -12,6 +13,22 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from graspsense.core.values.channel import FastChannel
+
+
+T = TypeVar("T")
+
+
+def latest_values(
+    times: NDArray[np.float64], sampled_s: NDArray[np.float64], values: Sequence[T], nothing: T
+) -> list[T]:
+    """Return the last of the values in each tick; `nothing` before the first."""
+    counts = np.searchsorted(sampled_s, times, side="right").tolist()
+    return [values[count - 1] if count else nothing for count in counts]
+
+
+def most_in_a_tick(times: NDArray[np.float64], sampled_s: Sequence[float] | NDArray[np.float64]) -> int:
+    """Return the largest number of samples that are new in one tick."""
+    return int(np.diff(np.searchsorted(sampled_s, times, side="right"), prepend=0).max(initial=0))
 
 
 def sample_blocks(

@@ -16,7 +16,7 @@ from graspsense.core.values.events import GraspEvent
 from graspsense.core.values.fingers import FingerForce, opposed_forces
 from graspsense.core.values.signals import NO_PADS, Frame, Image, Phase, Reading, Samples
 from graspsense.recording.replayable import Recording
-from graspsense.sources.fast_samples import sample_blocks
+from graspsense.sources.fast_samples import latest_values, most_in_a_tick, sample_blocks
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -388,7 +388,10 @@ def _array(columns: GraspColumns, name: str, values: Numbers) -> Channel:
         unit = columns.units.get(name, "counts")
         return TactileArray(name, unit, finger=name, rows=down, columns=across, components=components)
     across *= components
-    samples, axes = (down, across) if name not in columns.times else (_most_in_a_tick(columns, name), width)
+    if name in columns.times:
+        samples, axes = max(most_in_a_tick(columns.t_s, columns.times[name]), 1), width
+    else:
+        samples, axes = down, across
     names = (
         ("value",)
         if axes == 1
@@ -400,12 +403,6 @@ def _array(columns: GraspColumns, name: str, values: Numbers) -> Channel:
     a_row = 1 if name in columns.times else samples
     rate_hz = a_row / float(np.median(np.diff(t_s))) if len(t_s) > 1 else 0.0
     return FastChannel(name, columns.units.get(name, "1"), rate_hz, samples=samples, axes=names)
-
-
-def _most_in_a_tick(columns: GraspColumns, name: str) -> int:
-    """Return the largest number of samples of a channel with its own times that are new in one tick."""
-    there = np.searchsorted(columns.times[name], columns.t_s, side="right")
-    return max(int(np.diff(there, prepend=0).max(initial=0)), 1)
 
 
 def _series(columns: GraspColumns, channel: Channel, values: Numbers) -> list[Any]:
@@ -426,8 +423,7 @@ def _series(columns: GraspColumns, channel: Channel, values: Numbers) -> list[An
         nothing = no_signals((channel,))[0]
     if own is None:
         return rows
-    there = np.searchsorted(own, times, side="right").tolist()
-    return [rows[count - 1] if count else nothing for count in there]
+    return latest_values(times, own, rows, nothing)
 
 
 def _readings(

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from operator import itemgetter
 from pathlib import Path
 from typing import Any, Final
 
@@ -146,14 +147,14 @@ def _grasps(folder: str) -> list[tuple[Path, str, int]]:
     place = within if within.is_dir() else given
     if not place.is_dir():
         raise ConfigError(f"there is no folder {given}: name the folder of the iCub Grasp Dataset")
-    named = []
+    grasps = []
     for path in place.glob("*.txt"):
         match = _FILE.fullmatch(path.name)
         if match:
-            named.append((path, match["label"], int(match["number"])))
-    if not named:
+            grasps.append((path, match["label"], int(match["number"])))
+    if not grasps:
         raise ConfigError(f"{place} contains no file of the iCub Grasp Dataset (CLASS_NUMBER.txt)")
-    return sorted(named, key=lambda named: (named[1], named[2]))
+    return sorted(grasps, key=itemgetter(1, 2))
 
 
 def _absolute(table: FeatureTable, grasps: list[IcubGrasp]) -> FeatureTable:

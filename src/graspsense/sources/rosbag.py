@@ -34,7 +34,7 @@ from graspsense.core.values.signals import Frame, Pads, Reading
 from graspsense.recording.readable import readable
 from graspsense.recording.replayable import Recording
 from graspsense.recording.unpacked import Unpacked
-from graspsense.sources.fast_samples import sample_blocks
+from graspsense.sources.fast_samples import most_in_a_tick, sample_blocks
 from graspsense.sources.ros_bags import opened_bag, stamp_ns
 from graspsense.sources.topic_clocks import Messages, TopicTimes, common_clock
 
@@ -146,27 +146,27 @@ class _Content:
         self.times[topic].add(recorded_ns, stamp_ns(message))
 
 
-def _recording(path: Path, bag: _Content) -> Recording:
+def _recording(path: Path, content: _Content) -> Recording:
     """Return the recording that these messages are. Raises DataDamaged."""
-    pressure, source, gripper = bag.pressure, bag.source, f"{SIDES[bag.side]} gripper"
-    if len(bag.motions) < 2 or not bag.images:
+    pressure, source, gripper = content.pressure, content.source, f"{SIDES[content.side]} gripper"
+    if len(content.motions) < 2 or not content.images:
         raise DataDamaged(
-            f"{path} contains {len(bag.motions)} positions of the {gripper} on {source} and {len(bag.images)} cell "
-            f"images on {pressure}: a grasp needs both"
+            f"{path} contains {len(content.motions)} positions of the {gripper} on {source} and {len(content.images)} "
+            f"cell images on {pressure}: a grasp needs both"
         )
-    topics = {topic: stamps for topic, stamps in bag.times.items() if stamps.recorded_ns}
+    topics = {topic: stamps for topic, stamps in content.times.items() if stamps.recorded_ns}
     clock = common_clock(path.name, topics, (pressure, source))
-    moved = _timed(bag.motions, clock.topics[source])
+    moved = _timed(content.motions, clock.topics[source])
     motions = [motion for motion in moved if clock.begin_ns <= motion.t_ns <= clock.end_ns]
     duration_s = (motions[-1].t_ns - motions[0].t_ns) * 1e-9 if motions else 0.0
     if duration_s <= 0.0:
         raise DataDamaged(f"{path}: all positions on {source} have the same time")
     notes = [f"recorded on a PR2, {gripper}: gap from {source}, cells from {pressure}", *clock.notes]
     images = clock.topics[pressure]
-    readings = tuple(_readings(motions, _timed(bag.images, images), images, notes))
+    readings = tuple(_readings(motions, _timed(content.images, images), images, notes))
     channels: tuple[Channel, ...] = ()
-    if any(sample.values for sample in bag.samples):
-        timed = _timed(bag.samples, clock.topics[bag.acceleration])
+    if any(sample.values for sample in content.samples):
+        timed = _timed(content.samples, clock.topics[content.acceleration])
         channels, readings = _with_acceleration(readings, motions[0].t_ns, timed)
     return Recording(
         name=f"{path.name}, {gripper}",
@@ -302,8 +302,7 @@ def _with_acceleration(
             values += rows
         before_ns = t_ns
     times = np.array([reading.frame.t_s for reading in readings])
-    there = np.searchsorted(sampled_s, times, side="right")
-    most = int(np.diff(there, prepend=0).max())
+    most = most_in_a_tick(times, sampled_s)
     if most == 0:
         return (), tuple(readings)
     rate_hz = (len(sampled_s) - 1) / (sampled_s[-1] - sampled_s[0]) if sampled_s[-1] > sampled_s[0] else 0.0

@@ -127,11 +127,11 @@ def common_clock(
     """
     began_ns, times, notices = on_one_clock(source, topics)
     wanted = {topic: times[topic] for topic in needed or times}
-    lasting = {topic: times for topic, times in wanted.items() if times.usual_ns} or wanted
-    begin = max(int(times.ns[0]) for times in lasting.values())
-    end = min(times.until_ns for times in lasting.values())
+    lasting = {topic: stamps for topic, stamps in wanted.items() if stamps.usual_ns} or wanted
+    begin = max(int(stamps.ns[0]) for stamps in lasting.values())
+    end = min(stamps.until_ns for stamps in lasting.values())
     earliest = min(int(stamps.ns[0]) for stamps in times.values())
-    inside = {topic: times.between(begin, end) for topic, times in lasting.items()}
+    inside = {topic: stamps.between(begin, end) for topic, stamps in lasting.items()}
     notes = tuple(_words(topic, stamps, earliest, inside.get(topic)) for topic, stamps in times.items())
     if end <= begin:
         raise DataDamaged(
@@ -139,7 +139,7 @@ def common_clock(
             "the computers that stamped them"
         )
     notes += (f"all have messages from {(begin - earliest) * 1e-9:.3f} to {(end - earliest) * 1e-9:.3f} s",)
-    silent = [topic for topic, times in inside.items() if _longest(times) > lasting[topic].longest_hold_ns]
+    silent = [topic for topic, within in inside.items() if _longest(within) > lasting[topic].longest_hold_ns]
     if silent:
         notices += (
             f"{', '.join(silent)} was silent for more than {PERIODS:g} of its usual periods: a value that then changed "

@@ -191,9 +191,7 @@ def read_manifest(place: Path) -> ReadManifest:
 
     quantities: dict[str, Any] = {name: [] for name in QUANTITIES}
     for name in QUANTITIES:
-        given = getattr(keys, name)
-        for text in (given,) if isinstance(given, str) else given:
-            quantities[name].append(parsed((name,), text))
+        quantities[name] += [parsed((name,), text) for text in texts_of(getattr(keys, name))]
     value_files = {
         name: text for name, text in keys.values.items() if re.fullmatch(r"[^'\"*/+()]+\.(npy|txt|csv)", text)
     }
@@ -265,7 +263,7 @@ def _contradictions(keys: Manifest) -> list[tuple[tuple[str, ...], str]]:
     if (
         not keys.label
         and not keys.list
-        and not any("{label" in pattern for pattern in _patterns(keys))
+        and not any("{label" in pattern for pattern in texts_of(keys.files))
         and "?P<label>" not in keys.start
         and "{label" not in keys.arrays
     ):
@@ -322,10 +320,6 @@ def _finger_problems(keys: Manifest) -> Iterator[tuple[tuple[str, ...], str]]:
         hand_of(keys, "N")
     except ValueError as error:
         yield ("fingers",), str(error)
-
-
-def _patterns(keys: Manifest) -> tuple[str, ...]:
-    return texts_of(keys.files)
 
 
 def texts_of(value: Text) -> tuple[str, ...]:

@@ -12,7 +12,7 @@ from attrs import frozen
 from graspsense.core.values.errors import ConfigError
 from graspsense.core.values.label_text import is_missing_label
 from graspsense.sources.csv_columns import CsvColumns
-from graspsense.sources.manifest.description import ReadManifest
+from graspsense.sources.manifest.description import ReadManifest, texts_of
 from graspsense.sources.manifest.patterns import FileTemplate, PatternError, file_template
 
 
@@ -42,10 +42,9 @@ def files_of(manifest: ReadManifest) -> list[NamedFile]:
     keys = manifest.keys
     files = list(_listed(manifest)) if keys.list else list(_matching(manifest))
     if not files:
-        patterns = (keys.files,) if isinstance(keys.files, str) else keys.files
         some = [name for name, _ in tree_below(manifest.base)][:5]
         raise ConfigError(
-            f"{manifest.place}: no file in {manifest.base} matches {' or '.join(map(repr, patterns))}. "
+            f"{manifest.place}: no file in {manifest.base} matches {' or '.join(map(repr, texts_of(keys.files)))}. "
             + (f"It contains, for example: {', '.join(some)}" if some else "The folder is empty")
         )
     return files
@@ -67,9 +66,8 @@ def _matching(manifest: ReadManifest) -> Iterator[NamedFile]:
 
 def _templates(manifest: ReadManifest) -> list[FileTemplate]:
     """Return the patterns of the files. Raises ConfigError."""
-    given = manifest.keys.files
     try:
-        return [file_template(pattern) for pattern in ((given,) if isinstance(given, str) else given)]
+        return [file_template(pattern) for pattern in texts_of(manifest.keys.files)]
     except PatternError as error:
         raise ConfigError(f"{manifest.place}: files: {error}") from None
 

@@ -113,7 +113,7 @@ def grasps_in(
         raise DataDamaged(table.damage)
     columns = samples(manifest, table)
     if manifest.keys.split != "force":
-        yield _grasp(manifest, file, table, columns)
+        yield from _grasps(manifest, file, table, columns)
         return
     for part in squeezes(columns):
         yield from each_readable(part.source, partial(_grasps, manifest, file, table, part))
@@ -121,20 +121,14 @@ def grasps_in(
 
 def _grasps(
     manifest: ReadManifest, file: NamedFile, table: ColumnTable, columns: GraspColumns
-) -> tuple[LabelledRecording]:
-    return (_grasp(manifest, file, table, columns),)
-
-
-def _grasp(
-    manifest: ReadManifest, file: NamedFile, table: ColumnTable, columns: GraspColumns
-) -> LabelledRecording:
-    """Return the grasp that these samples of a table are. Raises ConfigError, DataDamaged."""
+) -> Iterator[LabelledRecording]:
+    """Yield the one grasp that these samples of a table are. Raises ConfigError, DataDamaged."""
     keys = manifest.keys
     cut = cut_at(columns, keys.cut) if keys.cut else columns
     kept = resampled(cut, keys.resample_hz) if keys.resample_hz else cut
     with np.errstate(all="ignore"):  # what is infinite is refused by `checked_recording`
         notices = tuple(notices_of(cut, zeroed=bool(keys.zero)))
-    return LabelledRecording(
+    yield LabelledRecording(
         recording=_checked(kept, table, keys.rate_hz or 1.0),
         source=cut.source,
         label=label_of(manifest, table),

@@ -43,23 +43,10 @@ _STAMP: Final = re.compile(r"(?P<text>.*?)(?P<gap>[-_ ]?)(?P<stamp>\d{8}[T_-]?\d
 _NUMBER: Final = re.compile(r"(?P<text>.*?)(?P<gap>[-_ ]?)(?P<number>\d+)(?P<end>)")
 _OF_A_SET: Final = re.compile("train|test|valid")
 _LABELS: Final = frozenset(["label", "class", "object", "material", "kind", "fruit", "target", "item"])
-_PARTS: Final = frozenset(
-    [
-        "trial",
-        "grasp",
-        "tap",
-        "squeeze",
-        "episode",
-        "run",
-        "id",
-        "seq",
-        "test",
-        "touch",
-        "press",
-        "repetition",
-        "rep",
-    ]
-)
+_PARTS: Final = frozenset({
+    "trial", "grasp", "tap", "squeeze", "episode", "run", "id", "seq", "test", "touch", "press", "repetition",
+    "rep"
+})  # fmt: skip
 _MOST_LABELS: Final = 100
 _ALIKE: Final = 3
 """Most arrays of a file with the same name but for its number that are not taken for grasps."""
