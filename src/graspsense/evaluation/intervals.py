@@ -14,11 +14,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from attrs import field, frozen
 
 from graspsense.core.values.errors import counted
+
+if TYPE_CHECKING:
+    from graspsense.core.learn.labelled import Labelled
 
 Z: Final = 1.959963984540054
 """97.5 % quantile of the standard normal distribution."""
@@ -127,6 +130,13 @@ def rate_of(
     return RecognitionRate(correct, n, clustered(right, instances, comparisons), instances=count)
 
 
+def rate_among(trials: Labelled, right: Sequence[bool], rows: Sequence[int] | None = None) -> RecognitionRate:
+    """Return the rate of some of these trials (default: all), with the interval that their instances allow."""
+    chosen = range(len(right)) if rows is None else rows
+    instances = None if trials.instances is None else [trials.instances[i] for i in chosen]
+    return rate_of([right[i] for i in chosen], instances, trials.no_interval)
+
+
 def too_few(instances: int) -> str:
     """Return the reason why a rate on this number of instances has no interval."""
     return f"{counted(instances, 'instance')}, at least {MIN_INSTANCES} are needed"
@@ -139,7 +149,7 @@ def clustered(right: Sequence[bool], instances: Sequence[str], comparisons: floa
     p = correct / n
     # Where every trial is right (or wrong), the design effect is unknown; trials of an instance then count as one.
     effect = n / count if p in (0.0, 1.0) else max(variance / (p * (1.0 - p) / n), 1.0)
-    return wilson(correct / effect, n / effect, _t(count - 1, comparisons))
+    return wilson(correct / effect, n / effect, t_quantile(count - 1, comparisons))
 
 
 def wilson(correct: float, n: float, quantile: float = Z) -> Interval:
@@ -176,7 +186,7 @@ def difference(
     if count < MIN_INSTANCES:
         return Difference(value, None, too_few(count))
     each = [float(x) - float(y) for x, y in zip(minuend, subtrahend, strict=True)]
-    half = _t(count - 1, comparisons) * math.sqrt(_variance_of_mean(each, instances)[0])
+    half = t_quantile(count - 1, comparisons) * math.sqrt(_variance_of_mean(each, instances)[0])
     low, high = min(value - half, independent[0]), max(value + half, independent[1])
     return Difference(value, (max(low, -1.0), min(high, 1.0)))
 
@@ -195,7 +205,7 @@ def mean_interval(
             return None, too_few(count)
         return None, f"{counted(count, 'trial')}, at least {MIN_INSTANCES} are needed"
     mean = math.fsum(values) / len(values)
-    half = _t(count - 1) * math.sqrt(_variance_of_mean(values, units)[0])
+    half = t_quantile(count - 1) * math.sqrt(_variance_of_mean(values, units)[0])
     return (mean - half, mean + half), ""
 
 
@@ -212,7 +222,7 @@ def _variance_of_mean(values: Sequence[float], instances: Sequence[str]) -> tupl
     ) / n**2, count
 
 
-def _t(degrees: int, comparisons: float = 1.0) -> float:
+def t_quantile(degrees: int, comparisons: float = 1.0) -> float:
     """Return the 97.5 % quantile of Student's distribution, for one of several comparisons."""
     from scipy.special import stdtrit
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
@@ -20,7 +21,7 @@ from graspsense.evaluation.crossval import ClassifierFactory, FitRefused, cross_
 from graspsense.evaluation.doubt import SetCoverage, exchangeable_instances, set_coverage
 from graspsense.evaluation.folds import INSTANCE_HELD_OUT, in_order, instance_held_out, stratified
 from graspsense.evaluation.gathered_warnings import gathered_warnings
-from graspsense.evaluation.intervals import Difference, RecognitionRate, difference, rate_of
+from graspsense.evaluation.intervals import Difference, RecognitionRate, difference, rate_among, rate_of
 
 if TYPE_CHECKING:
     from graspsense.core.learn.labelled import Labelled
@@ -236,20 +237,9 @@ def _measured(
         right[protocol] = pooled.right(labels)
         if sets is None:
             sets = set_coverage(
-                pooled, labels, exchangeable_instances(trials), groups, [folds], _rate_among(trials)
+                pooled, labels, exchangeable_instances(trials), groups, [folds], partial(rate_among, trials)
             )
     return CandidateResult(right=right, training_s=seconds[0], sets=sets)
-
-
-def _rate_among(trials: Labelled) -> Callable[[Sequence[bool], Sequence[int] | None], RecognitionRate]:
-    """Return a function that gives the rate of some rows, or of all, with the interval that the trials allow."""
-
-    def rate(right: Sequence[bool], rows: Sequence[int] | None) -> RecognitionRate:
-        chosen = range(len(trials)) if rows is None else rows
-        instances = None if trials.instances is None else [trials.instances[i] for i in chosen]
-        return rate_of([right[i] for i in chosen], instances, trials.no_interval)
-
-    return rate
 
 
 def _ranked(

@@ -15,6 +15,7 @@ import time
 import warnings
 from collections.abc import Callable, Sequence
 from functools import partial
+from operator import eq
 from typing import Any, Final
 
 import numpy as np
@@ -28,7 +29,7 @@ from graspsense.core.values.errors import ConfigError
 from graspsense.core.values.features import FeatureTable, table_of
 from graspsense.evaluation.distribution import DistributionDistance, distribution_distance
 from graspsense.evaluation.equivalence import Equivalence, equivalence
-from graspsense.experiments.recognise import TEST_SEED_OFFSET
+from graspsense.experiments.recognise import TEST_SEED_OFFSET, predictions
 from graspsense.sources.simulated import Group, SimulationPlan, plan_trials
 
 TIME_MARGIN: Final = 1.25
@@ -221,12 +222,8 @@ def _rate(
     seed: int,
 ) -> float:
     """Return the share of test grasps that a classifier recognises which is trained on the other table."""
-    classifier = learner.create()
-    classifier.fit(training[0], list(training[1]), seed)
-    classes = classifier.classes()
-    best = classifier.probabilities(test[0]).argmax(axis=1)
-    right = sum(classes[int(k)] == label for k, label in zip(best, test[1], strict=True))
-    return float(right / len(test[1]))
+    predicted = predictions(learner, *training, test[0], seed)
+    return float(np.mean(list(map(eq, predicted, test[1]))))
 
 
 def _point(

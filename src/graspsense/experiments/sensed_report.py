@@ -6,11 +6,9 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from graspsense.core.values.errors import PluginUnavailable
 from graspsense.experiments.sensed import TIME_MARGIN
 from graspsense.report.simulation import axes_of, markdown_table
-from graspsense.report.trace_plot import MATPLOTLIB_HINT
-from graspsense.report.write import write_picture
+from graspsense.report.write import new_figure, write_picture
 
 if TYPE_CHECKING:
     from graspsense.experiments.sensed import SensedPoint, SensedTrade
@@ -107,13 +105,7 @@ def sensed_png(trade: SensedTrade, path: Path) -> None:
 
     Raises PluginUnavailable without matplotlib, ConfigError if the file cannot be written.
     """
-    try:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise PluginUnavailable(f"{MATPLOTLIB_HINT} ({error})") from error
-    figure = Figure(figsize=(11.0, 5.2), dpi=100, layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(11.0, 5.2, dpi=100)
     left, right = figure.subplots(1, 2)
     _draw_rates(left, trade)
     _draw_distances(right, trade)

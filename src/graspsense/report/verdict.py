@@ -16,10 +16,13 @@ LEAST_TRIALS: Final = 10
 
 def verdict(evaluation: Evaluation) -> str:
     """Return the rate with its interval, the comparison with guessing, and what the controls say about its origin."""
-    sentences = [_rate(evaluation), _against_guessing(evaluation.controls.get("majority_class"))]
-    sentences.append(_before_contact(evaluation))
-    sentences.append(_first_line(evaluation))
-    sentences.append(_width(evaluation.controls.get("width_only"), evaluation.headline.n))
+    sentences = (
+        _rate(evaluation),
+        _against_guessing(evaluation.controls.get("majority_class")),
+        _before_contact(evaluation),
+        _first_line(evaluation),
+        _width(evaluation.controls.get("width_only"), evaluation.headline.n),
+    )
     return " ".join(filter(None, sentences))
 
 

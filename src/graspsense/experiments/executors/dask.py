@@ -34,7 +34,8 @@ class DaskCluster:
 
     def __init__(self, address: str | None, workers: int) -> None:
         try:
-            dask, self._distributed = _parts()
+            # Imported only here, because the import takes a second.
+            dask, self._distributed = import_module("dask"), import_module("distributed")
         except ImportError as error:
             raise PluginUnavailable(f"{HINT} ({error})") from error
         self._cluster: Any = None
@@ -222,11 +223,6 @@ def _done(task: Task, answer: str | Exception) -> TaskResult:
     if isinstance(answer, Exception):
         return TaskResult.failed(task, f"the worker failed: {named(answer)}")
     return TaskResult.from_text(answer)
-
-
-def _parts() -> tuple[Any, Any]:
-    """Return Dask's modules. They are imported only here, because the import takes a second."""
-    return import_module("dask"), import_module("distributed")
 
 
 _GONE: Final = "the Dask scheduler, or the connection to it, is gone"

@@ -8,11 +8,11 @@ from typing import Any, Final
 from attrs import frozen
 
 from graspsense.core.components.strict import structured
+from graspsense.experiments.recognise import classifiers_of
 from graspsense.experiments.task_results import ClassifierResult, RecognitionResult
 from graspsense.experiments.trade.costs import CostSettings
 from graspsense.experiments.trade.trade_task import (
     STRATIFIED,
-    classifiers_of,
     predictions,
     settings_of,
     simulated_result,

@@ -13,11 +13,11 @@ from graspsense.core.components.strict import structured
 from graspsense.core.learn.checkpoints import contact_of, until_checkpoint
 from graspsense.core.values.features import Features, table_of
 from graspsense.core.values.signals import Phase
+from graspsense.experiments.recognise import classifiers_of
 from graspsense.experiments.task_results import ClassifierResult, RecognitionResult
 from graspsense.experiments.trade.costs import CostSettings
 from graspsense.experiments.trade.trade_task import (
     STRATIFIED,
-    classifiers_of,
     predictions,
     settings_of,
     simulated_result,

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 from graspsense.experiments.findings import CONTROLS, Findings, FoundTable, control_cells, percent
-from graspsense.experiments.summary import ConditionResult, Summary
+from graspsense.experiments.summary import Summary
 from graspsense.experiments.trade.classifier_findings import compare_classifiers
 from graspsense.experiments.trade.cost_findings import Report, cost_report, damage_table
 from graspsense.experiments.trade.sequential_findings import compare_sequential
@@ -30,7 +30,11 @@ def findings(summary: Summary) -> Findings:
     reports: dict[str, Report] = {}
     for part, case in parts.items():
         title = titles.get(part, summary.planned.experiment.title)
-        conditions = _conditions_of(summary, part)
+        conditions = [
+            condition
+            for condition in summary.conditions
+            if (condition.case.part or summary.planned.name) == part
+        ]
         if not conditions:
             continue
         if case.kind == "compare":
@@ -60,12 +64,6 @@ def findings(summary: Summary) -> Findings:
         drawn={part: report.picture for part, report in reports.items() if report.picture},
         values=values,
     )
-
-
-def _conditions_of(summary: Summary, part: str) -> list[ConditionResult]:
-    return [
-        condition for condition in summary.conditions if (condition.case.part or summary.planned.name) == part
-    ]
 
 
 def _controls_table(summary: Summary, titles: Mapping[str, str]) -> FoundTable | None:

@@ -19,11 +19,11 @@ from attrs.validators import ge, le
 from graspsense.core.components.config import settings_from
 from graspsense.core.components.strict import structured
 from graspsense.evaluation.folds import INSTANCE_HELD_OUT, instance_held_out
+from graspsense.experiments.recognise import classifiers_of
 from graspsense.experiments.task_results import ClassifierResult, RecognitionResult
 from graspsense.experiments.trade.costs import CostSettings
 from graspsense.experiments.trade.squeezes import MOST_SQUEEZES
 from graspsense.experiments.trade.trade_task import (
-    classifiers_of,
     simulated_result,
     target_labels,
     trial_groups,

@@ -8,18 +8,15 @@ from typing import Any, Final
 from attrs import field, frozen
 from attrs.validators import ge
 
-from graspsense.core.components.config import SelectedComponent, settings_from
+from graspsense.core.components.config import settings_from
 from graspsense.core.components.strict import structured
-from graspsense.core.learn.labelled import Labelled, Target, class_of
 from graspsense.core.values.errors import ConfigError
-from graspsense.experiments.recognise import TEST_SEED_OFFSET
+from graspsense.experiments.recognise import TEST_SEED_OFFSET, classifiers_of, true_and_predicted
 from graspsense.experiments.task_results import ClassifierResult, RecognitionResult
 from graspsense.experiments.trade.costs import CostSettings
 from graspsense.experiments.trade.trade_task import (
-    classifiers_of,
     settings_of,
     simulated_result,
-    target_labels,
     trial_groups,
 )
 from graspsense.sources.simulated import simulated
@@ -57,7 +54,7 @@ def physics(params: Mapping[str, Any], seed: int) -> RecognitionResult:
     results = []
     for name, learner in classifiers_of(params).items():
         for target in settings.targets:
-            true, predicted = _predictions(learner, training, test, target, seed)
+            true, predicted = true_and_predicted(learner, training, test, target, seed)
             results.append(ClassifierResult.from_answers(name, target, PROTOCOL, true, predicted, cost=cost))
     return simulated_result(test, results)
 
@@ -73,20 +70,3 @@ def _wrong_model(params: Mapping[str, Any], settings: ModelErrorSettings) -> Any
             ) from None
     wrong["gripper"].update(settings.learned_on)
     return settings_from(wrong, "the wrong model")
-
-
-def _predictions(
-    learner: SelectedComponent, training: Labelled, test: Labelled, target: Target, seed: int
-) -> tuple[list[str], list[str]]:
-    """Return true and predicted labels, with a model for each class if the target is `state`."""
-    true: list[str] = []
-    predicted: list[str] = []
-    classes = sorted({class_of(label) for label in training.labels}) if target == "state" else [""]
-    for name in classes:
-        known, tested = (data.of_class(name) if name else data for data in (training, test))
-        classifier = learner.create()
-        classifier.fit(known.table, target_labels(known.labels, target), seed)
-        labels = classifier.classes()
-        true += target_labels(tested.labels, target)
-        predicted += [labels[k] for k in classifier.probabilities(tested.table).argmax(axis=1)]
-    return true, predicted

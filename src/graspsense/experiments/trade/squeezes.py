@@ -13,17 +13,16 @@ from graspsense.core.components.config import SelectedComponent
 from graspsense.core.components.strict import structured
 from graspsense.core.learn.labelled import Labelled, Target
 from graspsense.core.values.errors import ConfigError, counted
-from graspsense.evaluation.folds import INSTANCE_HELD_OUT, instance_held_out
+from graspsense.evaluation.folds import INSTANCE_HELD_OUT, instance_held_out, trials_by_class
+from graspsense.experiments.recognise import classifiers_of
 from graspsense.experiments.task_results import ClassifierResult, RecognitionResult, TrialValues
 from graspsense.experiments.trade.costs import CostSettings, mean_seconds
 from graspsense.experiments.trade.trade_task import (
     FOLDS,
-    classifiers_of,
     settings_of,
     simulated_result,
     target_labels,
     trial_groups,
-    trials_by_class,
 )
 from graspsense.sources.simulated import simulated
 
