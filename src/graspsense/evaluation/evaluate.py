@@ -183,7 +183,7 @@ class _Evaluator:
     ) -> dict[str, Measurement]:
         """Measure the controls, and warn if they show that the recording itself reveals the labels."""
         trials = self.trials
-        first = trials.first_line
+        opening = trials.first_line
         majority_correct, majority = self._majority(headline)
         controls = {
             "before_contact": self._other_features(
@@ -193,7 +193,11 @@ class _Evaluator:
                 "features from before contact only",
                 trials.no_before_contact,
             ),
-            **({} if first is None else {"first_line": self._other_features("first_line", first, headline)}),
+            **(
+                {}
+                if opening is None
+                else {"first_line": self._other_features("first_line", opening, headline)}
+            ),
             "width_only": self._other_features(
                 "width_only", trials.width, headline, "the width alone", trials.no_width
             ),
