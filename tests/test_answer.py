@@ -16,10 +16,10 @@ def condition(name, *rates, n=100, simulated=True):
 
     def of(rate):
         predicted = ["can:full"] * round(rate * n) + ["can:empty"] * (n - round(rate * n))
-        return ClassifierResult.of("c45", "both", "stratified_10_fold", ["can:full"] * n, predicted)
+        return ClassifierResult.from_answers("c45", "both", "stratified_10_fold", ["can:full"] * n, predicted)
 
     return ConditionResult(
-        case=SimpleNamespace(name=name, part="", learners=(), at={"force": name}),
+        case=SimpleNamespace(name=name, part="", learners=(), levels={"force": name}),
         classifier="c45",
         target="both",
         by_seed={seed: of(rate) for seed, rate in enumerate(rates)},

@@ -75,7 +75,7 @@ def test_a_candidate_that_is_far_worse_is_told_and_the_rate_of_a_clear_best_stay
     )
     chosen = rate_of_chosen(right, None)
     assert chosen.rate == pytest.approx(right[0].mean(), abs=0.01)
-    assert chosen.of == 4
+    assert chosen.candidates == 4
 
 
 def test_candidates_with_the_same_answers_are_one_comparison():

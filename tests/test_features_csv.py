@@ -154,7 +154,7 @@ def test_labels_that_differ_in_case_only_are_noted(csv):
 def test_instances_order_and_what_is_known_before_the_contact(csv):
     lines = [f"{'ab'[i % 2]},thing{i % 4},{100 - i},{i % 3},{i % 5}" for i in range(12)]
     path = csv("what,thing,when,start,p\n" + "\n".join(lines) + "\n")
-    found = read_labelled(path, "what", instance="thing", order="when", before=["start"])
+    found = read_labelled(path, "what", instance="thing", order="when", known_before=["start"])
 
     assert found.instances == ("thing0", "thing1", "thing2", "thing3") * 3
     assert found.order == tuple(range(11, -1, -1))

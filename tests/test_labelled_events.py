@@ -250,12 +250,12 @@ def test_the_fitted_threshold_is_the_best_one_next_to_that_of_the_unit():
     recordings, told = thresholds()
     one = evaluate_kind("slip", recordings, told, factor=10.0, tolerance_s=0.1, folds=10, seed=0)
     assert one.factors == pytest.approx([10 * 10**-0.75] * 8)  # the largest of the steps that is at most 3
-    assert (one.fitted.found, one.fitted.labelled, one.fitted.false_alarms) == (24, 24, 0)
+    assert (one.fitted.detected, one.fitted.labelled, one.fitted.false_alarms) == (24, 24, 0)
     assert one.fitted.delay.median_s == pytest.approx(0.05)
     assert one.fitted.delay.interval == pytest.approx((0.05, 0.05))
     assert one.fitted.recall.instances == 8
     assert one.fitted.recall.interval[0] < 0.8  # 24 trials of 8 groups say no more than 8
-    assert one.chance.found == 0
+    assert one.chance.detected == 0
 
 
 def test_the_threshold_of_a_group_does_not_come_from_its_own_recordings():
@@ -276,7 +276,7 @@ def test_one_group_alone_has_no_fitted_score():
     one = evaluate_kind("slip", recordings, told, factor=1.0, tolerance_s=0.1, folds=10, seed=0)
     assert one.fitted is None
     assert "none can be held out" in one.not_fitted
-    assert one.given.found == 3
+    assert one.given.detected == 3
 
 
 def boxes(folder, newtons=0.15):

@@ -29,7 +29,6 @@ LONG_FUNCTIONS: dict[str, str] = {}
 
 MANY_PARAMETERS = {
     "graspsense/cli/collect.py:collect": OPTIONS,
-    "graspsense/cli/emulate.py:emulate": OPTIONS,
     "graspsense/cli/evaluate.py:evaluate": OPTIONS,
     "graspsense/cli/experiment.py:experiment": OPTIONS,
     "graspsense/cli/identify.py:identify": OPTIONS,
@@ -37,8 +36,6 @@ MANY_PARAMETERS = {
     "graspsense/cli/plugins.py:check": OPTIONS,
     "graspsense/cli/report.py:report": OPTIONS,
     "graspsense/cli/run.py:run": OPTIONS,
-    "graspsense/cli/tradeoff.py:condition": OPTIONS,
-    "graspsense/cli/tradeoff.py:simulation": OPTIONS,
     "graspsense/cli/train.py:train": OPTIONS,
     "graspsense/core/components/setting.py:setting": "public; every part of a declaration is optional, by keyword only",
     "graspsense/core/grasp/transmission.py:screw_linkage": "the ten published constants of a linkage, by keyword only",

@@ -36,7 +36,7 @@ def test_features_without_information_are_worse_and_the_same_trials_are_compared
     }
     assert {candidate.rates["instance_held_out"].n for candidate in found.candidates} == {180}
     assert found.candidates[0].name in found.verdict
-    assert found.chosen.of == 6
+    assert found.chosen.candidates == 6
     assert found.chosen.rate <= found.candidates[0].rates["instance_held_out"].rate
     assert found.candidates[0].rates["instance_held_out"].interval == found.chosen.interval
     assert found.chosen.words in found.verdict

@@ -31,7 +31,7 @@ def case(name, cost, *rates, n=100):
 
     def of(rate):
         predicted = ["can:full"] * round(rate * n) + ["can:empty"] * (n - round(rate * n))
-        return ClassifierResult.of(
+        return ClassifierResult.from_answers(
             "c45", "state", "stratified_10_fold", ["can:full"] * n, predicted, cost=cost
         )
 

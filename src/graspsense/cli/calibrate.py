@@ -121,7 +121,10 @@ def delivered_force(readings: str, replace: bool, as_json: bool, **asked: Any) -
 
     with _set_up(asked, replace) as setup:
         columns = _columns(readings, "asked_n", "delivered_n")
-        table = load_table((one, two) for one, two in _rows(readings, columns, "asked_n", "delivered_n"))
+        table = load_table(
+            (asked_n, delivered_n)
+            for asked_n, delivered_n in _rows(readings, columns, "asked_n", "delivered_n")
+        )
         data = {"asked_n": list(table.pad_n), "delivered_n": list(table.load_n)}
         _store(setup, "delivered-force", data, as_json)
         if not as_json:
@@ -146,15 +149,17 @@ def friction(gaps: int, narrowest_m: float, replace: bool, as_json: bool, **aske
             setup.backend.tare(unloaded_images(setup.rig, setup.info.tare_images, timeout_s=10.0))
         widest_m = setup.rig.open().frame.gap_m * 0.95
         step_m = (widest_m - narrowest_m) / (gaps - 1)
-        found = breakaways(setup.rig, [narrowest_m + i * step_m for i in range(gaps)], setup.first_effort_n)
+        measured = breakaways(
+            setup.rig, [narrowest_m + i * step_m for i in range(gaps)], setup.first_effort_n
+        )
         data = {
-            "gap_m": [breakaway.gap_m for breakaway in found],
-            "closing_n": [breakaway.closing_n for breakaway in found],
-            "opening_n": [breakaway.opening_n for breakaway in found],
+            "gap_m": [breakaway.gap_m for breakaway in measured],
+            "closing_n": [breakaway.closing_n for breakaway in measured],
+            "opening_n": [breakaway.opening_n for breakaway in measured],
         }
         _store(setup, "friction", data, as_json)
         if not as_json:
-            rows = [(f"{a * 1e3:.1f}", f"{b:.2f}", f"{c:.2f}") for a, b, c in found]
+            rows = [(f"{a * 1e3:.1f}", f"{b:.2f}", f"{c:.2f}") for a, b, c in measured]
             echo_table(("GAP mm", "CLOSING N", "OPENING N"), rows)
 
 
@@ -287,14 +292,14 @@ def _grouped(
     from graspsense.core.values.errors import DataDamaged
 
     columns = _columns(path, group, *names)
-    found: dict[str, list[tuple[float, ...]]] = {value: [] for value in values}
+    readings_of: dict[str, list[tuple[float, ...]]] = {value: [] for value in values}
     for line, value, numbers in zip(
         columns.lines, columns.cells[group], _rows(path, columns, *names), strict=True
     ):
-        if value not in found:
+        if value not in readings_of:
             raise DataDamaged(f"{path}:{line}: {group} is {value[:40]!r}, expected {' or '.join(values)}")
-        found[value].append(numbers)
-    return found
+        readings_of[value].append(numbers)
+    return readings_of
 
 
 def _columns(path: str, *names: str) -> CsvColumns:

@@ -123,7 +123,7 @@ def _pairs(
 
 def _sets(given: Mapping[str, Any], key: str) -> bool:
     """Return whether an option -o gives this key."""
-    return any(one.partition("=")[0].strip() == key for one in given["options"])
+    return any(option.partition("=")[0].strip() == key for option in given["options"])
 
 
 def _tables(
@@ -145,14 +145,14 @@ def _tables(
         trials = trials_of(source, progress, given)
         features = trials.provenance.get("settings", {}).get("features", {})
         return {str(features.get("type", "given")).rpartition("/")[2]: trials}
-    known = [one for one in installed().components("feature-set") if one.qualified != UNION]
-    available = [one for one in known if _available(one, notes)]
+    known = [component for component in installed().components("feature-set") if component.qualified != UNION]
+    available = [component for component in known if _available(component, notes)]
     # Of equal rates the first candidate is chosen: that with the fewest features.
-    available.sort(key=lambda one: (len(one.declared().features), one.qualified))
+    available.sort(key=lambda component: (len(component.declared().features), component.qualified))
     try:
         united = _with_union(source, progress, given, available)
     except GraspsenseError as error:
-        own = [one for one in available if one.distribution == "graspsense"]
+        own = [component for component in available if component.distribution == "graspsense"]
         if len(own) == len(available):
             raise
         notes.append(f"only the features of graspsense are used: {error}")
@@ -212,7 +212,7 @@ def _config(united: Labelled, component: Component, **keys: Any) -> Any:
 
     known = keys_of(component.config_class())
     given = {**united.provenance.get("settings", {}).get("features", {}), **keys}
-    return build(component, {key: one for key, one in given.items() if key in known})
+    return build(component, {key: value for key, value in given.items() if key in known})
 
 
 def _part(united: Labelled, component: Component, columns: NDArray[np.int64], **keys: Any) -> Labelled:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from contextlib import suppress
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -60,14 +60,9 @@ def collect(
     operator: str | None,
     values: tuple[str, ...],
     changed: bool,
-    pipeline: str | None,
-    gripper: str | None,
-    object_name: str | None,
-    options: tuple[str, ...],
-    seed: int | None,
-    force: bool,
     live: LiveOptions,
     as_json: bool,
+    **asked: Any,
 ) -> None:
     """Prompt for the next object, grasp it and store the trial.
 
@@ -85,18 +80,21 @@ def collect(
     from graspsense.store.store import Store
 
     wanted = Wanted(
-        words=tuple(one.strip() for one in labels.split(",") if one.strip()),
+        words=tuple(word.strip() for word in labels.split(",") if word.strip()),
         each=each,
-        seed=seed or 0,
+        seed=asked["seed"] or 0,
         labels={**({"operator": operator} if operator else {}), **dict(map(value_label, values))},
     )
-    first = settings_of(pipeline, gripper, object_name, options, seed, force)
-    check(first)
-    options = options if _has_model(first) else (*options, *GRIPPER_ALONE)
-    selects = _label_selects_object(first, wanted.words, names_object(object_name, options))
+    settings = settings_of(**asked)
+    check(settings)
+    if not _has_model(settings):
+        asked["options"] = (*asked["options"], *GRIPPER_ALONE)
+    selects = _label_selects_object(
+        settings, wanted.words, names_object(asked["object_name"], asked["options"])
+    )
 
     def settings_for(word: str, number: int) -> Settings:
-        return settings_of(pipeline, gripper, word if selects else object_name, options, number, force)
+        return settings_of(**{**asked, "seed": number, **({"object_name": word} if selects else {})})
 
     with Store.open(save) as store, shown_live(live, save) as shown:
         _prepare(store, values)

@@ -81,17 +81,17 @@ def compare(
     learners = {name: learner_of(source, name, given) for name in names}
     with ProgressLine() as progress:
         trials = compared_trials(source, feature_sets, folds, progress, given)
-        found = rank(learners, trials, folds=folds, seed=given["seed"], progress=progress)
+        ranking = rank(learners, trials, folds=folds, seed=given["seed"], progress=progress)
     if out is not None:
         from graspsense.report.ranking_page import ranking_page
         from graspsense.report.write import write_html
 
-        write_html(Path(out), ranking_page(found, command_line(("out", "as_json"))))
+        write_html(Path(out), ranking_page(ranking, command_line(("out", "as_json"))))
     if as_json:
         page = {} if out is None else {"page": out}
-        echo_json({**to_json(found), "verdict": found.verdict, **page})
+        echo_json({**to_json(ranking), "verdict": ranking.verdict, **page})
         return
-    _print(found)
+    _print(ranking)
     if out is not None:
         echo_entry("page", out)
 
@@ -170,7 +170,7 @@ def _names(text: str, option: str, role: Role) -> tuple[str, ...]:
     from graspsense.core.components.registry import installed
     from graspsense.core.values.errors import UnknownName
 
-    names = tuple(dict.fromkeys(one.strip() for one in text.split(",") if one.strip()))
+    names = tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
     if not names:
         raise click.UsageError(f"{option} names nothing: give names with commas between them")
     for name in names:

@@ -76,7 +76,7 @@ def conditions_markdown(measured: Sequence[Conditions]) -> str:
             *(f"| {' | '.join(row)} |" for row in condition_rows(conditions)),
             "",
         ]
-    return "\n".join([*lines, f"CandidateResult with: {where_measured()}.", ""])
+    return "\n".join([*lines, f"Measured with: {where_measured()}.", ""])
 
 
 def _most_by(condition: FeatureCondition) -> str:

@@ -28,17 +28,23 @@ def devices(timeout_s: float, as_json: bool) -> None:
             "nan is not a number of seconds; give a number above 0", param_hint="--timeout"
         )
     probes = installed().probe_devices(timeout_s)
-    found = [(probe.distribution, device) for probe in probes for device in probe.devices]
+    devices = [(probe.distribution, device) for probe in probes for device in probe.devices]
     failed = {probe.distribution: probe.error for probe in probes if probe.error}
     for distribution, error in failed.items():
         talk(f"{distribution} could not look for its devices: {error}")
     if as_json:
-        listed = [{**attrs.asdict(device), "distribution": distribution} for distribution, device in found]
+        listed = [{**attrs.asdict(device), "distribution": distribution} for distribution, device in devices]
         echo_json({"devices": listed, "looked": [probe.distribution for probe in probes], "failed": failed})
-    elif found:
+    elif devices:
         rows = [
-            (one.backend, one.serial or "-", one.where, "ready" if one.ready else "not ready", one.advice)
-            for _, one in found
+            (
+                device.backend,
+                device.serial or "-",
+                device.where,
+                "ready" if device.ready else "not ready",
+                device.advice,
+            )
+            for _, device in devices
         ]
         echo_table(("GRIPPER", "SERIAL", "WHERE", "STATE", "ADVICE"), rows, {"STATE": state_style})
     elif probes:

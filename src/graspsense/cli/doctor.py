@@ -62,14 +62,14 @@ def doctor(timeout_s: float, repetitions: int | None, as_json: bool, **asked: An
         diagnoses = [Diagnosis("graspsense", _ourselves(plugins)), *plugins.diagnose(config, timeout_s)]
         if repetitions is not None:
             diagnoses.append(_latency(settings, repetitions))
-    problems = sum(diagnose.error != "" for diagnose in diagnoses) + sum(
-        finding.state == "problem" for diagnose in diagnoses for finding in diagnose.findings
+    problems = sum(diagnosis.error != "" for diagnosis in diagnoses) + sum(
+        finding.state == "problem" for diagnosis in diagnoses for finding in diagnosis.findings
     )
     if as_json:
-        echo_json({"problems": problems, "diagnoses": [_as_json(diagnose) for diagnose in diagnoses]})
+        echo_json({"problems": problems, "diagnoses": [_as_json(diagnosis) for diagnosis in diagnoses]})
     else:
-        for diagnose in diagnoses:
-            _print(diagnose)
+        for diagnosis in diagnoses:
+            _print(diagnosis)
         echo(f"{problems} problem(s)", Style.BAD) if problems else echo("no problem found", Style.GOOD)
     if problems:
         raise click.exceptions.Exit(EXIT_PROBLEM)
@@ -82,25 +82,27 @@ def _ourselves(plugins: Plugins) -> tuple[Finding, ...]:
 
     from graspsense.core.components.entries import Finding
 
-    found = [
+    findings = [
         Finding("system", "ok", f"Python {platform.python_version()} on {platform.platform()}",
                 numbers={"python": platform.python_version(), "platform": platform.platform()}),
     ]  # fmt: skip
     for name in ("numpy", "scipy", "scikit-learn", "numba"):
         try:
-            found.append(Finding(f"library {name}", "ok", version(name), numbers={"version": version(name)}))
+            findings.append(
+                Finding(f"library {name}", "ok", version(name), numbers={"version": version(name)})
+            )
         except PackageNotFoundError:
-            found.append(Finding(f"library {name}", "note", "not installed"))
+            findings.append(Finding(f"library {name}", "note", "not installed"))
     for status in plugins.statuses:
         subject = f"plugin {status.distribution}"
         numbers = {"version": status.version, "state": status.state}
         if status.state == "broken":
-            found.append(
+            findings.append(
                 Finding(subject, "problem", f"{status.version} does not load: {status.reason}",
                         f"graspsense plugins show {status.distribution}", numbers)
             )  # fmt: skip
         else:
-            found.append(
+            findings.append(
                 Finding(
                     subject,
                     "ok" if status.state == "loaded" else "note",
@@ -108,7 +110,7 @@ def _ourselves(plugins: Plugins) -> tuple[Finding, ...]:
                     numbers=numbers,
                 )
             )
-    return tuple(found)
+    return tuple(findings)
 
 
 def _latency(settings: Settings | None, repetitions: int) -> Diagnosis:
@@ -123,8 +125,8 @@ def _latency(settings: Settings | None, repetitions: int) -> Diagnosis:
     backend = gripper.create()
     try:
         info = backend.open(run.seed)
-        found = latency_findings(backend, gripper.declared.accepts, info, run, repetitions)
-        return Diagnosis(gripper.component.qualified, found)
+        findings = latency_findings(backend, gripper.declared.accepts, info, run, repetitions)
+        return Diagnosis(gripper.component.qualified, findings)
     except GraspsenseError as error:
         return Diagnosis(gripper.component.qualified, error=str(error))
     finally:

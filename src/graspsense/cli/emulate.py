@@ -10,7 +10,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
@@ -43,13 +43,8 @@ EXIT_FAILED: Final = 4
 def emulate(
     name: str,
     wire: str,
-    pipeline: str | None,
-    gripper: str | None,
-    object_name: str | None,
-    options: tuple[str, ...],
-    seed: int | None,
-    force: bool,
     as_json: bool,
+    **asked: Any,
 ) -> None:
     """Emulate the gripper NAME (for example pr2) as a device of the operating system, until Ctrl-C.
 
@@ -60,7 +55,7 @@ def emulate(
     from graspsense.core.control.garbage_collection import present_objects_kept
     from graspsense.core.values.errors import ConfigError, suggestion
 
-    if gripper is not None:
+    if asked["gripper"] is not None:
         raise click.UsageError("the gripper is the argument: graspsense emulate NAME, without --gripper")
     emulator = installed().emulator(name)
     if wire and wire not in emulator.entry.wires:
@@ -69,9 +64,8 @@ def emulate(
             + suggestion(wire, emulator.entry.wires)
         )
     backend = f"{emulator.distribution}/{emulator.entry.backend or emulator.name}"
-    settings = settings_of(
-        pipeline, backend, object_name, (*GRIPPER_ALONE, *emulator.entry.options, *options), seed, force
-    )
+    options = (*GRIPPER_ALONE, *emulator.entry.options, *asked["options"])
+    settings = settings_of(**{**asked, "gripper": backend, "options": options})
     device: EmulatedDevice = emulator.load()(settings.gripper.config, wire, settings.run.seed)
     try:
         with present_objects_kept(), _ended_by_signals():
@@ -99,12 +93,14 @@ def _ended_by_signals() -> Iterator[None]:
     def end(number: int, frame: FrameType | None) -> None:
         raise _Ended
 
-    before = {one: signal.signal(one, end) for one in (signal.SIGINT, signal.SIGTERM)}
+    handlers = {
+        signal_number: signal.signal(signal_number, end) for signal_number in (signal.SIGINT, signal.SIGTERM)
+    }
     try:
         yield
     finally:
-        for one, handler in before.items():
-            signal.signal(one, handler)
+        for signal_number, handler in handlers.items():
+            signal.signal(signal_number, handler)
 
 
 def _serve(device: EmulatedDevice, as_json: bool) -> None:
@@ -137,8 +133,8 @@ def _do(device: EmulatedDevice, word: str, as_json: bool) -> None:
     from graspsense.core.values.errors import suggestion
 
     if word == "help":
-        for one, what in device.words.items():
-            talk(f"  {one:<10}{what}")
+        for command, what in device.words.items():
+            talk(f"  {command:<10}{what}")
     elif word == "state" or word in device.words:
         if word != "state":
             device.tell(word)

@@ -7,13 +7,16 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from graspsense.cli.output import check_outputs, echo_json, file_to_write, file_to_write_as, page_to_write
+from graspsense.cli.options import target_option
+from graspsense.cli.output import check_outputs, echo_json, file_to_write_as, page_to_write
 from graspsense.cli.sources import (
     SOURCES,
     checkpoints_option,
     classifier_option,
     command_line,
     folds_option,
+    keep_features,
+    keep_option,
     learner_of,
     source_argument,
     source_options,
@@ -42,21 +45,13 @@ if TYPE_CHECKING:
     {SOURCES}""",
 )
 @source_argument
-@click.option(
-    "--target",
-    type=click.Choice(["both", "class", "state"]),
-    default="both",
-    show_default=True,
-    help="What is recognised: whole labels, classes, or the states within each class.",
-)
+@target_option("What is recognised: whole labels, classes, or the states within each class.")
 @folds_option
 @click.option(
     "--png", metavar="FILE.png", callback=file_to_write_as(".png"), help="Draw the confusion matrix."
 )
 @click.option("--report", metavar="DIR", help="Write the page DIR/report.html as well.")
-@click.option(
-    "--keep", metavar="FILE", callback=file_to_write, help="Write the features of all trials as a CSV file."
-)
+@keep_option
 @click.option("--overwrite", is_flag=True, help="Replace the file of --keep if it exists.")
 @checkpoints_option
 @click.option(
@@ -111,8 +106,7 @@ def evaluate(
     with ProgressLine() as progress:
         labelled = trials_of(source, progress, given, times, folds)
         labelled, parts = _parts(labelled, times, target)
-        if keep:
-            _keep(keep, labelled)
+        keep_features(keep, labelled)
         evaluation, early = _measured(learner, labelled, parts, target, folds, given["seed"], progress)
     if png:
         _draw(evaluation, Path(png))
@@ -152,12 +146,6 @@ def _measured(
         progress=progress,
     )
     return evaluation, early_recognition(learner, parts, folds=folds, seed=seed) if parts else None
-
-
-def _keep(keep: str, labelled: Labelled) -> None:
-    from graspsense.sources.features_csv import write_labelled
-
-    write_labelled(Path(keep), labelled)
 
 
 def _draw(evaluation: Evaluation, path: Path) -> None:
@@ -206,8 +194,8 @@ def _print_early(recognition: EarlyRecognition) -> None:
     rows = []
     for row in recognition.rows:
         told = [
-            "-" if one is None else percentage(one.rate) if one.n else "-"
-            for one in (row.covered, row.single)
+            "-" if share is None else percentage(share.rate) if share.n else "-"
+            for share in (row.covered, row.single)
         ]
         newtons = "-" if row.newtons is None else f"{row.newtons:.2f} N"
         costs = (f"{row.seconds:.3f} s", newtons)
@@ -247,15 +235,17 @@ def _print(evaluation: Evaluation) -> None:
         name: control for name, control in evaluation.controls.items() if name not in evaluation.protocols
     }
     measured = {
-        name: one for name, one in {**evaluation.protocols, **controls}.items() if one.rate is not None
+        name: measurement
+        for name, measurement in {**evaluation.protocols, **controls}.items()
+        if measurement.rate is not None
     }
     echo_table(
         ("PROTOCOL OR CONTROL", "RATE", "95 %", "TRIALS", "LOWER BY, IN POINTS", "WHAT"),
-        [_row(name, one, evaluation.headline.n) for name, one in measured.items()],
+        [_row(name, measurement, evaluation.headline.n) for name, measurement in measured.items()],
     )
-    for name, one in {**evaluation.protocols, **controls}.items():
-        if one.rate is None:
-            echo(f"{name}: not measured ({one.reason})", indent=2)
+    for name, measurement in {**evaluation.protocols, **controls}.items():
+        if measurement.rate is None:
+            echo(f"{name}: not measured ({measurement.reason})", indent=2)
     echo("\nconfusion (rows are the truth)")
     for line in confusion_text(evaluation.confusion):
         echo(f"  {line}")
@@ -266,13 +256,13 @@ def _print(evaluation: Evaluation) -> None:
         echo_table(("CLASS", "RATE", "95 %", "TRIALS"), rows)
     if evaluation.reliability is not None:
         echo("\nreliability of the probabilities")
-        bins = [(percentage(one.probability), percentage(one.rate.rate), percentages(one.rate.interval),
-                 str(one.rate.n)) for one in evaluation.reliability.curve]  # fmt: skip
+        bins = [(percentage(bin_.probability), percentage(bin_.rate.rate), percentages(bin_.rate.interval),
+                 str(bin_.rate.n)) for bin_ in evaluation.reliability.curve]  # fmt: skip
         echo_table(("MEAN PROBABILITY", "RATE", "95 %", "TRIALS"), bins)
     if evaluation.learning_curve:
         echo("\nlearning curve")
-        points = [(f"{one.trained_on:.0f}", percentage(one.rate.rate), percentages(one.rate.interval))
-                  for one in evaluation.learning_curve]  # fmt: skip
+        points = [(f"{point.trained_on:.0f}", percentage(point.rate.rate), percentages(point.rate.interval))
+                  for point in evaluation.learning_curve]  # fmt: skip
         echo_table(("TRAINING TRIALS", "RATE", "95 %"), points)
 
 
@@ -297,10 +287,10 @@ def _print_doubt(evaluation: Evaluation) -> None:
     if evaluation.reliability is not None:
         error = percentage(evaluation.reliability.calibration_error)
         raw = evaluation.reliability.uncalibrated_error
-        before = "" if raw is None else f" ({percentage(raw)} before calibration)"
+        raw_words = "" if raw is None else f" ({percentage(raw)} before calibration)"
         echo_entry(
             "probability",
-            f"Brier score {evaluation.reliability.brier:.3f}, expected calibration error {error}{before}",
+            f"Brier score {evaluation.reliability.brier:.3f}, expected calibration error {error}{raw_words}",
         )
 
 

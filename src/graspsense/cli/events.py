@@ -36,11 +36,11 @@ def evaluate_events(
             raise click.UsageError(f"--{name.replace('_', '-')} has no meaning with --events", context)
     if tolerance_s != tolerance_s:
         raise click.BadParameter("nan is no time: give a number of seconds", param_hint="--tolerance")
-    found = _evaluated(source, tolerance_s, folds, given)
+    evaluation = _evaluated(source, tolerance_s, folds, given)
     if as_json:
-        echo_json(to_json(found))
+        echo_json(to_json(evaluation))
     else:
-        _print(found)
+        _print(evaluation)
 
 
 def _evaluated(source: str, tolerance_s: float, folds: int, given: Mapping[str, Any]) -> EventsEvaluation:
@@ -64,7 +64,11 @@ def _evaluated(source: str, tolerance_s: float, folds: int, given: Mapping[str, 
         labelled = [
             _labelled(recording, group) for recording, group in zip(recordings, read.groups, strict=True)
         ]
-        names = list(dict.fromkeys(n for one in labelled for n in one.labelled if not n.endswith(NOT_KNOWN)))
+        names = list(
+            dict.fromkeys(
+                n for recording in labelled for n in recording.labelled if not n.endswith(NOT_KNOWN)
+            )
+        )
         total = len(recordings) * (len(STEPS) + 1)
         teller = EventTeller(controller, recordings, lambda done: progress("detecting events", done, total))
         factor = threshold_factor(recordings)
@@ -82,7 +86,9 @@ def _evaluated(source: str, tolerance_s: float, folds: int, given: Mapping[str, 
             if name in known
         }
         told = [teller(k, 1.0) for k in range(len(recordings))]
-    others = {name: sum(len(one.get(name, ())) for one in told) for name in known if name not in kinds}
+    others = {
+        name: sum(len(detected.get(name, ())) for detected in told) for name in known if name not in kinds
+    }
     return EventsEvaluation(
         source=source,
         detector=selected.component.name,
@@ -179,7 +185,7 @@ def _print_tables(evaluation: EventsEvaluation) -> None:
         for score in (kind.fitted, kind.given)
         if score is not None
     ]
-    rates = [one for score in scores for one in (score.recall, score.precision) if one is not None]
+    rates = [rate for score in scores for rate in (score.recall, score.precision) if rate is not None]
     reasons = dict.fromkeys(rate.no_interval for rate in rates if rate.interval is None)
     for reason in reasons:
         echo(f"no interval: {reason}")
@@ -199,7 +205,7 @@ def _row(score: EventScore) -> tuple[str, ...]:
         ends = "none" if delay.interval is None else f"{delay.interval[0]:.3f} to {delay.interval[1]:.3f}"
         delays = (f"{delay.median_s:.3f} ({delay.low_s:.3f} to {delay.high_s:.3f})", ends)
     return (
-        f"{score.found} of {score.labelled}",
+        f"{score.detected} of {score.labelled}",
         *_cells(score.recall),
         f"{score.false_alarms} ({per_minute:.2g})",
         *_cells(score.precision),

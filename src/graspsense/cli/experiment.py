@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from graspsense.cli.live import Live, LiveOptions, live_options, shown_live
-from graspsense.cli.options import force_option
+from graspsense.cli.options import force_option, keys_option
 from graspsense.cli.output import echo_json
 from graspsense.cli.terminal import Style, echo, echo_entry, echo_table, talk
 from graspsense.core.values.errors import counted
@@ -56,13 +56,7 @@ class ExperimentCommand(click.Command):
     help="serial, processes, dask, or dask:ADDRESS.  [default: processes; serial on one core]",
 )
 @click.option("--workers", type=int, help="Number of processes or local workers.  [default: number of cores]")
-@click.option(
-    "-o",
-    "options",
-    metavar="KEY=VALUE",
-    multiple=True,
-    help="Set a key of the file: -o seeds=3, -o data.trials=2. Can be repeated.",
-)
+@keys_option("Set a key of the file: -o seeds=3, -o data.trials=2.", "KEY=VALUE")
 @force_option
 @live_options
 @click.option("--dry-run", is_flag=True, help="Print what would be done, and do nothing.")
@@ -107,14 +101,14 @@ def experiment(
         return
     with shown_live(live) as shown:
         account = _run(planned, results, make, resume, shown)
-        found = summarise(planned, results)
-        page, problem = _written_page(found, results)
-        more = findings_of(found)
-        shown.told("progress", {"text": answer(found) if more is None else more.answer})
+        summary = summarise(planned, results)
+        page, problem = _written_page(summary, results)
+        more = findings_of(summary)
+        shown.told("progress", {"text": answer(summary) if more is None else more.answer})
     if as_json:
-        _print_json(found, more, page, _counts(account, problem))
+        _print_json(summary, more, page, _counts(account, problem))
     else:
-        _print(found, more, account, f"none: {problem}" if problem else str(page))
+        _print(summary, more, account, f"none: {problem}" if problem else str(page))
     if account.stopped == "interrupted":
         raise click.exceptions.Exit(EXIT_INTERRUPTED)
     if problem or not account.complete:
@@ -172,18 +166,18 @@ def _list(known: Iterable[str], as_json: bool) -> None:
 
     cores = os.cpu_count() or 1
     planned = {name: read_experiment(name) for name in known}
-    efforts = {name: effort_of(one) for name, one in planned.items()}
+    efforts = {name: effort_of(experiment) for name, experiment in planned.items()}
     if as_json:
         echo_json(
             [
-                {"name": name, "title": one.experiment.title, **_effort_as_json(efforts[name])}
-                for name, one in planned.items()
+                {"name": name, "title": experiment.experiment.title, **_effort_as_json(efforts[name])}
+                for name, experiment in planned.items()
             ]
         )
         return
     rows = [
-        (name, efforts[name].time_on(cores), str(efforts[name].tasks), one.experiment.title)
-        for name, one in planned.items()
+        (name, efforts[name].time_on(cores), str(efforts[name].tasks), experiment.experiment.title)
+        for name, experiment in planned.items()
     ]
     echo_table(("EXPERIMENT", "TIME", "TASKS", "WHAT"), rows)
     echo(f"\nTIME is for {cores} cores, {measured_on()}.")

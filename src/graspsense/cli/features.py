@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from graspsense.cli.output import check_outputs, echo_json, file_to_write
-from graspsense.cli.sources import named_store
+from graspsense.cli.options import keys_option
+from graspsense.cli.output import check_outputs, echo_json
+from graspsense.cli.sources import keep_features, keep_option, named_store
 from graspsense.cli.terminal import echo, echo_entry, echo_table
 
 if TYPE_CHECKING:
@@ -20,17 +20,10 @@ if TYPE_CHECKING:
 
 @click.command(short_help="Extract the features of a store again.")
 @click.argument("source", metavar="DIR", callback=named_store)
-@click.option(
-    "-o",
-    "options",
-    metavar="TABLE.KEY=VALUE",
-    multiple=True,
-    required=True,
-    help="Change a key of [features], [controller] or [run]: -o controller.contact_force_n=0.1. Can be repeated.",
+@keys_option(
+    "Change a key of [features], [controller] or [run]: -o controller.contact_force_n=0.1.", required=True
 )
-@click.option(
-    "--keep", metavar="FILE", callback=file_to_write, help="Write the features of all trials as a CSV file."
-)
+@keep_option
 @click.option("--overwrite", is_flag=True, help="Replace the file of --keep if it exists.")
 @click.option("--json", "as_json", is_flag=True, help="Print the comparison as JSON.")
 def features(source: str, options: tuple[str, ...], keep: str | None, overwrite: bool, as_json: bool) -> None:
@@ -44,16 +37,13 @@ def features(source: str, options: tuple[str, ...], keep: str | None, overwrite:
     from graspsense.store.naming import STORE
 
     check_outputs(keep, overwrite=overwrite)
-    before = labelled_store(source)
+    stored = labelled_store(source)
     with ProgressLine() as progress:
         after = labelled_store(
             source, options, progress=lambda done, total: progress("extracting features", done, total)
         )
-    if keep:
-        from graspsense.sources.features_csv import write_labelled
-
-        write_labelled(Path(keep), after)
-    rows = _rows(before, after)
+    keep_features(keep, after)
+    rows = _rows(stored, after)
     if as_json:
         echo_json(
             {
@@ -69,7 +59,7 @@ def features(source: str, options: tuple[str, ...], keep: str | None, overwrite:
     echo_table(
         ("FEATURE", "UNIT", "TRIALS BEFORE", "NOW", "MEDIAN BEFORE", "NOW"),
         [
-            (row["name"], row["unit"], _count(row["trials_before"], before), _count(row["trials"], after),
+            (row["name"], row["unit"], _count(row["trials_before"], stored), _count(row["trials"], after),
              _number(row["median_before"]), _number(row["median"]))
             for row in rows
         ],
@@ -81,7 +71,7 @@ def features(source: str, options: tuple[str, ...], keep: str | None, overwrite:
         echo_entry("written", keep)
 
 
-def _rows(before: Labelled, after: Labelled) -> list[dict[str, Any]]:
+def _rows(stored: Labelled, after: Labelled) -> list[dict[str, Any]]:
     """Return for each feature in how many trials it is defined, and its median, before and now."""
     import numpy as np
 
@@ -92,13 +82,13 @@ def _rows(before: Labelled, after: Labelled) -> list[dict[str, Any]]:
         return values[~np.isnan(values)]
 
     rows = []
-    names = dict.fromkeys((*after.table.names, *before.table.names))
+    names = dict.fromkeys((*after.table.names, *stored.table.names))
     units = {
-        **dict(zip(before.table.names, before.table.units, strict=True)),
+        **dict(zip(stored.table.names, stored.table.units, strict=True)),
         **dict(zip(after.table.names, after.table.units, strict=True)),
     }
     for name in names:
-        was, now = known(before, name), known(after, name)
+        was, now = known(stored, name), known(after, name)
         rows.append(
             {
                 "name": name,

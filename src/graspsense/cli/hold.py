@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import inf, nan
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
@@ -31,15 +31,7 @@ TO_GRASP_S: Final = 60.0
     help="Time from the grip until the fingers open.",
 )
 @pipeline_options
-def hold(
-    seconds: float,
-    pipeline: str | None,
-    gripper: str | None,
-    object_name: str | None,
-    options: tuple[str, ...],
-    seed: int | None,
-    force: bool,
-) -> None:
+def hold(seconds: float, **asked: Any) -> None:
     """Close, hold with little force, add force whenever the thing slips, and open at the end.
 
     Without --pipeline it is the pipeline hold of graspsense-romano, with a simulated gripper. The fingers open at the
@@ -48,12 +40,13 @@ def hold(
     from graspsense.cli.run import finish, grasped, print_trial
     from graspsense.core.pipeline.wiring import check
 
-    if any(option.partition("=")[0].strip() == "run.hold_s" for option in options):
+    if any(option.partition("=")[0].strip() == "run.hold_s" for option in asked["options"]):
         raise click.UsageError("--seconds sets run.hold_s: leave out -o run.hold_s")
     if seconds != seconds:
         raise click.BadParameter("nan is no time: give a number of seconds", param_hint="--seconds")
     lasting = (f"run.hold_s={seconds}", f"run.grasp_timeout_s={max(seconds + TO_GRASP_S, 300.0)}")
-    settings = settings_of(pipeline or PIPELINE, gripper, object_name, (*lasting, *options), seed, force)
+    options = (*lasting, *asked["options"])
+    settings = settings_of(**{**asked, "pipeline": asked["pipeline"] or PIPELINE, "options": options})
     check(settings)
     rows = HoldRows()
     trial, interrupted = grasped(settings, (rows,))

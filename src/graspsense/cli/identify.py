@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from graspsense.cli.options import keys_option
 from graspsense.cli.output import check_outputs, echo_json, file_to_write_as
 from graspsense.cli.sources import named_source
 from graspsense.cli.terminal import Style, echo, echo_entry, echo_table, talk
@@ -49,13 +50,7 @@ if TYPE_CHECKING:
     help="Pipeline with the simulated gripper.  [default: default]",
 )
 @click.option("--gripper", metavar="NAME", help="Another simulated gripper. (gripper.type)")
-@click.option(
-    "-o",
-    "options",
-    metavar="TABLE.KEY=VALUE",
-    multiple=True,
-    help="Set a key: -o gripper.pad_stiffness_n_m=inf for rigid fingertips. Can be repeated.",
-)
+@keys_option("Set a key: -o gripper.pad_stiffness_n_m=inf for rigid fingertips.")
 @click.option(
     "--force",
     is_flag=True,

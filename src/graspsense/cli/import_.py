@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 from attrs import frozen
 
+from graspsense.cli.options import keys_option
 from graspsense.cli.output import echo_json, file_to_write_as
 from graspsense.cli.sources import named_source
 from graspsense.cli.terminal import Style, echo, echo_as_it_is, echo_entry, echo_table
@@ -65,13 +66,7 @@ FEW: Final = 3
     default="default",
     help="Pipeline that computes the features.  [default: default]",
 )
-@click.option(
-    "-o",
-    "options",
-    metavar="TABLE.KEY=VALUE",
-    multiple=True,
-    help="Set a key of the pipeline: -o controller.probing_force_n=17. Can be repeated.",
-)
+@keys_option("Set a key of the pipeline: -o controller.probing_force_n=17.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def import_(
     sources: tuple[str, ...],
@@ -235,11 +230,15 @@ class _Chosen:
         given: dict[str, float] = {
             key: controller[key] for key in THRESHOLDS if key in controller and key not in is_open
         }
-        found = thresholds_for([recording.labelled.recording for recording in recordings], timeouts, given)
-        open_keys = {key for key in found.settings if key.partition(".")[2] in is_open}
-        self.words = found.words if open_keys or not found.settings else "thresholds: those that are given"
+        thresholds = thresholds_for(
+            [recording.labelled.recording for recording in recordings], timeouts, given
+        )
+        open_keys = {key for key in thresholds.settings if key.partition(".")[2] in is_open}
+        self.words = (
+            thresholds.words if open_keys or not thresholds.settings else "thresholds: those that are given"
+        )
         self.words += self._unpredicted
-        self._added = tuple(f"{key}={found.settings[key]!r}" for key in sorted(open_keys))
+        self._added = tuple(f"{key}={thresholds.settings[key]!r}" for key in sorted(open_keys))
 
     def settings(self, recording: ImportedRecording) -> Settings:
         """Return the settings under which a recording is replayed. Raises ConfigError."""
@@ -289,12 +288,12 @@ def _import(
     if not stored.kept:
         echo(f"no new trial for {save}", err=as_json)
     elif len(recordings) <= FEW:
-        for one, notes in zip(stored.kept, stored.notes, strict=True):
-            echo(f"{one['source']}: trial {one['trial']}, {one['outcome']}", indent=2, err=as_json)
+        for trial, notes in zip(stored.kept, stored.notes, strict=True):
+            echo(f"{trial['source']}: trial {trial['trial']}, {trial['outcome']}", indent=2, err=as_json)
             for note in notes:
                 echo(f"  {note}", Style.CAUTION, err=as_json)
     else:
-        outcomes = Counter(one["outcome"] for one in stored.kept)
+        outcomes = Counter(trial["outcome"] for trial in stored.kept)
         words = ", ".join(f"{count} {outcome}" for outcome, count in outcomes.items())
         echo(f"{counted(len(stored.kept), 'trial')} imported into {save}: {words}", err=as_json)
         for note in recordings[0].labelled.recording.notes[1:]:

@@ -58,11 +58,11 @@ def suggest_manifest(sources: Sequence[str], name: str) -> None:
     path, folder = Path(name).expanduser(), Path(sources[0]).expanduser()
     if path.suffix != ".toml":
         raise click.UsageError(f"--suggest {name}: a manifest is a file FILE.toml")
-    found = suggested_manifest(folder, path.parent)
-    write_new(path, found.text.encode())
-    echo_as_it_is(found.text)
+    suggested = suggested_manifest(folder, path.parent)
+    write_new(path, suggested.text.encode())
+    echo_as_it_is(suggested.text)
     talk(
-        f"written to {path}, from {found.example}. Correct the lines that say `check`, then: graspsense import "
+        f"written to {path}, from {suggested.example}. Correct the lines that say `check`, then: graspsense import "
         f"{path} --check"
     )
 

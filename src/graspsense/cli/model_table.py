@@ -55,22 +55,22 @@ def _loss(row: Mapping[str, Any], accuracy: float) -> str:
     if row["failed"]:
         return str(row["failed"])
     lost = [
-        (math.inf if one["change"] is None else abs(one["change"]), name, one)
-        for name, one in row["changes"].items()
+        (math.inf if effect["change"] is None else abs(effect["change"]), name, effect)
+        for name, effect in row["changes"].items()
     ]
-    beyond = sorted((one for one in lost if one[0] > accuracy), key=lambda one: -one[0])
+    beyond = sorted((change for change in lost if change[0] > accuracy), key=lambda change: -change[0])
     if not beyond and row["same_outcome"]:
         return f"nothing by more than {accuracy:.2g}: it can be left out of the scene"
-    words = [_change(name, one) for _, name, one in beyond[:MOST_CHANGES]]
+    words = [_change(name, effect) for _, name, effect in beyond[:MOST_CHANGES]]
     if len(beyond) > MOST_CHANGES:
         words.append(f"and {len(beyond) - MOST_CHANGES} more")
     return ", ".join(words if row["same_outcome"] else ["the outcome", *words])
 
 
-def _change(name: str, one: Mapping[str, Any]) -> str:
-    if one["change"] is not None:
-        return f"{name} {one['change']:+.1%}"
-    return f"{name} is no longer defined" if one["without"] is None else f"{name} becomes defined"
+def _change(name: str, effect: Mapping[str, Any]) -> str:
+    if effect["change"] is not None:
+        return f"{name} {effect['change']:+.1%}"
+    return f"{name} is no longer defined" if effect["without"] is None else f"{name} becomes defined"
 
 
 def print_not_verified(report: Mapping[str, Any]) -> None:

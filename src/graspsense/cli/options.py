@@ -19,6 +19,21 @@ GRIPPER_ALONE: Final = ("classifier.type=none",)
 """Before the options of a command that is about the gripper: a classifier that is missing must not stop it."""
 
 
+def keys_option(
+    text: str, metavar: str = "TABLE.KEY=VALUE", *, required: bool = False
+) -> Callable[[CommandT], CommandT]:
+    """Return the decorator that adds -o, which can be repeated; `text` says what it sets."""
+    return click.option(
+        "-o", "options", metavar=metavar, multiple=True, required=required, help=f"{text} Can be repeated."
+    )
+
+
+def target_option(text: str) -> Callable[[CommandT], CommandT]:
+    """Return the decorator that adds --target; `text` says what it is good for."""
+    targets = click.Choice(["both", "class", "state"])
+    return click.option("--target", type=targets, default="both", show_default=True, help=text)
+
+
 def force_option(command: CommandT) -> CommandT:
     """Add --force, which accepts settings outside of their plausible ranges."""
     return click.option("--force", is_flag=True, help="Accept settings outside of their plausible range.")(
@@ -39,13 +54,7 @@ _OPTIONS: Final = (
         metavar="NAME:STATE",
         help="Object of a simulated gripper: odwalla:full_open. (gripper.object)",
     ),
-    click.option(
-        "-o",
-        "options",
-        metavar="TABLE.KEY=VALUE",
-        multiple=True,
-        help="Set any other key: -o controller.probing_force_n=17. Can be repeated.",
-    ),
+    keys_option("Set any other key: -o controller.probing_force_n=17."),
     click.option("--seed", type=int, help="Seed of all random numbers. (run.seed)"),
     force_option,
 )
@@ -75,11 +84,11 @@ def contradiction(settings: Settings, label: str) -> click.UsageError:
 
 
 def settings_of(
-    pipeline: str | None,
-    gripper: str | None,
-    object_name: str | None,
-    options: Sequence[str],
-    seed: int | None,
+    pipeline: str | None = None,
+    gripper: str | None = None,
+    object_name: str | None = None,
+    options: Sequence[str] = (),
+    seed: int | None = None,
     force: bool = False,
 ) -> Settings:
     """Return the settings that these options ask for. Raises ConfigError with every error at once."""

@@ -34,23 +34,26 @@ def file_to_write(ctx: click.Context, param: click.Parameter, value: str | None)
 
     A pipe or a device is refused as well: the file that is written takes its place, also where root could replace it.
     """
-    if value is not None and Path(value).exists() and not (Path(value).is_file() or Path(value).is_dir()):
-        raise click.BadParameter(f"{value} is a pipe or a device: name a file", ctx, param)
-    if value is not None and Path(value).is_dir():
+    if value is None:
+        return None
+    path = Path(value)
+    if path.is_dir():
         raise click.BadParameter(f"{value} is a folder: name a file in it", ctx, param)
-    if value is not None and Path(value).exists() and not Path(value).is_file():
-        raise click.BadParameter(f"{value} is a device or a pipe: name a file", ctx, param)
-    if value is not None and not Path(value).parent.is_dir():
-        raise click.BadParameter(
-            f"{value} cannot be written: there is no folder {Path(value).parent}", ctx, param
-        )
-    if value is not None:
-        try:
-            with tempfile.TemporaryFile(dir=Path(value).parent) as probe:
-                probe.write(bytes(_PROBE_BYTES))
-        except OSError as error:
-            raise click.BadParameter(f"{value} cannot be written: {error.strerror}", ctx, param) from error
+    if path.exists() and not path.is_file():
+        raise click.BadParameter(f"{value} is a pipe or a device: name a file", ctx, param)
+    if not path.parent.is_dir():
+        raise click.BadParameter(f"{value} cannot be written: there is no folder {path.parent}", ctx, param)
+    try:
+        _probe(path.parent)
+    except OSError as error:
+        raise click.BadParameter(f"{value} cannot be written: {error.strerror}", ctx, param) from error
     return value
+
+
+def _probe(folder: Path) -> None:
+    """Raise OSError if no file can be written in this folder."""
+    with tempfile.TemporaryFile(dir=folder) as probe:
+        probe.write(bytes(_PROBE_BYTES))
 
 
 def file_to_write_as(ending: str) -> Callable[[click.Context, click.Parameter, str | None], str | None]:
@@ -77,8 +80,7 @@ def page_to_write(folder: str) -> Path:
         raise click.UsageError(f"{folder} has a page of its own, that of its trials: name another folder")
     try:
         path.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=path) as probe:
-            probe.write(bytes(_PROBE_BYTES))
+        _probe(path)
     except OSError as error:
         raise click.UsageError(f"{folder} cannot be written: {error.strerror}") from error
     return path / "report.html"

@@ -40,12 +40,14 @@ def list_plugins(as_json: bool) -> None:
         [[_line(cell) for cell in row] for row in table],
         {"STATE": state_style},
     )
-    advice = list(dict.fromkeys(f"{row['distribution']}: {one}" for row in rows for one in row["advice"]))
+    advice = list(
+        dict.fromkeys(f"{row['distribution']}: {sentence}" for row in rows for sentence in row["advice"])
+    )
     advice += loaded.unknown_names
     if advice:
         echo("\nTo be done:", Style.CAUTION)
-        for fromkey in advice:
-            echo(f"  {fromkey}", indent=2)
+        for sentence in advice:
+            echo(f"  {sentence}", indent=2)
 
 
 @plugins.command()
@@ -127,7 +129,7 @@ def check(
         unplugged=_settings(unplugged) if unplugged else None,
         absent=_settings(absent) if absent else None,
         wheel=wheel,
-        data=dict(_named_folder(one) for one in data),
+        data=dict(_named_folder(text) for text in data),
     )
 
     def told(result: Any) -> None:
@@ -142,7 +144,7 @@ def check(
             {
                 "conforms": not report.failures,
                 "failures": report.failures,
-                "results": [attrs.asdict(one) for one in report.results],
+                "results": [attrs.asdict(result) for result in report.results],
             }
         )
     else:
@@ -238,7 +240,7 @@ def enable(distribution: str) -> None:
     from graspsense.core.components.registry.discovery import disabled_in_config, write_disabled
     from graspsense.core.values.errors import UnknownName
 
-    name, names = canonical(distribution), {canonical(one) for one in disabled_in_config()}
+    name, names = canonical(distribution), {canonical(other) for other in disabled_in_config()}
     if name not in names:
         raise UnknownName(f"{name} is not disabled. Disabled are: {', '.join(sorted(names)) or 'none'}")
     path = write_disabled(names - {name})
@@ -310,11 +312,11 @@ def _rows(loaded: Plugins) -> list[dict[str, Any]]:
         for status in loaded.statuses
         if status.state != "loaded" or status.distribution not in bringing
     ]
-    found = {status.distribution for status in loaded.statuses}
+    distributions = {status.distribution for status in loaded.statuses}
     rows += [
         _row(role, name, shipped.distribution, None, "not installed", "", shipped.hint)
         for (role, name), shipped in SHIPPED.items()
-        if shipped.distribution not in found
+        if shipped.distribution not in distributions
     ]
     return rows
 
@@ -353,9 +355,9 @@ def _advice(status: PluginStatus) -> tuple[str, ...]:
 def _clash(component: Component, loaded: Plugins) -> tuple[str, ...]:
     """Return what is to be done where others use the name of this component."""
     others = [
-        one.qualified
-        for one in loaded.components(component.role)
-        if one.name == component.name and one.distribution != component.distribution
+        other.qualified
+        for other in loaded.components(component.role)
+        if other.name == component.name and other.distribution != component.distribution
     ]
     if not others:
         return ()
@@ -377,7 +379,7 @@ def _status_text(status: PluginStatus) -> str:
     ]
     if status.hooks:
         lines.append(f"  hooks        {', '.join(status.hooks)}")
-    lines += [f"  to be done   {one}" for one in status.advice]
+    lines += [f"  to be done   {sentence}" for sentence in status.advice]
     if status.traceback:
         lines += ["", status.traceback.rstrip()]
     return "\n".join(lines)
@@ -405,8 +407,8 @@ def _component_text(component: Component) -> str:
     for key in ("channels", "requires"):
         if key in entry:
             names = [
-                f"{one.name} in {one.unit}" + f" at {one.rate_hz:g} Hz" * bool(one.rate_hz)
-                for one in entry[key]
+                f"{channel.name} in {channel.unit}" + f" at {channel.rate_hz:g} Hz" * bool(channel.rate_hz)
+                for channel in entry[key]
             ]
             lines.append(f"  {key:<11}  {', '.join(names) or 'none'}")
     for key in ("accepts", "commands", "alternatives"):
@@ -414,7 +416,7 @@ def _component_text(component: Component) -> str:
             lines.append(f"  {key:<11}  {', '.join(entry[key]) or 'none'}")
     if "features" in entry:
         lines.append("  features, with their units and meanings:")
-        lines += [f"    {one.name} in {one.unit}: {one.meaning}" for one in entry["features"]]
+        lines += [f"    {feature.name} in {feature.unit}: {feature.meaning}" for feature in entry["features"]]
     keys, reason = _keys(component)
     if reason:
         lines.append(f"  not usable here: {reason}")

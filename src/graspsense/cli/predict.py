@@ -101,7 +101,7 @@ def _refuse_swapped(model: str, source: str) -> None:
     """Raise UsageError if the source was named first and the model second."""
     from graspsense.core.components.registry import installed
 
-    models = {one.name for one in installed().models()}
+    models = {entry.name for entry in installed().models()}
     if not model.endswith(".json") and model not in models and (source.endswith(".json") or source in models):
         raise click.UsageError(
             f"{model} is not a model, and {source} is one. The model comes first: graspsense predict {source} {model}"
@@ -157,5 +157,5 @@ def _known(prediction: Prediction) -> bool:
 
 
 def _as_json(prediction: Prediction, truth: str | None) -> dict[str, Any]:
-    found = prediction.as_json()
-    return found if truth is None else {**found, "truth": truth}
+    document = prediction.as_json()
+    return document if truth is None else {**document, "truth": truth}

@@ -31,25 +31,25 @@ def recover(source: str, out: str | None, as_json: bool) -> None:
             raise click.UsageError("--out is for a FILE; in a store everything has its place")
         with Store.open(source) as store:
             rebuilt = not store.recording_names()
-            found = recover_store(store)
-        if rebuilt and any(one.what == "added" for one in found):
+            recovered = recover_store(store)
+        if rebuilt and any(trial.what == "added" for trial in recovered):
             talk(
                 "note: the database was built anew from the recordings. Labels are as recorded, and no trial is set "
                 "aside: repeat the changes of `graspsense trials`"
             )
     else:
-        found = [recover_file(source, out)]
+        recovered = [recover_file(source, out)]
     if as_json:
-        echo_json({"files": [one.as_json() for one in found]})
+        echo_json({"files": [trial.as_json() for trial in recovered]})
     else:
-        for one in found:
-            where = f" as trial {one.trial}" if one.trial is not None else f" in {one.recording}"
-            why = f": {one.why}" if one.why else ""
+        for trial in recovered:
+            where = f" as trial {trial.trial}" if trial.trial is not None else f" in {trial.recording}"
+            why = f": {trial.why}" if trial.why else ""
             echo(
-                f"{one.file.name}: {one.what}{where if one.recording else ''}, {one.ticks} ticks{why}",
+                f"{trial.file.name}: {trial.what}{where if trial.recording else ''}, {trial.ticks} ticks{why}",
                 indent=2,
             )
-        if not found:
+        if not recovered:
             echo("nothing to recover")
-    if any(one.what == "failed" for one in found):
+    if any(trial.what == "failed" for trial in recovered):
         raise click.exceptions.Exit(EXIT_DAMAGED)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from graspsense.cli.options import force_option
+from graspsense.cli.options import force_option, keys_option
 from graspsense.cli.output import echo_json
 
 if TYPE_CHECKING:
@@ -19,13 +19,7 @@ if TYPE_CHECKING:
 @click.option(
     "--pipeline", metavar="NAME|FILE", help="Another pipeline.  [default: the one it was recorded with]"
 )
-@click.option(
-    "-o",
-    "options",
-    metavar="TABLE.KEY=VALUE",
-    multiple=True,
-    help="Set a key of the pipeline: -o features.pads=left. Can be repeated.",
-)
+@keys_option("Set a key of the pipeline: -o features.pads=left.")
 @force_option
 @click.option("--plot", metavar="FILE.png", help="Draw the grasp: forces, gap, phases, features, prediction.")
 @click.option("--json", "as_json", is_flag=True, help="Print the trial as JSON.")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from graspsense.cli.options import SEED
+from graspsense.cli.options import SEED, target_option
 from graspsense.cli.output import echo_json
 from graspsense.cli.sources import folds_option, named_store
 from graspsense.cli.terminal import Style, echo, echo_as_it_is, warn
@@ -18,13 +18,7 @@ from graspsense.cli.terminal import Style, echo, echo_as_it_is, warn
 @click.option(
     "--classifier", metavar="NAME", default="c45", show_default=True, help="Store: classifier to evaluate."
 )
-@click.option(
-    "--target",
-    type=click.Choice(["both", "class", "state"]),
-    default="both",
-    show_default=True,
-    help="Store: what is recognised, as in `evaluate`.",
-)
+@target_option("Store: what is recognised, as in `evaluate`.")
 @folds_option
 @click.option("--seed", type=SEED, default=0, show_default=True, help="Store: seed of the folds.")
 @click.option(

@@ -80,12 +80,6 @@ MANY_GUARDED: Final = 0.1
 @click.option("--dry-run", is_flag=True, help="Print what would be done, and open nothing.")
 @click.option("--json", "as_json", is_flag=True, help="Print the trial as JSON.")
 def run(
-    pipeline: str | None,
-    gripper: str | None,
-    object_name: str | None,
-    options: tuple[str, ...],
-    seed: int | None,
-    force: bool,
     save: str | None,
     label: str | None,
     changed: bool,
@@ -98,6 +92,7 @@ def run(
     live: LiveOptions,
     dry_run: bool,
     as_json: bool,
+    **asked: Any,
 ) -> None:
     """Open, tare, close, squeeze and release; print the outcome, the features and the prediction.
 
@@ -112,12 +107,12 @@ def run(
             "--foxglove and --rerun"
         )
     if explain_model:
-        options = (*options, "gripper.explain=true")
-    settings = _labelled_settings(label, pipeline, gripper, object_name, options, seed, force)
+        asked["options"] = (*asked["options"], "gripper.explain=true")
+    settings = _labelled_settings(label, asked)
     drawn = save is not None and settings.origins["run.seed"] == "default"
     if drawn:  # a grasp with the seed of another one is a copy of it, not another trial
-        seed = randbelow(LARGEST_DRAWN_SEED + 1)
-        settings = _labelled_settings(label, pipeline, gripper, object_name, options, seed, force)
+        asked["seed"] = randbelow(LARGEST_DRAWN_SEED + 1)
+        settings = _labelled_settings(label, asked)
     check(settings)
     if dry_run:
         _say_what_would_be_done(settings, as_json)
@@ -131,7 +126,7 @@ def run(
     with shown_live(live, save) as shown:
         trial, interrupted, kept = _performed(settings, (*sinks, *shown.sinks), save, label, changed)
         if drawn:
-            talk(f"seed {seed}, drawn for this trial; --seed {seed} repeats the grasp")
+            talk(f"seed {asked['seed']}, drawn for this trial; --seed {asked['seed']} repeats the grasp")
         shown.finished(trial, save)
         _say_all(settings, trial, interrupted, kept, explain_model, as_json)
         if plot is not None:
@@ -178,10 +173,10 @@ def _run_beside(
     from graspsense.cli.run_beside import grasp_beside
     from graspsense.core.pipeline.wiring import check
 
-    other = _labelled_settings(label, pipeline, None, None, (), None, False)
+    other = _labelled_settings(label, {"pipeline": pipeline})
     if save is not None and other.origins["run.seed"] == "default":
         drawn = randbelow(LARGEST_DRAWN_SEED + 1)
-        other = _labelled_settings(label, pipeline, None, None, (), drawn, False)
+        other = _labelled_settings(label, {"pipeline": pipeline, "seed": drawn})
     check(other)
     both = grasp_beside(settings, other, save, label)
     if as_json:
@@ -272,26 +267,18 @@ def _print_model(trial: Trial, condition: Conditions | None) -> None:
         print_conditions(condition, trial.report["selection"]["accuracy"])
 
 
-def _labelled_settings(
-    label: str | None,
-    pipeline: str | None,
-    gripper: str | None,
-    object_name: str | None,
-    options: tuple[str, ...],
-    seed: int | None,
-    force: bool,
-) -> Settings:
+def _labelled_settings(label: str | None, asked: Mapping[str, Any]) -> Settings:
     """Return the settings of a grasp of what the label says, where the gripper can be told what it holds."""
     from graspsense.store.labels import agrees, labels_of
 
     if label is not None:
         labels_of(label)  # what is not a label is refused as such
-    settings = settings_of(pipeline, gripper, object_name, options, seed, force)
+    settings = settings_of(**asked)
     if label is None or agrees(settings, label):
         return settings
-    if names_object(object_name, options):
+    if names_object(asked.get("object_name"), asked.get("options", ())):
         raise contradiction(settings, label)
-    return settings_of(pipeline, gripper, label, options, seed, force)
+    return settings_of(**{**asked, "object_name": label})
 
 
 def draw_grasp(trial: Trial, path: Path) -> None:
@@ -348,15 +335,15 @@ def _kept(
 
     labels = {} if label is None else labels_of(label)
     with Store.open(save) as store:
-        before = None if changed else newest_grasp(store)
-        if before is not None:
-            check_settings(store, before, settings)
+        earlier = None if changed else newest_grasp(store)
+        if earlier is not None:
+            check_settings(store, earlier, settings)
 
         def opened(device: DeviceInfo) -> None:
             if label is not None:
                 check_label(settings, device)
-            if before is not None:
-                check_device(store, before, device)
+            if earlier is not None:
+                check_device(store, earlier, device)
 
         grasp = record_grasp(
             store, settings, installed(), labels=labels, origin="run", sinks=sinks, on_open=opened
@@ -397,13 +384,13 @@ def print_trial(trial: Trial, *, events: bool = True) -> None:
         echo_entry("note", note)
     counts = trial.counts
     if counts.get("guarded"):
-        first = ""
+        why_limited = ""
         if trial.device.clock == "device" and counts["guarded"] > MANY_GUARDED * counts["ticks"]:
-            first = ": until a contact, run.first_speed_m_s and run.first_effort_n limit this gripper"
+            why_limited = ": until a contact, run.first_speed_m_s and run.first_effort_n limit this gripper"
             channels = {channel.name for channel in trial.device.channels}
             if channels and not channels & {"force_left", "force_right"}:
-                first += ", which has no pads to feel one"
-        echo_entry("note", f"the guard limited {counts['guarded']} of {counts['ticks']} ticks{first}")
+                why_limited += ", which has no pads to feel one"
+        echo_entry("note", f"the guard limited {counts['guarded']} of {counts['ticks']} ticks{why_limited}")
     if counts.get("late"):
         echo_entry("note", f"{counts['late']} of {counts['ticks']} frames came late")
     if trial.seconds_simulated is not None:

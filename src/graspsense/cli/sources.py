@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import click
 
-from graspsense.cli.options import SEED, force_option
+from graspsense.cli.options import SEED, force_option, keys_option
+from graspsense.cli.output import file_to_write
 
 if TYPE_CHECKING:
     from graspsense.cli.progress import ProgressLine
@@ -81,13 +83,7 @@ _OPTIONS: Final = (
         metavar="CLASS",
         help="Use only the trials of this class (the part of a label before the colon).",
     ),
-    click.option(
-        "-o",
-        "options",
-        metavar="TABLE.KEY=VALUE",
-        multiple=True,
-        help="Set a key of a component: -o controller.probing_force_n=17. Can be repeated.",
-    ),
+    keys_option("Set a key of a component: -o controller.probing_force_n=17."),
     click.option("--seed", type=SEED, default=0, show_default=True, help="Seed of all random numbers."),
     force_option,
 )
@@ -148,6 +144,24 @@ def folds_option(command: CommandT) -> CommandT:
     return click.option(
         "--folds", type=click.IntRange(min=2), default=10, show_default=True, help="Number of folds."
     )(command)
+
+
+def keep_option(command: CommandT) -> CommandT:
+    """Add --keep, the file that `keep_features` writes."""
+    return click.option(
+        "--keep",
+        metavar="FILE",
+        callback=file_to_write,
+        help="Write the features of all trials as a CSV file.",
+    )(command)
+
+
+def keep_features(keep: str | None, labelled: Labelled) -> None:
+    """Write the trials as a table of features, if a file is named."""
+    if keep:
+        from graspsense.sources.features_csv import write_labelled
+
+        write_labelled(Path(keep), labelled)
 
 
 def checkpoints_option(command: CommandT) -> CommandT:
@@ -215,7 +229,7 @@ def trials_of(
         from graspsense.sources.simulated import number_of_trials
 
         check_folds(number_of_trials(_settings(source, given, None), groups_of(described)), folds)
-    found = labelled_trials(
+    trials = labelled_trials(
         described,
         settings=lambda: _settings(source, given, None),
         features=lambda: _alone("features", "chitta", given, source).create(),
@@ -225,7 +239,7 @@ def trials_of(
             "grasping" if kind == SIMULATED else "extracting features", done, total
         ),
     )
-    return found if copies else without_copies(found)
+    return trials if copies else without_copies(trials)
 
 
 def learner_of(source: str, classifier: str | None, given: Mapping[str, Any]) -> SelectedComponent:
@@ -315,8 +329,8 @@ def _alone(table: str, name: str, given: Mapping[str, Any], source: str) -> Sele
     for layer in layers:
         for key, values in layer.values.items():
             if key not in tables or not isinstance(values, dict):
-                first = ", ".join(f"[{one}]" for one in tables[:-1])
-                known = f"{first} and [{tables[-1]}]" if first else f"[{tables[-1]}]"
+                others = ", ".join(f"[{other}]" for other in tables[:-1])
+                known = f"{others} and [{tables[-1]}]" if others else f"[{tables[-1]}]"
                 near = nearest_path(".".join(map(str, typed_path(layer))), default_paths(tables))
                 meant = f" Did you mean {near!r}?" if near else ""
                 complaints.append(f"{layer.typed}: here only keys of {known} have a meaning.{meant}")
@@ -324,7 +338,7 @@ def _alone(table: str, name: str, given: Mapping[str, Any], source: str) -> Sele
                 merged.add((), values, layer)
     if complaints:
         raise ConfigError("\n".join(complaints))
-    role = next(role for role, one in TABLE_OF_ROLE.items() if one == table)
+    role = next(role for role, name in TABLE_OF_ROLE.items() if name == table)
     values = merged.values
     component = installed().find(role, str(values.pop("type", name)))
     return SelectedComponent(component, build_plausible(component, values, force=given["force"]))
@@ -334,4 +348,4 @@ def _names(text: str | tuple[str, ...] | None) -> tuple[str, ...]:
     """Return the names in an option, or those that a model has."""
     if isinstance(text, tuple):
         return text
-    return tuple(one.strip() for one in text.split(",") if one.strip()) if text else ()
+    return tuple(name.strip() for name in text.split(",") if name.strip()) if text else ()

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from graspsense.cli.output import echo_json
-from graspsense.cli.sources import command_line, is_csv, trials_of
+from graspsense.cli.sources import command_line, is_csv, keep_features, trials_of
 from graspsense.cli.terminal import Style, echo, echo_as_it_is, echo_entry, echo_table, talk
 from graspsense.core.values.errors import counted
 
@@ -50,14 +50,14 @@ def evaluate_value(
     refuse_options_for_labels(given["options"])
     with ProgressLine() as progress:
         labelled = _trials(source, estimator, progress, given)
-        _keep(keep, labelled)
-        found = evaluate_regression(
+        keep_features(keep, labelled)
+        evaluation = evaluate_regression(
             estimator or DEFAULT_ESTIMATOR, labelled, folds=folds, seed=given["seed"], progress=progress
         )
     if as_json:
-        echo_json(to_json(found))
+        echo_json(to_json(evaluation))
     else:
-        _print_evaluation(found)
+        _print_evaluation(evaluation)
 
 
 def train_value(
@@ -83,7 +83,7 @@ def train_value(
             provenance={"command": command_line(("keep", "overwrite", "as_json"))},
         )
     write_regression(Path(out), model)
-    _keep(keep, labelled)
+    keep_features(keep, labelled)
     for note in notes:
         talk(f"note: {note}")
     if as_json:
@@ -156,13 +156,6 @@ def _trials(source: str, estimator: str | None, progress: ProgressLine, given: M
     if estimator is not None:
         check_estimator(estimator)
     return trials_of(source, progress, given)
-
-
-def _keep(keep: str | None, labelled: Labelled) -> None:
-    if keep:
-        from graspsense.sources.features_csv import write_labelled
-
-        write_labelled(Path(keep), labelled)
 
 
 def _to_predict(
@@ -240,11 +233,15 @@ def _print_evaluation(evaluation: RegressionEvaluation) -> None:
     unit = f" [{evaluation.unit}]" if evaluation.unit else ""
     echo_table(
         ("PROTOCOL OR CONTROL", f"ERROR{unit}", "95 %", "TRIALS", "LARGER BY", "WHAT"),
-        [_row(name, one, evaluation.headline.n) for name, one in all_of.items() if one.error is not None],
+        [
+            _row(name, measured, evaluation.headline.n)
+            for name, measured in all_of.items()
+            if measured.error is not None
+        ],
     )
-    for name, one in all_of.items():
-        if one.error is None:
-            echo(f"{name}: not measured ({one.reason})", indent=2)
+    for name, measured in all_of.items():
+        if measured.error is None:
+            echo(f"{name}: not measured ({measured.reason})", indent=2)
 
 
 def _row(name: str, measured: RegressionMeasurement, trials: int) -> tuple[str, ...]:
@@ -258,14 +255,14 @@ def _row(name: str, measured: RegressionMeasurement, trials: int) -> tuple[str, 
         larger = f"{by.value:+.3g}"
         if by.interval is not None:
             larger += f" ({by.interval[0]:+.3g} to {by.interval[1]:+.3g})"
-    of = f" (compared with {measured.difference_of})" if measured.difference_of else ""
+    compared = f" (compared with {measured.difference_of})" if measured.difference_of else ""
     return (
         name,
         f"{error.mean_absolute:.4g}",
         interval,
         f"{error.n} of {trials}",
         larger,
-        f"{measured.what}{of}",
+        f"{measured.what}{compared}",
     )
 
 

@@ -168,11 +168,11 @@ def echo_table(
 def _lines(text: str) -> list[str]:
     """Return the lines of one text: those after the first are indented deeper, so that none looks like another text."""
     lines = printable(text).split("\n")
-    first = next((k for k, line in enumerate(lines) if line.strip()), 0)
-    margin = len(lines[first]) - len(lines[first].lstrip(" ")) + 1
-    return lines[: first + 1] + [
+    begin = next((k for k, line in enumerate(lines) if line.strip()), 0)
+    margin = len(lines[begin]) - len(lines[begin].lstrip(" ")) + 1
+    return lines[: begin + 1] + [
         " " * (margin + 1) + line.lstrip(" ") if line and not line.startswith(" " * margin) else line
-        for line in lines[first + 1 :]
+        for line in lines[begin + 1 :]
     ]
 
 

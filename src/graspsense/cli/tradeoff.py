@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 from attrs import asdict
@@ -15,6 +15,8 @@ from graspsense.cli.terminal import echo, echo_table, talk
 from graspsense.cli.tradeoff_recognition import commands
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from graspsense.experiments.sensed import SensedTrade
     from graspsense.report.simulation import SimulationTrade
 
@@ -24,8 +26,15 @@ def tradeoff() -> None:
     """Measure recognition, or the accuracy of the simulator, against its cost."""
 
 
-for _one in commands():
-    tradeoff.add_command(_one)
+for _command in commands():
+    tradeoff.add_command(_command)
+
+
+def _scenes(scenes: tuple[str, ...], asked: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return the scenes to grasp: those of --scene, that of --object, or some of the catalogue."""
+    from graspsense.experiments.simulation import SCENES
+
+    return scenes or ((asked["object_name"],) if asked["object_name"] else SCENES)
 
 
 scenes_option = click.option(
@@ -37,30 +46,28 @@ scenes_option = click.option(
 )
 
 
+markdown_option = click.option(
+    "--markdown",
+    metavar="FILE.md",
+    callback=file_to_write_as(".md"),
+    help="Write the tables as a Markdown page.",
+)
+
+
 @tradeoff.command(short_help="How far each feature moves for 1 ppm of a parameter.")
 @pipeline_options
 @scenes_option
 @click.option(
     "--seeds", type=click.IntRange(min=1), default=10, show_default=True, help="Grasps of each scene."
 )
-@click.option(
-    "--markdown",
-    metavar="FILE.md",
-    callback=file_to_write_as(".md"),
-    help="Write the tables as a Markdown page.",
-)
+@markdown_option
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def condition(
     scenes: tuple[str, ...],
     seeds: int,
     markdown: str | None,
     as_json: bool,
-    pipeline: str | None,
-    gripper: str | None,
-    object_name: str | None,
-    options: tuple[str, ...],
-    seed: int | None,
-    force: bool,
+    **asked: Any,
 ) -> None:
     """Change each parameter of gripper and object by one part in a million, and measure how far features move.
 
@@ -70,10 +77,9 @@ def condition(
     from graspsense.cli.condition_table import conditions_markdown, print_conditions
     from graspsense.cli.progress import ProgressLine
     from graspsense.experiments.condition import conditions
-    from graspsense.experiments.simulation import SCENES
 
-    settings = settings_of(pipeline, gripper, object_name, options, seed, force)
-    wanted = scenes or ((object_name,) if object_name else SCENES)
+    settings = settings_of(**asked)
+    wanted = _scenes(scenes, asked)
     names = [scene for scene in wanted for _ in range(seeds)]
     numbers = [settings.run.seed + k for _ in wanted for k in range(seeds)]
     sensors = dict.fromkeys(("ideal", str(getattr(settings.gripper.config, "sensor", "ideal"))))
@@ -84,11 +90,11 @@ def condition(
     if markdown:
         write_text(markdown, conditions_markdown(measured))
     if as_json:
-        echo_json([one.as_values() for one in measured])
+        echo_json([trade.as_values() for trade in measured])
         return
     echo(f"simulated: {', '.join(wanted)}, {seeds} seeds each")
-    for one in measured:
-        print_conditions(one)
+    for trade in measured:
+        print_conditions(trade)
 
 
 @tradeoff.command(short_help="Accuracy of the simulator against its run time.")
@@ -117,12 +123,7 @@ def condition(
     callback=file_to_write_as(".png"),
     help="Draw the result; recognition in FILE_recognition.png.",
 )
-@click.option(
-    "--markdown",
-    metavar="FILE.md",
-    callback=file_to_write_as(".md"),
-    help="Write the tables as a Markdown page.",
-)
+@markdown_option
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def simulation(
     scenes: tuple[str, ...],
@@ -132,12 +133,7 @@ def simulation(
     png: str | None,
     markdown: str | None,
     as_json: bool,
-    pipeline: str | None,
-    gripper: str | None,
-    object_name: str | None,
-    options: tuple[str, ...],
-    seed: int | None,
-    force: bool,
+    **asked: Any,
 ) -> None:
     """Run the same grasps with several accuracies and step lengths of the simulator.
 
@@ -149,33 +145,33 @@ def simulation(
     from graspsense.cli.progress import ProgressLine
     from graspsense.experiments.sensed import sensed_trade
     from graspsense.experiments.sensed_report import about, conclusion, sensed_rows
-    from graspsense.experiments.simulation import SCENES, trade_simulation
+    from graspsense.experiments.simulation import trade_simulation
     from graspsense.report.simulation import simulation_rows
 
-    settings = settings_of(pipeline, gripper, object_name, options, seed, force)
-    wanted = scenes or ((object_name,) if object_name else SCENES)
-    first = settings.run.seed
+    settings = settings_of(**asked)
+    wanted = _scenes(scenes, asked)
+    first_seed = settings.run.seed
     with ProgressLine() as progress:
-        found = trade_simulation(
-            settings, scenes=wanted, seeds=range(first, first + seeds), progress=progress
+        trade = trade_simulation(
+            settings, scenes=wanted, seeds=range(first_seed, first_seed + seeds), progress=progress
         )
         sensed = None
         if recognition_seeds:
-            numbers = range(first, first + recognition_seeds)
+            numbers = range(first_seed, first_seed + recognition_seeds)
             sensed = sensed_trade(settings, instances=instances, seeds=numbers, progress=progress)
     # What may have taken an hour is printed before a file can fail to be written.
     if as_json:
-        echo_json(found.as_json() if sensed is None else {**found.as_json(), "recognition": asdict(sensed)})
+        echo_json(trade.as_json() if sensed is None else {**trade.as_json(), "recognition": asdict(sensed)})
     else:
-        made = ", ".join(f"{key} {value}" for key, value in found.made.items())
-        echo(f"{found.gripper}, simulated: {', '.join(found.scenes)}, {len(found.seeds)} seeds each")
+        made = ", ".join(f"{key} {value}" for key, value in trade.made.items())
+        echo(f"{trade.gripper}, simulated: {', '.join(trade.scenes)}, {len(trade.seeds)} seeds each")
         echo(f"{made}\n")
-        echo_table(*simulation_rows(found))
+        echo_table(*simulation_rows(trade))
         if sensed is not None:
             echo(f"\n{about(sensed)}")
             echo(f"{conclusion(sensed)}\n")
             echo_table(*sensed_rows(sensed))
-    _write_files(png, markdown, found, sensed)
+    _write_files(png, markdown, trade, sensed)
 
 
 def _write_files(

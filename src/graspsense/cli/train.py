@@ -8,13 +8,16 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from graspsense.cli.choosing import chosen, pipeline_beside, pipeline_text, refuse_with_choice, say_chosen
-from graspsense.cli.output import check_outputs, echo_json, file_to_write, file_to_write_as
+from graspsense.cli.options import target_option
+from graspsense.cli.output import check_outputs, echo_json, file_to_write_as
 from graspsense.cli.sources import (
     SOURCES,
     checkpoints_option,
     classifier_option,
     command_line,
     is_csv,
+    keep_features,
+    keep_option,
     learner_of,
     source_argument,
     source_options,
@@ -52,17 +55,9 @@ _NOT_EVALUATED: Final = ("out", "keep", "overwrite", "as_json", "calibration_ins
 @click.option(
     "--out", metavar="FILE.json", callback=file_to_write_as(".json"), required=True, help="File of the model."
 )
-@click.option(
-    "--keep", metavar="FILE", callback=file_to_write, help="Write the features of all trials as a CSV file."
-)
+@keep_option
 @click.option("--overwrite", is_flag=True, help="Replace the files of --out and --keep if they exist.")
-@click.option(
-    "--target",
-    type=click.Choice(["both", "class", "state"]),
-    default="both",
-    show_default=True,
-    help="What the model predicts; state needs --only CLASS.",
-)
+@target_option("What the model predicts; state needs --only CLASS.")
 @checkpoints_option
 @classifier_option
 @click.option(
@@ -110,32 +105,32 @@ def train(
         train_value(source, classifier, out, keep, as_json, given)
         return
     _refuse_single_scene(source)
-    found, held_out = (
+    trained, held_out = (
         chosen(source, classifier, given, partial(_with_target, target=target)) if choose else None,
         None,
     )
-    if found is not None:
-        learner, labelled = found.learner, found.labelled
+    if trained is not None:
+        learner, labelled = trained.learner, trained.labelled
     else:
         learner = learner_of(source, classifier, given)
         labelled, held_out = _trials(source, given, times, target, calibration_instances)
-    notes = list(labelled.notes) if found is None else []  # those of a choice are printed with it
+    notes = list(labelled.notes) if trained is None else []  # those of a choice are printed with it
     with gathered_warnings(notes):
         made = _maker(learner, Path(out).stem, target, given["seed"])
         labelled, model = _made(made, learner, labelled, held_out, times, given["seed"])
     write_model(Path(out), model)
-    if found is not None and pipeline is not None:
-        write_whole(Path(pipeline), pipeline_text(found, out).encode())
-    _keep(keep, labelled)
+    if trained is not None and pipeline is not None:
+        write_whole(Path(pipeline), pipeline_text(trained, out).encode())
+    keep_features(keep, labelled)
     for note in notes:
         talk(f"note: {note}")
     if as_json:
-        choice = {} if found is None else {"pipeline": pipeline, "choice": found.as_values()}
+        choice = {} if trained is None else {"pipeline": pipeline, "choice": trained.as_values()}
         echo_json({"model": out, **_as_values(model), "trials": len(labelled), **choice})
         return
     _say_trained(out, model)
-    if found is not None:
-        say_chosen(found, pipeline)
+    if trained is not None:
+        say_chosen(trained, pipeline)
     else:
         _say_how_good(default=classifier is None and not given["options"])
 
@@ -212,14 +207,6 @@ def _trials(
         # A seed that neither another training nor an evaluation is likely to have.
         others = {"instances": calibration_instances, "seed": (given["seed"] + 2**31) % 2**32}
         return labelled, trials_of(source, progress, {**given, **others}, times).aimed(target)
-
-
-def _keep(keep: str | None, labelled: Labelled) -> None:
-    """Write the trials as a table of features, if a file is named."""
-    if keep:
-        from graspsense.sources.features_csv import write_labelled
-
-        write_labelled(Path(keep), labelled)
 
 
 def _as_values(model: Model) -> dict[str, Any]:

@@ -50,16 +50,16 @@ def list_trials(folder: str, label: str | None, aside: bool | None, limit: int, 
         changes = history(store)
     last_relabel = {change.trial: change for change in changes if change.action == "relabel"}
     if as_json:
-        echo_json([{**one.as_json(), "relabelled": one.id in last_relabel} for one in page])
+        echo_json([{**trial.as_json(), "relabelled": trial.id in last_relabel} for trial in page])
         return
     rows = []
-    for one in page:
-        states = [f"set aside: {one.set_aside}" if one.set_aside is not None else ""]
-        if one.id in last_relabel:
-            states.append(last_relabel[one.id].words)
-        made = one.made_at[:16].replace("T", " ")
-        outcome = one.outcome if one.complete else f"{one.outcome}, incomplete"
-        cells = (str(one.id), made, one.label or "", one.instance or "", outcome, one.device)
+    for trial in page:
+        states = [f"set aside: {trial.set_aside}" if trial.set_aside is not None else ""]
+        if trial.id in last_relabel:
+            states.append(last_relabel[trial.id].words)
+        made = trial.made_at[:16].replace("T", " ")
+        outcome = trial.outcome if trial.complete else f"{trial.outcome}, incomplete"
+        cells = (str(trial.id), made, trial.label or "", trial.instance or "", outcome, trial.device)
         rows.append((*cells, "; ".join(state for state in states if state)))
     if not rows:
         echo(f"no trial of {folder} matches")
@@ -154,13 +154,13 @@ def show_history(source: str, as_json: bool) -> None:
 
     folder, number = (source, None) if Path(source).is_dir() else parse_trial_ref(source)
     with Store.read(folder) as store:
-        found = history(store, number)
+        changes = history(store, number)
     if as_json:
-        echo_json([change.as_json() for change in found])
+        echo_json([change.as_json() for change in changes])
         return
-    if not found:
+    if not changes:
         echo("nothing was changed after recording")
-    echo_table(("TRIAL", "WHEN", "CHANGE", "WHY"), [_row(change) for change in found])
+    echo_table(("TRIAL", "WHEN", "CHANGE", "WHY"), [_row(change) for change in changes])
 
 
 def _row(change: Change) -> tuple[str, str, str, str]:
@@ -174,8 +174,8 @@ def _change(refs: Sequence[str], change: Callable[[Store, Sequence[int]], None],
     from graspsense.store.store import Store
     from graspsense.store.trial_ref import parse_trial_ref
 
-    found = [parse_trial_ref(ref) for ref in refs]
-    folders = {folder for folder, _ in found}
+    trials = [parse_trial_ref(ref) for ref in refs]
+    folders = {folder for folder, _ in trials}
     if len(folders) > 1:
         raise click.UsageError(
             f"these trials are of several stores: {', '.join(sorted(folders))}. Name those of one"
@@ -183,14 +183,16 @@ def _change(refs: Sequence[str], change: Callable[[Store, Sequence[int]], None],
     (folder,) = folders
     Store.read(folder).close()  # a store that does not exist is not created
     with Store.open(folder) as store:
-        before = len(history(store))
-        change(store, [number for _, number in found])
-        done = history(store)[before:]
+        earlier = len(history(store))
+        change(store, [number for _, number in trials])
+        done = history(store)[earlier:]
     if as_json:
-        echo_json({"store": folder, "changes": [one.as_json() for one in done]})
+        echo_json({"store": folder, "changes": [change_.as_json() for change_ in done]})
         return
-    for one in done:
-        echo(f"trial {one.trial}: {one.words}" + (f" ({one.why})" if one.why else ""), indent=2)
+    for change_ in done:
+        echo(
+            f"trial {change_.trial}: {change_.words}" + (f" ({change_.why})" if change_.why else ""), indent=2
+        )
 
 
 def _refuse_contradiction(trial: StoredTrial, label: str) -> None:

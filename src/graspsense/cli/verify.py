@@ -28,31 +28,31 @@ def verify(source: str, as_json: bool) -> None:
 
     if Path(source).is_dir():
         with ProgressLine() as progress:
-            found = verify_store(source, lambda done, total: progress("checking", done, total))
+            verified = verify_store(source, lambda done, total: progress("checking", done, total))
     else:
-        found = verify_file(source)
+        verified = verify_file(source)
     if as_json:
-        echo_json(found.as_json())
+        echo_json(verified.as_json())
     else:
-        for problem in found.problems:
+        for problem in verified.problems:
             echo_entry("damaged", str(problem), Style.BAD)
-        for name in found.unread:
+        for name in verified.unread:
             echo_entry("not read", str(name), Style.CAUTION)
-        for name in found.unfinished:
+        for name in verified.unfinished:
             echo_entry("unfinished", str(name), Style.CAUTION)
         counts = (
-            f"{counted(found.trials, 'trial')}, {counted(found.recordings, 'recording')}, "
-            f"{len(found.problems)} damaged"
+            f"{counted(verified.trials, 'trial')}, {counted(verified.recordings, 'recording')}, "
+            f"{len(verified.problems)} damaged"
         )
-        counts += f", {len(found.unread)} not read" if found.unread else ""
-        echo(counts, Style.BAD if found.problems else Style.CAUTION if found.unread else Style.GOOD)
-        if found.unread:
+        counts += f", {len(verified.unread)} not read" if verified.unread else ""
+        echo(counts, Style.BAD if verified.problems else Style.CAUTION if verified.unread else Style.GOOD)
+        if verified.unread:
             echo(
                 "the disk could not be read: nothing is known of this data, which may be whole. Check the disk"
             )
-        if found.unfinished:
+        if verified.unfinished:
             echo("graspsense recover saves what is unfinished")
-    if found.problems:
+    if verified.problems:
         raise click.exceptions.Exit(EXIT_DAMAGED)
-    if found.unread:
+    if verified.unread:
         raise click.exceptions.Exit(EXIT_UNREAD)

@@ -11,11 +11,11 @@ import click
 
 def advice(error: Exception, arguments: Sequence[str]) -> list[str]:
     """Return what to type instead of these arguments of the program, which were refused with this error."""
-    found = list(_split_options(arguments))
+    advised = list(_split_options(arguments))
     context = getattr(error, "ctx", None)
-    if not found and isinstance(error, click.UsageError) and context is not None:
-        found = list(_misplaced_words(context, arguments))
-    return found
+    if not advised and isinstance(error, click.UsageError) and context is not None:
+        advised = list(_misplaced_words(context, arguments))
+    return advised
 
 
 def _split_options(arguments: Sequence[str]) -> Iterator[str]:

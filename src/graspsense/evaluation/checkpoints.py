@@ -9,10 +9,10 @@ import numpy as np
 from attrs import frozen
 
 from graspsense.core.learn.model import Model, checkpoint_model, train
-from graspsense.evaluation.crossval import Pooled, cross_validate
+from graspsense.evaluation.crossval import columns_of, cross_validate
 from graspsense.evaluation.doubt import calibrated, calibrated_by, exchangeable_instances, held_out_members
-from graspsense.evaluation.folds import instance_held_out, stratified
-from graspsense.evaluation.intervals import RecognitionRate, rate_of
+from graspsense.evaluation.folds import held_out
+from graspsense.evaluation.intervals import RecognitionRate, rate_among
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -95,12 +95,8 @@ def early_recognition(
     """
     whole = parts[-1].labelled
     instances = exchangeable_instances(whole)
-    of = (
-        stratified(whole.labels, min(folds, len(whole)), seed)
-        if instances is None
-        else instance_held_out(whole.labels, instances, folds, seed)
-    )
-    answers = [_answers(learner, part, instances, of, seed) for part in parts]
+    fold_of = held_out(whole.labels, instances, folds, seed)
+    answers = [_answers(learner, part, instances, fold_of, seed) for part in parts]
     ended = answers[-1].predicted
     rows = []
     for part, answer in zip(parts, answers, strict=True):
@@ -135,12 +131,12 @@ def _answers(
     learner: SelectedComponent,
     part: CheckpointTrials,
     instances: Sequence[str] | None,
-    of: Folds,
+    fold_of: Folds,
     seed: int,
 ) -> _Answers:
-    labels, numbers, n = part.labelled.labels, part.rows.tolist(), len(of)
+    labels, numbers, n = part.labelled.labels, part.rows.tolist(), len(fold_of)
     own = None if instances is None else [instances[i] for i in numbers]
-    groups, folds = [np.arange(len(labels))], [of[part.rows]]
+    groups, folds = [np.arange(len(labels))], [fold_of[part.rows]]
     pooled = cross_validate(learner, part.labelled.table, labels, groups, folds, seed=seed)
     predicted = [""] * n
     for i, label in zip(numbers, pooled.predicted, strict=True):
@@ -151,14 +147,8 @@ def _answers(
         reason = inside
     else:
         sizes[part.rows] = np.where(pooled.unlike, 0, inside.sum(axis=1))
-        covered[part.rows] = _true_inside(pooled, inside, labels)
+        covered[part.rows] = inside[np.arange(len(labels)), columns_of(labels, pooled.classes)]
     return _Answers(predicted=tuple(predicted), sizes=sizes, covered=covered, reason=reason)
-
-
-def _true_inside(pooled: Pooled, inside: NDArray[np.bool_], labels: Sequence[str]) -> NDArray[np.bool_]:
-    columns = [pooled.classes.index(label) for label in labels]
-    result: NDArray[np.bool_] = inside[np.arange(len(labels)), columns]
-    return result
 
 
 def _row(
@@ -168,11 +158,11 @@ def _row(
     right = [a == b for a, b in zip(predicted, whole.labels, strict=True)]
     return EarlyRate(
         name=name,
-        rate=_rate(whole, right, range(len(whole))),
+        rate=rate_among(whole, right),
         seconds=_mean(part.used_s) or 0.0,
         newtons=_mean(part.used_n),
-        covered=None if answers.reason else _rate(whole, answers.covered.tolist(), reached),
-        single=None if answers.reason else _rate(whole, (answers.sizes == 1).tolist(), reached),
+        covered=None if answers.reason else rate_among(whole, answers.covered.tolist(), reached),
+        single=None if answers.reason else rate_among(whole, (answers.sizes == 1).tolist(), reached),
     )
 
 
@@ -194,18 +184,12 @@ def _stopped(whole: Labelled, parts: Sequence[CheckpointTrials], answers: Sequen
     early = np.flatnonzero(stopped).tolist()
     return EarlyRate(
         name=SURE,
-        rate=_rate(whole, right, range(len(whole))),
+        rate=rate_among(whole, right),
         seconds=_mean(seconds) or 0.0,
         newtons=_mean(newtons),
-        covered=_rate(whole, right, early) if early else None,
-        single=_rate(whole, stopped.tolist(), range(len(whole))),
+        covered=rate_among(whole, right, early) if early else None,
+        single=rate_among(whole, stopped.tolist()),
     )
-
-
-def _rate(whole: Labelled, right: Sequence[bool], rows: Sequence[int]) -> RecognitionRate:
-    """Return the rate among these trials."""
-    instances = None if whole.instances is None else [whole.instances[i] for i in rows]
-    return rate_of([right[i] for i in rows], instances, whole.no_interval)
 
 
 def _mean(values: NDArray[np.float64]) -> float | None:

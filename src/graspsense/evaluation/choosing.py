@@ -164,12 +164,12 @@ def _answers(learner: ClassifierFactory, trials: Labelled, folds: Folds, seed: i
         test = np.flatnonzero(folds == fold)
         outer[test] = _right(learner, trials.table, trials.labels, np.flatnonzero(folds != fold), test, seed)
     training_s = (time.perf_counter() - began) / count
-    for one, other in combinations(range(count), 2):
-        away = (folds == one) | (folds == other)
+    for fold, other in combinations(range(count), 2):
+        away = (folds == fold) | (folds == other)
         test = np.flatnonzero(away)
         right = _right(learner, trials.table, trials.labels, np.flatnonzero(~away), test, seed)
-        inner[one, test] |= right & (folds[test] == other)
-        inner[other, test] |= right & (folds[test] == one)
+        inner[fold, test] |= right & (folds[test] == other)
+        inner[other, test] |= right & (folds[test] == fold)
     return _Answers(inner=inner, outer=outer, training_s=training_s)
 
 

@@ -19,7 +19,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from attrs import frozen
+from attrs import field, frozen
 
 from graspsense.evaluation.intervals import Interval, percentage, percentages, rate_of
 
@@ -35,12 +35,12 @@ _SEED: Final = 20101
 class ChosenRate:
     """The rate of the candidate that was chosen because it has the highest one, without the luck of the choice.
 
-    `of` is the number of candidates. `interval` is at 95 %, None where single rates have none either.
+    `candidates` is the number of candidates. `interval` is at 95 %, None where single rates have none either.
     """
 
     rate: float
     interval: Interval | None
-    of: int
+    candidates: int = field(alias="of")
 
     @property
     def words(self) -> str:

@@ -104,13 +104,13 @@ def cross_validate(
     unlike = np.zeros(len(labels), dtype=np.bool_)
     support = np.full(len(labels), np.nan)
     sizes: list[int] = []
-    for rows, of in zip(groups, folds, strict=True):
+    for rows, fold_of in zip(groups, folds, strict=True):
         of_group = {labels[i] for i in rows}
         possible = np.flatnonzero([name in of_group for name in all_classes])
         probabilities[np.ix_(rows, possible)] = 0.0
         scores[np.ix_(rows, possible)] = 0.0
-        for fold in range(int(of.max()) + 1):
-            test, training = rows[of == fold], rows[of != fold]
+        for fold in range(int(fold_of.max()) + 1):
+            test, training = rows[fold_of == fold], rows[fold_of != fold]
             if len(test) == 0:
                 continue
             if share < 1.0:
@@ -136,10 +136,10 @@ def cross_validate(
 def thinned(rows: NDArray[np.int64], labels: Sequence[str], share: float, seed: int) -> NDArray[np.int64]:
     """Return about this share of the trials of each label, at least one; a larger share contains a smaller one."""
     rng = np.random.default_rng(seed)
-    of = np.array([labels[i] for i in rows])
+    known = np.array([labels[i] for i in rows])
     kept = []
-    for label in np.unique(of):
-        shuffled = rng.permutation(rows[of == label])
+    for label in np.unique(known):
+        shuffled = rng.permutation(rows[known == label])
         kept.append(shuffled[: max(1, round(share * len(shuffled)))])
     return np.sort(np.concatenate(kept))
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -28,7 +28,7 @@ from graspsense.evaluation.crossval import (
     columns_of,
     cross_validate,
 )
-from graspsense.evaluation.folds import instance_held_out, stratified
+from graspsense.evaluation.folds import held_out
 from graspsense.evaluation.intervals import RecognitionRate
 
 if TYPE_CHECKING:
@@ -120,16 +120,10 @@ def calibrated(model: Model, learner: ClassifierFactory, labelled: Labelled, see
     instances = exchangeable_instances(labelled)
     labels = labelled.labels
     try:
-        folds = (
-            stratified(labels, min(FOLDS, len(labels)), seed)
-            if instances is None
-            else instance_held_out(labels, instances, FOLDS, seed)
-        )
+        folds = held_out(labels, instances, FOLDS, seed)
         pooled = cross_validate(learner, labelled.table, labels, [np.arange(len(labels))], [folds], seed=seed)
     except (FitRefused, ConfigError) as refusal:
-        unit = "trials" if instances is None else "instances"
-        none = PredictionSets(coverage=COVERAGE, unit=unit, thresholds={}, reason=str(refusal))
-        return evolve(model, sets=none)
+        return evolve(model, sets=_no_sets(instances, str(refusal)))
     return _with_calibration(model, pooled, labels, instances)
 
 
@@ -158,16 +152,23 @@ def calibrated_by(model: Model, labelled: Labelled) -> Model:
 def _with_calibration(
     model: Model, pooled: Pooled, labels: Sequence[str], instances: Sequence[str] | None
 ) -> Model:
-    found = _calibration(pooled, labels, instances, np.arange(len(labels)))
-    if isinstance(found, str):
-        unit = "trials" if instances is None else "instances"
-        return evolve(model, sets=PredictionSets(coverage=COVERAGE, unit=unit, thresholds={}, reason=found))
+    calibration = _calibration(pooled, labels, instances, np.arange(len(labels)))
+    if isinstance(calibration, str):
+        return evolve(model, sets=_no_sets(instances, calibration))
     return evolve(
         model,
-        certainty=found.certainty,
-        temperature=found.temperature,
-        sets=evolve(found.sets, unknown=int(pooled.unlike.sum()), trials=len(labels)),
+        certainty=calibration.certainty,
+        temperature=calibration.temperature,
+        sets=evolve(calibration.sets, unknown=int(pooled.unlike.sum()), trials=len(labels)),
     )
+
+
+def _no_sets(instances: Sequence[str] | None, why: str) -> PredictionSets:
+    return PredictionSets(coverage=COVERAGE, unit=_unit(instances), thresholds={}, reason=why)
+
+
+def _unit(instances: Sequence[str] | None) -> str:
+    return "trials" if instances is None else "instances"
 
 
 def _calibration(
@@ -180,8 +181,7 @@ def _calibration(
     units = [str(i) if instances is None else f"{labels[i]} {instances[i]}" for i in numbers]
     count = len(set(units if own is None else own))
     if count < units_needed():
-        unit = "trials" if own is None else "instances"
-        return f"{count} calibration {unit}, {100 * COVERAGE:.0f} % needs {units_needed()}"
+        return f"{count} calibration {_unit(own)}, {100 * COVERAGE:.0f} % needs {units_needed()}"
     right = pooled.right(labels)
     certainty = certainty_of(
         pooled.probabilities[rows, pooled.columns[rows]],
@@ -216,6 +216,19 @@ def exchangeable_instances(labelled: Labelled) -> tuple[str, ...] | None:
     return labelled.instances if several else None
 
 
+def _calibrations(
+    pooled: Pooled,
+    labels: Sequence[str],
+    instances: Sequence[str] | None,
+    groups: Groups,
+    folds: Sequence[Folds],
+) -> Iterator[tuple[NDArray[np.int64], _Calibration | str]]:
+    """Yield the trials of each fold, and the calibration with the predictions of the other folds."""
+    for rows, fold_of in zip(groups, folds, strict=True):
+        for fold in np.unique(fold_of).tolist():
+            yield rows[fold_of == fold], _calibration(pooled, labels, instances, rows[fold_of != fold])
+
+
 def held_out_members(
     pooled: Pooled,
     labels: Sequence[str],
@@ -228,13 +241,10 @@ def held_out_members(
     The sets of a fold are calibrated with the predictions of the other folds.
     """
     inside = np.zeros(pooled.scores.shape, dtype=np.bool_)
-    for rows, of in zip(groups, folds, strict=True):
-        for fold in np.unique(of).tolist():
-            test = rows[of == fold]
-            found = _calibration(pooled, labels, instances, rows[of != fold])
-            if isinstance(found, str) or not found.sets.thresholds:
-                return found if isinstance(found, str) else found.sets.reason
-            inside[test] = found.sets.members(found.answers(pooled, test), pooled.classes)
+    for test, calibration in _calibrations(pooled, labels, instances, groups, folds):
+        if isinstance(calibration, str) or not calibration.sets.thresholds:
+            return calibration if isinstance(calibration, str) else calibration.sets.reason
+        inside[test] = calibration.sets.members(calibration.answers(pooled, test), pooled.classes)
     return inside
 
 
@@ -251,7 +261,7 @@ def set_coverage(
     The sets of a fold are calibrated with the predictions of the other folds. The model of the fold does not know the
     instances that it is tested on. The thresholds do indirectly: the models of the other folds were trained on them.
     """
-    unit = "trials" if instances is None else "instances"
+    unit = _unit(instances)
     inside = held_out_members(pooled, labels, instances, groups, folds)
     if isinstance(inside, str):
         return SetCoverage(asked=COVERAGE, unit=unit, reason=inside)
@@ -280,12 +290,9 @@ def held_out_probabilities(
 ) -> NDArray[np.float64]:
     """Return the probabilities of held-out trials as a model gives them: calibrated with the trials of other folds."""
     probabilities = pooled.probabilities.copy()
-    for rows, of in zip(groups, folds, strict=True):
-        for fold in np.unique(of).tolist():
-            test = rows[of == fold]
-            found = _calibration(pooled, labels, instances, rows[of != fold])
-            if not isinstance(found, str):
-                probabilities[test] = found.probabilities(pooled, test)
+    for test, calibration in _calibrations(pooled, labels, instances, groups, folds):
+        if not isinstance(calibration, str):
+            probabilities[test] = calibration.probabilities(pooled, test)
     return probabilities
 
 
@@ -301,13 +308,13 @@ def reliability(
     truth = np.array(labels)[:, np.newaxis] == np.array(pooled.classes)
     right = pooled.right(labels)
     given = np.nan_to_num(held_out_probabilities(pooled, labels, instances, groups, folds), nan=0.0)
-    before = _bins(np.nan_to_num(pooled.probabilities, nan=0.0), right, rate_of)
+    uncalibrated = _bins(np.nan_to_num(pooled.probabilities, nan=0.0), right, rate_of)
     curve = _bins(given, right, rate_of)
     return Reliability(
         brier=float(((given - truth) ** 2).sum(axis=1).mean()),
         calibration_error=_calibration_error(curve),
         curve=curve,
-        uncalibrated_error=_calibration_error(before),
+        uncalibrated_error=_calibration_error(uncalibrated),
     )
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -18,7 +19,14 @@ from graspsense.core.values.errors import ConfigError, counted
 from graspsense.evaluation.confusion import confusion
 from graspsense.evaluation.crossval import ClassifierFactory, FitRefused, Groups, Pooled, cross_validate
 from graspsense.evaluation.doubt import reliability, set_coverage
-from graspsense.evaluation.folds import INSTANCE_HELD_OUT, commonest, in_order, instance_held_out, stratified
+from graspsense.evaluation.folds import (
+    INSTANCE_HELD_OUT,
+    commonest,
+    in_order,
+    instance_held_out,
+    stratified,
+    trials_by_class,
+)
 from graspsense.evaluation.gathered_warnings import gathered_warnings
 from graspsense.evaluation.intervals import (
     MIN_INSTANCES,
@@ -26,7 +34,7 @@ from graspsense.evaluation.intervals import (
     RecognitionRate,
     difference,
     percentage,
-    rate_of,
+    rate_among,
 )
 from graspsense.evaluation.results import CurvePoint, Evaluation, Measurement
 
@@ -143,7 +151,8 @@ class _Evaluator:
         self.learner, self.trials, self.k, self.seed = learner, trials, k, seed
         self.progress, self.notes = progress, notes
         self.labels = trials.labels
-        self.groups = _groups(self.labels, target)
+        self.rate_among = partial(rate_among, trials)
+        self.groups = trials_by_class(self.labels, target)
         self._featureless = np.isnan(trials.table.values).all(axis=1)
         self.warnings: list[str] = []
         self.stratified_name = f"stratified_{k}_fold"
@@ -174,6 +183,7 @@ class _Evaluator:
     ) -> dict[str, Measurement]:
         """Measure the controls, and warn if they show that the recording itself reveals the labels."""
         trials = self.trials
+        opening = trials.first_line
         majority_correct, majority = self._majority(headline)
         controls = {
             "before_contact": self._other_features(
@@ -183,7 +193,11 @@ class _Evaluator:
                 "features from before contact only",
                 trials.no_before_contact,
             ),
-            **self._first_line(headline),
+            **(
+                {}
+                if opening is None
+                else {"first_line": self._other_features("first_line", opening, headline)}
+            ),
             "width_only": self._other_features(
                 "width_only", trials.width, headline, "the width alone", trials.no_width
             ),
@@ -228,7 +242,7 @@ class _Evaluator:
         rows: dict[str, list[int]] = {}
         for i, label in enumerate(self.labels):
             rows.setdefault(class_of(label), []).append(i)
-        return {name: self.rate_among(right, of) for name, of in sorted(rows.items())}
+        return {name: self.rate_among(right, of_class) for name, of_class in sorted(rows.items())}
 
     def unknown(self, pooled: Pooled) -> RecognitionRate:
         """Return the share of trials that the model of their fold calls unknown, or that have no feature at all."""
@@ -267,30 +281,20 @@ class _Evaluator:
         right = pooled.right(self.labels)
         chosen = {"with features": ~self._featureless, "without any feature": self._featureless}
         return {
-            name: self.rate_among(right, np.flatnonzero(of).tolist())
-            for name, of in chosen.items()
-            if of.any()
+            name: self.rate_among(right, np.flatnonzero(chosen_trials).tolist())
+            for name, chosen_trials in chosen.items()
+            if chosen_trials.any()
         }
 
-    def rate_among(self, right: Sequence[bool], rows: Sequence[int] | None = None) -> RecognitionRate:
-        """Return the rate of these trials (default: all), with the interval that their instances allow."""
-        instances = self.trials.instances
-        rows = range(len(right)) if rows is None else rows
-        return rate_of(
-            [right[i] for i in rows],
-            None if instances is None else [instances[i] for i in rows],
-            self.trials.no_interval,
-        )
-
     def _difference(
-        self, first: Sequence[bool], second: Sequence[bool], rows: Sequence[int] | None = None
+        self, minuend: Sequence[bool], subtrahend: Sequence[bool], rows: Sequence[int] | None = None
     ) -> Difference:
         """Return the difference of two rates on these trials (default: all)."""
         instances = self.trials.instances
-        rows = range(len(first)) if rows is None else rows
+        rows = range(len(minuend)) if rows is None else rows
         return difference(
-            [first[i] for i in rows],
-            [second[i] for i in rows],
+            [minuend[i] for i in rows],
+            [subtrahend[i] for i in rows],
             None if instances is None else [instances[i] for i in rows],
         )
 
@@ -356,7 +360,7 @@ class _Evaluator:
         of_label: dict[str, set[str]] = {}
         for instance, label in zip(instances, self.labels, strict=True):
             of_label.setdefault(label, set()).add(instance)
-        single = sorted(label for label, of in of_label.items() if len(of) == 1)
+        single = sorted(label for label, objects in of_label.items() if len(objects) == 1)
         if single:
             reason = f"labels with a single instance, which cannot be held out: {', '.join(single)}"
             return None, Measurement(what, reason=reason)
@@ -399,9 +403,9 @@ class _Evaluator:
         if control is None:
             return Measurement(default, reason=reason or "these trials have no such features")
         having: NDArray[np.bool_] = np.array(~np.isnan(control.table.values).all(axis=1))
-        n, of = int(having.sum()), len(having)
+        n, total = int(having.sum()), len(having)
         why = f": {control.missing}" if control.missing else ""
-        having_words = f"{n} of {counted(of, 'trial')} have such features{why}"
+        having_words = f"{n} of {counted(total, 'trial')} have such features{why}"
         if n == 0:
             return Measurement(control.what, reason=having_words)
         groups, folds = _among(having, self.groups, headline.folds)
@@ -413,15 +417,8 @@ class _Evaluator:
             return Measurement(control.what, reason=str(refusal))
         rows = np.sort(np.concatenate(list(groups))).tolist()
         self.predicted_by_control[name] = (pooled, rows)
-        what = control.what if len(rows) == of else f"{control.what}; {having_words}"
+        what = control.what if len(rows) == total else f"{control.what}; {having_words}"
         return self._against(what, pooled, headline.pooled, headline.protocol, rows)
-
-    def _first_line(self, headline: _Headline) -> dict[str, Measurement]:
-        """Measure the rate with the first frame alone, if the trials were imported."""
-        control = self.trials.first_line
-        return (
-            {} if control is None else {"first_line": self._other_features("first_line", control, headline)}
-        )
 
     def _majority(self, headline: _Headline) -> tuple[list[bool], Measurement]:
         """Return which trials have the most frequent label of their group, and the rate of predicting that label."""
@@ -564,11 +561,3 @@ def _with_several_states(labelled: Labelled, notes: list[str]) -> Labelled:
             f"every class in {labelled.source} has a single state: there is nothing to tell apart"
         )
     return labelled.rows(np.array(rows, dtype=np.int64))
-
-
-def _groups(labels: Sequence[str], target: Target) -> Groups:
-    """Return the trials that are cross-validated separately: those of each class if the target is `state`."""
-    if target != "state":
-        return [np.arange(len(labels))]
-    classes = np.array([class_of(label) for label in labels])
-    return [np.flatnonzero(classes == name) for name in np.unique(classes)]

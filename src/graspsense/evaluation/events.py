@@ -79,7 +79,7 @@ class EventScore:
     """How well one kind of event is told. A rate is None where nothing was labelled, or nothing told."""
 
     labelled: int
-    found: int
+    detected: int = field(alias="found")
     false_alarms: int
     repeated: int
     seconds: float
@@ -124,12 +124,12 @@ def outcomes(labels: Spans, unknown: Spans, told: Sequence[float], tolerance_s: 
     """Return what became of the labels (begin and end, s) and the detections (s) of one recording."""
     free, delays = sorted(told), []
     for begin, _ in sorted(labels):
-        near = next((at for at in free if abs(at - begin) <= tolerance_s), None)
+        near = next((t_s for t_s in free if abs(t_s - begin) <= tolerance_s), None)
         if near is not None:
             free.remove(near)
             delays.append(near - begin)
-    free = [at for at in free if not any(b - tolerance_s <= at <= e + tolerance_s for b, e in unknown)]
-    repeated = sum(any(b <= at <= e for b, e in labels if e > b) for at in free)
+    free = [t_s for t_s in free if not any(b - tolerance_s <= t_s <= e + tolerance_s for b, e in unknown)]
+    repeated = sum(any(b <= t_s <= e for b, e in labels if e > b) for t_s in free)
     return Outcomes(
         delays_s=tuple(delays),
         missed=len(labels) - len(delays),
@@ -154,20 +154,24 @@ def evaluate_kind(
     thresholds have to be multiplied by for the unit of the forces.
     """
     rows = [(k, recording) for k, recording in enumerate(recordings) if name in recording.labelled]
-    groups = [one.group for _, one in rows]
+    groups = [recording.group for _, recording in rows]
 
     def scores(factors: Sequence[float]) -> tuple[EventScore, EventScore, dict[str, tuple[int, int, int]]]:
         """Return the score with these factors, one for each row, that of chance, and the numbers of each group."""
         told_s = [told(k, by).get(name, ()) for (k, _), by in zip(rows, factors, strict=True)]
-        found = [one.outcomes(name, at, tolerance_s) for (_, one), at in zip(rows, told_s, strict=True)]
-        moved = [
-            one.outcomes(name, one.moved(at), tolerance_s) for (_, one), at in zip(rows, told_s, strict=True)
+        results = [
+            recording.outcomes(name, t_s, tolerance_s)
+            for (_, recording), t_s in zip(rows, told_s, strict=True)
         ]
-        seconds = math.fsum(one.seconds for _, one in rows)
+        moved = [
+            recording.outcomes(name, recording.moved(t_s), tolerance_s)
+            for (_, recording), t_s in zip(rows, told_s, strict=True)
+        ]
+        seconds = math.fsum(recording.seconds for _, recording in rows)
         return (
-            _score(found, groups, seconds, seed),
+            _score(results, groups, seconds, seed),
             _score(moved, groups, seconds, seed),
-            _by_group(found, groups),
+            _by_group(results, groups),
         )
 
     given, chance, by_group = scores([1.0] * len(rows))
@@ -177,14 +181,14 @@ def evaluate_kind(
     if why:
         return KindOfEvent(given=given, fitted=None, chance=chance, not_fitted=why, by_group=by_group)
     tried = {
-        step: [one.outcomes(name, told(k, factor * step).get(name, ()), tolerance_s) for k, one in rows]
+        step: [each.outcomes(name, told(k, factor * step).get(name, ()), tolerance_s) for k, each in rows]
         for step in STEPS
     }
     fold_of = instance_held_out(groups, groups, min(folds, len(set(groups))), seed).tolist()
 
     def best(fold: int) -> float:
         """Return the factor with the best F1 on the recordings of the other folds; of several, the one next to 1."""
-        others = [k for k, of in enumerate(fold_of) if of != fold]
+        others = [k for k, its_fold in enumerate(fold_of) if its_fold != fold]
         return float(
             max(STEPS, key=lambda step: (_f1([tried[step][k] for k in others]), -abs(math.log(step))))
         )
@@ -196,23 +200,25 @@ def evaluate_kind(
     )
 
 
-def _f1(found: Sequence[Outcomes]) -> float:
-    hits = sum(len(one.delays_s) for one in found)
-    wrong = sum(one.missed + one.false_alarms for one in found)
+def _f1(results: Sequence[Outcomes]) -> float:
+    hits = sum(len(result.delays_s) for result in results)
+    wrong = sum(result.missed + result.false_alarms for result in results)
     return 2.0 * hits / (2.0 * hits + wrong) if hits else 0.0
 
 
-def _score(found: Sequence[Outcomes], groups: Sequence[str], seconds: float, seed: int) -> EventScore:
-    hits = [len(one.delays_s) for one in found]
-    delays = [(delay, group) for one, group in zip(found, groups, strict=True) for delay in one.delays_s]
-    alarms = [one.false_alarms for one in found]
+def _score(results: Sequence[Outcomes], groups: Sequence[str], seconds: float, seed: int) -> EventScore:
+    hits = [len(result.delays_s) for result in results]
+    delays = [
+        (delay, group) for result, group in zip(results, groups, strict=True) for delay in result.delays_s
+    ]
+    alarms = [result.false_alarms for result in results]
     return EventScore(
-        labelled=sum(hits) + sum(one.missed for one in found),
+        labelled=sum(hits) + sum(result.missed for result in results),
         found=sum(hits),
         false_alarms=sum(alarms),
-        repeated=sum(one.repeated for one in found),
+        repeated=sum(result.repeated for result in results),
         seconds=seconds,
-        recall=_rate(hits, [one.missed for one in found], groups),
+        recall=_rate(hits, [result.missed for result in results], groups),
         precision=_rate(hits, alarms, groups),
         delay=_delay(delays, seed) if delays else None,
     )
@@ -221,11 +227,11 @@ def _score(found: Sequence[Outcomes], groups: Sequence[str], seconds: float, see
 def _rate(right: Sequence[int], wrong: Sequence[int], groups: Sequence[str]) -> RecognitionRate | None:
     """Return the share of right ones, with an interval over the groups."""
     each = [
-        (one, group)
+        (is_right, group)
         for r, w, group in zip(right, wrong, groups, strict=True)
-        for one in (True,) * r + (False,) * w
+        for is_right in (True,) * r + (False,) * w
     ]
-    return rate_of([one for one, _ in each], [group for _, group in each]) if each else None
+    return rate_of([is_right for is_right, _ in each], [group for _, group in each]) if each else None
 
 
 def _delay(delays: Sequence[tuple[float, str]], seed: int) -> DetectionDelay:
@@ -245,11 +251,11 @@ def _delay(delays: Sequence[tuple[float, str]], seed: int) -> DetectionDelay:
     return DetectionDelay(median_s=median, low_s=low, high_s=high, interval=(below, above))
 
 
-def _by_group(found: Sequence[Outcomes], groups: Sequence[str]) -> dict[str, tuple[int, int, int]]:
+def _by_group(results: Sequence[Outcomes], groups: Sequence[str]) -> dict[str, tuple[int, int, int]]:
     """Return the numbers of events found, labelled, and of false alarms of each group."""
     totals = dict.fromkeys(sorted(set(groups)), (0, 0, 0))
-    for one, group in zip(found, groups, strict=True):
+    for result, group in zip(results, groups, strict=True):
         hits, labelled, alarms = totals[group]
-        n = len(one.delays_s)
-        totals[group] = (hits + n, labelled + n + one.missed, alarms + one.false_alarms)
+        n = len(result.delays_s)
+        totals[group] = (hits + n, labelled + n + result.missed, alarms + result.false_alarms)
     return totals

@@ -9,10 +9,13 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from graspsense.core.components.caller import option
+from graspsense.core.learn.labelled import class_of
 from graspsense.core.values.errors import ConfigError, counted
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    from graspsense.core.learn.labelled import Target
 
     Folds = NDArray[np.int64]
 
@@ -62,6 +65,13 @@ def instance_held_out(labels: Sequence[str], instances: Sequence[str], k: int, s
     return fold_of[np.searchsorted(np.array(objects), instance_of)]
 
 
+def held_out(labels: Sequence[str], instances: Sequence[str] | None, k: int, seed: int) -> Folds:
+    """Assign whole instances where they are given, else trials, to at most `k` folds."""
+    if instances is None:
+        return stratified(labels, min(k, len(labels)), seed)
+    return instance_held_out(labels, instances, k, seed)
+
+
 def in_order(labels: Sequence[str], order: Sequence[int], k: int) -> Folds:
     """Split the trials of each label into `k` consecutive blocks in the order of recording."""
     check_folds(len(labels), k)
@@ -94,3 +104,11 @@ def check_folds(n: int, k: int) -> None:
             f"{counted(n, 'trial')} cannot be split into {k} folds: give more trials, or fewer folds "
             f"({option('folds')})"
         )
+
+
+def trials_by_class(labels: Sequence[str], target: Target) -> list[NDArray[np.int64]]:
+    """Return the trials that are cross-validated separately: those of each class if the target is `state`."""
+    if target != "state":
+        return [np.arange(len(labels))]
+    classes = np.array([class_of(label) for label in labels])
+    return [np.flatnonzero(classes == name) for name in np.unique(classes)]

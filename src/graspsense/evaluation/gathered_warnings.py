@@ -21,7 +21,8 @@ def gathered_warnings(notes: list[str]) -> Iterator[None]:
             yield
         finally:
             counts = Counter(
-                (in_words(one.message, one.category, one.filename), one.category) for one in caught
+                (in_words(warning.message, warning.category, warning.filename), warning.category)
+                for warning in caught
             )
     for (words, category), n in counts.items():
         # What is given without a category is a sentence for the user, and means the same in every fit.
@@ -32,6 +33,6 @@ def in_words(message: Warning | str, category: type[Warning], filename: str) -> 
     """Return a warning in one line for a user; further lines of it are advice to programmers."""
     if category.__name__ == "ConvergenceWarning":
         return "a classifier was still improving when its iterations ended: more of them can raise its rate"
-    first = next(iter(str(message).strip().splitlines()), "").rstrip(".: ")
+    sentence = next(iter(str(message).strip().splitlines()), "").rstrip(".: ")
     library = next((name for name in _LIBRARIES if name in Path(filename).parts), "")
-    return f"{library} remarks: {first}" if library else first
+    return f"{library} remarks: {sentence}" if library else sentence

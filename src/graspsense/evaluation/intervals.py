@@ -14,11 +14,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from attrs import field, frozen
 
 from graspsense.core.values.errors import counted
+
+if TYPE_CHECKING:
+    from graspsense.core.learn.labelled import Labelled
 
 Z: Final = 1.959963984540054
 """97.5 % quantile of the standard normal distribution."""
@@ -127,6 +130,13 @@ def rate_of(
     return RecognitionRate(correct, n, clustered(right, instances, comparisons), instances=count)
 
 
+def rate_among(trials: Labelled, right: Sequence[bool], rows: Sequence[int] | None = None) -> RecognitionRate:
+    """Return the rate of some of these trials (default: all), with the interval that their instances allow."""
+    chosen = range(len(right)) if rows is None else rows
+    instances = None if trials.instances is None else [trials.instances[i] for i in chosen]
+    return rate_of([right[i] for i in chosen], instances, trials.no_interval)
+
+
 def too_few(instances: int) -> str:
     """Return the reason why a rate on this number of instances has no interval."""
     return f"{counted(instances, 'instance')}, at least {MIN_INSTANCES} are needed"
@@ -135,11 +145,11 @@ def too_few(instances: int) -> str:
 def clustered(right: Sequence[bool], instances: Sequence[str], comparisons: float = 1.0) -> Interval:
     """Return the 95 % interval of a rate on several instances, as if these were drawn at random."""
     n, correct = len(right), sum(right)
-    variance, count = _variance_of_mean([float(one) for one in right], instances)
+    variance, count = _variance_of_mean([float(is_right) for is_right in right], instances)
     p = correct / n
     # Where every trial is right (or wrong), the design effect is unknown; trials of an instance then count as one.
     effect = n / count if p in (0.0, 1.0) else max(variance / (p * (1.0 - p) / n), 1.0)
-    return wilson(correct / effect, n / effect, _t(count - 1, comparisons))
+    return wilson(correct / effect, n / effect, t_quantile(count - 1, comparisons))
 
 
 def wilson(correct: float, n: float, quantile: float = Z) -> Interval:
@@ -154,29 +164,29 @@ def wilson(correct: float, n: float, quantile: float = Z) -> Interval:
 
 
 def difference(
-    first: Sequence[bool],
-    second: Sequence[bool],
+    minuend: Sequence[bool],
+    subtrahend: Sequence[bool],
     instances: Sequence[str] | None = None,
     comparisons: float = 1.0,
 ) -> Difference:
-    """Return the rate of `first` minus that of `second`; both state which of the same trials are correct.
+    """Return the rate of `minuend` minus that of `subtrahend`; both state which of the same trials are correct.
 
     With `instances`, the object of each trial, the interval is Student's t of the differences by instance, and never
     narrower than that of independent trials. It is corrected for a number of comparisons (Bonferroni). Raises
     ValueError if the lengths differ or are zero.
     """
-    n = len(first)
-    if n == 0 or len(second) != n:
-        raise ValueError(f"{n} and {len(second)} trials: both must be of the same trials")
-    value = (sum(first) - sum(second)) / n
-    independent = _newcombe(first, second, _z(comparisons))
+    n = len(minuend)
+    if n == 0 or len(subtrahend) != n:
+        raise ValueError(f"{n} and {len(subtrahend)} trials: both must be of the same trials")
+    value = (sum(minuend) - sum(subtrahend)) / n
+    independent = _newcombe(minuend, subtrahend, _z(comparisons))
     if instances is None:
         return Difference(value, independent)
     count = len(set(instances))
     if count < MIN_INSTANCES:
         return Difference(value, None, too_few(count))
-    each = [float(x) - float(y) for x, y in zip(first, second, strict=True)]
-    half = _t(count - 1, comparisons) * math.sqrt(_variance_of_mean(each, instances)[0])
+    each = [float(x) - float(y) for x, y in zip(minuend, subtrahend, strict=True)]
+    half = t_quantile(count - 1, comparisons) * math.sqrt(_variance_of_mean(each, instances)[0])
     low, high = min(value - half, independent[0]), max(value + half, independent[1])
     return Difference(value, (max(low, -1.0), min(high, 1.0)))
 
@@ -195,7 +205,7 @@ def mean_interval(
             return None, too_few(count)
         return None, f"{counted(count, 'trial')}, at least {MIN_INSTANCES} are needed"
     mean = math.fsum(values) / len(values)
-    half = _t(count - 1) * math.sqrt(_variance_of_mean(values, units)[0])
+    half = t_quantile(count - 1) * math.sqrt(_variance_of_mean(values, units)[0])
     return (mean - half, mean + half), ""
 
 
@@ -207,10 +217,12 @@ def _variance_of_mean(values: Sequence[float], instances: Sequence[str]) -> tupl
     for value, instance in zip(values, instances, strict=True):
         by_instance[instance] = by_instance.get(instance, 0.0) + value - mean
     count = len(by_instance)
-    return count / (count - 1) * math.fsum(one * one for one in by_instance.values()) / n**2, count
+    return count / (count - 1) * math.fsum(
+        deviation * deviation for deviation in by_instance.values()
+    ) / n**2, count
 
 
-def _t(degrees: int, comparisons: float = 1.0) -> float:
+def t_quantile(degrees: int, comparisons: float = 1.0) -> float:
     """Return the 97.5 % quantile of Student's distribution, for one of several comparisons."""
     from scipy.special import stdtrit
 
@@ -226,12 +238,12 @@ def _z(comparisons: float) -> float:
     return float(ndtri(1.0 - 0.025 / comparisons))
 
 
-def _newcombe(first: Sequence[bool], second: Sequence[bool], quantile: float = Z) -> Interval:
+def _newcombe(minuend: Sequence[bool], subtrahend: Sequence[bool], quantile: float = Z) -> Interval:
     """Return the interval of a difference on independent trials."""
-    n = len(first)
-    both = sum(1 for x, y in zip(first, second, strict=True) if x and y)
-    only_first = sum(1 for x, y in zip(first, second, strict=True) if x and not y)
-    only_second = sum(1 for x, y in zip(first, second, strict=True) if y and not x)
+    n = len(minuend)
+    both = sum(1 for x, y in zip(minuend, subtrahend, strict=True) if x and y)
+    only_first = sum(1 for x, y in zip(minuend, subtrahend, strict=True) if x and not y)
+    only_second = sum(1 for x, y in zip(minuend, subtrahend, strict=True) if y and not x)
     neither = n - both - only_first - only_second
     right1, right2 = both + only_first, both + only_second
     p1, p2 = right1 / n, right2 / n
@@ -254,5 +266,5 @@ def _correlation(both: int, only_first: int, only_second: int, neither: int) -> 
     return product / math.sqrt(margins)
 
 
-def _added(one: float, other: float, phi: float) -> float:
-    return math.sqrt(max(one * one - 2.0 * phi * one * other + other * other, 0.0))
+def _added(x: float, y: float, phi: float) -> float:
+    return math.sqrt(max(x * x - 2.0 * phi * x * y + y * y, 0.0))

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 from typing import Any, Final, TypeVar
 
+import attrs
 import cattrs
+from cattrs.gen import make_dict_structure_fn, make_dict_unstructure_fn
 
 from graspsense.core.values.json_values import json_ready
 from graspsense.evaluation.intervals import RecognitionRate
@@ -52,5 +54,12 @@ def _read_rate(values: Any, _: type) -> RecognitionRate:
 
 
 _CONVERTER: Final = cattrs.Converter()
+# A key of the JSON is the alias of its field: it stays where the field has a new name.
+_CONVERTER.register_unstructure_hook_factory(
+    attrs.has, lambda cls: make_dict_unstructure_fn(cls, _CONVERTER, _cattrs_use_alias=True)
+)
+_CONVERTER.register_structure_hook_factory(
+    attrs.has, lambda cls: make_dict_structure_fn(cls, _CONVERTER, _cattrs_use_alias=True)
+)
 _CONVERTER.register_unstructure_hook(RecognitionRate, _write_rate)
 _CONVERTER.register_structure_hook(RecognitionRate, _read_rate)

@@ -4,10 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from statistics import stdev
 
 from attrs import frozen
 
-from graspsense.evaluation.intervals import Interval, RecognitionRate, percentage, percentages, wilson
+from graspsense.evaluation.intervals import (
+    Interval,
+    RecognitionRate,
+    percentage,
+    percentages,
+    t_quantile,
+    wilson,
+)
 
 
 @frozen
@@ -52,7 +60,7 @@ class OverSeeds:
         least = wilson(self.mean * n, n)
         if len(self.rates) == 1:
             return least
-        half = _t(len(self.rates) - 1) * _deviation(self.rates) * factor
+        half = t_quantile(len(self.rates) - 1) * stdev(self.rates) * factor
         return max(min(self.mean - half, least[0]), 0.0), min(max(self.mean + half, least[1]), 1.0)
 
     @property
@@ -77,32 +85,20 @@ class MeanDifference:
 
 
 def mean_difference(
-    first: Sequence[float], second: Sequence[float], n: int, comparisons: int = 1
+    minuend: Sequence[float], subtrahend: Sequence[float], n: int, comparisons: int = 1
 ) -> MeanDifference:
-    """Return the mean of `first` minus `second`, paired by seed.
+    """Return the mean of `minuend` minus `subtrahend`, paired by seed.
 
     Rates of `n` trials have steps of 1/n, so the standard deviation between seeds is taken as at least 1/n. Raises
     ValueError if the lengths differ or there are fewer than two seeds.
     """
     from scipy.special import stdtr
 
-    if len(first) != len(second) or len(first) < 2:
-        raise ValueError(f"{len(first)} and {len(second)} rates: give two or more, of the same seeds")
-    each = [value - other for value, other in zip(first, second, strict=True)]
+    if len(minuend) != len(subtrahend) or len(minuend) < 2:
+        raise ValueError(f"{len(minuend)} and {len(subtrahend)} rates: give two or more, of the same seeds")
+    each = [value - other for value, other in zip(minuend, subtrahend, strict=True)]
     mean = math.fsum(each) / len(each)
-    error = max(_deviation(each), 1 / n) / math.sqrt(len(each))
-    half = _t(len(each) - 1, comparisons) * error
+    error = max(stdev(each), 1 / n) / math.sqrt(len(each))
+    half = t_quantile(len(each) - 1, comparisons) * error
     p = 2.0 * float(stdtr(len(each) - 1, -abs(mean) / error))
     return MeanDifference(mean, (mean - half, mean + half), min(1.0, comparisons * p))
-
-
-def _deviation(values: Sequence[float]) -> float:
-    mean = math.fsum(values) / len(values)
-    return math.sqrt(math.fsum((value - mean) ** 2 for value in values) / (len(values) - 1))
-
-
-def _t(degrees: int, comparisons: int = 1) -> float:
-    """Return the 97.5 % quantile of Student's distribution, for one of several comparisons."""
-    from scipy.special import stdtrit
-
-    return float(stdtrit(degrees, 1.0 - 0.025 / comparisons))

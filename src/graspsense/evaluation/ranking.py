@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
@@ -20,7 +21,7 @@ from graspsense.evaluation.crossval import ClassifierFactory, FitRefused, cross_
 from graspsense.evaluation.doubt import SetCoverage, exchangeable_instances, set_coverage
 from graspsense.evaluation.folds import INSTANCE_HELD_OUT, in_order, instance_held_out, stratified
 from graspsense.evaluation.gathered_warnings import gathered_warnings
-from graspsense.evaluation.intervals import Difference, RecognitionRate, difference, rate_of
+from graspsense.evaluation.intervals import Difference, RecognitionRate, difference, rate_among, rate_of
 
 if TYPE_CHECKING:
     from graspsense.core.learn.labelled import Labelled
@@ -78,7 +79,10 @@ class Ranking:
         rate = 100 * best.rates[self.protocol].rate
         text = f"{best.name} has the highest rate, {rate:.1f} %."
         if self.chosen is not None:
-            text += f" As the best of {self.chosen.of} it was lucky too: of new trials expect {self.chosen.words}."
+            chosen = self.chosen
+            text += (
+                f" As the best of {chosen.candidates} it was lucky too: of new trials expect {chosen.words}."
+            )
         text += f" {self.equals}"
         controls = [candidate for candidate in self.candidates if candidate.standing == "control"]
         if controls:
@@ -142,17 +146,17 @@ def rank(
     otherwise; the candidates are compared under the first. `outside` has further answers by the name of the classifier
     and of its features. Raises ConfigError if the trials differ in labels, or if no candidate can be measured.
     """
-    first = next(iter(trials.values()))
+    reference = next(iter(trials.values()))
     for name, trial in trials.items():
-        if (trial.labels, trial.instances) != (first.labels, first.instances):
+        if (trial.labels, trial.instances) != (reference.labels, reference.instances):
             raise ConfigError(
                 f"the trials with the features {name!r} are not those with {next(iter(trials))!r}"
             )
-    protocols = protocols or protocols_of(first, folds, seed)
+    protocols = protocols or protocols_of(reference, folds, seed)
     headline = next(iter(protocols))
     tables = {name: trial.table for name, trial in trials.items()}
-    if first.before_contact is not None:
-        tables[BEFORE_CONTACT] = first.before_contact.table
+    if reference.before_contact is not None:
+        tables[BEFORE_CONTACT] = reference.before_contact.table
     measured: dict[tuple[str, str], CandidateResult] = {}
     notes: list[str] = []
     pairs = [(learner, name) for name in tables for learner in learners]
@@ -162,16 +166,16 @@ def rank(
         wanted = {headline: protocols[headline]} if name == BEFORE_CONTACT else protocols
         try:
             with gathered_warnings(notes):
-                measured[learner, name] = _measured(learners[learner], tables[name], first, wanted, seed)
+                measured[learner, name] = _measured(learners[learner], tables[name], reference, wanted, seed)
         except FitRefused as refusal:
             notes.append(f"{learner} with {name}: {refusal}")
     for key, answers in (outside or {}).items():
         right = {
-            protocol: [a == b for a, b in zip(predicted, first.labels, strict=True)]
+            protocol: [a == b for a, b in zip(predicted, reference.labels, strict=True)]
             for protocol, predicted in answers.predicted.items()
         }
         measured[key] = CandidateResult(right=right, training_s=answers.training_s)
-    return ranking_of(measured, headline, first, (*first.notes, *dict.fromkeys(notes)))
+    return ranking_of(measured, headline, reference, (*reference.notes, *dict.fromkeys(notes)))
 
 
 def ranking_of(
@@ -233,20 +237,9 @@ def _measured(
         right[protocol] = pooled.right(labels)
         if sets is None:
             sets = set_coverage(
-                pooled, labels, exchangeable_instances(trials), groups, [folds], _rate_among(trials)
+                pooled, labels, exchangeable_instances(trials), groups, [folds], partial(rate_among, trials)
             )
     return CandidateResult(right=right, training_s=seconds[0], sets=sets)
-
-
-def _rate_among(trials: Labelled) -> Callable[[Sequence[bool], Sequence[int] | None], RecognitionRate]:
-    """Return a function that gives the rate of some rows, or of all, with the interval that the trials allow."""
-
-    def rate(right: Sequence[bool], rows: Sequence[int] | None) -> RecognitionRate:
-        chosen = range(len(trials)) if rows is None else rows
-        instances = None if trials.instances is None else [trials.instances[i] for i in chosen]
-        return rate_of([right[i] for i in chosen], instances, trials.no_interval)
-
-    return rate
 
 
 def _ranked(
@@ -267,9 +260,10 @@ def _ranked(
         if key != best and key in judged:
             loss = difference(right[best], right[key], trials.instances, comparisons)
             standing = _standing(loss)
-        one = measured[key]
+        measured_key = measured[key]
         rates = {
-            protocol: rate_of(of, trials.instances, trials.no_interval) for protocol, of in one.right.items()
+            protocol: rate_of(answers, trials.instances, trials.no_interval)
+            for protocol, answers in measured_key.right.items()
         }
         if key == best and chosen is not None:
             rates[headline] = evolve(rates[headline], interval=chosen.interval)
@@ -278,8 +272,8 @@ def _ranked(
                 classifier=key[0],
                 features=key[1],
                 rates=rates,
-                training_s=one.training_s,
-                sets=one.sets if key in judged else None,
+                training_s=measured_key.training_s,
+                sets=measured_key.sets if key in judged else None,
                 loss=loss,
                 standing=standing,
             )

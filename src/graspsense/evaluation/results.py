@@ -86,8 +86,12 @@ class Evaluation:
 
     def _repr_html_(self) -> str:
         rows = [
-            (name, "not measured" if one.rate is None else one.rate.words, one.reason or one.what)
-            for name, one in {**self.protocols, **self.controls}.items()
+            (
+                name,
+                "not measured" if measurement.rate is None else measurement.rate.words,
+                measurement.reason or measurement.what,
+            )
+            for name, measurement in {**self.protocols, **self.controls}.items()
         ]
         parts = [sentence(self._words(), strong=True)]
         parts += [sentence(f"warning: {warning}") for warning in self.warnings]

@@ -98,12 +98,12 @@ def _ends_of_sweep(
     conditions: Sequence[ConditionResult],
 ) -> tuple[ConditionResult, ConditionResult] | None:
     """Return the conditions at the smallest and the largest value, if they differ in a single number only."""
-    if len({condition.classifier for condition in conditions}) > 1 or len(conditions[0].case.at) != 1:
+    if len({condition.classifier for condition in conditions}) > 1 or len(conditions[0].case.levels) != 1:
         return None
-    key = next(iter(conditions[0].case.at))
-    if not all(type(condition.case.at.get(key)) in (int, float) for condition in conditions):
+    key = next(iter(conditions[0].case.levels))
+    if not all(type(condition.case.levels.get(key)) in (int, float) for condition in conditions):
         return None
-    ordered = sorted(conditions, key=lambda condition: float(condition.case.at[key]))
+    ordered = sorted(conditions, key=lambda condition: float(condition.case.levels[key]))
     return ordered[0], ordered[-1]
 
 

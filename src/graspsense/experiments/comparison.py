@@ -49,9 +49,9 @@ class SettingDifference:
 
 @frozen(kw_only=True, eq=False)
 class ConditionDifference:
-    """The rate of a condition of one experiment minus that of the first; `how` says what the interval rests on."""
+    """The rate of a condition of one experiment minus that of the first (`base`); `how` tells the basis."""
 
-    first: ConditionResult
+    base: ConditionResult
     other: ConditionResult
     other_name: str
     """The name of the experiment of `other`."""
@@ -81,16 +81,17 @@ class ExperimentComparison:
         if not self.differences:
             return f"{self.names} have no case in common"
         difference = self.differences[0]
-        first, recognises = self.experiments[0].name, TARGETS[difference.first.recognised]
-        mine, theirs = in_hundred(difference.first.rate.mean), in_hundred(difference.other.rate.mean)
+        reference, recognises = self.experiments[0].name, TARGETS[difference.base.recognised]
+        mine, theirs = in_hundred(difference.base.rate.mean), in_hundred(difference.other.rate.mean)
         if difference.verdict == "not shown to differ":
             return (
-                f"{difference.other_name} is not shown to recognise {recognises} better or worse than {first}: "
+                f"{difference.other_name} is not shown to recognise {recognises} better or worse than {reference}: "
                 f"{theirs} grasps against {mine}"
             )
         return (
             f"{difference.other_name} recognises {recognises} "
-            f"{'more' if difference.verdict == 'higher' else 'less'} often than {first}: {theirs} grasps against {mine}"
+            f"{'more' if difference.verdict == 'higher' else 'less'} often than {reference}: "
+            f"{theirs} grasps against {mine}"
         )
 
     @property
@@ -195,8 +196,8 @@ def _read(name: str, folder: Path) -> FinishedExperiment:
     try:
         summary = summarise(results.experiment(), results)
     except (ConfigError, DataDamaged) as error:
-        first, *rest = str(error).splitlines()
-        reason = rest[0].strip() if rest and first.endswith(":") else first
+        sentence, *further = str(error).splitlines()
+        reason = further[0].strip() if further and sentence.endswith(":") else sentence
         raise ConfigError(_of_another_version(results, reason)) from error
     if not summary.results and not summary.failed and results.any():
         raise ConfigError(_of_another_version(results, "its results do not belong to its settings here"))
@@ -221,13 +222,13 @@ def _setting_differences(experiments: Sequence[FinishedExperiment]) -> list[Sett
     for experiment in experiments:
         meanings |= _meanings(experiment.summary.planned.cases[0])
     columns_made = [_circumstances(experiment) for experiment in experiments]
-    found = []
+    differing = []
     for each in (columns, columns_made):
         for key in dict.fromkeys(key for column in each for key in column):
             values = tuple(column.get(key, ABSENT) for column in each)
             if len(set(values)) > 1:
-                found.append(SettingDifference(key=key, meaning=meanings.get(key, ""), values=values))
-    return found
+                differing.append(SettingDifference(key=key, meaning=meanings.get(key, ""), values=values))
+    return differing
 
 
 def _settings(summary: Summary) -> dict[str, str]:
@@ -254,13 +255,13 @@ def _settings(summary: Summary) -> dict[str, str]:
 def _flat(value: Any, key: str = "") -> dict[str, str]:
     """Return the leaves of nested tables as text, by their dotted keys, without those that are not set."""
     if isinstance(value, Mapping):
-        found: dict[str, str] = {}
+        flat: dict[str, str] = {}
         for name, inner in value.items():
-            found |= _flat(inner, f"{key}.{name}" if key else str(name))
-        return found
+            flat |= _flat(inner, f"{key}.{name}" if key else str(name))
+        return flat
     if value is None or value == () or value == []:
         return {}
-    if isinstance(value, list | tuple) and any(isinstance(one, Mapping) for one in value):
+    if isinstance(value, list | tuple) and any(isinstance(item, Mapping) for item in value):
         return {key: json.dumps(value)}
     return {key: shown(value)}
 
@@ -287,19 +288,19 @@ def _commit(made: Mapping[str, Any]) -> str:
 
 def _differences(experiments: Sequence[FinishedExperiment]) -> list[ConditionDifference]:
     """Return the difference of each experiment from the first, for each condition that both have."""
-    first, *others = experiments
+    reference, *others = experiments
     pairs = [
         (mine, theirs, other.name)
         for other in others
-        for mine, theirs in _matched(first.summary.conditions, other.summary.conditions)
+        for mine, theirs in _matched(reference.summary.conditions, other.summary.conditions)
     ]
-    found = []
+    differences = []
     for mine, theirs, name in pairs:
         difference, how = _difference(theirs, mine, len(pairs))
-        found.append(
-            ConditionDifference(first=mine, other=theirs, other_name=name, difference=difference, how=how)
+        differences.append(
+            ConditionDifference(base=mine, other=theirs, other_name=name, difference=difference, how=how)
         )
-    return found
+    return differences
 
 
 def _matched(
@@ -307,17 +308,21 @@ def _matched(
 ) -> list[tuple[ConditionResult, ConditionResult]]:
     """Return the conditions of the same name and target; if there are none, the best ones for each target."""
     by_name = {(their.name, their.target): their for their in theirs}
-    found = [
+    pairs = [
         (result, by_name[result.name, result.target])
         for result in mine
         if (result.name, result.target) in by_name
     ]
-    if found:
-        return found
+    if pairs:
+        return pairs
     targets = list(dict.fromkeys(result.target for result in mine))
     best = [
         tuple(
-            max((one for one in side if one.target == target), key=lambda one: one.rate.mean, default=None)
+            max(
+                (condition for condition in side if condition.target == target),
+                key=lambda condition: condition.rate.mean,
+                default=None,
+            )
             for side in (mine, theirs)
         )
         for target in targets

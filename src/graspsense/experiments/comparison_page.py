@@ -18,10 +18,10 @@ DIFFERENCE_HEADER = ("experiment", "case", "recognises", "points", "95 % interva
 
 def comparison_page(comparison: ExperimentComparison) -> Page:
     """Return the page."""
-    first = comparison.experiments[0].name
+    reference = comparison.experiments[0].name
     simulated = any(condition.simulated for e in comparison.experiments for condition in e.summary.conditions)
     text = (
-        f"Differences are those from {first}. Where both experiments simulate the same trials with the same seeds, "
+        f"Differences are those from {reference}. Where both experiments simulate the same trials with the same seeds, "
         "they are paired by seed; otherwise the interval follows from those of both rates."
     )
     return Page(
@@ -64,11 +64,11 @@ def settings_rows(comparison: ExperimentComparison) -> tuple[tuple[str, ...], li
 
 def rate_rows(comparison: ExperimentComparison) -> list[tuple[str, ...]]:
     """Return the rates of all conditions, for `RATE_HEADER`."""
-    found: list[tuple[str, ...]] = []
+    rows: list[tuple[str, ...]] = []
     for experiment in comparison.experiments:
         for condition in experiment.summary.conditions:
             row = RateRow(name="", rate=condition.rate.mean, interval=condition.rate.interval)
-            found.append(
+            rows.append(
                 (
                     experiment.name,
                     condition_name(condition),
@@ -79,18 +79,18 @@ def rate_rows(comparison: ExperimentComparison) -> list[tuple[str, ...]]:
                     str(len(condition.by_seed)),
                 )
             )
-    return found
+    return rows
 
 
 def difference_rows(comparison: ExperimentComparison) -> list[tuple[str, ...]]:
     """Return the differences from the first experiment, for `DIFFERENCE_HEADER`."""
-    found: list[tuple[str, ...]] = []
+    rows: list[tuple[str, ...]] = []
     for difference in comparison.differences:
         interval = difference.difference.interval
         case = condition_name(difference.other)
-        if difference.other.name != difference.first.name:
-            case = f"{case} (here) and {condition_name(difference.first)} (first)"
-        found.append(
+        if difference.other.name != difference.base.name:
+            case = f"{case} (here) and {condition_name(difference.base)} (first)"
+        rows.append(
             (
                 difference.other_name,
                 case,
@@ -101,7 +101,7 @@ def difference_rows(comparison: ExperimentComparison) -> list[tuple[str, ...]]:
                 difference.how,
             )
         )
-    return found
+    return rows
 
 
 def _settings(comparison: ExperimentComparison) -> Section:
@@ -119,20 +119,20 @@ def _settings(comparison: ExperimentComparison) -> Section:
 def _rates(comparison: ExperimentComparison) -> Section:
     body = []
     conditions = [(e, condition) for e in comparison.experiments for condition in e.summary.conditions]
-    for target in dict.fromkeys(one.target for _, one in conditions):
-        of = [(e, one) for e, one in conditions if one.target == target]
-        best = max((one for _, one in of), key=lambda one: one.rate.mean)
+    for target in dict.fromkeys(condition.target for _, condition in conditions):
+        recognising = [(e, condition) for e, condition in conditions if condition.target == target]
+        best = max((condition for _, condition in recognising), key=lambda condition: condition.rate.mean)
         rows = [
             RateRow(
-                name=f"{e.name}: {condition_name(one)}",
-                rate=one.rate.mean,
-                interval=one.rate.interval,
-                strong=one is best,
+                name=f"{e.name}: {condition_name(condition)}",
+                rate=condition.rate.mean,
+                interval=condition.rate.interval,
+                strong=condition is best,
             )
-            for e, one in of
+            for e, condition in recognising
         ]
         title = f"How often {TARGETS[best.recognised]} is recognised"
-        protocols = dict.fromkeys(protocol_words(one.protocol) for _, one in of)
+        protocols = dict.fromkeys(protocol_words(condition.protocol) for _, condition in recognising)
         notes = "".join(paragraph(f"Every grasp is classified by {words}.") for words in protocols)
         picture = rates_picture(rows, f"{title}. Bars are 95 % intervals.")
         body.append(f"<h3>{escape(title)}</h3>{pair(picture, notes)}")
@@ -141,14 +141,14 @@ def _rates(comparison: ExperimentComparison) -> Section:
 
 
 def _differences(comparison: ExperimentComparison) -> Section:
-    first = comparison.experiments[0].name
+    reference = comparison.experiments[0].name
     rows = difference_rows(comparison)
     body = (
-        table(f"Rate minus that of {first}, in percentage points", DIFFERENCE_HEADER, rows, verdicts=(5,))
+        table(f"Rate minus that of {reference}, in percentage points", DIFFERENCE_HEADER, rows, verdicts=(5,))
         if rows
-        else paragraph(f"No other experiment recognises what {first} does.")
+        else paragraph(f"No other experiment recognises what {reference} does.")
     )
-    return Section(id="differences", title=f"Differences from {first}", body=body)
+    return Section(id="differences", title=f"Differences from {reference}", body=body)
 
 
 def _made_of(comparison: ExperimentComparison) -> Section:

@@ -116,17 +116,17 @@ def _features(
         # A few grasps run in the interpreter, which needs no remark.
         warnings.simplefilter("ignore")
         done = backend.run_many(controller, scenes, seeds, run=settings.run, extract=extract)
-    return [one.extracted for one in done]
+    return [grasp.extracted for grasp in done]
 
 
 def _movements(base: Features, moved: Features) -> list[float]:
     """Return the relative change of each feature; infinite where it is missing in only one of the grasps."""
     changes = []
-    for before, after, unit in zip(base.values, moved.values, base.units, strict=True):
-        if math.isnan(before) and math.isnan(after):
+    for base_value, moved_value, unit in zip(base.values, moved.values, base.units, strict=True):
+        if math.isnan(base_value) and math.isnan(moved_value):
             changes.append(0.0)
             continue
-        change = abs(after - before) / max(abs(before), SCALES.get(unit, 1.0))
+        change = abs(moved_value - base_value) / max(abs(base_value), SCALES.get(unit, 1.0))
         changes.append(math.inf if math.isnan(change) else change)
     return changes
 

@@ -37,7 +37,7 @@ from graspsense.sources.trial_source import (
     tables_without_effect,
 )
 
-PIPELINE_TABLES: Final = (*(one for one in TABLE_OF_ROLE.values() if one != "classifier"), "run")
+PIPELINE_TABLES: Final = (*(table for table in TABLE_OF_ROLE.values() if table != "classifier"), "run")
 SWEPT_TABLES: Final = (*PIPELINE_TABLES, "classifier", "data", "test", "judge")
 DEFAULT_CLASSIFIER: Final = "c45"
 MOST_SEEDS: Final = 10_000
@@ -124,7 +124,7 @@ class ExperimentCase:
     """One of the cases that are compared: its name, its differences from the others, and all that defines its tasks."""
 
     name: str
-    at: Mapping[str, Any]
+    levels: Mapping[str, Any]
     """The values of `pipeline`, `variant` and the swept keys (except those of the classifier) in this case."""
     settings: Settings
     data: TrialSource
@@ -158,19 +158,19 @@ class Planned:
 
     def task(self, case: ExperimentCase, seed: int) -> Task:
         """Return the task for a case and a seed."""
-        params = self._params(case, first=seed == self.seeds[0])
+        params = self._params(case, is_first=seed == self.seeds[0])
         own = {text: self.inputs[text] for text in input_names(params) if text in self.inputs}
         params = {**params, "inputs": own} if own else params
         return Task(kind=case.kind, params=params, seed=seed, name=f"{case.name}, seed {seed}".lstrip(", "))
 
     def with_inputs(self) -> Planned:
         """Return the experiment with the present content of its inputs."""
-        return evolve(self, inputs=contents_of([self._params(case, first=True) for case in self.cases]))
+        return evolve(self, inputs=contents_of([self._params(case, is_first=True) for case in self.cases]))
 
-    def _params(self, case: ExperimentCase, *, first: bool) -> dict[str, Any]:
+    def _params(self, case: ExperimentCase, *, is_first: bool) -> dict[str, Any]:
         return {
             "settings": {
-                table: {key: one for key, one in case.settings.values[table].items() if one is not None}
+                table: {key: value for key, value in case.settings.values[table].items() if value is not None}
                 for table in PIPELINE_TABLES
             },
             "data": plain(case.data),
@@ -180,7 +180,7 @@ class Planned:
                 for learner in case.learners
             ],
             "judge": plain(case.judge),
-            "first": first,
+            "first": is_first,
         }
 
 
@@ -204,14 +204,14 @@ def read_experiment(
     layer, base, name = _found(asked)
     identity = asked if base is None else str(Path(asked).expanduser().resolve())
     if identity in within:
-        chain = " > ".join(Path(one).name for one in (*within, identity))
+        chain = " > ".join(Path(path).name for path in (*within, identity))
         raise ConfigError(f"{layer.label}: an experiment cannot be a part of itself: {chain}")
     within = (*within, identity)
     layers, complaints = option_layers(options)
     merged = Merged()
     merged.add((), _located(layer.values, base), layer)
-    for one in layers:
-        merged.add((), one.values, one)
+    for option in layers:
+        merged.add((), option.values, option)
     values = merged.values
     try:
         experiment = structured(values, Experiment, "an experiment")
@@ -265,7 +265,7 @@ def _of_parts(
             pipelines[called] = settings
         for case in part.cases:
             where = f"{part.name}: {case.name}" if case.name else part.name
-            cases.append(evolve(case, name=where, at={"part": part.name, **case.at}, part=part.name))
+            cases.append(evolve(case, name=where, levels={"part": part.name, **case.levels}, part=part.name))
     if len({part.name for part in parts}) < len(parts):
         raise ConfigError(
             f"{layer.where(('parts',))}: two parts have the same name: {', '.join(experiment.parts)}"
@@ -298,13 +298,15 @@ class _Plan:
         seeds = _listed(experiment.seeds)
         pipelines = {}
         for asked in experiment.pipelines:
-            of = asked if isinstance(asked, PipelineOf) else PipelineOf(name=Path(asked).stem, pipeline=asked)
-            if of.name in pipelines:
+            pipeline_of = (
+                asked if isinstance(asked, PipelineOf) else PipelineOf(name=Path(asked).stem, pipeline=asked)
+            )
+            if pipeline_of.name in pipelines:
                 raise ConfigError(
-                    f"{self.layer.where(('pipelines',))}: two pipelines are called {of.name!r}: name one of "
+                    f"{self.layer.where(('pipelines',))}: two pipelines are called {pipeline_of.name!r}: name one of "
                     'them, { name = "...", pipeline = "..." }'
                 )
-            pipelines[of.name] = resolve(of.pipeline, force=self.force)
+            pipelines[pipeline_of.name] = resolve(pipeline_of.pipeline, force=self.force)
         if not pipelines:
             raise ConfigError(f"{self.layer.where(('pipelines',))}: pipelines: name at least one")
         sweep = self._sweep()
@@ -313,13 +315,13 @@ class _Plan:
         for pipeline, settings in pipelines.items():
             for variant in experiment.variants or (Variant(name=""),):
                 for point in _points(sweep, "classifier", within=False):
-                    at: dict[str, Any] = {}
+                    levels: dict[str, Any] = {}
                     if len(pipelines) > 1:
-                        at["pipeline"] = pipeline
+                        levels["pipeline"] = pipeline
                     if experiment.variants:
-                        at["variant"] = variant.name
-                    at.update((dotted(path), value) for path, value in point)
-                    cases.append(self._case(settings, variant, point, sweep, at))
+                        levels["variant"] = variant.name
+                    levels.update((dotted(path), value) for path, value in point)
+                    cases.append(self._case(settings, variant, point, sweep, levels))
         self._check_effect(cases, sweep)
         if self.complaints:
             raise ConfigError("\n".join(dict.fromkeys(self.complaints)))
@@ -341,7 +343,7 @@ class _Plan:
             keys = [dotted(path) for path in sweep if {path[0], dotted(path[:2])} & inert]
             twin = seen.setdefault(_what_matters(case, inert), case)
             if not keys and twin is not case:
-                keys = [key for key in case.at if case.at[key] != twin.at[key]]
+                keys = [key for key in case.levels if case.levels[key] != twin.levels[key]]
             for key in keys:
                 self.complaints.append(
                     f"{self.layer.where(('sweep', key))}: {key} makes no difference: the trials of {named} do not "
@@ -359,7 +361,7 @@ class _Plan:
 
     def _sweep(self) -> dict[tuple[str, ...], Sequence[Any]]:
         """Return the values of each swept key, by its path."""
-        found: dict[tuple[str, ...], Sequence[Any]] = {}
+        sweep: dict[tuple[str, ...], Sequence[Any]] = {}
 
         def take(path: tuple[str, ...], value: Any, where: tuple[str, ...]) -> None:
             if isinstance(value, Mapping):
@@ -375,11 +377,11 @@ class _Plan:
             elif not isinstance(value, list) or not value:
                 self.complaints.append(f"{place}: give a list of values, such as [17.0, 20.0, 23.0]")
             else:
-                found[path] = value
+                sweep[path] = value
 
         for key, value in self.experiment.sweep.items():
             take(tuple(key.split(".")), value, (key,))
-        return found
+        return sweep
 
     def _case(
         self,
@@ -387,7 +389,7 @@ class _Plan:
         variant: Variant,
         point: Sequence[tuple[tuple[str, ...], Any]],
         sweep: Mapping[tuple[str, ...], Sequence[Any]],
-        at: dict[str, Any],
+        levels: dict[str, Any],
     ) -> ExperimentCase:
         experiment = self.experiment
         merged = Merged()
@@ -410,7 +412,7 @@ class _Plan:
         )
         name = ", ".join(
             str(value) if key in ("pipeline", "variant") else in_a_name(key, value)
-            for key, value in at.items()
+            for key, value in levels.items()
         )
         if any(source is not None and source.kind == SIMULATED for source in (data, test)):
             simulated_objects(settings)
@@ -419,7 +421,7 @@ class _Plan:
             self._check_folds(settings, data, judge)
         return ExperimentCase(
             name=name,
-            at=at,
+            levels=levels,
             settings=settings,
             data=data,
             test=test,
@@ -430,20 +432,20 @@ class _Plan:
 
     def _fingertips(self, data: TrialSource | None, test: TrialSource | None) -> dict[str, float]:
         """Return the settings of the fingertips that the scenes of `identified:` were recorded with."""
-        found: dict[str, dict[str, float]] = {}
+        variants: dict[str, dict[str, float]] = {}
         for table, source in (("data", data), ("test", test)):
             if source is None or not source.source.startswith(IDENTIFIED):
                 continue
             try:
-                found[table] = dict(identified_scenes(source.source)[0].gripper)
+                variants[table] = dict(identified_scenes(source.source)[0].gripper)
             except GraspsenseError as error:
                 self.complaints.append(f"{self.layer.where((table,))}: {error}")
-        if len(found) > 1 and found["data"] != found["test"]:
+        if len(variants) > 1 and variants["data"] != variants["test"]:
             self.complaints.append(
                 f"{self.layer.where(('test',))}: the scenes of [data] and [test] were identified with different "
                 "fingertips ([identified.gripper]): their squeezes cannot be compared"
             )
-        return next(iter(found.values()), {})
+        return next(iter(variants.values()), {})
 
     def _check_folds(self, settings: Settings, data: TrialSource, judge: Any) -> None:
         """Add an error if there are more folds than trials, because every task of the case would fail."""
@@ -565,7 +567,7 @@ def shown(value: Any) -> str:
 
 def _fresh(config: Any) -> dict[str, Any]:
     """Return the keys of a classifier that are set, without a trained model."""
-    return {key: one for key, one in plain(config).items() if one is not None and key != "model"}
+    return {key: value for key, value in plain(config).items() if value is not None and key != "model"}
 
 
 def _tables(experiment: Experiment | Variant) -> dict[str, Mapping[str, Any]]:
@@ -616,14 +618,14 @@ def _located(values: Mapping[str, Any], base: Path | None) -> dict[str, Any]:
 
     def inside(value: Any) -> Any:
         if isinstance(value, Mapping):
-            return {key: inside(one) for key, one in value.items()}
+            return {key: inside(inner) for key, inner in value.items()}
         if isinstance(value, list):
-            return [inside(one) for one in value]
+            return [inside(inner) for inner in value]
         return located_text(value, base) if isinstance(value, str) else value
 
     located = {
-        key: inside(one)
-        for key, one in values.items()
+        key: inside(inner)
+        for key, inner in values.items()
         if key in ("parts", "pipelines", "gripper", "variants", "sweep", "data", "test")
     }
     return {**values, **located}

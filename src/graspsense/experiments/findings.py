@@ -52,7 +52,7 @@ class FoundTable:
         lines.append(f"| {' | '.join(self.header)} |")
         lines.append("|---" * len(self.header) + "|")
         for row in self.rows:
-            lines.append(f"| {' | '.join(_cell(one) for one in row)} |")
+            lines.append(f"| {' | '.join(_cell(cell) for cell in row)} |")
         return [*lines, ""]
 
 
@@ -80,10 +80,10 @@ class Findings:
 
     def page_sections(self) -> list[Section]:
         """Return the tables with their pictures, then the notes and the further sections."""
-        found = [one.section(self.drawn.get(one.id, "")) for one in self.tables]
+        sections = [table.section(self.drawn.get(table.id, "")) for table in self.tables]
         if self.notes:
-            found.append(Section(id="notes", title="Notes", body=bullets(self.notes)))
-        return [*found, *self.sections]
+            sections.append(Section(id="notes", title="Notes", body=bullets(self.notes)))
+        return [*sections, *self.sections]
 
     def markdown(self, title: str, made: Mapping[str, Any], cpu_seconds: float) -> str:
         """Return the findings as Markdown, with the command, date and machine."""
@@ -98,8 +98,8 @@ class Findings:
             self.answer,
             "",
         ]
-        for one in self.tables:
-            lines += one.markdown
+        for shown in self.tables:
+            lines += shown.markdown
         if self.notes:
             lines += ["## Notes", "", *(f"- {_cell(note)}" for note in self.notes), ""]
         return "\n".join(lines)

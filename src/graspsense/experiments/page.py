@@ -40,9 +40,9 @@ def write_page(summary: Summary, results: Results) -> Path:
     """Write `report.html` beside the results and return its path. Raises SaveFailed."""
     path = results.folder / NAME
     write_html(path, experiment_page(summary, results))
-    found = findings_of(summary)
-    if found is not None:
-        text = found.markdown(summary.planned.experiment.title, results.provenance(), summary.cpu_seconds)
+    findings = findings_of(summary)
+    if findings is not None:
+        text = findings.markdown(summary.planned.experiment.title, results.provenance(), summary.cpu_seconds)
         write_or_replace(results.folder / MARKDOWN, text.encode())
     return path
 
@@ -56,16 +56,16 @@ def findings_of(summary: Summary) -> Findings | None:
 def experiment_page(summary: Summary, results: Results) -> Page:
     """Return the page."""
     experiment = summary.planned.experiment
-    found = findings_of(summary)
-    if found is not None:
+    findings = findings_of(summary)
+    if findings is not None:
         return Page(
             kind="Experiment",
             title=experiment.title,
             question=experiment.question,
-            answer=found.answer,
-            headline=found.headline,
+            answer=findings.answer,
+            headline=findings.headline,
             beside=_failures(summary) + bullets([SIMULATED], "notes"),
-            sections=(*found.page_sections(), _made_of(summary, results)),
+            sections=(*findings.page_sections(), _made_of(summary, results)),
         )
     best = best_condition(summary)
     sections = [_rates(summary)] if summary.conditions else []
@@ -119,12 +119,12 @@ def _beside(summary: Summary, best: ConditionResult | None) -> str:
     text = (
         "A gripper closes two fingers with force sensors on an object that it cannot see into. Each grasp gives a few "
         f"numbers ({features}), from which a classifier learns {TARGETS[best.recognised]}. There are "
-        f"{counted(len(best.first.confusion.labels), 'possible answer')}.{guessing} Each case has "
+        f"{counted(len(best.of_first_seed.confusion.labels), 'possible answer')}.{guessing} Each case has "
         f"{counted(best.rate.n, 'grasp')}, {origin}. "
         f"Every grasp is classified by {protocol_words(best.protocol)}. A 95 % interval contains the true mean in "
         "95 of 100 such experiments."
     )
-    warnings = list(dict.fromkeys(best.first.warnings))
+    warnings = list(dict.fromkeys(best.of_first_seed.warnings))
     notes = [SIMULATED] if best.simulated else []
     return paragraph(text) + _failures(summary) + bullets(warnings, "warning") + bullets(notes, "notes")
 
@@ -138,7 +138,7 @@ def _first_result(summary: Summary, condition: ConditionResult) -> RecognitionRe
 def _failures(summary: Summary) -> str:
     lines = []
     if summary.failed:
-        reasons = list(dict.fromkeys(one.reason for one in summary.failed))
+        reasons = list(dict.fromkeys(task.reason for task in summary.failed))
         lines.append(f"{len(summary.failed)} tasks failed and are not included: {'; '.join(reasons[:5])}")
     lines += unreadable_lines(summary)
     if summary.missing:
@@ -169,13 +169,13 @@ def _picture(conditions: Sequence[ConditionResult], rows: Sequence[RateRow], cap
         return rates_picture(rows[:ROWS], caption + cut)
     series: dict[str, list[tuple[float, RateRow]]] = {}
     for condition, row in zip(conditions, rows, strict=True):
-        others = [str(value) for name, value in condition.case.at.items() if name != key]
+        others = [str(value) for name, value in condition.case.levels.items() if name != key]
         series.setdefault(", ".join([*others, condition.classifier]), []).append(
-            (float(condition.case.at[key]), row)
+            (float(condition.case.levels[key]), row)
         )
     guess = conditions[0].majority
-    what, one = worded(key.rpartition(".")[2], 1.0)
-    factor, _, unit = one.partition(" ")
+    what, in_unit = worded(key.rpartition(".")[2], 1.0)
+    factor, _, unit = in_unit.partition(" ")
     series = {name: [(x * float(factor), row) for x, row in points] for name, points in series.items()}
     axis = f"{what}, {unit}" if unit else what
     return rates_over(series, axis, caption, None if guess is None else guess.mean)
@@ -185,11 +185,11 @@ def _swept_number(conditions: Sequence[ConditionResult]) -> str | None:
     """Return the swept key with the most different numbers, None if no key has more than one."""
     numbers: dict[str, set[float]] = {}
     for condition in conditions:
-        for key, value in condition.case.at.items():
+        for key, value in condition.case.levels.items():
             if isinstance(value, int | float) and not isinstance(value, bool):
                 numbers.setdefault(key, set()).add(float(value))
     most = max(numbers, key=lambda key: len(numbers[key]), default=None)
-    everywhere = most is not None and all(most in condition.case.at for condition in conditions)
+    everywhere = most is not None and all(most in condition.case.levels for condition in conditions)
     return most if everywhere and most is not None and len(numbers[most]) > 1 else None
 
 
@@ -202,7 +202,7 @@ def _evaluation_sections(summary: Summary, best: ConditionResult) -> list[Sectio
     conditions = [condition for condition in summary.conditions if condition.target == best.target]
     conditions = sorted(conditions, key=lambda condition: -condition.rate.mean)
     chosen = conditions if len(conditions) <= MATRICES else [*conditions[: MATRICES - 1], conditions[-1]]
-    first, *others = [
+    headline, *others = [
         (
             f"{condition.name}: {condition.confusion.n} predictions of {len(condition.by_seed)} seeds, "
             f"{100 * condition.rate.mean:.1f} % correct",
@@ -210,7 +210,7 @@ def _evaluation_sections(summary: Summary, best: ConditionResult) -> list[Sectio
         )
         for condition in chosen
     ]
-    sections.append(confusion_section(first, others))
+    sections.append(confusion_section(headline, others))
     tree = next((result.tree for result in best.by_seed.values() if result.tree), None)
     if tree:
         sections.append(tree_section(tree, f"{best.classifier} grows on all grasps of the first seed"))

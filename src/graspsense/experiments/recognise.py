@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 from attrs import field, frozen
@@ -29,6 +29,7 @@ from graspsense.sources.trial_source import TrialSource, labelled_trials
 if TYPE_CHECKING:
     from graspsense.core.components.config import Settings
     from graspsense.core.learn.labelled import Labelled, Target
+    from graspsense.core.values.features import FeatureTable
     from graspsense.core.values.trace import Trace
     from graspsense.core.values.tree import TreeNode
     from graspsense.evaluation.results import Evaluation
@@ -70,25 +71,32 @@ def recognise(params: Mapping[str, Any], seed: int) -> RecognitionResult:
     if params["test"]:
         test = apart_from(_trials(params["test"], settings, seed + TEST_SEED_OFFSET, None), data)
     results = []
-    for spec in params["learners"]:
-        component = installed().find("classifier", spec["type"])
-        learner = SelectedComponent(component, build(component, spec["config"]))
+    for name, learner in classifiers_of(params).items():
         for target in evaluation.targets:
             tree = _tree(learner, data, target, seed) if params["first"] else None
             if test is not None:
-                result = _on_other_trials(spec["name"], learner, data, test, target, seed, tree)
+                result = _on_other_trials(name, learner, data, test, target, seed, tree)
             else:
-                result = _cross_validated(spec["name"], learner, data, target, seed, evaluation, tree)
+                result = _cross_validated(name, learner, data, target, seed, evaluation, tree)
             results.append(result)
     return RecognitionResult(
         source=data.source,
         simulated=bool(data.provenance.get("simulated", False)),
         notes=data.notes,
         provenance=data.provenance,
-        trials=TrialValues.of(data),
+        trials=TrialValues.from_trials(data),
         classifiers=tuple(results),
         grasps=tuple(curves.curves),
     )
+
+
+def classifiers_of(params: Mapping[str, Any]) -> dict[str, SelectedComponent]:
+    """Return the classifiers of a task by name."""
+    classifiers = {}
+    for spec in params["learners"]:
+        component = installed().find("classifier", spec["type"])
+        classifiers[str(spec["name"])] = SelectedComponent(component, build(component, spec["config"]))
+    return classifiers
 
 
 class _CurveCollector:
@@ -179,27 +187,40 @@ def _on_other_trials(
     seed: int,
     tree: tuple[TreeNode, ...] | None,
 ) -> ClassifierResult:
-    """Train on one source and test on another, for states within each class separately."""
-    classes = {""} if target != "state" else {class_of(label) for label in test.labels}
-    true: list[str] = []
-    predicted: list[str] = []
     told: list[str] = []
-    for class_name in sorted(classes):
-        training, tested = (one.of_class(class_name) if class_name else one for one in (data, test))
-        if target == "class":
-            training, tested = training.aimed("class"), tested.aimed("class")
-        classifier = learner.create()
-        with gathered_warnings(told):
-            classifier.fit(training.table, training.labels, seed)
-        labels = classifier.classes()
-        best = classifier.probabilities(tested.table).argmax(axis=1)
-        true += tested.labels
-        predicted += [labels[k] for k in best]
+    with gathered_warnings(told):
+        true, predicted = true_and_predicted(learner, data, test, target, seed)
     note = (
         f"trained on {counted(len(data), 'trial')} of {data.source}, tested on {len(true)} of {test.source}"
     )
     notes = (note, *test.notes, *told)
-    return ClassifierResult.of(name, target, OTHER_TRIALS, true, predicted, notes=notes, tree=tree)
+    return ClassifierResult.from_answers(name, target, OTHER_TRIALS, true, predicted, notes=notes, tree=tree)
+
+
+def true_and_predicted(
+    learner: SelectedComponent, training: Labelled, test: Labelled, target: Target, seed: int
+) -> tuple[list[str], list[str]]:
+    """Return the labels of other trials, true and predicted, with a model for each class if the target is `state`."""
+    classes = {""} if target != "state" else {class_of(label) for label in test.labels}
+    true: list[str] = []
+    predicted: list[str] = []
+    for name in sorted(classes):
+        known, tested = (trials.of_class(name) if name else trials for trials in (training, test))
+        if target == "class":
+            known, tested = known.aimed("class"), tested.aimed("class")
+        true += tested.labels
+        predicted += predictions(learner, known.table, known.labels, tested.table, seed)
+    return true, predicted
+
+
+def predictions(
+    learner: SelectedComponent, known: FeatureTable, labels: Sequence[str], tested: FeatureTable, seed: int
+) -> list[str]:
+    """Return what a classifier that learns known trials predicts for others."""
+    classifier = learner.create()
+    classifier.fit(known, labels, seed)
+    classes = classifier.classes()
+    return [classes[k] for k in classifier.probabilities(tested).argmax(axis=1)]
 
 
 def _tree(

@@ -78,10 +78,10 @@ class Results:
             raise ValueError("it is the result of another task")
         return done
 
-    def of(self, keys: Sequence[str]) -> dict[str, TaskResult]:
+    def finished(self, keys: Sequence[str]) -> dict[str, TaskResult]:
         """Return the results of those of these tasks that have one, in their order."""
-        found = ((key, self.get(key)) for key in keys)
-        return {key: done for key, done in found if done is not None}
+        stored = ((key, self.get(key)) for key in keys)
+        return {key: done for key, done in stored if done is not None}
 
     def any(self) -> bool:
         """Whether the folder has results."""
@@ -114,18 +114,18 @@ class Results:
     def provenance(self) -> dict[str, Any]:
         """Return the provenance that `begin` wrote; empty if it cannot be read."""
         try:
-            found = json.loads((self.folder / PROVENANCE).read_text(encoding="utf-8"))
+            document = json.loads((self.folder / PROVENANCE).read_text(encoding="utf-8"))
         except (OSError, ValueError):
             return {}
-        return found if isinstance(found, dict) else {}
+        return document if isinstance(document, dict) else {}
 
     def experiment(self) -> Planned:
         """Return the experiment of the folder, under the name that it was run by. Raises ConfigError."""
         planned = read_experiment(str(self.folder / EXPERIMENT), force=True)
-        found = self.provenance()
+        provenance = self.provenance()
         # The results are those of the inputs that there were. Without them, an earlier version made the results.
-        inputs = found.get("inputs", {})
-        return evolve(planned, name=str(found.get("experiment", planned.name)), inputs=inputs)
+        inputs = provenance.get("inputs", {})
+        return evolve(planned, name=str(provenance.get("experiment", planned.name)), inputs=inputs)
 
     @contextmanager
     def alone(self) -> Iterator[None]:
@@ -163,7 +163,7 @@ def resolved(planned: Planned) -> str:
     ]
     if not planned.experiment.classifiers and planned.cases and not planned.parts:
         values["classifiers"] = [
-            {"name": one.name, "type": one.type, **one.config} for one in _unswept(planned)
+            {"name": case.name, "type": case.type, **case.config} for case in _unswept(planned)
         ]
     lines = [
         f"# {planned.name}, with everything filled in: `graspsense experiment FILE` gives the same again."
@@ -176,7 +176,11 @@ def resolved(planned: Planned) -> str:
     ]
     for table, keys in tables.items():
         if keys:
-            lines += ["", f"[{table}]", *(f"{toml_key(k)} = {toml_value(one)}" for k, one in keys.items())]
+            lines += [
+                "",
+                f"[{table}]",
+                *(f"{toml_key(k)} = {toml_value(value)}" for k, value in keys.items()),
+            ]
     return "\n".join(lines) + "\n"
 
 

@@ -94,19 +94,21 @@ def run_experiment(
                 f"another folder ({option('out', python='Results')}) begins anew"
             )
         known = {
-            key: one for key, one in results.of([task.key for task in tasks]).items() if one.state == "done"
+            key: result
+            for key, result in results.finished([task.key for task in tasks]).items()
+            if result.state == "done"
         }
         changed = _changed_inputs(results, planned)
         results.begin(planned, command)
         todo = [task for task in tasks if task.key not in known]
         keys, stopped = _run_tasks(todo, len(tasks), results, executor, progress, said) if todo else ([], "")
         # Counted on the disk: an interrupt can come while a result is being written.
-        new = results.of(keys).values()
+        new = results.finished(keys).values()
     return Account(
         total=len(tasks),
         kept=len(known),
-        done=sum(one.state == "done" for one in new),
-        failed=tuple(one for one in new if one.state == "failed"),
+        done=sum(result.state == "done" for result in new),
+        failed=tuple(result for result in new if result.state == "failed"),
         stopped=stopped,
         notes=(*changed, *_notes(list(known.values()))),
     )
@@ -155,8 +157,8 @@ def _run_tasks(
 
 def _changed_inputs(results: Results, planned: Planned) -> list[str]:
     """Return a note on the inputs that differ from those of the results in the folder."""
-    before = results.provenance().get("inputs", {})
-    names = [name for name, content in planned.inputs.items() if before.get(name, content) != content]
+    earlier = results.provenance().get("inputs", {})
+    names = [name for name, content in planned.inputs.items() if earlier.get(name, content) != content]
     if not names:
         return []
     return [
@@ -166,10 +168,10 @@ def _changed_inputs(results: Results, planned: Planned) -> list[str]:
 
 def _notes(known: Sequence[TaskResult]) -> list[str]:
     """Return the differences between the versions of the existing results and those of this process."""
-    found: list[str] = []
+    notes: list[str] = []
     for result in known:
         for line in differences(versions(), result.made.get("versions", {})):
             text = f"results from before were made with other versions: {line}"
-            if text not in found:
-                found.append(text)
-    return found
+            if text not in notes:
+                notes.append(text)
+    return notes

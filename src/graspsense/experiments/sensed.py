@@ -15,6 +15,7 @@ import time
 import warnings
 from collections.abc import Callable, Sequence
 from functools import partial
+from operator import eq
 from typing import Any, Final
 
 import numpy as np
@@ -28,7 +29,7 @@ from graspsense.core.values.errors import ConfigError
 from graspsense.core.values.features import FeatureTable, table_of
 from graspsense.evaluation.distribution import DistributionDistance, distribution_distance
 from graspsense.evaluation.equivalence import Equivalence, equivalence
-from graspsense.experiments.recognise import TEST_SEED_OFFSET
+from graspsense.experiments.recognise import TEST_SEED_OFFSET, predictions
 from graspsense.sources.simulated import Group, SimulationPlan, plan_trials
 
 TIME_MARGIN: Final = 1.25
@@ -120,14 +121,14 @@ def sensed_trade(
     """
     backend = settings.gripper.create()
     if variants is None and isinstance(backend, BatchBackend):
-        variants = [one for one in backend.variants() if one.for_recognition]
+        variants = [variant for variant in backend.variants() if variant.for_recognition]
     if not variants:
         raise ConfigError(f"gripper {settings.gripper.component.qualified} has no accuracy to trade for time")
     if settings.classifier is None:
         raise ConfigError(
             f"recognition needs a classifier: choose one, as in {set_option('classifier.type=c45')}"
         )
-    in_turn = sorted(variants, key=lambda one: one.role != "reference")
+    in_turn = sorted(variants, key=lambda variant: variant.role != "reference")
     group = Group(objects=tuple(objects), instances=instances, trials=1)
     training = _Plans([plan_trials(settings, (group,), seed) for seed in seeds])
     tests = _Plans([plan_trials(settings, (group,), seed + TEST_SEED_OFFSET) for seed in seeds])
@@ -146,8 +147,8 @@ def sensed_trade(
         ]
         collected.append(_Collected(table.values, rates, seconds))
     points = [
-        _point(variant, one, collected[0], names, training.labels, comparisons=max(len(in_turn) - 1, 1))
-        for variant, one in zip(in_turn, collected, strict=True)
+        _point(variant, grasps, collected[0], names, training.labels, comparisons=max(len(in_turn) - 1, 1))
+        for variant, grasps in zip(in_turn, collected, strict=True)
     ]
     return SensedTrade(
         objects=training.plans[0].groups[0].objects,
@@ -179,11 +180,11 @@ def _tick(
     progress: Callable[[str, int, int], None],
     variant: SimulationVariant,
     k: int,
-    of: int,
+    of_all: int,
     done: int,
     total: int,
 ) -> None:
-    progress(f"{variant.method}, {variant.fidelity}, {variant.step}: grasp {done} of {total}", k, of)
+    progress(f"{variant.method}, {variant.fidelity}, {variant.step}: grasp {done} of {total}", k, of_all)
 
 
 def _grasps(
@@ -211,7 +212,7 @@ def _grasps(
         began = time.process_time()
         done = backend.run_many(controller, scenes, seeds, progress=tick, **options)
         spent = time.process_time() - began
-    return table_of([one.extracted for one in done]), spent / len(scenes)
+    return table_of([grasp.extracted for grasp in done]), spent / len(scenes)
 
 
 def _rate(
@@ -221,12 +222,8 @@ def _rate(
     seed: int,
 ) -> float:
     """Return the share of test grasps that a classifier recognises which is trained on the other table."""
-    classifier = learner.create()
-    classifier.fit(training[0], list(training[1]), seed)
-    classes = classifier.classes()
-    best = classifier.probabilities(test[0]).argmax(axis=1)
-    right = sum(classes[int(k)] == label for k, label in zip(best, test[1], strict=True))
-    return float(right / len(test[1]))
+    predicted = predictions(learner, *training, test[0], seed)
+    return float(np.mean(list(map(eq, predicted, test[1]))))
 
 
 def _point(

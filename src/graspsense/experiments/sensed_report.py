@@ -6,11 +6,9 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from graspsense.core.values.errors import PluginUnavailable
 from graspsense.experiments.sensed import TIME_MARGIN
 from graspsense.report.simulation import axes_of, markdown_table
-from graspsense.report.trace_plot import MATPLOTLIB_HINT
-from graspsense.report.write import write_picture
+from graspsense.report.write import new_figure, write_picture
 
 if TYPE_CHECKING:
     from graspsense.experiments.sensed import SensedPoint, SensedTrade
@@ -29,7 +27,7 @@ LEAST_DISTANCE: Final = 1e-4
 
 def sensed_rows(trade: SensedTrade) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Return the header and one row for each variant; of a distance, the upper end of its interval is in brackets."""
-    features = tuple(one.feature.upper() for one in trade.points[0].distances)
+    features = tuple(distance.feature.upper() for distance in trade.points[0].distances)
     rows = [
         (
             point.method,
@@ -63,7 +61,7 @@ def conclusion(trade: SensedTrade) -> str:
         return "With one seed, no test of equivalence is possible: give two seeds or more."
     margin, least = f"{100 * tests[0].margin:g} points", min(test.power for test in tests)
     best = trade.coarsest
-    found = (
+    sentence = (
         f"Take {best.name}, {1e3 * best.seconds:.3g} ms a grasp: its recognition is equivalent to that of the "
         f"reference within {margin}. No equivalent variant is faster by more than {100 * (TIME_MARGIN - 1):.0f} %, "
         "below which times are not told apart, and of those it is the nearest to the reference."
@@ -71,7 +69,7 @@ def conclusion(trade: SensedTrade) -> str:
         else f"With {len(trade.seeds)} seeds, no variant is shown to be equivalent to the reference within {margin}."
     )
     return (
-        f"{found} The power of the weakest test is {least:.2g}: with this probability it shows that equal rates are "
+        f"{sentence} The power of the weakest test is {least:.2g}: with this probability it shows that equal rates are "
         "equivalent."
     )
 
@@ -107,13 +105,7 @@ def sensed_png(trade: SensedTrade, path: Path) -> None:
 
     Raises PluginUnavailable without matplotlib, ConfigError if the file cannot be written.
     """
-    try:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise PluginUnavailable(f"{MATPLOTLIB_HINT} ({error})") from error
-    figure = Figure(figsize=(11.0, 5.2), dpi=100, layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(11.0, 5.2, dpi=100)
     left, right = figure.subplots(1, 2)
     _draw_rates(left, trade)
     _draw_distances(right, trade)

@@ -63,7 +63,7 @@ def trade_simulation(
     reference: list[_Measured] | None = None
     quantities: tuple[str, ...] = ()
     points: list[VariantPoint] = []
-    in_turn = sorted(variants, key=lambda one: one.role != "reference")
+    in_turn = sorted(variants, key=lambda variant: variant.role != "reference")
     for k, variant in enumerate(in_turn):
         what = f"{variant.method}, {variant.fidelity}, {variant.step}"
         tick = None if progress is None else partial(progress, what, k, len(in_turn))
@@ -137,12 +137,12 @@ def _measured(
     with warnings.catch_warnings():
         # Some variants run in the interpreter on purpose; the warning about this is not needed.
         warnings.simplefilter("ignore")
-        _, first = run(slice(None))
+        _, cold_s = run(slice(None))
         least, total, runs = math.inf, 0.0, 0
         while total < LEAST_S or runs < LEAST_RUNS:
             done, spent = run(slice(None))
             least, total, runs = min(least, spent), total + spent, runs + 1
-    return [one.extracted for one in done], least / len(scenes), max(first - least, 0.0)
+    return [grasp.extracted for grasp in done], least / len(scenes), max(cold_s - least, 0.0)
 
 
 def _point(
@@ -166,9 +166,9 @@ def _point(
             worst[name] = max(worst.get(name, 0.0), error)
         n = min(len(measured.force), len(true.force))
         peak = max(float(np.max(true.force, initial=0.0)), SCALES["N"])
-        found = float(np.max(measured.force, initial=0.0))
+        reached = float(np.max(measured.force, initial=0.0))
         off = float(np.sqrt(np.mean((measured.force[:n] - true.force[:n]) ** 2))) if n else math.inf
-        worst[PEAK] = max(worst.get(PEAK, 0.0), abs(found - float(np.max(true.force, initial=0.0))) / peak)
+        worst[PEAK] = max(worst.get(PEAK, 0.0), abs(reached - float(np.max(true.force, initial=0.0))) / peak)
         worst[TRACE] = max(worst.get(TRACE, 0.0), off / peak)
     failure = missing or ("" if all(map(math.isfinite, worst.values())) else "no number in the force trace")
     return VariantPoint(

@@ -51,19 +51,19 @@ class ConditionResult:
         return ", ".join(part for part in (self.case.name, classifier) if part)
 
     @property
-    def first(self) -> ClassifierResult:
+    def of_first_seed(self) -> ClassifierResult:
         """The result of the first seed."""
         return next(iter(self.by_seed.values()))
 
     @property
     def protocol(self) -> str:
         """The protocol of the rates."""
-        return self.first.protocol
+        return self.of_first_seed.protocol
 
     @property
     def recognised(self) -> Target:
         """What a correct prediction recognises: the target, or the class if labels have no state."""
-        no_state = not any(":" in label for label in self.first.confusion.labels)
+        no_state = not any(":" in label for label in self.of_first_seed.confusion.labels)
         return "class" if self.target == "both" and no_state else self.target
 
     @property
@@ -80,7 +80,7 @@ class ConditionResult:
     def controls(self) -> dict[str, ControlOverSeeds]:
         """The controls over the seeds, by name."""
         controls = {}
-        for name, control in self.first.controls.items():
+        for name, control in self.of_first_seed.controls.items():
             measured = (result.controls[name].rate for result in self.by_seed.values())
             rates = [rate for rate in measured if rate is not None]
             rate = self._over_seeds(rates) if rates else None
@@ -114,8 +114,8 @@ class ConditionResult:
         seeds = [seed for seed in self.rates if seed in other.rates]
         if len(seeds) < 2 or not self.simulated:
             return None
-        first, second = ([one.rates[seed] for seed in seeds] for one in (self, other))
-        return mean_difference(first, second, self.rate.n, comparisons)
+        minuend, subtrahend = ([classifier.rates[seed] for seed in seeds] for classifier in (self, other))
+        return mean_difference(minuend, subtrahend, self.rate.n, comparisons)
 
     def _over_seeds(self, measured: list[RecognitionRate]) -> OverSeeds:
         rates = [rate.rate for rate in measured]
@@ -127,7 +127,7 @@ class ConditionResult:
             if len(intervals) == len(measured):
                 low, high = (sum(ends) / len(ends) for ends in zip(*intervals, strict=True))
                 single = evolve(single, interval=(low, high))
-        return OverSeeds(tuple(rates), self.first.rate.n, single if len(rates) == 1 else None)
+        return OverSeeds(tuple(rates), self.of_first_seed.rate.n, single if len(rates) == 1 else None)
 
 
 @frozen(kw_only=True, eq=False)
@@ -176,7 +176,7 @@ class Summary:
             "conditions": [
                 {
                     "case": condition.case.name,
-                    "at": dict(condition.case.at),
+                    "at": dict(condition.case.levels),
                     "classifier": condition.classifier,
                     "target": condition.target,
                     "protocol": condition.protocol,
@@ -190,7 +190,7 @@ class Summary:
                 }
                 for condition in self.conditions
             ],
-            "failed": [{"task": one.name, "reason": one.reason} for one in self.failed],
+            "failed": [{"task": task.name, "reason": task.reason} for task in self.failed],
             "missing": self.missing,
             **({"unreadable": list(self.unreadable)} if self.unreadable else {}),
             "seconds": self.seconds,
@@ -221,8 +221,10 @@ def summarise(planned: Planned, results: Results) -> Summary:
             decoded[case.name, seed] = result
             simulated[case.name] = result.simulated
             if isinstance(result, RecognitionResult):
-                for one in result.classifiers:
-                    by_condition.setdefault((case.name, one.classifier, one.target), {})[seed] = one
+                for outcome in result.classifiers:
+                    by_condition.setdefault((case.name, outcome.classifier, outcome.target), {})[seed] = (
+                        outcome
+                    )
     case_of = {case.name: case for case in planned.cases}
     return Summary(
         planned=planned,

@@ -44,7 +44,7 @@ class ClassifierResult:
     squeezes: float | None = None
 
     @classmethod
-    def of(
+    def from_answers(
         cls,
         classifier: str,
         target: Target,
@@ -76,7 +76,7 @@ class TrialValues:
     values: tuple[tuple[float | None, ...], ...]
 
     @classmethod
-    def of(cls, labelled: Labelled) -> TrialValues:
+    def from_trials(cls, labelled: Labelled) -> TrialValues:
         """Return the labels and features of these trials."""
         table = labelled.table
         return cls(

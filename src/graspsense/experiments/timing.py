@@ -26,16 +26,18 @@ class TimeLeft:
     @property
     def bounds_s(self) -> tuple[float, float] | None:
         """Two standard errors below and above the estimate; None if there is no estimate yet."""
-        rest = self.total - len(self._seconds)
+        remaining = self.total - len(self._seconds)
         known = self._seconds[self.workers :]
         if len(known) < 2:
             return None
         n = len(known)
         mean = sum(known) / n
-        spread = math.sqrt(sum((second - mean) ** 2 for second in known) / (n - 1))
+        spread = math.sqrt(sum((seconds - mean) ** 2 for seconds in known) / (n - 1))
         # Both the mean itself and the tasks to come are uncertain.
-        error = spread * math.sqrt(rest * rest / n + rest)
-        return max(rest * mean - 2 * error, 0.0) / self.workers, (rest * mean + 2 * error) / self.workers
+        error = spread * math.sqrt(remaining * remaining / n + remaining)
+        return max(remaining * mean - 2 * error, 0.0) / self.workers, (
+            remaining * mean + 2 * error
+        ) / self.workers
 
     @property
     def words(self) -> str:

@@ -19,17 +19,21 @@ _LIBRARIES: Final = ("numpy", "scipy", "scikit-learn", "numba")
 @cache
 def versions() -> Mapping[str, str]:
     """Return the versions that a result may depend on: Python, libraries, plugins, processor."""
-    found = {"python": platform.python_version(), "graspsense": __version__, "machine": platform.machine()}
+    versions_here = {
+        "python": platform.python_version(),
+        "graspsense": __version__,
+        "machine": platform.machine(),
+    }
     for name in _LIBRARIES:
         try:
-            found[name] = version(name)
+            versions_here[name] = version(name)
         except PackageNotFoundError:
-            found[name] = "not installed"
+            versions_here[name] = "not installed"
     for status in installed().statuses:
-        found[status.distribution] = (
+        versions_here[status.distribution] = (
             status.version if status.state == "loaded" else f"{status.version} ({status.state})"
         )
-    return found
+    return versions_here
 
 
 def measured_on() -> dict[str, str]:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from graspsense.report.grasp_picture import DPI, require_picture
-from graspsense.report.write import write_picture
+from graspsense.report.write import new_figure, write_picture
 
 if TYPE_CHECKING:
     import numpy as np
@@ -28,12 +28,8 @@ def channels_png(
     Raises as `require_picture`, and ConfigError where `path` cannot be written.
     """
     require_picture(path)
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     shown = list(series.items())[:MOST_PANELS]
-    figure = Figure(figsize=(8.5, PANEL_IN * max(len(shown), 2)), dpi=DPI, layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(8.5, PANEL_IN * max(len(shown), 2), DPI)
     panels: Any = figure.subplots(max(len(shown), 1), 1, sharex=True, squeeze=False)
     for (name, (t_s, values)), panel in zip(shown, panels[:, 0], strict=False):
         panel.plot(t_s, values, linewidth=0.8)

@@ -5,9 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from graspsense.core.values.errors import PluginUnavailable
-from graspsense.report.trace_plot import MATPLOTLIB_HINT
-from graspsense.report.write import write_picture
+from graspsense.report.write import new_figure, write_picture
 
 if TYPE_CHECKING:
     from graspsense.evaluation.confusion import Confusion
@@ -27,15 +25,9 @@ def confusion_text(confusion: Confusion) -> list[str]:
 
 def confusion_png(confusion: Confusion, title: str, path: Path) -> None:
     """Draw the matrix. Raises PluginUnavailable without matplotlib, ConfigError for a path that cannot be written."""
-    try:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise PluginUnavailable(f"{MATPLOTLIB_HINT} ({error})") from error
     n = len(confusion.labels)
     side = 2.6 + 0.42 * n
-    figure = Figure(figsize=(side, side), dpi=120, layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(side, side)
     axes: Any = figure.add_subplot()
     totals = [max(sum(row), 1) for row in confusion.counts]
     shares = [[count / total for count in row] for row, total in zip(confusion.counts, totals, strict=True)]

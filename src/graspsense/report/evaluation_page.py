@@ -75,9 +75,9 @@ def result_sections(evaluation: Evaluation, learner: SelectedComponent, labelled
             missing.append(f"{title}: not measured ({measured.reason})")
         elif name != evaluation.protocol:
             n = measured.rate.n
-            of = "" if n == head.n else f" ({n} of {head.n} trials)"
+            among = "" if n == head.n else f" ({n} of {head.n} trials)"
             interval = measured.rate.interval
-            rows.append(RateRow(name=title + of, rate=measured.rate.rate, interval=interval, what=purpose))
+            rows.append(RateRow(name=title + among, rate=measured.rate.rate, interval=interval, what=purpose))
     title = f"{classifier}: {evaluation.confusion.n} predictions"
     sections = [
         controls_section(rows, missing, classifier),
@@ -117,7 +117,9 @@ def _made_of(evaluation: Evaluation, command: str) -> Section:
         ("protocol", f"{evaluation.protocol}, {evaluation.folds} folds, seed {evaluation.seed}"),
         ("code", f"graspsense {__version__}"),
     ]
-    curve = [(f"{one.trained_on:.0f}", f"{100 * one.rate.rate:.1f} %") for one in evaluation.learning_curve]
+    curve = [
+        (f"{point.trained_on:.0f}", f"{100 * point.rate.rate:.1f} %") for point in evaluation.learning_curve
+    ]
     body = facts(pairs)
     if curve:
         body += table("Rate by the number of training trials", ("training trials", "recognised"), curve, 1)

@@ -16,11 +16,11 @@ from graspsense.report.svg import INKS, QUIET, AxisScale, Picture
 from graspsense.report.tree import tree_list
 
 
-def controls_section(rows: Sequence[RateRow], missing: Sequence[str], of: str) -> Section:
+def controls_section(rows: Sequence[RateRow], missing: Sequence[str], subject: str) -> Section:
     """Return the section with a rate, the first of `rows`, and its controls; `missing` lists those not measured."""
     text = (
         "A rate may come from the recording rather than from the objects, for example if classes were recorded on "
-        f"different days. The controls measure this. The figures are those of {of}."
+        f"different days. The controls measure this. The figures are those of {subject}."
     )
     picture = rates_picture(rows, "The rate and its controls. Bars are 95 % intervals.")
     return Section(
@@ -30,9 +30,11 @@ def controls_section(rows: Sequence[RateRow], missing: Sequence[str], of: str) -
     )
 
 
-def confusion_section(first: tuple[str, Confusion], others: Sequence[tuple[str, Confusion]] = ()) -> Section:
+def confusion_section(
+    headline: tuple[str, Confusion], others: Sequence[tuple[str, Confusion]] = ()
+) -> Section:
     """Return the section with the most important confusion matrix, and folded ones with the others."""
-    body = confusion_table(first[1], f"{first[0]}.")
+    body = confusion_table(headline[1], f"{headline[0]}.")
     body += "".join(folded(name, confusion_table(matrix, f"{name}.")) for name, matrix in others)
     return Section(id="confusion", title="Confusion matrix", body=body)
 
@@ -62,11 +64,11 @@ def doubt_section(sets: SetCoverage, reliability: Reliability) -> Section:
             "member, so a label is covered at least as often as it is recognised."
         )
     raw = reliability.uncalibrated_error
-    before = "" if raw is None else f", and {percentage(raw)} before calibration"
+    raw_words = "" if raw is None else f", and {percentage(raw)} before calibration"
     probabilities = (
         f"Where the probabilities are right, predictions of 80 % are correct in 80 of 100 grasps. The Brier score is "
         f"{reliability.brier:.3f} (0 is perfect, 2 the worst); the expected calibration error is "
-        f"{percentage(reliability.calibration_error)}{before}."
+        f"{percentage(reliability.calibration_error)}{raw_words}."
     )
     covered = rates_table("Sets that contain the true label", rows, "contain it") if rows else ""
     return Section(
@@ -85,21 +87,21 @@ def _reliability_curve(reliability: Reliability) -> str:
     with picture.plot(x, y, 24, 280):
         picture.line([(x(0.0), y(0.0)), (x(100.0), y(100.0))], QUIET)
         for point in reliability.curve:
-            at = x(100 * point.probability)
+            place = x(100 * point.probability)
             if point.rate.interval is not None:
                 low, high = point.rate.interval
-                picture.line([(at, y(100 * low)), (at, y(100 * high))], INKS[0])
+                picture.line([(place, y(100 * low)), (place, y(100 * high))], INKS[0])
             words = f"{percentage(point.probability)}: {point.rate.words}"
-            picture.mark(at, y(100 * point.rate.rate), INKS[0], words=words)
+            picture.mark(place, y(100 * point.rate.rate), INKS[0], words=words)
     caption = "Recognition rate over probability, in ten bins. Bars are 95 % intervals; the line is perfect agreement."
     return figure(picture.svg(caption), caption)
 
 
-def tree_section(nodes: Sequence[TreeNode], of: str) -> Section:
-    """Return the section with a decision tree; `of` completes the sentence 'The tree that ...'."""
+def tree_section(nodes: Sequence[TreeNode], what: str) -> Section:
+    """Return the section with a decision tree; `what` completes the sentence 'The tree that ...'."""
     text = (
-        f"The tree that {of}. Read it from the top: each line is a condition on a feature, and an arrow leads to the "
-        "predicted label."
+        f"The tree that {what}. Read it from the top: each line is a condition on a feature, and an arrow leads to "
+        "the predicted label."
     )
     return Section(id="tree", title="Decision tree", body=paragraph(text) + tree_list(nodes))
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import tempfile
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from graspsense.core.control.tick import RELEASE
 from graspsense.core.values.errors import ConfigError, PluginUnavailable
+from graspsense.report.write import require_writable
 
 if TYPE_CHECKING:
     from graspsense.core.values.signals import Command, Reading
@@ -89,14 +89,9 @@ def _checked(name: str, kinds: tuple[str, ...]) -> Path:
     package = PACKAGES[path.suffix.lower()]
     if find_spec(package) is None:
         raise PluginUnavailable(HINTS[package])
-    if path.is_dir() or not path.parent.is_dir():
-        raise ConfigError(
-            f"{path} cannot be written: there is no folder {path.parent}, or it is a folder itself"
-        )
-    try:
-        tempfile.TemporaryFile(dir=path.parent).close()
-    except OSError as error:
-        raise ConfigError(f"{path} cannot be written: {error.strerror}") from error
+    if path.is_dir():
+        raise ConfigError(f"{path} is a folder: name a file in it")
+    require_writable(path)
     return path
 
 

@@ -69,7 +69,7 @@ def channel_figures(trace: Trace, channels: Sequence[Channel]) -> list[str]:
             figures.append(
                 _figure(trace, channel, signal.t_s[shown] - zero, lines, contact is not None, signal.lost)
             )
-    return [one for one in figures if one]
+    return [drawn for drawn in figures if drawn]
 
 
 def _figure(
@@ -96,7 +96,7 @@ def _figure(
     picture.y_axis(y_scale, 42, picture.width - 10, unit)
     with picture.plot(x_scale, y_scale, 44.0, 150.0):
         for k, (axis, line) in enumerate(lines.items()):
-            points = [(x_scale(at), y_scale(factor * value)) for at, value in envelope(t, line)]
+            points = [(x_scale(t_s), y_scale(factor * value)) for t_s, value in envelope(t, line)]
             picture.line(
                 points,
                 INKS[k % len(INKS)],

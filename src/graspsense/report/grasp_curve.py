@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import inf
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -54,6 +55,14 @@ class GraspCurve:
         """The times from shortly before contact on; before that, the fingers move through free space."""
         known = [t for t in self.t_s if t is not None]
         return [t for t in known if t >= BEFORE_S] or known
+
+    def values(self, column: str, begin: float = -inf, end: float = inf) -> list[tuple[float, float]]:
+        """Return times and values of a column in this interval of time, without those that are missing."""
+        return [
+            (t, value)
+            for t, value in zip(self.t_s, getattr(self, column), strict=True)
+            if t is not None and value is not None and begin <= t <= end
+        ]
 
     @property
     def time_words(self) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from pathlib import Path
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any, Final
@@ -10,8 +9,8 @@ from typing import TYPE_CHECKING, Any, Final
 from graspsense.core.values.errors import ConfigError, PluginUnavailable
 from graspsense.core.values.fingers import fingers_of
 from graspsense.core.values.units import display_unit
-from graspsense.report.trace_plot import MATPLOTLIB_HINT, draw_trace
-from graspsense.report.write import write_picture
+from graspsense.report.trace_plot import draw_trace
+from graspsense.report.write import MATPLOTLIB_HINT, new_figure, require_writable, write_picture
 
 if TYPE_CHECKING:
     from graspsense.core.values.trial import Trial
@@ -42,26 +41,17 @@ def require_picture(path: Path) -> None:
         )
     if path.suffix.lower() != ".png":
         raise ConfigError(f"the picture is a PNG file: name it {path.with_suffix('.png')}, not {path}")
-    if not path.parent.is_dir():
-        raise ConfigError(f"the picture cannot be written to {path}: there is no folder {path.parent}")
-    try:
-        tempfile.TemporaryFile(dir=path.parent).close()
-    except OSError as error:
-        raise ConfigError(f"the picture cannot be written to {path}: {error.strerror}") from error
+    require_writable(path)
 
 
 def grasp_png(trial: Trial, path: Path) -> None:
     """Draw a trial as a PNG file. Raises as `require_picture`, and ConfigError where `path` cannot be written."""
     require_picture(path)
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     lines = [
         part for line in _words(trial) for part in wrap(line, COLUMNS, subsequent_indent="      ") or [""]
     ]
     height = max(HEIGHT_IN, LINE_IN * len(lines))
-    figure = Figure(figsize=(8.5, height), dpi=DPI, layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(8.5, height, DPI)
     grid = figure.add_gridspec(2, 2, width_ratios=(2.1, 1.0))
     force: Any = figure.add_subplot(grid[0, 0])
     gap: Any = figure.add_subplot(grid[1, 0], sharex=force)
@@ -96,7 +86,7 @@ def _words(trial: Trial) -> list[str]:
         lines += [f"   set: {prediction.set_in_words}"]
     lines += ["", "because", *(f"   {reason.words}" for reason in prediction.because)]
     if prediction.warnings:
-        lines += ["", *(f"Warning: {one}" for one in prediction.warnings)]
+        lines += ["", *(f"Warning: {warning}" for warning in prediction.warnings)]
     if trial.report.get("simulated"):
         lines += ["", "simulated gripper and object"]
     return lines

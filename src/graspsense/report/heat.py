@@ -44,14 +44,14 @@ class HeatScale:
         step = width / LEVELS
         for k, colour in enumerate(COLOURS):
             picture.box(left + k * step, y, step, 10, colour)
-        for share, at in ((0.0, "start"), (0.5, "middle"), (1.0, "end")):
+        for share, anchor in ((0.0, "start"), (0.5, "middle"), (1.0, "end")):
             value = self.low + share * (self.high - self.low)
             words = _short_number(value)
             picture.text(
                 left + share * width,
                 y + 23,
-                f"{words} {self.unit}" if at == "end" else words,
-                at=at,
+                f"{words} {self.unit}" if anchor == "end" else words,
+                anchor=anchor,
                 ink=QUIET,
             )
 

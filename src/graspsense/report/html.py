@@ -137,8 +137,8 @@ def table(
         "<tr>"
         + f'<th scope="row">{inline(row[0])}</th>'
         + "".join(
-            f"<td{kinds[k]}>{marked(one) if k in verdicts else inline(one)}</td>"
-            for k, one in enumerate(row[1:], start=1)
+            f"<td{kinds[k]}>{marked(cell) if k in verdicts else inline(cell)}</td>"
+            for k, cell in enumerate(row[1:], start=1)
         )
         + "</tr>"
         for row in rows

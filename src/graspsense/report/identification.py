@@ -116,8 +116,8 @@ def _fits(fits: Sequence[SqueezeFit]) -> str:
         figure(_fit_picture(fit), f"{fit.name}: rms {1e3 * fit.rms_n:.0f} mN") for fit in fits[:MAX_FITS]
     ]
     left = len(fits) - MAX_FITS
-    rest = paragraph(f"{left} more squeezes are not drawn.") if left > 0 else ""
-    return panels(figures) + rest
+    remark = paragraph(f"{left} more squeezes are not drawn.") if left > 0 else ""
+    return panels(figures) + remark
 
 
 def _fit_picture(fit: SqueezeFit) -> str:
@@ -137,8 +137,8 @@ def _fit_picture(fit: SqueezeFit) -> str:
         picture.y_axis(below, LEFT, RIGHT, "measured − fitted, N")
         picture.x_axis(x, 178.0, 215.0, "time, s")
         picture.dots(_points(x, below, t, residual), INKS[0], "residual")
-    picture.text(RIGHT - 56.0, 262.0, "● measured", at="end", ink=INKS[0])
-    picture.text(RIGHT, 262.0, "— fitted", at="end", ink=INKS[1])
+    picture.text(RIGHT - 56.0, 262.0, "● measured", anchor="end", ink=INKS[0])
+    picture.text(RIGHT, 262.0, "— fitted", anchor="end", ink=INKS[1])
     return picture.svg(f"Force over time of {fit.name}, measured and fitted, and the residual", "s")
 
 

@@ -53,16 +53,16 @@ def moments(trace: Trace) -> dict[str, float]:
     closing = np.flatnonzero(trace.phase < int(Phase.RELEASE))
     if not len(closing):
         return {}
-    found: dict[str, float] = {}
+    times: dict[str, float] = {}
     contact = contact_time(trace)
     if contact is not None:
-        found["contact"] = contact
+        times["contact"] = contact
     force = (trace.force_left_n[closing] + trace.force_right_n[closing]) / 2.0
     if not np.isnan(force).all():
-        found["peak"] = float(trace.t_s[closing[int(np.nanargmax(force))]])
+        times["peak"] = float(trace.t_s[closing[int(np.nanargmax(force))]])
     held = np.flatnonzero(trace.phase == int(Phase.HOLD))
-    found["rest" if len(held) else "end"] = float(trace.t_s[held[0] if len(held) else closing[-1]])
-    return found
+    times["rest" if len(held) else "end"] = float(trace.t_s[held[0] if len(held) else closing[-1]])
+    return times
 
 
 @frozen
@@ -79,15 +79,17 @@ def images_at(images: ImageTrace, factor: float, times: Mapping[str, float]) -> 
     Where there is no image before contact, these are the values themselves. Of a cell with several components it is
     their length.
     """
-    before = int(np.searchsorted(images.t_s, times["contact"], side="left")) - 1 if "contact" in times else -1
+    last_free = (
+        int(np.searchsorted(images.t_s, times["contact"], side="left")) - 1 if "contact" in times else -1
+    )
     # The image shortly before contact can already show it, so the zero is one image earlier where there is one.
-    zero = images.cells[max(before - 1, 0)].astype(np.float64) if before >= 0 else 0.0
+    zero = images.cells[max(last_free - 1, 0)].astype(np.float64) if last_free >= 0 else 0.0
     missing = np.full(images.cells.shape[1:], np.nan)
     values = {}
     for moment, t in times.items():
         cells = last_image(images, t)
         values[moment] = number_of_each(images, factor * ((missing if cells is None else cells) - zero))
-    return ImagesAtMoments(values, before >= 0)
+    return ImagesAtMoments(values, last_free >= 0)
 
 
 def last_image(images: ImageTrace, t_s: float) -> NDArray[Any] | None:

@@ -116,11 +116,7 @@ def trace_svg(trace: Trace) -> str:
         *_panel(t, [factor * trace.gap_m[start:]], INKS[2:], bottom),
         *_time_labels(t, bottom + PANEL + 26, trace.units["t"]),
     ]
-    return (
-        f'<svg viewBox="0 0 {WIDTH:g} {HEIGHT:g}" role="img" aria-label="{escape(trace.words)}" '
-        f'style="max-width:{WIDTH:g}px;font:11px sans-serif" xmlns="http://www.w3.org/2000/svg">'
-        f"{''.join(parts)}</svg>"
-    )
+    return _svg(parts, HEIGHT, trace.words)
 
 
 def arrays_html(trace: Trace) -> str:

@@ -48,23 +48,25 @@ def number_sections(
 
 def with_numbers(page: Page, numbers: Sequence[Section]) -> Page:
     """Return the page of a store with the sections of its numbers, before its measurements."""
-    at = next(k for k, section in enumerate(page.sections) if section.id == MEASUREMENTS)
-    return evolve(page, sections=(*page.sections[:at], *numbers, *page.sections[at:]))
+    place = next(k for k, section in enumerate(page.sections) if section.id == MEASUREMENTS)
+    return evolve(page, sections=(*page.sections[:place], *numbers, *page.sections[place:]))
 
 
-def number_section(found: RegressionEvaluation) -> Section:
+def number_section(evaluation: RegressionEvaluation) -> Section:
     """Return the section with the error of a predicted number, its controls, and each prediction beside the truth."""
-    name, unit = found.target_value, found.unit
+    name, unit = evaluation.target_value, evaluation.unit
     objects = (
         "objects of which no grasp was used for training"
-        if found.protocol == "instance_held_out"
+        if evaluation.protocol == "instance_held_out"
         else "grasps of which others of the same object may have been used for training"
     )
-    error = found.headline.words(unit)
-    text = f"{found.estimator} predicts {name} with a mean absolute error of {error}, on {objects}."
-    if found.explained is not None:
-        text += f" R² is {found.explained:.2f}: 1 is perfect, 0 no better than always predicting the mean."
-    intervals = found.intervals
+    error = evaluation.headline.words(unit)
+    text = f"{evaluation.estimator} predicts {name} with a mean absolute error of {error}, on {objects}."
+    if evaluation.explained is not None:
+        text += (
+            f" R² is {evaluation.explained:.2f}: 1 is perfect, 0 no better than always predicting the mean."
+        )
+    intervals = evaluation.intervals
     if intervals.covered is None or intervals.mean_half_width is None:
         text += f" Prediction intervals are not measured: {intervals.reason}."
     else:
@@ -73,15 +75,21 @@ def number_section(found: RegressionEvaluation) -> Section:
             f"{intervals.covered.words}; they are plus or minus "
             f"{_with_unit(number(intervals.mean_half_width), unit)} on average."
         )
-    measured = {**found.protocols, **found.controls}
-    rows = [_row(key, one) for key, one in measured.items() if one.error is not None]
-    missing = [f"{key}: not measured ({one.reason})" for key, one in measured.items() if one.error is None]
+    measured = {**evaluation.protocols, **evaluation.controls}
+    rows = [
+        _row(key, measured_key) for key, measured_key in measured.items() if measured_key.error is not None
+    ]
+    missing = [
+        f"{key}: not measured ({measured_key.reason})"
+        for key, measured_key in measured.items()
+        if measured_key.error is None
+    ]
     header = ("protocol or control", _with_unit("error", unit and f"[{unit}]"), "95 %", "trials", "what")
     caption = f"Errors of {name}: other protocols, and controls"
     body = (
         paragraph(text)
-        + bullets(found.warnings, "warning")
-        + pair(_scatter(found), table(caption, header, rows, 1) + bullets(missing))
+        + bullets(evaluation.warnings, "warning")
+        + pair(_scatter(evaluation), table(caption, header, rows, 1) + bullets(missing))
     )
     return Section(id=f"number-{_identifier(name)}", title=f"Predicted number: {name}", body=body)
 
@@ -111,7 +119,7 @@ def _scatter(evaluation: RegressionEvaluation) -> str:
         y, 50.0, picture.width - 16, _with_unit("predicted", evaluation.unit and f"in {evaluation.unit}")
     )
     with picture.plot(x, y, 24, 280):
-        picture.line([(x(one), y(one)) for one in (x.low, x.high)], QUIET)
+        picture.line([(x(end), y(end)) for end in (x.low, x.high)], QUIET)
         for truth, predicted in evaluation.predictions:
             words = f"{number(truth)}, predicted {number(predicted)}"
             picture.mark(x(truth), y(predicted), INKS[0], words=words)
@@ -124,4 +132,6 @@ def _with_unit(text: str, unit: str) -> str:
 
 
 def _identifier(name: str) -> str:
-    return "".join(one if one.isalnum() and one.isascii() else "-" for one in name.lower())
+    return "".join(
+        character if character.isalnum() and character.isascii() else "-" for character in name.lower()
+    )

@@ -79,8 +79,8 @@ def draw_breaks(picture: Picture, scale: AxisScale, x: float, y: float, *, uprig
         if cut:
             shift = 5.0 * (1 if end else -1)
             # Within the upper end of an upright axis, above which its title stands.
-            at = (x, place + 5.0) if upright else (place + shift, y)
-            picture.break_mark(*at, upright=upright)
+            point = (x, place + 5.0) if upright else (place + shift, y)
+            picture.break_mark(*point, upright=upright)
 
 
 def rates_picture(rows: Sequence[RateRow], caption: str) -> str:
@@ -100,7 +100,7 @@ def rates_picture(rows: Sequence[RateRow], caption: str) -> str:
             y = 27.0 + tops[k + 1] - ROW
             ink = INKS[0] if row.strong else INKS[7]
             if row.interval is not None:
-                low, high = (scale(100 * one) for one in row.interval)
+                low, high = (scale(100 * end) for end in row.interval)
                 picture.line([(low, y), (high, y)], ink, width=3)
             words = f"{row.name}: {row.words}"
             picture.mark(scale(100 * row.rate), y, ink, 0 if row.strong else 3, 4.5, words)
@@ -121,8 +121,8 @@ def rates_over(
     draw_breaks(picture, y_scale, 36, 0.0, upright=True)
     for x in dict.fromkeys(xs):
         picture.line([(x_scale(x), 24), (x_scale(x), 215)], GRID, width=1)
-        picture.text(x_scale(x), 229, number(x), at="middle", ink=QUIET)
-    picture.text((x_scale.start + x_scale.end) / 2, 245, axis, at="middle", ink=QUIET)
+        picture.text(x_scale(x), 229, number(x), anchor="middle", ink=QUIET)
+    picture.text((x_scale.start + x_scale.end) / 2, 245, axis, anchor="middle", ink=QUIET)
     if guess is not None and y_scale.low <= 100 * guess <= y_scale.high:
         y = y_scale(100 * guess)
         picture.line([(36, y), (picture.width - 8, y)], QUIET, dash="3 3")
@@ -141,7 +141,7 @@ def rates_over(
             picture.line(places, ink, width=2, dash=dash)
             for (x, place), (_, row) in zip(places, drawn, strict=True):
                 if row.interval is not None:
-                    low, high = (y_scale(100 * one) for one in row.interval)
+                    low, high = (y_scale(100 * end) for end in row.interval)
                     picture.line([(x, low), (x, high)], ink, width=2)
                 picture.mark(x, place, ink, k, words=f"{row.name}: {row.words}")
         picture.line([(40, y - 4), (66, y - 4)], ink, width=2, dash=dash)

@@ -9,9 +9,7 @@ from typing import Any, Final
 
 from attrs import asdict, frozen
 
-from graspsense.core.values.errors import PluginUnavailable
-from graspsense.report.trace_plot import MATPLOTLIB_HINT
-from graspsense.report.write import write_picture
+from graspsense.report.write import new_figure, write_picture
 
 HEADER: Final = ("METHOD", "FIDELITY", "STEP OR ACCURACY", "MS A GRASP", "SET-UP, S")
 PEAK: Final = "peak force"
@@ -107,17 +105,11 @@ def simulation_png(trade: SimulationTrade, path: Path) -> None:
 
     Raises PluginUnavailable without matplotlib, ConfigError if the file cannot be written.
     """
-    try:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise PluginUnavailable(f"{MATPLOTLIB_HINT} ({error})") from error
     names = trade.quantities
     panels = len(names)
     columns = 3
     rows = -(-panels // columns)
-    figure = Figure(figsize=(4.6 * columns, 3.5 * rows + 1.3), dpi=120, layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(4.6 * columns, 3.5 * rows + 1.3)
     axes: Any = figure.subplots(rows, columns, squeeze=False).ravel()
     handles: dict[str, Any] = {}
     for ax, name in zip(axes, names, strict=False):

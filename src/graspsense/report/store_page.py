@@ -135,7 +135,9 @@ def _newest_readable(store: Store, listed: Sequence[TrialSummary]) -> StoredTria
     Raises DataDamaged if none can be read.
     """
     damage: DataDamaged | None = None
-    for summary in sorted(listed, key=lambda one: not (one.complete and one.set_aside is None)):
+    for summary in sorted(
+        listed, key=lambda listed_trial: not (listed_trial.complete and listed_trial.set_aside is None)
+    ):
         try:
             return store.trial(summary.id)
         except DataDamaged as error:
@@ -176,11 +178,11 @@ def _curves(store: Store) -> tuple[list[GraspCurve], list[UnreadableRecording]]:
 
 def _newest_of_labels(curves: Sequence[GraspCurve]) -> list[GraspCurve]:
     """Return the newest grasps of each label, the labels in alphabetical order."""
-    of: dict[str, list[GraspCurve]] = {}
+    by_label: dict[str, list[GraspCurve]] = {}
     for curve in curves:
         if curve.label != NO_LABEL:
-            of.setdefault(curve.label, []).append(curve)
-    return [curve for label in sorted(of) for curve in of[label][:GRASPS]]
+            by_label.setdefault(curve.label, []).append(curve)
+    return [curve for label in sorted(by_label) for curve in by_label[label][:GRASPS]]
 
 
 def _answer(evaluation: Evaluation | None, total: int, problem: str) -> str:
@@ -209,7 +211,7 @@ def _measurement_sections(
         body = paragraph(f"The recording of trial {summary.id} cannot be shown: {error}")
     features = trial.result.features
     values = features_table(f"Features of trial {summary.id}", features.features, features.values)
-    warnings = [str(one) for one in trial.result.details.get("warnings") or ()]
+    warnings = [str(warning) for warning in trial.result.details.get("warnings") or ()]
     body = bullets(warnings, "warning") + pair(body, values)
     sections = [Section(id="grasp", title="One grasp, from the approach to rest", body=body)]
     if further:
@@ -255,7 +257,10 @@ def _provenance(
         ("simulated", f"{sum(summary.simulated for summary in listed)} of the newest {len(listed)}"),
         ("machine", f"{made.get('host', '?')}, {made.get('system', '?')}"),
         ("code", f"graspsense {made.get('graspsense', '?')}, commit {commit_text(made)}"),
-        *((f"component {name}", str(one)) for name, one in (made.get("components") or {}).items()),
+        *(
+            (f"component {name}", str(component))
+            for name, component in (made.get("components") or {}).items()
+        ),
     ]
     by_label = [
         (

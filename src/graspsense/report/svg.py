@@ -44,10 +44,10 @@ class AxisScale:
         """Return about this many round values within the range."""
         span = (self.high - self.low) or 1.0
         power = 10.0 ** math.floor(math.log10(span / about))
-        step = next(one * power for one in (1, 2, 5, 10) if span / (one * power) <= about)
-        first = math.ceil(self.low / step - 1e-9)
+        step = next(factor * power for factor in (1, 2, 5, 10) if span / (factor * power) <= about)
+        lowest = math.ceil(self.low / step - 1e-9)
         last = math.floor(self.high / step + 1e-9)
-        return [k * step for k in range(first, last + 1)]
+        return [k * step for k in range(lowest, last + 1)]
 
 
 def reaching(values: Sequence[float], start: float, end: float, *, zero: bool = False) -> AxisScale:
@@ -163,15 +163,15 @@ class Picture:
         y: float,
         words: str,
         *,
-        at: str = "start",
+        anchor: str = "start",
         ink: str = TEXT,
         bold: bool = False,
         size: float = SIZE,
     ) -> None:
-        """Write words; `at` is `start`, `middle` or `end`."""
+        """Write words; `anchor` is `start`, `middle` or `end`."""
         weight = ' font-weight="600"' if bold else ""
         self.parts.append(
-            f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{at}" fill="{ink}" font-size="{size:g}"{weight} '
+            f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" fill="{ink}" font-size="{size:g}"{weight} '
             f'paint-order="stroke" stroke="{GROUND}" stroke-width="2.5" stroke-opacity="0.8">'
             f"{escape(words)}</text>"
         )
@@ -182,10 +182,10 @@ class Picture:
         for value in scale.ticks():
             x = scale(value)
             self.line([(x, top), (x, bottom)], GRID, width=1)
-            self.text(x, bottom + 13, number(value), at="middle", ink=QUIET)
+            self.text(x, bottom + 13, number(value), anchor="middle", ink=QUIET)
         self.parts.append("</g>")
         if title:
-            self.text((scale.start + scale.end) / 2, bottom + 28, title, at="middle", ink=QUIET)
+            self.text((scale.start + scale.end) / 2, bottom + 28, title, anchor="middle", ink=QUIET)
 
     def y_axis(self, scale: AxisScale, left: float, right: float, title: str) -> None:
         """Draw the ticks of a vertical axis, and its title above."""
@@ -193,7 +193,7 @@ class Picture:
         for value in scale.ticks(4):
             y = scale(value)
             self.line([(left, y), (right, y)], GRID, width=1)
-            self.text(left - 4, y + 4, number(value), at="end", ink=QUIET)
+            self.text(left - 4, y + 4, number(value), anchor="end", ink=QUIET)
         self.parts.append("</g>")
         self.text(2, min(scale.start, scale.end) - 8, title, ink=QUIET)
 

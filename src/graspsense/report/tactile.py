@@ -49,7 +49,7 @@ class _Layout:
     columns: float
     height: float
 
-    def at(self, left: float, top: float, width: float) -> list[_Place]:
+    def placed(self, left: float, top: float, width: float) -> list[_Place]:
         """Return the cells of a map with this left upper corner and this width in a picture."""
         return [_Place(left + width * cell.x, top + width * cell.y, width * cell.side) for cell in self.cells]
 
@@ -90,7 +90,7 @@ def tactile_figures(trace: Trace, channels: Sequence[Channel]) -> list[str]:
                 pictures.append(camera_figure(without_underscores(name), signal, shape, moments(trace)))
                 continue
             arrays.append((without_underscores(name), {shape.finger: signal}, shape))
-    return [*(_figure(title, of, shape, moments(trace)) for title, of, shape in arrays), *pictures]
+    return [*(_figure(title, images, shape, moments(trace)) for title, images, shape in arrays), *pictures]
 
 
 def _figure(
@@ -98,13 +98,13 @@ def _figure(
 ) -> str:
     unit, factor = display_unit(shape.unit)
     shown = {side: images_at(image, factor, times) for side, image in images.items()}
-    relative = all(at.relative for at in shown.values())
+    relative = all(shown_images.relative for shown_images in shown.values())
     facing = list(shape.facing) or [True] * shape.cells
     scale = HeatScale.over(
         (
             float(value)
-            for at in shown.values()
-            for cells in at.values.values()
+            for shown_images in shown.values()
+            for cells in shown_images.values.values()
             for value, faces in zip(cells, facing, strict=True)
             if faces
         ),
@@ -118,12 +118,12 @@ def _figure(
     width = min(room, layout.columns * LARGEST_CELL, TALLEST / layout.height)
     top = 44.0
     said = []
-    for side, at in shown.items():
-        for k, (moment, cells) in enumerate(at.values.items()):
+    for side, shown_images in shown.items():
+        for k, (moment, cells) in enumerate(shown_images.values.items()):
             left = k * (room + GAP)
             words = f"{moment}, {side}" if side and len(shown) > 1 else moment
             picture.text(left, top - 6, words, ink=QUIET)
-            _draw(picture, layout.at(left, top, width), cells, scale, words)
+            _draw(picture, layout.placed(left, top, width), cells, scale, words)
             if np.isfinite(cells).any():
                 said.append(f"{words} up to {number(float(np.nanmax(cells)))} {unit}")
         top += width * layout.height + 26.0
@@ -162,14 +162,14 @@ def layout_of(shape: TactileArray) -> _Layout:
     columns = max((max(y for _, y in placed) - left) / pitch + 1.0, float(min(elsewhere, 4)))
     face = (far - min(x for x, _ in placed)) / pitch + 1.0
     side = 1.0 / columns
-    cells, rest = [], 0
+    cells, outside = [], 0
     for x, y in shape.positions_m:
         if math.isfinite(x) and math.isfinite(y):
             cells.append(_Place((y - left) / pitch * side, (far - x) / pitch * side, side))
         else:
-            row, column = divmod(rest, int(columns))
+            row, column = divmod(outside, int(columns))
             cells.append(_Place(column * side, (face + 0.4 + row) * side, side))
-            rest += 1
+            outside += 1
     rows = face + (0.4 + math.ceil(elsewhere / int(columns)) if elsewhere else 0.0)
     return _Layout(tuple(cells), columns, rows * side)
 
@@ -177,9 +177,9 @@ def layout_of(shape: TactileArray) -> _Layout:
 def _pitch(placed: Sequence[tuple[float, float]]) -> float:
     """Return the least distance of two cells along or across the finger; 1 of a single cell."""
     steps = [
-        after - before
+        place_after - place_before
         for axis in (0, 1)
-        for before, after in pairwise(sorted({round(place[axis], 7) for place in placed}))
+        for place_before, place_after in pairwise(sorted({round(place[axis], 7) for place in placed}))
     ]
     return min(steps, default=1.0)
 

@@ -20,6 +20,7 @@ from graspsense.report.moments import (
     phase_spans,
     shown_from,
 )
+from graspsense.report.write import MATPLOTLIB_HINT
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -27,9 +28,6 @@ if TYPE_CHECKING:
     from graspsense.core.values.fingers import FingerForce
     from graspsense.core.values.trace import Floats, ImageTrace, Integers, Trace
 
-MATPLOTLIB_HINT: Final = (
-    'a picture needs matplotlib: pip install "graspsense[plot]", or pip install matplotlib'
-)
 PHASE_COLOURS: Final = {Phase.APPROACH: "#e9eff6", Phase.SQUEEZE: "#fbdcb4", Phase.HOLD: "#c9e6cf"}
 OTHER_PHASE: Final = "#f3f3f3"
 LEAST_NAMED: Final = 0.05

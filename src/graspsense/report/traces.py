@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Final
 
+import numpy as np
 from attrs import frozen
 
 from graspsense.core.components.registry import installed
@@ -44,13 +45,10 @@ def traces_by_class(grasps: Sequence[GraspCurve]) -> str:
         times=(min(times), max(times)),
         forces=[force for grasp in grasps for force in grasp.force_n if force is not None],
         gaps=[
-            gap
-            for grasp in grasps
-            for t, gap in zip(grasp.t_s, grasp.gap_mm, strict=True)
-            if gap is not None and t is not None and t >= min(grasp.shown_times)
+            gap for grasp in grasps for _, gap in grasp.values("gap_mm", min(grasp.shown_times, default=0.0))
         ],
     )
-    return panels([_traces(name, of, axes) for name, of in sorted(classes.items())])
+    return panels([_traces(name, curves, axes) for name, curves in sorted(classes.items())])
 
 
 @frozen
@@ -84,11 +82,7 @@ def _traces(name: str, grasps: Sequence[GraspCurve], axes: _Axes) -> str:
                 if grasp.label not in states:
                     continue
                 k = states.index(grasp.label)
-                points = [
-                    (x_scale(t), scale(v))
-                    for t, v in zip(grasp.t_s, getattr(grasp, column), strict=True)
-                    if t is not None and v is not None and axes.times[0] <= t <= axes.times[1]
-                ]
+                points = [(x_scale(t), scale(v)) for t, v in grasp.values(column, *axes.times)]
                 state = without_underscores(grasp.label.partition(":")[2] or grasp.label)
                 named = f"{state} (trial {grasp.trial}), {unit}"
                 picture.line(points, INKS[k], width=1.4, dash=DASHES[k], name=named)
@@ -124,14 +118,10 @@ def one_grasp(grasp: GraspCurve, caption: str) -> str:
     picture.y_axis(gap, 36, picture.width - 10, "gap, mm")
     picture.y_axis(force, 36, picture.width - 10, "force, N")
     for column, scale, ink, named, top, bottom in (
-        (grasp.gap_mm, gap, INKS[0], "gap, mm", 44.0, 140.0),
-        (grasp.force_n, force, INKS[1], "force, N", 176.0, 280.0),
+        ("gap_mm", gap, INKS[0], "gap, mm", 44.0, 140.0),
+        ("force_n", force, INKS[1], "force, N", 176.0, 280.0),
     ):
-        points = [
-            (x_scale(time), scale(value))
-            for time, value in zip(grasp.t_s, column, strict=True)
-            if time is not None and value is not None
-        ]
+        points = [(x_scale(time), scale(value)) for time, value in grasp.values(column)]
         with picture.plot(x_scale, scale, top, bottom):
             picture.line(points, ink, width=2, name=named)
     words = (
@@ -201,22 +191,22 @@ def _feature(
 ) -> str:
     shown, factor = display_unit(unit)
     title = f"{name}, {shown}" if shown else name
-    of: dict[str, list[float]] = {label: [] for label in sorted(set(labels))}
+    by_label: dict[str, list[float]] = {label: [] for label in sorted(set(labels))}
     for label, value in zip(labels, column, strict=True):
         if value is not None:
-            of[label].append(factor * value)
+            by_label[label].append(factor * value)
     missing = sum(value is None for value in column)
-    left = 12 + 6.1 * max(len(line) for label in of for line in _label_lines(label))
-    pitch = 19 if all(len(label) <= LABEL for label in of) else 24
-    bottom = 34.0 + pitch * len(of)
+    left = 12 + 6.1 * max(len(line) for label in by_label for line in _label_lines(label))
+    pitch = 19 if all(len(label) <= LABEL for label in by_label) else 24
+    bottom = 34.0 + pitch * len(by_label)
     picture = Picture(bottom + 34)
-    scale = reaching([v for values in of.values() for v in values], min(left, 165), picture.width - 12)
+    scale = reaching([v for values in by_label.values() for v in values], min(left, 165), picture.width - 12)
     picture.text(2, 14, title, bold=True, size=13)
     picture.x_axis(scale, 24, bottom, shown or "value")
-    classes = list(dict.fromkeys(map(class_of, of)))
+    classes = list(dict.fromkeys(map(class_of, by_label)))
     rows = [
         _feature_row(picture, scale, 38.0 + pitch * k, label, sorted(values), classes.index(class_of(label)))
-        for k, (label, values) in enumerate(of.items())
+        for k, (label, values) in enumerate(by_label.items())
     ]
     medians = "; ".join(f"{row[0]} {row[3]}" for row in rows if row[3])
     absent = f" Missing in {missing} of {counted(len(column), 'trial')}." if missing else ""
@@ -237,7 +227,7 @@ def _feature_row(
             scale.start - 6,
             y + 4 + 10 * (k - (len(lines) - 1) / 2),
             line,
-            at="end",
+            anchor="end",
             size=SIZE - len(lines) + 1,
         )
     if not values:
@@ -246,7 +236,7 @@ def _feature_row(
     step = max(1, math.ceil(len(values) / DRAWN))
     # The dots of a row alternate between three heights, so that they do not hide each other.
     dots = [(scale(value), y + 4 * (i % 3 - 1)) for i, value in enumerate(values[::step])]
-    low, middle, high = (_quantile(values, q) for q in (0.25, 0.5, 0.75))
+    low, middle, high = np.quantile(values, (0.25, 0.5, 0.75)).tolist()
     with picture.plot(scale, None, y - 9, y + 9):
         picture.dots(dots, INKS[colour % len(INKS)], label)
         picture.line([(scale(low), y), (scale(high), y)], TEXT, width=2.5)
@@ -265,10 +255,3 @@ def _label_lines(label: str) -> list[str]:
         name + colon * (state != label[LABEL:]),
         state if len(state) <= LABEL else f"{state[: LABEL - 1]}…",
     ]
-
-
-def _quantile(ordered: Sequence[float], share: float) -> float:
-    place = share * (len(ordered) - 1)
-    below = math.floor(place)
-    above = min(below + 1, len(ordered) - 1)
-    return ordered[below] + (place - below) * (ordered[above] - ordered[below])

@@ -87,16 +87,9 @@ def _times(curves: Sequence[GraspCurve], start: float, end: float) -> AxisScale:
 
 def _values(curves: Sequence[GraspCurve], column: str) -> list[float]:
     return [
-        value
-        for curve in curves
-        for t, value in zip(curve.t_s, getattr(curve, column), strict=True)
-        if t is not None and value is not None and t >= min(curve.shown_times)
+        value for curve in curves for _, value in curve.values(column, min(curve.shown_times, default=0.0))
     ]
 
 
 def _points(curve: GraspCurve, column: str, x: AxisScale, y: AxisScale) -> list[tuple[float, float]]:
-    return [
-        (x(t), y(value))
-        for t, value in zip(curve.t_s, getattr(curve, column), strict=True)
-        if t is not None and value is not None and x.low <= t <= x.high
-    ]
+    return [(x(t), y(value)) for t, value in curve.values(column, x.low, x.high)]

@@ -16,10 +16,13 @@ LEAST_TRIALS: Final = 10
 
 def verdict(evaluation: Evaluation) -> str:
     """Return the rate with its interval, the comparison with guessing, and what the controls say about its origin."""
-    sentences = [_rate(evaluation), _against_guessing(evaluation.controls.get("majority_class"))]
-    sentences.append(_before_contact(evaluation))
-    sentences.append(_first_line(evaluation))
-    sentences.append(_width(evaluation.controls.get("width_only"), evaluation.headline.n))
+    sentences = (
+        _rate(evaluation),
+        _against_guessing(evaluation.controls.get("majority_class")),
+        _before_contact(evaluation),
+        _first_line(evaluation),
+        _width(evaluation.controls.get("width_only"), evaluation.headline.n),
+    )
     return " ".join(filter(None, sentences))
 
 
@@ -82,18 +85,18 @@ def _before_contact(evaluation: Evaluation) -> str:
     if control.rate is None or majority is None or majority.rate is None:
         why = "" if control.rate is not None else f": {control.reason}"
         return f"Whether the recording reveals the labels before contact was not measured{why}."
-    before = f"{percentage(control.rate.rate)}{_among(control, evaluation.headline.n)}"
+    known = f"{percentage(control.rate.rate)}{_among(control, evaluation.headline.n)}"
     if any("from before contact" in warning for warning in evaluation.warnings):
-        return f"But {before} are recognised before any contact: the recording reveals the labels, so do not trust it."
+        return f"But {known} are recognised before any contact: the recording reveals the labels, so do not trust it."
     if control.rate.n < LEAST_TRIALS <= evaluation.headline.n:
-        return f"Before contact {before} are recognised, too few to say what that means."
+        return f"Before contact {known} are recognised, too few to say what that means."
     if control.difference is not None and control.difference.interval is None:
-        return f"Before contact {before} are recognised, on too few instances to say what that means."
+        return f"Before contact {known} are recognised, on too few instances to say what that means."
     if control.difference is not None and not control.difference.is_positive:
         return (
-            f"Before contact {before} are recognised: whether the recording explains the rate cannot be told."
+            f"Before contact {known} are recognised: whether the recording explains the rate cannot be told."
         )
-    return f"Before contact {before} are recognised, so the recording does not explain the rate."
+    return f"Before contact {known} are recognised, so the recording does not explain the rate."
 
 
 def _first_line(evaluation: Evaluation) -> str:

@@ -1,17 +1,44 @@
-"""Writing a page or a picture to a file."""
+"""Figures of matplotlib, and writing a page or a picture to a file."""
 
 from __future__ import annotations
 
 import io
+import tempfile
 import warnings
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from graspsense.core.files.whole_file import write_whole
-from graspsense.core.values.errors import ConfigError
+from graspsense.core.values.errors import ConfigError, PluginUnavailable
 from graspsense.recording.atomic_file import write_or_replace
 from graspsense.report.html import Page
 from graspsense.report.literal_text import show_literally
+
+MATPLOTLIB_HINT: Final = (
+    'a picture needs matplotlib: pip install "graspsense[plot]", or pip install matplotlib'
+)
+
+
+def new_figure(width_in: float, height_in: float, dpi: int = 120) -> Any:
+    """Return a figure of matplotlib that no window shows. Raises PluginUnavailable without matplotlib."""
+    try:
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+    except ImportError as error:
+        raise PluginUnavailable(f"{MATPLOTLIB_HINT} ({error})") from error
+    figure = Figure(figsize=(width_in, height_in), dpi=dpi, layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def require_writable(path: Path) -> None:
+    """Raise ConfigError if no file can be written in the folder of `path`."""
+    if not path.parent.is_dir():
+        raise ConfigError(f"{path} cannot be written: there is no folder {path.parent}")
+    try:
+        tempfile.TemporaryFile(dir=path.parent).close()
+    except OSError as error:
+        raise ConfigError(f"{path} cannot be written: {error.strerror}") from error
 
 
 def write_html(path: Path, page: Page) -> None:

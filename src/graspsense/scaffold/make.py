@@ -32,7 +32,7 @@ class ScaffoldKind:
     entry: str
     """The entry that its hook returns; empty for a hook that returns none."""
     needs: tuple[str, ...]
-    first: str
+    first_command: str
 
 
 KINDS: Final[Mapping[str, ScaffoldKind]] = {
@@ -136,8 +136,8 @@ def words_of(name: str, roles: Sequence[str]) -> dict[str, str]:
     kind, command = ("effort", "EFFORT, effort, inf, SPEED_M_S")
     if "sensor-backend" in kinds:
         kind, command = ("velocity", "VELOCITY, -SPEED_M_S, effort, inf")
-    entries = [one.entry for one in kinds.values() if one.entry] + ["PipelineEntry"] * together
-    needs = dict.fromkeys(need for one in kinds.values() for need in one.needs)
+    entries = [kind.entry for kind in kinds.values() if kind.entry] + ["PipelineEntry"] * together
+    needs = dict.fromkeys(need for kind in kinds.values() for need in kind.needs)
     simulator = KINDS["sim-term"].needs
     tests = ["pytest>=8", *(simulator if together and "sensor-backend" not in kinds else ())]
     words = {
@@ -152,7 +152,7 @@ def words_of(name: str, roles: Sequence[str]) -> dict[str, str]:
         "import_effort": "    EFFORT,\n" if kind == "effort" else "",
         "import_velocity": "    VELOCITY,\n" if kind == "velocity" else "",
         "command": command,
-        "needs": "".join(f', "{fromkey}"' for fromkey in needs),
+        "needs": "".join(f', "{need}"' for need in needs),
         "tests": ", ".join(f'"{test}"' for test in tests),
         "core": _compatible(__version__),
         "imports": _imports([*sorted(entries), "hookimpl"]),
@@ -206,7 +206,7 @@ def _imports(names: Sequence[str]) -> str:
 def _first(kinds: Mapping[str, ScaffoldKind], words: Mapping[str, str]) -> list[str]:
     """Return the first commands to try."""
     apart = [kind for kind in kinds.values() if kind.role is None or not _together(kinds)]
-    commands = [Template(kind.first).substitute(words) for kind in apart]
+    commands = [Template(kind.first_command).substitute(words) for kind in apart]
     if _together(kinds):
         commands.insert(0, f"graspsense run --pipeline {words['part']}")
     return list(dict.fromkeys(commands))
@@ -269,7 +269,9 @@ def _check_importable(name: str) -> None:
         return
     plugins = {source.distribution for source in installed_sources()}
     others = [
-        one for one in packages_distributions().get(package, ()) if canonical(one) not in {name} & plugins
+        distribution
+        for distribution in packages_distributions().get(package, ())
+        if canonical(distribution) not in {name} & plugins
     ]
     if others:
         raise ConfigError(

@@ -151,7 +151,7 @@ class ArffColumns(CsvColumns):
                 return
             quoted = single if single is not None else double
             if quoted is not None:
-                yield _ESCAPE.sub(lambda found: _ESCAPED.get(found[1], found[1]), quoted), True
+                yield _ESCAPE.sub(lambda match: _ESCAPED.get(match[1], match[1]), quoted), True
             else:
                 yield brace or word, False
             place = match.end()

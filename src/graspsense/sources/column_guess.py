@@ -104,23 +104,25 @@ def time_column(table: ColumnTable) -> str | None:
 
 def _evenly_rising(table: ColumnTable, rising: Sequence[str]) -> list[str]:
     """Return the columns without a name that rise by nearly equal steps, those with fractions first; no counters."""
-    found = []
+    candidates = []
     for name in rising:
         steps = np.diff(table.numbers[name])
         step = float(np.median(steps))
         even = bool(np.mean(np.abs(steps - step) <= _EVEN * step) > _MOSTLY) and step != 1.0
         if even and re.fullmatch(r"c\d+", name):
-            found.append(name)
-    return sorted(found, key=lambda name: bool((table.numbers[name] == np.round(table.numbers[name])).all()))
+            candidates.append(name)
+    return sorted(
+        candidates, key=lambda name: bool((table.numbers[name] == np.round(table.numbers[name])).all())
+    )
 
 
 def force_columns(table: ColumnTable, time: str | None) -> tuple[str, ...]:
     """Return the columns that are most likely forces."""
-    rest = [name for name in table.numbers if name != time]
-    stated = [name for name in rest if table.units.get(name, "").lower() in UNIT_WORDS["force"]]
+    columns = [name for name in table.numbers if name != time]
+    stated = [name for name in columns if table.units.get(name, "").lower() in UNIT_WORDS["force"]]
     named = [
         name
-        for name in rest
+        for name in columns
         if FORCE_WORDS & set(words_of(name)) and not (GAP_WORDS | {"torque"}) & set(words_of(name))
     ]
     strong = [name for name in named if len(set(words_of(name)) & (FORCE_WORDS - {"f", "n", "g"}))]
@@ -141,13 +143,13 @@ def numbered_groups(names: Sequence[str]) -> dict[str, list[str]]:
 
 def _gap_columns(table: ColumnTable, taken: Sequence[str | None]) -> tuple[str, ...]:
     """Return the column that is most likely the gap, or several of one kind, as the positions of fingers."""
-    rest = [name for name, values in table.numbers.items() if name not in taken and values.ndim == 1]
-    stated = [name for name in rest if table.units.get(name, "").lower() in UNIT_WORDS["gap"]]
-    named = [name for name in rest if GAP_WORDS & set(words_of(name))]
-    units = [name for name in rest if set(words_of(name)) & {"mm", "cm"}]
+    columns = [name for name, values in table.numbers.items() if name not in taken and values.ndim == 1]
+    stated = [name for name in columns if table.units.get(name, "").lower() in UNIT_WORDS["gap"]]
+    named = [name for name in columns if GAP_WORDS & set(words_of(name))]
+    units = [name for name in columns if set(words_of(name)) & {"mm", "cm"}]
     able = [name for name in (*stated, *named, *units) if np.nanstd(table.numbers[name]) > 0.0]
-    found = able or named
-    return tuple(name for name in dict.fromkeys(found) if words_of(name) == words_of(found[0]))
+    gaps = able or named
+    return tuple(name for name in dict.fromkeys(gaps) if words_of(name) == words_of(gaps[0]))
 
 
 def _time(table: ColumnTable, name: str) -> Guess:
@@ -158,7 +160,7 @@ def _time(table: ColumnTable, name: str) -> Guess:
     step = float(np.median(np.diff(values)))
     if abs(float(values[0])) > 1e11:  # since 1970: in ms, us or ns, which the reader tells
         return Guess(key="time", value=quoted(name))
-    unit = next((one for one, factor in TO_S.items() if step * factor <= _LONGEST_STEP_S), "s")
+    unit = next((unit for unit, factor in TO_S.items() if step * factor <= _LONGEST_STEP_S), "s")
     return Guess(
         key="time",
         value=f"{quoted(name)} [{unit}]",
@@ -222,7 +224,9 @@ def _forces(table: ColumnTable, names: Sequence[str]) -> Iterator[Guess]:
     if cells and sum(map(len, cells.values())) == len(names):
         yield from _forces_of_cells(table, cells)
         return
-    sides = next((found for pair in _SIDES if (found := _sided(names, pair)) is not None), None)
+    sides = next(
+        (pair_of_sides for pair in _SIDES if (pair_of_sides := _sided(names, pair)) is not None), None
+    )
     several = table.numbers[names[0]].ndim == 2
     if sides is None and len(names) == 2:
         sides = (names[:1], names[1:])

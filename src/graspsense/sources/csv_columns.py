@@ -161,8 +161,8 @@ class CsvColumns:
             known.setdefault(column, set()).add(value)
         values = np.array(
             [
-                self.numbers(name) if found is None else self._is_value(*found, known[found[0]])
-                for name, found in zip(names, wanted, strict=True)
+                self.numbers(name) if column is None else self._is_value(*column, known[column[0]])
+                for name, column in zip(names, wanted, strict=True)
             ],
             dtype=np.float64,
         ).T

@@ -67,14 +67,14 @@ def recordings_of(
     number = 0
     try:
         with readable(f"{kind}:{place}"), _failing_as(dataset.qualified):
-            for one in read(place):
-                if not isinstance(one, LabelledRecording | UnreadableRecording):
+            for recording in read(place):
+                if not isinstance(recording, LabelledRecording | UnreadableRecording):
                     raise PluginUnavailable(
-                        f"data set {dataset.qualified} cannot be used here: its reader gave {type(one).__name__}, not "
-                        "LabelledRecording"
+                        f"data set {dataset.qualified} cannot be used here: its reader gave "
+                        f"{type(recording).__name__}, not LabelledRecording"
                     )
                 number += 1
-                yield _checked(one)
+                yield _checked(recording)
     except PluginUnavailable:
         raise
     except GraspsenseError as error:
@@ -117,12 +117,12 @@ def numbered_recording(kind: str, name: str) -> LabelledRecording:
             f"{kind}:{name}#1"
         )
     number = int(match["number"])
-    found = next(islice(readable_or_not(kind, match["place"]), number - 1, None), None)
-    if isinstance(found, UnreadableRecording):
-        raise found.error
-    if found is None:
+    numbered = next(islice(readable_or_not(kind, match["place"]), number - 1, None), None)
+    if isinstance(numbered, UnreadableRecording):
+        raise numbered.error
+    if numbered is None:
         raise ConfigError(f"{kind}:{match['place']} has fewer than {number} recordings")
-    return found
+    return numbered
 
 
 def handed_recording(name: str) -> Recording | None:

@@ -50,39 +50,49 @@ def event_recordings(source: str, only: str | None = None) -> EventRecordings:
             f"--events needs recordings, and {source!r} is not a source of them. There are {known}"
         )
     read = list(_stored(place) if source.startswith(STORE) else readable_or_not(kind, place))
-    unreadable = [one for one in read if isinstance(one, UnreadableRecording)]
-    found = [
-        one for one in read if isinstance(one, LabelledRecording) and only in (None, class_of(one.label))
+    unreadable = [recording for recording in read if isinstance(recording, UnreadableRecording)]
+    recordings = [
+        recording
+        for recording in read
+        if isinstance(recording, LabelledRecording) and only in (None, class_of(recording.label))
     ]
-    if unreadable and not found:
+    if unreadable and not recordings:
         raise error_of_all(unreadable)
-    several = {content_sha256(one.recording): one for one in reversed(found)}
-    copies = len(found) - len(several)
-    found = list(reversed(several.values()))
-    labelled = [one for one in found if one.recording.events]
+    several = {content_sha256(recording.recording): recording for recording in reversed(recordings)}
+    copies = len(recordings) - len(several)
+    recordings = list(reversed(several.values()))
+    labelled = [recording for recording in recordings if recording.recording.events]
     if not labelled:
         raise ConfigError(
-            f"{source}: no event is labelled in {counted(len(found), 'recording')}{f' of {only}' if only else ''}. "
+            f"{source}: no event is labelled in {counted(len(recordings), 'recording')}"
+            f"{f' of {only}' if only else ''}. "
             'In a manifest, events says where: events = { slip = "COLUMN" }'
         )
     notes = note_on(unreadable, len(read))
     if copies:
         notes.append(f"{counted(copies, 'recording')} left out: the same content as another one")
-    if len(labelled) < len(found):
+    if len(labelled) < len(recordings):
         notes.append(
-            f"{len(found) - len(labelled)} of {len(found)} recordings left out: no event is labelled"
+            f"{len(recordings) - len(labelled)} of {len(recordings)} recordings left out: no event is labelled"
         )
     units = sorted(
-        {one.recording.units["force_left"] for one in labelled if "force_left" in one.recording.units}
+        {
+            recording.recording.units["force_left"]
+            for recording in labelled
+            if "force_left" in recording.recording.units
+        }
     )
     if units:
         notes.append(
             f"the forces are in {', '.join(units)}, for which thresholds in N have no meaning: see the fitted ones"
         )
-    objects = all(one.instance for one in labelled)
+    objects = all(recording.instance for recording in labelled)
     return EventRecordings(
         recordings=tuple(labelled),
-        groups=tuple(f"{class_of(one.label)}#{one.instance}" if objects else one.label for one in labelled),
+        groups=tuple(
+            f"{class_of(recording.label)}#{recording.instance}" if objects else recording.label
+            for recording in labelled
+        ),
         held_out="instance" if objects else "label",
         notes=tuple(notes),
     )

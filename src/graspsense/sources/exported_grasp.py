@@ -31,7 +31,7 @@ from graspsense.sources.exported_grasp_tables import (
     read_exported_tables,
     refuse_table_of_store,
 )
-from graspsense.sources.fast_samples import sample_blocks
+from graspsense.sources.fast_samples import latest_values, sample_blocks
 from graspsense.sources.numpy_files import npz_arrays
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ def read_exported(name: str) -> Recording:
     foreign = ". Arrays of other programs are imported by a manifest (docs/import.md)"
     with readable(path, "a grasp of `graspsense export`", foreign):
         about = json.loads(declared)
-        channels = tuple(from_json(one) for one in about["channels"])
+        channels = tuple(from_json(channel) for channel in about["channels"])
         return Recording(
             name=f"export {path.name} of {about['device']}",
             readings=tuple(_readings(arrays, further(channels))),
@@ -84,10 +84,10 @@ def _readings(arrays: Arrays, channels: tuple[Channel, ...]) -> list[Reading]:
     images = [
         Pads(t_s, k, tuple(left), tuple(right))
         for k, (t_s, left, right) in enumerate(
-            zip(*(arrays[f"pad_{one}"].tolist() for one in ("t_s", "left", "right")), strict=True), 1
+            zip(*(arrays[f"pad_{column}"].tolist() for column in ("t_s", "left", "right")), strict=True), 1
         )
     ]
-    pads = _latest(times, arrays["pad_t_s"], images, no_pads(cells))
+    pads = latest_values(times, arrays["pad_t_s"], images, no_pads(cells))
     signals: list[Any] = [()] * n
     if channels:
         make = signal_type(channels)._make  # type: ignore[attr-defined]
@@ -100,22 +100,14 @@ def _series(times: NDArray[np.float64], arrays: Arrays, channel: Channel) -> lis
     """Return the value of a further channel in each tick."""
     values = arrays[f"signal_{channel.name}"]
     if isinstance(channel, TactileArray):
-        array = arrays[f"signal_{channel.name}_t_s"]
+        sampled_s = arrays[f"signal_{channel.name}_t_s"]
         if channel.dtype != FLOATS:
             values = read_only(values, channel.dtype)  # once, so that its images are passed by reference
         images = [
             Image(t_s, k, cells_of(channel, cells))
-            for k, (t_s, cells) in enumerate(zip(array.tolist(), values, strict=True), 1)
+            for k, (t_s, cells) in enumerate(zip(sampled_s.tolist(), values, strict=True), 1)
         ]
-        return _latest(times, array, images, no_signals((channel,))[0])
+        return latest_values(times, sampled_s, images, no_signals((channel,))[0])
     if isinstance(channel, FastChannel):
         return sample_blocks(times, arrays[f"signal_{channel.name}_t_s"], values, channel)
     return list(values.tolist())
-
-
-def _latest(
-    times: NDArray[np.float64], array: NDArray[np.float64], values: list[Any], nothing: Any
-) -> list[Any]:
-    """Return the last of the values in each tick; `nothing` before the first."""
-    counts = np.searchsorted(array, times, side="right").tolist()
-    return [values[count - 1] if count else nothing for count in counts]

@@ -63,7 +63,7 @@ def _read(path: Path, declared: Path) -> tuple[Columns, str]:
     try:
         text = text_of(declared)
         about = json.loads(text)
-        channels = further(tuple(from_json(one) for one in about["channels"]))
+        channels = further(tuple(from_json(channel) for channel in about["channels"]))
         tables = frozenset(about["tables"])
         cells = int(about["cells"])
     except (ConfigError, ValueError, KeyError, TypeError, OverflowError, RecursionError) as error:
@@ -164,8 +164,8 @@ def _columns(path: Path) -> Columns:
     except (ValueError, csv.Error) as error:
         raise DataDamaged(f"{path} is not as `graspsense export` writes it: {error}") from error
     numbers: Columns = {}
-    for name, found in columns.items():
-        if isinstance(found, NotNumbers):
-            raise DataDamaged(f"{path}, line {found.row + 2}: {name} is {found.words}")
-        numbers[name] = found
+    for name, parsed in columns.items():
+        if isinstance(parsed, NotNumbers):
+            raise DataDamaged(f"{path}, line {parsed.row + 2}: {name} is {parsed.words}")
+        numbers[name] = parsed
     return numbers

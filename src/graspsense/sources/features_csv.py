@@ -41,17 +41,17 @@ def read_labelled(
     instance: str | None = None,
     order: str | None = None,
     features: Sequence[str] = (),
-    before: Sequence[str] = (),
+    known_before: Sequence[str] = (),
     value: str | None = None,
 ) -> Labelled:
     """Return the trials of a CSV file; the column `label` says what was grasped.
 
     `instance` is the column that identifies the individual object, `order` a column of numbers that increase in the
     order of recording (default: the order of the lines). Both are known in a table that `graspsense export` wrote.
-    `features` are the columns to learn from, by default all columns of numbers that have no other meaning. `before`
-    are the columns that are known before contact; the control from before contact uses them, and they are features too
-    unless `features` leaves them out. With `value`, this column of numbers is the target; lines without it are left
-    out, and the column of the label is not needed.
+    `features` are the columns to learn from, by default all columns of numbers that have no other meaning.
+    `known_before` are the columns that are known before contact; the control from before contact uses them, and they
+    are features too unless `features` leaves them out. With `value`, this column of numbers is the target; lines
+    without it are left out, and the column of the label is not needed.
 
     Raises ConfigError if a column does not exist or cannot be a label, DataDamaged if the file is not a valid table.
     """
@@ -85,7 +85,7 @@ def read_labelled(
         no_instances=f"no column names the instance ({option('instance', 'COLUMN')})",
         order=ranks,
         no_order=no_order,
-        **_controls(table, columns, before, export),
+        **_controls(table, columns, known_before, export),
         value=target,
         notes=tuple(notes),
         provenance={"simulated": export is not None and "1" in columns.cells["simulated"]},
@@ -93,15 +93,15 @@ def read_labelled(
 
 
 def _controls(
-    table: FeatureTable, columns: CsvColumns, before: Sequence[str], export: ExportedTable | None
+    table: FeatureTable, columns: CsvColumns, known_before: Sequence[str], export: ExportedTable | None
 ) -> Controls:
-    """Return the controls: of an exported store the same as those of the store, unless `before` names columns."""
-    if export is not None and not before and (found := export.before_contact()) is not None:
-        return controls(table, found, first_line=export.first_line())
+    """Return the controls: of an exported store the same as those of the store, unless `known_before` names some."""
+    if export is not None and not known_before and (earlier := export.before_contact()) is not None:
+        return controls(table, earlier, first_line=export.first_line())
     return controls(
         table,
-        columns.table(list(before)) if before else None,
-        before_what=f"only {', '.join(before)}",
+        columns.table(list(known_before)) if known_before else None,
+        before_what=f"only {', '.join(known_before)}",
         no_before=f"no columns are named as known before contact ({option('before', 'COLUMNS')})",
     )
 
@@ -165,7 +165,7 @@ def _labels(columns: CsvColumns, label: str | None, notes: list[str]) -> list[st
         )
     written = columns.complete_column(label, "the label")
     labels = [label_text(name) for name in written]
-    if words := sorted({one for one in labels if is_missing(one)}):
+    if words := sorted({label for label in labels if is_missing(label)}):
         notes.append(f"taken as labels, not as missing ones: {listed(words)}")
     if len(set(written)) > len(set(labels)):
         notes.append("labels that differ in invisible characters, or as 1 and 1.0 do, count as one")

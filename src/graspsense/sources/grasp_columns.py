@@ -16,7 +16,7 @@ from graspsense.core.values.events import GraspEvent
 from graspsense.core.values.fingers import FingerForce, opposed_forces
 from graspsense.core.values.signals import NO_PADS, Frame, Image, Phase, Reading, Samples
 from graspsense.recording.replayable import Recording
-from graspsense.sources.fast_samples import sample_blocks
+from graspsense.sources.fast_samples import latest_values, most_in_a_tick, sample_blocks
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -112,14 +112,14 @@ class GraspColumns:
     def _rows(self, channels: Mapping[str, Numbers], which: Any) -> dict[str, Numbers]:
         """Return these samples of channels; of one with its own times, those within the times of the samples."""
         t_s = self.t_s[which]
-        found = {}
+        chosen = {}
         for name, values in channels.items():
             rows = which
             if name in self.times:
                 time_s = self.times[name]
                 rows = (time_s >= t_s[0]) & (time_s <= t_s[-1]) if len(t_s) else np.zeros(len(time_s), bool)
-            found[name] = values[rows]
-        return found
+            chosen[name] = values[rows]
+        return chosen
 
 
 def finger_sides(fingers: Sequence[FingerForce], forces: Mapping[str, Numbers]) -> tuple[Numbers, Numbers]:
@@ -133,7 +133,7 @@ def finger_sides(fingers: Sequence[FingerForce], forces: Mapping[str, Numbers]) 
 def without_missing(columns: GraspColumns) -> GraspColumns:
     """Return the samples that have a time, a gap and both forces; all of them if most lack one."""
     needed = (columns.t_s, columns.gap_m, columns.left_n, columns.right_n)
-    known: NDArray[np.bool_] = np.logical_and.reduce([~np.isnan(one) for one in needed])
+    known: NDArray[np.bool_] = np.logical_and.reduce([~np.isnan(values) for values in needed])
     if known.all() or 2 * int(known.sum()) < len(known):
         return columns
     return only(columns, known, f"without a number ({columns.place(int(np.argmin(known)))})")
@@ -187,12 +187,12 @@ def checked_recording(columns: GraspColumns, *, rate_hz: float | None = None) ->
 
 def _events(columns: GraspColumns) -> dict[str, tuple[GraspEvent, ...]]:
     """Return the labelled events, as far as they are within the samples."""
-    first, last = columns.t_s[[0, -1]].tolist()
+    begin_s, end_s = columns.t_s[[0, -1]].tolist()
     return {
         name: tuple(
-            GraspEvent(max(begin, first), Phase.APPROACH, name, "label", until_s=min(end, last))
+            GraspEvent(max(begin, begin_s), Phase.APPROACH, name, "label", until_s=min(end, end_s))
             for begin, end in spans
-            if begin <= last and end >= first
+            if begin <= end_s and end >= begin_s
         )
         for name, spans in columns.events.items()
     }
@@ -229,8 +229,8 @@ def _check_lengths(columns: GraspColumns) -> None:
             )
         rows = len(columns.times[name]) if name in columns.times else n
         if len(values) != rows:
-            of = f"`times` has {rows} for it" if name in columns.times else f"t_s has {rows}"
-            raise DataDamaged(f"{columns.source}: {name!r} has {len(values)} samples, and {of}")
+            wanted = f"`times` has {rows} for it" if name in columns.times else f"t_s has {rows}"
+            raise DataDamaged(f"{columns.source}: {name!r} has {len(values)} samples, and {wanted}")
     for finger in columns.fingers:
         if finger.name not in columns.scalars:
             raise DataDamaged(f"{columns.source}: `fingers` names {finger.name!r}, which is not in `scalars`")
@@ -296,9 +296,9 @@ def check_increasing(columns: GraspColumns) -> None:
     wrong = np.flatnonzero(~(np.diff(columns.t_s) > 0.0))
     if len(wrong):
         k = int(wrong[0])
-        before, after = columns.t_s[k].item(), columns.t_s[k + 1].item()
+        t0, t1 = columns.t_s[k].item(), columns.t_s[k + 1].item()
         raise DataDamaged(
-            f"{columns.source}, {columns.place(k + 1)}: the time goes from {before!r} to {after!r}; it must increase. "
+            f"{columns.source}, {columns.place(k + 1)}: the time goes from {t0!r} to {t1!r}; it must increase. "
             + _advice_on_times(columns.t_s)
         )
 
@@ -351,8 +351,8 @@ def _check_plausible(columns: GraspColumns, quantity: str, unit_of: str, *values
     if low <= extreme <= high:
         return
     advice = [
-        f"in {one}, write its unit behind it: [{one}]"
-        for one, f in others.items()
+        f"in {unit}, write its unit behind it: [{unit}]"
+        for unit, f in others.items()
         if low <= f * extreme <= high
     ]
     advice = advice[:1] or ["in another unit, multiply it by its factor"]
@@ -368,9 +368,9 @@ def _check_plausible(columns: GraspColumns, quantity: str, unit_of: str, *values
 def _units(units: Mapping[str, str]) -> dict[str, str]:
     """Return the units of the channels of a frame that are not SI units."""
     t, gap, force = units.get("t", ""), units.get("gap", ""), units.get("force", "")
-    found = {"t": t, "gap": gap, "velocity": f"{gap or 'm'}/{t or 's'}" if gap or t else ""}
-    found |= dict.fromkeys(("force_left", "force_right"), force)
-    return {name: unit for name, unit in found.items() if unit}
+    named = {"t": t, "gap": gap, "velocity": f"{gap or 'm'}/{t or 's'}" if gap or t else ""}
+    named |= dict.fromkeys(("force_left", "force_right"), force)
+    return {name: unit for name, unit in named.items() if unit}
 
 
 def _channels(columns: GraspColumns) -> tuple[Channel, ...]:
@@ -383,12 +383,15 @@ def _array(columns: GraspColumns, name: str, values: Numbers) -> Channel:
     """Return the tactile array or the fast channel that several columns are."""
     width = values.shape[1]
     shape = columns.shapes.get(name, (1, width))
-    first, second, components = shape if len(shape) > 2 else (*shape, 1)
+    down, across, components = shape if len(shape) > 2 else (*shape, 1)
     if name not in columns.fast:
         unit = columns.units.get(name, "counts")
-        return TactileArray(name, unit, finger=name, rows=first, columns=second, components=components)
-    second *= components
-    samples, axes = (first, second) if name not in columns.times else (_most_in_a_tick(columns, name), width)
+        return TactileArray(name, unit, finger=name, rows=down, columns=across, components=components)
+    across *= components
+    if name in columns.times:
+        samples, axes = max(most_in_a_tick(columns.t_s, columns.times[name]), 1), width
+    else:
+        samples, axes = down, across
     names = (
         ("value",)
         if axes == 1
@@ -396,16 +399,10 @@ def _array(columns: GraspColumns, name: str, values: Numbers) -> Channel:
         if axes <= 3
         else tuple(f"axis_{k}" for k in range(axes))
     )
-    at = columns.times.get(name, columns.t_s)
+    t_s = columns.times.get(name, columns.t_s)
     a_row = 1 if name in columns.times else samples
-    rate_hz = a_row / float(np.median(np.diff(at))) if len(at) > 1 else 0.0
+    rate_hz = a_row / float(np.median(np.diff(t_s))) if len(t_s) > 1 else 0.0
     return FastChannel(name, columns.units.get(name, "1"), rate_hz, samples=samples, axes=names)
-
-
-def _most_in_a_tick(columns: GraspColumns, name: str) -> int:
-    """Return the largest number of samples of a channel with its own times that are new in one tick."""
-    there = np.searchsorted(columns.times[name], columns.t_s, side="right")
-    return max(int(np.diff(there, prepend=0).max(initial=0)), 1)
 
 
 def _series(columns: GraspColumns, channel: Channel, values: Numbers) -> list[Any]:
@@ -415,19 +412,18 @@ def _series(columns: GraspColumns, channel: Channel, values: Numbers) -> list[An
         if own is not None:
             return sample_blocks(times, own, values, channel)
         return _blocks(times.tolist(), values, channel)
-    at = times if own is None else own
+    sampled_s = times if own is None else own
     rows: list[Any] = [] if isinstance(channel, TactileArray) else values.tolist()
     nothing: Any = math.nan
     if isinstance(channel, TactileArray):
         rows = [
             Image(t_s, k, cells_of(channel, row))
-            for k, (t_s, row) in enumerate(zip(at.tolist(), values, strict=True), 1)
+            for k, (t_s, row) in enumerate(zip(sampled_s.tolist(), values, strict=True), 1)
         ]
         nothing = no_signals((channel,))[0]
     if own is None:
         return rows
-    there = np.searchsorted(own, times, side="right").tolist()
-    return [rows[count - 1] if count else nothing for count in there]
+    return latest_values(times, own, rows, nothing)
 
 
 def _readings(

@@ -128,12 +128,12 @@ def read_grasp(path: Path) -> IcubGrasp:
         )
     if not text.endswith("\n"):
         raise _damaged(path, len(lines), "the file ends within this line: download it again")
-    frames, rest = divmod(len(lines) - 1, len(_LINES))
-    if rest:
+    frames, left_over = divmod(len(lines) - 1, len(_LINES))
+    if left_over:
         raise _damaged(
             path,
             len(lines),
-            f"the file ends after {rest} of the {len(_LINES)} lines of frame {frames + 1}: download it again",
+            f"the file ends after {left_over} of the {len(_LINES)} lines of frame {frames + 1}: download it again",
         )
     if not frames:
         raise _damaged(path, 1, "there is no frame after the first line")

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from operator import itemgetter
 from pathlib import Path
 from typing import Any, Final
 
@@ -55,7 +56,7 @@ def read_dataset(folder: str, features: FeatureSet[Any], *, unreliable: bool = F
     """
     paths = _grasps(folder)
     left_out = [path for path, label, _ in paths if label == UNRELIABLE] if not unreliable else []
-    paths = [one for one in paths if one[0] not in left_out]
+    paths = [named for named in paths if named[0] not in left_out]
     if not paths:
         raise ConfigError(
             f"all grasps in {folder} are of {UNRELIABLE}, which the author calls unreliable: include them with "
@@ -129,13 +130,13 @@ def _readable(
 ) -> tuple[list[tuple[Path, str, int]], list[IcubGrasp], list[UnreadableRecording]]:
     """Return the files that can be read, the grasps in them, and why the others cannot be."""
     kept, grasps, unreadable = [], [], []
-    for one in paths:
-        for grasp in each_readable(one[0].name, lambda path=one[0]: [read_grasp(path)]):  # type: ignore[misc]
+    for named in paths:
+        for grasp in each_readable(named[0].name, lambda path=named[0]: [read_grasp(path)]):  # type: ignore[misc]
             if isinstance(grasp, UnreadableRecording):
                 unreadable.append(grasp)
             else:
                 grasps.append(grasp)
-                kept.append(one)
+                kept.append(named)
     return kept, grasps, unreadable
 
 
@@ -146,14 +147,14 @@ def _grasps(folder: str) -> list[tuple[Path, str, int]]:
     place = within if within.is_dir() else given
     if not place.is_dir():
         raise ConfigError(f"there is no folder {given}: name the folder of the iCub Grasp Dataset")
-    found = []
+    grasps = []
     for path in place.glob("*.txt"):
         match = _FILE.fullmatch(path.name)
         if match:
-            found.append((path, match["label"], int(match["number"])))
-    if not found:
+            grasps.append((path, match["label"], int(match["number"])))
+    if not grasps:
         raise ConfigError(f"{place} contains no file of the iCub Grasp Dataset (CLASS_NUMBER.txt)")
-    return sorted(found, key=lambda one: (one[1], one[2]))
+    return sorted(grasps, key=itemgetter(1, 2))
 
 
 def _absolute(table: FeatureTable, grasps: list[IcubGrasp]) -> FeatureTable:
@@ -164,12 +165,12 @@ def _absolute(table: FeatureTable, grasps: list[IcubGrasp]) -> FeatureTable:
             for joints in (THUMB_FLEXION, FINGER_FLEXION)
         )
         pressure = FORCE_N_PER_COUNT * (255.0 - grasp.taxels[0]).sum(axis=1)
-        first = {
+        start = {
             "gap": -GAP_M_PER_DEG * (thumb + finger) / 2.0,
             "force": (pressure[0] + pressure[1:].max()) / 2.0,
         }
         for name, what in _SHIFTED_BY.items():
-            values[i, table.names.index(name)] += first[what]
+            values[i, table.names.index(name)] += start[what]
     return FeatureTable(names=table.names, units=table.units, values=values)
 
 

@@ -40,7 +40,7 @@ def identified_scenes(source: str) -> tuple[IdentifiedScene, ...]:
     labels = [scene.label for scene in scenes]
     for scene in scenes:
         if labels.count(scene.label) > 1:
-            both = ", ".join(one.path for one in scenes if one.label == scene.label)
+            both = ", ".join(twin.path for twin in scenes if twin.label == scene.label)
             raise ConfigError(f"{both} have the same label {scene.label!r}: name one scene for each label")
         if scene.gripper != scenes[0].gripper:
             raise ConfigError(

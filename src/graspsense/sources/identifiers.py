@@ -25,37 +25,11 @@ if TYPE_CHECKING:
 
 _COUNTED: Final = frozenset({"", "1", "-", "#", "count", "counts"})
 _TIMES: Final = frozenset({"s", "sec", "ms", "us", "µs", "ns", "min", "h", "d"})
-_NAMES: Final = frozenset(
-    {
-        "id",
-        "uid",
-        "uuid",
-        "index",
-        "idx",
-        "number",
-        "num",
-        "no",
-        "nr",
-        "trial",
-        "run",
-        "row",
-        "line",
-        "record",
-    }
-    | {
-        "seq",
-        "sequence",
-        "serial",
-        "counter",
-        "file",
-        "filename",
-        "session",
-        "date",
-        "timestamp",
-        "time",
-        "epoch",
-    }
-)
+_NAMES: Final = frozenset({
+    "id", "uid", "uuid", "index", "idx", "number", "num", "no", "nr", "trial", "run", "row", "line", "record",
+    "seq", "sequence", "serial", "counter", "file", "filename", "session", "date", "timestamp", "time",
+    "epoch"
+})  # fmt: skip
 _LEAST: Final = 5
 """Lines from which on the values of a column can show that it is an identifier."""
 _FOLLOWS: Final = 0.95

@@ -27,14 +27,14 @@ def outcomes_of(
     recordings: Sequence[ImportedRecording], settings_of: Callable[[ImportedRecording], Settings]
 ) -> Counter[Outcome]:
     """Return how many of some recordings, evenly spread, end in which way."""
-    found: Counter[Outcome] = Counter()
+    outcomes: Counter[Outcome] = Counter()
     for recording in recordings[:: -(-len(recordings) // MOST)]:
         with handed_over(recording.name, recording.labelled.recording):
             try:
-                found[grasp_with(settings_of(recording), installed()).outcome] += 1
+                outcomes[grasp_with(settings_of(recording), installed()).outcome] += 1
             except GraspsenseError:  # which the import itself reports
                 continue
-    return found
+    return outcomes
 
 
 def refuse_useless(

@@ -62,11 +62,11 @@ def recordings_to_import(
     good: list[ImportedRecording] = []
     bad: list[UnreadableRecording] = []
     for source in sources:
-        for one in each_readable(source, partial(_named_by, source, columns, label)):
-            if isinstance(one, UnreadableRecording):
-                bad.append(one)
+        for recording in each_readable(source, partial(_named_by, source, columns, label)):
+            if isinstance(recording, UnreadableRecording):
+                bad.append(recording)
             else:
-                good.append(one)
+                good.append(recording)
     if bad and not good:
         raise error_of_all(bad)
     return good, bad
@@ -100,7 +100,7 @@ def _named_by(
         yield ImportedRecording(source=source, name=name, labelled=_relabelled(numbered, label))
         return
     if kind not in KINDS:
-        kinds = ", ".join(f"{fromkey}:" for fromkey in dict.fromkeys((*KINDS, *datasets_with_recordings())))
+        kinds = ", ".join(f"{kind}:" for kind in dict.fromkeys((*KINDS, *datasets_with_recordings())))
         raise ConfigError(
             f"{source!r} is not a source of recordings: name a FILE.csv, {', '.join(KIND_OF)}, a "
             f"manifest FILE.toml, or write one of {kinds} before a file"

@@ -75,16 +75,16 @@ def summary_of(recordings: Sequence[LabelledRecording]) -> ImportSummary:
         by_label.setdefault(recording.label, []).append(recording)
         for notice in recording.notices:
             notices[notice] = notices.get(notice, 0) + 1
-    first = recordings[0].recording
+    earliest = recordings[0].recording
     times = sorted(recording.recorded_at for recording in recordings)
     return ImportSummary(
         grasps=len(recordings),
         labels=tuple(_label(label, some) for label, some in sorted(by_label.items())),
-        units=dict(first.units),
-        channels=tuple(f"{channel.name} [{channel.unit}]" for channel in further(first.channels)),
+        units=dict(earliest.units),
+        channels=tuple(f"{channel.name} [{channel.unit}]" for channel in further(earliest.channels)),
         values=tuple(dict.fromkeys(name for recording in recordings for name in recording.values)),
         recorded=(times[0], times[-1]) if times[0] else None,
-        notes=first.notes,
+        notes=earliest.notes,
         notices=tuple(sorted(notices.items(), key=lambda item: -item[1])),
         measured=_measured([recording.recording for recording in recordings]),
     )

@@ -34,16 +34,16 @@ if TYPE_CHECKING:
     from graspsense.store.store import Store
 
 
-def labels_of_recording(one: LabelledRecording) -> dict[str, str]:
+def labels_of_recording(recording: LabelledRecording) -> dict[str, str]:
     """Return what a data set says about a grasp as the labels of a trial."""
-    labels = {"label": one.label} if one.label else {}
-    if one.label and one.instance:
-        labels["instance"] = f"{class_of(one.label)}#{one.instance}"
-    if one.recorded_at:
-        labels["recorded_at"] = one.recorded_at
-    if one.order is not None:
-        labels["order"] = f"{one.order:.17g}"
-    return labels | {name: repr(value) for name, value in one.values.items()}
+    labels = {"label": recording.label} if recording.label else {}
+    if recording.label and recording.instance:
+        labels["instance"] = f"{class_of(recording.label)}#{recording.instance}"
+    if recording.recorded_at:
+        labels["recorded_at"] = recording.recorded_at
+    if recording.order is not None:
+        labels["order"] = f"{recording.order:.17g}"
+    return labels | {name: repr(value) for name, value in recording.values.items()}
 
 
 def import_recording(
@@ -91,7 +91,7 @@ def _with_labels(trial: Trial, recording: Recording) -> Trial:
     """Return the trial with the events that others labelled in its recording among its own, in the order of time."""
     if not recording.events:
         return trial
-    events = [*trial.events, *(event for one in recording.events.values() for event in one)]
+    events = [*trial.events, *(event for kind in recording.events.values() for event in kind)]
     report = {**trial.report, LABELLED: ", ".join(recording.events)}
     return evolve(trial, events=tuple(sorted(events, key=lambda event: event.t_s)), report=report)
 

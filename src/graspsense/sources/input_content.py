@@ -33,13 +33,13 @@ def contents_of(params: Any) -> dict[str, str]:
     Parameters are JSON values. A text names an input if it is a file, if a file or folder follows its colon
     (`store:DIR`, `identified:cup.toml,mug.toml`), or if it is the qualified name of a component.
     """
-    found = {FRAMEWORK: __version__}
+    contents = {FRAMEWORK: __version__}
     codes = _codes()
-    for text in set(input_names(params)) - found.keys():
+    for text in set(input_names(params)) - contents.keys():
         content = _content(text, codes)
         if content is not None:
-            found[text] = content
-    return found
+            contents[text] = content
+    return contents
 
 
 def input_names(params: Any) -> Iterator[str]:
@@ -103,14 +103,14 @@ def located_text(text: str, base: Path) -> str:
 
 def _codes() -> dict[str, tuple[str, str]]:
     """Return version and module of every component by its qualified name, and of every data set as `NAME:`."""
-    found = {
+    codes = {
         part.qualified: (part.version, part.entry.target.partition(":")[0])
         for part in installed().components()
     }
     for part in installed().datasets():
         target = part.entry.target or part.entry.recordings
-        found[f"{part.name}:"] = (part.version, target.partition(":")[0])
-    return found
+        codes[f"{part.name}:"] = (part.version, target.partition(":")[0])
+    return codes
 
 
 @cache
@@ -150,24 +150,24 @@ def _hash_of_files(path: str, kind: str) -> str:
     return _hash(_hash_of_tree(str(file)) for file in (path, *files))
 
 
-def _named_files(path: str, folders: tuple[str, ...], found: set[str]) -> set[str]:
+def _named_files(path: str, folders: tuple[str, ...], known: set[str]) -> set[str]:
     """Add the files that a TOML or XML file names, and those that these name: models, their parts and meshes.
 
     They are in the folder of the file, in a folder that it names (meshdir), or in `folders`, those of what names it.
     """
     if not path.lower().endswith((".toml", ".xml")) or not os.path.isfile(path):
-        return found
+        return known
     try:
         texts = {text[1:-1] for text in _QUOTED.findall(Path(path).read_text(encoding="utf-8"))}
     except (OSError, UnicodeDecodeError):
-        return found  # the task tells it
+        return known  # the task tells it
     folder = os.path.dirname(path)
     folders += (folder, *(place for text in texts if os.path.isdir(place := os.path.join(folder, text))))
-    for place in sorted({os.path.join(name, text) for name in folders for text in texts} - found - {path}):
+    for place in sorted({os.path.join(name, text) for name in folders for text in texts} - known - {path}):
         if os.path.isfile(place):
-            found.add(place)
-            _named_files(place, folders, found)
-    return found
+            known.add(place)
+            _named_files(place, folders, known)
+    return known
 
 
 def _hash_of_tree(path: str) -> str:

@@ -42,7 +42,7 @@ def labelled_recordings(
     """
     facts: list[LabelledRecording] = []
     rows: list[Features] = []
-    before: list[Features] = []
+    early: list[Features] = []
     unreadable: list[UnreadableRecording] = []
     unlabelled = 0
     read = list(readable_or_not(kind, place))
@@ -55,12 +55,12 @@ def labelled_recordings(
         elif not recording.label:
             unlabelled += 1
         else:
-            for found in each_readable(recording.source, partial(_features_of, recording, features)):
-                if isinstance(found, UnreadableRecording):
-                    unreadable.append(found)
+            for extracted in each_readable(recording.source, partial(_features_of, recording, features)):
+                if isinstance(extracted, UnreadableRecording):
+                    unreadable.append(extracted)
                     continue
-                rows.append(found[0])
-                before.append(found[1])
+                rows.append(extracted[0])
+                early.append(extracted[1])
                 facts.append(recording)
     if unreadable and not facts:
         raise error_of_all(unreadable)
@@ -85,7 +85,7 @@ def labelled_recordings(
         order=order,
         no_order="" if order is not None else "the data set does not say when each trial was recorded",
         content=tuple(map(str, grasp_numbers([curve_bytes(fact.recording.readings) for fact in facts]))),
-        **_controls(table, before, facts),
+        **_controls(table, early, facts),
         notes=tuple(notes),
         provenance={"simulated": False},
     )
@@ -98,13 +98,13 @@ def _fitted(features: FeatureSet[Any], recordings: Sequence[Recording]) -> tuple
     config, default = features.config, type(features.config)()
     keys = [key for key in THRESHOLDS if hasattr(config, key)]
     given = {key: getattr(config, key) for key in keys if getattr(config, key) != getattr(default, key)}
-    found = thresholds_for(recordings, {}, given)
+    thresholds = thresholds_for(recordings, {}, given)
     chosen = {
-        key: found.settings[f"controller.{key}"]
+        key: thresholds.settings[f"controller.{key}"]
         for key in keys
-        if key not in given and f"controller.{key}" in found.settings
+        if key not in given and f"controller.{key}" in thresholds.settings
     }
-    return (type(features)(evolve(config, **chosen)), [found.words]) if chosen else (features, [])
+    return (type(features)(evolve(config, **chosen)), [thresholds.words]) if chosen else (features, [])
 
 
 def _features_of(recording: LabelledRecording, features: FeatureSet[Any]) -> tuple[tuple[Features, Features]]:
@@ -159,20 +159,18 @@ def _first_lines(facts: Sequence[LabelledRecording]) -> FeatureTable:
     return FeatureTable(names=NAMES, units=UNITS, values=values)
 
 
-def _controls(
-    table: FeatureTable, before: Sequence[Features], facts: Sequence[LabelledRecording]
-) -> Controls:
-    found = controls(
-        table, table_of(before), before_missing=_why_missing(before), first_line=_first_lines(facts)
+def _controls(table: FeatureTable, early: Sequence[Features], facts: Sequence[LabelledRecording]) -> Controls:
+    measured = controls(
+        table, table_of(early), before_missing=_why_missing(early), first_line=_first_lines(facts)
     )
     return without_constant_gap(
-        found, ([reading.frame.gap_m for reading in fact.recording.readings] for fact in facts)
+        measured, ([reading.frame.gap_m for reading in fact.recording.readings] for fact in facts)
     )
 
 
-def _why_missing(before: Sequence[Features]) -> str:
+def _why_missing(early: Sequence[Features]) -> str:
     """Return why trials have no features from before contact, empty if all have them."""
-    return next((reason for features in before for reason in features.reasons.values()), "")
+    return next((reason for features in early for reason in features.reasons.values()), "")
 
 
 def _counted(notices: Any) -> list[str]:

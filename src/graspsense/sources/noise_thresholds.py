@@ -103,16 +103,16 @@ def thresholds_for(
         return Thresholds(settings={}, words="thresholds of contact and rest: the defaults")
     units = Counter(tuple(sorted(recording.units.items())) for recording in long_enough).most_common(1)[0][0]
     used = [recording for recording in long_enough if tuple(sorted(recording.units.items())) == units]
-    scale = _Scale.of(dict(units))
+    scale = _Scale.in_units(dict(units))
     if scale.is_nominal:
         return Thresholds(settings={}, words="thresholds of contact and rest: the defaults")
-    measured = [_Noise.of(one, scale) for one in used]
+    measured = [_Noise.measured_in(recording, scale) for recording in used]
     force, force_words = _contact_force(measured, scale)
     contact = (given or {}).get("contact_force_n", force.get("controller.contact_force_n", CONTACT_FORCE_N))
-    rest, rest_words = _rest(measured, scale, contact, given or {})
+    resting, rest_words = _rest(measured, scale, contact, given or {})
     times, times_words = _timeouts(used, timeouts_s or {}, scale)
     ends, ends_words = _ends(measured, scale, contact)
-    settings = {**force, **rest, **times, **ends}
+    settings = {**force, **resting, **times, **ends}
     seen = _seen(measured, scale)
     if not settings:
         words = f"thresholds of contact and rest: the defaults, which fit the noise ({scale.defaults}{seen})"
@@ -130,7 +130,7 @@ class _Scale:
     t: str
 
     @classmethod
-    def of(cls, units: Mapping[str, str]) -> _Scale:
+    def in_units(cls, units: Mapping[str, str]) -> _Scale:
         return cls(units.get("force_left", "N"), units.get("gap", "m"), units.get("t", "s"))
 
     @property
@@ -180,7 +180,7 @@ class _Noise:
     """The mean speed from a fifth of the peak force to all of it; 0 if the gap hardly moves."""
 
     @classmethod
-    def of(cls, recording: Recording, scale: _Scale) -> _Noise:
+    def measured_in(cls, recording: Recording, scale: _Scale) -> _Noise:
         """Measure the noise of a recording."""
         frames = [reading.frame for reading in recording.readings]
         times, gap, left, right = (
@@ -254,12 +254,12 @@ def _rest(
     measured: Sequence[_Noise], scale: _Scale, contact: float, given: Mapping[str, float]
 ) -> tuple[dict[str, float], str]:
     """Return the rest speed and window if the defaults do not fit, and why."""
-    noise = float(np.quantile([one.noise for one in measured], _REACHING))
-    step = float(np.quantile([one.step for one in measured], 0.9))
-    period = float(np.quantile([one.period for one in measured], 0.9))
-    sampled = float(np.median([one.sampled for one in measured]))
-    closing = float(np.median([one.closing for one in measured]))
-    squeezing = [one.squeezing for one in measured if one.squeezing > 0.0]
+    noise = float(np.quantile([noise_.noise for noise_ in measured], _REACHING))
+    step = float(np.quantile([recording.step for recording in measured], 0.9))
+    period = float(np.quantile([recording.period for recording in measured], 0.9))
+    sampled = float(np.median([recording.sampled for recording in measured]))
+    closing = float(np.median([recording.closing for recording in measured]))
+    squeezing = [recording.squeezing for recording in measured if recording.squeezing > 0.0]
     slowest = _SQUEEZE_SHARE * float(np.median(squeezing)) if squeezing else _SLOW_SHARE * closing
     default_speed = REST_SPEED_M_S if scale.has_rest else _STILL_SHARE * closing
     default_window = max(
@@ -286,8 +286,8 @@ def _rest(
     # Steps of a coarse gap pass for noise while it moves, so the step alone is tried first.
     travels = sorted({MARGIN * step, travel}) if step else [travel]
     pairs = [(v, _window(x / v, least, scale)) for x in travels for v in map(_rounded_up, candidates)]
-    resting = [sum(one.rests(contact, *pair) for one in tried) for pair in pairs]
-    enough = _REACHING * sum(bool((one.both >= contact).any()) for one in tried)
+    resting = [sum(recording.rests(contact, *pair) for recording in tried) for pair in pairs]
+    enough = _REACHING * sum(bool((recording.both >= contact).any()) for recording in tried)
     chosen = next((k for k, count in enumerate(resting) if count >= enough), int(np.argmax(resting)))
     speed, window = pairs[chosen]
     default = (
@@ -448,8 +448,8 @@ def _free_force(force: NDArray[np.float64], baseline: float) -> float:
 
 def _rises(force: NDArray[np.float64]) -> bool:
     """Return whether a force grows by more than its noise explains, so that something is squeezed already."""
-    third = max(len(force) // 3, 1)
-    growth = float(np.median(force[-third:]) - np.median(force[:third]))
+    a_third = max(len(force) // 3, 1)
+    growth = float(np.median(force[-a_third:]) - np.median(force[:a_third]))
     return growth > _FORCE_SIGMAS * _scatter_of_differences(force)
 
 
@@ -466,8 +466,8 @@ def _gap_at_rest(gap: NDArray[np.float64], force: NDArray[np.float64]) -> float:
 
 def _scatter_of_differences(values: NDArray[np.float64]) -> float:
     """Return the standard deviation of the noise of a smooth course, from its second differences."""
-    second = np.diff(values, n=2)
-    return _NORMAL * float(np.median(np.abs(second - np.median(second)))) / math.sqrt(6.0)
+    curvature = np.diff(values, n=2)
+    return _NORMAL * float(np.median(np.abs(curvature - np.median(curvature)))) / math.sqrt(6.0)
 
 
 def _rounded_down(value: float) -> float:

@@ -46,8 +46,8 @@ def npz_arrays(path: Path) -> dict[str, NDArray[Any]]:
             opened.seek(max(0, path.stat().st_size - _END_BYTES))
             opened.read(_END_BYTES)  # an error of the disk there would be told as a damaged archive
             archive = zipfile.ZipFile(opened)
-            members = [one for one in archive.infolist() if one.filename.endswith(_MEMBER)]
-            unpacked.expect(sum(one.file_size for one in members))
+            members = [member for member in archive.infolist() if member.filename.endswith(_MEMBER)]
+            unpacked.expect(sum(member.file_size for member in members))
             arrays = {}
             for member in members:
                 if member.compress_type not in _COMPRESSIONS:

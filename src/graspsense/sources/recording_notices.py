@@ -22,10 +22,10 @@ FREE: Final = 0.2
 """Share of its range up to which a force is that of free fingers."""
 
 
-def with_notices(one: LabelledRecording) -> LabelledRecording:
+def with_notices(labelled: LabelledRecording) -> LabelledRecording:
     """Return the recording with all that looks wrong: what its reader noticed, and what its forces show."""
-    found = (*one.notices, *one.recording.notices, *_notices(one.recording))
-    return evolve(one, notices=tuple(dict.fromkeys(found)))
+    notices = (*labelled.notices, *labelled.recording.notices, *_notices(labelled.recording))
+    return evolve(labelled, notices=tuple(dict.fromkeys(notices)))
 
 
 def _notices(recording: Recording) -> Iterator[str]:
@@ -56,9 +56,9 @@ def _stops(force: NDArray[np.float64]) -> bool:
     changed = np.diff(force) != 0.0
     until = int(np.flatnonzero(changed)[-1]) + 1
     free = force < force.min() + FREE * np.ptp(force)
-    before = changed[:until]
-    usual = float(before.mean())
-    noise = before[free[:until]]
+    earlier = changed[:until]
+    usual = float(earlier.mean())
+    noise = earlier[free[:until]]
     repeated = len(changed) - until
     return bool(
         len(noise)

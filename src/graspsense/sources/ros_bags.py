@@ -54,7 +54,9 @@ class Bag:
 
         Raises ConfigError, TooLarge, DataDamaged.
         """
-        connections: list[Connection] = [one for one in self.reader.connections if wanted(one.topic)]
+        connections: list[Connection] = [
+            connection for connection in self.reader.connections if wanted(connection.topic)
+        ]
         if not connections:
             return
         definitions = Definitions(self.path, self.reader.typestore.fielddefs)
@@ -126,11 +128,11 @@ class Definitions:
             return self._has_objects[name]
         if name in within or name not in self.fields:
             raise DataDamaged(f"{self.path}: the type {name} of a message contains itself, or is not defined")
-        found = [
+        packed = [
             self._is_object(name, field_name, described, (*within, name))
             for field_name, described in self.fields[name][1]
         ]
-        self._has_objects[name] = any(found)
+        self._has_objects[name] = any(packed)
         return self._has_objects[name]
 
     def _is_object(self, name: str, field: str, described: Any, within: Sequence[str]) -> bool:
@@ -186,16 +188,16 @@ def _unpacking_within(unpacked: Unpacked) -> Iterator[None]:
     from rosbags.rosbag2 import storage_mcap as mcap
 
     ros2: Any = reader
-    before = dict(ros1.decompressors), dict(mcap.DECOMPRESSORS), ros2.zstd
-    ros1.decompressors.update({one: _unpacker(unpacked, one) for one in ("bz2", "lz4")})
-    mcap.DECOMPRESSORS.update({one: _unpacker(unpacked, one) for one in ("zstd", "lz4")})
+    originals = dict(ros1.decompressors), dict(mcap.DECOMPRESSORS), ros2.zstd
+    ros1.decompressors.update({name: _unpacker(unpacked, name) for name in ("bz2", "lz4")})
+    mcap.DECOMPRESSORS.update({name: _unpacker(unpacked, name) for name in ("zstd", "lz4")})
     ros2.zstd = _Zstd(unpacked)
     try:
         yield
     finally:
-        ros1.decompressors.update(before[0])
-        mcap.DECOMPRESSORS.update(before[1])
-        ros2.zstd = before[2]
+        ros1.decompressors.update(originals[0])
+        mcap.DECOMPRESSORS.update(originals[1])
+        ros2.zstd = originals[2]
 
 
 def _unpacker(unpacked: Unpacked, compression: str) -> Callable[..., bytes]:

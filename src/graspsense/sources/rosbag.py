@@ -34,7 +34,7 @@ from graspsense.core.values.signals import Frame, Pads, Reading
 from graspsense.recording.readable import readable
 from graspsense.recording.replayable import Recording
 from graspsense.recording.unpacked import Unpacked
-from graspsense.sources.fast_samples import sample_blocks
+from graspsense.sources.fast_samples import most_in_a_tick, sample_blocks
 from graspsense.sources.ros_bags import opened_bag, stamp_ns
 from graspsense.sources.topic_clocks import Messages, TopicTimes, common_clock
 
@@ -113,14 +113,14 @@ def read_bag(name: str) -> Recording:
     kept = Unpacked(path)
     with opened_bag(path, DEFINITIONS) as bag, readable(path):
         side = _side(path, side, bag.topics)
-        found = _Found(path, side, _source(path, side, bag.topics))
-        for topic, recorded_ns, message in bag.messages(found.times.__contains__):
+        content = _Content(path, side, _source(path, side, bag.topics))
+        for topic, recorded_ns, message in bag.messages(content.times.__contains__):
             kept.add(_MESSAGE_BYTES)
-            found.add(topic, recorded_ns, message)
-    return _recording(path, found)
+            content.add(topic, recorded_ns, message)
+    return _recording(path, content)
 
 
-class _Found:
+class _Content:
     """The messages of a gripper in a bag, and when they came."""
 
     def __init__(self, path: Path, side: str, source: str) -> None:
@@ -146,27 +146,27 @@ class _Found:
         self.times[topic].add(recorded_ns, stamp_ns(message))
 
 
-def _recording(path: Path, found: _Found) -> Recording:
+def _recording(path: Path, content: _Content) -> Recording:
     """Return the recording that these messages are. Raises DataDamaged."""
-    pressure, source, gripper = found.pressure, found.source, f"{SIDES[found.side]} gripper"
-    if len(found.motions) < 2 or not found.images:
+    pressure, source, gripper = content.pressure, content.source, f"{SIDES[content.side]} gripper"
+    if len(content.motions) < 2 or not content.images:
         raise DataDamaged(
-            f"{path} contains {len(found.motions)} positions of the {gripper} on {source} and {len(found.images)} cell "
-            f"images on {pressure}: a grasp needs both"
+            f"{path} contains {len(content.motions)} positions of the {gripper} on {source} and {len(content.images)} "
+            f"cell images on {pressure}: a grasp needs both"
         )
-    topics = {topic: stamps for topic, stamps in found.times.items() if stamps.recorded_ns}
+    topics = {topic: stamps for topic, stamps in content.times.items() if stamps.recorded_ns}
     clock = common_clock(path.name, topics, (pressure, source))
-    moved = _timed(found.motions, clock.topics[source])
-    motions = [one for one in moved if clock.begin_ns <= one.t_ns <= clock.end_ns]
+    moved = _timed(content.motions, clock.topics[source])
+    motions = [motion for motion in moved if clock.begin_ns <= motion.t_ns <= clock.end_ns]
     duration_s = (motions[-1].t_ns - motions[0].t_ns) * 1e-9 if motions else 0.0
     if duration_s <= 0.0:
         raise DataDamaged(f"{path}: all positions on {source} have the same time")
     notes = [f"recorded on a PR2, {gripper}: gap from {source}, cells from {pressure}", *clock.notes]
     images = clock.topics[pressure]
-    readings = tuple(_readings(motions, _timed(found.images, images), images, notes))
+    readings = tuple(_readings(motions, _timed(content.images, images), images, notes))
     channels: tuple[Channel, ...] = ()
-    if any(sample.values for sample in found.samples):
-        timed = _timed(found.samples, clock.topics[found.acceleration])
+    if any(sample.values for sample in content.samples):
+        timed = _timed(content.samples, clock.topics[content.acceleration])
         channels, readings = _with_acceleration(readings, motions[0].t_ns, timed)
     return Recording(
         name=f"{path.name}, {gripper}",
@@ -184,11 +184,11 @@ def _timed(messages: Sequence[T], times: TopicTimes) -> list[T]:
 
 
 def _side(path: Path, side: str, topics: Collection[str]) -> str:
-    there = [one for one in SIDES if PRESSURE.format(one) in topics]
+    there = [candidate for candidate in SIDES if PRESSURE.format(candidate) in topics]
     if side in there:
         return side
     if not there:
-        wanted = " or ".join(PRESSURE.format(one) for one in SIDES)
+        wanted = " or ".join(PRESSURE.format(candidate) for candidate in SIDES)
         raise DataDamaged(
             f"{path} has no fingertips: no topic {wanted}. It has: {', '.join(sorted(topics)) or 'none'}"
         )
@@ -251,21 +251,22 @@ def _readings(
         if not pads or image[1:] != (pads[-1].left, pads[-1].right):
             pads.append(Pads((image.t_ns - began_ns) * 1e-9, len(pads) + 1, image.left, image.right))
         latest.append(pads[-1])
-    first = pads[:TARE_IMAGES]
+    unloaded = pads[:TARE_IMAGES]
     try:
-        zero = tare(first, PAD_COUNTS_PER_N, FIRST_PAD_CELL)
+        zero = tare(unloaded, PAD_COUNTS_PER_N, FIRST_PAD_CELL)
     except TareRefused as refused:
-        zero = zero_of([pad.left for pad in first]), zero_of([pad.right for pad in first])
+        zero = zero_of([pad.left for pad in unloaded]), zero_of([pad.right for pad in unloaded])
         notes.append(
-            f"the zero of the pads is uncertain, because the first {len(first)} images cannot be used for it: {refused}"
+            f"the zero of the pads is uncertain, because the first {len(unloaded)} images cannot be used "
+            f"for it: {refused}"
         )
-    last, old = times.latest(np.array([one.t_ns for one in motions], dtype=np.int64))
-    before: _Motion | None = None
+    last, old = times.latest(np.array([motion.t_ns for motion in motions], dtype=np.int64))
+    previous: _Motion | None = None
     for motion, n, is_old in zip(motions, last.tolist(), old.tolist(), strict=True):
-        dt_s = (motion.t_ns - before.t_ns) * 1e-9 if before else 0.0
+        dt_s = (motion.t_ns - previous.t_ns) * 1e-9 if previous else 0.0
         velocity = motion.velocity_m_s
-        if velocity != velocity and before is not None and dt_s > 0.0:
-            velocity = (motion.gap_m - before.gap_m) / dt_s
+        if velocity != velocity and previous is not None and dt_s > 0.0:
+            velocity = (motion.gap_m - previous.gap_m) / dt_s
         seen = latest[n]
         forces = (
             ((_NAN, _NAN), (_NAN, _NAN))
@@ -280,7 +281,7 @@ def _readings(
             ),
             seen,
         )  # fmt: skip
-        before = motion
+        previous = motion
 
 
 def _with_acceleration(
@@ -291,26 +292,25 @@ def _with_acceleration(
     The samples of a message are taken as equally spaced since the one before. Those before the first reading are left
     out.
     """
-    at: list[float] = []
+    sampled_s: list[float] = []
     values: list[tuple[float, float, float]] = []
     before_ns: int | None = None
     for t_ns, rows in messages:
         if before_ns is not None and before_ns >= began_ns:
             step_ns = (t_ns - before_ns) / max(len(rows), 1)
-            at += [(before_ns - began_ns + step_ns * k) * 1e-9 for k in range(1, len(rows) + 1)]
+            sampled_s += [(before_ns - began_ns + step_ns * k) * 1e-9 for k in range(1, len(rows) + 1)]
             values += rows
         before_ns = t_ns
     times = np.array([reading.frame.t_s for reading in readings])
-    there = np.searchsorted(at, times, side="right")
-    most = int(np.diff(there, prepend=0).max())
+    most = most_in_a_tick(times, sampled_s)
     if most == 0:
         return (), tuple(readings)
-    rate_hz = (len(at) - 1) / (at[-1] - at[0]) if at[-1] > at[0] else 0.0
+    rate_hz = (len(sampled_s) - 1) / (sampled_s[-1] - sampled_s[0]) if sampled_s[-1] > sampled_s[0] else 0.0
     channel = FastChannel(
         "acceleration", "m/s2", rate_hz, samples=min(most, MOST_SAMPLES), axes=("x", "y", "z"), clock="sensor"
     )
     make = signal_type((channel,))._make  # type: ignore[attr-defined]
-    blocks = sample_blocks(times, np.array(at), np.array(values), channel)
+    blocks = sample_blocks(times, np.array(sampled_s), np.array(values), channel)
     return (channel,), tuple(
         reading._replace(signals=make((block,))) for reading, block in zip(readings, blocks, strict=True)
     )

@@ -191,12 +191,12 @@ def plan_trials(settings: Settings, groups: Sequence[Group], seed: int) -> Simul
     """Return the trials to simulate. Raises ConfigError if the gripper is not simulated or there are no trials."""
     kinds, groups = _checked_groups(settings, groups)
     trials = [trial for group in groups for trial in group.planned(kinds)]
-    first = OBJECTS_PER_SEED * seed
+    first_object = OBJECTS_PER_SEED * seed
     return SimulationPlan(
         groups=groups,
         labels=tuple(trial.label for trial in trials),
-        instances=tuple(f"{class_of(trial.label)}#{first + trial.instance}" for trial in trials),
-        scenes=tuple(f"{trial.object_name}#{first + trial.instance}" for trial in trials),
+        instances=tuple(f"{class_of(trial.label)}#{first_object + trial.instance}" for trial in trials),
+        scenes=tuple(f"{trial.object_name}#{first_object + trial.instance}" for trial in trials),
         seeds=tuple(TRIALS_PER_SEED * seed + k for k in range(len(trials))),
     )
 
@@ -220,7 +220,7 @@ def simulated(
     plan = plan_trials(settings, groups, seed)
     if progress is not None:
         progress(0, len(plan.scenes))
-    rows, before = FeatureRows(), FeatureRows()
+    rows, early = FeatureRows(), FeatureRows()
     doubts: dict[str, list[str]] = {}
     feature_set = with_checkpoints(settings.features.create(), checkpoints_s)
     extract = _Extraction(
@@ -232,7 +232,7 @@ def simulated(
         if on_trace is not None and trace is not None:
             on_trace(number, plan.labels[number], trace)
         rows.add(features)
-        before.add(features_before)
+        early.add(features_before)
         for doubt in _doubts(report):
             doubts.setdefault(doubt, []).append(plan.labels[number])
     table = rows.table()
@@ -242,11 +242,11 @@ def simulated(
         labels=plan.labels,
         instances=plan.instances,
         no_order="simulated trials are independent, so they have no order of recording",
-        **controls(table, before.table()),
+        **controls(table, early.table()),
         notes=(
             "every figure here is simulated: it comes from a model of gripper and objects",
             *_states_note(plan.groups, plan.labels),
-            *(_doubt_note(doubt, of, len(plan.labels)) for doubt, of in doubts.items()),
+            *(_doubt_note(doubt, doubted, len(plan.labels)) for doubt, doubted in doubts.items()),
         ),
         provenance={
             "simulated": True,

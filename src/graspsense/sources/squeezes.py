@@ -33,14 +33,18 @@ def recorded_squeezes(sources: Sequence[str], name: str | None = None) -> tuple[
     labels = sorted({squeeze.label for squeeze in squeezes if squeeze.label})
     if name is not None:
         known = sorted({*labels, *map(class_of, labels)})
-        squeezes = [one for one in squeezes if one.label and name in (one.label, class_of(one.label))]
+        squeezes = [
+            squeeze
+            for squeeze in squeezes
+            if squeeze.label and name in (squeeze.label, class_of(squeeze.label))
+        ]
         if not squeezes:
             there_are = ", ".join(known) or "none has a label; leave out the name"
             raise ConfigError(
                 f"no recording has the label or the class {name!r}. Known: {there_are}."
                 + suggestion(name, known)
             )
-        squeezes = [evolve(one, label=name) for one in squeezes]
+        squeezes = [evolve(squeeze, label=name) for squeeze in squeezes]
         labels = [name]
     if len(labels) > 1:
         raise ConfigError(
@@ -76,7 +80,7 @@ def _of_store(folder: str, number: int | None = None) -> Iterator[RecordedSqueez
     from graspsense.store.store import Store
 
     with Store.read(folder) as store:
-        complete = (one.id for one in store.page(limit=1_000_000) if one.complete)
+        complete = (trial.id for trial in store.page(limit=1_000_000) if trial.complete)
         for k in [number] if number is not None else reversed([*complete]):
             trial = store.trial(k)
             yield _of_grasp(read_recorded(trial.recording), f"{folder}#{k}", trial.recording_sha256)

@@ -100,8 +100,8 @@ class _Layout:
         given = _SEPARATOR_LINE.fullmatch(written[0][1]) if written else None
         if given:
             written = written[1:]
-        self.comments = [one for one in written if one[1].lstrip().startswith(_COMMENTS)]
-        plain = [one for one in written if not one[1].lstrip().startswith(_COMMENTS)]
+        self.comments = [numbered for numbered in written if numbered[1].lstrip().startswith(_COMMENTS)]
+        plain = [numbered for numbered in written if not numbered[1].lstrip().startswith(_COMMENTS)]
         self.separator = given[1] if given else _separator([line for _, line in _sample(plain)])
         self.rows = list(self._checked(self._rows(plain)))
 
@@ -165,16 +165,16 @@ class _Layout:
         sample = sample[: max(2, _SAMPLED_CELLS // width)]
         numeric = _numeric_columns(sample, width)
         data = next((k for k, (_, row) in enumerate(self.rows) if _is_data(row, width, numeric)), None)
-        first = self.rows[0][1]
-        if data is None or (data == 1 and len(first) > 1):
-            return first, None, 1, self.rows[0][0]
+        top = self.rows[0][1]
+        if data is None or (data == 1 and len(top) > 1):
+            return top, None, 1, self.rows[0][0]
         if data == 0:
             named = self._names_in_comment(width)
             if named is not None:
                 return named[1], None, 0, named[0]
-            if all(is_number(cell) or is_missing(cell) for cell in first):
+            if all(is_number(cell) or is_missing(cell) for cell in top):
                 return [f"c{k}" for k in range(1, width + 1)], None, 0, 0
-            return first, None, 1, self.rows[0][0]
+            return top, None, 1, self.rows[0][0]
         return self._later_header(data, width, numeric)
 
     def _later_header(
@@ -193,7 +193,7 @@ class _Layout:
             units = [cell.strip("[]()") for cell in self.rows[able[-1] + 1][1]]
         if not able:
             number, row = self.rows[data]
-            if all(len(one) == 1 for _, one in self.rows[:data]):
+            if all(len(row) == 1 for _, row in self.rows[:data]):
                 self.notes.append(
                     f"{data} lines before the numbers are left out, and none of them names the columns"
                 )
@@ -205,19 +205,19 @@ class _Layout:
             )
         names = able[-1]
         if names:
-            before = [number for number, _ in self.rows[:names]]
+            skipped = [number for number, _ in self.rows[:names]]
             self.notes.append(
                 f"the names of the columns are those of line {self.rows[names][0]}; "
-                + _lines_words(before, "lines before them")
+                + _lines_words(skipped, "lines before them")
             )
         return self.rows[names][1], units, names + (2 if units else 1), self.rows[names][0]
 
     def _names_in_comment(self, width: int) -> tuple[int, list[str]] | None:
         """Return the names that the last comment before the first row has, with its line; None if it has none."""
-        before = [(number, line) for number, line in self.comments if number < self.rows[0][0]]
-        if not before:
+        above = [(number, line) for number, line in self.comments if number < self.rows[0][0]]
+        if not above:
             return None
-        number, line = before[-1]
+        number, line = above[-1]
         text = line.strip().lstrip("#% ")
         cells = (
             text.split() if self.separator == " " else [cell.strip() for cell in text.split(self.separator)]
@@ -234,7 +234,7 @@ class _Layout:
         if not again or all(map(is_number, header)):
             return rows
         self.notes.append(_lines_words(again, "repeated headers"))
-        return [one for one in rows if one[1] != header and not (units and _are_units(one[1]))]
+        return [row for row in rows if row[1] != header and not (units and _are_units(row[1]))]
 
     def _without_blank_end(self, names: list[str], rows: list[Row]) -> tuple[list[str], list[Row]]:
         """Return names and rows without a last column that a separator at the end of the lines makes."""
@@ -308,7 +308,7 @@ def _cells_of(value: Any, name: str, depth: int) -> Iterator[tuple[str, str]]:
     if isinstance(value, dict):
         parts = value
     elif isinstance(value, list):
-        parts = {str(k): one for k, one in enumerate(value)}
+        parts = {str(k): inner for k, inner in enumerate(value)}
     if parts is None:
         yield (
             name,
@@ -330,11 +330,11 @@ def _separator(lines: Sequence[str]) -> str:
 
     It gives most lines the same number of cells, and the first line as many if any does.
     """
-    widths = {one: _width(lines, one) for one in (";", "\t", ",", " ")}
-    agreeing = {one: count for one, (width, count) in widths.items() if width > 1}
+    widths = {separator: _width(lines, separator) for separator in (";", "\t", ",", " ")}
+    agreeing = {separator: count for separator, (width, count) in widths.items() if width > 1}
     if agreeing.get(" ", 0) >= agreeing.get(",", 1) and _commas_are_within_numbers(lines):
         agreeing.pop(",", None)
-    able = [one for one, count in agreeing.items() if count >= 0.9 * max(agreeing.values())]
+    able = [separator for separator, count in agreeing.items() if count >= 0.9 * max(agreeing.values())]
     fitting = [item for item in able if _width(lines[:1], item)[0] == widths[item][0]]
     return next(iter(fitting or able), " ")
 

@@ -127,11 +127,11 @@ def common_clock(
     """
     began_ns, times, notices = on_one_clock(source, topics)
     wanted = {topic: times[topic] for topic in needed or times}
-    lasting = {topic: one for topic, one in wanted.items() if one.usual_ns} or wanted
-    begin = max(int(one.ns[0]) for one in lasting.values())
-    end = min(one.until_ns for one in lasting.values())
+    lasting = {topic: stamps for topic, stamps in wanted.items() if stamps.usual_ns} or wanted
+    begin = max(int(stamps.ns[0]) for stamps in lasting.values())
+    end = min(stamps.until_ns for stamps in lasting.values())
     earliest = min(int(stamps.ns[0]) for stamps in times.values())
-    inside = {topic: one.between(begin, end) for topic, one in lasting.items()}
+    inside = {topic: stamps.between(begin, end) for topic, stamps in lasting.items()}
     notes = tuple(_words(topic, stamps, earliest, inside.get(topic)) for topic, stamps in times.items())
     if end <= begin:
         raise DataDamaged(
@@ -139,7 +139,7 @@ def common_clock(
             "the computers that stamped them"
         )
     notes += (f"all have messages from {(begin - earliest) * 1e-9:.3f} to {(end - earliest) * 1e-9:.3f} s",)
-    silent = [topic for topic, one in inside.items() if _longest(one) > lasting[topic].longest_hold_ns]
+    silent = [topic for topic, within in inside.items() if _longest(within) > lasting[topic].longest_hold_ns]
     if silent:
         notices += (
             f"{', '.join(silent)} was silent for more than {PERIODS:g} of its usual periods: a value that then changed "
@@ -221,21 +221,21 @@ def _longest(times_ns: Nanoseconds) -> int:
 def _words(topic: str, times: TopicTimes, earliest_ns: int, inside: Nanoseconds | None) -> str:
     if not times.usual_ns:
         return f"{topic}: a message, whose value holds throughout"
-    first, last = ((ns - earliest_ns) * 1e-9 for ns in (times.ns[0], times.ns[-1]))
+    begin_s, end_s = ((ns - earliest_ns) * 1e-9 for ns in (times.ns[0], times.ns[-1]))
     return (
-        f"{topic}: {len(times.ns)} messages from {first:.3f} to {last:.3f} s, {1e9 / times.usual_ns:.4g} Hz, longest "
-        f"hold {_longest(times.ns if inside is None else inside) * 1e-6:.3g} ms"
+        f"{topic}: {len(times.ns)} messages from {begin_s:.3f} to {end_s:.3f} s, {1e9 / times.usual_ns:.4g} Hz, "
+        f"longest hold {_longest(times.ns if inside is None else inside) * 1e-6:.3g} ms"
     )
 
 
 def _trimmed(lasting: Mapping[str, TopicTimes], begin_ns: int, end_ns: int) -> Iterator[str]:
     """Yield a sentence if much of the recording is outside the common interval."""
-    first = min(int(times.ns[0]) for times in lasting.values())
+    begin = min(int(times.ns[0]) for times in lasting.values())
     last = max(times.until_ns for times in lasting.values())
-    much = NOTICED * (last - first)
+    much = NOTICED * (last - begin)
     late = max(lasting, key=lambda topic: int(lasting[topic].ns[0]))
     early = min(lasting, key=lambda topic: lasting[topic].until_ns)
-    parts = [f"{late} begins after the other topics"] if begin_ns - first > much else []
+    parts = [f"{late} begins after the other topics"] if begin_ns - begin > much else []
     parts += [f"{early} ends before the other topics"] if last - end_ns > much else []
     if parts:
         yield f"more than {NOTICED:.0%} of the recording is left out, because {' and '.join(parts)}"

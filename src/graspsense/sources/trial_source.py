@@ -53,7 +53,7 @@ class TrialSource(Group):
     order: str | None = None
     columns: tuple[str, ...] = ()
     """CSV: the columns to learn from; empty for all columns of numbers."""
-    before: tuple[str, ...] = ()
+    known_before: tuple[str, ...] = field(default=(), alias="before")
     """CSV: columns that are known before contact."""
     value: str | None = None
     """CSV, store: the column, or the number among the labels, that is to be predicted in place of the label."""
@@ -146,9 +146,9 @@ def kind_of(source: str) -> Kind:
             "CLASS:STATE makes a trial of it"
         )
     if source.lower().endswith(".toml") and Path(source).is_file():
-        found = toml_kind(read_toml(Path(source), source, "TOML").values)
-        called = KINDS[found].called if found else "a TOML file"
-        raise ConfigError(f"{source} is {called}, not a source of trials. {_OF_TOML.get(found, '')}".rstrip())
+        kind = toml_kind(read_toml(Path(source), source, "TOML").values)
+        called = KINDS[kind].called if kind else "a TOML file"
+        raise ConfigError(f"{source} is {called}, not a source of trials. {_OF_TOML.get(kind, '')}".rstrip())
     if source.lower().endswith((".csv", ".tsv", ".txt", ".arff")) or Path(source).is_file():
         return "CSV"
     if ":" in source:
@@ -179,7 +179,7 @@ def labelled_trials(
     if source.value is not None and source.kind != "CSV" and not source.source.startswith(STORE):
         raise ConfigError(f"{source.source} has no numbers to predict: they are in a CSV file or in a store")
     if source.kind == "simulated":
-        found = simulated(
+        trials = simulated(
             settings(),
             groups=groups_of(source),
             seed=seed,
@@ -188,17 +188,17 @@ def labelled_trials(
             checkpoints_s=source.checkpoints_s,
         )
     elif source.kind == "CSV":
-        found = _csv(source)
+        trials = _csv(source)
     elif source.source.startswith(STORE) and (changed or source.value is not None or source.checkpoints_s):
         from graspsense.store.dataset import labelled_store
 
         folder = source.source.removeprefix(STORE)
-        found = labelled_store(
+        trials = labelled_store(
             folder, changed, value=source.value, checkpoints_s=source.checkpoints_s, progress=progress
         )
     else:
-        found = _data_set(source, features())
-    return found.of_class(source.only) if source.only else found
+        trials = _data_set(source, features())
+    return trials.of_class(source.only) if source.only else trials
 
 
 def groups_of(source: TrialSource) -> tuple[Group, ...]:
@@ -228,7 +228,7 @@ def _csv(source: TrialSource) -> Labelled:
         instance=source.instance,
         order=source.order,
         features=source.columns,
-        before=source.before,
+        known_before=source.known_before,
         value=source.value,
     )
 
@@ -244,11 +244,11 @@ def _data_set(source: TrialSource, features: FeatureSet[Any]) -> Labelled:
         from graspsense.sources.labelled_recordings import labelled_recordings
 
         return labelled_recordings(name, folder, features, source.checkpoints_s)
-    found = dataset.load()(
+    trials = dataset.load()(
         folder, with_checkpoints(features, source.checkpoints_s), unreliable=source.unreliable
     )
-    if not isinstance(found, Labelled):
+    if not isinstance(trials, Labelled):
         raise PluginUnavailable(
-            f"data set {name!r} cannot be used here: its reader gave {type(found).__name__}, not Labelled"
+            f"data set {name!r} cannot be used here: its reader gave {type(trials).__name__}, not Labelled"
         )
-    return found
+    return trials

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Sequence
+from contextlib import closing, suppress
 from itertools import pairwise
 from math import inf, isfinite, isnan, nan
 from statistics import fmean, median
@@ -40,7 +41,7 @@ from graspsense.core.values.signals import (
     Samples,
 )
 from graspsense.testing import component, fingers, protection, recorded
-from graspsense.testing.checks import CheckFailed, CheckSkipped, checks_of, demand
+from graspsense.testing.checks import CheckFailed, CheckSkipped, checks_of, demand, raises_nothing
 from graspsense.testing.gentle import EFFORT_N, FORCE_N, GentleController, kind_of
 from graspsense.testing.model_gripper import CHANNELS_OF_FIELD
 from graspsense.testing.session import TIMEOUT_S, limits_of, readings_of, sums_of
@@ -115,7 +116,7 @@ def frames_are_numbers(subject: Subject) -> None:
         )
         for side in (pads.left, pads.right):
             demand(
-                isinstance(side, tuple) and len(side) == cells and all(type(one) is float for one in side),
+                isinstance(side, tuple) and len(side) == cells and all(type(cell) is float for cell in side),
                 f"an image of a fingertip has the cells {side!r:.80}: give a tuple of {cells} floats, as many as the "
                 "channel 'pads' declares (NaN for a cell without a value)",
             )
@@ -139,7 +140,7 @@ def _cells(subject: Subject) -> int:
 def channels_are_those_declared(subject: Subject) -> None:
     """A declared channel has numbers; a channel that is not declared is always NaN."""
     session = subject.session
-    declared = {one.name for one in subject.entry.channels}
+    declared = {channel.name for channel in subject.entry.channels}
     recording = session.info.opening is None
     for name, channel in CHANNELS_OF_FIELD.items():
         values = [getattr(frame, name) for frame in session.frames]
@@ -173,10 +174,10 @@ def signals_are_those_declared(subject: Subject) -> None:
     nothing = no_signals(channels)
     names = ", ".join(getattr(nothing, "_fields", ())) or "none"
     for reading in session.readings:
-        found = getattr(reading.signals, "_fields", ())
+        fields = getattr(reading.signals, "_fields", ())
         demand(
-            found == getattr(nothing, "_fields", ()),
-            f"the further channels declared are {names}, and read delivers {', '.join(found) or 'none'}: fill "
+            fields == getattr(nothing, "_fields", ()),
+            f"the further channels declared are {names}, and read delivers {', '.join(fields) or 'none'}: fill "
             "signal_type(self.channels) with a value for each, in this order",
         )
         for channel, empty, value in zip(channels, nothing, reading.signals, strict=True):
@@ -200,7 +201,7 @@ def signals_are_those_declared(subject: Subject) -> None:
             numbers = [number for value in values for row in value.values[: value.new] for number in row]
         else:
             numbers = values
-        wrong = next((one for one in numbers if type(one) is not float or _infinite(one)), None)
+        wrong = next((number for number in numbers if type(number) is not float or _infinite(number)), None)
         demand(wrong is None, f"{channel.name!r} has the value {wrong!r}: give finite floats, or NaN")
         demand(
             not all(map(isnan, numbers)),
@@ -226,11 +227,11 @@ def images_stay_as_they_were_delivered(subject: Subject) -> None:
     if all(declared_dtype(channel) == FLOATS for channel in further(subject.entry.channels)):
         raise CheckSkipped("this gripper has no images that are numpy arrays")
     problem, session = Delivered(subject.entry.channels).problem, subject.session
-    for reading, before in zip(session.readings, session.sums, strict=True):
-        found = problem(reading)
-        demand(not found, f"a reading is not as declared: {found}")
+    for reading, sums in zip(session.readings, session.sums, strict=True):
+        fault = problem(reading)
+        demand(not fault, f"a reading is not as declared: {fault}")
         demand(
-            sums_of(reading) == before,
+            sums_of(reading) == sums,
             "an image was changed after it was delivered, and laws and recordings refer to it: fill a new array for "
             "each image",
         )
@@ -239,19 +240,19 @@ def images_stay_as_they_were_delivered(subject: Subject) -> None:
 def signals_have_no_gaps_or_repeats(subject: Subject) -> None:
     """Images and samples of further channels are counted: each once, and what is lost shows in the counter."""
     channels = further(subject.entry.channels)
-    counted = [one for one in channels if isinstance(one, TactileArray | FastChannel)]
+    counted = [channel for channel in channels if isinstance(channel, TactileArray | FastChannel)]
     if not counted:
         raise CheckSkipped("this gripper has no further arrays or fast channels")
     for channel in counted:
         values = [getattr(reading.signals, channel.name) for reading in subject.session.readings]
         taken = last_s = 0.0
-        for before, now in pairwise(values):
-            came = now.counter - before.counter
+        for earlier, now in pairwise(values):
+            came = now.counter - earlier.counter
+            taken += came
             if isinstance(now, Samples):
-                taken += came
                 demand(
                     0 <= now.new <= channel.samples and came >= now.new,  # type: ignore[union-attr]
-                    f"{channel.name!r} has {now.new} new samples while its counter goes from {before.counter} to "
+                    f"{channel.name!r} has {now.new} new samples while its counter goes from {earlier.counter} to "
                     f"{now.counter}: count every sample that the sensor has taken, also those that were lost",
                 )
                 demand(
@@ -259,15 +260,14 @@ def signals_have_no_gaps_or_repeats(subject: Subject) -> None:
                     f"{channel.name!r} has numbers behind its {now.new} new samples: they repeat old ones; give NaN",
                 )
             else:
-                taken += came
                 demand(
-                    came >= 0 and (came > 0 or _is_same(now, before)),
+                    came >= 0 and (came > 0 or _is_same(now, earlier)),
                     f"an image of {channel.name!r} changes while its counter stays at {now.counter}: count up",
                 )
             if came:
                 demand(
-                    now.t_s > before.t_s or before.counter == 0,
-                    f"{channel.name!r} goes from {before.t_s} to {now.t_s} s: what is new is later",
+                    now.t_s > earlier.t_s or earlier.counter == 0,
+                    f"{channel.name!r} goes from {earlier.t_s} to {now.t_s} s: what is new is later",
                 )
                 last_s = now.t_s
         first_s = next((value.t_s for value in values if value.counter), 0.0)
@@ -279,34 +279,32 @@ def signals_have_no_gaps_or_repeats(subject: Subject) -> None:
             )
 
 
-def _is_same(now: Image, before: Image) -> bool:
+def _is_same(now: Image, earlier: Image) -> bool:
     if dtype_of(now) == FLOATS:
-        return repr(now) == repr(before)
-    return now[:2] == before[:2] and np.array_equal(now.cells, before.cells, equal_nan=True)
+        return repr(now) == repr(earlier)
+    return now[:2] == earlier[:2] and np.array_equal(now.cells, earlier.cells, equal_nan=True)
 
 
 def channels_follow_from_the_settings(subject: Subject) -> None:
     """The declared channels follow from the settings alone, and opening the gripper does not change them."""
     if not subject.component.channels_vary():
         return
-    backend, again = subject.create(), subject.create()
-    before = backend.channels
-    demand(
-        isinstance(before, tuple) and all(isinstance(channel, Channel) for channel in before),
-        f"`channels` returns {before!r:.80}: return a tuple of Channel",
-    )
-    try:
+    again = subject.create()
+    with closing(subject.create()) as backend:
+        declared = backend.channels
+        demand(
+            isinstance(declared, tuple) and all(isinstance(channel, Channel) for channel in declared),
+            f"`channels` returns {declared!r:.80}: return a tuple of Channel",
+        )
         backend.open(0)
         for other, when in (
             (again.channels, "with the same settings"),
             (backend.channels, "once it is open"),
         ):
             demand(
-                other == before,
-                f"`channels` are {_named(before)}, and {_named(other)} {when}: make them depend on self.config only",
+                other == declared,
+                f"`channels` are {_named(declared)}, and {_named(other)} {when}: make them depend on self.config only",
             )
-    finally:
-        backend.close()
 
 
 def _named(channels: Sequence[Channel]) -> str:
@@ -321,11 +319,11 @@ def time_runs_forward(subject: Subject) -> None:
     """`t_s` increases from frame to frame, and `dt_s` is the difference."""
     session = subject.session
     demand(all(isfinite(frame.t_s) for frame in session.frames), "t_s of a frame is not a number")
-    for before, now in pairwise(session.frames):
-        passed = now.t_s - before.t_s
+    for earlier, now in pairwise(session.frames):
+        passed = now.t_s - earlier.t_s
         demand(
             passed > 0.0,
-            f"t_s goes from {before.t_s} to {now.t_s} s: a frame is given once, and each is later than the last",
+            f"t_s goes from {earlier.t_s} to {now.t_s} s: a frame is given once, and each is later than the last",
         )
         demand(
             abs(now.dt_s - passed) <= 0.5 * passed + 1e-9,
@@ -336,7 +334,7 @@ def time_runs_forward(subject: Subject) -> None:
 def rate_is_as_declared(subject: Subject) -> None:
     """Frames come at `rate_hz`, and no channel is declared with a higher rate."""
     info, frames = subject.session.info, subject.session.frames
-    passed = [now.t_s - before.t_s for before, now in pairwise(frames)]
+    passed = [now.t_s - earlier.t_s for earlier, now in pairwise(frames)]
     demand(bool(passed), "only one frame came")
     rate = 1.0 / median(passed)
     if info.units.get("t", "s") == "s":
@@ -349,8 +347,7 @@ def rate_is_as_declared(subject: Subject) -> None:
         demand(
             channel.rate_hz <= most * info.rate_hz * (1.0 + FORGIVEN),
             f"channel {channel.name!r} is declared at {channel.rate_hz:g} Hz, the gripper gives "
-            f"{info.rate_hz:g} frames "
-            "a second: declare the rate at which its value is new",
+            f"{info.rate_hz:g} frames a second: declare the rate at which its value is new",
         )
 
 
@@ -358,10 +355,11 @@ def images_count_up(subject: Subject) -> None:
     """The counter increases with each new image, by more where some were lost; no image is later than its frame."""
     if not subject.session.images:
         raise CheckSkipped("this gripper has no cells")
-    for before, now in pairwise(subject.session.images):
+    for earlier, now in pairwise(subject.session.images):
         demand(
-            now.counter > before.counter and now.t_s > before.t_s,
-            f"after image {before.counter} of {before.t_s} s comes image {now.counter} of {now.t_s} s: count up by one",
+            now.counter > earlier.counter and now.t_s > earlier.t_s,
+            f"after image {earlier.counter} of {earlier.t_s} s comes image {now.counter} of {now.t_s} s: "
+            "count up by one",
         )
     shown: dict[int, Pads] = {}
     for frame, pads, _ in subject.session.readings:
@@ -405,11 +403,11 @@ def forces_are_in_newtons(subject: Subject) -> None:
 
 def velocity_is_the_rate_of_the_gap(subject: Subject) -> None:
     """The sum of `velocity_m_s` over time is the change of the gap; closing is negative."""
-    closing = [one.frame for one in subject.session.stages.get("closing", [])]
-    if not closing or isnan(closing[0].velocity_m_s) or isnan(closing[0].gap_m):
+    frames = [reading.frame for reading in subject.session.stages.get("closing", [])]
+    if not frames or isnan(frames[0].velocity_m_s) or isnan(frames[0].gap_m):
         raise CheckSkipped("this gripper has no velocity and gap of its own, or is a recording")
-    moved = closing[-1].gap_m - closing[0].gap_m
-    summed = sum(frame.velocity_m_s * frame.dt_s for frame in closing[1:])
+    moved = frames[-1].gap_m - frames[0].gap_m
+    summed = sum(frame.velocity_m_s * frame.dt_s for frame in frames[1:])
     if max(abs(moved), abs(summed)) < 2e-3:
         raise CheckSkipped(f"the gap moved by {abs(moved) * 1e3:.2g} mm only")
     demand(
@@ -424,16 +422,16 @@ def closing_closes(subject: Subject) -> None:
     stages = subject.session.stages
     if "closing" not in stages:
         raise CheckSkipped("a recording cannot be commanded")
-    closing = [one.frame.gap_m for one in stages["closing"]]
-    if all(map(isnan, closing)):
+    gaps = [reading.frame.gap_m for reading in stages["closing"]]
+    if all(map(isnan, gaps)):
         raise CheckSkipped("this gripper has no gap")
     kind = KINDS[kind_of(subject.entry.accepts)]
     demand(
-        closing[0] - closing[-1] > 1e-3,
-        f"under a closing {kind} command the gap goes from {closing[0]:.4g} to {closing[-1]:.4g} m: an "
+        gaps[0] - gaps[-1] > 1e-3,
+        f"under a closing {kind} command the gap goes from {gaps[0]:.4g} to {gaps[-1]:.4g} m: an "
         "effort or force above 0, a velocity below 0 and a smaller position close the fingers",
     )
-    opened = [one.frame.gap_m for one in stages["open again"]]
+    opened = [reading.frame.gap_m for reading in stages["open again"]]
     demand(
         max(opened) - opened[0] > 1e-3,
         f"under the opening command {subject.session.info.opening} the gap goes from {opened[0] * 1e3:.4g} to "
@@ -450,13 +448,14 @@ def stays_within_its_limits(subject: Subject) -> None:
 
 
 def _stays_within_its_limits(subject: Subject, kind: int) -> None:
-    backend = subject.create()
-    least = {"effort_n": backend.least_force_n, "velocity_m_s": backend.least_speed_m_s}
-    try:
+    with closing(subject.create()) as backend:
+        least = {"effort_n": backend.least_force_n, "velocity_m_s": backend.least_speed_m_s}
         info = backend.open(0)
-        first = limits_of(info)
+        first_limits = limits_of(info)
         # The limits of a first use apply after a contact too.
-        limits = first._replace(effort_limit_n=first.first_effort_n, speed_limit_m_s=first.first_speed_m_s)
+        limits = first_limits._replace(
+            effort_limit_n=first_limits.first_effort_n, speed_limit_m_s=first_limits.first_speed_m_s
+        )
         watcher = GuardState(0, 0, 0)
         greatest = {VELOCITY: -1e6, POSITION: 0.0, FORCE: 1e6, EFFORT: 1e6}[kind]
         command = Command(kind, greatest, inf, inf)
@@ -469,16 +468,14 @@ def _stays_within_its_limits(subject: Subject, kind: int) -> None:
                 ("effort_n", limits.first_effort_n, 1.1),
                 ("velocity_m_s", limits.first_speed_m_s, 3.0),
             ):
-                found = abs(getattr(frame, name))
+                reached = abs(getattr(frame, name))
                 demand(
-                    not found > grace * max(limit, least[name]),
-                    f"{name} reaches {found:.3g} under {KINDS[kind]} commands limited to {limit:g}: apply "
+                    not reached > grace * max(limit, least[name]),
+                    f"{name} reaches {reached:.3g} under {KINDS[kind]} commands limited to {limit:g}: apply "
                     "`effort_limit_n` and `speed_limit_m_s` of each command",
                 )
             allowed, watcher = guard(limits, watcher, frame, command)
             backend.apply(allowed)
-    finally:
-        backend.close()
 
 
 def says_what_commands_become(subject: Subject) -> None:
@@ -500,9 +497,8 @@ def says_what_commands_become(subject: Subject) -> None:
 
 def accepts_every_declared_kind(subject: Subject) -> None:
     """Each kind in `accepts` can be applied, and frames continue to come."""
-    backend = subject.create()
     demand(bool(subject.entry.accepts), "`accepts` is empty: a gripper takes at least one kind of command")
-    try:
+    with closing(subject.create()) as backend:
         info = backend.open(0)
         for name in subject.entry.accepts:
             kind = KINDS.index(name)
@@ -513,21 +509,14 @@ def accepts_every_declared_kind(subject: Subject) -> None:
                 FORCE: FORCE_N,
             }[kind]
             backend.read(TIMEOUT_S)
-            try:
+            advice = f" on a {name} command, which `accepts` says it takes: take it, or take {name!r} out of `accepts`"
+            with raises_nothing("apply", advice):
                 backend.apply(Command(kind, value, min(EFFORT_N, info.effort_limit_n), 0.01))
-            except Exception as error:
-                raise CheckFailed(
-                    f"apply raised {named(error)} on a {name} command, which `accepts` "
-                    "says it takes: take it, or take "
-                    f"{name!r} out of `accepts`"
-                ) from error
             demand(
                 any(backend.read(TIMEOUT_S) is not None for _ in range(10)),
                 f"after a {name} command no frame came",
             )
         backend.apply(info.relaxed)
-    finally:
-        backend.close()
 
 
 def read_returns_within_its_timeout(subject: Subject) -> None:
@@ -547,17 +536,13 @@ def pads_can_be_zeroed(subject: Subject) -> None:
     info, declared = subject.session.info, {channel.name for channel in subject.entry.channels}
     if not info.tare_images or not declared & {"force_left", "force_right"}:
         raise CheckSkipped("this gripper is not tared")
-    backend = subject.create()
-    try:
+    with closing(subject.create()) as backend:
         info = backend.open(0)
-        try:
+        with (
+            raises_nothing("a tare without images", ": raise TareRefused with what to do"),
+            suppress(TareRefused),
+        ):
             backend.tare([])
-        except TareRefused:
-            pass
-        except Exception as error:
-            raise CheckFailed(
-                f"a tare without images raised {named(error)}: raise TareRefused with what to do"
-            ) from error
         images: list[Pads] = []
         for _ in range(int(5.0 * info.rate_hz)):
             reading = backend.read(TIMEOUT_S)
@@ -581,12 +566,9 @@ def pads_can_be_zeroed(subject: Subject) -> None:
         known = [force for force in forces if not isnan(force)]
         demand(
             bool(known) and abs(fmean(known)) < 0.6,
-            f"after the tare the unloaded pads feel {fmean(known or [nan]):.3g} N: subtract the zero, "
-            "then divide by the "
-            "counts of a newton",
+            f"after the tare the unloaded pads feel {fmean(known or [nan]):.3g} N: subtract the zero, then divide by "
+            "the counts of a newton",
         )
-    finally:
-        backend.close()
 
 
 def closes_in_any_state(subject: Subject) -> None:
@@ -625,18 +607,13 @@ def same_seed_same_frames(subject: Subject) -> None:
         raise CheckSkipped("a device clock: measurements are never the same twice")
     texts = []
     for _ in range(2):
-        backend = subject.create()
-        try:
+        readings: list[str] = []
+        with closing(subject.create()) as backend, suppress(RecordingEnded):
             info = backend.open(3)
-            readings: list[str] = []
             for _ in range(100):
                 readings.append(repr(backend.read(TIMEOUT_S)))
                 backend.apply(info.opening or info.relaxed)
-            texts.append(readings)
-        except RecordingEnded:
-            texts.append(readings)
-        finally:
-            backend.close()
+        texts.append(readings)
     demand(
         texts[0] == texts[1],
         "two openings with one seed give other frames: draw everything from the seed that `open` is given",
@@ -647,24 +624,17 @@ def expect_accepts_any_controller(subject: Subject) -> None:
     """`expect` accepts any controller before `open`, and `expect_features` any set; both raise and open nothing."""
     controller, run = GentleController(kind_of(subject.entry.accepts)), RunConfig()
     feature_set = create("feature-set", "chitta")
-    backend = subject.create(**(subject.absent or {}))
-    try:
+    advice = ": store the arguments, open nothing, and raise in `open` instead"
+    with (
+        closing(subject.create(**(subject.absent or {}))) as backend,
+        raises_nothing("expect or expect_features", advice),
+    ):
         backend.expect(controller, run)
         backend.expect_features(feature_set)
-    except Exception as error:
-        raise CheckFailed(
-            f"expect or expect_features raised {named(error)}: store the arguments, open nothing, and raise in `open` "
-            "instead"
-        ) from error
-    finally:
-        backend.close()
-    backend = subject.create()
-    try:
+    with closing(subject.create()) as backend:
         backend.expect(controller, run)
         backend.expect_features(feature_set)
         backend.open(0)
-    finally:
-        backend.close()
 
 
 def objects_can_be_grasped(subject: Subject) -> None:
@@ -688,16 +658,11 @@ def objects_can_be_grasped(subject: Subject) -> None:
     demand(not twice, f"objects() gives {', '.join(sorted(twice))} twice: give each full name once")
     for kind in kinds:
         name = kind.full_names[0]
-        try:
-            backend = subject.create().with_object(name)
-            try:
-                simulated = backend.open(0).simulated
-            finally:
-                backend.close()
-        except Exception as error:
-            raise CheckFailed(
-                f"with_object({name!r}) cannot be opened: {named(error)}. objects() gives that name"
-            ) from error
+        with (
+            raises_nothing(f"the opening of with_object({name!r})", ", although objects() gives that name"),
+            closing(subject.create().with_object(name)) as backend,
+        ):
+            simulated = backend.open(0).simulated
         demand(
             simulated,
             f"objects() gives {name!r}, but the opened gripper is not simulated: give DeviceInfo(simulated=True, ...), "
@@ -747,20 +712,13 @@ def performs_a_whole_grasp(subject: Subject) -> None:
 
 def reports_plain_values(subject: Subject) -> None:
     """`report` returns numbers, text and booleans that JSON represents, while it is open and after it was closed."""
-    backend = subject.create()
-    try:
+    with closing(subject.create()) as backend:
         backend.open(0)
         reports = [backend.report()]
-    finally:
-        backend.close()
     reports.append(backend.report())
     for report in reports:
-        try:
+        with raises_nothing(f"JSON, given the report {report!r},", ": numbers, text and booleans only"):
             json.dumps(dict(report))
-        except (TypeError, ValueError) as error:
-            raise CheckFailed(
-                f"report gave {report!r}: numbers, text and booleans only ({named(error)})"
-            ) from error
 
 
 def dry_run_accepts_the_same_commands(subject: Subject) -> None:
@@ -772,15 +730,13 @@ def dry_run_accepts_the_same_commands(subject: Subject) -> None:
         isinstance(other, SensorBackend),
         f"dry_run_backend returned {other!r}: return a SensorBackend or None",
     )
-    try:
+    with closing(other):
         info = other.open(0)
         demand(
             info.opening is None or KINDS[info.opening.kind] in subject.entry.accepts,
             f"the gripper of a dry run opens with {info.opening}, of a kind that the real one does not accept",
         )
         _first_frame(other)
-    finally:
-        other.close()
 
 
 def reports_a_lost_device(subject: Subject) -> None:
@@ -789,12 +745,9 @@ def reports_a_lost_device(subject: Subject) -> None:
         raise CheckSkipped(
             "no settings were given under which it vanishes (--unplugged, or `unplugged` in a test)"
         )
-    backend = subject.create(**subject.unplugged)
-    try:
+    with closing(subject.create(**subject.unplugged)) as backend:
         info = backend.open(0)
         text = _lost(backend, info.relaxed, info.rate_hz)
-    finally:
-        backend.close()
     demand(len(text) > 10, f"DeviceLost says {text!r}: say which gripper, and what to look at")
     grasp = run_uninterrupted(
         subject.create(**subject.unplugged), GentleController(kind_of(subject.entry.accepts)), RunConfig()
@@ -808,21 +761,17 @@ def reports_a_lost_device(subject: Subject) -> None:
 def _lost(backend: SensorBackend[Any], relaxed: Command, rate_hz: float) -> str:
     until = time.perf_counter() + 3.0 * VANISHING_S + GRACE_S
     for _ in range(int(4.0 * VANISHING_S * rate_hz) + 50):
-        try:
-            backend.read(TIMEOUT_S)
-            backend.apply(relaxed)
-        except DeviceLost as lost:
-            return str(lost)
-        except Exception as error:
-            raise CheckFailed(
-                f"unplugged, it raised {named(error)}: turn what the driver raises into DeviceLost"
-            ) from error
+        with raises_nothing("unplugged, it", ": turn what the driver raises into DeviceLost"):
+            try:
+                backend.read(TIMEOUT_S)
+                backend.apply(relaxed)
+            except DeviceLost as lost:
+                return str(lost)
         if time.perf_counter() > until:
             break
     raise CheckFailed(
-        f"unplugged, it never raised DeviceLost within {VANISHING_S:g} s of its clock: raise it where "
-        "read or apply finds "
-        "the gripper gone"
+        f"unplugged, it never raised DeviceLost within {VANISHING_S:g} s of its clock: raise it where read or apply "
+        "finds the gripper gone"
     )
 
 
@@ -832,20 +781,16 @@ def reports_a_missing_device(subject: Subject) -> None:
         raise CheckSkipped(
             "no settings were given under which it is not there (--absent, or `absent` in a test)"
         )
-    backend = subject.create(**subject.absent)
     began = time.perf_counter()
-    try:
-        backend.open(0)
-    except NoDevice as error:
-        text = str(error)
-    except Exception as error:
-        raise CheckFailed(
-            f"not there, open raised {named(error)}: raise NoDevice with what to try"
-        ) from error
-    else:
-        raise CheckFailed("open succeeded where no gripper is: raise NoDevice if nothing answers")
-    finally:
-        backend.close()
+    with (
+        closing(subject.create(**subject.absent)) as backend,
+        raises_nothing("not there, open", ": raise NoDevice with what to try"),
+    ):
+        try:
+            backend.open(0)
+            raise CheckFailed("open succeeded where no gripper is: raise NoDevice if nothing answers")
+        except NoDevice as error:
+            text = str(error)
     took = time.perf_counter() - began
     demand(took < 10.0, f"it took {took:.1f} s to say so: `open` is bounded in time")
     demand(len(text) > 20, f"NoDevice says {text!r}: say what was searched for, where, and what to try")

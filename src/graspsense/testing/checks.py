@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any, Final, Literal, Protocol
 
 from attrs import define, field, frozen
@@ -81,6 +82,17 @@ def demand(holds: bool, text: str) -> None:
         raise CheckFailed(text)
 
 
+@contextmanager
+def raises_nothing(what: str, advice: str) -> Iterator[None]:
+    """Raise CheckFailed for what is raised in this context: `what` raised it, and the advice."""
+    try:
+        yield
+    except CheckFailed:
+        raise
+    except Exception as error:
+        raise CheckFailed(f"{what} raised {named(error)}{advice}") from error
+
+
 def outcome_of(check: Check, subject: Named, expected: Mapping[str, str]) -> Result:
     """Run one check; `expected` maps the ids of checks that are known to fail to the reasons.
 
@@ -126,16 +138,16 @@ class ConformanceReport:
     @property
     def failures(self) -> list[str]:
         """Return the reasons why the components do not conform."""
-        found = [
+        failures = [
             f"{result.subject}: {result.check}: {result.text}"
             for result in self.results
             if result.state == "failed"
         ]
         for subject, role in dict.fromkeys((result.subject, result.role) for result in self.results):
             text = self.too_few_ran(subject, role)
-            if text and not any(one.startswith(f"{subject}: ") for one in found):
-                found.append(f"{subject}: {text}")
-        return found
+            if text and not any(failure.startswith(f"{subject}: ") for failure in failures):
+                failures.append(f"{subject}: {text}")
+        return failures
 
     def too_few_ran(self, subject: str, role: str) -> str:
         """Return a message if too few checks of a component ran, else an empty string."""

@@ -5,16 +5,17 @@ from __future__ import annotations
 import json
 import math
 import random
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from contextlib import suppress
 from typing import Any, Final
 
 import numpy as np
 from attrs import evolve
 
-from graspsense.core.values.errors import DataDamaged, named
+from graspsense.core.values.errors import DataDamaged
 from graspsense.core.values.features import FeatureTable, Prediction
 from graspsense.testing import component
-from graspsense.testing.checks import CheckFailed, checks_of, demand
+from graspsense.testing.checks import CheckFailed, checks_of, demand, raises_nothing
 from graspsense.testing.damage import damaged_at, paths
 from graspsense.testing.samples import sample_table
 from graspsense.testing.subject import Subject
@@ -24,19 +25,16 @@ LEAST_RIGHT: Final = 0.9
 MOST_PLACES: Final = 40
 """Number of values of a model that are changed, chosen at random."""
 DAMAGES_EACH: Final = 4
+REFUSALS: Final = (KeyError, TypeError, ValueError, DataDamaged)
+"""What `from_json` raises for values that are no model."""
 
 
 def _fitted(subject: Subject, table: FeatureTable, labels: Sequence[str]) -> Any:
-    one = subject.create()
-    try:
-        one.fit(table, labels, SEED)
-    except Exception as error:
-        raise CheckFailed(
-            f"fit raised {named(error)} on {len(labels)} trials of {len(set(labels))} labels: learn "
-            "from them; a NaN in "
-            "the table is missing"
-        ) from error
-    return one
+    classifier = subject.create()
+    trials = f" on {len(labels)} trials of {len(set(labels))} labels"
+    with raises_nothing("fit", f"{trials}: learn from them; a NaN in the table is missing"):
+        classifier.fit(table, labels, SEED)
+    return classifier
 
 
 def _learned(subject: Subject) -> tuple[Any, FeatureTable, list[str]]:
@@ -46,14 +44,9 @@ def _learned(subject: Subject) -> tuple[Any, FeatureTable, list[str]]:
 
 def _json(fitted: Any) -> Any:
     model = fitted.to_json()
-    try:
+    advice = ": give lists, dicts, text, numbers, true, false, None; a NaN as None"
+    with raises_nothing("to_json gives what JSON cannot hold: it", advice):
         return json.loads(json.dumps(model, allow_nan=False))
-    except (TypeError, ValueError) as error:
-        raise CheckFailed(
-            f"to_json gives what JSON cannot hold ({named(error)}): lists, dicts, text, numbers, "
-            "true, false, None; a NaN "
-            "as None"
-        ) from error
 
 
 def _again(subject: Subject, fitted: Any) -> Any:
@@ -79,18 +72,18 @@ def classes_are_the_labels(subject: Subject) -> None:
 def probabilities_are_valid(subject: Subject) -> None:
     """`probabilities` has a row for each trial and a column for each class, from 0 to 1; each row sums to 1."""
     fitted, table, _ = _learned(subject)
-    found = fitted.probabilities(table)
+    given = fitted.probabilities(table)
     wanted = (len(table), len(fitted.classes()))
     demand(
-        isinstance(found, np.ndarray) and found.shape == wanted and found.dtype == np.float64,
-        f"probabilities gives {getattr(found, 'dtype', type(found).__name__)} of shape {getattr(found, 'shape', '-')}: "
+        isinstance(given, np.ndarray) and given.shape == wanted and given.dtype == np.float64,
+        f"probabilities gives {getattr(given, 'dtype', type(given).__name__)} of shape {getattr(given, 'shape', '-')}: "
         f"float64 of shape {wanted}",
     )
     demand(
-        bool(np.isfinite(found).all() and (found >= 0.0).all() and (found <= 1.0 + 1e-9).all()),
-        f"probabilities go from {np.min(found):g} to {np.max(found):g}: from 0 to 1",
+        bool(np.isfinite(given).all() and (given >= 0.0).all() and (given <= 1.0 + 1e-9).all()),
+        f"probabilities go from {np.min(given):g} to {np.max(given):g}: from 0 to 1",
     )
-    worst = float(np.max(np.abs(found.sum(axis=1) - 1.0)))
+    worst = float(np.max(np.abs(given.sum(axis=1) - 1.0)))
     demand(worst <= 1e-6, f"a row of probabilities misses 1 by {worst:.2g}: divide each row by its sum")
 
 
@@ -108,10 +101,11 @@ def separates_separable_trials(subject: Subject) -> None:
 
 def same_seed_same_model(subject: Subject) -> None:
     """The same trials and seed give the same model, bit for bit."""
-    one, table, _ = _learned(subject)
-    two, _, _ = _learned(subject)
+    fitted, table, _ = _learned(subject)
+    again, _, _ = _learned(subject)
     demand(
-        _json(one) == _json(two) and bool((one.probabilities(table) == two.probabilities(table)).all()),
+        _json(fitted) == _json(again)
+        and bool((fitted.probabilities(table) == again.probabilities(table)).all()),
         "two models of one seed differ: draw everything from the seed that fit is given",
     )
 
@@ -152,10 +146,10 @@ def handles_missing_values(subject: Subject) -> None:
         fitted = _fitted(subject, evolve(table, values=values), labels)
         nothing = evolve(table, values=np.full((1, len(table.names)), math.nan))
         for asked in (table, nothing):
-            found = fitted.probabilities(asked)
+            given = fitted.probabilities(asked)
             demand(
-                bool(np.isfinite(found).all()) and bool(np.allclose(found.sum(axis=1), 1.0, atol=1e-6)),
-                f"with {what} in training it gives {found[0]} for a trial with missing values: fill or skip them",
+                bool(np.isfinite(given).all()) and bool(np.allclose(given.sum(axis=1), 1.0, atol=1e-6)),
+                f"with {what} in training it gives {given[0]} for a trial with missing values: fill or skip them",
             )
         fitted.explain(nothing.row(0))
 
@@ -163,18 +157,19 @@ def handles_missing_values(subject: Subject) -> None:
 def one_label_is_refused_or_certain(subject: Subject) -> None:
     """With one training label, `fit` raises ValueError, or that label has probability 1."""
     table, labels = sample_table()
-    one = subject.create()
-    try:
-        one.fit(table, ["can:full"] * len(labels), SEED)
-    except ValueError as error:
-        demand(bool(str(error)), "fit on one label raised ValueError without a message: say what is lacking")
-        return
-    except Exception as error:
-        raise CheckFailed(f"fit on one label raised {named(error)}: raise ValueError, or learn it") from error
-    found = one.probabilities(table)
+    classifier = subject.create()
+    with raises_nothing("fit on one label", ": raise ValueError, or learn it"):
+        try:
+            classifier.fit(table, ["can:full"] * len(labels), SEED)
+        except ValueError as error:
+            demand(
+                bool(str(error)), "fit on one label raised ValueError without a message: say what is lacking"
+            )
+            return
+    given = classifier.probabilities(table)
     demand(
-        one.classes() == ("can:full",) and bool((found == 1.0).all()),
-        f"trained on one label it gives {one.classes()} with {found[0]}",
+        classifier.classes() == ("can:full",) and bool((given == 1.0).all()),
+        f"trained on one label it gives {classifier.classes()} with {given[0]}",
     )
 
 
@@ -188,26 +183,20 @@ def few_trials_are_refused_or_learned(subject: Subject) -> None:
         ("two trials of each label", [0, 1, 2, 3, 4, 5]),
     ):
         few = table.rows(np.array(rows))
-        one = subject.create()
-        try:
-            one.fit(few, [labels[i] for i in rows], SEED)
-        except ValueError as error:
-            demand(
-                bool(str(error)), f"fit on {what} raised ValueError without a message: say what is lacking"
-            )
-            continue
-        except Exception as error:
-            raise CheckFailed(
-                f"fit on {what} raised {named(error)}: raise ValueError, or learn from them"
-            ) from error
-        try:
-            probabilities = one.probabilities(table)
-        except Exception as error:
-            raise CheckFailed(
-                f"trained on {what}, probabilities raised {named(error)}: raise ValueError in fit, or answer"
-            ) from error
+        classifier = subject.create()
+        with raises_nothing(f"fit on {what}", ": raise ValueError, or learn from them"):
+            try:
+                classifier.fit(few, [labels[i] for i in rows], SEED)
+            except ValueError as error:
+                demand(
+                    bool(str(error)),
+                    f"fit on {what} raised ValueError without a message: say what is lacking",
+                )
+                continue
+        with raises_nothing(f"trained on {what}, probabilities", ": raise ValueError in fit, or answer"):
+            probabilities = classifier.probabilities(table)
         demand(
-            probabilities.shape == (len(table), len(one.classes()))
+            probabilities.shape == (len(table), len(classifier.classes()))
             and bool(np.isfinite(probabilities).all())
             and bool(np.allclose(probabilities.sum(axis=1), 1.0, atol=1e-6)),
             f"trained on {what}, it gives the probabilities {probabilities[0]}: finite numbers, each row summing "
@@ -233,8 +222,7 @@ def explains_its_predictions(subject: Subject) -> None:
             demand(
                 type(share) is float and abs(share - shares.get(label, math.nan)) <= 1e-9,
                 f"explain gives {label!r} the probability {share!r} of type {type(share).__name__}; "
-                "probabilities gives "
-                f"{shares.get(label)}: write float(...)",
+                f"probabilities gives {shares.get(label)}: write float(...)",
             )
         demand(
             len(said.because) > 0 and all(reason.words for reason in said.because),
@@ -245,11 +233,11 @@ def explains_its_predictions(subject: Subject) -> None:
 def does_not_change_the_table(subject: Subject) -> None:
     """Neither fit nor probabilities changes the table."""
     table, labels = sample_table(missing=True)
-    before = table.values.copy()
+    original = table.values.copy()
     fitted = _fitted(subject, table, labels)
     fitted.probabilities(table)
     demand(
-        bool(np.array_equal(before, table.values, equal_nan=True)),
+        bool(np.array_equal(original, table.values, equal_nan=True)),
         "fit or probabilities changed the table: work on a copy (`table.values.copy()`)",
     )
 
@@ -258,21 +246,16 @@ def refuses_an_invalid_model(subject: Subject) -> None:
     """`from_json` raises KeyError, TypeError, ValueError or DataDamaged for values that are not its model."""
     good = _json(_learned(subject)[0])
     demand(isinstance(good, dict) and bool(good), f"to_json gives {good!r:.80}: a dict")
-    bad: list[Mapping[str, Any]] = [{}, {"nonsense": 1}]
-    bad += [{key: one for key, one in good.items() if key != lacking} for lacking in _vital(subject, good)]
-    for model in bad:
-        try:
-            subject.create().from_json(model)
-        except (KeyError, TypeError, ValueError, DataDamaged):
-            continue
-        except Exception as error:
-            raise CheckFailed(
-                f"from_json raised {named(error)} on a model with the keys "
-                f"{', '.join(model) or 'none'}: raise ValueError"
-            ) from error
+    largest = max(good, key=lambda key: len(json.dumps(good[key])))
+    for model in ({}, {"nonsense": 1}, {key: value for key, value in good.items() if key != largest}):
+        what = f"a model with the keys {', '.join(model) or 'none'}"
+        with raises_nothing("from_json", f" on {what}: raise ValueError"):
+            try:
+                subject.create().from_json(model)
+            except REFUSALS:
+                continue
         raise CheckFailed(
-            f"from_json takes a model with the keys {', '.join(model) or 'none'}: look at what is given, and raise "
-            "ValueError if it is no model"
+            f"from_json takes {what}: look at what is given, and raise ValueError if it is no model"
         )
 
 
@@ -285,22 +268,13 @@ def a_damaged_model_raises_a_documented_error(subject: Subject) -> None:
         for damaged in rng.sample(list(damaged_at(good, place)), DAMAGES_EACH):
             if not isinstance(damaged, dict):
                 continue
-            try:
+            advice = (
+                f" on a model that was changed at {'.'.join(map(str, place))}: read it by "
+                "graspsense.plugin_api.StoredValues, which checks types, ranges and sizes before anything is made of "
+                "them"
+            )
+            with raises_nothing("from_json", advice), suppress(*REFUSALS):
                 subject.create().from_json(damaged)
-            except (KeyError, TypeError, ValueError, DataDamaged):
-                continue
-            except Exception as error:
-                raise CheckFailed(
-                    f"from_json raised {named(error)} on a model that was changed at "
-                    f"{'.'.join(map(str, place))}: read it by graspsense.plugin_api.StoredValues, which checks types, "
-                    "ranges and sizes before anything is made of them"
-                ) from error
-
-
-def _vital(subject: Subject, good: Mapping[str, Any]) -> list[str]:
-    """Return the key with the largest content, without which a model is invalid."""
-    del subject
-    return [max(good, key=lambda key: len(json.dumps(good[key])))]
 
 
 CHECKS: Final = (

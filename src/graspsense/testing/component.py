@@ -20,8 +20,7 @@ from graspsense.testing.subject import Subject
 
 ADVICE_ON_IMPORTS: Final = (
     "is the name right? what has to be installed goes into `dependencies` of its pyproject.toml, or, "
-    "where that is not for "
-    "everybody, into `needs` of the entry, in words"
+    "where that is not for everybody, into `needs` of the entry, in words"
 )
 
 
@@ -115,7 +114,7 @@ def defaults_are_what_their_types_say(subject: Subject) -> None:
 def settings_survive_a_file(subject: Subject) -> None:
     """Settings written as TOML and read again are the same settings."""
     config = subject.config()
-    values = {key: one for key, one in plain(config).items() if one is not None}
+    values = {key: value for key, value in plain(config).items() if value is not None}
     text = "\n".join(f"{toml_key(key)} = {toml_value(value)}" for key, value in values.items())
     again = build(subject.component, tomllib.loads(text))
     demand(
@@ -164,8 +163,7 @@ def making_one_does_nothing(subject: Subject) -> None:
     demand(
         not seen,
         f"the constructor of {subject.component.entry.target} does {', '.join(dict.fromkeys(seen))}: keep the "
-        "config only, and do "
-        "that where it is first needed (a gripper in `open`)",
+        "config only, and do that where it is first needed (a gripper in `open`)",
     )
 
 
@@ -188,9 +186,9 @@ class _Watched:
         if not _Watched._hooked:
             sys.addaudithook(_Watched._heard)
             _Watched._hooked = True
-        found: list[str] = []
-        _Watched._seen = found
-        return found
+        touched: list[str] = []
+        _Watched._seen = touched
+        return touched
 
     def __exit__(self, *_: object) -> None:
         _Watched._seen = None

@@ -104,9 +104,9 @@ class Examined:
         return self._results[key]
 
     def _run(self, subject: Subject | Package, check: Check) -> Result:
-        first = CHECKS[subject.role][0]
-        if check is not first and self.result(subject, first).state == "failed":
-            why = f"no other check can run before {first.id} passes"
+        basic = CHECKS[subject.role][0]
+        if check is not basic and self.result(subject, basic).state == "failed":
+            why = f"no other check can run before {basic.id} passes"
             return Result(subject.name, subject.role, check.id, check.title, "skipped", why)
         return outcome_of(check, subject, self.expected)
 
@@ -150,7 +150,9 @@ def examine(
     """
     plugins = installed() if plugins is None else plugins
     whole = package_of(name, plugins, builds=wheel, data=data)
-    components = [one for one in plugins.components() if name in (one.name, one.qualified)]
+    components = [
+        component for component in plugins.components() if name in (component.name, component.qualified)
+    ]
     if whole is None and not components:
         raise plugins.unknown(name)
     expected = dict(expected_failures or {})
@@ -171,7 +173,7 @@ def examine(
         return Subject(component=component, keys=mine, unplugged=unplugged, absent=absent)
 
     subjects: list[Subject | Package] = [] if whole is None else [whole]
-    subjects += [under(one) for one in (components if whole is None else whole.components)]
+    subjects += [under(part) for part in (components if whole is None else whole.components)]
     return Examined(tuple(subjects), expected)
 
 

@@ -17,7 +17,6 @@ from graspsense.core.control.free_motion import FreeMotion, free_motion_of
 from graspsense.core.grasp.protection.effort_ceiling import MARGIN
 from graspsense.core.grasp.runner import run_uninterrupted
 from graspsense.core.values.channel import Channel
-from graspsense.core.values.errors import named
 from graspsense.core.values.signals import (
     APPROACH,
     EFFORT,
@@ -35,7 +34,7 @@ from graspsense.core.values.signals import (
     no_pads,
 )
 from graspsense.testing import component
-from graspsense.testing.checks import CheckFailed, checks_of, demand
+from graspsense.testing.checks import checks_of, demand, raises_nothing
 from graspsense.testing.model_gripper import CELLS, CHANNELS_OF_FIELD, OBJECTS, model_gripper
 from graspsense.testing.subject import Subject
 
@@ -48,7 +47,7 @@ FORCES: Final = slice(5, 9)
 class Tick(NamedTuple):
     """One tick of a law: its arguments and its result."""
 
-    before: Any
+    state: Any
     reading: Reading
     command: Command
     after: Any
@@ -68,11 +67,11 @@ def ticks_of(subject: Subject, object_name: str = "a soft object") -> list[Tick]
 
 
 def fresh_ticks(
-    subject: Subject, object_name: str = "a soft object", channels: Any = None, first: int = 0
+    subject: Subject, object_name: str = "a soft object", channels: Any = None, from_tick: int = 0
 ) -> list[Tick]:
     """Return the same ticks as `ticks_of`, computed again.
 
-    Before tick `first`, if given, the state is rebuilt from plain numbers.
+    Before tick `from_tick`, if given, the state is rebuilt from plain numbers.
     """
     law = subject.create()
     step, params, state = type(law).step, law.params(), law.init()
@@ -81,17 +80,15 @@ def fresh_ticks(
     gripper.tare([])
     ticks: list[Tick] = []
     for k in range(TICKS):
-        if first and k == first:
+        if from_tick and k == from_tick:
             state, params = _made_again(state), _made_again(params)
         reading = gripper.read(0.1)
-        frame = reading.frame
-        try:
+        advice = (
+            f" at t = {reading.frame.t_s:.3f} s with {object_name} between the fingers: a law answers every frame with "
+            "a command and a state; a channel that the gripper lacks is NaN"
+        )
+        with raises_nothing("step", advice):
             command, after = step(params, state, reading)
-        except Exception as error:
-            raise CheckFailed(
-                f"step raised {named(error)} at t = {frame.t_s:.3f} s with {object_name} between the fingers: a law "
-                "answers every frame with a command and a state; a channel that the gripper lacks is NaN"
-            ) from error
         ticks.append(Tick(state, reading, command, after))
         state = after
         if getattr(after, "outcome", RUNNING) != RUNNING:
@@ -104,16 +101,12 @@ def _all_channels(subject: Subject) -> set[str | Channel]:
     return {*CHANNELS_OF_FIELD.values(), "pads", *further(subject.entry.requires)}
 
 
-def _required(subject: Subject) -> set[Channel]:
-    return set(subject.entry.requires)
-
-
 def _made_again(value: Any) -> Any:
     """Return the same named tuples after their numbers were written as JSON and read."""
     if isinstance(value, tuple) and hasattr(value, "_fields"):
-        return type(value)(*(_made_again(one) for one in value))
+        return type(value)(*(_made_again(inner) for inner in value))
     if isinstance(value, tuple):
-        return tuple(_made_again(one) for one in value)
+        return tuple(_made_again(inner) for inner in value)
     if isinstance(value, np.ndarray):
         return read_only(value.copy(), str(value.dtype))
     return json.loads(json.dumps(value))
@@ -123,9 +116,9 @@ def _leaves(value: Any, path: str, annotated: Any = None) -> Iterator[tuple[str,
     if isinstance(value, tuple):
         names = getattr(value, "_fields", None)
         hints = get_type_hints(type(value)) if names else {}
-        for i, one in enumerate(value):
+        for i, inner in enumerate(value):
             name = names[i] if names else str(i)
-            yield from _leaves(one, f"{path}.{name}", hints.get(name))
+            yield from _leaves(inner, f"{path}.{name}", hints.get(name))
     else:
         yield path, value, annotated
 
@@ -135,24 +128,23 @@ def _demand_numbers(value: Any, what: str) -> None:
         isinstance(value, tuple) and hasattr(value, "_fields"),
         f"{what} is {value!r} of type {type(value).__name__}: make it a typing.NamedTuple of numbers",
     )
-    for path, one, annotated in _leaves(value, what):
-        if what == "state" and isinstance(one, np.ndarray):
+    for path, leaf, annotated in _leaves(value, what):
+        if what == "state" and isinstance(leaf, np.ndarray):
             demand(
-                not can_change(one),
+                not can_change(leaf),
                 f"{path} is an array that can be changed: hold the cells of an image as they come, or a read-only copy",
             )
             continue
         demand(
-            type(one) in (float, int),
-            f"{path} is {one!r} of type {type(one).__name__}: hold plain floats and ints only (write float(...), or 0 "
-            "and 1 for a truth), and in a state the cells of an image",
+            type(leaf) in (float, int),
+            f"{path} is {leaf!r} of type {type(leaf).__name__}: hold plain floats and ints only (write float(...), or "
+            "0 and 1 for a truth), and in a state the cells of an image",
         )
         demand(
-            annotated not in (float, int) or type(one) is annotated,
-            f"{path} is annotated {getattr(annotated, '__name__', annotated)} and is {one!r}, of type "
-            f"{type(one).__name__}: write {getattr(annotated, '__name__', 'float')}(...). A compiler "
-            "takes another type "
-            "for another law",
+            annotated not in (float, int) or type(leaf) is annotated,
+            f"{path} is annotated {getattr(annotated, '__name__', annotated)} and is {leaf!r}, of type "
+            f"{type(leaf).__name__}: write {getattr(annotated, '__name__', 'float')}(...). A compiler "
+            "takes another type for another law",
         )
 
 
@@ -163,8 +155,7 @@ def step_is_a_plain_function(subject: Subject) -> None:
     demand(
         isinstance(raw, staticmethod),
         f"step of {cls.__name__} is not a static method: write a module function `step(params, state, "
-        "reading)` and in "
-        "the class `step = staticmethod(step)`",
+        "reading)` and in the class `step = staticmethod(step)`",
     )
     demand(
         len(inspect.signature(cls.step).parameters) == 3,
@@ -186,10 +177,10 @@ def starts_in_the_approach(subject: Subject) -> None:
     """The first state has phase APPROACH and outcome RUNNING."""
     state = subject.create().init()
     for name, wanted, word in (("phase", APPROACH, "APPROACH"), ("outcome", RUNNING, "RUNNING")):
-        found = getattr(state, name, None)
+        given = getattr(state, name, None)
         demand(
-            found == wanted,
-            f"{name} of the first state is {found!r}: give the state a field `{name}: int` that begins as {word}",
+            given == wanted,
+            f"{name} of the first state is {given!r}: give the state a field `{name}: int` that begins as {word}",
         )
 
 
@@ -197,18 +188,17 @@ def types_do_not_change(subject: Subject) -> None:
     """No number of the state changes its type, and every state has the class of the first one."""
     for tick in ticks_of(subject):
         demand(
-            type(tick.after) is type(tick.before),
+            type(tick.after) is type(tick.state),
             f"after t = {tick.frame.t_s:.3f} s the state is {type(tick.after).__name__} instead of "
-            f"{type(tick.before).__name__}: return the same named tuple",
+            f"{type(tick.state).__name__}: return the same named tuple",
         )
         for (path, a, _), (_, b, _) in zip(
-            _leaves(tick.before, "state"), _leaves(tick.after, "state"), strict=True
+            _leaves(tick.state, "state"), _leaves(tick.after, "state"), strict=True
         ):
             demand(
                 type(a) is type(b) and getattr(a, "dtype", "") == getattr(b, "dtype", ""),
                 f"{path} goes from {a!r} ({type(a).__name__}) to {b!r} ({type(b).__name__}) at t = "
-                f"{tick.frame.t_s:.3f} "
-                "s: keep one type throughout",
+                f"{tick.frame.t_s:.3f} s: keep one type throughout",
             )
 
 
@@ -226,10 +216,10 @@ def commands_are_numbers(subject: Subject) -> None:
             "VELOCITY, POSITION, FORCE of plugin_api",
         )
         for name in ("value", "effort_limit_n", "speed_limit_m_s"):
-            found = getattr(command, name)
+            number = getattr(command, name)
             demand(
-                type(found) is float,
-                f"{name} of a command is {found!r} of type {type(found).__name__}: write a float",
+                type(number) is float,
+                f"{name} of a command is {number!r} of type {type(number).__name__}: write a float",
             )
 
 
@@ -242,8 +232,7 @@ def commands_are_of_declared_kinds(subject: Subject) -> None:
             demand(
                 name in subject.entry.commands,
                 f"it commands {name} at t = {tick.frame.t_s:.3f} s with {object_name} between the fingers; "
-                "its entry declares "
-                f"{', '.join(subject.entry.commands) or 'none'}: add it to `commands`",
+                f"its entry declares {', '.join(subject.entry.commands) or 'none'}: add it to `commands`",
             )
 
 
@@ -272,7 +261,7 @@ def same_tick_same_command(subject: Subject) -> None:
     ticks, law = ticks_of(subject), subject.create()
     step, params = type(law).step, law.params()
     for tick in reversed(ticks[::7]):
-        command, after = step(params, tick.before, tick.reading)
+        command, after = step(params, tick.state, tick.reading)
         demand(
             repr((command, after)) == repr((tick.command, tick.after)),
             f"repeated for t = {tick.frame.t_s:.3f} s, step gives {command} instead of {tick.command}: it may know "
@@ -283,7 +272,7 @@ def same_tick_same_command(subject: Subject) -> None:
 def state_holds_everything(subject: Subject) -> None:
     """Continued from a state and params that were written and read again, it gives the same commands."""
     whole = ticks_of(subject)
-    resumed = fresh_ticks(subject, first=max(len(whole) // 2, 1))
+    resumed = fresh_ticks(subject, from_tick=max(len(whole) // 2, 1))
     demand(
         [repr(tick.command) for tick in whole] == [repr(tick.command) for tick in resumed],
         "going on from a state that was written down it commands something else: keep everything in the state, as "
@@ -293,22 +282,23 @@ def state_holds_everything(subject: Subject) -> None:
 
 def grasps_are_independent(subject: Subject) -> None:
     """Two alternating grasps give the same commands as each alone: no state is shared."""
-    first = ticks_of(subject)
+    alone = ticks_of(subject)
     fresh_ticks(subject, "nothing")
     again = fresh_ticks(subject)
     demand(
-        [repr(tick.command) for tick in first] == [repr(tick.command) for tick in again],
+        [repr(tick.command) for tick in alone] == [repr(tick.command) for tick in again],
         "a second grasp differs from the first: keep no state in the class or the module",
     )
 
 
 def requires_what_it_reads(subject: Subject) -> None:
     """The channels in `requires` suffice: without the others, the commands are the same."""
-    full, own = ticks_of(subject), fresh_ticks(subject, channels=_required(subject))
+    required = set(subject.entry.requires)
+    full, own = ticks_of(subject), fresh_ticks(subject, channels=required)
     demand(
-        [repr(one.command) for one in full] == [repr(one.command) for one in own],
+        [repr(tick.command) for tick in full] == [repr(tick.command) for tick in own],
         "on a gripper that has only the channels it declares "
-        f"({', '.join(sorted(channel.name for channel in _required(subject))) or 'none'}) it commands something else: "
+        f"({', '.join(sorted(channel.name for channel in required)) or 'none'}) it commands something else: "
         "add what it reads to `requires`",
     )
 
@@ -319,12 +309,8 @@ def handles_frames_of_nan(subject: Subject) -> None:
     step, params, state = type(law).step, law.params(), law.init()
     silent = Frame(0.001, 0.001, *(nan,) * 7, 0)
     reading = Reading(silent, no_pads(CELLS), no_signals(subject.entry.requires))
-    try:
+    with raises_nothing("step", " on a frame of NaN: write comparisons so that NaN gives the safe result"):
         command, _ = step(params, state, reading)
-    except Exception as error:
-        raise CheckFailed(
-            f"step raised {named(error)} on a frame of NaN: write comparisons so that NaN gives the safe result"
-        ) from error
     demand(isinstance(command, Command), f"step returned {command!r} on a frame of NaN")
 
 
@@ -332,7 +318,7 @@ def says_what_it_asks_for(subject: Subject) -> None:
     """`asked_force_n` and `asked_speed_m_s` say the force of the squeeze and the speed that it commands, if any."""
     law = subject.create()
     forces, speeds = [], []
-    for tick in (one for thing in OBJECTS for one in ticks_of(subject, thing)):
+    for tick in (tick for thing in OBJECTS for tick in ticks_of(subject, thing)):
         kind, value, effort_limit_n, speed_limit_m_s = tick.command
         if tick.after.phase in (SQUEEZE, HOLD):
             forces += [effort_limit_n] if kind in (VELOCITY, POSITION) else [value] * (kind == FORCE)
@@ -342,7 +328,7 @@ def says_what_it_asks_for(subject: Subject) -> None:
         ("force", "N", law.asked_force_n(), forces, MARGIN),
         ("speed", "m/s", law.asked_speed_m_s(), speeds, 1.0 + 1e-9),
     ):
-        most = max((one for one in commanded if one < inf), default=0.0)
+        most = max((limit for limit in commanded if limit < inf), default=0.0)
         name = f"asked_{what}_{unit.replace('/', '_').lower()}"
         demand(
             most == 0.0 or asked is not None,
@@ -350,11 +336,13 @@ def says_what_it_asks_for(subject: Subject) -> None:
             "that cannot do as little is refused before it moves",
         )
         # A speed is the least that is asked for, a force the greatest.
-        found = most if what == "force" else min((one for one in commanded if 0.0 < one < inf), default=inf)
-        fits = asked is None or (most <= margin * asked if what == "force" else asked <= margin * found)
+        extreme = (
+            most if what == "force" else min((limit for limit in commanded if 0.0 < limit < inf), default=inf)
+        )
+        fits = asked is None or (most <= margin * asked if what == "force" else asked <= margin * extreme)
         demand(
             most == 0.0 or fits,
-            f"{name} returns {asked} {unit}, and it commands {found:g} {unit}: return the {what} that it commands",
+            f"{name} returns {asked} {unit}, and it commands {extreme:g} {unit}: return the {what} that it commands",
         )
 
 
@@ -398,9 +386,9 @@ def free_motion_is_step(subject: Subject) -> None:
         )
     for object_name in OBJECTS:
         ticks = ticks_of(subject, object_name)
-        first = 0
-        while first < len(ticks):
-            first += max(_free_ticks_that_agree(motion, params, ticks[first:]), 1)
+        begin = 0
+        while begin < len(ticks):
+            begin += max(_free_ticks_that_agree(motion, params, ticks[begin:]), 1)
 
 
 def _free_ticks_that_agree(motion: FreeMotion, params: Any, ticks: Sequence[Tick]) -> int:
@@ -456,8 +444,7 @@ def ends_every_grasp(subject: Subject) -> None:
         demand(
             grasp.outcome not in (Outcome.ABORTED, Outcome.DEVICE_LOST, Outcome.RUNNING),
             f"with {object_name} between the fingers the grasp ended as {grasp.outcome.words}: "
-            f"{grasp.reason}. Let the state's "
-            f"`outcome` leave RUNNING, after {LONGEST_S:g} s at the latest",
+            f"{grasp.reason}. Let the state's `outcome` leave RUNNING, after {LONGEST_S:g} s at the latest",
         )
 
 

@@ -46,15 +46,15 @@ _DEEP: Final = 500
 Path = tuple[str | int, ...]
 
 
-def paths(value: Any, at: Path = ()) -> Iterator[Path]:
+def paths(value: Any, path: Path = ()) -> Iterator[Path]:
     """Return the path of this value and of those within it; of a list, those of the first two items and the last."""
-    yield at
+    yield path
     if isinstance(value, dict):
         for key, inner in value.items():
-            yield from paths(inner, (*at, key))
+            yield from paths(inner, (*path, key))
     elif isinstance(value, list):
         for i in sorted({0, 1, len(value) - 1} & set(range(len(value)))):
-            yield from paths(value[i], (*at, i))
+            yield from paths(value[i], (*path, i))
 
 
 def damaged_at(document: Any, path: Path) -> Iterator[Any]:
@@ -62,10 +62,10 @@ def damaged_at(document: Any, path: Path) -> Iterator[Any]:
 
     NaN and infinite numbers, which strict JSON does not have, are among them.
     """
-    found = document
+    value = document
     for step in path:
-        found = found[step]
-    for other in _others(found):
+        value = value[step]
+    for other in _others(value):
         yield _replaced(document, path, other)
 
 

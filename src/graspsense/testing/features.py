@@ -10,12 +10,11 @@ import numpy as np
 from attrs import evolve
 
 from graspsense.core.components.compiled_features import columns_of_ticks, compiled_extraction
-from graspsense.core.values.errors import named
 from graspsense.core.values.features import Features
 from graspsense.core.values.signals import Phase
 from graspsense.core.values.trace import Trace
 from graspsense.testing import component
-from graspsense.testing.checks import CheckFailed, checks_of, demand
+from graspsense.testing.checks import checks_of, demand, raises_nothing
 from graspsense.testing.samples import (
     COLUMNS_OF_CHANNEL,
     an_event,
@@ -32,14 +31,10 @@ from graspsense.testing.subject import Subject
 CUTS: Final = 48
 
 
-def _features(subject: Subject, trace: Trace, of: str = "a whole grasp") -> Features:
-    try:
+def _features(subject: Subject, trace: Trace, which: str = "a whole grasp") -> Features:
+    advice = f" on {which}: return NaN with a reason in `reasons` where a feature is not defined"
+    with raises_nothing("extract", advice):
         features: Features = subject.create().extract(trace)
-    except Exception as error:
-        raise CheckFailed(
-            f"extract raised {named(error)} on {of}: return NaN with a reason in `reasons` where a "
-            "feature is not defined"
-        ) from error
     demand(
         isinstance(features, Features),
         f"extract returned {features!r}: return graspsense.plugin_api.Features",
@@ -55,7 +50,7 @@ def _whole(subject: Subject, stiffness_n_m: float = 4000.0) -> Trace:
 
 def _unusual(subject: Subject) -> dict[str, Trace]:
     """Return the unusual traces of a gripper that has the further channels in `requires`, by their description."""
-    return {of: with_signals(trace, subject.entry.requires) for of, trace in unusual_traces().items()}
+    return {which: with_signals(trace, subject.entry.requires) for which, trace in unusual_traces().items()}
 
 
 def _all(subject: Subject) -> dict[str, Trace]:
@@ -68,22 +63,19 @@ def _own(subject: Subject) -> Trace:
 
 
 def _same(a: Features, b: Features) -> bool:
-    return repr(a.as_dict()) == repr(b.as_dict()) and (a.names, a.units, a.reasons) == (
-        b.names,
-        b.units,
-        b.reasons,
-    )
+    same = (a.names, a.units, a.reasons) == (b.names, b.units, b.reasons)
+    return same and repr(a.as_dict()) == repr(b.as_dict())
 
 
 def returns_the_declared_features(subject: Subject) -> None:
     """Names and units are those of the declared features, in their order, for every trace."""
     declared = tuple((feature.name, feature.unit) for feature in subject.entry.features)
-    for of, trace in _all(subject).items():
-        features = _features(subject, trace, of)
+    for which, trace in _all(subject).items():
+        features = _features(subject, trace, which)
         given = tuple(zip(features.names, features.units, strict=True))
         demand(
             given == declared,
-            f"on {of} it gives {_listed(given)}; `features` declares {_listed(declared)}: make `features` "
+            f"on {which} it gives {_listed(given)}; `features` declares {_listed(declared)}: make `features` "
             "and what extract returns the same",
         )
 
@@ -94,12 +86,12 @@ def _listed(features: tuple[tuple[str, str], ...]) -> str:
 
 def values_are_floats(subject: Subject) -> None:
     """Every value is a Python float, not an int or a scalar of numpy."""
-    for of, trace in _all(subject).items():
-        features = _features(subject, trace, of)
+    for which, trace in _all(subject).items():
+        features = _features(subject, trace, which)
         for name, value in zip(features.names, features.values, strict=True):
             demand(
                 type(value) is float,
-                f"feature {name!r} is {value!r} of type {type(value).__name__} on {of}: write float(...)",
+                f"feature {name!r} is {value!r} of type {type(value).__name__} on {which}: write float(...)",
             )
 
 
@@ -115,8 +107,8 @@ def a_whole_grasp_has_features(subject: Subject) -> None:
 
 def handles_every_trace(subject: Subject) -> None:
     """Any trace (empty, short, without contact, without a channel, with gaps) gives values, or NaN with a reason."""
-    for of, trace in _unusual(subject).items():
-        _features(subject, trace, of)
+    for which, trace in _unusual(subject).items():
+        _features(subject, trace, which)
 
 
 def handles_a_trace_that_ends_anywhere(subject: Subject) -> None:
@@ -130,12 +122,12 @@ def handles_a_trace_that_ends_anywhere(subject: Subject) -> None:
 def same_trace_same_features(subject: Subject) -> None:
     """The same trace gives the same features with the same and with another instance."""
     set_, trace = subject.create(), _whole(subject)
-    first = set_.extract(trace)
+    features = set_.extract(trace)
     set_.extract(_whole(subject, stiffness_n_m=500.0))
     for again in (set_.extract(trace), subject.create().extract(trace)):
         demand(
-            _same(first, again),
-            f"called again it gives {again.as_dict()}, not {first.as_dict()}: keep no state between calls and draw "
+            _same(features, again),
+            f"called again it gives {again.as_dict()}, not {features.as_dict()}: keep no state between calls and draw "
             "nothing at random",
         )
 
@@ -143,9 +135,9 @@ def same_trace_same_features(subject: Subject) -> None:
 def does_not_change_the_trace(subject: Subject) -> None:
     """`extract` does not change the trace."""
     trace = copied(_whole(subject))
-    before = {name: array.tobytes() for name, array in arrays_of(trace).items()}
+    contents = {name: array.tobytes() for name, array in arrays_of(trace).items()}
     _features(subject, trace)
-    changed = [name for name, array in arrays_of(trace).items() if array.tobytes() != before[name]]
+    changed = [name for name, array in arrays_of(trace).items() if array.tobytes() != contents[name]]
     demand(
         not changed,
         f"extract changed {', '.join(changed)} of the trace: work on a copy "
@@ -167,7 +159,7 @@ def requires_what_it_reads(subject: Subject) -> None:
 
 def independent_of_the_start_of_the_clock(subject: Subject) -> None:
     """A shift of all times changes no feature beyond rounding."""
-    early, late = (_features(subject, one) for one in (_whole(subject), shifted(_whole(subject), 64.0)))
+    early, late = (_features(subject, trace) for trace in (_whole(subject), shifted(_whole(subject), 64.0)))
     for name, a, b in zip(early.names, early.values, late.values, strict=True):
         demand(
             (a != a and b != b) or abs(a - b) <= 1e-6 * max(1.0, abs(a)),
@@ -188,10 +180,10 @@ def views_and_copies_agree(subject: Subject) -> None:
 
 def survives_json(subject: Subject) -> None:
     """The features survive being written as JSON and read again."""
-    for of, trace in _all(subject).items():
-        features = _features(subject, trace, of)
+    for which, trace in _all(subject).items():
+        features = _features(subject, trace, which)
         again = json.loads(json.dumps(features.as_dict(), allow_nan=False))
-        demand(again == features.as_dict(), f"on {of} {features.as_dict()} became {again} through JSON")
+        demand(again == features.as_dict(), f"on {which} {features.as_dict()} became {again} through JSON")
         text = json.loads(json.dumps(dict(features.reasons)))
         demand(text == dict(features.reasons), f"the reasons {features.reasons!r} are not plain text")
 
@@ -206,21 +198,19 @@ def compiled_features_are_those_of_extract(subject: Subject) -> None:
         inspect.isfunction(form.measure) and form.measure.__closure__ is None,
         f"{form.measure!r} in `compiled` is not a module function: write one, which numba can compile",
     )
-    for of, trace in _all(subject).items():
+    for which, trace in _all(subject).items():
         extracted = set_.extract(trace)
-        try:
+        advice = f" on {which}: return the same tuple of floats for every grasp"
+        with raises_nothing("`compiled`", advice):
             measured = form.measure(form.params, columns_of_ticks(trace))
             numbers = map(float, measured)
             named_tuple = getattr(measured, "_make", tuple)
             features: Features = form.result(named_tuple(numbers))
-        except Exception as error:
-            raise CheckFailed(
-                f"`compiled` raised {named(error)} on {of}: return the same tuple of floats for every grasp"
-            ) from error
         demand(
             _same(features, extracted),
-            f"on {of} `compiled` gives {features.as_dict()} with the reasons {dict(features.reasons)}, and `extract` "
-            f"gives {extracted.as_dict()} with {dict(extracted.reasons)}: make `compiled` measure what `extract` does",
+            f"on {which} `compiled` gives {features.as_dict()} with the reasons {dict(features.reasons)}, "
+            f"and `extract` gives {extracted.as_dict()} with {dict(extracted.reasons)}: make "
+            "`compiled` measure what `extract` does",
         )
 
 
@@ -230,14 +220,14 @@ def reads_no_release_unless_it_says_so(subject: Subject) -> None:
     form = compiled_extraction(set_.extract)
     if form is None or form.reads_release:
         return
-    for of, trace in _all(subject).items():
+    for which, trace in _all(subject).items():
         released = np.flatnonzero(trace.phase == Phase.RELEASE)
         if not len(released) or not (trace.phase == Phase.HOLD).any():
             continue
         whole, held = set_.extract(trace), set_.extract(trace.until(float(trace.t_s[released[0]])))
         demand(
             _same(whole, held),
-            f"on {of} it gives {whole.as_dict()} with the reasons {dict(whole.reasons)}, and without the release "
+            f"on {which} it gives {whole.as_dict()} with the reasons {dict(whole.reasons)}, and without the release "
             f"{held.as_dict()} with {dict(held.reasons)}: remove `reads_release=False` of `compiled`, or read no tick "
             "of the release",
         )

@@ -32,7 +32,7 @@ def fingers_are_those_declared(subject: Subject) -> None:
             )
             demand(
                 same,
-                f"force_{side}_n is {given:g} where the fingers bear {', '.join(f'{one:g}' for one in each)} N, which "
-                f"are {follows:g} N by touch={fingers[0].touch!r}: fill the frame with "
+                f"force_{side}_n is {given:g} where the fingers bear {', '.join(f'{force:g}' for force in each)} N, "
+                f"which are {follows:g} N by touch={fingers[0].touch!r}: fill the frame with "
                 "opposed_forces(self.channels)(forces)",
             )

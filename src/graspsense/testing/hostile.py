@@ -93,34 +93,15 @@ class HostileController(Controller[int]):
         return HostileState(APPROACH, RUNNING, 0)
 
 
-class NotANumber(HostileController):
-    """Commands nothing, then NaN."""
-
-    step = staticmethod(not_a_number)
-
-
-class Huge(HostileController):
-    """Closes with all its force, and calls it an approach."""
-
-    step = staticmethod(huge)
-
-
-class Oscillating(HostileController):
-    """Closes and opens with all its force, and calls it a squeeze."""
-
-    step = staticmethod(oscillating)
-
-
-class NeverEnding(HostileController):
-    """Closes with all its force, and calls it a hold."""
-
-    step = staticmethod(never_ending)
+def _obeying(law: Law) -> type[HostileController]:
+    """Return a controller with this law."""
+    return type("Hostile", (HostileController,), {"step": staticmethod(law)})
 
 
 HOSTILE: Final[Mapping[str, Callable[[int], Controller[Any]]]] = {
-    "NaN": NotANumber,
-    "1e308": Huge,
-    "oscillating": Oscillating,
-    "never ending": NeverEnding,
+    "NaN": _obeying(not_a_number),
+    "1e308": _obeying(huge),
+    "oscillating": _obeying(oscillating),
+    "never ending": _obeying(never_ending),
 }
 """The laws by name; each is called with the number of a kind of command."""

@@ -64,7 +64,11 @@ class ModelGripper(SensorBackend[None]):
         names = {channel.name if isinstance(channel, Channel) else channel for channel in channels}
         self._absent = [field for field, name in CHANNELS_OF_FIELD.items() if name not in names]
         self._has_pads = "pads" in names
-        arrays = [one.cells for one in declared if one.name == "pads" and isinstance(one, TactileArray)]
+        arrays = [
+            channel.cells
+            for channel in declared
+            if channel.name == "pads" and isinstance(channel, TactileArray)
+        ]
         self._cells = arrays[0] if arrays else CELLS
         self._further = tuple(sorted(further(declared), key=lambda channel: channel.name))
         self._signals = no_signals(self._further)

@@ -23,9 +23,9 @@ from graspsense.core.components.config import resolve
 from graspsense.core.components.entries import ConformanceCheckEntry, PipelineEntry
 from graspsense.core.components.registry import SLOW_IMPORT_S, Resource
 from graspsense.core.pipeline.wiring import check as check_wiring
-from graspsense.core.values.errors import GraspsenseError, named
+from graspsense.core.values.errors import GraspsenseError
 from graspsense.testing import reader
-from graspsense.testing.checks import Check, CheckFailed, CheckSkipped, checks_of, demand
+from graspsense.testing.checks import Check, CheckFailed, CheckSkipped, checks_of, demand, raises_nothing
 from graspsense.testing.component import ADVICE_ON_IMPORTS
 from graspsense.testing.old_imports import old_imports
 from graspsense.testing.samples import a_trial, an_event
@@ -33,6 +33,7 @@ from graspsense.testing.subject import Package
 
 OBSERVERS: Final = ("graspsense_run_starting", "graspsense_grasp_event", "graspsense_run_finished")
 PROBE_S: Final = 1.0
+_ADVICE_ON_OBSERVERS: Final = ": an observer that raises is passed over from then on; catch what may go wrong"
 
 
 def plugins_load(package: Package) -> None:
@@ -69,7 +70,7 @@ def plugin_modules_are_light(package: Package) -> None:
         "took = max([s.import_s for s in mine] or [0.0])\n"
         "print(json.dumps({'heavy': sorted(p.HEAVY & set(sys.modules)), 'took': took}))"
     )
-    environ = {**os.environ, "PYTHONPATH": os.pathsep.join(one for one in sys.path if one)}
+    environ = {**os.environ, "PYTHONPATH": os.pathsep.join(place for place in sys.path if place)}
     environ |= {"GRASPSENSE_PLUGINS": package.distribution}
     environ.pop("GRASPSENSE_TRACE_PLUGINS", None)
     ran = subprocess.run(
@@ -80,15 +81,15 @@ def plugin_modules_are_light(package: Package) -> None:
         check=False,
     )
     demand(ran.returncode == 0, f"listing it in a fresh interpreter failed: {ran.stderr.strip()[-300:]}")
-    found = json.loads(ran.stdout.splitlines()[-1])
+    listed = json.loads(ran.stdout.splitlines()[-1])
     demand(
-        not found["heavy"],
-        f"listing it imports {', '.join(found['heavy'])}: in the module of the entry point import "
+        not listed["heavy"],
+        f"listing it imports {', '.join(listed['heavy'])}: in the module of the entry point import "
         "graspsense.plugin_api and its like only; name classes by import strings, and import what is heavy inside them",
     )
     demand(
-        found["took"] <= 5.0 * SLOW_IMPORT_S,
-        f"importing it takes {found['took'] * 1e3:.0f} ms of processor time: do less in the module of the entry point",
+        listed["took"] <= 5.0 * SLOW_IMPORT_S,
+        f"importing it takes {listed['took'] * 1e3:.0f} ms of processor time: do less in the module of the entry point",
     )
 
 
@@ -147,7 +148,7 @@ def observers_change_nothing(package: Package) -> None:
         raise CheckSkipped("it observes nothing")
     trial = a_trial()
     run, event = trial.run, an_event()
-    before = copy.deepcopy((run.settings, run.components, run.labels))
+    given = copy.deepcopy((run.settings, run.components, run.labels))
     column = trial.trace.gap_m.tobytes()
     arguments: dict[str, dict[str, Any]] = {
         OBSERVERS[0]: {"run": run},
@@ -158,24 +159,18 @@ def observers_change_nothing(package: Package) -> None:
         for hook in OBSERVERS:
             if hook not in status.hooks:
                 continue
-            try:
+            with raises_nothing(f"{hook} of {status.entry_point}", _ADVICE_ON_OBSERVERS):
                 results = package.plugins.called(status, hook, **arguments[hook])
-            except Exception as error:
-                raise CheckFailed(
-                    f"{hook} of {status.entry_point} raised {named(error)}: an observer that raises "
-                    "is passed over from "
-                    "then on; catch what may go wrong"
-                ) from error
             demand(not results, f"{hook} returned {results}: an observer returns nothing")
     demand(
-        (run.settings, run.components, run.labels) == before and trial.trace.gap_m.tobytes() == column,
+        (run.settings, run.components, run.labels) == given and trial.trace.gap_m.tobytes() == column,
         "an observer changed its arguments: work on a copy",
     )
 
 
 def probe_returns_in_time(package: Package) -> None:
     """The search for devices ends in time and raises nothing, whatever is connected."""
-    if not any("graspsense_probe_devices" in statuse.hooks for statuse in package.statuses):
+    if not any("graspsense_probe_devices" in status.hooks for status in package.statuses):
         raise CheckSkipped("it looks for no devices")
     began = time.perf_counter()
     probes = [
@@ -225,9 +220,8 @@ def wheel_is_complete(package: Package) -> None:
 
 
 _ADVICE: Final = (
-    "it is in the folder but is not packed; in pyproject.toml, with hatchling, "
-    "[tool.hatch.build.targets.wheel] packages "
-    '= ["src/PACKAGE"] takes every file of it that .gitignore does not leave out'
+    "it is in the folder but is not packed; in pyproject.toml, with hatchling, [tool.hatch.build.targets.wheel] "
+    'packages = ["src/PACKAGE"] takes every file of it that .gitignore does not leave out'
 )
 
 
@@ -256,9 +250,9 @@ def _sources(package: Package) -> Iterator[Path]:
         folders = [folder]
     elif not folders:
         yield from (Path(spec.origin) for spec in specs if spec.origin)
-    for one in folders:
-        for path in sorted(one.rglob("*.py")):
-            inside = path.relative_to(one).parts
+    for place in folders:
+        for path in sorted(place.rglob("*.py")):
+            inside = path.relative_to(place).parts
             if "site-packages" not in inside and not any(part.startswith(".") for part in inside):
                 yield path
 
@@ -294,16 +288,17 @@ def _built(folder: Path, scratch: Path) -> Path:
         str(project.get("build-system", {}).get("build-backend", "")).partition(":")[0].partition(".")[0]
     )
     here = bool(backend) and importlib.util.find_spec(backend) is not None
-    command = [sys.executable, "-P", "-m", "pip", "wheel"]
-    command += [
+    command = [
+        sys.executable,
+        "-P",
+        "-m",
+        "pip",
+        "wheel",
         "--quiet",
         "--no-deps",
         "--disable-pip-version-check",
-        "--wheel-dir",
-        str(scratch),
-        *(["--no-build-isolation"] if here else []),
-        str(folder),
     ]
+    command += ["--wheel-dir", str(scratch), *(["--no-build-isolation"] if here else []), str(folder)]
     ran = subprocess.run(command, capture_output=True, text=True, check=False)
     if "No module named pip" in ran.stderr:
         raise CheckSkipped(

@@ -142,7 +142,9 @@ def hostile_laws_stay_below_the_ceiling(subject: Subject) -> None:
         for command in gripper.commands:
             effort_n = command.value if command.kind in (EFFORT, FORCE) else command.effort_limit_n
             usual = (grasp.device.opening, grasp.device.relaxed)
-            opens = any(one is not None and command[:2] == one[:2] for one in usual)
+            opens = any(
+                usual_command is not None and command[:2] == usual_command[:2] for usual_command in usual
+            )
             demand(
                 opens or effort_n <= ceiling_n,
                 f"a law that commands {name} by {KINDS[kind]} squeezed with {effort_n:g} N, {ceiling_n:g} N is allowed",

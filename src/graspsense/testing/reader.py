@@ -32,14 +32,14 @@ class _Read(NamedTuple):
 def readers_read_the_same_twice(package: Package) -> None:
     """Each reader reads its examples, all of them, and the same again when it reads them once more."""
     for dataset, folder in _examples(package):
-        first, second = _read(dataset, folder), _read(dataset, folder)
+        once, again = _read(dataset, folder), _read(dataset, folder)
         demand(
-            bool(first.recordings) and not first.errors,
-            f"{dataset.name}:{folder} has {len(first.recordings)} readable recordings, and cannot read: "
-            f"{'; '.join(first.errors) or 'nothing'}",
+            bool(once.recordings) and not once.errors,
+            f"{dataset.name}:{folder} has {len(once.recordings)} readable recordings, and cannot read: "
+            f"{'; '.join(once.errors) or 'nothing'}",
         )
         demand(
-            first == second,
+            once == again,
             f"{dataset.name}:{folder} gives other recordings when it is read again: sort the files, and draw nothing "
             "at random",
         )
@@ -61,13 +61,13 @@ def reader_errors_name_file_and_column(package: Package) -> None:
             for text in empty.errors:
                 demand(file.name in text, f"the error of an empty {inside} does not name it: {text}")
             for damaged in _with_a_word(file):
-                found = _read_with(dataset, folder, inside, damaged.content)
+                read = _read_with(dataset, folder, inside, damaged.content)
                 demand(
-                    bool(found.errors) or found == sound,
+                    bool(read.errors) or read == sound,
                     f"a word in column {damaged.number} ({damaged.name}) of {inside} is no error, and the recordings "
                     "are others",
                 )
-                for text in found.errors:
+                for text in read.errors:
                     named = damaged.name in text or re.search(rf"column {damaged.number}\b", text)
                     demand(
                         file.name in text and bool(named),

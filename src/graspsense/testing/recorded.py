@@ -92,19 +92,19 @@ def _replayed(recording: Recording, grasp: Trace) -> Trace:
     return recorder.trace()
 
 
-def _demand_same(before: Trace, now: Trace, where: str) -> None:
+def _demand_same(original: Trace, now: Trace, where: str) -> None:
     """Raise CheckFailed for the first column that is not the same."""
     columns: dict[str, tuple[Any, Any]] = {
-        name: (getattr(before, name), getattr(now, name)) for name in (*TICK_COLUMNS, *PAD_COLUMNS)
+        name: (getattr(original, name), getattr(now, name)) for name in (*TICK_COLUMNS, *PAD_COLUMNS)
     }
-    for name, signal in before.signals.items():
+    for name, signal in original.signals.items():
         columns[name] = _values(signal), _values(now.signals.get(name, np.empty(0)))
-    for name, (delivered, found) in columns.items():
+    for name, (came, kept) in columns.items():
         # Arrays without an image have no size to compare.
         demand(
-            not (delivered.size or found.size)
-            or (delivered.dtype == found.dtype and np.array_equal(delivered, found, equal_nan=True)),
-            f"{name!r} is not in {where} as it was delivered: {_shown(delivered)} came, {_shown(found)} is there",
+            not (came.size or kept.size)
+            or (came.dtype == kept.dtype and np.array_equal(came, kept, equal_nan=True)),
+            f"{name!r} is not in {where} as it was delivered: {_shown(came)} came, {_shown(kept)} is there",
         )
 
 
@@ -117,4 +117,4 @@ def _values(signal: Any) -> NDArray[Any]:
 
 
 def _shown(values: NDArray[Any]) -> str:
-    return f"{' x '.join(map(str, values.shape))} numbers ({', '.join(f'{one:g}' for one in values.flat[:3])}, ...)"
+    return f"{' x '.join(map(str, values.shape))} numbers ({', '.join(f'{value:g}' for value in values.flat[:3])}, ...)"

@@ -73,7 +73,7 @@ def _image(frame: _Frame, counter: int) -> Pads:
     cells = []
     for force in (frame.force_left_n, frame.force_right_n):
         face = 1600.0 * max(force, 0.0) * blob / blob.sum()
-        cells.append((*(0.0,) * FIRST_PAD_CELL, *(float(round(one)) for one in face)))
+        cells.append((*(0.0,) * FIRST_PAD_CELL, *(float(round(count)) for count in face)))
     return Pads(frame.t_s, counter, cells[0], cells[1])
 
 
@@ -140,15 +140,15 @@ def copied(trace: Trace) -> Trace:
 
 def arrays_of(trace: Trace) -> dict[str, NDArray[Any]]:
     """Return the arrays of a trace, and of its further channels, by their names in it."""
-    found = {field.name: getattr(trace, field.name) for field in fields(Trace)}
+    arrays = {field.name: getattr(trace, field.name) for field in fields(Trace)}
     for name, signal in trace.signals.items():
-        found[f"signals[{name!r}]"] = signal
+        arrays[f"signals[{name!r}]"] = signal
         if not isinstance(signal, np.ndarray):
-            found |= {
+            arrays |= {
                 f"signals[{name!r}].{field.name}": getattr(signal, field.name)
                 for field in fields(type(signal))
             }
-    return {name: value for name, value in found.items() if isinstance(value, np.ndarray)}
+    return {name: value for name, value in arrays.items() if isinstance(value, np.ndarray)}
 
 
 def unusual_traces() -> dict[str, Trace]:

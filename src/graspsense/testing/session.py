@@ -43,7 +43,7 @@ class Session:
     @property
     def readings(self) -> list[Reading]:
         """Return all readings, in order."""
-        return [one for stage in self.stages.values() for one in stage]
+        return [reading for stage in self.stages.values() for reading in stage]
 
     @property
     def frames(self) -> list[Frame]:
@@ -53,11 +53,11 @@ class Session:
     @property
     def images(self) -> list[Pads]:
         """Return the cell images, each once, in order."""
-        found: list[Pads] = []
+        images: list[Pads] = []
         for _, pads, _ in self.readings:
-            if pads.counter and (not found or found[-1].counter != pads.counter):
-                found.append(pads)
-        return found
+            if pads.counter and (not images or images[-1].counter != pads.counter):
+                images.append(pads)
+        return images
 
 
 class Gripper(Protocol):
@@ -137,7 +137,7 @@ def _use(
         frame = reading.frame
         asked = command
         if isinstance(asked, int):
-            before = readings[max(len(readings) - 2, 0)].frame
-            asked = closing(asked, frame.t_s - readings[0].frame.t_s, before.gap_m, frame)
+            earlier = readings[max(len(readings) - 2, 0)].frame
+            asked = closing(asked, frame.t_s - readings[0].frame.t_s, earlier.gap_m, frame)
         allowed, watcher = guard(limits, watcher, frame, asked)
         backend.apply(allowed)

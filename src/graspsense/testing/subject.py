@@ -86,7 +86,7 @@ def package_of(
 ) -> Package | None:
     """Return the distribution of this name as it is installed, or None."""
     name = canonical(distribution)
-    statuses = tuple(statuse for statuse in plugins.statuses if statuse.distribution == name)
+    statuses = tuple(status for status in plugins.statuses if status.distribution == name)
     if not statuses:
         return None
     resources: list[Resource[Any]] = [

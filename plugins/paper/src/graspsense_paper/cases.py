@@ -17,7 +17,7 @@ SWEPT: Final = "data.states_per_instance"
 
 def of_protocol(summary: Summary, protocol: Protocol) -> Summary:
     """Return the part of a summary with this protocol; cases that do not vary it are in both."""
-    cases = tuple(case for case in summary.planned.cases if case.at.get(SWEPT, protocol) == protocol)
+    cases = tuple(case for case in summary.planned.cases if case.levels.get(SWEPT, protocol) == protocol)
     kept = {case.name for case in cases}
     return evolve(
         summary,
@@ -35,7 +35,7 @@ def condition_result(
 ) -> ConditionResult | None:
     """Return the condition of a case of an experiment, which may be part of another experiment; None if there is none.
 
-    `settings` holds the swept values of the case, as `ExperimentCase.at`.
+    `settings` holds the swept values of the case, as `ExperimentCase.levels`.
     """
     for condition in summary.conditions:
         if (
@@ -53,5 +53,5 @@ def is_of(
     """Return whether a case belongs to this experiment and has these swept values."""
     wanted = settings or {}
     return (case.part or summary.planned.name) == experiment and all(
-        case.at.get(key) == value for key, value in wanted.items()
+        case.levels.get(key) == value for key, value in wanted.items()
     )

@@ -623,8 +623,8 @@ def curve(summary: Summary) -> list[tuple[float, float, float, float]]:
     for case in summary.planned.cases:
         if not is_of(case, summary, "fig_4"):
             continue
-        effort = float(case.at[FORCE])
-        for row in grasps_of(summary, "fig_4", {FORCE: case.at[FORCE]}):
+        effort = float(case.levels[FORCE])
+        for row in grasps_of(summary, "fig_4", {FORCE: case.levels[FORCE]}):
             if row.left_counts is not None and row.right_counts is not None:
                 points.append((effort, row.true_peak_force_n, row.left_counts, row.right_counts))
     return sorted(points)

@@ -390,7 +390,7 @@ def _courses(summary: Summary) -> list[str]:
             continue
         for grasp in result.grasps:
             row = result.rows[grasp.trial]
-            control = str(case.at.get("variant", ""))
+            control = str(case.levels.get("variant", ""))
             number = "Fig. 5" if control == "force" else "Fig. 6"
             caption = (
                 f"{number}: {control} control on the {grasp.label}, 23 N. Contact {row.contact_s or 0:.2f} s after the "

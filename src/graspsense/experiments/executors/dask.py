@@ -34,7 +34,8 @@ class DaskCluster:
 
     def __init__(self, address: str | None, workers: int) -> None:
         try:
-            dask, self._distributed = _parts()
+            # Imported only here, because the import takes a second.
+            dask, self._distributed = import_module("dask"), import_module("distributed")
         except ImportError as error:
             raise PluginUnavailable(f"{HINT} ({error})") from error
         self._cluster: Any = None
@@ -154,12 +155,12 @@ class DaskCluster:
 
         Raises ExecutorLost if there is no worker for too long.
         """
-        before: set[str] = set()
+        known: set[str] = set()
         while True:
             now = set(self._client.nthreads())
-            if now and now == before:
+            if now and now == known:
                 return
-            before = now
+            known = now
             self._watch()
             time.sleep(SETTLING_S)
 
@@ -168,8 +169,8 @@ class DaskCluster:
         distributed = self._distributed
         while True:
             with suppress(TimeoutError, distributed.TimeoutError):
-                found = distributed.wait(list(futures), timeout=LOOKING_S, return_when="FIRST_COMPLETED")
-                return next(iter(found.done))
+                waited = distributed.wait(list(futures), timeout=LOOKING_S, return_when="FIRST_COMPLETED")
+                return next(iter(waited.done))
             self._watch()
 
     def _watch(self) -> None:
@@ -206,7 +207,9 @@ class DaskCluster:
             ) from error
         there = self._client.run(versions)
         differs = [
-            f"{worker}: {line}" for worker, found in there.items() for line in differences(versions(), found)
+            f"{worker}: {line}"
+            for worker, installed in there.items()
+            for line in differences(versions(), installed)
         ]
         if differs:
             raise ConfigError(
@@ -220,11 +223,6 @@ def _done(task: Task, answer: str | Exception) -> TaskResult:
     if isinstance(answer, Exception):
         return TaskResult.failed(task, f"the worker failed: {named(answer)}")
     return TaskResult.from_text(answer)
-
-
-def _parts() -> tuple[Any, Any]:
-    """Return Dask's modules. They are imported only here, because the import takes a second."""
-    return import_module("dask"), import_module("distributed")
 
 
 _GONE: Final = "the Dask scheduler, or the connection to it, is gone"

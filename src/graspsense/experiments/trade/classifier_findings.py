@@ -65,8 +65,8 @@ def compare_classifiers(part: str, title: str, conditions: Sequence[ConditionRes
         )
         for condition in conditions
     ]
-    classifiers = [one for one in compared if not one.name.startswith(WITHOUT)]
-    reduced = [one for one in compared if one.name.startswith(WITHOUT)]
+    classifiers = [classifier for classifier in compared if not classifier.name.startswith(WITHOUT)]
+    reduced = [classifier for classifier in compared if classifier.name.startswith(WITHOUT)]
     text = _text(base, classifiers, reduced)
     header = (
         "classifier",
@@ -94,7 +94,7 @@ def compare_classifiers(part: str, title: str, conditions: Sequence[ConditionRes
                 id=f"{part}_features",
                 title="The effect of leaving out each feature",
                 header=("features", *header[1:]),
-                rows=tuple(one.cells for one in reduced),
+                rows=tuple(classifier.cells for classifier in reduced),
                 numbers=1,
             )
         )

@@ -8,11 +8,11 @@ from typing import Any, Final
 from attrs import frozen
 
 from graspsense.core.components.strict import structured
+from graspsense.experiments.recognise import classifiers_of
 from graspsense.experiments.task_results import ClassifierResult, RecognitionResult
 from graspsense.experiments.trade.costs import CostSettings
 from graspsense.experiments.trade.trade_task import (
     STRATIFIED,
-    classifiers_of,
     predictions,
     settings_of,
     simulated_result,
@@ -41,15 +41,15 @@ def compare(params: Mapping[str, Any], seed: int) -> RecognitionResult:
     classifiers = classifiers_of(params)
     tables = {name: (learner, data.table) for name, learner in classifiers.items()}
     if settings.without:
-        first = next(iter(classifiers.values()))
+        classifier = next(iter(classifiers.values()))
         for feature in data.table.names:
             others = [name for name in data.table.names if name != feature]
-            tables[f"{WITHOUT}{feature}"] = (first, data.table.columns(others))
+            tables[f"{WITHOUT}{feature}"] = (classifier, data.table.columns(others))
     results = []
     for target in settings.targets:
         folds = stratified_folds(data.labels, target, seed)
         true = target_labels(data.labels, target)
         for name, (learner, table) in tables.items():
             predicted = predictions(learner, table, data.labels, target, folds, seed)
-            results.append(ClassifierResult.of(name, target, STRATIFIED, true, predicted, cost=0.0))
+            results.append(ClassifierResult.from_answers(name, target, STRATIFIED, true, predicted, cost=0.0))
     return simulated_result(data, results)

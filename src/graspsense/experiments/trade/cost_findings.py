@@ -52,7 +52,7 @@ def cost_report(part: str, title: str, conditions: Sequence[ConditionResult], co
             for point in points
         ]
         series[TARGETS[target]] = points
-    text = " ".join(one.text for one in advice)
+    text = " ".join(sentence.text for sentence in advice)
     table = FoundTable(
         id=part,
         title=title,

@@ -13,11 +13,11 @@ from graspsense.core.components.strict import structured
 from graspsense.core.learn.checkpoints import contact_of
 from graspsense.core.values.features import Features, table_of
 from graspsense.core.values.signals import Phase
+from graspsense.experiments.recognise import classifiers_of
 from graspsense.experiments.task_results import ClassifierResult, RecognitionResult
 from graspsense.experiments.trade.costs import CostSettings
 from graspsense.experiments.trade.trade_task import (
     STRATIFIED,
-    classifiers_of,
     predictions,
     settings_of,
     simulated_result,
@@ -79,7 +79,7 @@ def early(params: Mapping[str, Any], seed: int) -> RecognitionResult:
                 predicted = predictions(learner, table_of(features), data.labels, target, folds, seed)
                 cost = float(np.mean(used_s[moment]))
                 results.append(
-                    ClassifierResult.of(
+                    ClassifierResult.from_answers(
                         f"{moment:g} s{suffix}", target, STRATIFIED, true, predicted, cost=cost
                     )
                 )

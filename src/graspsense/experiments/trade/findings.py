@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 from graspsense.experiments.findings import CONTROLS, Findings, FoundTable, control_cells, percent
-from graspsense.experiments.summary import ConditionResult, Summary
+from graspsense.experiments.summary import Summary
 from graspsense.experiments.trade.classifier_findings import compare_classifiers
 from graspsense.experiments.trade.cost_findings import Report, cost_report, damage_table
 from graspsense.experiments.trade.sequential_findings import compare_sequential
@@ -30,7 +30,11 @@ def findings(summary: Summary) -> Findings:
     reports: dict[str, Report] = {}
     for part, case in parts.items():
         title = titles.get(part, summary.planned.experiment.title)
-        conditions = _conditions_of(summary, part)
+        conditions = [
+            condition
+            for condition in summary.conditions
+            if (condition.case.part or summary.planned.name) == part
+        ]
         if not conditions:
             continue
         if case.kind == "compare":
@@ -48,7 +52,7 @@ def findings(summary: Summary) -> Findings:
         table, reasons = damage_table()
         tables.append(table)
         notes += reasons
-    advice = [one for report in reports.values() for one in report.advice]
+    advice = [piece for report in reports.values() for piece in report.advice]
     if len(reports) > 1 and advice:
         tables.insert(0, _advice_table(advice))
     values: dict[str, Any] = {part: {"advice": report.text} for part, report in reports.items()}
@@ -60,12 +64,6 @@ def findings(summary: Summary) -> Findings:
         drawn={part: report.picture for part, report in reports.items() if report.picture},
         values=values,
     )
-
-
-def _conditions_of(summary: Summary, part: str) -> list[ConditionResult]:
-    return [
-        condition for condition in summary.conditions if (condition.case.part or summary.planned.name) == part
-    ]
 
 
 def _controls_table(summary: Summary, titles: Mapping[str, str]) -> FoundTable | None:
@@ -108,15 +106,15 @@ def _answer(reports: dict[str, Report]) -> str:
 def _headline(advice: Sequence[Advice]) -> str:
     """Return the recommendations as a person would say them."""
     parts = [
-        f"to recognise {one.recognises}, "
+        f"to recognise {piece.recognises}, "
         + (
             "it cannot be told which case to take"
-            if one.recommended is None
-            else f"no difference is shown; take the cheapest, {one.recommended.name}"
-            if one.best_is_cheapest or (one.loss is not None and not one.shown)
-            else f"{one.recommended.name} {'is best' if one.recommended is one.best else 'is enough'}"
+            if piece.recommended is None
+            else f"no difference is shown; take the cheapest, {piece.recommended.name}"
+            if piece.best_is_cheapest or (piece.loss is not None and not piece.shown)
+            else f"{piece.recommended.name} {'is best' if piece.recommended is piece.best else 'is enough'}"
         )
-        for one in advice
+        for piece in advice
     ]
     text = "; ".join(parts)
     return text[:1].upper() + text[1:]
@@ -135,7 +133,7 @@ def _advice_table(advice: Sequence[Advice]) -> FoundTable:
             "best",
             "points below the best",
         ),
-        rows=tuple(one.cells for one in advice),
+        rows=tuple(piece.cells for piece in advice),
         note=RULE,
         numbers=4,
     )

@@ -19,11 +19,11 @@ from attrs.validators import ge, le
 from graspsense.core.components.config import settings_from
 from graspsense.core.components.strict import structured
 from graspsense.evaluation.folds import INSTANCE_HELD_OUT, instance_held_out
+from graspsense.experiments.recognise import classifiers_of
 from graspsense.experiments.task_results import ClassifierResult, RecognitionResult
 from graspsense.experiments.trade.costs import CostSettings
 from graspsense.experiments.trade.squeezes import MOST_SQUEEZES
 from graspsense.experiments.trade.trade_task import (
-    classifiers_of,
     simulated_result,
     target_labels,
     trial_groups,
@@ -122,8 +122,8 @@ def decide(
     `contact` holds the predictions from the width alone. Squeezing stops when a label has the probability `sure`, or
     after `most` squeezes. `again_s` is the time to open and close between squeezes.
     """
-    first, known = contact
-    belief = _normalised(known.confusion[:, first.answer[trial]])
+    after_contact, known = contact
+    belief = _normalised(known.confusion[:, after_contact.answer[trial]])
     # The squeezes measure the width as well, so they replace the prediction from the width alone.
     evidence = np.ones(len(belief))
     seconds = 0.0
@@ -163,7 +163,7 @@ def next_squeeze(params: Mapping[str, Any], seed: int) -> RecognitionResult:
     results = []
     for name, rows in decisions.items():
         results.append(
-            ClassifierResult.of(
+            ClassifierResult.from_answers(
                 name,
                 target,
                 INSTANCE_HELD_OUT,
@@ -206,8 +206,8 @@ def _decisions(
     controller = params["settings"]["controller"]
     again_s = OPENED_M / float(controller["closing_speed_m_s"])
     seconds = {force: _squeeze_seconds(table, controller) for force, table in tables.items()}
-    first = next(iter(tables.values()))
-    width = first.columns([width_feature(first.names) or first.names[0]])
+    shortest = next(iter(tables.values()))
+    width = shortest.columns([width_feature(shortest.names) or shortest.names[0]])
     decisions: dict[str, list[tuple[str, Decision]]] = {}
     folds = instance_held_out(learning.true.tolist(), learning.instances, settings.folds, learning.seed)
     for fold in range(int(folds.max()) + 1):

@@ -8,18 +8,15 @@ from typing import Any, Final
 from attrs import field, frozen
 from attrs.validators import ge
 
-from graspsense.core.components.config import SelectedComponent, settings_from
+from graspsense.core.components.config import settings_from
 from graspsense.core.components.strict import structured
-from graspsense.core.learn.labelled import Labelled, Target, class_of
 from graspsense.core.values.errors import ConfigError
-from graspsense.experiments.recognise import TEST_SEED_OFFSET
+from graspsense.experiments.recognise import TEST_SEED_OFFSET, classifiers_of, true_and_predicted
 from graspsense.experiments.task_results import ClassifierResult, RecognitionResult
 from graspsense.experiments.trade.costs import CostSettings
 from graspsense.experiments.trade.trade_task import (
-    classifiers_of,
     settings_of,
     simulated_result,
-    target_labels,
     trial_groups,
 )
 from graspsense.sources.simulated import simulated
@@ -32,13 +29,16 @@ class ModelErrorSettings(CostSettings):
     """The keys of `[judge]`."""
 
     error: float = field(default=0.0, validator=ge(-0.9))
-    """Relative error of the gripper settings named in `of`, in the model for training."""
-    of: tuple[str, ...] = (
-        "coulomb_n",
-        "breakaway_n",
-        "load_friction_coefficient",
-        "rotor_kg_m2",
-        "pad_stiffness_n_m",
+    """Relative error of the gripper settings named in `wrong`, in the model for training."""
+    wrong: tuple[str, ...] = field(
+        default=(
+            "coulomb_n",
+            "breakaway_n",
+            "load_friction_coefficient",
+            "rotor_kg_m2",
+            "pad_stiffness_n_m",
+        ),
+        alias="of",
     )
     learned_on: Mapping[str, Any] = field(factory=dict)
     """Further gripper settings of the model for training, such as `accuracy`."""
@@ -54,14 +54,14 @@ def physics(params: Mapping[str, Any], seed: int) -> RecognitionResult:
     results = []
     for name, learner in classifiers_of(params).items():
         for target in settings.targets:
-            true, predicted = _predictions(learner, training, test, target, seed)
-            results.append(ClassifierResult.of(name, target, PROTOCOL, true, predicted, cost=cost))
+            true, predicted = true_and_predicted(learner, training, test, target, seed)
+            results.append(ClassifierResult.from_answers(name, target, PROTOCOL, true, predicted, cost=cost))
     return simulated_result(test, results)
 
 
 def _wrong_model(params: Mapping[str, Any], settings: ModelErrorSettings) -> Any:
     wrong = {table: dict(keys) for table, keys in params["settings"].items()}
-    for key in settings.of:
+    for key in settings.wrong:
         try:
             wrong["gripper"][key] *= 1.0 + settings.error
         except (KeyError, TypeError):
@@ -70,20 +70,3 @@ def _wrong_model(params: Mapping[str, Any], settings: ModelErrorSettings) -> Any
             ) from None
     wrong["gripper"].update(settings.learned_on)
     return settings_from(wrong, "the wrong model")
-
-
-def _predictions(
-    learner: SelectedComponent, training: Labelled, test: Labelled, target: Target, seed: int
-) -> tuple[list[str], list[str]]:
-    """Return true and predicted labels, with a model for each class if the target is `state`."""
-    true: list[str] = []
-    predicted: list[str] = []
-    classes = sorted({class_of(label) for label in training.labels}) if target == "state" else [""]
-    for name in classes:
-        known, tested = (data.of_class(name) if name else data for data in (training, test))
-        classifier = learner.create()
-        classifier.fit(known.table, target_labels(known.labels, target), seed)
-        labels = classifier.classes()
-        true += target_labels(tested.labels, target)
-        predicted += [labels[k] for k in classifier.probabilities(tested.table).argmax(axis=1)]
-    return true, predicted

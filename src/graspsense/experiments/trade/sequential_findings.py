@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from statistics import stdev
 
+from graspsense.evaluation.intervals import t_quantile
 from graspsense.evaluation.over_seeds import MeanDifference
 from graspsense.experiments.findings import FoundTable, percent, span
 from graspsense.experiments.summary import ConditionResult
@@ -81,8 +83,6 @@ def _cells(point: TradePoint, difference: MeanDifference | None, saved: Saved | 
 
 def _seconds_minus(condition: ConditionResult, other: ConditionResult) -> Saved | None:
     """Return the seconds of one condition minus another's, paired by seed, with a 95 % interval by Student's t."""
-    from scipy.special import stdtrit
-
     each = [
         (result.cost or 0.0) - (other.by_seed[seed].cost or 0.0)
         for seed, result in condition.by_seed.items()
@@ -91,6 +91,5 @@ def _seconds_minus(condition: ConditionResult, other: ConditionResult) -> Saved 
     if len(each) < 2:
         return None
     mean = math.fsum(each) / len(each)
-    variance = math.fsum((value - mean) ** 2 for value in each) / (len(each) - 1)
-    half = float(stdtrit(len(each) - 1, 0.975)) * math.sqrt(variance / len(each))
+    half = t_quantile(len(each) - 1) * stdev(each) / math.sqrt(len(each))
     return mean, (mean - half, mean + half)

@@ -13,17 +13,16 @@ from graspsense.core.components.config import SelectedComponent
 from graspsense.core.components.strict import structured
 from graspsense.core.learn.labelled import Labelled, Target
 from graspsense.core.values.errors import ConfigError, counted
-from graspsense.evaluation.folds import INSTANCE_HELD_OUT, instance_held_out
+from graspsense.evaluation.folds import INSTANCE_HELD_OUT, instance_held_out, trials_by_class
+from graspsense.experiments.recognise import classifiers_of
 from graspsense.experiments.task_results import ClassifierResult, RecognitionResult, TrialValues
 from graspsense.experiments.trade.costs import CostSettings, mean_seconds
 from graspsense.experiments.trade.trade_task import (
     FOLDS,
-    classifiers_of,
     settings_of,
     simulated_result,
     target_labels,
     trial_groups,
-    trials_by_class,
 )
 from graspsense.sources.simulated import simulated
 
@@ -55,7 +54,7 @@ def squeezes(params: Mapping[str, Any], seed: int) -> RecognitionResult:
         raise ConfigError(
             f"{len(data)} trials are not a multiple of judge.most = {settings.most} squeezes: set data.trials to it"
         )
-    one_s = mean_seconds(params["settings"], TrialValues.of(data))
+    one_s = mean_seconds(params["settings"], TrialValues.from_trials(data))
     results = []
     for name, learner in classifiers_of(params).items():
         suffix = f", {name}" if len(params["learners"]) > 1 else ""
@@ -64,7 +63,9 @@ def squeezes(params: Mapping[str, Any], seed: int) -> RecognitionResult:
             for k, labels in predicted.items():
                 title = f"{counted(k, 'squeeze')}{suffix}"
                 results.append(
-                    ClassifierResult.of(title, target, INSTANCE_HELD_OUT, true, labels, cost=k * one_s)
+                    ClassifierResult.from_answers(
+                        title, target, INSTANCE_HELD_OUT, true, labels, cost=k * one_s
+                    )
                 )
     return simulated_result(data, results)
 

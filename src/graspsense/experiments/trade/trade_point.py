@@ -65,7 +65,7 @@ class Advice:
     @property
     def recognises(self) -> str:
         """What is recognised, in words, with the objects it is about."""
-        labels = self.best.condition.first.confusion.labels
+        labels = self.best.condition.of_first_seed.confusion.labels
         classes = list(dict.fromkeys(class_of(label) for label in labels))
         return f"{TARGETS[self.best.condition.target]} ({', '.join(classes)})"
 
@@ -73,17 +73,17 @@ class Advice:
     def text(self) -> str:
         """The recommendation in a sentence."""
         grasps, seeds = self.best.condition.rate.n, len(self.best.condition.by_seed)
-        to = f"To recognise {self.recognises}, from {counted(grasps, 'grasp')} of each of {counted(seeds, 'seed')}"
+        aim = f"To recognise {self.recognises}, from {counted(grasps, 'grasp')} of each of {counted(seeds, 'seed')}"
         best = f"{self.best.name} at {self.best.cost:.3g} {self.axis}"
         caution = f"; {self.caution}" if self.caution else ""
         if self.recommended is None:
             return (
-                f"{to}, it cannot be told which case to take: {best} has the highest rate, {self.best.rate_text}, and "
+                f"{aim}, it cannot be told which case to take: {best} has the highest rate, {self.best.rate_text}, and "
                 f"a single seed has no interval of a difference{caution}."
             )
         if self.loss is None and self.best_is_cheapest:
             return (
-                f"{to}, no difference is shown; take the cheapest, {best}. Its rate is {self.best.rate_text}, and no "
+                f"{aim}, no difference is shown; take the cheapest, {best}. Its rate is {self.best.rate_text}, and no "
                 f"case is shown to be better{caution}."
             )
         if self.loss is None:
@@ -93,17 +93,17 @@ class Advice:
                 else f"no cheaper case comes within {100 * ENOUGH:g} points, although {seeds} seeds do not show that "
                 "all of them are worse"
             )
-            return f"{to}, use {best}: its rate is the highest, {self.best.rate_text}, and {why}{caution}."
+            return f"{aim}, use {best}: its rate is the highest, {self.best.rate_text}, and {why}{caution}."
         value, (low, high) = self.loss.value, self.loss.interval
         chosen = f"{self.recommended.name} at {self.recommended.cost:.3g} {self.axis}"
         if not self.shown:
             return (
-                f"{to}, no difference to the best is shown; take the cheapest, {chosen}. It has "
+                f"{aim}, no difference to the best is shown; take the cheapest, {chosen}. It has "
                 f"{self.recommended.rate_text}, and the best, {best}, {self.best.rate_text}. The loss is "
                 f"{100 * value:.1f} points ({100 * low:.1f} to {100 * high:.1f}){caution}."
             )
         return (
-            f"{to}, {chosen} is good enough: it has {self.recommended.rate_text}. The best, {best}, has "
+            f"{aim}, {chosen} is good enough: it has {self.recommended.rate_text}. The best, {best}, has "
             f"{self.best.rate_text}. The loss is {100 * value:.1f} points ({100 * low:.1f} to {100 * high:.1f}), below "
             f"the limit of 5{caution}."
         )

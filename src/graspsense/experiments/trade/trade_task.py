@@ -5,20 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
-import numpy as np
-
-from graspsense.core.components.config import SelectedComponent, build, settings_from
-from graspsense.core.components.registry import installed
+from graspsense.core.components.config import SelectedComponent, settings_from
 from graspsense.core.components.strict import structured
 from graspsense.core.learn.labelled import Target, class_of
 from graspsense.evaluation.crossval import cross_validate
-from graspsense.evaluation.folds import stratified
+from graspsense.evaluation.folds import stratified, trials_by_class
 from graspsense.experiments.task_results import ClassifierResult, RecognitionResult
 from graspsense.sources.trial_source import TrialSource, groups_of
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from graspsense.core.components.config import Settings
     from graspsense.core.learn.labelled import Labelled
     from graspsense.core.values.features import FeatureTable
@@ -39,26 +34,9 @@ def trial_groups(params: Mapping[str, Any]) -> tuple[Group, ...]:
     return groups_of(structured(params["data"], TrialSource, "[data]"))
 
 
-def classifiers_of(params: Mapping[str, Any]) -> dict[str, SelectedComponent]:
-    """Return the classifiers of a task by name."""
-    classifiers = {}
-    for spec in params["learners"]:
-        component = installed().find("classifier", spec["type"])
-        classifiers[str(spec["name"])] = SelectedComponent(component, build(component, spec["config"]))
-    return classifiers
-
-
 def target_labels(labels: Sequence[str], target: Target) -> list[str]:
     """Return the labels to recognise: whole labels, or classes. States stay whole: folds separate the classes."""
     return [class_of(label) for label in labels] if target == "class" else list(labels)
-
-
-def trials_by_class(labels: Sequence[str], target: Target) -> list[NDArray[np.int64]]:
-    """Return the trials that are cross-validated separately: those of each class if the target is `state`."""
-    if target != "state":
-        return [np.arange(len(labels))]
-    classes = np.array([class_of(label) for label in labels])
-    return [np.flatnonzero(classes == name) for name in np.unique(classes)]
 
 
 def stratified_folds(labels: Sequence[str], target: Target, seed: int) -> list[Folds]:

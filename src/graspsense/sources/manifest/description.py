@@ -186,14 +186,12 @@ def read_manifest(place: Path) -> ReadManifest:
         try:
             return parse(text)
         except ExpressionError as error:
-            problems.append(f"{layer.where(path)}: {'.'.join(str(one) for one in path)}: {error}")
+            problems.append(f"{layer.where(path)}: {'.'.join(str(part) for part in path)}: {error}")
             return None
 
-    found: dict[str, Any] = {name: [] for name in QUANTITIES}
+    quantities: dict[str, Any] = {name: [] for name in QUANTITIES}
     for name in QUANTITIES:
-        given = getattr(keys, name)
-        for text in (given,) if isinstance(given, str) else given:
-            found[name].append(parsed((name,), text))
+        quantities[name] += [parsed((name,), text) for text in texts_of(getattr(keys, name))]
     value_files = {
         name: text for name, text in keys.values.items() if re.fullmatch(r"[^'\"*/+()]+\.(npy|txt|csv)", text)
     }
@@ -203,7 +201,7 @@ def read_manifest(place: Path) -> ReadManifest:
     }
     events = {name: parsed(("events", name), text) for name, text in keys.events.items()}
     for name, text in keys.fingers.items():
-        found[f"{PREFIX}{name}"] = [parsed(("fingers", name), text)]
+        quantities[f"{PREFIX}{name}"] = [parsed(("fingers", name), text)]
     problems += [
         f"{layer.where(path)}: {why}" for path, why in (*_contradictions(keys), *_finger_problems(keys))
     ]
@@ -214,7 +212,7 @@ def read_manifest(place: Path) -> ReadManifest:
         base=place.parent
         / os.path.expanduser(keys.folder),  # of pathlib, it raises where there is no such user
         keys=keys,
-        expressions={name: tuple(parts) for name, parts in found.items()},
+        expressions={name: tuple(parts) for name, parts in quantities.items()},
         channels=channels,  # type: ignore[arg-type]
         values=values,  # type: ignore[arg-type]
         events=events,  # type: ignore[arg-type]
@@ -236,16 +234,16 @@ def _too_many(keys: Manifest) -> list[tuple[tuple[str, ...], str]]:
 
 def _contradictions(keys: Manifest) -> list[tuple[tuple[str, ...], str]]:
     """Return what is missing or contradicts itself, each with the key it belongs to."""
-    found: list[tuple[tuple[str, ...], str]] = []
+    problems: list[tuple[tuple[str, ...], str]] = []
     if bool(keys.files) == bool(keys.list):
-        found.append(
+        problems.append(
             (("files",), 'name the files, either by patterns (files = "{label}/*.csv") or by a list')
         )
     if keys.force and (keys.left or keys.right):
-        found.append((("force",), "force stands for both pads: give it alone, or left and right"))
+        problems.append((("force",), "force stands for both pads: give it alone, or left and right"))
     if not keys.force and not keys.left and not keys.right and not keys.fingers:
-        found.append((("force",), "a grasp needs its force: force, left and right, or fingers"))
-    found += [
+        problems.append((("force",), "a grasp needs its force: force, left and right, or fingers"))
+    problems += [
         (
             ("events", name),
             f"write small letters, digits, spaces, - and _, a letter first, and not{NOT_KNOWN} at the end",
@@ -255,18 +253,22 @@ def _contradictions(keys: Manifest) -> list[tuple[tuple[str, ...], str]]:
     ]
     unknown = [name for name in texts_of(keys.fast) if name not in keys.channels]
     if unknown:
-        found.append((("fast",), f"{unknown[0]!r} is not among the channels: name it there with its columns"))
+        problems.append(
+            (("fast",), f"{unknown[0]!r} is not among the channels: name it there with its columns")
+        )
     elif keys.fast and keys.resample_hz:
-        found.append((("resample_hz",), "fast channels cannot be resampled: leave out fast or resample_hz"))
+        problems.append(
+            (("resample_hz",), "fast channels cannot be resampled: leave out fast or resample_hz")
+        )
     if (
         not keys.label
         and not keys.list
-        and not any("{label" in pattern for pattern in _patterns(keys))
+        and not any("{label" in pattern for pattern in texts_of(keys.files))
         and "?P<label>" not in keys.start
         and "{label" not in keys.arrays
     ):
-        found.append((("label",), 'no label: write label = "{field}", or {label} in the pattern of files'))
-    return found
+        problems.append((("label",), 'no label: write label = "{field}", or {label} in the pattern of files'))
+    return problems
 
 
 def hand_of(keys: Manifest, unit: str) -> tuple[FingerForce, ...]:
@@ -318,10 +320,6 @@ def _finger_problems(keys: Manifest) -> Iterator[tuple[tuple[str, ...], str]]:
         hand_of(keys, "N")
     except ValueError as error:
         yield ("fingers",), str(error)
-
-
-def _patterns(keys: Manifest) -> tuple[str, ...]:
-    return texts_of(keys.files)
 
 
 def texts_of(value: Text) -> tuple[str, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -18,7 +19,7 @@ from graspsense.sources.manifest.table import Numbers
 _SEPARATORS: Final = re.compile(r"[\s;,|]+")
 
 
-def labelled_events(found: AvailableColumns, t_s: Numbers, origin_s: float) -> dict[str, Spans]:
+def labelled_events(columns: AvailableColumns, t_s: Numbers, origin_s: float) -> dict[str, Spans]:
     """Return begin and end (s) of the labelled events of each kind, on the clock of `t_s`.
 
     An expression with a unit of time gives the times of events, one without says in each sample whether the event goes
@@ -26,12 +27,12 @@ def labelled_events(found: AvailableColumns, t_s: Numbers, origin_s: float) -> d
     of the file. Raises ConfigError, DataDamaged.
     """
     events: dict[str, Spans] = {}
-    for kind, expression in found.manifest.events.items():
+    for kind, expression in columns.manifest.events.items():
         if expression.unit:
-            events[kind] = _at_times(found, kind, expression, t_s, origin_s)
+            events[kind] = _at_times(columns, kind, expression, t_s, origin_s)
         else:
-            values = found.computed(f"events.{kind}", lambda one=expression: one.numbers(found, len(t_s)))  # type: ignore[misc]
-            _check_flags(found, kind, values)
+            values = columns.computed(f"events.{kind}", partial(expression.numbers, columns, len(t_s)))
+            _check_flags(columns, kind, values)
             if not np.isnan(values).all():
                 events[kind], events[kind + NOT_KNOWN] = _where_set(values, t_s)
     return events

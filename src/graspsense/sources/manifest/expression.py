@@ -112,8 +112,8 @@ class Expression:
         if isinstance(node, ast.Constant) and not isinstance(node.value, str):
             return np.float64(node.value)  # type: ignore[arg-type] # checked by `parse`
         if isinstance(node, ast.Name | ast.Constant):
-            found = [columns[name] for name in self._matching(node, tuple(columns))]
-            return found[0] if len(found) == 1 else np.column_stack(found)
+            matching = [columns[name] for name in self._matching(node, tuple(columns))]
+            return matching[0] if len(matching) == 1 else np.column_stack(matching)
         if isinstance(node, ast.UnaryOp):
             value = self._value(node.operand, columns)
             return -value if isinstance(node.op, ast.USub) else value
@@ -188,19 +188,19 @@ class Expression:
         if name in known:
             return (name,)
         quoted = isinstance(node, ast.Constant)
-        found: tuple[str, ...] = ()
+        names: tuple[str, ...] = ()
         if quoted and set("*?") & set(name):
             try:
                 pattern = wildcard(name)
             except PatternError as error:
                 self._refuse(node, str(error))
-            found = tuple(column for column in known if pattern.fullmatch(column))
-        if not found:
+            names = tuple(column for column in known if pattern.fullmatch(column))
+        if not names:
             what = (
                 f"no column matches {name!r}" if quoted and set("*?") & set(name) else f"no column {name!r}"
             )
             self._refuse(node, f"{what}. Columns: {_listed(known) or 'none'}.{suggestion(name, known)}")
-        return found
+        return names
 
     def _refuse(self, node: ast.expr, why: str) -> NoReturn:
         raise _error(self.text, node.col_offset, why)
@@ -237,51 +237,51 @@ def parse(text: str) -> Expression:
 
 def _body_and_unit(text: str) -> tuple[str, str]:
     """Return an expression and the unit in brackets behind it: `Pos [mm]`, but not an index as in `force[2]`."""
-    before, bracket, unit = text[:-1].rpartition("[") if text.endswith("]") else ("", "", "")
+    body, bracket, unit = text[:-1].rpartition("[") if text.endswith("]") else ("", "", "")
     is_unit = (
         bracket
-        and before.strip()
-        and before[-1].isspace()
+        and body.strip()
+        and body[-1].isspace()
         and not set("]'") & set(unit)
         and any(not (sign.isdecimal() or sign.isspace()) for sign in unit)
     )
-    return (before.rstrip(), unit.strip()) if is_unit else (text, "")
+    return (body.rstrip(), unit.strip()) if is_unit else (text, "")
 
 
 def _check(node: ast.AST, text: str, depth: int) -> None:
     """Raise ExpressionError at the first node that is not in the closed list."""
-    at = getattr(node, "col_offset", 0)
+    offset = getattr(node, "col_offset", 0)
     if depth > 50:
-        raise _error(text, at, "it is nested too deep")
+        raise _error(text, offset, "it is nested too deep")
     inner: Sequence[ast.AST] = ()
     if isinstance(node, ast.Constant):
         if type(node.value) not in (int, float, str):
-            raise _error(text, at, f"{node.value!r} is not a number")
+            raise _error(text, offset, f"{node.value!r} is not a number")
         if isinstance(node.value, int | float) and not abs(node.value) <= LARGEST:
-            raise _error(text, at, f"a number is at most {LARGEST:g}")
+            raise _error(text, offset, f"a number is at most {LARGEST:g}")
     elif isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.UAdd | ast.USub):
         inner = (node.operand,)
     elif isinstance(node, ast.BinOp):
         if type(node.op) not in _OPERATORS:
-            raise _error(text, at, "there are + - * /, and the functions " + ", ".join(FUNCTIONS))
+            raise _error(text, offset, "there are + - * /, and the functions " + ", ".join(FUNCTIONS))
         inner = (node.left, node.right)
     elif isinstance(node, ast.Subscript):
         if not _is_component(node.slice):
             raise _error(
                 text,
-                at,
+                offset,
                 "write the number of a component in brackets, counted from 0: force[2], or cells[2::3] for every third",
             )
         inner = (node.value,)
     elif isinstance(node, ast.Call):
-        inner = _checked_call(node, text, at)
+        inner = _checked_call(node, text, offset)
     elif not isinstance(node, ast.Name):
         kind = type(node).__name__
         raise _error(
-            text, at, f"{kind} is not allowed here: there are numbers, columns, + - * / and functions"
+            text, offset, f"{kind} is not allowed here: there are numbers, columns, + - * / and functions"
         )
-    for one in inner:
-        _check(one, text, depth + 1)
+    for child in inner:
+        _check(child, text, depth + 1)
 
 
 def _is_component(index: ast.expr) -> bool:
@@ -293,19 +293,19 @@ def _is_component(index: ast.expr) -> bool:
     return len(numbers) == len(parts) and numbers[0] >= 0 and all(step > 0 for step in numbers[1:])
 
 
-def _checked_call(node: ast.Call, text: str, at: int) -> Sequence[ast.AST]:
+def _checked_call(node: ast.Call, text: str, offset: int) -> Sequence[ast.AST]:
     name = node.func.id if isinstance(node.func, ast.Name) else ""
     if name not in FUNCTIONS:
         raise _error(
             text,
-            at,
+            offset,
             f"no function {name or 'of this kind'}. There are {', '.join(FUNCTIONS)}.{suggestion(name, FUNCTIONS)}",
         )
     if node.keywords or any(isinstance(argument, ast.Starred) for argument in node.args):
-        raise _error(text, at, f"{name} takes columns, separated by commas")
+        raise _error(text, offset, f"{name} takes columns, separated by commas")
     if not node.args or (name not in FOLDS and len(node.args) != 1):
         wanted = "at least one argument" if name in FOLDS else "one argument"
-        raise _error(text, at, f"{name} takes {wanted}, and here are {len(node.args)}")
+        raise _error(text, offset, f"{name} takes {wanted}, and here are {len(node.args)}")
     return node.args
 
 
@@ -350,6 +350,6 @@ def _shown(name: str) -> str:
     return name if name.isidentifier() else f"'{name}'"
 
 
-def _error(text: str, at: int, why: str) -> ExpressionError:
-    before = len(text.encode()[:at].decode(errors="ignore"))
-    return ExpressionError(f"{why}\n    {text}\n    {' ' * before}^")
+def _error(text: str, offset: int, why: str) -> ExpressionError:
+    indent = len(text.encode()[:offset].decode(errors="ignore"))
+    return ExpressionError(f"{why}\n    {text}\n    {' ' * indent}^")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -96,7 +97,7 @@ def values_of(manifest: ReadManifest, file: NamedFile, table: ColumnTable) -> di
     columns = AvailableColumns(manifest, table)
     values = {}
     for name, expression in manifest.values.items():
-        column = columns.computed(f"values.{name}", lambda one=expression: one.numbers(columns, len(table)))  # type: ignore[misc]
+        column = columns.computed(f"values.{name}", partial(expression.numbers, columns, len(table)))
         if np.ptp(column) > 0.0:
             raise ConfigError(
                 f"{manifest.place}: values.{name} changes during {table.source}: take peak(...), "

@@ -12,7 +12,7 @@ from attrs import frozen
 from graspsense.core.values.errors import ConfigError
 from graspsense.core.values.label_text import is_missing_label
 from graspsense.sources.csv_columns import CsvColumns
-from graspsense.sources.manifest.description import ReadManifest
+from graspsense.sources.manifest.description import ReadManifest, texts_of
 from graspsense.sources.manifest.patterns import FileTemplate, PatternError, file_template
 
 
@@ -40,15 +40,14 @@ def files_of(manifest: ReadManifest) -> list[NamedFile]:
             f"{manifest.place}: there is no folder {manifest.base}. The key folder is relative to the manifest"
         )
     keys = manifest.keys
-    found = list(_listed(manifest)) if keys.list else list(_matching(manifest))
-    if not found:
-        patterns = (keys.files,) if isinstance(keys.files, str) else keys.files
+    files = list(_listed(manifest)) if keys.list else list(_matching(manifest))
+    if not files:
         some = [name for name, _ in tree_below(manifest.base)][:5]
         raise ConfigError(
-            f"{manifest.place}: no file in {manifest.base} matches {' or '.join(map(repr, patterns))}. "
+            f"{manifest.place}: no file in {manifest.base} matches {' or '.join(map(repr, texts_of(keys.files)))}. "
             + (f"It contains, for example: {', '.join(some)}" if some else "The folder is empty")
         )
-    return found
+    return files
 
 
 def _matching(manifest: ReadManifest) -> Iterator[NamedFile]:
@@ -57,8 +56,8 @@ def _matching(manifest: ReadManifest) -> Iterator[NamedFile]:
         if path.name == manifest.place.name and path.resolve() == manifest.place.resolve():
             continue
         try:
-            found = (template.fields(name) for template in templates)
-            fields = next((one for one in found if one is not None), None)
+            matches = (template.fields(name) for template in templates)
+            fields = next((match for match in matches if match is not None), None)
         except PatternError as error:
             raise ConfigError(f"{manifest.place}: files: {error}") from None
         if fields is not None:
@@ -67,30 +66,29 @@ def _matching(manifest: ReadManifest) -> Iterator[NamedFile]:
 
 def _templates(manifest: ReadManifest) -> list[FileTemplate]:
     """Return the patterns of the files. Raises ConfigError."""
-    given = manifest.keys.files
     try:
-        return [file_template(one) for one in ((given,) if isinstance(given, str) else given)]
+        return [file_template(pattern) for pattern in texts_of(manifest.keys.files)]
     except PatternError as error:
         raise ConfigError(f"{manifest.place}: files: {error}") from None
 
 
 def tree_below(base: Path) -> Iterator[tuple[str, Path]]:
     """Yield every file below a folder by its path from there; the folder of a ROS 2 bag counts as a file."""
-    found = []
+    paths = []
     for folder, folders, names in os.walk(base):
-        folders[:] = [one for one in folders if not one.startswith(".")]
+        folders[:] = [name for name in folders if not name.startswith(".")]
         if "metadata.yaml" in names:
             folders.clear()
-            found.append(Path(folder))
+            paths.append(Path(folder))
         else:
-            found += [Path(folder) / name for name in names if not name.startswith(".")]
-    shown = [(path.relative_to(base).as_posix(), path) for path in found]
-    return iter(sorted(shown, key=lambda one: natural_key(one[0])))
+            paths += [Path(folder) / name for name in names if not name.startswith(".")]
+    shown = [(path.relative_to(base).as_posix(), path) for path in paths]
+    return iter(sorted(shown, key=lambda named: natural_key(named[0])))
 
 
 def natural_key(name: str) -> list[tuple[int, int, str]]:
     """Return the key by which names are sorted so that `data_2` stands before `data_10`."""
-    return [(0, int(one), "") if one.isdecimal() else (1, 0, one) for one in re.split(r"(\d+)", name)]
+    return [(0, int(part), "") if part.isdecimal() else (1, 0, part) for part in re.split(r"(\d+)", name)]
 
 
 def _listed(manifest: ReadManifest) -> Iterator[NamedFile]:
@@ -99,9 +97,9 @@ def _listed(manifest: ReadManifest) -> Iterator[NamedFile]:
     columns = CsvColumns(place)
     for k, name in enumerate(columns.complete_column("file", "the file of each grasp")):
         row = {
-            one: cells[k]
-            for one, cells in columns.cells.items()
-            if one != "file" and not is_missing_label(cells[k])
+            column: cells[k]
+            for column, cells in columns.cells.items()
+            if column != "file" and not is_missing_label(cells[k])
         }
         path, where = manifest.base / name, f"{place}, line {columns.lines[k]}"
         rows, problem = None, "" if os.path.exists(path) else f"{where}: there is no file {path}"
@@ -117,7 +115,7 @@ def _rows(where: str, row: dict[str, str]) -> tuple[int, int] | None:
     given = [row.pop(name, "") for name in ("first_row", "last_row")]
     if not any(given):
         return None
-    if not all(_is_row(one) for one in given) or not 1 <= int(given[0]) <= int(given[1]):
+    if not all(_is_row(cell) for cell in given) or not 1 <= int(given[0]) <= int(given[1]):
         raise ConfigError(
             f"{where}: first_row and last_row are {given[0]!r} and {given[1]!r}: give two numbers of "
             "rows, counted from 1, the first not behind the last"

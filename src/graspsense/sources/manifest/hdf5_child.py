@@ -27,36 +27,38 @@ def datasets(group: Any, name: str, seen: set[Any], depth: int) -> Iterator[tupl
             )
         if not isinstance(group.get(key, getlink=True), h5py.HardLink) or key in ("#refs#", "#subsystem#"):
             continue
-        found = group[key]
-        address = h5py.h5o.get_info(found.id).addr
+        member = group[key]
+        address = h5py.h5o.get_info(member.id).addr
         path = f"{name}/{key}" if name else key
-        if isinstance(found, h5py.Group) and address not in seen:
+        if isinstance(member, h5py.Group) and address not in seen:
             seen.add(address)
-            yield from datasets(found, path, seen, depth + 1)
-        elif isinstance(found, h5py.Dataset):
+            yield from datasets(member, path, seen, depth + 1)
+        elif isinstance(member, h5py.Dataset):
             seen.add(path)
-            yield path, found
+            yield path, member
 
 
-def arrays(path: str, name: str, found: Any, left: int) -> Iterator[tuple[str, Any]]:
+def arrays(path: str, name: str, dataset: Any, left: int) -> Iterator[tuple[str, Any]]:
     """Yield the arrays of numbers or texts in a dataset. Raises OverflowError if it has more bytes than are left."""
-    if found.shape is None or found.is_virtual or found.external or found.ndim > 3:
+    if dataset.shape is None or dataset.is_virtual or dataset.external or dataset.ndim > 3:
         return
-    kind = found.dtype.kind
-    text = h5py.check_string_dtype(found.dtype) is not None
+    kind = dataset.dtype.kind
+    text = h5py.check_string_dtype(dataset.dtype) is not None
     if kind not in "fiubV" and not text:
         return
-    if found.size * found.dtype.itemsize > left:
+    if dataset.size * dataset.dtype.itemsize > left:
         raise OverflowError
-    values = found[()]
+    values = dataset[()]
     if text:
-        yield name, np.array(found.asstr()[()], dtype=np.str_)
-    elif found.dtype.names:
+        yield name, np.array(dataset.asstr()[()], dtype=np.str_)
+    elif dataset.dtype.names:
         yield from (
-            (f"{name}.{one}", values[one]) for one in found.dtype.names if values[one].dtype.kind in "fiub"
+            (f"{name}.{column}", values[column])
+            for column in dataset.dtype.names
+            if values[column].dtype.kind in "fiub"
         )
     elif kind != "V":
-        matlab = found.attrs.get("MATLAB_class", b"")
+        matlab = dataset.attrs.get("MATLAB_class", b"")
         if matlab == b"char":
             yield name, np.array("".join(map(chr, np.ravel(values, order="F").tolist())))
         else:
@@ -67,8 +69,8 @@ def main(path: str, out: str, most: int) -> None:
     """Copy the arrays. Exits with a message if the file is not HDF5, or too large."""
     left = most
     with h5py.File(path, "r") as file, zipfile.ZipFile(out, "w") as archive:
-        for name, found in datasets(file, "", {h5py.h5o.get_info(file.id).addr}, 0):
-            for member, values in arrays(path, name, found, left):
+        for name, dataset in datasets(file, "", {h5py.h5o.get_info(file.id).addr}, 0):
+            for member, values in arrays(path, name, dataset, left):
                 left -= values.nbytes
                 if left < 0:
                     raise OverflowError

@@ -60,34 +60,34 @@ def mat_variables(path: Path) -> dict[str, NDArray[Any]]:
         (version,) = struct.unpack_from(f"{order}H", data, _HEADER_BYTES - 4)
         if version >> 8 == 2:  # version 7.3
             return hdf5_arrays(path, "\n  or save the file in MATLAB with: save(NAME, '-v7')")
-        found = {}
+        variables = {}
         for element in _elements(data[_HEADER_BYTES:], order):
             if element.kind == _COMPRESSED:
                 (element,) = _elements(unpacked.unpack("zlib", element.data), order)
             if element.kind == _MATRIX and (variable := _variable(element.data, order)) is not None:
-                found[variable[0]] = variable[1]
-    if not found:
+                variables[variable[0]] = variable[1]
+    if not variables:
         raise ConfigError(
             f"{path} has no array at its top level, and structures and cells are not read. Save the file with "
             "save(NAME, '-v7.3'), which gives the fields of a structure paths: arrays = \"S/{label}/{column}\""
         )
-    return found
+    return variables
 
 
 def _elements(data: bytes, order: str) -> Iterator[_Element]:
     """Yield the elements that follow each other in the data. Raises ValueError if one ends behind it."""
-    at = 0
-    while at + 8 <= len(data):
-        kind, size = struct.unpack_from(f"{order}II", data, at)
-        begin = at + 8
+    position = 0
+    while position + 8 <= len(data):
+        kind, size = struct.unpack_from(f"{order}II", data, position)
+        begin = position + 8
         if kind >> 16:  # a small element has its size and its data in the tag
-            kind, size, begin = kind & 0xFFFF, kind >> 16, at + 4
+            kind, size, begin = kind & 0xFFFF, kind >> 16, position + 4
         if begin + size > len(data):
             raise ValueError(f"an element of {size} bytes ends behind the file")
         yield _Element(kind, data[begin : begin + size])
-        at = begin + size
+        position = begin + size
         if kind != _COMPRESSED:
-            at += -at % 8
+            position += -position % 8
 
 
 def _variable(data: bytes, order: str) -> tuple[str, NDArray[Any]] | None:
@@ -115,19 +115,19 @@ def _text(element: _Element, order: str) -> str:
 
 def _of_version_4(data: bytes) -> Iterator[tuple[str, NDArray[Any]]]:
     """Yield the variables of a file of version 4, each a matrix behind a header of five numbers."""
-    at = 0
-    while at < len(data):
-        order = "<" if struct.unpack_from("<I", data, at)[0] < 5000 else ">"
-        kind, rows, columns, imaginary, length = struct.unpack_from(f"{order}5I", data, at)
+    position = 0
+    while position < len(data):
+        order = "<" if struct.unpack_from("<I", data, position)[0] < 5000 else ">"
+        kind, rows, columns, imaginary, length = struct.unpack_from(f"{order}5I", data, position)
         number = np.dtype(f"{order}{_STORED_BY_4[kind // 10 % 10]}")
-        begin = at + 20 + length
+        begin = position + 20 + length
         size = rows * columns * number.itemsize
         if kind // 1000 > 1 or begin + size * (2 if imaginary else 1) > len(data):
             raise ValueError(f"a matrix of {rows} rows and {columns} columns ends behind the file")
-        name = data[at + 20 : begin].rstrip(b"\0").decode("latin-1")
+        name = data[position + 20 : begin].rstrip(b"\0").decode("latin-1")
         values = np.frombuffer(data, dtype=number, count=rows * columns, offset=begin)
         if kind % 10 == 0 and not imaginary:
             yield name, values.astype(number.newbyteorder("=")).reshape((rows, columns), order="F")
         elif kind % 10 == 1 and rows == 1:
             yield name, np.array(["".join(map(chr, values.astype(np.int64) & 0xFF))])
-        at = begin + size * (2 if imaginary else 1)
+        position = begin + size * (2 if imaginary else 1)

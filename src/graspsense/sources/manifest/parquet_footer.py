@@ -60,7 +60,7 @@ class _Compact:
     """A reader of the compact protocol: structures become dictionaries by the numbers of their fields."""
 
     def __init__(self, data: bytes) -> None:
-        self.data, self.at = data, 0
+        self.data, self.place = data, 0
 
     def value(self, kind: int, depth: int) -> Any:
         """Return the next value of this type. Raises IndexError or ValueError where there is none."""
@@ -104,13 +104,13 @@ class _Compact:
         return fields
 
     def _skip(self, size: int) -> None:
-        if size > len(self.data) - self.at:
+        if size > len(self.data) - self.place:
             raise ValueError("its footer ends early")
-        self.at += size
+        self.place += size
 
     def _byte(self) -> int:
-        byte = self.data[self.at]
-        self.at += 1
+        byte = self.data[self.place]
+        self.place += 1
         return byte
 
     def _varint(self) -> int:

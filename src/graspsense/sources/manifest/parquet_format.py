@@ -103,10 +103,10 @@ def _numbers(column: Any) -> Numbers | None:
 def _numbers_of_texts(column: Any) -> Numbers | None:
     whole = column.unify_dictionaries().combine_chunks()
     words = whole.dictionary.to_pylist()
-    found = columns_of_numbers({"": [word.strip() for word in words if isinstance(word, str)]})[""]
-    if isinstance(found, NotNumbers) or len(found) < len(words):
+    numbers = columns_of_numbers({"": [word.strip() for word in words if isinstance(word, str)]})[""]
+    if isinstance(numbers, NotNumbers) or len(numbers) < len(words):
         return None
-    known = np.concatenate(([np.nan], found))
+    known = np.concatenate(([np.nan], numbers))
     places: Numbers = known[whole.indices.cast("int64").fill_null(-1).to_numpy(zero_copy_only=False) + 1]
     return places
 
@@ -122,9 +122,9 @@ def _numbers_of_lists(column: Any) -> Numbers | None:
         numbers[whole.is_valid().to_numpy(zero_copy_only=False)] = known
         return numbers
     inner = whole.flatten()
-    width, rest = divmod(len(inner), len(whole)) if len(whole) else (0, 0)
+    width, left_over = divmod(len(inner), len(whole)) if len(whole) else (0, 0)
     lengths = whole.value_lengths() if hasattr(whole, "value_lengths") else None
-    if inner.null_count or rest or not width:
+    if inner.null_count or left_over or not width:
         return None
     if lengths is not None and (lengths.to_numpy(zero_copy_only=False) != width).any():
         return None
@@ -146,7 +146,7 @@ def _texts(path: Path, column: Any) -> list[str]:
 
     if types.is_dictionary(column.type):
         whole = column.unify_dictionaries().combine_chunks()
-        words = ["", *("" if one is None else str(one) for one in whole.dictionary.to_pylist())]
+        words = ["", *("" if word is None else str(word) for word in whole.dictionary.to_pylist())]
         return [words[i + 1] for i in whole.indices.cast("int64").fill_null(-1).to_pylist()]
     Unpacked(path).expect(_BYTES_OF_A_TEXT * len(column))
-    return ["" if one is None else str(one) for one in column.to_pylist()]
+    return ["" if word is None else str(word) for word in column.to_pylist()]

@@ -134,12 +134,12 @@ class FileTemplate:
         match = _compiled(_joined(self.pieces, known)).fullmatch(path)
         if match is None:
             return None
-        found = match.groupdict()
+        fields = match.groupdict()
         names = self._names()
         open_name = next((name for name in names if names.count(name) > 1 and name not in known), None)
         if open_name is None:
-            return {name: known[name] if name in known else found[name] for name in dict.fromkeys(names)}
-        for value in (found[open_name], *_repeated(path, names.count(open_name))):
+            return {name: known[name] if name in known else fields[name] for name in dict.fromkeys(names)}
+        for value in (fields[open_name], *_repeated(path, names.count(open_name))):
             solved = self._solved(path, {**known, open_name: value}, tries)
             if solved is not None:
                 return solved

@@ -60,10 +60,10 @@ def tables_of(manifest: ReadManifest, file: NamedFile) -> list[ColumnTable]:
     for name in texts_of(manifest.keys.beside):
         tables = _joined(manifest, tables, file.path.parent / name)
     if file.rows is not None:
-        first, last = file.rows
-        if last > len(tables[0]):
-            raise DataDamaged(f"{file.path} has {len(tables[0])} rows, and the list names row {last}")
-        tables = [tables[0].rows(slice(first - 1, last), f"rows {first} to {last}")]
+        begin, end = file.rows
+        if end > len(tables[0]):
+            raise DataDamaged(f"{file.path} has {len(tables[0])} rows, and the list names row {end}")
+        tables = [tables[0].rows(slice(begin - 1, end), f"rows {begin} to {end}")]
     split = manifest.keys.split
     if split == "rows":
         if too_many := RECORDINGS.exceeded(sum(map(len, tables))):
@@ -113,7 +113,7 @@ def grasps_in(
         raise DataDamaged(table.damage)
     columns = samples(manifest, table)
     if manifest.keys.split != "force":
-        yield _grasp(manifest, file, table, columns)
+        yield from _grasps(manifest, file, table, columns)
         return
     for part in squeezes(columns):
         yield from each_readable(part.source, partial(_grasps, manifest, file, table, part))
@@ -121,20 +121,14 @@ def grasps_in(
 
 def _grasps(
     manifest: ReadManifest, file: NamedFile, table: ColumnTable, columns: GraspColumns
-) -> tuple[LabelledRecording]:
-    return (_grasp(manifest, file, table, columns),)
-
-
-def _grasp(
-    manifest: ReadManifest, file: NamedFile, table: ColumnTable, columns: GraspColumns
-) -> LabelledRecording:
-    """Return the grasp that these samples of a table are. Raises ConfigError, DataDamaged."""
+) -> Iterator[LabelledRecording]:
+    """Yield the one grasp that these samples of a table are. Raises ConfigError, DataDamaged."""
     keys = manifest.keys
     cut = cut_at(columns, keys.cut) if keys.cut else columns
     kept = resampled(cut, keys.resample_hz) if keys.resample_hz else cut
     with np.errstate(all="ignore"):  # what is infinite is refused by `checked_recording`
         notices = tuple(notices_of(cut, zeroed=bool(keys.zero)))
-    return LabelledRecording(
+    yield LabelledRecording(
         recording=_checked(kept, table, keys.rate_hz or 1.0),
         source=cut.source,
         label=label_of(manifest, table),
@@ -189,7 +183,7 @@ def _bag(manifest: ReadManifest) -> Callable[[Path], list[ColumnTable]]:
 
     texts = [part.text for parts in manifest.expressions.values() for part in parts]
     further = (*manifest.channels.values(), *manifest.values.values(), *manifest.events.values())
-    texts += [one.text for one in further]
+    texts += [text.text for text in further]
     topics = {match[1] for text in texts for match in re.finditer(r"['\"](/[^.'\"*?]+)\.", text)}
     return lambda path: read_bag(path, topics)
 

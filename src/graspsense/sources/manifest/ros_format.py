@@ -75,16 +75,16 @@ def _collected(
     return values, {topic: times[topic] for topic in values}
 
 
-def _held(times: TopicTimes, found: Sequence[dict[str, Any]], rows_ns: Nanoseconds) -> dict[str, Numbers]:
+def _held(times: TopicTimes, messages: Sequence[dict[str, Any]], rows_ns: Nanoseconds) -> dict[str, Numbers]:
     """Return the columns of a topic: in each row the last value, NaN where it is too old to hold.
 
     A value that is the same before and after a silence holds throughout.
     """
     last, old = times.latest(rows_ns)
     columns: dict[str, Numbers] = {}
-    for name, example in found[0].items():
+    for name, example in messages[0].items():
         width = np.size(example)
-        rows = [found[k].get(name, np.full(width, np.nan)) for k in times.order]
+        rows = [messages[k].get(name, np.full(width, np.nan)) for k in times.order]
         if any(np.size(row) != width for row in rows):
             continue  # an array whose length changes has no fixed columns
         every = np.array(rows, dtype=np.float64).reshape(len(rows), -1)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from keyword import iskeyword
 from typing import Final
 
@@ -40,38 +41,38 @@ _TAKEN: Final = frozenset({*CHANNELS, "force", "t"})
 @np.errstate(all="ignore")  # what is infinite, or too large, is refused by `checked_recording`
 def samples(manifest: ReadManifest, table: ColumnTable) -> GraspColumns:
     """Return the samples of a table as the manifest describes them. Raises ConfigError, DataDamaged."""
-    keys, found = manifest.keys, AvailableColumns(manifest, table)
+    keys, available = manifest.keys, AvailableColumns(manifest, table)
     if not len(table):
         raise DataDamaged(f"{table.source} has no rows")
     notes = [f"{len(table)} samples of {table.source}", *table.notes]
-    t_s, origin_s, time_notes = _times(manifest, table, found)
+    t_s, origin_s, time_notes = _times(manifest, table, available)
     notes += time_notes
-    events = labelled_events(found, t_s, origin_s)
+    events = labelled_events(available, t_s, origin_s)
     notes += [
         f"labelled in the recording: {len(spans)} times {name}" for name, spans in events.items() if spans
     ]
-    scalars, arrays, units = _channels(manifest, table, found)
+    scalars, arrays, units = _channels(manifest, table, available)
     zero = samples_of(keys.zero, t_s) if keys.zero else 0
     if zero:
         notes.append(f"zero of the forces: the mean of the first {zero} samples")
         for name, values in (*scalars.items(), *arrays.items()):
             if name not in manifest.fast and units.get(name, "") in ("N", "counts"):
                 values -= np.nanmean(values[:zero], axis=0)
-    found.update(scalars)
-    found.update(arrays)
+    available.update(scalars)
+    available.update(arrays)
     expressions = manifest.expressions
-    gap = found.value("gap", expressions["gap"], "gap") or (np.zeros(len(table)), NO_GAP)
-    hand, each = _fingers(manifest, found, zero)
+    gap = available.value("gap", expressions["gap"], "gap") or (np.zeros(len(table)), NO_GAP)
+    hand, each = _fingers(manifest, available, zero)
     scalars |= each
-    units |= {one.name: one.unit for one in hand}
+    units |= {channel.name: channel.unit for channel in hand}
     if hand:
         left_n, right_n = finger_sides(hand, each)
         unit = "" if hand[0].unit == "N" else hand[0].unit
     else:
-        left_n, right_n, unit = _sides(manifest, found, zero)
+        left_n, right_n, unit = _sides(manifest, available, zero)
     notes += _folds(manifest)
-    effort = found.value("effort", expressions["effort"], "effort")
-    velocity = found.value("velocity", expressions["velocity"], "velocity")
+    effort = available.value("effort", expressions["effort"], "effort")
+    velocity = available.value("velocity", expressions["velocity"], "velocity")
     columns = GraspColumns(
         source=table.source,
         t_s=t_s,
@@ -83,16 +84,16 @@ def samples(manifest: ReadManifest, table: ColumnTable) -> GraspColumns:
         scalars=scalars,
         fingers=hand,
         arrays=arrays,
-        shapes=_shapes(manifest, table, found, arrays),
+        shapes=_shapes(manifest, table, available, arrays),
         fast=manifest.fast,
         units={
             **units,
             "gap": gap[1],
             "force": unit,
-            "t": "" if _has_time(manifest, table, found) else "sample",
+            "t": "" if _has_time(manifest, table, available) else "sample",
         },
         notes=tuple(notes),
-        warnings=(*table.warnings, *_doubtful_units(manifest, found)),
+        warnings=(*table.warnings, *_doubtful_units(manifest, available)),
         lines=table.lines,
         events=events,
     )
@@ -186,17 +187,17 @@ def _has_time(manifest: ReadManifest, table: ColumnTable, columns: AvailableColu
 
 
 def _times(
-    manifest: ReadManifest, table: ColumnTable, found: AvailableColumns
+    manifest: ReadManifest, table: ColumnTable, available: AvailableColumns
 ) -> tuple[Numbers, float, tuple[str, ...]]:
     """Return the time of each row (s), what was subtracted from it, and what was chosen for it, in words.
 
     Raises ConfigError.
     """
     parts = manifest.expressions["time"]
-    missing = not any(map(found.has, parts))
-    given = None if missing and manifest.keys.rate_hz else found.value("time", parts, "time")
+    missing = not any(map(available.has, parts))
+    given = None if missing and manifest.keys.rate_hz else available.value("time", parts, "time")
     if given is not None:
-        unit = "" if found.unit(found.chosen(parts), "time") else _unit_since_1970(given[0])
+        unit = "" if available.unit(available.chosen(parts), "time") else _unit_since_1970(given[0])
         notes = (f"the time is in {unit} since 1970",) if unit else ()
         factor, origin = TO_SI["time"].get(unit, 1.0), _origin(given[0])
         return (given[0] - origin) * factor, origin * factor, notes
@@ -240,7 +241,7 @@ def _channels(
                 f"{manifest.place}: channels: {name!r} cannot be the name of a channel: write small letters, digits "
                 "and underscores, a letter first, and no name of a channel of every gripper"
             )
-        values = columns.computed(f"channels.{name}", lambda one=expression: one.values(columns, len(table)))  # type: ignore[misc]
+        values = columns.computed(f"channels.{name}", partial(expression.values, columns, len(table)))
         if name in manifest.fast:
             values = values.reshape(len(values), -1)
         (scalars if values.ndim == 1 else arrays)[name] = values
@@ -249,7 +250,7 @@ def _channels(
 
 
 def _shapes(
-    manifest: ReadManifest, table: ColumnTable, found: AvailableColumns, arrays: Mapping[str, Numbers]
+    manifest: ReadManifest, table: ColumnTable, available: AvailableColumns, arrays: Mapping[str, Numbers]
 ) -> dict[str, tuple[int, ...]]:
     """Return the shape of each channel that is computed from a column with a shape, such as an image.
 
@@ -258,7 +259,7 @@ def _shapes(
     shapes: dict[str, tuple[int, ...]] = {}
     for name, values in arrays.items():
         width = values.shape[1]
-        columns = manifest.channels[name].columns(tuple(found))
+        columns = manifest.channels[name].columns(tuple(available))
         known = [table.shapes[column] for column in columns if column in table.shapes]
         # An expression may have taken some of the cells.
         if known and math.prod(known[-1]) == width:

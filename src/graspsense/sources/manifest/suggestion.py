@@ -43,23 +43,10 @@ _STAMP: Final = re.compile(r"(?P<text>.*?)(?P<gap>[-_ ]?)(?P<stamp>\d{8}[T_-]?\d
 _NUMBER: Final = re.compile(r"(?P<text>.*?)(?P<gap>[-_ ]?)(?P<number>\d+)(?P<end>)")
 _OF_A_SET: Final = re.compile("train|test|valid")
 _LABELS: Final = frozenset(["label", "class", "object", "material", "kind", "fruit", "target", "item"])
-_PARTS: Final = frozenset(
-    [
-        "trial",
-        "grasp",
-        "tap",
-        "squeeze",
-        "episode",
-        "run",
-        "id",
-        "seq",
-        "test",
-        "touch",
-        "press",
-        "repetition",
-        "rep",
-    ]
-)
+_PARTS: Final = frozenset({
+    "trial", "grasp", "tap", "squeeze", "episode", "run", "id", "seq", "test", "touch", "press", "repetition",
+    "rep"
+})  # fmt: skip
 _MOST_LABELS: Final = 100
 _ALIKE: Final = 3
 """Most arrays of a file with the same name but for its number that are not taken for grasps."""
@@ -181,12 +168,12 @@ def _pieces(values: Sequence[str]) -> list[tuple[str, Sequence[str]]]:
         return [("number", list(values))]
     for what, pattern in (("stamp", _STAMP), ("number", _NUMBER)):
         matches = [match for value in values if (match := pattern.fullmatch(value)) is not None]
-        if len(matches) == len(values) and len({(one["gap"], one["end"]) for one in matches}) == 1:
-            texts = [one["text"] for one in matches]
-            middle = [one[what] for one in matches]
-            found: list[tuple[str, Sequence[str]]] = [*_pieces(texts), ("same", [matches[0]["gap"]])]
-            found.append(("same", middle) if len(set(middle)) == 1 else (what, middle))
-            return [*found, ("same", [matches[0]["end"]])]
+        if len(matches) == len(values) and len({(match["gap"], match["end"]) for match in matches}) == 1:
+            texts = [match["text"] for match in matches]
+            middle = [match[what] for match in matches]
+            pieces: list[tuple[str, Sequence[str]]] = [*_pieces(texts), ("same", [matches[0]["gap"]])]
+            pieces.append(("same", middle) if len(set(middle)) == 1 else (what, middle))
+            return [*pieces, ("same", [matches[0]["end"]])]
     ending = _common_ending(values)
     if ending:
         return [*_pieces([value.removesuffix(ending) for value in values]), ("same", [ending])]
@@ -234,7 +221,7 @@ def _start(path: Path) -> tuple[str, int] | None:
     names = next((line for line, count in again.most_common(1) if count > 1), None)
     if names is None:
         return None
-    begins = [before for before, line in pairwise(lines) if line == names]
+    begins = [number for number, line in pairwise(lines) if line == names]
     rows = [line.split(",") for line in begins]
     if len(begins) < 2 or len({len(row) for row in rows}) > 1 or len(rows[0]) == len(names.split(",")):
         return None
@@ -258,7 +245,7 @@ def _array_pattern(path: Path) -> tuple[str, tuple[int, ...]]:
     for name in arrays:
         if re.search(r"\d+", name):
             shapes.setdefault(re.sub(r"\d+", "#", name), []).append(name)
-    many = {shape: found for shape, found in shapes.items() if len(found) > _ALIKE}
+    many = {shape: alike for shape, alike in shapes.items() if len(alike) > _ALIKE}
     if not many:
         return "", ()
     most = max(many, key=lambda shape: len(many[shape]))
@@ -267,10 +254,10 @@ def _array_pattern(path: Path) -> tuple[str, tuple[int, ...]]:
         names = ("object", *(f"number{k}" for k in range(2, most.count("#") + 1)))
         pieces = most.split("#")
         return pieces[0] + "".join(f"{{{a}:d}}{b}" for a, b in zip(names, pieces[1:], strict=True)), shape
-    many = {shape: found for shape, found in many.items() if shape.count("#") == 1}
+    many = {shape: alike for shape, alike in many.items() if shape.count("#") == 1}
     ends = {shape.partition("#")[2] for shape in many}
     starts = {shape.partition("#")[0] for shape in many}
-    signs = {one[-1:] for one in starts}
+    signs = {start[-1:] for start in starts}
     start = f"{{label}}{signs.pop()}" if signs in ({"_"}, {"/"}, {"."}) else "{label}"
     if len(ends) == 1:
         return f"{start}{{order:d}}{ends.pop()}", shape

@@ -64,7 +64,7 @@ class ColumnTable:
         if name in self.texts:
             values = set(self.texts[name])
         elif name in self.numbers and self.numbers[name].ndim == 1:
-            values = {_shown(float(one)) for one in np.unique(self.numbers[name])}
+            values = {_shown(float(number)) for number in np.unique(self.numbers[name])}
         else:
             return None
         if len(values) != 1:

@@ -48,11 +48,11 @@ def read_text(path: Path, start: str = "") -> list[ColumnTable]:
     lines, ended = read_lines(path)
     parts = list(_parts(lines, start))
     several = len(parts) > 1
-    found = [
+    read = [
         _part_table(path, part, ended=ended or k < len(parts), several=several)
         for k, part in enumerate(parts, 1)
     ]
-    tables = [table for table in found if table is not None]
+    tables = [table for table in read if table is not None]
     if not tables:
         what = f"no line of it matches start = {start!r}" if start else "it has no line with columns"
         raise DataDamaged(f"{path} has no recording: {what}")
@@ -156,13 +156,13 @@ def _unit_in(heading: str) -> str:
 
 def _names(names: Sequence[str]) -> list[str]:
     """Return a name for each column: a second one of the same name gets `.1` behind it, as pandas writes it."""
-    found: dict[str, None] = {}
+    ordered: dict[str, None] = {}
     repeats: dict[str, int] = {}
     for k, given in enumerate(names):
         name = given or (INDEX if k == 0 else f"c{k + 1}")
         again = repeats.get(name, 0)
-        while (name if not again else f"{name}.{again}") in found:
+        while (name if not again else f"{name}.{again}") in ordered:
             again += 1
         repeats[name] = again
-        found[f"{name}.{again}" if again else name] = None
-    return list(found)
+        ordered[f"{name}.{again}" if again else name] = None
+    return list(ordered)

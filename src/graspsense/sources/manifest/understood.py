@@ -54,17 +54,17 @@ def understood_file(path: Path) -> UnderstoodFile:
                 channel_facts(name, unit, values, t_s if known else None, max(ends, default=None))
             )
             courses[name] = (t_s, values if values.ndim == 1 else values.sum(axis=1))
-    force, found = _squeezes(timed)
+    force, squeezed = _squeezes(timed)
     likely = [guess for table in shown for guess in guesses(table) if guess.value and guess.key != "rate_hz"]
     return UnderstoodFile(
         path=path,
         tables=len(tables),
         channels=tuple(channels),
         courses=courses,
-        squeezes=found,
+        squeezes=squeezed,
         force=force,
         notes=tables[0].notes + tables[0].warnings,
-        suggested=tuple(f'{one.key} = "{one.value}"' for one in likely),
+        suggested=tuple(f'{guess.key} = "{guess.value}"' for guess in likely),
     )
 
 
@@ -75,7 +75,7 @@ def _times(table: ColumnTable) -> tuple[Numbers, bool]:
     name = time_column(table)
     if name is None:
         return np.arange(len(table), dtype=np.float64), False
-    guess = next(one for one in guesses(table) if one.key == "time")
+    guess = next(guess for guess in guesses(table) if guess.key == "time")
     unit = guess.value.rpartition("[")[2].rstrip("]") if guess.value.endswith("]") else ""
     values = table.numbers[name]
     factor = TO_S.get(unit, 1.0) if unit else TO_S[_unit_since_1970(float(values[0]))]
@@ -98,10 +98,10 @@ def _squeezes(
         force = np.nan_to_num(np.sum(parts, axis=0))
         columns = GraspColumns(source=table.source, t_s=t_s, gap_m=force, left_n=force, right_n=force)
         try:
-            found = squeezes(columns)
+            spans = squeezes(columns)
         except DataDamaged:
             return names[0], ()
-        return ", ".join(names), tuple(_held(squeeze) for squeeze in found)
+        return ", ".join(names), tuple(_held(squeeze) for squeeze in spans)
     return "", ()
 
 
