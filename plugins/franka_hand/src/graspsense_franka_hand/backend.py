@@ -108,19 +108,19 @@ class FrankaBackend(SensorBackend[FrankaConfig]):
         try:
             if config.host == EMULATED:
                 link: HandLink = LockStepHand(config, seed)
-                first = link.newest(1.0)
-                assert first is not None
+                state = link.newest(1.0)
+                assert state is not None
             else:
                 link = LibfrankaLink(config.host)
-                first = link.first
+                state = link.first
         except HandGone as error:
             raise NoDevice(
                 f"no Franka Hand at {config.host}: {error}. Look at gripper.host, at the cable to the control, whether "
                 "FCI is active in Desk, and whether another program has the hand"
             ) from error
-        self._link, self._state = link, first
-        self._began_s = self._last_s = first.host_s
-        self._recent: deque[tuple[float, float]] = deque([(0.0, first.width_m)])
+        self._link, self._state = link, state
+        self._began_s = self._last_s = state.host_s
+        self._recent: deque[tuple[float, float]] = deque([(0.0, state.width_m)])
         self._frames = self._sent = 0
         self._velocity_m_s = 0.0
         self._asked, self._waiting = Order(STOP), None
@@ -158,9 +158,9 @@ class FrankaBackend(SensorBackend[FrankaConfig]):
         order = self._order(command)
         if order is None or order == self._asked or self._link is None:
             return
-        before, self._asked = self._asked, order
+        previous, self._asked = self._asked, order
         busy = self._state.done < self._sent
-        if busy and before.kind == GRASP and order.kind == GRASP:
+        if busy and previous.kind == GRASP and order.kind == GRASP:
             # A hand that is interrupted too often no longer answers: the running grasp ends at the thing by itself.
             self._waiting = order
             return

@@ -48,11 +48,11 @@ class Point:
     """A point on a body, in the frame of the body (m)."""
 
     body: str
-    at: tuple[float, ...]
+    position_m: tuple[float, ...] = field(alias="at")
 
     def __attrs_post_init__(self) -> None:
-        if len(self.at) != 3:
-            raise ValueError(f"at has {len(self.at)} numbers: a point has three")
+        if len(self.position_m) != 3:
+            raise ValueError(f"at has {len(self.position_m)} numbers: a point has three")
 
 
 @frozen(kw_only=True)
@@ -253,8 +253,8 @@ def _menagerie_path(robot: str, entry: str) -> Path:
             "pip install mujoco-menagerie"
         ) from error
     try:
-        found = menagerie.get(robot)
-        return Path(found.xml(entry or found.default_model))
+        repository = menagerie.get(robot)
+        return Path(repository.xml(entry or repository.default_model))
     except LookupError as error:
         raise ConfigError(f"gripper.file: MuJoCo Menagerie has no menagerie:{robot}: {error}") from error
     except (menagerie.MenagerieError, OSError, ValueError) as error:

@@ -198,10 +198,10 @@ def read_scene(name: str, around: str = "") -> SceneModel:
     if scene.walls is not None:
         thing, spec = Thing(walls=scene.walls), scene.walls.spec(scene.thing)
     else:
-        thing, found = thing_named(scene.thing, beside)
-        if found is None:
+        thing, known = thing_named(scene.thing, beside)
+        if known is None:
             return SceneModel(scene, thing, None, "")
-        spec = found
+        spec = known
     return SceneModel(scene, thing, spec, f"{name.partition(':')[0]}#{instance}" if number else "")
 
 
@@ -225,7 +225,7 @@ def _check_schedule(name: str, rows: Schedule) -> None:
             f"{name} is a list of pairs of a time (s) and a value, as in [[0.3, 0.0], [0.8, 0.05]]"
         )
     times = [row[0] for row in rows]
-    if any(after <= before for before, after in pairwise(times)):
+    if any(later_s <= earlier_s for earlier_s, later_s in pairwise(times)):
         raise ValueError(f"the times of {name} rise from pair to pair")
 
 

@@ -199,24 +199,26 @@ class Pr2Backend(SensorBackend[Pr2Config]):
 
     def _described(self, opened: Opened) -> DeviceInfo:
         config, identity, emulation = self.config, opened.identity, opened.emulation
-        found = calibrations_of(config.calibration, identity.serial, device_numbers(identity))
+        stored = calibrations_of(config.calibration, identity.serial, device_numbers(identity))
         self._measure = Measure(
             identity,
             config,
-            stored_zero(found["tare"]) if "tare" in found else None,
-            stored_tables(found["load-cell"]) if "load-cell" in found else None,
-            stored_gain(found["gain"]) if "gain" in found else None,
+            stored_zero(stored["tare"]) if "tare" in stored else None,
+            stored_tables(stored["load-cell"]) if "load-cell" in stored else None,
+            stored_gain(stored["gain"]) if "gain" in stored else None,
         )
         self._effort_limit_n = min(identity.effort_limit_un / 1e6, EFFORT_CEILING_N)
         self._speed_limit_m_s = min(identity.speed_limit_um_s / 1e6, SPEED_CEILING_M_S)
         self._sent = self._echo = self._lost = 0
         self._heard_us = 0
-        notes = [f"calibration {kind} of {calibration.made} is in use" for kind, calibration in found.items()]
+        notes = [
+            f"calibration {kind} of {calibration.made} is in use" for kind, calibration in stored.items()
+        ]
         friction_n = FRICTION_N
-        if config.calibration not in ("", UNCALIBRATED) and not found:
+        if config.calibration not in ("", UNCALIBRATED) and not stored:
             notes.append(f"{config.calibration} has no calibration of {identity.serial}: uncalibrated")
-        if "friction" in found:
-            _, closing, _ = stored_friction(found["friction"])
+        if "friction" in stored:
+            _, closing, _ = stored_friction(stored["friction"])
             friction_n = max(closing, default=FRICTION_N)
             notes.append(f"breakaway {min(closing, default=FRICTION_N):.1f} to {friction_n:.1f} N, closing")
         if config.accelerometer and not identity.accelerometer_g:
@@ -238,7 +240,7 @@ class Pr2Backend(SensorBackend[Pr2Config]):
             relaxed=Command(EFFORT, 0.0, math.inf, math.inf),
             tare_images=TARE_IMAGES,
             numbers=device_numbers(identity),
-            calibration={kind: calibration.sha256 for kind, calibration in found.items()},
+            calibration={kind: calibration.sha256 for kind, calibration in stored.items()},
             notes=tuple(notes),
             friction_n=friction_n,
             status_bits=status_bits(config.swap_fingers),

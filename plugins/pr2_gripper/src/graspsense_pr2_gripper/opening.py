@@ -112,15 +112,15 @@ def _open_transport(config: Pr2Config, wait_s: float) -> Transport:
 def _hidraw(config: Pr2Config) -> tuple[Sequence[Callable[[], Transport]], NoDevice]:
     from graspsense_pr2_gripper.transports.hidraw import HidrawTransport
 
-    found = search(config)
+    listing = search(config)
     missing = NoDevice(
-        f"no PR2 gripper: searched for {found.wanted}\n"
-        f"  {found.looked}\n"
+        f"no PR2 gripper: searched for {listing.wanted}\n"
+        f"  {listing.looked}\n"
         "  try: plug it in and switch it on, then `graspsense devices`\n"
         "       other USB ids: -o gripper.vendor_id=0x1209 -o gripper.product_id=0x0001\n"
         "       no gripper at hand: -o gripper.transport=emulated, or `graspsense run --gripper sim`"
     )
-    return [partial(HidrawTransport, device) for device in found.matching], missing
+    return [partial(HidrawTransport, device) for device in listing.matching], missing
 
 
 def _pyusb(config: Pr2Config) -> tuple[Sequence[Callable[[], Transport]], NoDevice]:

@@ -127,8 +127,8 @@ class So101Backend(SensorBackend[So101Config]):
         arm = read_arm_calibration(Path(config.arm_calibration)) if config.arm_calibration else None
         serial = serial_number(config, config.port)
         numbers = {"jaw_length_m": config.jaw_length_m, "force_from": config.force_from}
-        found = calibrations_of(config.calibration, serial, numbers)
-        self._force = ForceOfMotor(config, found)
+        stored = calibrations_of(config.calibration, serial, numbers)
+        self._force = ForceOfMotor(config, stored)
         self._frames = self._retries = 0
         self._exchange_s = 0.0
         try:
@@ -149,7 +149,7 @@ class So101Backend(SensorBackend[So101Config]):
         self._began_s = self._last_s = self._due_s = self._time.monotonic()
         self._recent: deque[tuple[float, float]] = deque(maxlen=SLOPE_FRAMES)
         firmware = [REGISTERS[f"firmware_{part}_version"].number(memory) for part in ("major", "minor")]
-        return self._described(serial, ".".join(map(str, firmware)), numbers, found)
+        return self._described(serial, ".".join(map(str, firmware)), numbers, stored)
 
     def read(self, timeout_s: float) -> Reading | None:
         """Wait for the next multiple of 10 ms, then read the motor. Raises DeviceLost."""
@@ -295,7 +295,7 @@ class So101Backend(SensorBackend[So101Config]):
             ) from error
 
     def _described(
-        self, serial: str, firmware: str, numbers: Mapping[str, float | str], found: Mapping[str, Any]
+        self, serial: str, firmware: str, numbers: Mapping[str, float | str], stored: Mapping[str, Any]
     ) -> DeviceInfo:
         emulated, config = self._emulated is not None, self.config
         measured = (
@@ -316,7 +316,7 @@ class So101Backend(SensorBackend[So101Config]):
             speed_limit_m_s=SPEED_LIMIT_M_S,
             opening=Command(POSITION, self._jaw.stroke_m, inf, 0.05),
             relaxed=Command(VELOCITY, 0.0, inf, inf),
-            calibration={kind: one.sha256 for kind, one in found.items()},
+            calibration={kind: calibration.sha256 for kind, calibration in stored.items()},
             numbers=numbers,
             status_bits=STATUS_BITS,
             notes=(measured, *(("emulated: no gripper was touched",) if emulated else ())),

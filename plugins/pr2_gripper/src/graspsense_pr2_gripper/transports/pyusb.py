@@ -29,7 +29,7 @@ def find(config: Pr2Config) -> list[Any]:
     try:
         core, util = import_module("usb.core"), import_module("usb.util")
         devices = core.find(find_all=True, idVendor=config.vendor_id, idProduct=config.product_id)
-        found = list(devices)
+        plugged = list(devices)
     except ImportError as error:
         raise PluginUnavailable(f"transport pyusb needs pyusb: {error}\n  try: pip install pyusb") from error
     except core.NoBackendError as error:
@@ -38,9 +38,9 @@ def find(config: Pr2Config) -> list[Any]:
             "  try: apt install libusb-1.0-0, or -o gripper.transport=hidraw"
         ) from error
     if not config.serial:
-        return found
+        return plugged
     wanted = []
-    for device in found:
+    for device in plugged:
         try:
             serial = util.get_string(device, device.iSerialNumber)
         except (ValueError, core.USBError):
