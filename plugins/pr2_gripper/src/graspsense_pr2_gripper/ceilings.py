@@ -95,7 +95,7 @@ def refuse_implausible(identity: Identity) -> None:
             f"the board {identity.serial!r} says of itself what no PR2 gripper has, so it is not used:\n  "
             + "\n  ".join(wrong)
             + "\n  try: correct the feature report in its firmware (specs/pr2_hid.md, report 3);\n"
-            "       or name another board with -o gripper.serial"
+            "       or name another board in gripper.serial"
         )
 
 

@@ -41,7 +41,7 @@ def diagnose(config: object, timeout_s: float) -> Iterator[Finding]:
         return
     wanted = config if isinstance(config, Pr2Config) else Pr2Config()
     yield from _libraries()
-    if wanted.transport == "emulated":
+    if wanted.emulated:
         yield Finding("device", "note", "gripper.transport is emulated, so no device is searched")
         return
     listing = search(wanted)
