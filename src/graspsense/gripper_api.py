@@ -9,18 +9,31 @@ from graspsense.core.components.lazy_names import LazyNames, Table
 _TABLE: Final[Table] = {
     "Finding devices and their faults": {
         "core.components.entries": ("FoundDevice", "Finding"),
-        "core.components.serial_converters": ("converter_findings", "found_converters", "port_failed"),
+        "core.components.serial_converters": (
+            "converter_findings",
+            "found_converters",
+            "port_failed",
+            "why_not_opened",
+        ),
+        "core.components.caller": ("set_option",),
         "core.values.faults": ("StatusBit",),
         "core.values.errors": ("TareRefused", "GraspsenseError"),
     },
     "Emulated devices": {
         "core.components.emulated": ("EmulatedDevice",),
         "core.components.emulated_port": ("EmulatedPort",),
-        "core.components.emulated_serial": ("EmulatedSerial", "SerialFaults"),
+        "core.components.emulated_serial": ("EmulatedSerial", "EmulatorFaults", "SerialFaults"),
+        "core.grasp.emulated_body": (
+            "BackendWithEmulator",
+            "EmulatorSettings",
+            "opened_body",
+            "own_keys_first",
+        ),
         "core.grasp.emulated_fingers": ("EmulatedFingers", "FingerTarget"),
         "core.components.entries": ("EmulatorEntry",),
     },
-    "Reading threads and clocks of devices": {
+    "Polling, reading threads and clocks of devices": {
+        "core.grasp.polling": ("Polling",),
         "core.grasp.reading_thread": ("ReadingThread",),
         "core.grasp.device_clock": ("DeviceClock", "clock_report"),
     },

@@ -6,6 +6,8 @@ from graspsense.core.components.entries import Finding as Finding
 from graspsense.core.components.serial_converters import converter_findings as converter_findings
 from graspsense.core.components.serial_converters import found_converters as found_converters
 from graspsense.core.components.serial_converters import port_failed as port_failed
+from graspsense.core.components.serial_converters import why_not_opened as why_not_opened
+from graspsense.core.components.caller import set_option as set_option
 from graspsense.core.values.faults import StatusBit as StatusBit
 from graspsense.core.values.errors import TareRefused as TareRefused
 from graspsense.core.values.errors import GraspsenseError as GraspsenseError
@@ -14,12 +16,18 @@ from graspsense.core.values.errors import GraspsenseError as GraspsenseError
 from graspsense.core.components.emulated import EmulatedDevice as EmulatedDevice
 from graspsense.core.components.emulated_port import EmulatedPort as EmulatedPort
 from graspsense.core.components.emulated_serial import EmulatedSerial as EmulatedSerial
+from graspsense.core.components.emulated_serial import EmulatorFaults as EmulatorFaults
 from graspsense.core.components.emulated_serial import SerialFaults as SerialFaults
+from graspsense.core.grasp.emulated_body import BackendWithEmulator as BackendWithEmulator
+from graspsense.core.grasp.emulated_body import EmulatorSettings as EmulatorSettings
+from graspsense.core.grasp.emulated_body import opened_body as opened_body
+from graspsense.core.grasp.emulated_body import own_keys_first as own_keys_first
 from graspsense.core.grasp.emulated_fingers import EmulatedFingers as EmulatedFingers
 from graspsense.core.grasp.emulated_fingers import FingerTarget as FingerTarget
 from graspsense.core.components.entries import EmulatorEntry as EmulatorEntry
 
-# Reading threads and clocks of devices
+# Polling, reading threads and clocks of devices
+from graspsense.core.grasp.polling import Polling as Polling
 from graspsense.core.grasp.reading_thread import ReadingThread as ReadingThread
 from graspsense.core.grasp.device_clock import DeviceClock as DeviceClock
 from graspsense.core.grasp.device_clock import clock_report as clock_report

@@ -249,10 +249,10 @@ REQUESTS = st.one_of(
 def test_requests_in_any_pieces_are_taken(given_requests, size):
     data = b"".join(request_bytes(command, k, *values) for k, (command, *values) in enumerate(given_requests))
     requests = HandRequests()
-    found = [
+    taken = [
         request for start in range(0, len(data), size) for request in requests.fed(data[start : start + size])
     ]
-    assert found == [
+    assert taken == [
         HandRequest(command, k, tuple(values)) for k, (command, *values) in enumerate(given_requests)
     ]
 

@@ -170,10 +170,10 @@ def test_a_hand_that_answers_is_listed_and_goes_on(emulated):
     assert list(found_devices(PATIENT_S, hand.where)) == []
     assert driver.read(PATIENT_S).frame.gap_m > 0.0
     driver.close()
-    before = hand.state()
+    earlier = hand.state()
     [device] = found_devices(PATIENT_S, hand.where)
     assert (device.backend, device.where, device.ready) == ("franka", hand.where, True)
-    assert hand.state()["pressing"] == before["pressing"]
+    assert hand.state()["pressing"] == earlier["pressing"]
 
 
 def test_another_version_is_listed_as_not_ready_and_another_device_is_not(emulated):

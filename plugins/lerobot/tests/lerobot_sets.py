@@ -51,8 +51,8 @@ def features(names: Sequence[str], version: int) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def table(states: Sequence[np.ndarray], numbers: Sequence[int], tasks: Sequence[int], first: int) -> pa.Table:
-    lengths = [len(one) for one in states]
+def table(states: Sequence[np.ndarray], numbers: Sequence[int], tasks: Sequence[int], start: int) -> pa.Table:
+    lengths = [len(state) for state in states]
     state = np.concatenate(states).astype(np.float32)
     frame = np.concatenate([np.arange(n) for n in lengths])
     return pa.table(
@@ -62,7 +62,7 @@ def table(states: Sequence[np.ndarray], numbers: Sequence[int], tasks: Sequence[
             "timestamp": pa.array((frame / FPS).astype(np.float32)),
             "frame_index": pa.array(frame),
             "episode_index": pa.array(np.repeat(numbers, lengths)),
-            "index": pa.array(first + np.arange(len(frame))),
+            "index": pa.array(start + np.arange(len(frame))),
             "task_index": pa.array(np.repeat(tasks, lengths)),
         }
     )
@@ -107,7 +107,7 @@ def write_set(
     """Write a data set of these episodes, whose tasks alternate; `changed` are keys of `meta/info.json`."""
     states = [episode(), episode(2, peak=3.0), episode(peak=5.0)] if states is None else states
     tasks = ["pick the red cup", "squeeze: sponge"]
-    lengths = [len(one) for one in states]
+    lengths = [len(state) for state in states]
     starts = np.concatenate([[0], np.cumsum(lengths)])
     (folder / "meta").mkdir(parents=True)
     (folder / "meta/info.json").write_text(json.dumps(info(version, states, names, changed)))

@@ -23,9 +23,9 @@ from graspsense_lerobot.reader import recordings
 
 
 def read(place: object) -> list[LabelledRecording]:
-    found = list(recordings(str(place)))
-    assert all(isinstance(recording, LabelledRecording) for recording in found)
-    return found  # type: ignore[return-value]
+    records = list(recordings(str(place)))
+    assert all(isinstance(recording, LabelledRecording) for recording in records)
+    return records  # type: ignore[return-value]
 
 
 def column(recording: LabelledRecording, name: str) -> np.ndarray:
@@ -34,23 +34,23 @@ def column(recording: LabelledRecording, name: str) -> np.ndarray:
 
 @pytest.mark.parametrize("version", [2, 3])
 def test_each_squeeze_of_an_episode_is_a_trial_with_its_task_as_label(tmp_path, version):
-    found = read(write_set(tmp_path / "set", version))
-    assert [one.label for one in found] == [
+    squeezes = read(write_set(tmp_path / "set", version))
+    assert [squeeze.label for squeeze in squeezes] == [
         "pick_the_red_cup", "squeeze-_sponge", "squeeze-_sponge", "pick_the_red_cup",
     ]  # fmt: skip
-    assert [int(one.order) for one in found] == [0, 1, 1, 2]
+    assert [int(squeeze.order) for squeeze in squeezes] == [0, 1, 1, 2]
     # Four cells of 1, 2, 2 and 1 parts of the peak press along z; shear is not part of the force.
-    assert [float(column(one, "force_left_n").max()) for one in found] == pytest.approx(
+    assert [float(column(squeeze, "force_left_n").max()) for squeeze in squeezes] == pytest.approx(
         [24.0, 18.0, 19.5, 30.0], rel=1e-5
     )
     arrays = {
-        channel.name: channel for channel in found[0].recording.channels if hasattr(channel, "components")
+        channel.name: channel for channel in squeezes[0].recording.channels if hasattr(channel, "components")
     }
     assert {name: (array.cells, array.components) for name, array in arrays.items()} == {
         "f0": (4, 3),
         "f1": (4, 3),
     }
-    cells = np.array([reading.signals.f0.cells for reading in found[0].recording.readings])
+    cells = np.array([reading.signals.f0.cells for reading in squeezes[0].recording.readings])
     assert cells[:, 1, 2].max() == pytest.approx(8.0, rel=1e-5)
     assert cells[:, 1, 0].max() == pytest.approx(0.8, rel=1e-5)
 
@@ -63,15 +63,15 @@ def test_both_versions_of_the_same_episodes_are_the_same_trials(tmp_path):
 
 
 def test_videos_stay_and_are_linked_by_the_time_of_the_trial(tmp_path):
-    found = read(write_set(tmp_path / "set", 3))
-    lines = [line for line in found[3].recording.notes if "video" in line]
+    squeezes = read(write_set(tmp_path / "set", 3))
+    lines = [line for line in squeezes[3].recording.notes if "video" in line]
     assert ["videos/observation.images.wrist/chunk-000/file-000.mp4" in line for line in lines] == [True]
     assert f"from {270 / FPS:.3f} s" in lines[0]
 
 
 def test_the_moments_of_closing_and_contact_are_told(tmp_path):
-    one = read(write_set(tmp_path / "set", 3, [episode()]))[0]
-    line = next(line for line in one.recording.notes if "contact" in line)
+    squeeze = read(write_set(tmp_path / "set", 3, [episode()]))[0]
+    line = next(line for line in squeeze.recording.notes if "contact" in line)
     numbers = [float(word) for word in line.replace(",", " ").split() if word.replace(".", "").isdigit()]
     # The gripper closes in a third of the episode of 3 s, and touches at 60 % of that.
     assert numbers[0] <= 0.1
@@ -113,8 +113,8 @@ def test_a_gripper_in_radians_is_told(tmp_path):
 def test_a_gripper_whose_number_grows_while_it_closes_is_told(tmp_path):
     state = episode()
     state[:, 1] = 100.0 - state[:, 1]
-    one = read(write_set(tmp_path / "set", 3, [state]))[0]
-    assert any("gap_m_per_unit=-" in notice for notice in one.notices)
+    squeeze = read(write_set(tmp_path / "set", 3, [state]))[0]
+    assert any("gap_m_per_unit=-" in notice for notice in squeeze.notices)
 
 
 def test_another_frame_rate_is_told_and_mended(tmp_path):
@@ -142,7 +142,7 @@ def test_missing_frames_are_told_and_divide_the_episode(tmp_path):
     rows = pq.read_table(episodes).to_pydict()
     pq.write_table(pa.table({**rows, "length": [len(kept)]}), episodes)
     assert any("gaps=cut" in notice for notice in read(folder)[0].notices)
-    assert [len(one.recording.readings) for one in read(f"{folder}?gaps=cut")] == [88, 84]
+    assert [len(squeeze.recording.readings) for squeeze in read(f"{folder}?gaps=cut")] == [88, 84]
 
 
 def test_a_gripper_from_0_to_1_is_told(tmp_path):
@@ -155,22 +155,22 @@ def test_a_gripper_from_0_to_1_is_told(tmp_path):
 def test_frames_without_a_number_are_told_and_left_out(tmp_path, value):
     state = episode()
     state[10, 1] = value
-    one = read(write_set(tmp_path / "set", 3, [state]))[0]
-    assert len(one.recording.readings) == 89
-    assert any("without a number" in notice for notice in one.notices)
+    squeeze = read(write_set(tmp_path / "set", 3, [state]))[0]
+    assert len(squeeze.recording.readings) == 89
+    assert any("without a number" in notice for notice in squeeze.notices)
 
 
 def test_the_load_of_the_motor_is_the_force_where_nothing_feels(tmp_path):
     state = episode()[:, :3]
-    one = read(write_set(tmp_path / "set", 3, [state], NAMES[:3]))[0]
-    assert one.recording.units["force_left"] == "%"
-    assert column(one, "force_left_n").max() == pytest.approx(50.0)
+    squeeze = read(write_set(tmp_path / "set", 3, [state], NAMES[:3]))[0]
+    assert squeeze.recording.units["force_left"] == "%"
+    assert column(squeeze, "force_left_n").max() == pytest.approx(50.0)
 
 
 def test_a_load_in_newtons_is_the_effort_too(tmp_path):
     folder = write_set(tmp_path / "set", 3, [episode()[:, :3]], NAMES[:3])
-    one = read(f"{folder}?gap_m_per_unit=0.001&force_n_per_unit=0.2")[0]
-    assert column(one, "effort_n").max() == pytest.approx(10.0)
+    squeeze = read(f"{folder}?gap_m_per_unit=0.001&force_n_per_unit=0.2")[0]
+    assert column(squeeze, "effort_n").max() == pytest.approx(10.0)
     done = CliRunner().invoke(
         cli,
         ["import", f"lerobot:{folder}?gap_m_per_unit=0.001&force_n_per_unit=0.2", "--save", str(tmp_path / "s"),
@@ -223,9 +223,9 @@ def test_numbered_joints_are_no_cells():
 
 def test_numbers_that_sound_like_touch_and_are_not_understood_are_told(tmp_path):
     names = [*NAMES[:3], "touch of thumb", *NAMES[4:]]
-    found = read(write_set(tmp_path / "set", 3, names=names))
-    assert any("touch of thumb" in notice for notice in found[0].notices)
-    assert any("not used: shoulder.pos" in note for note in found[0].recording.notes)
+    squeezes = read(write_set(tmp_path / "set", 3, names=names))
+    assert any("touch of thumb" in notice for notice in squeezes[0].notices)
+    assert any("not used: shoulder.pos" in note for note in squeezes[0].recording.notes)
 
 
 @pytest.mark.parametrize("names", [{"motors": NAMES[:9], "cells": NAMES[9:]}, [NAMES], {"axes": [NAMES]}])
@@ -245,16 +245,16 @@ def test_of_two_arms_the_load_is_that_of_the_chosen_gripper(tmp_path):
     (refused,) = recordings(str(folder))
     assert isinstance(refused, UnreadableRecording)
     assert "right_gripper.pos" in str(refused.error)
-    one = read(f"{folder}?gap=right_gripper.pos")[0]
-    assert column(one, "force_left_n").max() == pytest.approx(50.0)
-    assert [channel.name for channel in one.recording.channels] == ["right_gripper_load"]
+    squeeze = read(f"{folder}?gap=right_gripper.pos")[0]
+    assert column(squeeze, "force_left_n").max() == pytest.approx(50.0)
+    assert [channel.name for channel in squeeze.recording.channels] == ["right_gripper_load"]
 
 
 def test_the_unit_in_the_name_of_a_gap_needs_no_option(tmp_path):
     names = [NAMES[0], "gripper_width_mm", *NAMES[2:]]
-    one = read(write_set(tmp_path / "set", 3, names=names))[0]
-    assert "gap" not in one.recording.units
-    assert column(one, "gap_m").max() == pytest.approx(0.1, rel=1e-3)
+    squeeze = read(write_set(tmp_path / "set", 3, names=names))[0]
+    assert "gap" not in squeeze.recording.units
+    assert column(squeeze, "gap_m").max() == pytest.approx(0.1, rel=1e-3)
 
 
 @pytest.mark.parametrize("damage", [Path.unlink, lambda path: path.write_bytes(path.read_bytes()[:500])])
@@ -291,9 +291,9 @@ def test_times_that_do_not_increase_name_the_option_that_mends_them(tmp_path, ti
 def test_a_finger_that_is_not_connected_leaves_the_force_to_the_other(tmp_path):
     state = episode()
     state[:, 15:] = np.nan
-    one = read(write_set(tmp_path / "set", 3, [state]))[0]
-    assert column(one, "force_right_n").max() == pytest.approx(24.0, rel=1e-5)
-    assert any("without a number" in notice for notice in one.notices)
+    squeeze = read(write_set(tmp_path / "set", 3, [state]))[0]
+    assert column(squeeze, "force_right_n").max() == pytest.approx(24.0, rel=1e-5)
+    assert any("without a number" in notice for notice in squeeze.notices)
 
 
 def test_a_video_that_is_missing_is_told(tmp_path):
@@ -422,11 +422,11 @@ def test_a_column_of_impossible_numbers_is_told_without_a_warning_of_numpy(tmp_p
     state[:, NAMES.index(name)] = value
     folder = write_set(tmp_path / "set", 3, [state, episode()])
     try:
-        found = list(recordings(f"{folder}?gap_m_per_unit=0.001&force_n_per_unit=1"))
+        records = list(recordings(f"{folder}?gap_m_per_unit=0.001&force_n_per_unit=1"))
     except GraspsenseError:
         return
-    assert isinstance(found[-1], LabelledRecording)
-    assert all(isinstance(recording, LabelledRecording | UnreadableRecording) for recording in found)
+    assert isinstance(records[-1], LabelledRecording)
+    assert all(isinstance(recording, LabelledRecording | UnreadableRecording) for recording in records)
 
 
 @pytest.mark.parametrize("seed", range(12))

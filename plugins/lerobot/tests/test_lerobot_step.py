@@ -44,7 +44,7 @@ def processed(step, observations):
 
 
 def events(seen):
-    return [EVENTS[int(one["graspsense.event"])] for one in seen if one["graspsense.event"]]
+    return [EVENTS[int(told["graspsense.event"])] for told in seen if told["graspsense.event"]]
 
 
 def test_the_step_tells_contact_rest_and_end_of_each_grasp():
@@ -53,16 +53,16 @@ def test_the_step_tells_contact_rest_and_end_of_each_grasp():
     seen = processed(step, observations)
 
     assert events(seen) == ["contact", "rest", "end"] * 2
-    first = next(k for k, one in enumerate(seen) if one["graspsense.event"] == 1)
-    assert observations[first]["gripper.pos"] * 0.0008 == pytest.approx(0.05, abs=1e-3)
-    assert {int(one["graspsense.phase"]) for one in seen} == {
+    touch = next(k for k, told in enumerate(seen) if told["graspsense.event"] == 1)
+    assert observations[touch]["gripper.pos"] * 0.0008 == pytest.approx(0.05, abs=1e-3)
+    assert {int(told["graspsense.phase"]) for told in seen} == {
         Phase.APPROACH,
         Phase.SQUEEZE,
         Phase.HOLD,
         Phase.RELEASE,
     }
-    assert all({*one} == {*given, *ADDED} for one, given in zip(seen, observations, strict=True))
-    assert all(one["graspsense.prediction"] == 0 for one in seen)
+    assert all({*told} == {*given, *ADDED} for told, given in zip(seen, observations, strict=True))
+    assert all(told["graspsense.prediction"] == 0 for told in seen)
 
 
 def test_a_model_predicts_at_the_end_of_the_grasp(tmp_path, monkeypatch):
@@ -74,7 +74,7 @@ def test_a_model_predicts_at_the_end_of_the_grasp(tmp_path, monkeypatch):
     step = processor_step()("default", options, READING)
     # As wide, stiff and slow as the cans of the training: what is unlike them would be unknown.
     can = grasp(width_m=0.0659, stiffness_n_m=2800.0, most_n=6.5, speed_m_s=0.01)
-    (end,) = [one for one in processed(step, can) if one["graspsense.event"] == EVENTS.index("end")]
+    (end,) = [told for told in processed(step, can) if told["graspsense.event"] == EVENTS.index("end")]
 
     assert step.grasp.classes == ("can:empty_open", "can:full_open")
     assert end["graspsense.prediction"] in (1, 2)

@@ -85,10 +85,10 @@ def test_phase_event_and_prediction_have_a_meaning(written):
     means, rows = json.loads((written[0] / "meta/graspsense.json").read_text()), frames(written[0])
     own = rows[rows["episode_index"] == 0]
     contact = next(number for number, name in means["graspsense.event"].items() if name == "contact")
-    (at,) = np.flatnonzero(own["graspsense.event"] == int(contact))
+    (touch,) = np.flatnonzero(own["graspsense.event"] == int(contact))
     phases = [means["graspsense.phase"][str(number)] for number in own["graspsense.phase"]]
-    assert phases[at - 2] == "approach"
-    assert phases[at + 1] == "squeeze"
+    assert phases[touch - 2] == "approach"
+    assert phases[touch + 1] == "squeeze"
     assert means["graspsense.prediction"][str(own["graspsense.prediction"].iloc[-1])]
 
 
@@ -111,16 +111,16 @@ def test_the_raw_rate_is_kept_beside(written):
 
 
 def test_what_was_written_reads_back_as_the_same_trials(written):
-    found = list(recordings(str(written[0])))
-    assert [recording.label for recording in found] == [
+    squeezes = list(recordings(str(written[0])))
+    assert [recording.label for recording in squeezes] == [
         "pick_the_red_cup",
         "squeeze-_sponge",
         "squeeze-_sponge",
         "pick_the_red_cup",
     ]
     with Store.read(written[1]) as store:
-        assert len(found) == len(store.page(limit=10))
-    for recording, peak in zip(found, [12.0, 9.0, 9.75, 15.0], strict=True):
+        assert len(squeezes) == len(store.page(limit=10))
+    for recording, peak in zip(squeezes, [12.0, 9.0, 9.75, 15.0], strict=True):
         assert not recording.recording.units  # metres and newtons, as the metadata says
         assert max(reading.frame.force_left_n for reading in recording.recording.readings) == pytest.approx(
             peak, rel=1e-5
@@ -200,9 +200,9 @@ def annotated(request, tmp_path):
     """Return a data set of this version, its store, and its annotated copy."""
     original = write_set(tmp_path / "set", request.param)
     printed("import", f"lerobot:{original}?gap_m_per_unit=0.001", "--save", tmp_path / "s")
-    before = contents(original)
+    unchanged = contents(original)
     printed("export", tmp_path / "s", "--to", f"lerobot:{tmp_path / 'copy'}?annotate={original}")
-    assert contents(original) == before
+    assert contents(original) == unchanged
     return request.param, original, tmp_path / "copy"
 
 
@@ -226,10 +226,10 @@ def test_a_copy_has_what_it_had_and_phase_event_and_prediction(annotated):
     own = new[new["episode_index"] == 1]  # with two squeezes, and so two contacts
     contacts = [means["graspsense.event"][str(number)] for number in own["graspsense.event"] if number]
     assert contacts.count("contact") == 2
-    at = np.flatnonzero(own["graspsense.event"])
+    event_frames = np.flatnonzero(own["graspsense.event"])
     state = np.stack(own["observation.state"])
-    assert (state[at[0], 5::3] > 0.0).all()  # the cells press where contact is told
-    assert (state[at[0] - 3, 5::3] == 0.0).all()
+    assert (state[event_frames[0], 5::3] > 0.0).all()  # the cells press where contact is told
+    assert (state[event_frames[0] - 3, 5::3] == 0.0).all()
 
 
 def test_a_copy_says_what_each_trial_of_an_episode_was(annotated):
@@ -237,7 +237,8 @@ def test_a_copy_says_what_each_trial_of_an_episode_was(annotated):
     if version == 2:
         rows = [json.loads(line) for line in (copy / "meta/episodes.jsonl").read_text().splitlines()]
         trials = [
-            [(one["graspsense/label"], one["graspsense/felt"]) for one in row["graspsense"]] for row in rows
+            [(trial["graspsense/label"], trial["graspsense/felt"]) for trial in row["graspsense"]]
+            for row in rows
         ]
     else:
         table = pd.read_parquet(copy / "meta/episodes/chunk-000/file-000.parquet")
@@ -282,11 +283,11 @@ def test_the_trials_of_another_data_set_annotate_nothing(annotated, tmp_path):
 
 def test_a_copy_within_the_original_is_refused(annotated, tmp_path):
     _, original, _ = annotated
-    before = contents(original)
+    unchanged = contents(original)
     done = graspsense("export", tmp_path / "s", "--to", f"lerobot:{original / 'copy'}?annotate={original}")
     assert done.returncode == 2
     assert "not changed" in done.stderr
-    assert contents(original) == before
+    assert contents(original) == unchanged
 
 
 def test_a_damaged_file_is_copied_and_counted(tmp_path):

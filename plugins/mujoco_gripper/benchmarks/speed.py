@@ -61,7 +61,7 @@ class Noted(MujocoGripper):
         info = super().open(seed)
         self.model, self.begun = self._model, mujoco.MjData(self._model)
         self.begun.qpos[:] = self._opened().qpos
-        self.fingers = [geoms_of(self._model, one) for one in (self._gripper.left, self._gripper.right)]
+        self.fingers = [geoms_of(self._model, finger) for finger in (self._gripper.left, self._gripper.right)]
         self.axis, self.ticks = self._travel.axis, []
         set_controls, data = self._drive.set_controls, self._opened()
 

@@ -93,9 +93,9 @@ def _features(gripper: str, **settings: object) -> Mapping[str, float]:
     return dict(zip(features.names, features.values, strict=True))
 
 
-def errors(found: Mapping[str, float], true: Mapping[str, float]) -> dict[str, float]:
+def errors(features: Mapping[str, float], true: Mapping[str, float]) -> dict[str, float]:
     """Return the relative error of each feature."""
-    return {name: abs(found[name] / value - 1.0) for name, value in true.items()}
+    return {name: abs(features[name] / value - 1.0) for name, value in true.items()}
 
 
 def main() -> None:

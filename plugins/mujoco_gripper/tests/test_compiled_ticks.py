@@ -170,9 +170,9 @@ def test_a_batch_prepares_each_thing_once_and_grasps_as_one_by_one(monkeypatch):
     monkeypatch.setattr(ticks, "WORTH_COMPILING", len(things))
     batch = MujocoGripper(MujocoConfig()).run_many(FAST, things, seeds, **options)
     assert made == ["block", "can", "can#1"]
-    for one, other in zip(batch, alone, strict=True):
-        assert one.report == other.report
-        assert one.trace.force_left_n.tobytes() == other.trace.force_left_n.tobytes()
+    for grasped, other in zip(batch, alone, strict=True):
+        assert grasped.report == other.report
+        assert grasped.trace.force_left_n.tobytes() == other.trace.force_left_n.tobytes()
 
 
 def test_few_grasps_are_not_compiled():

@@ -38,7 +38,7 @@ class Values:
 def felt(grasps, **options):
     things, seeds = zip(*grasps, strict=True)
     done = GRIPPER.run_many(HYBRID, things, seeds, run=RUN, extract=Values(), **options)
-    return [(one.outcome, one.extracted, one.report["greatest_force_n"]) for one in done]
+    return [(grasped.outcome, grasped.extracted, grasped.report["greatest_force_n"]) for grasped in done]
 
 
 @pytest.fixture(scope="module")
@@ -71,7 +71,7 @@ def test_progress_is_told_and_an_unknown_thing_ends_the_batch_before_any_grasp()
     told = []
     felt(GRASPS, workers=2, progress=lambda done, total: told.append((done, total)))
     assert told[-1] == (len(GRASPS), len(GRASPS))
-    assert all(after >= before for before, after in pairwise(told))
+    assert all(after >= earlier for earlier, after in pairwise(told))
     told.clear()
     with pytest.raises(UnknownName, match="blok"):
         felt([*GRASPS, ("blok", 1)], progress=lambda done, total: told.append(done))
@@ -85,4 +85,4 @@ def test_a_controller_that_other_processes_cannot_make_again_grasps_here(alone):
     things, seeds = zip(*GRASPS, strict=True)
     own = Unregistered(HYBRID.config)
     done = GRIPPER.run_many(own, things, seeds, run=RUN, extract=Values(), workers=2)
-    assert [one.extracted for one in done] == [alone[grasp][1] for grasp in GRASPS]
+    assert [grasped.extracted for grasped in done] == [alone[grasp][1] for grasp in GRASPS]

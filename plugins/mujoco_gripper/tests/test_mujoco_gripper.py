@@ -105,9 +105,9 @@ def test_an_egg_survives_20_newtons_and_breaks_at_60():
 
 def test_a_seed_decides_the_thing():
     options = ("gripper.spread=true",)
-    first, again, other = (grasped(*options, thing="block", seed=seed) for seed in (1, 1, 2))
-    assert first.features.values == again.features.values
-    assert first.features.values != other.features.values
+    trial, again, other = (grasped(*options, thing="block", seed=seed) for seed in (1, 1, 2))
+    assert trial.features.values == again.features.values
+    assert trial.features.values != other.features.values
 
 
 def test_a_light_gripper_under_gains_for_a_heavy_one_says_so(tmp_path):

@@ -85,7 +85,7 @@ def test_the_palm_feels_gravity_and_the_motion_of_the_fingers(tmp_path):
         backend.apply(Command(POSITION, 0.05, 50.0, 0.1))
         moving.append(backend.read(1.0).signals.acceleration)
     # 0.2 m/s2 of floor noise, and 27 1/s times 0.1 m/s of gear noise.
-    assert np.concatenate([one.values for one in moving[100:]])[:, 1].std() > 5.0 * values[:, 1].std()
+    assert np.concatenate([samples.values for samples in moving[100:]])[:, 1].std() > 5.0 * values[:, 1].std()
 
 
 def scene(folder, *lines):
@@ -104,9 +104,9 @@ def test_a_thing_that_is_filled_weighs_more(tmp_path):
 
 def test_the_table_rises_as_the_scene_says(tmp_path):
     backend = opened(scene(tmp_path, "table_height = [[0.0, 0.0], [0.2, 0.02]]"))
-    before = float(backend._data.mocap_pos[0, 2])
+    resting_m = float(backend._data.mocap_pos[0, 2])
     squeezed(backend, 0.035, 1700)
-    assert backend._data.mocap_pos[0, 2] - before == pytest.approx(0.02)
+    assert backend._data.mocap_pos[0, 2] - resting_m == pytest.approx(0.02)
 
 
 def test_roughness_disturbs_cells_that_slide_and_no_others(tmp_path):

@@ -55,9 +55,9 @@ def board() -> Any:
 
 @pytest.fixture(autouse=True)
 def no_thread_is_left() -> Iterator[None]:
-    before = set(threading.enumerate())
+    running = set(threading.enumerate())
     yield
-    assert set(threading.enumerate()) - before == set()
+    assert set(threading.enumerate()) - running == set()
 
 
 @pytest.fixture(autouse=True)
@@ -131,8 +131,8 @@ class Machine:
 
     def enumerate(self) -> list[dict[str, Any]]:
         self.listings += 1
-        for at, path, wire, serial in list(self.appear):
-            if self.listings >= at:
+        for listing, path, wire, serial in list(self.appear):
+            if self.listings >= listing:
                 self.plugged[path] = (wire, serial)
         return [
             {"vendor_id": 0x1209, "product_id": 1, "serial_number": serial, "path": path.encode()}

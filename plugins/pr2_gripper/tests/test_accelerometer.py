@@ -139,10 +139,10 @@ def test_every_sample_that_the_board_sends_reaches_the_trace(monkeypatch: pytest
     # The trace begins with the approach, and ends before the fingers have opened.
     words = [word for _, samples in Sent.words for word in samples]
     sent = of_words(words)
-    first = next(
+    start = next(
         i for i in range(len(sent)) if sent[i : i + 30].tobytes() == acceleration.values[:30].tobytes()
     )
-    assert sent[first : first + len(acceleration.values)].tobytes() == acceleration.values.tobytes()
+    assert sent[start : start + len(acceleration.values)].tobytes() == acceleration.values.tobytes()
 
 
 def test_reports_that_are_dropped_show_as_lost_samples() -> None:
@@ -220,10 +220,10 @@ def test_samples_survive_a_killed_program_a_replay_and_an_export_to_the_last_bit
     complete = trace.signals["acceleration"]
 
     read = read_recorded(part, salvage=True)
-    found = read.trace().signals["acceleration"]
+    salvaged = read.trace().signals["acceleration"]
     assert len(read) == 500
-    assert found.values.tobytes() == complete.values[:1500].tobytes()
-    assert found.t_s.tobytes() == complete.t_s[:1500].tobytes()
+    assert salvaged.values.tobytes() == complete.values[:1500].tobytes()
+    assert salvaged.t_s.tobytes() == complete.t_s[:1500].tobytes()
     assert (
         CHANNEL.samples
         == next(channel for channel in read.channels if channel.name == "acceleration").samples
@@ -233,7 +233,7 @@ def test_samples_survive_a_killed_program_a_replay_and_an_export_to_the_last_bit
     part.rename(whole)
     options = ["gripper.type=replay", f"gripper.recording={whole}", "classifier.type=none"]
     again = load_pipeline(options=options).grasp().trace.signals["acceleration"]
-    assert again.values.tobytes() == found.values.tobytes()
+    assert again.values.tobytes() == salvaged.values.tobytes()
     write_npz(tmp_path / "grasp.npz", read)
     with np.load(tmp_path / "grasp.npz") as exported:
-        assert exported["signal_acceleration"].tobytes() == found.values.tobytes()
+        assert exported["signal_acceleration"].tobytes() == salvaged.values.tobytes()

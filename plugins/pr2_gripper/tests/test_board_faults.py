@@ -47,12 +47,12 @@ def commanded(wire: Wire, newtons: float, count: int = 20) -> list[InputReport]:
 
 def by_cell(sent: list[InputReport]) -> dict[int, list[tuple[int, int]]]:
     """Return device time and value of each cell, as they come."""
-    found: dict[int, list[tuple[int, int]]] = {cell: [] for cell in range(44)}
+    values: dict[int, list[tuple[int, int]]] = {cell: [] for cell in range(44)}
     for report in sent:
         if report.image:
             for i, value in enumerate(report.cells):
-                found[report.slice * SLICE_CELLS + i].append((report.time_us, value))
-    return found
+                values[report.slice * SLICE_CELLS + i].append((report.time_us, value))
+    return values
 
 
 def healthy_and_faulty(board: Any, **faults: Any) -> tuple[list[InputReport], list[InputReport]]:
@@ -65,11 +65,11 @@ def healthy_and_faulty(board: Any, **faults: Any) -> tuple[list[InputReport], li
 def test_cells_of_a_fingertip_go_wrong_from_a_time_on(board: Any, kind: Any, side: Any) -> None:
     healthy, faulty = healthy_and_faulty(board, pad_fault=kind, pad_side=side, pad_at_s=AT_S)
     good, bad = by_cell(healthy), by_cell(faulty)
-    assert {one.status for one in faulty} == {0}
+    assert {report.status for report in faulty} == {0}
     for cell in range(44):
-        before = [value for time_us, value in bad[cell] if time_us < AT_S * 1e6]
+        healthy_values = [value for time_us, value in bad[cell] if time_us < AT_S * 1e6]
         after = [value for time_us, value in bad[cell] if time_us >= AT_S * 1e6]
-        assert before == [value for time_us, value in good[cell] if time_us < AT_S * 1e6]
+        assert healthy_values == [value for time_us, value in good[cell] if time_us < AT_S * 1e6]
         if cell not in SIDES[side]:
             assert bad[cell] == good[cell]
         elif kind == "zero":
@@ -89,8 +89,8 @@ def test_cells_of_a_fingertip_go_wrong_from_a_time_on(board: Any, kind: Any, sid
 def test_absent_fingertip_sets_its_bit_and_changes_no_cell(board: Any, side: Any, bits: int) -> None:
     healthy, faulty = healthy_and_faulty(board, pad_fault="absent", pad_side=side, pad_at_s=AT_S)
     assert by_cell(faulty) == by_cell(healthy)
-    assert {one.status for one in faulty if one.time_us < AT_S * 1e6} == {0}
-    assert {one.status for one in faulty if one.time_us >= AT_S * 1e6} == {bits}
+    assert {report.status for report in faulty if report.time_us < AT_S * 1e6} == {0}
+    assert {report.status for report in faulty if report.time_us >= AT_S * 1e6} == {bits}
 
 
 @pytest.mark.parametrize("side", SIDES)
@@ -108,9 +108,9 @@ def test_image_counter_stands_still_and_only_a_stale_image_tells_its_age(board: 
     stale = reports(board(faults=FaultConfig(image_fault="stale", image_at_s=AT_S)))
     assert healthy[-1].image == 14, "0.6 s, with an image each 41 ms"
     for sent in (frozen, stale):
-        assert [one.image for one in sent[:200]] == [one.image for one in healthy[:200]]
-        assert {one.image for one in sent[200:]} == {healthy[200].image}
-    assert max(one.image_age_us for one in frozen) <= 41_000
+        assert [report.image for report in sent[:200]] == [report.image for report in healthy[:200]]
+        assert {report.image for report in sent[200:]} == {healthy[200].image}
+    assert max(report.image_age_us for report in frozen) <= 41_000
     ages = [report.image_age_us for report in stale[200:]]
     assert ages[:10] == list(range(ages[0], ages[0] + 10_000, 1000))
     assert ages[-1] == 0xFFFF
@@ -118,8 +118,8 @@ def test_image_counter_stands_still_and_only_a_stale_image_tells_its_age(board: 
 
 def test_status_bits_are_set_from_a_time_on(board: Any) -> None:
     _, faulty = healthy_and_faulty(board, status_bits=0x8005, status_at_s=AT_S)
-    assert {one.status for one in faulty[:200]} == {0}
-    assert {one.status for one in faulty[200:]} == {0x8005}
+    assert {report.status for report in faulty[:200]} == {0}
+    assert {report.status for report in faulty[200:]} == {0x8005}
 
 
 @pytest.mark.parametrize("gain", [5.0, 0.5, 0.0, -1.0])
@@ -128,8 +128,8 @@ def test_motor_applies_a_multiple_of_the_command_and_the_board_reports_what_it_a
 ) -> None:
     wire = board(faults=FaultConfig(motor_gain=gain, motor_at_s=0.01))
     sent = commanded(wire, 15.0)
-    assert {one.effort_un for one in sent[1:10]} == {15_000_000}
-    assert {one.effort_un for one in sent[11:]} == {round(15_000_000 * gain)}
+    assert {report.effort_un for report in sent[1:10]} == {15_000_000}
+    assert {report.effort_un for report in sent[11:]} == {round(15_000_000 * gain)}
     assert wire.firmware.largest_effort_n == max(15.0, 15.0 * gain)
     assert wire.firmware.strong_s == pytest.approx(0.009 if gain == 5.0 else 0.0)
 
@@ -137,17 +137,19 @@ def test_motor_applies_a_multiple_of_the_command_and_the_board_reports_what_it_a
 def test_effort_is_reported_wrongly_while_the_motor_is_right(board: Any) -> None:
     wire = board(faults=FaultConfig(effort_report_gain=0.2, effort_report_at_s=0.01))
     sent = commanded(wire, 15.0)
-    assert {one.effort_un for one in sent[1:10]} == {15_000_000}
-    assert {one.effort_un for one in sent[10:]} == {3_000_000}
+    assert {report.effort_un for report in sent[1:10]} == {15_000_000}
+    assert {report.effort_un for report in sent[10:]} == {3_000_000}
     assert wire.firmware.largest_effort_n == 15.0
 
 
 @pytest.mark.parametrize("rate", [0.0, 0.5, 2.0])
 def test_clock_of_the_device_runs_at_another_rate(board: Any, rate: float) -> None:
     _, faulty = healthy_and_faulty(board, clock_rate=rate, clock_at_s=AT_S)
-    assert [one.time_us for one in faulty[:201]] == list(range(0, 201_000, 1000))
-    assert [one.time_us - 200_000 for one in faulty[200:]] == [round(1000 * rate * i) for i in range(400)]
-    assert [one.sequence for one in faulty] == list(range(600))
+    assert [report.time_us for report in faulty[:201]] == list(range(0, 201_000, 1000))
+    assert [report.time_us - 200_000 for report in faulty[200:]] == [
+        round(1000 * rate * i) for i in range(400)
+    ]
+    assert [report.sequence for report in faulty] == list(range(600))
 
 
 @pytest.mark.parametrize("number", IDENTITY_NUMBERS)

@@ -162,7 +162,7 @@ def test_limit_of_a_weaker_board_is_the_grippers() -> None:
 
 def test_specification_has_the_ranges_of_the_code() -> None:
     rows = re.findall(r"^\| (\w+) \| (\d+) to (\d+) \| ([^|]+) \|", SPECIFICATION.read_text(), re.M)
-    found = {(number, int(least), int(most), unit) for number, least, most, unit in rows}
-    assert found == {
+    ranges = {(number, int(least), int(most), unit) for number, least, most, unit in rows}
+    assert ranges == {
         (ceiling.number, round(ceiling.least), round(ceiling.most), ceiling.unit) for ceiling in RANGES
     }

@@ -223,12 +223,12 @@ def test_good_clock_with_late_reports_is_never_told(seed: int, off: float) -> No
 
 
 @given(st.lists(st.integers(1, 5000), min_size=1, max_size=50), st.integers(0, 2**32 - 1))
-def test_reports_that_were_lost_count_as_time(steps: list[int], first: int) -> None:
+def test_reports_that_were_lost_count_as_time(steps: list[int], start: int) -> None:
     """The sequence goes on while nothing arrives, and wraps."""
     check, count = CountedTime(1000, numbers_all=True), 0
-    check.check(first, 7_000_000)
+    check.check(start, 7_000_000)
     for step in steps:
         count += step
-        check.check((first + count) & 0xFFFFFFFF, 7_000_000 + 1000 * count)
+        check.check((start + count) & 0xFFFFFFFF, 7_000_000 + 1000 * count)
     with pytest.raises(ClockFault):
-        check.check((first + count + 1) & 0xFFFFFFFF, 7_000_000 + 1000 * count + 200_000)
+        check.check((start + count + 1) & 0xFFFFFFFF, 7_000_000 + 1000 * count + 200_000)

@@ -36,9 +36,13 @@ def doctor(monkeypatch: pytest.MonkeyPatch) -> Doctor:
 
     def run(*arguments: str) -> tuple[int, dict[str, dict[str, Any]]]:
         done = graspsense("doctor", "--json", "--timeout", "0.2", *arguments)
-        (ours,) = (one for one in done.json["diagnoses"] if one["distribution"] == "graspsense-pr2-gripper")
+        (ours,) = (
+            diagnosis
+            for diagnosis in done.json["diagnoses"]
+            if diagnosis["distribution"] == "graspsense-pr2-gripper"
+        )
         assert ours["error"] == ""
-        return done.returncode, {one["subject"]: one for one in ours["findings"]}
+        return done.returncode, {finding["subject"]: finding for finding in ours["findings"]}
 
     return run
 
@@ -133,12 +137,12 @@ def test_lost_and_damaged_reports_are_a_problem_with_a_remedy(
     machine.plug("/dev/hidraw3", board(faults=FaultConfig(drop=0.2, corrupt=0.2)))
     with powered(machine):
         code, said = doctor("--gripper", "pr2")
-    found = said["transport hidraw"]
-    assert (code, found["state"]) == (1, "problem")
-    assert found["numbers"]["lost"] > 0
-    assert found["numbers"]["corrupt"] > 0
-    assert "another cable or port" in found["advice"]
-    assert "firmware is faulty" in found["advice"]
+    finding = said["transport hidraw"]
+    assert (code, finding["state"]) == (1, "problem")
+    assert finding["numbers"]["lost"] > 0
+    assert finding["numbers"]["corrupt"] > 0
+    assert "another cable or port" in finding["advice"]
+    assert "firmware is faulty" in finding["advice"]
 
 
 def test_board_with_implausible_numbers_is_a_problem_with_each_of_them(
@@ -146,10 +150,10 @@ def test_board_with_implausible_numbers_is_a_problem_with_each_of_them(
 ) -> None:
     machine.plug("/dev/hidraw3", board(watchdog_ms=65535, effort_limit_un=2_147_000_000))
     code, said = doctor("--gripper", "pr2")
-    found = said["transport hidraw"]
-    assert (code, found["state"]) == (1, "problem")
-    assert "watchdog_ms is 65535 ms, allowed are 5 to 100 ms" in found["advice"]
-    assert "effort_limit_un is 2147000000" in found["advice"]
+    finding = said["transport hidraw"]
+    assert (code, finding["state"]) == (1, "problem")
+    assert "watchdog_ms is 65535 ms, allowed are 5 to 100 ms" in finding["advice"]
+    assert "effort_limit_un is 2147000000" in finding["advice"]
 
 
 def test_a_silent_gripper_is_a_problem(doctor: Doctor, machine: Any, board: Any) -> None:

@@ -114,8 +114,8 @@ def test_paced_grasp_runs_by_the_clock_under_the_limits_of_a_first_use() -> None
     assert ended.seconds_simulated is None
     assert ended.seconds_wall > ended.trace.t_s[-1] - ended.trace.t_s[0]
     squeezing = ended.trace.phase >= Phase.SQUEEZE
-    first = int(squeezing.argmax())
-    assert np.max(np.abs(ended.trace.command[:first])) <= 12.0
+    onset = int(squeezing.argmax())
+    assert np.max(np.abs(ended.trace.command[:onset])) <= 12.0
     assert np.max(ended.trace.command) == 20.0
 
 
@@ -138,13 +138,13 @@ def random_faults(chance: random.Random) -> FaultConfig:
     def some(most: float) -> float:
         return chance.random() * most if chance.random() < 0.4 else 0.0
 
-    def at(odds: float) -> float:
+    def chance_time(odds: float) -> float:
         return chance.random() * 5.0 if chance.random() < odds else math.inf
 
     return FaultConfig(
         drop=some(0.2), corrupt=some(0.2), repeat=some(0.2), reorder=some(0.2), delay=some(0.1),
         delay_s=0.001 + 0.05 * chance.random(), drop_command=some(0.3), corrupt_command=some(0.3),
-        stall_at_s=at(0.3), stall_s=0.001 + 0.2 * chance.random(), unplug_at_s=at(0.2),
+        stall_at_s=chance_time(0.3), stall_s=0.001 + 0.2 * chance.random(), unplug_at_s=chance_time(0.2),
         freeze_cell=chance.randrange(-1, 44), freeze_at_s=5.0 * chance.random(),
         drift_counts_s=chance.uniform(-200.0, 200.0) if chance.random() < 0.3 else 0.0,
     )  # fmt: skip

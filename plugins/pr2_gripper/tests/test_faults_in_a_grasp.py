@@ -39,7 +39,7 @@ def rows_of(controller, faults=FAULTS, sides=("left", "right")):
 
 @pytest.mark.parametrize("fault", ["fingertip absent", "fingertip stuck", "motor turns the wrong way"])
 def test_a_fault_in_any_phase_crushes_nothing(fault):
-    healthy, rows = rows_of("hybrid", [found for found in FAULTS if found.name == fault], ("left",))
+    healthy, rows = rows_of("hybrid", [kind for kind in FAULTS if kind.name == fault], ("left",))
     assert len(rows) == 5
     for row in rows:
         check(row, healthy)

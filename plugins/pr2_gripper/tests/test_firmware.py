@@ -80,7 +80,7 @@ def test_watchdog_lets_go_after_its_time_and_not_before(board: Any) -> None:
     firmware.step()
     firmware.output(effort(1, 20.0))
     efforts = [decode_input(firmware.step()) for _ in range(110)]
-    held = [one for one in efforts if one.effort_un]
+    held = [report for report in efforts if report.effort_un]
     assert len(held) == 99
     assert efforts[98].effort_un
     assert efforts[99].effort_un == 0

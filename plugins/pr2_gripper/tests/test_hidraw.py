@@ -45,9 +45,9 @@ def test_device_says_who_it_is(machine: Any, board: Any) -> None:
 
 
 def test_frames_come_and_commands_arrive(opened: Pr2Backend, machine: Any) -> None:
-    first = following(opened, machine)
-    assert first.frame.t_s == 0.0
-    assert first.frame.gap_m == pytest.approx(0.086, abs=1e-6)
+    opening = following(opened, machine)
+    assert opening.frame.t_s == 0.0
+    assert opening.frame.gap_m == pytest.approx(0.086, abs=1e-6)
     opened.apply(Command(EFFORT, 12.5, float("inf"), float("inf")))
     assert following(opened, machine).frame.effort_n == 12.5
 

@@ -21,9 +21,9 @@ TABLE = [
 @pytest.mark.parametrize(("gap_mm", "revolutions", "rate", "tick_um"), TABLE)
 def test_the_delivered_gripper_matches_its_table(gap_mm, revolutions, rate, tick_um):
     link = LINKAGES["pr2"]
-    found = revolutions_at(link, gap_mm / 1e3)
-    assert found == pytest.approx(revolutions, abs=0.06)
-    gap, slope = gap_and_rate(link, found)
+    turns = revolutions_at(link, gap_mm / 1e3)
+    assert turns == pytest.approx(revolutions, abs=0.06)
+    gap, slope = gap_and_rate(link, turns)
     assert gap == pytest.approx(gap_mm / 1e3, abs=1e-9)
     assert slope * 1e3 == pytest.approx(rate, abs=6e-5)
     assert slope * 1e6 / ENCODER_TICKS == pytest.approx(tick_um, abs=6e-4)

@@ -29,8 +29,8 @@ def image(counter: int, left: dict[int, int] | None = None, right: dict[int, int
     return RawImage(counter, 1000 * counter, tuple(map(float, cells)))
 
 
-def raw(base: RawImage, at: int, value: int) -> RawImage:
-    return base._replace(cells=(*base.cells[:at], value, *base.cells[at + 1 :]))
+def raw(base: RawImage, cell: int, value: int) -> RawImage:
+    return base._replace(cells=(*base.cells[:cell], value, *base.cells[cell + 1 :]))
 
 
 def tared(identity: Any, config: Pr2Config | None = None, **more: Any) -> Measure:
@@ -45,9 +45,9 @@ def test_gap_of_every_encoder_tick_comes_back_to_a_nanometre(transmission: str, 
     """Over the stroke 0 to 90 mm: ticks to metres by the driver, metres to ticks by the inverse."""
     measure = Measure(device_identity(transmission=transmission), Pr2Config(), None, None)
     link = LINKAGES[transmission]
-    first, last = (math.ceil(revolutions_at(link, gap) * 1200) for gap in (0.0, 0.09))
+    closed, last = (math.ceil(revolutions_at(link, gap) * 1200) for gap in (0.0, 0.09))
     gaps = []
-    for ticks in range(first, last, 97):
+    for ticks in range(closed, last, 97):
         gap = measure.reading(report(ticks), None).frame.gap_m
         gaps.append(gap)
         back = measure.reading(report(round(revolutions_at(link, gap) * 1200)), None).frame.gap_m
@@ -163,7 +163,7 @@ def test_cell_dead_during_the_tare_stays_out_when_it_comes_back(device_identity:
 
 def test_time_begins_with_the_first_report(device_identity: Any) -> None:
     measure = Measure(device_identity(), Pr2Config(), None, None)
-    first = measure.reading(report(time_us=7_000_000), None).frame
-    third = measure.reading(report(time_us=7_003_000), None).frame
-    assert (first.t_s, first.dt_s) == (0.0, 0.001)
-    assert (third.t_s, third.dt_s) == (0.003, 0.003)
+    earlier = measure.reading(report(time_us=7_000_000), None).frame
+    later = measure.reading(report(time_us=7_003_000), None).frame
+    assert (earlier.t_s, earlier.dt_s) == (0.0, 0.001)
+    assert (later.t_s, later.dt_s) == (0.003, 0.003)

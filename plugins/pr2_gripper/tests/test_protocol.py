@@ -63,15 +63,15 @@ OUTPUTS = st.builds(
 
 def tables() -> dict[str, list[tuple[int, str, str]]]:
     """The document's layouts: heading to (offset, type, field)."""
-    found: dict[str, list[tuple[int, str, str]]] = {}
+    layouts: dict[str, list[tuple[int, str, str]]] = {}
     heading = ""
     for line in DOCUMENT.read_text().splitlines():
         if line.startswith("## "):
             heading = line[3:]
         row = re.match(r"\| (\d+) \| ([ui]\d+)(\[\d+\])? \| (\w+) \|", line)
         if row:
-            found.setdefault(heading, []).append((int(row[1]), row[2] + (row[3] or ""), row[4]))
-    return found
+            layouts.setdefault(heading, []).append((int(row[1]), row[2] + (row[3] or ""), row[4]))
+    return layouts
 
 
 def width(kind: str) -> int:
@@ -89,13 +89,13 @@ LAYOUTS = {
 
 @pytest.mark.parametrize("heading", LAYOUTS)
 def test_document_has_no_gap_and_ends_with_the_crc_at_64_bytes(heading: str) -> None:
-    at = 0
+    position = 0
     for offset, kind, _ in TABLES[heading]:
-        assert offset == at
-        at += width(kind)
+        assert offset == position
+        position += width(kind)
     assert TABLES[heading][0][2] == "report_id"
     assert TABLES[heading][-1][1:] == ("u32", "crc")
-    assert at == protocol.REPORT_SIZE
+    assert position == protocol.REPORT_SIZE
 
 
 @pytest.mark.parametrize("heading", LAYOUTS)
@@ -167,9 +167,9 @@ def test_document_numbers_bits_results_and_kinds_as_the_codec_does() -> None:
     results = re.search(r"\| command result .*?\n\n", text, re.S)
     assert bits
     assert results
-    found = {name: 1 << int(bit) for bit, name in re.findall(r"\| (\d+) \| (\w+) \|", bits[0])}
-    assert found == {name: getattr(protocol, name.upper()) for name in found}
-    assert len(found) == 6
+    declared = {name: 1 << int(bit) for bit, name in re.findall(r"\| (\d+) \| (\w+) \|", bits[0])}
+    assert declared == {name: getattr(protocol, name.upper()) for name in declared}
+    assert len(declared) == 6
     numbers = {name: int(n) for n, name in re.findall(r"\| (\d) \| (\w+) \|", results[0])}
     assert numbers == {
         "none": protocol.NO_COMMAND,
@@ -186,11 +186,16 @@ def test_documents_report_descriptor_is_the_codecs_and_declares_63_byte_reports(
     descriptor = bytes.fromhex("".join(re.findall(r"\b[0-9A-F]{2}\b", block)))
     assert descriptor == protocol.REPORT_DESCRIPTOR
     # Items are a prefix byte (size in its two lowest bits) and their data; 0x94 is the report count, 0x84 the id.
-    items, at = [], 0
-    while at < len(descriptor):
-        size = (0, 1, 2, 4)[descriptor[at] & 3]
-        items.append((descriptor[at] & 0xFC, int.from_bytes(descriptor[at + 1 : at + 1 + size], "little")))
-        at += 1 + size
+    items, position = [], 0
+    while position < len(descriptor):
+        size = (0, 1, 2, 4)[descriptor[position] & 3]
+        items.append(
+            (
+                descriptor[position] & 0xFC,
+                int.from_bytes(descriptor[position + 1 : position + 1 + size], "little"),
+            )
+        )
+        position += 1 + size
     assert [data for tag, data in items if tag == 0x84] == [1, 2, 3]
     assert [data for tag, data in items if tag == 0x94] == [63, 63, 63]
     assert items[0] == (0x04, 0xFF00)
@@ -265,8 +270,8 @@ def mutated(chance: random.Random, good: bytes) -> bytes:
         return bytes(data[: chance.randrange(65)]) + chance.randbytes(chance.randrange(3))
     else:
         # Right CRC over nonsense: only the ranges are left to object.
-        first = chance.randrange(1, 60)
-        data[first:60] = chance.randbytes(60 - first)
+        start = chance.randrange(1, 60)
+        data[start:60] = chance.randbytes(60 - start)
         return bytes(data[:60]) + struct.pack("<I", crc32(data[:60]))
     return bytes(data)
 

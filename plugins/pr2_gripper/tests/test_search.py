@@ -51,8 +51,8 @@ def test_absent_device_says_what_was_looked_for_and_what_to_try() -> None:
 
 @pytest.mark.usefixtures("two_grippers_and_a_mouse")
 def test_device_is_known_by_its_numbers_and_serial() -> None:
-    assert [one.path for one in search(Pr2Config()).matching] == ["/dev/hidraw0", "/dev/hidraw2"]
-    assert [one.path for one in search(Pr2Config(serial="R2")).matching] == ["/dev/hidraw2"]
+    assert [node.path for node in search(Pr2Config()).matching] == ["/dev/hidraw0", "/dev/hidraw2"]
+    assert [node.path for node in search(Pr2Config(serial="R2")).matching] == ["/dev/hidraw2"]
     assert search(Pr2Config(serial="X")).matching == ()
     assert search(Pr2Config()).total == 3
 
@@ -66,7 +66,7 @@ def test_two_grippers_and_no_serial_is_a_question_back() -> None:
 @pytest.mark.usefixtures("two_grippers_and_a_mouse")
 def test_device_that_may_not_be_opened_is_not_passed_off_as_ready() -> None:
     """The nodes of this listing do not exist, so nobody may open them."""
-    assert [(one.serial, one.ready) for one in found_devices()] == [("L7", False), ("R2", False)]
+    assert [(device.serial, device.ready) for device in found_devices()] == [("L7", False), ("R2", False)]
     assert "no permission on /dev/hidraw0" in found_devices()[0].advice
 
 

@@ -68,11 +68,11 @@ def dead(left: int = 0, right: int = 0) -> RawImage:
 def test_every_bit_of_the_board_has_a_name_a_meaning_and_one_declaration(swap: bool) -> None:
     bits = status_bits(swap)
     for bit in range(16):
-        (declared,) = [one for one in bits if one.mask & 1 << bit]
+        (declared,) = [status for status in bits if status.mask & 1 << bit]
         assert declared.mask == 1 << bit
         assert declared.name
         assert declared.meaning
-    assert len({one.name for one in bits}) == len(bits)
+    assert len({status.name for status in bits}) == len(bits)
 
 
 def test_opened_gripper_declares_the_bits_and_the_friction_of_its_drive() -> None:
@@ -174,7 +174,7 @@ def test_gap_that_jumps_is_implausible_in_that_frame(step_m: float, time_us: int
 @pytest.mark.parametrize("swap", [False, True])
 @pytest.mark.parametrize("bit", [LEFT_ABSENT, RIGHT_ABSENT])
 def test_words_name_the_pad_that_has_no_force(bit: int, swap: bool) -> None:
-    (declared,) = [one for one in status_bits(swap) if one.mask == bit]
+    (declared,) = [status for status in status_bits(swap) if status.mask == bit]
     frame = measure(IDENTITY, swap).reading(report(status=bit), dead()).frame
     side = "left" if math.isnan(frame.force_left_n) else "right"
     assert declared.name == f"{side} fingertip absent"
@@ -191,13 +191,16 @@ def test_what_a_grasp_cannot_do_without_has_a_limit_and_what_only_informs_has_no
 
 def test_page_has_the_table_of_the_code() -> None:
     rows = re.findall(r"^\| (\d+) \| ([^|]+) \| [^|]+ \| ([^|]+) \|", PAGE.read_text(), re.M)
-    found = {int(bit): (name, limit) for bit, name, limit in rows}
+    printed = {int(bit): (name, limit) for bit, name, limit in rows}
     reserved = {bit for bit in range(16) if bit >= 6}
     expected = {
-        one.mask.bit_length() - 1: (one.name, "-" if one.limit_s == math.inf else f"{one.limit_s:g} s")
-        for one in status_bits(False)
+        status.mask.bit_length() - 1: (
+            status.name,
+            "-" if status.limit_s == math.inf else f"{status.limit_s:g} s",
+        )
+        for status in status_bits(False)
     }
-    assert found == {bit: row for bit, row in expected.items() if bit not in reserved}
+    assert printed == {bit: row for bit, row in expected.items() if bit not in reserved}
     assert "| 6 to 15 | unknown bit | " in PAGE.read_text()
 
 

@@ -22,9 +22,9 @@ def report(sequence: int, *, image: int = 1, slice: int = 0, cells: Any = None, 
     )
 
 
-def reports(first: int, count: int, image: int = 1) -> list[bytes]:
+def reports(start: int, count: int, image: int = 1) -> list[bytes]:
     """A board's stream: the image's slices over and over."""
-    return [report(first + i, image=image, slice=i % 11, age_us=1000 * i) for i in range(count)]
+    return [report(start + i, image=image, slice=i % 11, age_us=1000 * i) for i in range(count)]
 
 
 def test_image_is_whole_after_eleven_reports_and_bears_the_time_it_was_taken() -> None:
@@ -58,9 +58,9 @@ def test_image_that_never_came_whole_is_counted_and_not_made_up() -> None:
 
 def test_counters_wrap() -> None:
     stream = Stream()
-    first = 2**32 - 20
+    start = 2**32 - 20
     sent = [
-        *(report(first + i, image=65535, slice=i % 11) for i in range(20)),
+        *(report(start + i, image=65535, slice=i % 11) for i in range(20)),
         *(report(i, image=1, slice=i % 11) for i in range(11)),
     ]
     assert all(stream.take(data) for data in sent)
@@ -105,14 +105,14 @@ def test_device_that_begins_anew_is_noticed() -> None:
     st.lists(st.sampled_from(["pass", "drop", "repeat", "swap", "damage"]), min_size=1, max_size=80),
     st.randoms(use_true_random=False),
 )
-def test_what_is_counted_adds_up(first: int, fates: list[str], chance: random.Random) -> None:
+def test_what_is_counted_adds_up(start: int, fates: list[str], chance: random.Random) -> None:
     """The first and last report pass, so that both ends are known; then every report is accounted for."""
     stream = Stream()
-    arriving: list[bytes] = [report(first)]
+    arriving: list[bytes] = [report(start)]
     held: list[bytes] = []
     expected = {"drop": 0, "repeat": 0, "swap": 0, "damage": 0}
     for i, fate in enumerate(fates, 1):
-        data = report(first + i)
+        data = report(start + i)
         if fate == "swap" and not held:
             held.append(data)
             expected["swap"] += 1
@@ -131,10 +131,10 @@ def test_what_is_counted_adds_up(first: int, fates: list[str], chance: random.Ra
         arriving.append(data)
         if fate == "pass" and held:
             arriving.append(held.pop())
-    arriving += [report(first + len(fates) + 1), *held]
+    arriving += [report(start + len(fates) + 1), *held]
     handed_on = [stream.take(data) for data in arriving]
     counts = stream.counts
-    sequences = [(one.sequence - first) & 0xFFFFFFFF for one in handed_on if one]
+    sequences = [(passed.sequence - start) & 0xFFFFFFFF for passed in handed_on if passed]
     assert sequences == sorted(set(sequences))
     assert counts.lost == expected["drop"] + expected["damage"]
     assert counts.corrupt == expected["damage"]

@@ -134,9 +134,9 @@ def device() -> Taken:
 
 @pytest.fixture
 def served(device: Taken) -> Iterator[Served]:
-    one = Served(device)
-    yield one
-    one.close()
+    server = Served(device)
+    yield server
+    server.close()
 
 
 def test_a_host_finds_the_device_that_the_document_describes(served: Served) -> None:
@@ -217,9 +217,9 @@ def test_every_unlink_is_answered_and_every_transfer_ends_once(does: list[str | 
             else:
                 device.stalled = doe == "stall"
         device.stalled = False
-        for one in sorted(submitted - set(ended)):
-            if one not in ended:
-                unlinks[host.unlink(one)] = one
+        for victim in sorted(submitted - set(ended)):
+            if victim not in ended:
+                unlinks[host.unlink(victim)] = victim
                 while unlinks:
                     hear()
         assert sorted(ended) == sorted(submitted)

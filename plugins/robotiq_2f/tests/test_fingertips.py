@@ -76,7 +76,7 @@ def test_any_bytes_in_any_pieces_are_taken(data, size):
     whole, pieces = Packets(), Packets()
     expected = whole.fed(data)
     assert [
-        one for start in range(0, len(data), size) for one in pieces.fed(data[start : start + size])
+        packet for start in range(0, len(data), size) for packet in pieces.fed(data[start : start + size])
     ] == expected
     for _, fields in expected:
         decoded(fields)
@@ -98,14 +98,14 @@ def test_every_period_has_one_packet_and_images_come_at_60_hz(clock):
     tips = EmulatedFingertips(lambda: Felt(2.0, 4.0))
     tips.heard(packet(0x58, bytes((1,))))
     packets = Packets()
-    found = []
+    measured = []
     for tick in range(1, 401):
         clock.now_s = tick * 0.0025
-        found += [decoded(data) for _, data in packets.fed(tips.unasked())]
-    stamps = [fields[0].values[0] for fields in found]
+        measured += [decoded(data) for _, data in packets.fed(tips.unasked())]
+    stamps = [fields[0].values[0] for fields in measured]
     assert {later - earlier for earlier, later in pairwise(stamps)} == {1000}
     assert 1000 <= len(stamps) <= 1001
-    images = [field for fields in found for field in fields if field.kind == PRESSURE]
+    images = [field for fields in measured for field in fields if field.kind == PRESSURE]
     # A packet each millisecond: the image of 16.7 ms is in that of 17 ms.
     assert 58 <= len(images) / 2 <= 61
     for image in images:
@@ -136,34 +136,34 @@ def port():
 
 def taken_images(driver, count):
     """Return this many images with the samples that came with each."""
-    found = []
-    while len(found) < count:
+    images = []
+    while len(images) < count:
         driver.take(PATIENT_S)
         if driver.image is not None:
-            found.append((driver.image, driver.signals(0.0)))
-    return found
+            images.append((driver.image, driver.signals(0.0)))
+    return images
 
 
-def assert_images_of_both(found, rests):
-    images = [image for image, _ in found]
+def assert_images_of_both(taken, rests):
+    images = [image for image, _ in taken]
     counters, times = [image.counter for image in images], [image.host_s for image in images]
     assert counters == sorted(set(counters))
     assert times == sorted(set(times))
     for image in images:
-        for cells, rest, counts in zip(image.cells, rests, (2000, 4000), strict=True):
-            assert sum(cells) - sum(rest) == pytest.approx(counts, abs=NOISE_OF_SUM)
+        for cells, zeros, counts in zip(image.cells, rests, (2000, 4000), strict=True):
+            assert sum(cells) - sum(zeros) == pytest.approx(counts, abs=NOISE_OF_SUM)
 
 
 def test_the_driver_reads_images_in_a_thread_with_their_age(port):
     driver = TactileFingertips(opened_boards([port.where]))
-    found = taken_images(driver, 5)
+    images = taken_images(driver, 5)
     driver.close()
-    assert_images_of_both(found, REST)
+    assert_images_of_both(images, REST)
     report = driver.report()
     assert report["tactile_channels"].split()[:3] == ["pads", "force_left", "force_right"]
     assert report["tactile_latency_s"] >= 0.0
     assert report["tactile_damaged"] == 0
-    taken = [signals[0].counter for _, signals in found]
+    taken = [signals[0].counter for _, signals in images]
     assert taken == sorted(set(taken))
 
 
@@ -180,9 +180,9 @@ def ports():
 def test_two_boards_give_one_image_and_each_its_clock(ports):
     ports, boards = ports
     driver = TactileFingertips(opened_boards([port.where for port in ports]))
-    found = taken_images(driver, 5)
+    taken = taken_images(driver, 5)
     driver.close()
-    assert_images_of_both(found, [board.rest[board.fingers[0]] for board in boards])
+    assert_images_of_both(taken, [board.rest[board.fingers[0]] for board in boards])
     report = driver.report()
     assert {key: value for key, value in report.items() if key.endswith("_channels")} == {
         "tactile_left_channels": "force_left dynamic_left acceleration_left rotation_left",
@@ -333,13 +333,13 @@ def test_what_a_host_reads_late_is_not_lost():
 
     port = EmulatedPort("pty", lambda data: b"", unasked, 0.001)
     assert sent.wait(PATIENT_S)
-    found = b""
+    received = b""
     # Opened as a file, since pyserial throws away what waits.
     with open(port.where, "rb", buffering=0) as line:
-        while len(found) < 60_000 and select.select([line], [], [], PATIENT_S / 10)[0]:
-            found += line.read(4096)
+        while len(received) < 60_000 and select.select([line], [], [], PATIENT_S / 10)[0]:
+            received += line.read(4096)
     port.close()
-    assert found == b"".join(chunks)
+    assert received == b"".join(chunks)
 
 
 def test_fingertips_that_are_unplugged_are_told(port):
@@ -396,7 +396,7 @@ def test_each_packet_of_a_millisecond_is_a_sample_of_every_fast_channel(where):
     for samples in zip(*(reading.signals for reading in readings), strict=True):
         # 10 ms a frame: none twice, none lost.
         assert {sample.new for sample in samples[1:]} == {10}
-        assert {now.counter - before.counter for before, now in pairwise(samples)} == {10}
+        assert {now.counter - earlier.counter for earlier, now in pairwise(samples)} == {10}
     assert set(last.signals.acceleration_left.values[:10]) == {(0.0, 0.0, 16384.0)}
 
 

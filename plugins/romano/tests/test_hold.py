@@ -80,9 +80,9 @@ def test_a_tugged_block_is_held_with_more_force_from_the_first_slip_on():
     slips = [float(t) for t, _, _, _, what in told if what == "slip"]
     forces = {float(t): float(force) for t, _, force, _, what in told if what == "holds"}
     assert slips
-    before, after = forces[min(forces)], forces[max(forces)]
+    early_n, after = forces[min(forces)], forces[max(forces)]
     # 0.15 kg and 3 N at a friction of 0.4 need (1.47 + 3) / 0.8 = 5.6 N; it begins at 2.5 N.
-    assert before == pytest.approx(2.5, abs=0.3)
+    assert early_n == pytest.approx(2.5, abs=0.3)
     assert 5.6 < after < 12.0
     assert "steady" in out
 

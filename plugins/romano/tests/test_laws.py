@@ -179,10 +179,10 @@ def detected(*readings):
     """Return the time and the name of each event that the detector tells."""
     law = create("controller", "event-detector")
     state, told = law.init(), []
-    for one in readings:
-        command, state = law.step(law.params(), state, one)
+    for reading in readings:
+        command, state = law.step(law.params(), state, reading)
         assert (command.kind, command.value) == (EFFORT, 0.0)
-        told += [(one.frame.t_s, name) for k, name in enumerate(EVENTS) if state.events >> k & 1]
+        told += [(reading.frame.t_s, name) for k, name in enumerate(EVENTS) if state.events >> k & 1]
     return told
 
 

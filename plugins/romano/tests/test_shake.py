@@ -85,14 +85,14 @@ def test_a_wobble_that_fades_has_its_frequency_and_its_decay(frequency, rate):
 
 
 def test_a_shaken_thing_gives_its_mass_and_what_follows():
-    found = shaken(grasp())
+    features = shaken(grasp())
     # Three whole periods; Hann's window spreads them over three lines of the spectrum, all of them in the band.
-    assert found["acceleration_low"] == pytest.approx(2.0 / math.sqrt(2.0), rel=0.02)
-    assert found["moved_mass"] == pytest.approx(CARRIED_KG, rel=0.02)
-    assert found["pads_peak"] == pytest.approx(5.0, abs=0.2)
-    assert found["acceleration_decay"] == pytest.approx(2.0, rel=0.15)
-    assert found["acceleration_high"] < 0.01
-    assert not found.reasons
+    assert features["acceleration_low"] == pytest.approx(2.0 / math.sqrt(2.0), rel=0.02)
+    assert features["moved_mass"] == pytest.approx(CARRIED_KG, rel=0.02)
+    assert features["pads_peak"] == pytest.approx(5.0, abs=0.2)
+    assert features["acceleration_decay"] == pytest.approx(2.0, rel=0.15)
+    assert features["acceleration_high"] < 0.01
+    assert not features.reasons
 
 
 @pytest.mark.parametrize(
@@ -106,9 +106,11 @@ def test_a_shaken_thing_gives_its_mass_and_what_follows():
     ],
 )
 def test_what_was_not_measured_is_missing_with_the_reason(trace, missing, there, said):
-    found = shaken(trace)
-    assert all(math.isnan(found[name]) and said in found.reasons[name] for name in missing), found.reasons
-    assert all(math.isfinite(found[name]) for name in there)
+    features = shaken(trace)
+    assert all(math.isnan(features[name]) and said in features.reasons[name] for name in missing), (
+        features.reasons
+    )
+    assert all(math.isfinite(features[name]) for name in there)
 
 
 @pytest.fixture(scope="module")

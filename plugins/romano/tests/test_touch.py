@@ -110,8 +110,8 @@ def test_the_corners_of_weight_and_friction_are_held_or_lost_with_a_reason(tmp_p
 def test_a_finger_that_is_bumped_tells_a_side_impact(tmp_path):
     settings = TouchSettings(bump_at="finger", bump_kg=0.4, bump_m_s=0.15, bump_touch_s=0.2)
     trial = grasped(tmp_path, settings, "run.hold_s=4")
-    found = measured(trial.trace, settings)
-    assert found["edge_at_n"] > 0.2 > found["edge_before_n"]
+    quantities = measured(trial.trace, settings)
+    assert quantities["edge_at_n"] > 0.2 > quantities["edge_before_n"]
     told = [event.t_s for event in trial.trace.events if event.what == "side impact"]
     contact = next(event.t_s for event in trial.trace.events if event.what == "both in contact")
     assert told

@@ -27,6 +27,6 @@ def robot(router):
         return running[0]
 
     yield start
-    for one in running:
-        one.process.kill()
-        one.process.communicate()
+    for robot in running:
+        robot.process.kill()
+        robot.process.communicate()

@@ -37,7 +37,7 @@ def test_the_parts_of_an_action_are_derived_as_ros_derives_them():
     store = typestore({}, {FIBONACCI: ("int32 order", "int32[] sequence", "int32[] sequence")})
 
     assert {name: store.hash_rihs01(name) for name in OF_AN_ACTION} == {
-        name: f"RIHS01_{found}" for name, found in OF_AN_ACTION.items()
+        name: f"RIHS01_{digest}" for name, digest in OF_AN_ACTION.items()
     }
 
 

@@ -80,9 +80,9 @@ class Caller:
 
 @pytest.fixture
 def caller(router):
-    found = Caller()
-    yield found
-    found.node.close()
+    made = Caller()
+    yield made
+    made.node.close()
 
 
 def test_a_grasp_is_asked_for(robot, caller):
@@ -120,7 +120,7 @@ def test_a_goal_holds_the_object_and_the_end_opens(robot, caller, ending):
         assert bytes(feedback[0].goal_id.uuid) == bytes(goal["goal_id"]["uuid"])
 
     goals = sound.goals()
-    assert max(one["effort"] for one in goals if one["position"] < one["gap"]) <= 10.0
+    assert max(goal["effort"] for goal in goals if goal["position"] < goal["gap"]) <= 10.0
     assert goals[-1]["position"] == pytest.approx(OPEN_M)
 
 

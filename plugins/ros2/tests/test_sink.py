@@ -94,7 +94,7 @@ def received(router):
 
     for topic, type_name in TYPES.items():
         other.subscribe(
-            f"/graspsense/{topic}", type_name, lambda data, of=(topic, type_name): take(*of, data)
+            f"/graspsense/{topic}", type_name, lambda data, kind=(topic, type_name): take(*kind, data)
         )
     try:
         # What is published before the router has told of the subscriptions reaches nobody.

@@ -23,7 +23,7 @@ def closed_on_a_block(limits):
 
     After every second squeeze the limit is lowered, and a second reading is taken: the friction of the gears holds.
     """
-    motor, now_s, found = GripperMotor(So101Config(port="emulated"), 1), 0.0, []
+    motor, now_s, pairs = GripperMotor(So101Config(port="emulated"), 1), 0.0, []
 
     def goes(goal, limit, seconds):
         nonlocal now_s
@@ -38,9 +38,9 @@ def closed_on_a_block(limits):
         held = [goes(jaw_position(CLOSED_M), limit, 1.5)]
         if i % 2:
             held.append(goes(jaw_position(CLOSED_M), limit * 2 // 3, 0.3))
-        found += [(load, force_n - zero_n) for load, force_n in held]
+        pairs += [(load, force_n - zero_n) for load, force_n in held]
     motor.fingers.close()
-    return found
+    return pairs
 
 
 def jaw_position(gap_m):

@@ -44,15 +44,15 @@ def test_what_is_asked_is_one_write_of_neighbours():
 def test_the_gap_of_a_position_gives_the_position(stroke, inverted, position, length_m):
     position = min(position, stroke)
     jaw = Jaw(2000, 2000 - stroke, length_m) if inverted else Jaw(1000, 1000 + stroke, length_m)
-    at = jaw.closed + jaw.opens * position
-    assert jaw.position(jaw.gap_m(at)) == at
+    steps = jaw.closed + jaw.opens * position
+    assert jaw.position(jaw.gap_m(steps)) == steps
     assert jaw.gap_m(jaw.closed - 5 * jaw.opens) == 0.0
     assert jaw.position(1.0) == jaw.opened or stroke > 1023
     if position:
         # The rate is the slope of the gap, which is monotonic.
-        slope = (jaw.gap_m(at) - jaw.gap_m(at - jaw.opens)) * jaw.opens
-        assert jaw.gap_rate(at, 1.0) == pytest.approx(slope, rel=0.02, abs=2e-6)
-        assert jaw.speed(jaw.gap_m(at), abs(jaw.gap_rate(at, 100.0))) == pytest.approx(100.0)
+        slope = (jaw.gap_m(steps) - jaw.gap_m(steps - jaw.opens)) * jaw.opens
+        assert jaw.gap_rate(steps, 1.0) == pytest.approx(slope, rel=0.02, abs=2e-6)
+        assert jaw.speed(jaw.gap_m(steps), abs(jaw.gap_rate(steps, 100.0))) == pytest.approx(100.0)
 
 
 def test_the_gap_is_the_chord_of_the_jaw():

@@ -89,7 +89,7 @@ def test_conformance(check):
 def test_a_grasp_writes_to_no_other_motor_and_gives_the_gripper_back_as_it_was(emulated):
     arm = emulated()
     bus = ServoBus(arm.where, PATIENT_S)
-    before = {motor: bus.read(motor, *STATE) for motor in range(1, 7)}
+    states = {motor: bus.read(motor, *STATE) for motor in range(1, 7)}
     bus.close()
     options = [
         f"gripper.port={arm.where}",
@@ -107,9 +107,9 @@ def test_a_grasp_writes_to_no_other_motor_and_gives_the_gripper_back_as_it_was(e
     bus = ServoBus(arm.where, PATIENT_S)
     after = {motor: bus.read(motor, *STATE) for motor in range(1, 7)}
     bus.close()
-    assert {m: after[m] for m in range(1, 6)} == {m: before[m] for m in range(1, 6)}
-    asked, found = motor_state(after[6]).asked, motor_state(before[6]).asked
-    assert asked._replace(goal_position=0) == found._replace(goal_position=0)
+    assert {m: after[m] for m in range(1, 6)} == {m: states[m] for m in range(1, 6)}
+    asked, given = motor_state(after[6]).asked, motor_state(states[6]).asked
+    assert asked._replace(goal_position=0) == given._replace(goal_position=0)
 
 
 @pytest.mark.usefixtures("own_time")
@@ -117,9 +117,9 @@ def test_a_frame_is_one_read(emulated):
     arm = emulated()
     driver = driver_of(arm)
     driver.open(1)
-    before = arm.state()["requests"]
+    requests = arm.state()["requests"]
     frames = [driver.read(0.1).frame for _ in range(50)]
-    assert arm.state()["requests"] - before == 50
+    assert arm.state()["requests"] - requests == 50
     assert 1.0 / 110.0 < (frames[-1].t_s - frames[0].t_s) / 49 < 1.0 / 99.0
     driver.close()
 
@@ -158,10 +158,10 @@ def test_a_gripper_lost_in_a_grasp_ends_it_and_is_told(fault, at_s):
 
 
 def test_the_emulated_gripper_keeps_its_own_time_so_that_a_grasp_repeats_exactly():
-    first, again = (load_pipeline("so101", options=["gripper.port=emulated"]).grasp() for _ in range(2))
-    assert first.features.values == again.features.values
-    assert np.array_equal(first.trace.t_s, again.trace.t_s)
-    assert first.trace.t_s[-1] - first.trace.t_s[0] == pytest.approx((len(first.trace.t_s) - 1) / 100.0)
+    trial, again = (load_pipeline("so101", options=["gripper.port=emulated"]).grasp() for _ in range(2))
+    assert trial.features.values == again.features.values
+    assert np.array_equal(trial.trace.t_s, again.trace.t_s)
+    assert trial.trace.t_s[-1] - trial.trace.t_s[0] == pytest.approx((len(trial.trace.t_s) - 1) / 100.0)
 
 
 @pytest.mark.parametrize(
@@ -323,14 +323,14 @@ def test_less_than_moves_the_geared_motor_is_refused_before_anything_moves():
 
 def test_doctor_tells_the_gripper_from_another_motor_from_a_silent_bus_and_from_none(emulated):
     arm = emulated()
-    found = {}
+    states = {}
     for port, motor in ((arm.where, 6), (arm.where, 2), (arm.where, 9), ("/dev/nowhere", 6)):
         config = So101Config(port=port, motor=motor, reply_timeout_s=1.0 if motor == 9 else PATIENT_S)
         finding = next(iter(diagnose(config, PATIENT_S)))
-        found[port, motor] = finding.state
+        states[port, motor] = finding.state
         if motor == 9:
             assert "answer: 1, 2, 3, 4, 5, 6" in finding.words
-    assert list(found.values()) == ["ok", "problem", "problem", "problem"]
+    assert list(states.values()) == ["ok", "problem", "problem", "problem"]
     assert not arm.state()["torque"]
 
 

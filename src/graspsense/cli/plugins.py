@@ -204,7 +204,7 @@ def _write_gripper_file(name: str, roles: tuple[str, ...], folder: Path, model: 
     folder.mkdir(parents=True, exist_ok=True)
     write_whole(path, draft.text.encode(), replace=False)
     echo(f"{path} has a gripper file. Found:", indent=2)
-    for line in draft.found:
+    for line in draft.decided:
         echo(f"  {line}", indent=4)
     echo("Left to fill in or to look at:")
     for line in draft.left:

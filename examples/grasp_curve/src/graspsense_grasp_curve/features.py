@@ -131,25 +131,25 @@ def _curve(trace: Trace, contact_force_n: float) -> tuple[dict[str, float], dict
     touch &= trace.phase <= HOLD
     if not touch.any():
         return {}, missing(NAMES, f"the pads never felt {contact_force_n:g} N at the same time")
-    first = int(touch.argmax())
+    contact = int(touch.argmax())
     grasp = np.flatnonzero(known & (trace.phase <= HOLD))
-    grasp = grasp[grasp >= first]
+    grasp = grasp[grasp >= contact]
     force = 0.5 * (trace.force_left_n + trace.force_right_n)
     peak = int(grasp[np.argmax(force[grasp])])
     values = {"peak_force": float(force[peak]), "gap_at_peak": float(trace.gap_m[peak])}
     reasons: dict[str, str] = {}
     squeeze = grasp[grasp <= peak]
     release = np.flatnonzero(known & (trace.phase == RELEASE))
-    for name, found in (
+    for name, value in (
         ("stiffness_ratio", _stiffness_ratio(trace.gap_m[squeeze], force[squeeze])),
         ("hysteresis", _hysteresis(trace.gap_m, _in_time(trace, force), squeeze, release)),
         ("relaxation_time", _relaxation(trace.t_s, force, grasp[grasp >= peak])),
     ):
-        if isinstance(found, str):
-            reasons[name] = found
+        if isinstance(value, str):
+            reasons[name] = value
         else:
-            values[name] = found
-    moments = _moments(trace, float(trace.t_s[first]), float(trace.t_s[peak]))
+            values[name] = value
+    moments = _moments(trace, float(trace.t_s[contact]), float(trace.t_s[peak]))
     if isinstance(moments, str):
         return values, {**reasons, **missing(IMAGE, moments)}
     return {**values, **dict(zip(IMAGE, moments, strict=True))}, reasons
@@ -213,21 +213,21 @@ def _relaxation(t_s: Floats, force: Floats, held: Any) -> float | str:
 
 def _moments(trace: Trace, contact_s: float, peak_s: float) -> tuple[float, float, float] | str:
     """Return area, row and spread of the contact in the last image before the peak, or the reason for their absence."""
-    before = np.flatnonzero(trace.pad_t_s < contact_s)
+    untouched = np.flatnonzero(trace.pad_t_s < contact_s)
     upto = np.flatnonzero((trace.pad_t_s <= peak_s) & (trace.pad_t_s >= contact_s))
     if not len(trace.pad_t_s):
         return "there are no cell images"
-    if not len(before) or not len(upto):
+    if not len(untouched) or not len(upto):
         return "no cell image lies before the contact, or none between contact and peak"
     rows = np.arange(trace.pad_left.shape[1] - FIRST_PAD_CELL) // 3
-    found = []
+    moments = []
     for cells in (trace.pad_left, trace.pad_right):
-        face = np.clip(cells[upto[-1], FIRST_PAD_CELL:] - cells[before[-1], FIRST_PAD_CELL:], 0.0, None)
+        face = np.clip(cells[upto[-1], FIRST_PAD_CELL:] - cells[untouched[-1], FIRST_PAD_CELL:], 0.0, None)
         total = float(face.sum())
         if not total > 0.0:
             return "the gripping face of a pad felt nothing at the peak, or gave no number"
         row = float((rows * face).sum()) / total
         spread = math.sqrt(float(((rows - row) ** 2 * face).sum()) / total)
-        found.append((float((face > 0.1 * face.max()).sum()), row, spread))
-    (a, b, c), (d, e, f) = found
+        moments.append((float((face > 0.1 * face.max()).sum()), row, spread))
+    (a, b, c), (d, e, f) = moments
     return 0.5 * (a + d), 0.5 * (b + e), 0.5 * (c + f)

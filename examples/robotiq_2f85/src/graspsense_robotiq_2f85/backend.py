@@ -6,11 +6,12 @@ import struct
 import time
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from math import inf, nan
+from math import inf
 from typing import Any, Final, final
 
 from attrs import frozen
 
+from graspsense.gripper_api import Polling
 from graspsense.plugin_api import (
     NO_PADS,
     POSITION,
@@ -18,7 +19,6 @@ from graspsense.plugin_api import (
     Command,
     DeviceInfo,
     DeviceLost,
-    Frame,
     NoDevice,
     Pads,
     Reading,
@@ -97,8 +97,7 @@ class Robotiq2F85(SensorBackend[Robotiq2F85Config]):
             raise NoDevice(
                 f"no 2F-85 at {config.port}: {error}. Look at gripper.port and its power"
             ) from error
-        self._began_s = self._due_s = self._last_s = time.monotonic()
-        self._gap_m = nan
+        self._polling = Polling(RATE_HZ)
         return DeviceInfo(
             name="Robotiq 2F-85",
             clock="device",
@@ -112,23 +111,11 @@ class Robotiq2F85(SensorBackend[Robotiq2F85Config]):
 
     def read(self, timeout_s: float) -> Reading | None:
         """Wait for the next multiple of 10 ms, then exchange. Raises DeviceLost."""
-        wait_s = self._due_s - time.monotonic()
-        time.sleep(max(min(wait_s, timeout_s), 0.0))
-        if wait_s > timeout_s:
+        if not self._polling.wait(timeout_s):
             return None
-        self._due_s = max(self._due_s, time.monotonic()) + 1.0 / RATE_HZ
         status = self._exchange()
-        now_s = time.monotonic()
-        dt_s, self._last_s = now_s - self._last_s, now_s
-        before_m, self._gap_m = (
-            self._gap_m,
-            STEP_M * (CLOSED_BYTE - min(max(status[4], OPEN_BYTE), CLOSED_BYTE)),
-        )
-        velocity = (self._gap_m - before_m) / dt_s if before_m == before_m else 0.0
-        effort = status[5] * NEWTONS_A_STEP
-        return Reading(
-            Frame(now_s - self._began_s, dt_s, self._gap_m, velocity, effort, nan, nan, nan, nan, 0), NO_PADS
-        )
+        gap_m = STEP_M * (CLOSED_BYTE - min(max(status[4], OPEN_BYTE), CLOSED_BYTE))
+        return Reading(self._polling.frame(gap_m, status[5] * NEWTONS_A_STEP), NO_PADS)
 
     def apply(self, command: Command) -> None:
         """Keep the request of this command for the next exchange."""

@@ -9,9 +9,13 @@ from math import inf, nan
 from types import MappingProxyType
 from typing import Any, Final, final
 
-from attrs import evolve
-
-from graspsense.gripper_api import LoadTable, asked_force, calibrations_of, stored_delivered_force
+from graspsense.gripper_api import (
+    BackendWithEmulator,
+    LoadTable,
+    asked_force,
+    calibrations_of,
+    stored_delivered_force,
+)
 from graspsense.plugin_api import (
     FORCE,
     NO_PADS,
@@ -23,14 +27,11 @@ from graspsense.plugin_api import (
     DeviceLost,
     Frame,
     NoDevice,
-    ObjectKind,
     Pads,
     Reading,
-    SensorBackend,
-    create,
     signal_type,
 )
-from graspsense_franka_hand.config import EMULATED, FrankaConfig
+from graspsense_franka_hand.config import FrankaConfig
 from graspsense_franka_hand.emulator.lock_step import LockStepHand
 from graspsense_franka_hand.link import LibfrankaLink
 from graspsense_franka_hand.orders import (
@@ -57,7 +58,7 @@ KELVIN: Final = 273.15
 
 
 @final
-class FrankaBackend(SensorBackend[FrankaConfig]):
+class FrankaBackend(BackendWithEmulator[FrankaConfig]):
     """Turns commands into the few that a hand takes: grasp, move and stop. It measures no force."""
 
     channels = (
@@ -80,23 +81,10 @@ class FrankaBackend(SensorBackend[FrankaConfig]):
     def __init__(self, config: FrankaConfig) -> None:
         super().__init__(config)
         self._link: HandLink | None = None
+        self._emulated: LockStepHand | None = None
         self._waiting: Order | None = None
         self._table: LoadTable | None = None
         self._frames = self._sent = 0
-        self._body_report: Mapping[str, float | int | str | bool] = {}
-
-    def objects(self) -> Sequence[ObjectKind]:
-        """Return what the body of the emulated hand can hold."""
-        config = self.config
-        if config.host != EMULATED:
-            return ()
-        return tuple(create("sensor-backend", config.body, **config.body_config).objects())
-
-    def with_object(self, name: str) -> SensorBackend[FrankaConfig]:
-        """Return the emulated hand with this object. Raises ConfigError for a real one."""
-        if self.config.host != EMULATED:
-            return super().with_object(name)
-        return FrankaBackend(evolve(self.config, object=name))
 
     def open(self, seed: int) -> DeviceInfo:
         """Connect to the hand. Raises NoDevice, PluginUnavailable without pylibfranka."""
@@ -106,21 +94,17 @@ class FrankaBackend(SensorBackend[FrankaConfig]):
         delivered = stored.get("delivered-force")
         self._table = None if delivered is None else stored_delivered_force(delivered)
         try:
-            if config.host == EMULATED:
-                link: HandLink = LockStepHand(config, seed)
-                first = link.newest(1.0)
-                assert first is not None
-            else:
-                link = LibfrankaLink(config.host)
-                first = link.first
+            self._emulated = LockStepHand(config, seed) if config.emulated else None
+            link = self._emulated or LibfrankaLink(config.host)
+            state = link.first
         except HandGone as error:
             raise NoDevice(
                 f"no Franka Hand at {config.host}: {error}. Look at gripper.host, at the cable to the control, whether "
                 "FCI is active in Desk, and whether another program has the hand"
             ) from error
-        self._link, self._state = link, first
-        self._began_s = self._last_s = first.host_s
-        self._recent: deque[tuple[float, float]] = deque([(0.0, first.width_m)])
+        self._link, self._state = link, state
+        self._began_s = self._last_s = state.host_s
+        self._recent: deque[tuple[float, float]] = deque([(0.0, state.width_m)])
         self._frames = self._sent = 0
         self._velocity_m_s = 0.0
         self._asked, self._waiting = Order(STOP), None
@@ -158,9 +142,9 @@ class FrankaBackend(SensorBackend[FrankaConfig]):
         order = self._order(command)
         if order is None or order == self._asked or self._link is None:
             return
-        before, self._asked = self._asked, order
+        previous, self._asked = self._asked, order
         busy = self._state.done < self._sent
-        if busy and before.kind == GRASP and order.kind == GRASP:
+        if busy and previous.kind == GRASP and order.kind == GRASP:
             # A hand that is interrupted too often no longer answers: the running grasp ends at the thing by itself.
             self._waiting = order
             return
@@ -179,18 +163,15 @@ class FrankaBackend(SensorBackend[FrankaConfig]):
         if link is not None:
             with suppress(HandGone):
                 link.close()
-            if isinstance(link, LockStepHand):
-                self._body_report = link.body_report
 
     def report(self) -> dict[str, float | int | str | bool]:
         """Return the number of frames and of orders, with what the emulated body knows."""
-        link = self._link
-        body = link.body_report if isinstance(link, LockStepHand) else self._body_report
+        body = {} if self._emulated is None else self._emulated.body_report
         return {**body, "frames": self._frames, "orders": self._sent}
 
     def dry_run_backend(self) -> FrankaBackend:
         """Return the emulated hand."""
-        return FrankaBackend(self.config if self.config.host == EMULATED else FrankaConfig(host=EMULATED))
+        return FrankaBackend(self.config if self.config.emulated else FrankaConfig(host="emulated"))
 
     def _send(self, order: Order) -> None:
         assert self._link is not None
@@ -226,20 +207,16 @@ class FrankaBackend(SensorBackend[FrankaConfig]):
         return min(max(force_n, FORCES_N[0]), FORCES_N[1])
 
     def _described(self, calibration: Mapping[str, str]) -> DeviceInfo:
-        emulated = self.config.host == EMULATED
-        return DeviceInfo(
-            name="emulated Franka Hand" if emulated else "Franka Hand",
+        info = DeviceInfo(
+            name="Franka Hand",
             serial=self.config.host,
-            clock="virtual" if emulated else "device",
-            simulated=emulated,
+            clock="device",
             rate_hz=RATE_HZ,
             effort_limit_n=FORCES_N[1],
             speed_limit_m_s=FASTEST_M_S,
             opening=Command(POSITION, WIDEST_M, inf, 0.05),
             relaxed=Command(VELOCITY, 0.0, inf, inf),
             calibration=calibration,
-            notes=(
-                "a Franka Hand measures no force, so features that need one are missing",
-                *(("emulated: no hand was touched",) if emulated else ()),
-            ),
+            notes=("a Franka Hand measures no force, so features that need one are missing",),
         )
+        return self.marked(info)

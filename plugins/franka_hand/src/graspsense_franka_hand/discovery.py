@@ -9,7 +9,7 @@ from contextlib import suppress
 
 from graspsense.gripper_api import Finding, FoundDevice
 from graspsense.plugin_api import PluginUnavailable
-from graspsense_franka_hand.config import EMULATED, FrankaConfig
+from graspsense_franka_hand.config import FrankaConfig
 from graspsense_franka_hand.link import LibfrankaLink
 from graspsense_franka_hand.orders import HandGone
 from graspsense_franka_hand.protocol import (
@@ -58,7 +58,7 @@ def diagnose(config: object, timeout_s: float) -> Iterator[Finding]:
 
 
 def _asked(config: FrankaConfig, timeout_s: float) -> Iterator[Finding]:
-    if config.host == EMULATED:
+    if config.emulated:
         yield Finding("franka", "note", "gripper.host is emulated, so no device is searched")
         return
     try:

@@ -12,17 +12,12 @@ import time
 from contextlib import suppress
 from typing import Final, final
 
-from graspsense.gripper_api import ReadingThread
+from graspsense.gripper_api import ReadingThread, set_option
 from graspsense.plugin_api import PluginUnavailable
 from graspsense_franka_hand.orders import HandGone, HandState, Order
 
 CONNECT_S: Final = 8.0
 CLOSE_S: Final = 3.0
-MISSING: Final = (
-    "a Franka Hand needs pylibfranka, which is not installed here\n"
-    "  try: pip install pylibfranka (wheels for Linux on x86_64 with glibc 2.34, Python up to 3.12)\n"
-    "  without a hand: -o gripper.host=emulated needs nothing"
-)
 
 
 @final
@@ -31,7 +26,11 @@ class LibfrankaLink:
 
     def __init__(self, host: str, timeout_s: float = CONNECT_S) -> None:
         if importlib.util.find_spec("pylibfranka") is None:
-            raise PluginUnavailable(MISSING)
+            raise PluginUnavailable(
+                "a Franka Hand needs pylibfranka, which is not installed here\n"
+                "  try: pip install pylibfranka (wheels for Linux on x86_64 with glibc 2.34, Python up to 3.12)\n"
+                f"  without a hand: {set_option('gripper.host=emulated')} needs nothing"
+            )
         self._process = subprocess.Popen(
             [sys.executable, "-P", "-m", "graspsense_franka_hand.hand_process", host],
             stdin=subprocess.PIPE,

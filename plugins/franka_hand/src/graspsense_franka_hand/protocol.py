@@ -79,7 +79,7 @@ class HandRequests:
     def fed(self, data: bytes) -> list[HandRequest]:
         """Take bytes and return the complete requests. Raises NotARequest."""
         self._data += data
-        found = []
+        requests = []
         while len(self._data) >= HEADER.size:
             command, number, length = HEADER.unpack_from(self._data)
             layout = REQUESTS.get(command)
@@ -87,6 +87,6 @@ class HandRequests:
                 raise NotARequest(f"command {command} with {length} bytes")
             if len(self._data) < length:
                 break
-            found.append(HandRequest(command, number, layout.unpack_from(self._data, HEADER.size)))
+            requests.append(HandRequest(command, number, layout.unpack_from(self._data, HEADER.size)))
             self._data = self._data[length:]
-        return found
+        return requests

@@ -66,8 +66,8 @@ def annotate(grasps: Sequence[StoredGrasp], original: Path, copy: Path) -> dict[
         unreadable += not columns
         for name, values in columns.items():
             every[name] += values
-    found = {name: np.concatenate(values) for name, values in every.items() if values}
-    if not found:
+    added = {name: np.concatenate(values) for name, values in every.items() if values}
+    if not added:
         raise DataDamaged(f"{original} has no Parquet file in its folder data that can be read")
     _annotate_episodes(copy, folder.version, placed)
     declared = {name: {"dtype": "int64", "shape": [1], "names": None} for name in COLUMNS}
@@ -78,8 +78,8 @@ def annotate(grasps: Sequence[StoredGrasp], original: Path, copy: Path) -> dict[
     stats = copy / "meta" / "stats.json"
     if stats.is_file():
         known = json.loads(stats.read_text("utf-8"))
-        write_json(stats, {**known, **{name: statistics(values) for name, values in found.items()}})
-    counts = {"trials": len(grasps), "frames": len(found[COLUMNS[0]])}
+        write_json(stats, {**known, **{name: statistics(values) for name, values in added.items()}})
+    counts = {"trials": len(grasps), "frames": len(added[COLUMNS[0]])}
     return {**counts, "unreadable": unreadable} if unreadable else counts
 
 
@@ -92,7 +92,7 @@ def _placed(grasps: Sequence[StoredGrasp], original: Path) -> dict[int, list[Pla
             f"its own: graspsense import lerobot:{original} --save DIR"
         )
     parts = list(numbered_parts(places.pop().removeprefix(_KIND), original))
-    found: dict[int, list[Placed]] = {}
+    placed: dict[int, list[Placed]] = {}
     for grasp in grasps:
         number = int(grasp.source.rpartition("#")[2]) - 1
         part = parts[number] if number < len(parts) else None
@@ -106,8 +106,8 @@ def _placed(grasps: Sequence[StoredGrasp], original: Path) -> dict[int, list[Pla
                 f"trial {grasp.number} has another gap than {columns.source} of {original}: the data sets differ"
             )
         start_s, end_s = float(columns.t_s[0]), float(columns.t_s[-1])
-        found.setdefault(episode, []).append(Placed(grasp, start_s, end_s))
-    return found
+        placed.setdefault(episode, []).append(Placed(grasp, start_s, end_s))
+    return placed
 
 
 def _same(grasp: StoredGrasp, columns: GraspColumns) -> bool:
@@ -128,7 +128,7 @@ def _annotate_file(
 ) -> dict[str, list[Any]]:
     """Add the columns to a data file, one group of rows after the other, and return them; none if it is damaged."""
     part = path.with_suffix(".part")
-    found: dict[str, list[Any]] = {name: [] for name in COLUMNS}
+    added: dict[str, list[Any]] = {name: [] for name in COLUMNS}
     writer = None
     try:
         with parquet.ParquetFile(path) as file:
@@ -136,7 +136,7 @@ def _annotate_file(
                 table = file.read_row_group(k)
                 for name, values in _numbers(table, placed, meanings).items():
                     table = _with_column(table, name, values)
-                    found[name].append(values)
+                    added[name].append(values)
                 # What another library says of the columns does not name the new ones.
                 table = table.replace_schema_metadata(None)
                 writer = writer or parquet.ParquetWriter(part, table.schema)
@@ -149,7 +149,7 @@ def _annotate_file(
     if writer is not None:
         writer.close()
         part.replace(path)
-    return found
+    return added
 
 
 def _numbers(
@@ -160,16 +160,18 @@ def _numbers(
     phase = np.full(len(table), NO_GRASP, dtype=np.int64)
     event, prediction = np.zeros(len(table), dtype=np.int64), np.zeros(len(table), dtype=np.int64)
     for episode in np.unique(episodes).tolist():
-        for one in placed.get(int(episode), ()):
-            within = (episodes == episode) & (times >= one.start_s - 1e-6) & (times <= one.end_s + 1e-6)
-            own_s = times[within] - one.start_s
+        for squeeze in placed.get(int(episode), ()):
+            within = (
+                (episodes == episode) & (times >= squeeze.start_s - 1e-6) & (times <= squeeze.end_s + 1e-6)
+            )
+            own_s = times[within] - squeeze.start_s
             if not len(own_s):
                 continue
-            trace = one.grasp.trace()
+            trace = squeeze.grasp.trace()
             tick = np.clip(np.searchsorted(trace.t_s, own_s + 1e-6, side="right") - 1, 0, len(trace) - 1)
             phase[within] = trace.phase[tick]
-            event[within] = event_numbers(one.grasp, meanings[0], own_s)
-            prediction[within] = prediction_numbers(one.grasp, meanings[1], own_s)
+            event[within] = event_numbers(squeeze.grasp, meanings[0], own_s)
+            prediction[within] = prediction_numbers(squeeze.grasp, meanings[1], own_s)
     return dict(zip(COLUMNS, (phase, event, prediction), strict=True))
 
 
@@ -179,21 +181,26 @@ def _annotate_episodes(copy: Path, version: int, placed: Mapping[int, Sequence[P
         rows = json_lines(copy, "meta/episodes.jsonl")
         lines = [
             json.dumps(
-                {**row, "graspsense": [about(one.grasp) for one in placed.get(row["episode_index"], ())]}
+                {
+                    **row,
+                    "graspsense": [about(squeeze.grasp) for squeeze in placed.get(row["episode_index"], ())],
+                }
             )
             for row in rows
         ]
         (copy / "meta" / "episodes.jsonl").write_text("\n".join(lines) + "\n", "utf-8")
         return
-    names = dict.fromkeys(name for some in placed.values() for one in some for name in about(one.grasp))
+    names = dict.fromkeys(
+        name for some in placed.values() for squeeze in some for name in about(squeeze.grasp)
+    )
     for path in sorted((copy / "meta" / "episodes").glob("*/*.parquet")):
         table = parquet.read_table(path)
         known = [
-            [about(one.grasp) for one in placed.get(index, ())]
+            [about(squeeze.grasp) for squeeze in placed.get(index, ())]
             for index in table["episode_index"].to_pylist()
         ]
         for name in names:
-            table = _with_column(table, name, [[one.get(name) for one in some] for some in known])
+            table = _with_column(table, name, [[labels.get(name) for labels in some] for some in known])
         parquet.write_table(table.replace_schema_metadata(None), path)
 
 

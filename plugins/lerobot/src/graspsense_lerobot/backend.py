@@ -7,12 +7,12 @@ force is one of that distance, and a speed is that of a target that moves.
 from __future__ import annotations
 
 import time
-from collections import deque
 from collections.abc import Mapping, Sequence
 from math import inf, nan
 from types import MappingProxyType
 from typing import Final, final
 
+from graspsense.gripper_api import Polling
 from graspsense.plugin_api import (
     FORCE,
     NO_PADS,
@@ -22,7 +22,6 @@ from graspsense.plugin_api import (
     Command,
     DeviceInfo,
     DeviceLost,
-    Frame,
     NoDevice,
     Pads,
     Reading,
@@ -51,9 +50,9 @@ class LeRobotBackend(SensorBackend[LeRobotConfig]):
     def __init__(self, config: LeRobotConfig) -> None:
         super().__init__(config)
         self._motor: OneMotor | None = None
-        self._recent: deque[tuple[float, float]] = deque(maxlen=SLOPE_FRAMES)
+        self._polling = Polling(config.rate_hz, time, SLOPE_FRAMES)
         self._gap_m = self._target_m = self._effort_n = 0.0
-        self._frames = self._retries = 0
+        self._retries = 0
         self.command_delay_s = 1.0 / config.rate_hz
 
     @property
@@ -67,8 +66,7 @@ class LeRobotBackend(SensorBackend[LeRobotConfig]):
         """Connect the robot; nothing moves. Raises NoDevice, ConfigError, PluginUnavailable."""
         self.close()
         config = self.config
-        self._frames = self._retries = 0
-        self._recent.clear()
+        self._retries = 0
         try:
             self._motor = OneMotor(config)
             position, _ = self._motor.read()
@@ -79,32 +77,21 @@ class LeRobotBackend(SensorBackend[LeRobotConfig]):
                 "gripper.robot_config"
             ) from error
         self._gap_m = self._target_m = config.jaw.gap_m(position)
-        self._began_s = self._last_s = self._due_s = time.monotonic()
+        self._polling = Polling(config.rate_hz, time, SLOPE_FRAMES)
         return self._described()
 
     def read(self, timeout_s: float) -> Reading | None:
         """Wait until the next observation is due, and make it. Raises DeviceLost."""
-        wait_s = self._due_s - time.monotonic()
-        if wait_s > timeout_s:
-            time.sleep(timeout_s)
+        if not self._polling.wait(timeout_s):
             return None
-        if wait_s > 0.0:
-            time.sleep(wait_s)
-        self._due_s = max(self._due_s, time.monotonic()) + 1.0 / self.config.rate_hz
         try:
             position, load = self._opened().read()
         except NoAnswer as error:
             raise self._lost(error) from error
-        now_s = time.monotonic()
-        t_s, dt_s, self._last_s = now_s - self._began_s, now_s - self._last_s, now_s
         self._gap_m = self.config.jaw.gap_m(position)
-        self._recent.append((t_s, self._gap_m))
-        (start_s, start_m), span = self._recent[0], len(self._recent)
-        velocity = (self._gap_m - start_m) / (t_s - start_s) if span > 1 else 0.0
         self._effort_n = load * self.config.newtons_per_unit
         effort_n = nan if self.config.load == "none" else self._effort_n
-        self._frames += 1
-        return Reading(Frame(t_s, dt_s, self._gap_m, velocity, effort_n, nan, nan, nan, nan, 0), NO_PADS)
+        return Reading(self._polling.frame(self._gap_m, effort_n), NO_PADS)
 
     def apply(self, command: Command) -> None:
         """Move the target on by the way of one frame, and send it. Raises DeviceLost."""
@@ -127,7 +114,7 @@ class LeRobotBackend(SensorBackend[LeRobotConfig]):
     def report(self) -> dict[str, float | int | str | bool]:
         """Return the number of frames, and of questions that were repeated."""
         retries = self._retries if self._motor is None else self._motor.retries
-        return {"frames": self._frames, "repeated": retries}
+        return {"frames": self._polling.frames, "repeated": retries}
 
     def _next_target(self, command: Command) -> float:
         config = self.config

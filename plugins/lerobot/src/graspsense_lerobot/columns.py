@@ -46,7 +46,7 @@ def _arrow(values: Any) -> Any:
 def statistics(values: Any) -> dict[str, list[float] | list[int]]:
     """Return the statistics of a column over its frames as LeRobot stores them."""
     rows = values.reshape(len(values), -1).astype(np.float64)
-    found: dict[str, list[float] | list[int]] = {
+    summary: dict[str, list[float] | list[int]] = {
         "min": rows.min(axis=0).tolist(),
         "max": rows.max(axis=0).tolist(),
         "mean": rows.mean(axis=0).tolist(),
@@ -54,5 +54,5 @@ def statistics(values: Any) -> dict[str, list[float] | list[int]]:
         "count": [len(rows)],
     }
     for share, row in zip(QUANTILES, np.quantile(rows, QUANTILES, axis=0), strict=True):
-        found[f"q{round(100 * share):02d}"] = row.tolist()
-    return found
+        summary[f"q{round(100 * share):02d}"] = row.tolist()
+    return summary

@@ -184,13 +184,13 @@ class Folder:
         pattern = self.info.get(key) or default
 
         def value(match: re.Match[str]) -> str:
-            found = fields.get(match["name"])
-            if found is None:
+            filling = fields.get(match["name"])
+            if filling is None:
                 raise DataDamaged(
                     f"{self.place}: {key} in {INFO} has the unknown field {match['name']!r}; known are "
                     f"{', '.join(fields)}"
                 )
-            return str(found).rjust(int(match["width"] or 0), "0")
+            return str(filling).rjust(int(match["width"] or 0), "0")
 
         path = _FIELD.sub(value, str(pattern))
         parts = PurePosixPath(path)
@@ -230,7 +230,7 @@ class Folder:
         return self.tasks[number]
 
     def _videos(self, row: Mapping[str, Any], index: int) -> dict[str, tuple[str, float]]:
-        found = {}
+        videos = {}
         for feature in self.features.values():
             if feature.dtype != "video":
                 continue
@@ -241,17 +241,17 @@ class Folder:
                     "episode_index": index,
                     "video_key": feature.key,
                 }
-                found[feature.key] = self._filled("video_path", fields), 0.0
+                videos[feature.key] = self._filled("video_path", fields), 0.0
                 continue
             names = {name: f"videos/{feature.key}/{name}" for name in ("chunk_index", "file_index")}
             if all(name in row for name in names.values()):
                 numbers = {name: _whole(row, column, "meta/episodes") for name, column in names.items()}
                 start_s = float(row.get(f"videos/{feature.key}/from_timestamp", 0.0))
-                found[feature.key] = (
+                videos[feature.key] = (
                     self._filled("video_path", {**numbers, "video_key": feature.key}),
                     start_s,
                 )
-        return found
+        return videos
 
 
 def read_folder(place: Path) -> Folder:
@@ -288,7 +288,7 @@ def read_folder(place: Path) -> Folder:
 
 def _feature(place: Path, key: str, value: Any) -> DataColumn:
     shape = value.get("shape") if isinstance(value, dict) else None
-    if not isinstance(shape, list) or not all(isinstance(one, int) and 0 < one < 10**7 for one in shape):
+    if not isinstance(shape, list) or not all(isinstance(size, int) and 0 < size < 10**7 for size in shape):
         raise DataDamaged(f"{place}/{INFO}: the feature {key[:80]!r} has no shape of whole numbers")
     given = _flat(value.get("names"))
     about = value.get("info")
@@ -307,12 +307,14 @@ def _flat(names: Any) -> tuple[str, ...]:
     if isinstance(names, dict):
         names = (
             list(names.values())
-            if all(isinstance(one, list | dict) for one in names.values())
+            if all(isinstance(part, list | dict) for part in names.values())
             else list(names)
         )
     if isinstance(names, list):
         return tuple(
-            name for one in names for name in (_flat(one) if isinstance(one, list | dict) else (str(one),))
+            name
+            for part in names
+            for name in (_flat(part) if isinstance(part, list | dict) else (str(part),))
         )
     return ()
 

@@ -125,14 +125,14 @@ def channel_name(text: str) -> str:
 
 def _arrays(names: Sequence[str]) -> tuple[CellArray, ...]:
     """Return the arrays of at least two cells whose numbers are all there."""
-    found: dict[str, dict[tuple[int, int, str], str]] = {}
+    cells_by_finger: dict[str, dict[tuple[int, int, str], str]] = {}
     for name in names:
         match = CELL.fullmatch(name)
         if match and (match["row"] or match["kind"] or TOUCH.search(match["finger"])):
             axis = (match["after"] or match["before"] or "").lower()
             place = (int(match["row"] or 0), int(match["cell"] or match["column"]), axis)
-            found.setdefault(match["finger"], {})[place] = name
-    arrays = (_array(finger, cells) for finger, cells in found.items())
+            cells_by_finger.setdefault(match["finger"], {})[place] = name
+    arrays = (_array(finger, cells) for finger, cells in cells_by_finger.items())
     return tuple(array for array in arrays if array is not None)
 
 

@@ -192,10 +192,10 @@ def _check_times(columns: GraspColumns, understood: Understood) -> None:
     """Raise DataDamaged if the time does not increase."""
     wrong = np.flatnonzero(~(np.diff(columns.t_s) > 0.0))
     if len(wrong):
-        before, after = columns.t_s[wrong[0] : wrong[0] + 2].tolist()
+        earlier_s, later_s = columns.t_s[wrong[0] : wrong[0] + 2].tolist()
         raise DataDamaged(
-            f"{columns.source}: the time goes from {before:g} s to {after:g} s at frame {int(wrong[0]) + 1}, and must "
-            f"increase. With ?fps={understood.folder.fps:g} it follows from the numbers of the frames, and "
+            f"{columns.source}: the time goes from {earlier_s:g} s to {later_s:g} s at frame {int(wrong[0]) + 1}, and "
+            f"must increase. With ?fps={understood.folder.fps:g} it follows from the numbers of the frames, and "
             "?repeated=drop leaves out frames with the time of the one before"
         )
 

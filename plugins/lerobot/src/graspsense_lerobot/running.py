@@ -113,7 +113,7 @@ class FollowedGrasp:
         self.prediction = None
 
     def _follow(self, reading: Reading) -> None:
-        frame, before = reading.frame, int(self._state.phase)
+        frame, earlier_phase = reading.frame, int(self._state.phase)
         if self._hold_until_s == inf:
             command, self._state = self._law.step(self._law.params(), self._state, reading)
         else:
@@ -121,7 +121,7 @@ class FollowedGrasp:
         phase, outcome = int(self._state.phase), int(self._state.outcome)
         self._recorder.add(reading, phase, command)
         event = 0
-        if phase != before:
+        if phase != earlier_phase:
             event = {SQUEEZE: 1, HOLD: 2}.get(phase, 0)
         if self._anytime is not None:
             self._anytime.watch(frame, phase)
@@ -173,17 +173,17 @@ class FollowedGrasp:
 
     def _understood(self, numbers: Mapping[str, float]) -> Meaning:
         """Return the names of gap and forces, as the reader of data sets finds them. Raises ConfigError."""
-        found = meaning_of(numbers, self._given.gap, self._given.force)
-        gap = found.gap[:1]
-        forces = found.forces or (() if found.arrays else found.effort[:1])
+        meaning = meaning_of(numbers, self._given.gap, self._given.force)
+        gap = meaning.gap[:1]
+        forces = meaning.forces or (() if meaning.arrays else meaning.effort[:1])
         lacking = [name for name in (*gap, *forces) if name not in numbers]
-        if not gap or lacking or not (forces or found.arrays):
+        if not gap or lacking or not (forces or meaning.arrays):
             raise ConfigError(
                 f"no gap or no force in the observations (gap={', '.join(gap) or 'none'}, "
                 f"force={', '.join(forces) or 'none'}): name them, as in gap=NAME&force=NAME. There are "
                 f"{', '.join(list(numbers)[:12])}"
             )
-        return Meaning(gap=gap, forces=forces, arrays=found.arrays)
+        return Meaning(gap=gap, forces=forces, arrays=meaning.arrays)
 
 
 def _normals(meaning: Meaning) -> list[tuple[str, ...]]:

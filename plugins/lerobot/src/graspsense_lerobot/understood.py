@@ -50,9 +50,9 @@ def understand(folder: Folder, options: PlaceOptions) -> Understood:
     """Return what the names of a data set mean. Raises ConfigError if the opening or a force is not found."""
     names = [name for feature in _vectors(folder) for name in _names(feature)]
     images = tuple(
-        one
-        for one in folder.features.values()
-        if one.key.startswith("observation.") and _is_number(one) and len(one.shape) in (2, 3)
+        column
+        for column in folder.features.values()
+        if column.key.startswith("observation.") and _is_number(column) and len(column.shape) in (2, 3)
     )
     for what, given in (("gap", options.gap), *(("force", name) for name in options.force.split(","))):
         _refuse_unknown(given, names, what)
@@ -91,11 +91,11 @@ def understand(folder: Folder, options: PlaceOptions) -> Understood:
 
 def numbers_of(folder: Folder, episode: Episode) -> dict[str, Numbers]:
     """Return the numbers of an episode by name. Raises DataDamaged if a column is not as it is declared."""
-    found: dict[str, Numbers] = {}
+    numbers: dict[str, Numbers] = {}
     for feature in _vectors(folder):
         values = numbers_of_feature(folder, feature, episode)
-        found |= {name: values[:, k] for k, name in enumerate(_names(feature))}
-    return found
+        numbers |= {name: values[:, k] for k, name in enumerate(_names(feature))}
+    return numbers
 
 
 def numbers_of_feature(folder: Folder, feature: DataColumn, episode: Episode) -> Numbers:
@@ -174,7 +174,7 @@ def _unit_of_gap(folder: Folder, gap: str, options: PlaceOptions) -> tuple[float
     named = units_of(folder).get(gap, "") or unit_of_name(gap)
     if named in METRES:
         return METRES[named], "", []
-    episodes = [one for one in folder.episodes() if not isinstance(one, UnreadableRecording)]
+    episodes = [episode for episode in folder.episodes() if not isinstance(episode, UnreadableRecording)]
     values = np.concatenate([[], *(numbers_of(folder, episode)[gap] for episode in episodes)])
     known = values[np.isfinite(values)]
     if not len(known):

@@ -213,17 +213,18 @@ def _write(folder: Path, grasps: Sequence[StoredGrasp], plan: Plan) -> int:
     writer.close()
     _write_meta(folder, grasps, plan, rows, columns)
     write_json(
-        folder / "meta" / "stats.json", {key: statistics(np.concatenate(one)) for key, one in every.items()}
+        folder / "meta" / "stats.json",
+        {key: statistics(np.concatenate(parts)) for key, parts in every.items()},
     )
     return start
 
 
 def _columns(grasp: StoredGrasp, trace: Trace, plan: Plan, episode: int, start: int) -> list[Column]:
     """Return the columns of an episode, the frames of which are from its first tick to its last."""
-    first, last = float(trace.t_s[0]), float(trace.t_s[-1])
-    n = max(int((last - first) * plan.fps + JITTER) + 1, 2)
+    start_s, last = float(trace.t_s[0]), float(trace.t_s[-1])
+    n = max(int((last - start_s) * plan.fps + JITTER) + 1, 2)
     frame = np.arange(n)
-    times = first + frame / plan.fps
+    times = start_s + frame / plan.fps
     late = times + JITTER / plan.fps
     tick = np.clip(np.searchsorted(trace.t_s, late, side="right") - 1, 0, len(trace) - 1)
     known = _state(trace)

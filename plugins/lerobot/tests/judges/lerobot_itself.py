@@ -48,12 +48,12 @@ def loads(place: str) -> None:
 def step_runs() -> None:
     converters = {"to_transition": observation_to_transition, "to_output": transition_to_observation}
     pipeline = RobotProcessorPipeline(steps=[processor_step()("default", OPTIONS, READING)], **converters)
-    assert events([pipeline(one) for one in grasp()]) == ["contact", "rest", "end"]
+    assert events([pipeline(observation) for observation in grasp()]) == ["contact", "rest", "end"]
     with tempfile.TemporaryDirectory() as folder:
         pipeline.save_pretrained(folder)
         (config,) = Path(folder).glob("*.json")
         again = RobotProcessorPipeline.from_pretrained(folder, config_filename=config.name, **converters)
-    assert events([again(one) for one in grasp()]) == ["contact", "rest", "end"]
+    assert events([again(observation) for observation in grasp()]) == ["contact", "rest", "end"]
     sys.stdout.write("the step runs in LeRobot's pipeline, and is restored from what it saves\n")
 
 

@@ -155,7 +155,7 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
         for name in catalogue():
             kind, _, state = name.partition(":")
             states.setdefault(kind, []).extend([state] if state else [])
-        return [ObjectKind(name=kind, states=tuple(of), default=True) for kind, of in states.items()]
+        return [ObjectKind(name=kind, states=tuple(names), default=True) for kind, names in states.items()]
 
     def with_object(self, name: str) -> MujocoGripper:
         """Return this gripper with another thing between its fingers."""
@@ -164,7 +164,7 @@ class MujocoGripper(BatchBackend[MujocoConfig]):
     def variants(self) -> Sequence[SimulationVariant]:
         """Return each integrator of MuJoCo with steps from 0.1 ms to 1 ms; the reference has 0.05 ms."""
         curve = [(integrator, step_s) for integrator in INTEGRATORS for step_s in STEPS_S]
-        return [_step_variant(*one) for one in (REFERENCE, *curve)]
+        return [_step_variant(*scheme) for scheme in (REFERENCE, *curve)]
 
     def run_many(
         self,

@@ -30,7 +30,9 @@ from graspsense_mujoco_gripper.prepared import Batch
 
 WORTH_A_PROCESS: Final = 4
 """Grasps that take about as long as the start of a process."""
-_COLUMNS: Final = tuple(one.name for one in fields(Trace) if one.name not in ("units", "signals", "events"))
+_COLUMNS: Final = tuple(
+    field.name for field in fields(Trace) if field.name not in ("units", "signals", "events")
+)
 
 
 class JobStaysHere(Exception):
@@ -93,12 +95,12 @@ class GraspingJob:
 
     def grasp_in(self, process: subprocess.Popen[bytes], thing: str, seed: int) -> Grasped:
         """Run one grasp in a process. Raises JobStaysHere."""
-        to, answers = process.stdin, process.stdout
-        assert to is not None
+        jobs, answers = process.stdin, process.stdout
+        assert jobs is not None
         assert answers is not None
         try:
-            to.write(_line([thing, int(seed)]))
-            to.flush()
+            jobs.write(_line([thing, int(seed)]))
+            jobs.flush()
             line = answers.readline()
             if not line.endswith(b"\n"):
                 raise JobStaysHere
@@ -144,8 +146,8 @@ def grasps(job: GraspingJob, things: Sequence[str], seeds: Sequence[int]) -> lis
             return done
         with ThreadPoolExecutor(max_workers=workers) as pool:
             try:
-                for one in pool.map(grasp, range(len(things))):
-                    done.append(one)
+                for grasped in pool.map(grasp, range(len(things))):
+                    done.append(grasped)
                     if progress is not None:
                         progress(len(done), len(things))
             except BaseException:
@@ -221,8 +223,8 @@ def main() -> None:
         answers.flush()
 
 
-def _trace(of: IO[bytes], told: Sequence[Sequence[Any]]) -> Trace:
-    parts: dict[str, Any] = {name: np.lib.format.read_array(of, allow_pickle=False) for name in _COLUMNS}
+def _trace(answers: IO[bytes], told: Sequence[Sequence[Any]]) -> Trace:
+    parts: dict[str, Any] = {name: np.lib.format.read_array(answers, allow_pickle=False) for name in _COLUMNS}
     events = tuple(GraspEvent(t_s, Phase(phase), what, source) for t_s, phase, what, source in told)
     return Trace(**parts, events=events)
 

@@ -33,7 +33,7 @@ class Bump:
     The finger is the left one, and is hit where its edge sensor is.
     """
 
-    at: Literal["finger", "thing"] = "finger"
+    target: Literal["finger", "thing"] = field(default="finger", alias="at")
     t_s: float
     mass_kg: float = field(default=0.1, validator=ABOVE_ZERO)
     speed_m_s: float = field(default=0.2, validator=ABOVE_ZERO)
@@ -70,7 +70,7 @@ class Bumper:
 
     def __init__(self, model: mujoco.MjModel, bump: Bump, edge: str, thing: int) -> None:
         self._bump, self._thrown, self._thing, self._site = bump, False, thing, -1
-        if bump.at == "finger":
+        if bump.target == "finger":
             if not edge:
                 raise ConfigError(
                     "bump: the left finger has no edge sensor (edge in the gripper file) to bump into"

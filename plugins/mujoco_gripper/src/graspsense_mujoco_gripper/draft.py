@@ -37,10 +37,10 @@ FURTHER = (
 
 @frozen
 class Draft:
-    """The text of a gripper file, what was found, and what is left to fill in."""
+    """The text of a gripper file, what was decided, and what is left to fill in."""
 
     text: str
-    found: tuple[str, ...]
+    decided: tuple[str, ...]
     left: tuple[str, ...]
 
 
@@ -97,13 +97,13 @@ def drafted(name: str, folder: Path) -> Draft:
             "Where they are hulls of meshes, name the geoms that touch, with only_fingers = true"
         )
     fingers = [", ".join(model.body(k).name for k in bodies) for bodies in closing.fingers]
-    found = (
+    decided = (
         *(["angles in radians: the ranges of the joints are too small for degrees"] if radian else []),
         f"actuators that close: {', '.join(closing.actuators)}",
         f"left finger: {fingers[0]}; right finger: {fingers[1]}",
         f"sensors: {', '.join(sensors) or 'none'}",
     )
-    return Draft("\n".join(lines) + "\n", found, tuple(left))
+    return Draft("\n".join(lines) + "\n", decided, tuple(left))
 
 
 def _model(path: Path) -> tuple[mujoco.MjModel, bool]:
@@ -125,7 +125,7 @@ def _closing(model: mujoco.MjModel) -> _Closing:
     if model.nu == 0:
         raise ConfigError("the model has no actuator that could close fingers: add one to its <actuator>")
     ends = [_ends(model, k) for k in range(model.nu)]
-    rest = [float(np.clip(0.0, low, high)) for low, high in ends]
+    relaxed = [float(np.clip(0.0, low, high)) for low, high in ends]
     low, high = (_moved(model, [pair[k] for pair in ends]) for k in (0, 1))
     tips = _tips(model, low, high)
     if not tips:
@@ -135,7 +135,7 @@ def _closing(model: mujoco.MjModel) -> _Closing:
     for k, pair in enumerate(ends):
         gaps = []
         for control in pair:
-            controls = [pair_of[0] if j in closers else rest[j] for j, pair_of in enumerate(ends)]
+            controls = [pair_of[0] if j in closers else relaxed[j] for j, pair_of in enumerate(ends)]
             controls[k] = control
             gaps.append(_nearest(model, _moved(model, controls), fingers)[0])
         if abs(gaps[0] - gaps[1]) > LEAST_CHANGE_M:
@@ -145,7 +145,7 @@ def _closing(model: mujoco.MjModel) -> _Closing:
             "no actuator changes the distance of two fingers: the model has no two opposed fingers. Name them in a "
             "gripper file by hand"
         )
-    closed = [closers[k][1] if k in closers else rest[k] for k in range(model.nu)]
+    closed = [closers[k][1] if k in closers else relaxed[k] for k in range(model.nu)]
     total_m, points = _nearest(model, _moved(model, closed), fingers)
     return _Closing(
         tuple(model.actuator(k).name for k in closers),
@@ -238,14 +238,14 @@ def _nearest(
     """Return the sum of the distances of each body to the opposed finger, and its nearest point in its own frame."""
     total, points = 0.0, []
     for bodies, opposed in (fingers, fingers[::-1]):
-        others = [geom for body in opposed for geom in _geoms(model, body)]
+        others = [other for body in opposed for other in _geoms(model, body)]
         for body in bodies:
             best, nearest = FARTHEST_M, np.zeros(3)
-            for one, other in product(_geoms(model, body), others):
+            for geom, other in product(_geoms(model, body), others):
                 ends = np.zeros(6)
-                distance = float(mujoco.mj_geomDistance(model, data, one, other, FARTHEST_M, ends))
+                distance = float(mujoco.mj_geomDistance(model, data, geom, other, FARTHEST_M, ends))
                 if distance < best:
-                    best, nearest = distance, _level_with(data, one, other, ends[:3])
+                    best, nearest = distance, _level_with(data, geom, other, ends[:3])
             total += best
             points.append(data.xmat[body].reshape(3, 3).T @ (nearest - data.xpos[body]))
     return total, tuple(points)

@@ -296,7 +296,7 @@ def set_controls(
 
 def _keep_together(law: DriveLaw, row: int, gap_m: float, rate_m_s: float) -> None:
     """Set forces that keep several actuators at the positions of the test move for this gap, without effort."""
-    slopes, before, after = law.slopes[row], law.lengths[row - 1], law.lengths[row]
+    slopes, lower, upper = law.slopes[row], law.lengths[row - 1], law.lengths[row]
     start_m, end_m = law.gaps_m[row - 1], law.gaps_m[row]
     share = min(max((gap_m - start_m) / (end_m - start_m), 0.0), 1.0)
     square = 0.0
@@ -306,7 +306,7 @@ def _keep_together(law: DriveLaw, row: int, gap_m: float, rate_m_s: float) -> No
     closing = 0.0
     for k in range(len(slopes)):
         number = law.ids[k]
-        away = before[k] + share * (after[k] - before[k]) - law.length[number]
+        away = lower[k] + share * (upper[k] - lower[k]) - law.length[number]
         force = stiffness * (frequency * away + 2.0 * (slopes[k] * rate_m_s - law.velocity[number]))
         law.together_n[k] = force
         closing += slopes[k] * force

@@ -22,7 +22,7 @@ from importlib import import_module
 from importlib.resources import files
 from math import inf
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 from attrs import field, frozen
 
@@ -33,6 +33,8 @@ SHIPPED: Final = ("parallel", "soft_pads")
 """The gripper files of this package."""
 LARGEST_BYTES: Final = 512 * 1024
 """Limit on the size of a gripper file."""
+
+DescribedT = TypeVar("DescribedT")
 
 
 def text_of(path: Path, most: int, what: str) -> str:
@@ -48,11 +50,11 @@ class Point:
     """A point on a body, in the frame of the body (m)."""
 
     body: str
-    at: tuple[float, ...]
+    position_m: tuple[float, ...] = field(alias="at")
 
     def __attrs_post_init__(self) -> None:
-        if len(self.at) != 3:
-            raise ValueError(f"at has {len(self.at)} numbers: a point has three")
+        if len(self.position_m) != 3:
+            raise ValueError(f"at has {len(self.position_m)} numbers: a point has three")
 
 
 @frozen(kw_only=True)
@@ -202,23 +204,23 @@ def read_gripper(name: str) -> tuple[GripperFile, Path]:
     path = Path(name).expanduser()
     if not name or name in SHIPPED:
         path = Path(str(files("graspsense_mujoco_gripper") / f"{name or 'parallel'}.toml"))
+    gripper = described(path, f"gripper.file: {path}", LARGEST_BYTES, "gripper file", GripperFile)
+    return gripper, model_path(gripper.model, path)
+
+
+def described(path: Path, where: str, most: int, what: str, cls: type[DescribedT]) -> DescribedT:
+    """Return what a TOML file describes. Raises ConfigError, whose text begins with `where`."""
     try:
-        values = toml_values(text_of(path, LARGEST_BYTES, "gripper file"))
+        return structured(toml_values(text_of(path, most, what)), cls, f"a {what}")
     except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError(f"gripper.file: {path} cannot be read: {error}") from error
+        raise ConfigError(f"{where} cannot be read: {error}") from error
     except TomlError as error:
-        raise ConfigError(f"gripper.file: {path}, line {error.line}: {error}") from error
-    return _gripper_of(values, path), model_path(str(values["model"]), path)
-
-
-def _gripper_of(values: Mapping[str, Any], path: Path) -> GripperFile:
-    try:
-        return structured(values, GripperFile, "a gripper file")
+        raise ConfigError(f"{where}, line {error.line}: {error}") from error
     except ValidationFailed as misfit:
         said = [
             f"{'.'.join(map(str, problem.path)) or 'the file'}: {problem.text}" for problem in misfit.problems
         ]
-        raise ConfigError(f"gripper.file: {path}\n  " + "\n  ".join(said)) from None
+        raise ConfigError(f"{where}\n  " + "\n  ".join(said)) from None
 
 
 def model_path(name: str, beside: Path) -> Path:
@@ -253,8 +255,8 @@ def _menagerie_path(robot: str, entry: str) -> Path:
             "pip install mujoco-menagerie"
         ) from error
     try:
-        found = menagerie.get(robot)
-        return Path(found.xml(entry or found.default_model))
+        repository = menagerie.get(robot)
+        return Path(repository.xml(entry or repository.default_model))
     except LookupError as error:
         raise ConfigError(f"gripper.file: MuJoCo Menagerie has no menagerie:{robot}: {error}") from error
     except (menagerie.MenagerieError, OSError, ValueError) as error:

@@ -180,20 +180,20 @@ class ForceGauge:
         return total.tolist()  # type: ignore[no-any-return]
 
 
-def signs_of(first: int, second: int) -> tuple[float, float]:
+def signs_of(role: int, other_role: int) -> tuple[float, float]:
     """Return the sign of the force of a contact on the left and on the right finger; 0: none.
 
-    `first` and `second` are the roles of its geoms. The first row of the frame of a contact is the normal, from the
+    `role` and `other_role` are the roles of its geoms. The first row of the frame of a contact is the normal, from the
     first geom to the second; the force acts on the second.
     """
     left = right = 0.0
-    if second & LEFT and first & (ALL - LEFT):
+    if other_role & LEFT and role & (ALL - LEFT):
         left = -1.0
-    elif first & LEFT and second & (ALL - LEFT):
+    elif role & LEFT and other_role & (ALL - LEFT):
         left = 1.0
-    if second & RIGHT and first & (ALL - RIGHT):
+    if other_role & RIGHT and role & (ALL - RIGHT):
         right = 1.0
-    elif first & RIGHT and second & (ALL - RIGHT):
+    elif role & RIGHT and other_role & (ALL - RIGHT):
         right = -1.0
     return left, right
 
@@ -347,6 +347,6 @@ def geoms_of(model: mujoco.MjModel, finger: Finger) -> frozenset[int]:
     geoms = {identifier(model, OBJ.mjOBJ_GEOM, name, "geom") for name in finger.geoms}
     for name in finger.bodies:
         body = identifier(model, OBJ.mjOBJ_BODY, name, "body")
-        first = int(model.body_geomadr[body])
-        geoms |= set(range(first, first + int(model.body_geomnum[body])))
+        start = int(model.body_geomadr[body])
+        geoms |= set(range(start, start + int(model.body_geomnum[body])))
     return frozenset(geoms)

@@ -88,7 +88,7 @@ def gripper_spec(path: Path, gripper: GripperFile, timestep_s: float) -> mujoco.
                 raise ConfigError(
                     f"gripper.file: the model has no body {point.body!r}; there are {named(spec.bodies)}"
                 )
-            body.add_site(name=f"{POINT}{side}{k}", pos=point.at, group=5)
+            body.add_site(name=f"{POINT}{side}{k}", pos=point.position_m, group=5)
     return spec
 
 
@@ -135,12 +135,12 @@ def compiled(spec: mujoco.MjSpec, called: str) -> mujoco.MjModel:
 
 def identifier(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str, what: str) -> int:
     """Return the number of a named part of a model. Raises ConfigError with the names that it has."""
-    found = int(mujoco.mj_name2id(model, kind, name))
-    if found < 0:
+    number = int(mujoco.mj_name2id(model, kind, name))
+    if number < 0:
         known = [mujoco.mj_id2name(model, kind, k) for k in range(_count(model, kind))]
-        shown = ", ".join(one for one in known if one) or "none with a name"
+        shown = ", ".join(label for label in known if label) or "none with a name"
         raise ConfigError(f"gripper.file: the model has no {what} {name!r}; there are {shown}")
-    return found
+    return number
 
 
 def _count(model: mujoco.MjModel, kind: mujoco.mjtObj) -> int:

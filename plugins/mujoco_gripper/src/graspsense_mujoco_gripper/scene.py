@@ -31,10 +31,9 @@ from attrs.validators import ge, gt, le
 from numpy.typing import NDArray
 
 from graspsense.plugin_api import ConfigError
-from graspsense.simulator_api import TomlError, ValidationFailed, structured, toml_values
 from graspsense_mujoco_gripper.bump import Bump, Bumper, add_ball
 from graspsense_mujoco_gripper.catalogue import Thing, Walls, thing_named
-from graspsense_mujoco_gripper.gripper_file import text_of
+from graspsense_mujoco_gripper.gripper_file import described
 from graspsense_mujoco_gripper.model import compiled
 
 Floats = NDArray[np.float64]
@@ -173,7 +172,11 @@ def scene_named(name: str, around: str = "") -> Scene:
     path = SCENES / f"{name}.toml" if name in SHIPPED_SCENES else Path(name).expanduser()
     is_scene = path.suffix == ".toml"
     if not around:
-        return _scene_of(path) if is_scene else Scene(thing=name)
+        return (
+            described(path, f"the scene {path}", LARGEST_BYTES, "scene file", Scene)
+            if is_scene
+            else Scene(thing=name)
+        )
     if is_scene:
         raise ConfigError(
             f"gripper.object names the scene {name}, and gripper.scene the scene {around}: name a thing as the object"
@@ -198,25 +201,11 @@ def read_scene(name: str, around: str = "") -> SceneModel:
     if scene.walls is not None:
         thing, spec = Thing(walls=scene.walls), scene.walls.spec(scene.thing)
     else:
-        thing, found = thing_named(scene.thing, beside)
-        if found is None:
+        thing, known = thing_named(scene.thing, beside)
+        if known is None:
             return SceneModel(scene, thing, None, "")
-        spec = found
+        spec = known
     return SceneModel(scene, thing, spec, f"{name.partition(':')[0]}#{instance}" if number else "")
-
-
-def _scene_of(path: Path) -> Scene:
-    try:
-        return structured(toml_values(text_of(path, LARGEST_BYTES, "scene file")), Scene, "a scene file")
-    except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError(f"the scene {path} cannot be read: {error}") from error
-    except TomlError as error:
-        raise ConfigError(f"the scene {path}, line {error.line}: {error}") from error
-    except ValidationFailed as misfit:
-        said = [
-            f"{'.'.join(map(str, problem.path)) or 'the file'}: {problem.text}" for problem in misfit.problems
-        ]
-        raise ConfigError(f"the scene {path}\n  " + "\n  ".join(said)) from None
 
 
 def _check_schedule(name: str, rows: Schedule) -> None:
@@ -225,7 +214,7 @@ def _check_schedule(name: str, rows: Schedule) -> None:
             f"{name} is a list of pairs of a time (s) and a value, as in [[0.3, 0.0], [0.8, 0.05]]"
         )
     times = [row[0] for row in rows]
-    if any(after <= before for before, after in pairwise(times)):
+    if any(later_s <= earlier_s for earlier_s, later_s in pairwise(times)):
         raise ValueError(f"the times of {name} rise from pair to pair")
 
 

@@ -134,9 +134,9 @@ def ticks_at_once(
         acts = after.guard.stopped == 1 or (after.guard.acted != 0 and state.guard.acted == 0)
         if after.phase != state.phase or after.done == 1 or after.events != 0 or acts:
             return n, True, state, moved, ticked
-        state, swings, before = after, ticked.swings, ticked.command
-        if command.kind == EFFORT and command.value * before.value < 0.0:
-            swings += 1 if min(abs(command.value), abs(before.value)) > rig.swing_n else 0
+        state, swings, previous = after, ticked.swings, ticked.command
+        if command.kind == EFFORT and command.value * previous.value < 0.0:
+            swings += 1 if min(abs(command.value), abs(previous.value)) > rig.swing_n else 0
         ticked = Ticked(ticked.ticks + 1, frame.gap_m, greatest_n, swings, command)
         _record(buffers.rows, buffers.sent, n, frame, command)
         n += 1

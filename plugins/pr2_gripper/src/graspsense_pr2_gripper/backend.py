@@ -11,6 +11,7 @@ from typing import Final, final
 from attrs import asdict, evolve
 
 from graspsense.gripper_api import (
+    BackendWithEmulator,
     calibrations_of,
     stored_friction,
     stored_gain,
@@ -23,15 +24,12 @@ from graspsense.plugin_api import (
     Command,
     DeviceInfo,
     DeviceLost,
-    ObjectKind,
     Pads,
     Reading,
-    SensorBackend,
 )
 from graspsense_pr2_gripper.accelerometer import CHANNEL as ACCELERATION
 from graspsense_pr2_gripper.ceilings import EFFORT_CEILING_N, SPEED_CEILING_M_S
 from graspsense_pr2_gripper.config import Pr2Config
-from graspsense_pr2_gripper.emulation import emulated_body
 from graspsense_pr2_gripper.fingertip import fingertips
 from graspsense_pr2_gripper.link import LockStepLink
 from graspsense_pr2_gripper.linkage import FRICTION_N
@@ -74,7 +72,7 @@ TEST_NUMBER: Final = (0x1209, 0x0001)
 
 
 @final
-class Pr2Backend(SensorBackend[Pr2Config]):
+class Pr2Backend(BackendWithEmulator[Pr2Config]):
     """Reads and commands one gripper over the transport in the settings."""
 
     accepts = ("effort",)
@@ -90,16 +88,6 @@ class Pr2Backend(SensorBackend[Pr2Config]):
         """The frame and the fingertips, and the acceleration of the palm unless the settings say that there is none."""
         return (*_CHANNELS, ACCELERATION) if self.config.accelerometer else _CHANNELS
 
-    def objects(self) -> Sequence[ObjectKind]:
-        """Return the objects of the backend behind an emulated gripper; a real gripper has none."""
-        return emulated_body(self.config).objects() if self.config.transport == "emulated" else ()
-
-    def with_object(self, name: str) -> SensorBackend[Pr2Config]:
-        """Return this gripper with another object between its fingers. Raises ConfigError for a real one."""
-        if self.config.transport != "emulated":
-            return super().with_object(name)
-        return Pr2Backend(evolve(self.config, object=name))
-
     def open(self, seed: int) -> DeviceInfo:
         """Open the gripper; only an emulated one uses the seed.
 
@@ -109,7 +97,7 @@ class Pr2Backend(SensorBackend[Pr2Config]):
         self.close()
         config = self.config
         wait_s = 0.0
-        if self._lost_serial and config.transport != "emulated":
+        if self._lost_serial and not config.emulated:
             config, wait_s = evolve(config, serial=self._lost_serial), config.reconnect_s
         opened = open_board(config, seed, wait_s)
         try:
@@ -194,29 +182,31 @@ class Pr2Backend(SensorBackend[Pr2Config]):
         """Return an emulated gripper with the limits of a real one at its first use."""
         emulated = evolve(self.config, transport="emulated", pace="lock-step", calibration=UNCALIBRATED)
         backend = Pr2Backend(emulated)
-        backend._stands_in = self.config.transport != "emulated" or self.config.pace == "device"
+        backend._stands_in = not self.config.emulated or self.config.pace == "device"
         return backend
 
     def _described(self, opened: Opened) -> DeviceInfo:
         config, identity, emulation = self.config, opened.identity, opened.emulation
-        found = calibrations_of(config.calibration, identity.serial, device_numbers(identity))
+        stored = calibrations_of(config.calibration, identity.serial, device_numbers(identity))
         self._measure = Measure(
             identity,
             config,
-            stored_zero(found["tare"]) if "tare" in found else None,
-            stored_tables(found["load-cell"]) if "load-cell" in found else None,
-            stored_gain(found["gain"]) if "gain" in found else None,
+            stored_zero(stored["tare"]) if "tare" in stored else None,
+            stored_tables(stored["load-cell"]) if "load-cell" in stored else None,
+            stored_gain(stored["gain"]) if "gain" in stored else None,
         )
         self._effort_limit_n = min(identity.effort_limit_un / 1e6, EFFORT_CEILING_N)
         self._speed_limit_m_s = min(identity.speed_limit_um_s / 1e6, SPEED_CEILING_M_S)
         self._sent = self._echo = self._lost = 0
         self._heard_us = 0
-        notes = [f"calibration {kind} of {calibration.made} is in use" for kind, calibration in found.items()]
+        notes = [
+            f"calibration {kind} of {calibration.made} is in use" for kind, calibration in stored.items()
+        ]
         friction_n = FRICTION_N
-        if config.calibration not in ("", UNCALIBRATED) and not found:
+        if config.calibration not in ("", UNCALIBRATED) and not stored:
             notes.append(f"{config.calibration} has no calibration of {identity.serial}: uncalibrated")
-        if "friction" in found:
-            _, closing, _ = stored_friction(found["friction"])
+        if "friction" in stored:
+            _, closing, _ = stored_friction(stored["friction"])
             friction_n = max(closing, default=FRICTION_N)
             notes.append(f"breakaway {min(closing, default=FRICTION_N):.1f} to {friction_n:.1f} N, closing")
         if config.accelerometer and not identity.accelerometer_g:
@@ -238,7 +228,7 @@ class Pr2Backend(SensorBackend[Pr2Config]):
             relaxed=Command(EFFORT, 0.0, math.inf, math.inf),
             tare_images=TARE_IMAGES,
             numbers=device_numbers(identity),
-            calibration={kind: calibration.sha256 for kind, calibration in found.items()},
+            calibration={kind: calibration.sha256 for kind, calibration in stored.items()},
             notes=tuple(notes),
             friction_n=friction_n,
             status_bits=status_bits(config.swap_fingers),

@@ -62,13 +62,13 @@ class BoardFaults:
     def _cells(self, report: InputReport, now_us: int) -> tuple[int, int, int, int]:
         """Return the four cells with drift, and with those that are stuck or read 0."""
         faults = self._faults
-        first = report.slice * SLICE_CELLS
+        start = report.slice * SLICE_CELLS
         if not report.image:
             return report.cells
         pad = _CELLS[faults.pad_side] if now_us >= faults.pad_at_s * 1e6 else range(0)
         drift = round(faults.drift_counts_s * (now_us * 1e-6 - faults.pad_at_s))
         cells = list(report.cells)
-        for i, cell in enumerate(range(first, first + SLICE_CELLS)):
+        for i, cell in enumerate(range(start, start + SLICE_CELLS)):
             if cell in pad:
                 cells[i] = min(max(cells[i] + drift, 0), 0xFFFF)
             frozen = cell == faults.freeze_cell and now_us >= faults.freeze_at_s * 1e6

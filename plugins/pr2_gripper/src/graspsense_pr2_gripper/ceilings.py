@@ -95,15 +95,15 @@ def refuse_implausible(identity: Identity) -> None:
             f"the board {identity.serial!r} says of itself what no PR2 gripper has, so it is not used:\n  "
             + "\n  ".join(wrong)
             + "\n  try: correct the feature report in its firmware (specs/pr2_hid.md, report 3);\n"
-            "       or name another board with -o gripper.serial"
+            "       or name another board in gripper.serial"
         )
 
 
 def _out_of_range(identity: Identity) -> Iterator[str]:
     for number, least, most, unit, why in RANGES:
-        found = getattr(identity, number)
-        if not least <= found <= most:
-            yield f"{number} is {found} {unit}, allowed are {least:.0f} to {most:.0f} {unit}: {why}"
+        value = getattr(identity, number)
+        if not least <= value <= most:
+            yield f"{number} is {value} {unit}, allowed are {least:.0f} to {most:.0f} {unit}: {why}"
     if identity.accelerometer_g not in ACCELEROMETER_G:
         allowed = ", ".join(map(str, ACCELEROMETER_G))
         yield f"accelerometer_g is {identity.accelerometer_g} g, allowed are {allowed} g"

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from math import inf
-from typing import Any, Final, Literal
+from typing import Any, ClassVar, Final, Literal
 
 from attrs import fields_dict, frozen
 from attrs.validators import max_len
 
-from graspsense.plugin_api import NAMES_INPUT, setting
+from graspsense.gripper_api import EmulatorSettings, own_keys_first
+from graspsense.plugin_api import setting
 from graspsense_pr2_gripper.protocol import REPORT_SIZE, Identity
 
 IDENTITY_NUMBERS: Final = Identity._fields[Identity._fields.index("pad_counts_per_n") :]
@@ -217,13 +218,16 @@ _WITHOUT_EFFECT_ALONE: Final = {
 """Keys of a fault that say where or when, each with the keys that say what."""
 
 
-@frozen(kw_only=True)
-class Pr2Config:
+@frozen(kw_only=True, field_transformer=own_keys_first)
+class Pr2Config(EmulatorSettings):
     """A PR2 gripper: the device and its transport, the mounting of its fingertips, and the emulation.
 
     1209:0001 is the number that pid.codes reserves for private tests. The keys from `pace` on are for
     `transport = "emulated"` only.
     """
+
+    where: ClassVar[str] = "transport"
+    emulated_only: ClassVar[tuple[str, ...]] = ("pace", "transmission", "faults")
 
     transport: Literal["hidraw", "pyusb", "emulated"] = setting(
         default="hidraw",
@@ -270,32 +274,8 @@ class Pr2Config:
         meaning="Emulated only. lock-step: each read advances the time by a millisecond. device: real time, in a "
         "thread.",
     )
-    body: str = setting(
-        default="sim",
-        meaning="Emulated only: the backend that the emulated board drives, any one with a virtual clock.",
-    )
-    body_config: dict[str, Any] = setting(
-        factory=dict,
-        meaning="Emulated only: settings of that backend, as in its table [gripper].",
-    )
-    object: str | None = setting(
-        default=None,
-        effect=NAMES_INPUT,
-        meaning="Emulated only: the object between the fingers; not set: the default of body.",
-    )
     transmission: Literal["pr2", "pr2_2009", "pr2_paper"] = setting(
         default="pr2",
         meaning="Emulated only: the linkage that the emulated board reports.",
     )
     faults: FaultConfig = setting(factory=FaultConfig, meaning="Emulated only: faults of the device.")
-
-    def __attrs_post_init__(self) -> None:
-        if self.transport == "emulated":
-            return
-        defaults = Pr2Config(transport="emulated")
-        for key in ("object", "pace", "body", "body_config", "transmission", "faults"):
-            if getattr(self, key) != getattr(defaults, key):
-                raise ValueError(
-                    f"{key} is for the emulated gripper, but transport is {self.transport!r}: leave it out, or set "
-                    "gripper.transport to emulated"
-                )

@@ -66,8 +66,8 @@ class CountedTime:
         """Take a report. Raises ClockFault."""
         if self._began is None:
             self._began = sequence, time_us
-        first, began_us = self._began
-        counted_s = ((sequence - first) & 0xFFFFFFFF) * self._period_us * 1e-6
+        began_sequence, began_us = self._began
+        counted_s = ((sequence - began_sequence) & 0xFFFFFFFF) * self._period_us * 1e-6
         passed_s = (time_us - began_us) * 1e-6
         if passed_s < counted_s - COUNTED_OFF_S or (
             self._numbers_all and passed_s > counted_s + COUNTED_OFF_S

@@ -41,17 +41,17 @@ def diagnose(config: object, timeout_s: float) -> Iterator[Finding]:
         return
     wanted = config if isinstance(config, Pr2Config) else Pr2Config()
     yield from _libraries()
-    if wanted.transport == "emulated":
+    if wanted.emulated:
         yield Finding("device", "note", "gripper.transport is emulated, so no device is searched")
         return
-    found = search(wanted)
-    yield from _plugged(found, named)
+    listing = search(wanted)
+    yield from _plugged(listing, named)
     serials: dict[str, Identity] = {}
     in_use = False
     for transport in TRANSPORTS:
         if in_use:
             yield Finding(f"transport {transport}", "note", "not tried: another program commands the gripper")
-        elif not found.matching and not on_the_bus(wanted):
+        elif not listing.matching and not on_the_bus(wanted):
             continue
         else:
             tried = yield from _transport(evolve(wanted, transport=transport), timeout_s / len(TRANSPORTS))
@@ -79,27 +79,27 @@ def _libraries() -> Iterator[Finding]:
             yield Finding(f"library {name}", "problem", "not installed", f"pip install {name}")
 
 
-def _plugged(found: Search, named: bool) -> Iterator[Finding]:
-    config = found.config
+def _plugged(listing: Search, named: bool) -> Iterator[Finding]:
+    config = listing.config
     on_bus = on_the_bus(config)
-    if not found.matching:
+    if not listing.matching:
         if on_bus:
             yield Finding(
                 "device",
                 "problem",
-                f"{found.wanted} is on the bus ({', '.join(on_bus)}), but has no HID node",
+                f"{listing.wanted} is on the bus ({', '.join(on_bus)}), but has no HID node",
                 "another program may use it through libusb, or the module usbhid is missing: `sudo modprobe usbhid`",
             )
         else:
             yield Finding(
                 "device",
                 "problem" if named else "note",
-                f"no {found.wanted}",
-                f"plug it in and switch it on; {found.looked}. Other USB ids: -o gripper.vendor_id=0x1209 "
+                f"no {listing.wanted}",
+                f"plug it in and switch it on; {listing.looked}. Other USB ids: -o gripper.vendor_id=0x1209 "
                 "-o gripper.product_id=0x0001",
             )
         return
-    for device in found.matching:
+    for device in listing.matching:
         where = f"serial {device.serial or 'none'} at {device.path}, " + (
             f"USB {', '.join(on_bus)}" if on_bus else "not on USB (through uhid?)"
         )
@@ -171,14 +171,14 @@ def _measured(subject: str, identity: Identity, watched: Watched, clean: bool) -
         "in_use": watched.in_use,
         "closed_cleanly": clean,
     }
-    found = (
+    sentence = (
         f"{watched.rate_hz:.1f} of {wanted_hz:g} Hz, {watched.lost} lost, {watched.corrupt} damaged, jitter "
         f"{numbers['jitter_median_ms']} ms ({numbers['jitter_99_ms']} ms at 99 %)"
     )
     if watched.in_use:
-        found += ", another program commands it: nothing was sent"
+        sentence += ", another program commands it: nothing was sent"
     elif watched.trips_s:
-        found += (
+        sentence += (
             f", command to echo {numbers['latency_median_ms']} ms ({numbers['latency_99_ms']} ms at 99 %)"
         )
     wrong = []
@@ -194,7 +194,7 @@ def _measured(subject: str, identity: Identity, watched: Watched, clean: bool) -
         wrong.append("reports are damaged although USB checks them: the firmware is faulty")
     if watched.reports and not watched.in_use and not watched.trips_s:
         wrong.append("no command was echoed: it sends reports but does not receive commands")
-    return Finding(subject, "problem" if wrong else "ok", found, "\n".join(wrong), numbers)
+    return Finding(subject, "problem" if wrong else "ok", sentence, "\n".join(wrong), numbers)
 
 
 def _calibrations(config: Pr2Config, identity: Identity) -> Iterator[Finding]:

@@ -75,15 +75,17 @@ def search(config: Pr2Config) -> Search:
 
 def on_the_bus(config: Pr2Config) -> list[str]:
     """Return the places on the USB bus with a device of these USB ids, as Linux lists them without a library."""
-    found = []
+    places = []
     for folder in glob("/sys/bus/usb/devices/*"):
         try:
-            numbers = tuple(int((Path(folder) / one).read_text(), 16) for one in ("idVendor", "idProduct"))
+            numbers = tuple(
+                int((Path(folder) / file_name).read_text(), 16) for file_name in ("idVendor", "idProduct")
+            )
         except (OSError, ValueError):
             continue
         if numbers == (config.vendor_id, config.product_id):
-            found.append(os.path.basename(folder))
-    return sorted(found)
+            places.append(os.path.basename(folder))
+    return sorted(places)
 
 
 def found_devices() -> Sequence[FoundDevice]:

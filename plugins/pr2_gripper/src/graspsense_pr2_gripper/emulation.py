@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any, Final, NamedTuple
 
-from graspsense.plugin_api import ConfigError, DeviceInfo, SensorBackend, create
+from graspsense.gripper_api import opened_body
+from graspsense.plugin_api import ConfigError, DeviceInfo, SensorBackend
 from graspsense_pr2_gripper.accelerometer import RANGE_G
 from graspsense_pr2_gripper.ceilings import EFFORT_CEILING_N, SPEED_CEILING_M_S
 from graspsense_pr2_gripper.config import Pr2Config
@@ -45,24 +46,9 @@ class Emulation(NamedTuple):
         return report
 
 
-def emulated_body(config: Pr2Config) -> SensorBackend[Any]:
-    """Return the backend that the emulated board drives, not yet opened. Raises ConfigError."""
-    values = dict(config.body_config)
-    if config.object is not None:
-        values["object"] = config.object
-    body: SensorBackend[Any] = create("sensor-backend", config.body, **values)
-    return body
-
-
 def emulated_board(config: Pr2Config, seed: int) -> Emulation:
     """Return a board over the backend that the settings name, which is opened. Raises ConfigError."""
-    body = emulated_body(config)
-    info = body.open(seed)
-    if info.clock != "virtual":
-        raise ConfigError(
-            f"gripper.body {config.body!r} has a clock of its own, so no board can be emulated over it: name a gripper "
-            "with a virtual clock, such as sim"
-        )
+    body, info = opened_body(config.body, config.body_config, config.object, seed)
     identity = Identity(
         firmware=(1, 0, 0),
         serial=config.serial or EMULATED_SERIAL,

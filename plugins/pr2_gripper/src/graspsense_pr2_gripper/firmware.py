@@ -210,9 +210,9 @@ class Firmware:
         self._image = self._image % LAST_IMAGE + 1
         self._image_us = now_us
         self._slice, self._gone_out = 0, False
-        for first, cells, absent in ((0, pads.left, LEFT_ABSENT), (CELLS, pads.right, RIGHT_ABSENT)):
+        for start, cells, absent in ((0, pads.left, LEFT_ABSENT), (CELLS, pads.right, RIGHT_ABSENT)):
             raw = _raw(cells)
-            self._cells[first : first + CELLS] = raw
+            self._cells[start : start + CELLS] = raw
             self._status = self._status & ~absent | (0 if any(raw) else absent)
 
 

@@ -200,11 +200,11 @@ class ThreadedLink(Link):
         return False
 
 
-def joined(before: Arrival, now: Arrival) -> Arrival:
+def joined(earlier: Arrival, now: Arrival) -> Arrival:
     """Return the later of two arrivals, with the samples of both where none is missing between them."""
-    if before.sampled + len(now.words) != now.sampled:
+    if earlier.sampled + len(now.words) != now.sampled:
         return now
-    return now._replace(words=(*before.words, *now.words)[-MAX_SAMPLES:])
+    return now._replace(words=(*earlier.words, *now.words)[-MAX_SAMPLES:])
 
 
 def close_within(transport: Transport, time_s: float) -> bool:

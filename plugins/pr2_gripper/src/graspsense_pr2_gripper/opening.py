@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Final, NamedTuple
 
+from graspsense.gripper_api import set_option
 from graspsense.plugin_api import NoDevice
 from graspsense_pr2_gripper.ceilings import refuse_implausible
 from graspsense_pr2_gripper.config import Pr2Config
@@ -34,7 +35,7 @@ def open_board(config: Pr2Config, seed: int, wait_s: float) -> Opened:
 
     `wait_s` is the time to wait for a device that is not connected. Raises NoDevice, ConfigError, PluginUnavailable.
     """
-    if config.transport == "emulated":
+    if config.emulated:
         return _emulated(config, seed)
     transport = _open_transport(config, wait_s)
     try:
@@ -67,7 +68,7 @@ def _identified(config: Pr2Config, transport: Transport) -> Identity:
 def _no_answer(config: Pr2Config, error: Exception) -> NoDevice:
     return NoDevice(
         f"the device {config.vendor_id:04x}:{config.product_id:04x} does not answer as a PR2 gripper: "
-        f"{error}\n  try: other USB ids with -o gripper.vendor_id and gripper.product_id, or -o gripper.serial"
+        f"{error}\n  try: other USB ids in gripper.vendor_id and gripper.product_id, or gripper.serial"
     )
 
 
@@ -102,7 +103,7 @@ def _open_transport(config: Pr2Config, wait_s: float) -> Transport:
         elif openers:
             raise NoDevice(
                 f"there are {len(openers)} devices {config.vendor_id:04x}:{config.product_id:04x}\n"
-                "  try: -o gripper.serial=SERIAL, with a serial of `graspsense devices`"
+                f"  try: {set_option('gripper.serial=SERIAL')}, with a serial of `graspsense devices`"
             )
         if time.monotonic() >= give_up:
             raise missing
@@ -112,15 +113,15 @@ def _open_transport(config: Pr2Config, wait_s: float) -> Transport:
 def _hidraw(config: Pr2Config) -> tuple[Sequence[Callable[[], Transport]], NoDevice]:
     from graspsense_pr2_gripper.transports.hidraw import HidrawTransport
 
-    found = search(config)
+    listing = search(config)
     missing = NoDevice(
-        f"no PR2 gripper: searched for {found.wanted}\n"
-        f"  {found.looked}\n"
+        f"no PR2 gripper: searched for {listing.wanted}\n"
+        f"  {listing.looked}\n"
         "  try: plug it in and switch it on, then `graspsense devices`\n"
-        "       other USB ids: -o gripper.vendor_id=0x1209 -o gripper.product_id=0x0001\n"
-        "       no gripper at hand: -o gripper.transport=emulated, or `graspsense run --gripper sim`"
+        f"       other USB ids: {set_option('gripper.vendor_id=0x1209', 'gripper.product_id=0x0001')}\n"
+        f"       no gripper at hand: {set_option('gripper.transport=emulated')}, or `graspsense run --gripper sim`"
     )
-    return [partial(HidrawTransport, device) for device in found.matching], missing
+    return [partial(HidrawTransport, device) for device in listing.matching], missing
 
 
 def _pyusb(config: Pr2Config) -> tuple[Sequence[Callable[[], Transport]], NoDevice]:
@@ -131,6 +132,6 @@ def _pyusb(config: Pr2Config) -> tuple[Sequence[Callable[[], Transport]], NoDevi
     missing = NoDevice(
         f"no PR2 gripper: searched for USB device {config.vendor_id:04x}:{config.product_id:04x}{serial} with libusb\n"
         "  try: plug it in and switch it on; gripper.transport hidraw sees devices that are not on USB, too\n"
-        "       no gripper at hand: -o gripper.transport=emulated, or `graspsense run --gripper sim`"
+        f"       no gripper at hand: {set_option('gripper.transport=emulated')}, or `graspsense run --gripper sim`"
     )
     return [partial(PyusbTransport, device) for device in devices], missing

@@ -132,9 +132,9 @@ class Stream:
         if self._have & bit:
             return
         self._have |= bit
-        first = report.slice * SLICE_CELLS
+        start = report.slice * SLICE_CELLS
         # Converted slice by slice, since the tick in which an image is complete has enough to do.
-        self._cells[first : first + SLICE_CELLS] = map(float, report.cells)
+        self._cells[start : start + SLICE_CELLS] = map(float, report.cells)
         if self._have == _ALL_SLICES:
             counts.images += 1
             self.image = RawImage(counts.images + counts.images_lost, self._taken_us, tuple(self._cells))

@@ -168,8 +168,8 @@ def load_order(kernel: Path, wanted: Iterable[str]) -> dict[str, bytes]:
             return
         data = unpacked(files[name])
         needs = re.search(rb"\0depends=([^\0]*)\0", b"\0" + data)
-        for one in needs.group(1).decode().split(",") if needs else ():
-            visit(one)
+        for module in needs.group(1).decode().split(",") if needs else ():
+            visit(module)
         order[name] = data
 
     for name in wanted:
@@ -195,7 +195,7 @@ def cpio(files: Iterable[tuple[str, int, bytes]]) -> bytes:
     for number, (name, mode, data) in enumerate((*files, ("TRAILER!!!", 0, b"")), 1):
         path = name.encode() + b"\0"
         numbers = (number, mode, 0, 0, 1, 0, len(data), 0, 0, 0, 0, len(path), 0)
-        archive += b"070701" + b"".join(b"%08X" % one for one in numbers) + path
+        archive += b"070701" + b"".join(b"%08X" % number for number in numbers) + path
         archive += b"\0" * (-len(archive) % 4) + data
         archive += b"\0" * (-len(archive) % 4)
     return bytes(archive)

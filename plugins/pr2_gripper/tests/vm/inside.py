@@ -149,12 +149,12 @@ class Emulator:
 
 @contextmanager
 def emulator(way: Way, rate_hz: int) -> Iterator[Emulator]:
-    one = Emulator(way, rate_hz)
+    started = Emulator(way, rate_hz)
     try:
         appeared(way)
-        yield one
+        yield started
     finally:
-        one.gone()
+        started.gone()
         vanished()
 
 
@@ -191,9 +191,9 @@ def tapped(pause_s: float) -> Iterator[list[bytes]]:
     After each fifty the reader sleeps for `pause_s`.
     """
     taken: list[bytes] = []
-    before = {}
+    reads = {}
     for kind in (HidrawTransport, PyusbTransport):
-        before[kind] = plain = kind.read
+        reads[kind] = plain = kind.read
 
         def read(self: Any, timeout_s: float, plain: Callable[..., bytes] = plain) -> bytes:
             if data := plain(self, timeout_s):
@@ -206,7 +206,7 @@ def tapped(pause_s: float) -> Iterator[list[bytes]]:
     try:
         yield taken
     finally:
-        for kind, plain in before.items():
+        for kind, plain in reads.items():
             kind.read = plain  # type: ignore[method-assign]
 
 
@@ -214,7 +214,7 @@ def stream(way: Way, device: Emulator, reports: int, pause_s: float = 0.0) -> No
     """Read and command for a while: what was lost, by our own count, and does the driver's agree?"""
     with tapped(pause_s) as taken:
         opened = open_board(Pr2Config(transport=way.transport), 0, 0.0)
-        link, before = opened.link, device.tell("state")["commands"]
+        link, sent_earlier = opened.link, device.tell("state")["commands"]
         began = time.monotonic()
         sent = 0
         while link.stream.counts.reports < reports:
@@ -224,10 +224,10 @@ def stream(way: Way, device: Emulator, reports: int, pause_s: float = 0.0) -> No
         took_s = time.monotonic() - began
         link.close()
     counts = link.stream.counts
-    arrived = device.tell("state")["commands"] - before
+    arrived = device.tell("state")["commands"] - sent_earlier
     taken = taken[1:]  # the first one is read to be forgotten
-    right = [zlib.crc32(one[:60]) == struct.unpack_from("<I", one, 60)[0] for one in taken]
-    numbers = [struct.unpack_from("<I", one, 1)[0] for one in taken]
+    right = [zlib.crc32(report[:60]) == struct.unpack_from("<I", report, 60)[0] for report in taken]
+    numbers = [struct.unpack_from("<I", report, 1)[0] for report in taken]
     lost = numbers[-1] - numbers[0] + 1 - len(numbers)
     name = f"{way.name}, a reader that lags" if pause_s else way.name
     words = (
@@ -288,21 +288,21 @@ def grasp(way: Way, phase: Phase, tick: int, act: Callable[[], None]) -> tuple[A
     """Grasp, and act at the n-th tick of a phase; again where the grasp was lost before that moment."""
     settings = settings_of(None, "pr2", None, options_of(way), 0)
     for _ in range(ATTEMPTS):
-        at = At(phase, tick, act)
-        trial = grasp_with(settings, installed(), sinks=[at], on_event=at.event)
-        if at.when_s or trial.outcome is Outcome.STEADY:
+        moment = At(phase, tick, act)
+        trial = grasp_with(settings, installed(), sinks=[moment], on_event=moment.event)
+        if moment.when_s or trial.outcome is Outcome.STEADY:
             break
         # The emulated processor was held up.
         print(f"note   {way.name}: {trial.outcome.words} before {phase.name.lower()}: {trial.reason}")
         appeared(way)
-    return at, trial
+    return moment, trial
 
 
-def lost_in_a_grasp(way: Way, device: Emulator, what: str, trial: Trial, at: At) -> None:
+def lost_in_a_grasp(way: Way, device: Emulator, what: str, trial: Trial, moment: At) -> None:
     """What must hold after a loss: it is told, nothing squeezes, and what was felt is kept."""
-    told_s = time.monotonic() - at.when_s
+    told_s = time.monotonic() - moment.when_s
     released, took_s = device.let_go()
-    words = f"{way.name}: {what} in {at.phase.name.lower()}, at {at.force_n:.1f} N on a pad"
+    words = f"{way.name}: {what} in {moment.phase.name.lower()}, at {moment.force_n:.1f} N on a pad"
     # Where the emulated processor was held up at that moment, the watchdog of the board was faster.
     let_go = trial.outcome is Outcome.ABORTED and "watchdog" in trial.reason
     check(
@@ -310,7 +310,7 @@ def lost_in_a_grasp(way: Way, device: Emulator, what: str, trial: Trial, at: At)
         f"{words}: {trial.outcome.words} after {told_s:.2f} s: {trial.reason}",
     )
     check(released, f"{words}: let go {took_s:.2f} s later")
-    if at.phase >= Phase.APPROACH:
+    if moment.phase >= Phase.APPROACH:
         check(len(trial.trace) > 0, f"{words}: {len(trial.trace)} ticks are kept")
 
 
@@ -321,9 +321,9 @@ def unplugged(way: Way, device: Emulator, pulls: int) -> None:
     moments = [(Phase.TARING, 0), (Phase.APPROACH, 2), (Phase.SQUEEZE, 1), (Phase.HOLD, 2)]
     moments += [(chance.choice(phases), chance.randrange(1, way.grasp_hz // 5)) for _ in range(pulls)]
     for phase, tick in moments:
-        at, trial = grasp(way, phase, tick, lambda: device.say("unplug"))
-        if at.when_s:
-            lost_in_a_grasp(way, device, "unplugged", trial, at)
+        moment, trial = grasp(way, phase, tick, lambda: device.say("unplug"))
+        if moment.when_s:
+            lost_in_a_grasp(way, device, "unplugged", trial, moment)
         else:
             # The phase was over before its n-th tick.
             words = f"{trial.outcome.words} {trial.reason}"
@@ -334,11 +334,11 @@ def unplugged(way: Way, device: Emulator, pulls: int) -> None:
 
 def unplugged_and_kept(way: Way, device: Emulator, store: Path) -> None:
     """The trial of a lost device is in the store, and the next one too."""
-    at = At(Phase.SQUEEZE, 3, lambda: device.say("unplug"))
+    moment = At(Phase.SQUEEZE, 3, lambda: device.say("unplug"))
     settings = settings_of(None, "pr2", None, options_of(way), 0)
     with Store.open(store) as opened:
-        kept = record_grasp(opened, settings, installed(), labels={}, origin="run", sinks=[at])
-    lost_in_a_grasp(way, device, "unplugged", kept.trial, at)
+        kept = record_grasp(opened, settings, installed(), labels={}, origin="run", sinks=[moment])
+    lost_in_a_grasp(way, device, "unplugged", kept.trial, moment)
     check(kept.number is not None and not kept.problem, f"{way.name}: kept as trial {kept.number}")
     device.tell("plug")
     appeared(way)
@@ -346,8 +346,8 @@ def unplugged_and_kept(way: Way, device: Emulator, store: Path) -> None:
 
 def silent(way: Way, device: Emulator) -> None:
     for word in ("silent", "stalled"):
-        at, trial = grasp(way, Phase.SQUEEZE, 3, lambda word=word: device.say(word))  # type: ignore[misc]
-        lost_in_a_grasp(way, device, word, trial, at)
+        moment, trial = grasp(way, Phase.SQUEEZE, 3, lambda word=word: device.say(word))  # type: ignore[misc]
+        lost_in_a_grasp(way, device, word, trial, moment)
         device.tell("well")
         if way.wire == "usb":
             # A real one that hung is pulled out, too.
@@ -384,12 +384,12 @@ def replugged(way: Way, device: Emulator) -> None:
     began = time.monotonic()
     try:
         backend.open(0)
-        found = backend.read(1.0) is not None
+        reads = backend.read(1.0) is not None
     except NoDevice as error:
-        found = False
+        reads = False
         print(error)
     check(
-        found, f"{way.name}: plugged in again after 0.3 s, reads again after {time.monotonic() - began:.2f} s"
+        reads, f"{way.name}: plugged in again after 0.3 s, reads again after {time.monotonic() - began:.2f} s"
     )
     backend.close()
     os.waitpid(pid, 0)
@@ -400,8 +400,8 @@ def replugged(way: Way, device: Emulator) -> None:
 def killed(way: Way) -> None:
     device = Emulator(way, way.grasp_hz)
     appeared(way)
-    at, trial = grasp(way, Phase.SQUEEZE, 3, device.kill)
-    told_s = time.monotonic() - at.when_s
+    moment, trial = grasp(way, Phase.SQUEEZE, 3, device.kill)
+    told_s = time.monotonic() - moment.when_s
     check(
         trial.outcome is Outcome.DEVICE_LOST,
         f"{way.name}: emulator killed in squeeze: {trial.outcome.words} after {told_s:.2f} s: {trial.reason}",
@@ -445,11 +445,11 @@ def whole_grasp(way: Way) -> None:
 def examined(way: Way) -> None:
     """The doctor finds it well, and measures it."""
     code, said = ran("doctor", "--json", "--timeout", "1", "--gripper", "pr2")
-    findings = {one["subject"]: one for part in said["diagnoses"] for one in part["findings"]}
-    found = findings.get(f"transport {way.transport}", {})
+    findings = {finding["subject"]: finding for part in said["diagnoses"] for finding in part["findings"]}
+    finding = findings.get(f"transport {way.transport}", {})
     check(
-        found.get("state") == "ok",
-        f"{way.name}: doctor, exit code {code}: {found.get('found')} {found.get('advice')}",
+        finding.get("state") == "ok",
+        f"{way.name}: doctor, exit code {code}: {finding.get('found')} {finding.get('advice')}",
     )
 
 
@@ -460,9 +460,11 @@ def ruled(way: Way, device: Emulator) -> None:
     if way.wire == "usb":
         (place,) = on_the_bus(Pr2Config())
         asked.append(f"/sys/bus/usb/devices/{place}")
-    for one in asked:
-        told = subprocess.run(["udevadm", "info", one], capture_output=True, text=True, check=True).stdout
-        check(":uaccess:" in told, f"{way.name}: {one} is tagged uaccess by the rule to copy")
+    for device_path in asked:
+        told = subprocess.run(
+            ["udevadm", "info", device_path], capture_output=True, text=True, check=True
+        ).stdout
+        check(":uaccess:" in told, f"{way.name}: {device_path} is tagged uaccess by the rule to copy")
 
 
 def without_permission() -> None:
@@ -481,7 +483,8 @@ def without_permission() -> None:
     os.waitpid(pid, 0)
     os.close(read)
     check(
-        all(one in text for one in ("uaccess", "only root", "transport=emulated")), f"no permission:\n{text}"
+        all(word in text for word in ("uaccess", "only root", "transport=emulated")),
+        f"no permission:\n{text}",
     )
 
 
@@ -518,7 +521,7 @@ def main() -> int:
     )
     print(f"ready after {time.monotonic():.1f} s", flush=True)
     without_permission()
-    for way in [one for one in WAYS if one.wire in asked.wires]:
+    for way in [way for way in WAYS if way.wire in asked.wires]:
         with emulator(way, way.stream_hz) as device:
             stream(way, device, way.reports)
             stream(way, device, 150, pause_s=0.04)
@@ -538,8 +541,8 @@ def main() -> int:
     free = Path("/proc/meminfo").read_text().split("MemAvailable:")[1].split()[0]
     print(f"{free} kB of memory were free at the end", flush=True)
     print(f"{len(failed)} failed", flush=True)
-    for one in failed:
-        print(f"FAILED {one}")
+    for failure in failed:
+        print(f"FAILED {failure}")
     return 1 if failed else 0
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections import deque
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from math import inf, nan
@@ -12,7 +11,7 @@ from typing import Any, Final, final
 
 from attrs import evolve
 
-from graspsense.gripper_api import no_pads, pad_force, tare
+from graspsense.gripper_api import BackendWithEmulator, Polling, no_pads, pad_force, tare
 from graspsense.plugin_api import (
     FORCE,
     NO_PADS,
@@ -22,14 +21,10 @@ from graspsense.plugin_api import (
     Command,
     DeviceInfo,
     DeviceLost,
-    Frame,
     NoDevice,
-    ObjectKind,
     Pads,
     Reading,
-    SensorBackend,
     TactileArray,
-    create,
     signal_type,
 )
 from graspsense_robotiq_2f.config import RobotiqConfig
@@ -51,8 +46,6 @@ from graspsense_robotiq_2f.ur_cap import PREFIX, UrCapLink, opened_link
 
 RATE_HZ: Final = 100.0
 ACTIVATION_S: Final = 5.0
-ATTEMPTS: Final = 3
-SLOPE_FRAMES: Final = 6
 COMMAND_DELAY_S: Final = 0.02
 """A command waits for the next exchange (10 ms), which takes 5 ms on the line, and the gripper's next period (5 ms)."""
 AHEAD_M: Final = 0.004
@@ -76,7 +69,7 @@ PADS_SILENT_S: Final = 0.5
 
 
 @final
-class RobotiqBackend(SensorBackend[RobotiqConfig]):
+class RobotiqBackend(BackendWithEmulator[RobotiqConfig]):
     """Turns commands into a target position with a speed and a force; each read is one exchange."""
 
     accepts = ("velocity", "position", "force")
@@ -95,15 +88,14 @@ class RobotiqBackend(SensorBackend[RobotiqConfig]):
         self.least_force_n = self._model.forces_n[0]
         self.least_step_m = self._model.step_m
         self._link: ModbusLink | UrCapLink | LockStepGripper | None = None
+        self._emulated: LockStepGripper | None = None
         self._fingertips: TactileFingertips | None = None
-        self._time: Any = time
+        self._polling = Polling(RATE_HZ)
+        self._gap_m = self._target_m = 0.0
         self._pads = NO_PADS
         self._zero = ((0.0,) * CELLS, (0.0,) * CELLS)
         self._asked = Request(active=True, go=False, position=0, speed=0, force=0)
-        self._frames = self._retries = 0
-        self._exchange_s = 0.0
         self._clock_report: Mapping[str, float | int | str | bool] = {}
-        self._body_report: Mapping[str, float | int | str | bool] = {}
 
     @property
     def channels(self) -> tuple[Channel, ...]:
@@ -111,32 +103,15 @@ class RobotiqBackend(SensorBackend[RobotiqConfig]):
         bare = BARE[:2] if self.config.port.startswith(PREFIX) else BARE
         return bare + PADS if self.config.tactile_port else bare
 
-    def objects(self) -> Sequence[ObjectKind]:
-        """Return what the body of the emulated gripper can hold."""
-        config = self.config
-        if config.port != "emulated":
-            return ()
-        return tuple(create("sensor-backend", config.body, **config.body_config).objects())
-
-    def with_object(self, name: str) -> SensorBackend[RobotiqConfig]:
-        """Return the emulated gripper with this object. Raises ConfigError for a real one."""
-        if self.config.port != "emulated":
-            return super().with_object(name)
-        return RobotiqBackend(evolve(self.config, object=name))
-
     def open(self, seed: int) -> DeviceInfo:
         """Open the gripper, and activate it if it is not: it then opens and closes once. Raises NoDevice."""
         self.close()
         config, model = self.config, self._model
         self._asked = Request(active=True, go=False, position=0, speed=0, force=0)
-        self._frames = self._retries = 0
-        self._exchange_s = 0.0
         try:
-            if config.port == "emulated":
-                self._link = self._time = LockStepGripper(config, seed)
-            else:
-                self._link = opened_link(config.port, config.address, config.reply_timeout_s)
-                self._time = time
+            self._emulated = LockStepGripper(config, seed) if config.emulated else None
+            self._link = self._emulated or opened_link(config.port, config.address, config.reply_timeout_s)
+            self._polling = Polling(RATE_HZ, self._emulated or time)
             status = self._activated()
             self._open_fingertips()
         except (OSError, ValueError, NoReply) as error:
@@ -145,45 +120,26 @@ class RobotiqBackend(SensorBackend[RobotiqConfig]):
                 f"no {model.name} at {config.port}, unit {config.address}: {error}. Look at its power and cable, at "
                 "gripper.port and gripper.address; on Linux be in the group dialout"
             ) from error
-        self._began_s = self._last_s = self._due_s = self._time.monotonic()
-        self._target_m = model.gap_m(status.position)
-        self._recent: deque[tuple[float, float]] = deque(maxlen=SLOPE_FRAMES)
+        self._polling.begin()
+        self._gap_m = self._target_m = model.gap_m(status.position)
         return self._described()
 
     def read(self, timeout_s: float) -> Reading | None:
         """Wait for the next multiple of 10 ms, then exchange data with the gripper. Raises DeviceLost."""
-        wait_s = self._due_s - self._time.monotonic()
-        if wait_s > timeout_s:
-            self._time.sleep(timeout_s)
+        if not self._polling.wait(timeout_s):
             return None
-        if wait_s > 0.0:
-            self._time.sleep(wait_s)
-        # On a grid of times, so that the duration of an exchange does not lower the rate; lost time is not made up.
-        self._due_s = max(self._due_s + 1.0 / RATE_HZ, self._time.monotonic())
-        asked_s = self._time.monotonic()
         status = self._status()
-        now_s = self._time.monotonic()
-        self._exchange_s = max(self._exchange_s, now_s - asked_s)
-        t_s, dt_s, self._last_s = now_s - self._began_s, now_s - self._last_s, now_s
-        gap_m = self._model.gap_m(status.position)
-        self._recent.append((t_s, gap_m))
-        (start_s, start_m), span = self._recent[0], len(self._recent)
-        velocity = (gap_m - start_m) / (t_s - start_s) if span > 1 else 0.0
+        self._gap_m = self._model.gap_m(status.position)
         told = not isinstance(self._link, UrCapLink)
-        effort = status.current * AMPERES_A_STEP * self.config.newtons_per_ampere if told else nan
-        self._frames += 1
-        forces, signals = self._felt()
-        return Reading(
-            Frame(t_s, dt_s, gap_m, velocity, effort, *forces, nan, nan, bit_of(status.fault)),
-            self._pads,
-            signals,
-        )
+        effort_n = status.current * AMPERES_A_STEP * self.config.newtons_per_ampere if told else nan
+        frame = self._polling.frame(self._gap_m, effort_n, bit_of(status.fault))
+        (left_n, right_n), signals = self._felt()
+        return Reading(frame._replace(force_left_n=left_n, force_right_n=right_n), self._pads, signals)
 
     def apply(self, command: Command) -> None:
         """Store a command for the next exchange."""
         kind, value, effort_limit, speed_limit = command
         slowest = self._model.speeds_m_s[0]
-        gap_m = self._recent[-1][1] if self._recent else self._target_m
         force = effort_limit
         if kind == VELOCITY:
             speed, goal = min(abs(value), speed_limit), self._model.stroke_m if value > 0.0 else 0.0
@@ -192,9 +148,9 @@ class RobotiqBackend(SensorBackend[RobotiqConfig]):
         elif kind == FORCE:
             speed, goal, force = min(slowest, speed_limit), 0.0, min(value, effort_limit)
         else:
-            speed, goal = 0.0, gap_m
+            speed, goal = 0.0, self._gap_m
         if speed <= slowest:
-            self._move_target(goal, speed, gap_m)
+            self._move_target(goal, speed)
         else:
             self._target_m = goal
         self._asked = Request(
@@ -214,43 +170,27 @@ class RobotiqBackend(SensorBackend[RobotiqConfig]):
         """Stop the fingers if the gripper still responds, and close the connection."""
         link, self._link = self._link, None
         if link is not None:
-            for _ in range(ATTEMPTS):
-                with suppress(NoReply, OSError):
-                    link.exchange(self._asked._replace(go=False).registers())
-                    break
+            stop = self._asked._replace(go=False).registers()
+            with suppress(NoReply, OSError):
+                self._polling.tried(lambda: link.exchange(stop), NoReply, OSError)
             with suppress(OSError):
                 link.close()
-            if isinstance(link, LockStepGripper):
-                self._body_report = link.body_report
         fingertips, self._fingertips = self._fingertips, None
         if fingertips is not None:
             fingertips.close()
 
     def report(self) -> dict[str, float | int | str | bool]:
         """Return the number of frames, and of repeated exchanges, with what the emulated body knows."""
-        link = self._link
-        body = link.body_report if isinstance(link, LockStepGripper) else self._body_report
-        return {
-            **body,
-            "frames": self._frames,
-            "repeated": self._retries,
-            "frame_uncertainty_s": self._exchange_s,
-            **self._clock_report,
-        }
+        body = {} if self._emulated is None else self._emulated.body_report
+        return {**body, **self._polling.report(), **self._clock_report}
 
     def dry_run_backend(self) -> RobotiqBackend:
         """Return the emulated gripper."""
         config = self.config
-        if config.port != "emulated":
-            config = RobotiqConfig(
-                port="emulated",
-                model=config.model,
-                address=config.address,
-                newtons_per_ampere=config.newtons_per_ampere,
-                tactile_port=",".join("emulated" for _ in config.tactile_ports),
-                pad_counts_per_newton=config.pad_counts_per_newton,
-            )
-        return RobotiqBackend(config)
+        emulated_tips = ",".join("emulated" for _ in config.tactile_ports)
+        return RobotiqBackend(
+            config if config.emulated else evolve(config, port="emulated", tactile_port=emulated_tips)
+        )
 
     def _open_fingertips(self) -> None:
         ports = self.config.tactile_ports
@@ -260,8 +200,8 @@ class RobotiqBackend(SensorBackend[RobotiqConfig]):
         self._zero = ((0.0,) * CELLS, (0.0,) * CELLS)
         boards: Sequence[Board]
         if "emulated" in ports:
-            assert isinstance(self._link, LockStepGripper)
-            boards = self._link.boards()
+            assert self._emulated is not None
+            boards = self._emulated.boards()
         else:
             boards = opened_boards(ports)
         self._fingertips = TactileFingertips(boards)
@@ -279,7 +219,7 @@ class RobotiqBackend(SensorBackend[RobotiqConfig]):
         image = self._fingertips.image
         if image is not None:
             # An image that was measured before the gripper was opened has its time.
-            self._pads = Pads(max(image.host_s - self._began_s, 0.0), image.counter, *image.cells)
+            self._pads = Pads(max(image.host_s - self._polling.began_s, 0.0), image.counter, *image.cells)
             self._clock_report = self._fingertips.report()
         if self._fingertips.age_s() > PADS_SILENT_S:
             raise DeviceLost(
@@ -290,14 +230,13 @@ class RobotiqBackend(SensorBackend[RobotiqConfig]):
             pad_force(cells, zero, gain, 0) if self._pads.counter else 0.0
             for cells, zero in zip(self._pads[2:], self._zero, strict=True)
         )
-        return (left, right), signal_type(self.channels)(*self._fingertips.signals(self._began_s))
+        return (left, right), signal_type(self.channels)(*self._fingertips.signals(self._polling.began_s))
 
     def _described(self) -> DeviceInfo:
-        model, emulated = self._model, self.config.port == "emulated"
-        return DeviceInfo(
-            name=f"emulated {model.name}" if emulated else model.name,
-            clock="virtual" if emulated else "device",
-            simulated=emulated,
+        model = self._model
+        info = DeviceInfo(
+            name=model.name,
+            clock="device",
             rate_hz=RATE_HZ,
             effort_limit_n=model.forces_n[1],
             speed_limit_m_s=model.speeds_m_s[1],
@@ -320,9 +259,9 @@ class RobotiqBackend(SensorBackend[RobotiqConfig]):
                     if self.config.tactile_port
                     else ()
                 ),
-                *(("emulated: no gripper was touched",) if emulated else ()),
             ),
         )
+        return self.marked(info)
 
     def _activated(self) -> Status:
         """Return the status of the gripper once it is active. One that is already active does not move."""
@@ -331,21 +270,22 @@ class RobotiqBackend(SensorBackend[RobotiqConfig]):
         if status.state == ACTIVE and not status.fault:
             return self._exchange(self._asked)
         self._exchange(self._asked._replace(active=False))
-        until = self._time.monotonic() + ACTIVATION_S
+        clock = self._emulated or time
+        until = clock.monotonic() + ACTIVATION_S
         while (status := self._exchange(self._asked)).state != ACTIVE:
-            if self._time.monotonic() > until:
+            if clock.monotonic() > until:
                 raise NoReply(f"not activated after {ACTIVATION_S:g} s, fault {status.fault}")
-            self._time.sleep(1.0 / RATE_HZ)
+            clock.sleep(1.0 / RATE_HZ)
         return status
 
-    def _move_target(self, goal_m: float, speed_m_s: float, gap_m: float) -> None:
+    def _move_target(self, goal_m: float, speed_m_s: float) -> None:
         """Move the target on by the way of one frame: the gripper itself cannot move that slowly."""
         if speed_m_s == 0.0:
-            self._target_m = gap_m
+            self._target_m = self._gap_m
         step = speed_m_s / RATE_HZ
         self._target_m += min(max(goal_m - self._target_m, -step), step)
-        if goal_m < gap_m:
-            self._target_m = max(self._target_m, gap_m - AHEAD_M)
+        if goal_m < self._gap_m:
+            self._target_m = max(self._target_m, self._gap_m - AHEAD_M)
 
     def _exchange(self, request: Request) -> Status:
         assert self._link is not None
@@ -354,20 +294,12 @@ class RobotiqBackend(SensorBackend[RobotiqConfig]):
     def _status(self) -> Status:
         if self._link is None:
             raise DeviceLost(f"the {self._model.name} is not open")
-        said = ""
-        for attempt in range(ATTEMPTS):
-            try:
-                status = self._exchange(self._asked)
-            except NoReply as error:
-                said = str(error)
-                self._retries += attempt < ATTEMPTS - 1
-                continue
-            except OSError as error:
-                said = str(error)
-                break
-            if not status.active:
-                raise DeviceLost(f"the {self._model.name} was switched off and on again: open it anew")
-            return status
-        raise DeviceLost(
-            f"the {self._model.name} at {self.config.port} does not answer ({said}): look at its cable and power"
-        )
+        try:
+            status = self._polling.tried(lambda: self._exchange(self._asked), NoReply)
+        except (NoReply, OSError) as error:
+            raise DeviceLost(
+                f"the {self._model.name} at {self.config.port} does not answer ({error}): look at its cable and power"
+            ) from error
+        if not status.active:
+            raise DeviceLost(f"the {self._model.name} was switched off and on again: open it anew")
+        return status

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Literal
 
 from attrs import frozen
 
-from graspsense.gripper_api import SerialFaults
-from graspsense.plugin_api import NAMES_INPUT, setting
+from graspsense.gripper_api import EmulatorSettings, SerialFaults, own_keys_first
+from graspsense.plugin_api import setting
 
 
-@frozen(kw_only=True)
-class RobotiqConfig:
-    """A Robotiq gripper and its connection. The keys from `body` on are for `port = "emulated"` only."""
+@frozen(kw_only=True, field_transformer=own_keys_first)
+class RobotiqConfig(EmulatorSettings):
+    """A Robotiq gripper and its connection; with `port = "emulated"` a gripper in software."""
 
     model: Literal["2f-85", "2f-140", "hand-e"] = setting(
         default="2f-85", meaning="The model of the gripper."
@@ -49,19 +49,6 @@ class RobotiqConfig:
         plausible=(1.0, 2000.0),
         meaning="Grip force per motor current. The manual does not give it, so this is an assumption: measure yours.",
     )
-    body: str = setting(
-        default="sim",
-        meaning="Emulated only: a backend with a virtual clock that takes an effort, behind the emulated registers.",
-    )
-    body_config: dict[str, Any] = setting(
-        factory=dict,
-        meaning="Emulated only: settings of that backend, as in its table [gripper].",
-    )
-    object: str | None = setting(
-        default=None,
-        effect=NAMES_INPUT,
-        meaning="Emulated only: the object between the fingers; not set: the default of body.",
-    )
     faults: SerialFaults = setting(factory=SerialFaults, meaning="Emulated only: faults of the gripper.")
 
     @property
@@ -76,17 +63,9 @@ class RobotiqConfig:
                 f"tactile_port is {self.tactile_port!r}: give one port, or two with a comma between, both emulated or "
                 "none"
             )
-        if self.port == "emulated":
-            return
-        if "emulated" in ports:
+        if "emulated" in ports and not self.emulated:
             raise ValueError(
                 f"tactile_port is emulated, but port is {self.port!r}: give the port of the fingertips, or set "
                 "gripper.port to emulated"
             )
-        defaults = RobotiqConfig(port="emulated")
-        for key in ("object", "body", "body_config", "faults"):
-            if getattr(self, key) != getattr(defaults, key):
-                raise ValueError(
-                    f"{key} is for the emulated gripper, but port is {self.port!r}: leave it out, or set gripper.port "
-                    "to emulated"
-                )
+        super().__attrs_post_init__()

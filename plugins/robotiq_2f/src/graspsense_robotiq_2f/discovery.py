@@ -34,7 +34,7 @@ def diagnose(config: object, timeout_s: float) -> Iterator[Finding]:
 
 
 def _asked(config: RobotiqConfig, timeout_s: float) -> Iterator[Finding]:
-    if config.port == "emulated":
+    if config.emulated:
         yield Finding("robotiq", "note", "gripper.port is emulated, so no device is searched")
         return
     model = MODELS[config.model]

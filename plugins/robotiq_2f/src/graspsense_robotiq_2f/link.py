@@ -7,12 +7,12 @@ before the next request, which pymodbus does on a serial port only.
 from __future__ import annotations
 
 import logging
-import os
 import select
 import socket
 from collections.abc import Sequence
 from typing import Any, Final, final
 
+from graspsense.gripper_api import why_not_opened
 from graspsense_robotiq_2f.registers import COUNT, INPUT, OUTPUT
 
 BAUD: Final = 115200
@@ -33,7 +33,11 @@ class ModbusLink:
         self._address = address
         self._client: Any = _client(port, timeout_s)
         if not self._client.connect():
-            raise OSError(_why_not(port))
+            raise OSError(
+                "nothing answers at this host and port"
+                if port.startswith("socket:")
+                else why_not_opened(port)
+            )
 
     def exchange(self, values: Sequence[int]) -> list[int]:
         """Write the output registers and return the input registers. Raises NoReply, OSError."""
@@ -92,13 +96,3 @@ def _client(port: str, timeout_s: float) -> Any:
     if not host or not number.isdecimal():
         raise ValueError(f"{port!r} is not socket:HOST:PORT")
     return ModbusTcpClient(host, port=int(number), framer=FramerType.RTU, timeout=timeout_s, retries=0)
-
-
-def _why_not(port: str) -> str:
-    if port.startswith("socket:"):
-        return "nothing answers at this host and port"
-    if not os.path.exists(port):
-        return "there is no such port"
-    if not os.access(port, os.R_OK | os.W_OK):
-        return "no permission to open it"
-    return "it cannot be opened, perhaps because another program uses it"

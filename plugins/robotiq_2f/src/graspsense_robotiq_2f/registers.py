@@ -86,16 +86,16 @@ def request_of(registers: Sequence[int]) -> Request:
 
 def status_of(registers: Sequence[int]) -> Status:
     """Return the status in these input registers."""
-    first, second, third = registers
-    status = first >> 8
+    state, echo, measured = registers
+    status = state >> 8
     return Status(
         bool(status & 1),
         bool(status >> 3 & 1),
         status >> 4 & 3,
         status >> 6 & 3,
-        second >> 8 & 15,
-        third >> 8,
-        third & 0xFF,
+        echo >> 8 & 15,
+        measured >> 8,
+        measured & 0xFF,
     )
 
 

@@ -83,10 +83,10 @@ class TactileData(NamedTuple):
         return tuple(made)
 
 
-def joined(before: TactileData, now: TactileData) -> TactileData:
+def joined(earlier: TactileData, now: TactileData) -> TactileData:
     """Return the data of both."""
-    rows = tuple((*first, *second)[-MOST:] for first, second in zip(before.rows, now.rows, strict=True))
-    return TactileData(now.image or before.image, rows, now.taken, now.host_s)
+    rows = tuple((*old, *new)[-MOST:] for old, new in zip(earlier.rows, now.rows, strict=True))
+    return TactileData(now.image or earlier.image, rows, now.taken, now.host_s)
 
 
 @final

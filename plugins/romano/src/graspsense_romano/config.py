@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Final, Literal
+from typing import ClassVar, Final, Literal, get_args
 
 from attrs import frozen
 
 from graspsense.plugin_api import setting
 
-PLACE_BY: Final = (
-    "side-or-acceleration",
-    "slip-and-acceleration",
-    "side-slip-or-acceleration",
-    "slip",
-    "acceleration",
-)
+PlaceBy = Literal[
+    "side-or-acceleration", "slip-and-acceleration", "side-slip-or-acceleration", "slip", "acceleration"
+]
+PLACE_BY: Final = get_args(PlaceBy)
 
 
 @frozen(kw_only=True, slots=False)
@@ -165,9 +162,7 @@ class GrabConfig(SlipServoConfig):
 class PlaceConfig(GrabConfig):
     """Settings of the laws that let go when the thing is put down."""
 
-    place_by: Literal[
-        "side-or-acceleration", "slip-and-acceleration", "side-slip-or-acceleration", "slip", "acceleration"
-    ] = setting(default="slip-and-acceleration", meaning="What counts as being put down.")
+    place_by: PlaceBy = setting(default="slip-and-acceleration", meaning="What counts as being put down.")
     acceleration_m_s2: float = setting(
         default=3.25,
         unit="m/s2",

@@ -131,31 +131,31 @@ NOT_BEGUN: Final = -1
 
 def step(params: Params, state: State, reading: Reading) -> tuple[Command, State]:
     """Close until both pads touch, then load, hold and let go as planned."""
-    frame, before, wanted = reading.frame, state.progress, state.wanted_m
-    if before.stage == NOT_BEGUN:
-        before = Progress(APPROACH, RUNNING, CLOSE, frame.t_s, frame.t_s, frame.gap_m, 0.0, 0.0)
+    frame, earlier, wanted = reading.frame, state.progress, state.wanted_m
+    if earlier.stage == NOT_BEGUN:
+        earlier = Progress(APPROACH, RUNNING, CLOSE, frame.t_s, frame.t_s, frame.gap_m, 0.0, 0.0)
         wanted = frame.gap_m
     signals = updated(params.filters, state.signals, reading)
     now = conditions(params.thresholds, signals)
-    progress = before
-    if before.outcome == RUNNING or before.outcome == STEADY:
-        if before.stage == CLOSE:
-            progress = closing(params.plan, before, now, frame)
-        elif before.stage == TOUCH:
-            progress = touching(params.plan, before, frame)
-        elif before.stage == LOAD:
-            progress = loading(params.plan, before, signals, frame)
+    progress = earlier
+    if earlier.outcome == RUNNING or earlier.outcome == STEADY:
+        if earlier.stage == CLOSE:
+            progress = closing(params.plan, earlier, now, frame)
+        elif earlier.stage == TOUCH:
+            progress = touching(params.plan, earlier, frame)
+        elif earlier.stage == LOAD:
+            progress = loading(params.plan, earlier, signals, frame)
         else:
-            progress = keeping(params, before, signals, now, frame)
+            progress = keeping(params, earlier, signals, now, frame)
     events = begun(state.conditions, now)
-    if before.stage != KEEP:
+    if earlier.stage != KEEP:
         events &= ~SLIP_BIT
-    if progress.target_n >= params.plan.limit_n > before.target_n:
+    if progress.target_n >= params.plan.limit_n > earlier.target_n:
         events |= LIMIT_BIT
     if params.plan.places == 1:
-        if progress.stage == KEEP and before.stage == LOAD and signals.acceleration.present == 0:
+        if progress.stage == KEEP and earlier.stage == LOAD and signals.acceleration.present == 0:
             events |= UNFELT_BIT
-        if progress.outcome == STEADY and before.outcome == RUNNING:
+        if progress.outcome == STEADY and earlier.outcome == RUNNING:
             events |= PLACE_BIT
     command, wanted = commanded(params, progress, wanted, frame)
     return command, State(progress.phase, progress.outcome, events, progress, wanted, signals, now)
@@ -167,13 +167,13 @@ def detect(params: Params, state: State, reading: Reading) -> tuple[Command, Sta
     A grasp ends after the longest time until a thing is put down; events are told beyond it.
     """
     signals = updated(params.filters, state.signals, reading)
-    now, before = conditions(params.thresholds, signals), state.conditions
+    now, earlier = conditions(params.thresholds, signals), state.conditions
     stage, since_s, t_s = state.progress.stage, state.progress.since_s, reading.frame.t_s
     if state.signals.left.begun == 0:
         since_s = t_s
-    events = begun(before, now)
+    events = begun(earlier, now)
     present = signals.acceleration.present
-    if placed(params.thresholds, now, present) and not placed(params.thresholds, before, present):
+    if placed(params.thresholds, now, present) and not placed(params.thresholds, earlier, present):
         events |= PLACE_BIT
     if stage == NOT_BEGUN and state.signals.left.begun == 1 and signals.fresh == 1:
         stage = KEEP

@@ -98,19 +98,19 @@ def placed(params: EventThresholds, now: TouchConditions, measured: int) -> bool
     return now.side == 1 or shock == 1 or (params.place_by == ANY and now.place_slip == 1)
 
 
-def begun(before: TouchConditions, now: TouchConditions) -> int:
+def begun(earlier: TouchConditions, now: TouchConditions) -> int:
     """Return the bits of the events that begin in this tick."""
     bits = 0
-    if now.left > before.left:
+    if now.left > earlier.left:
         bits |= 1
-    if now.right > before.right:
+    if now.right > earlier.right:
         bits |= 2
-    if now.left + now.right == 2 and before.left + before.right < 2:
+    if now.left + now.right == 2 and earlier.left + earlier.right < 2:
         bits |= 4
-    if now.slip > before.slip:
+    if now.slip > earlier.slip:
         bits |= 8
-    if now.side > before.side:
+    if now.side > earlier.side:
         bits |= 32
-    if now.shock > before.shock:
+    if now.shock > earlier.shock:
         bits |= 64
     return bits

@@ -27,7 +27,7 @@ def findings(summary: Summary) -> Findings:
     for (case, _), result in summary.results.items():
         if isinstance(result, TouchRow):
             cases.setdefault(case, []).append(result)
-    rows = [row for found in cases.values() for row in found]
+    rows = [row for results in cases.values() for row in results]
     # Where weight and friction are swept, things slip in the lift, which is not scored.
     tables = [_cases(cases), *(tuple(_ranges(rows)) or _scores(rows))]
     kept = sum(row.outcome in HELD for row in rows)
@@ -88,18 +88,18 @@ def _scores(rows: Sequence[TouchRow]) -> Iterator[FoundTable]:
         return [value for row in chosen if (value := getattr(row, key)) is not None]
 
     still, slipped = [r for r in rows if r.slip_m < STILL_M], [r for r in rows if r.slip_m > SLIPPED_M]
-    bumped = {at: [r for r in rows if r.bump_at == at] for at in ("finger", "thing")}
+    bumped = {target: [r for r in rows if r.bump_at == target] for target in ("finger", "thing")}
     for key, low in (("slip_high_n", "0.18 N (published)"), ("slip_wide_n", "1 N (pipeline hold)")):
         title = f"Slip by more than 1 mm told from less than 0.3 mm by the high band, N; low band below {low}"
         yield from _trade(key, title, SLIP_THRESHOLDS_N, known(key, slipped), known(key, still))
-    title, at = "Placing told by the acceleration band, m/s2", known("shock_at_m_s2", rows)
-    yield from _trade("place", title, SHOCK_THRESHOLDS_M_S2, at, known("shock_before_m_s2", rows))
+    title, hits = "Placing told by the acceleration band, m/s2", known("shock_at_m_s2", rows)
+    yield from _trade("place", title, SHOCK_THRESHOLDS_M_S2, hits, known("shock_before_m_s2", rows))
     title = "Bumps into a finger told from bumps into the thing by the high band of the edges, N"
     others = known("edge_before_n", rows) + known("edge_at_n", bumped["thing"])
     yield from _trade("side", title, SIDE_THRESHOLDS_N, known("edge_at_n", bumped["finger"]), others)
     title = "Bumps into finger or thing told by the acceleration band, m/s2: false alarms of placing"
-    at, before = known("bump_m_s2", rows), known("still_m_s2", rows)
-    yield from _trade("bump", title, SHOCK_THRESHOLDS_M_S2, at, before)
+    hits, others = known("bump_m_s2", rows), known("still_m_s2", rows)
+    yield from _trade("bump", title, SHOCK_THRESHOLDS_M_S2, hits, others)
 
 
 def _ranges(rows: Sequence[TouchRow]) -> Iterator[FoundTable]:

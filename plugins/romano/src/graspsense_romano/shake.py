@@ -47,17 +47,19 @@ _NEEDS: Final = "needs a shake in the hold"
 
 
 def _declared() -> tuple[Feature, ...]:
-    found = []
+    features = []
     for signal, unit in SIGNALS.items():
         for when, words in (("", "during"), ("_after", "after")):
             for band, (low, high) in BANDS_HZ.items():
                 meaning = f"rms from {low:g} to {high:g} Hz {words} the shake; {_NEEDS}"
-                found.append(Feature(f"{signal}_{band}{when}", unit, meaning))
-        found.append(
+                features.append(Feature(f"{signal}_{band}{when}", unit, meaning))
+        features.append(
             Feature(f"{signal}_peak", "Hz", f"frequency of the largest density after the shake; {_NEEDS}")
         )
-        found.append(Feature(f"{signal}_decay", "1/s", f"rate at which it fades after the shake; {_NEEDS}"))
-    return (*found, Feature("moved_mass", "kg", f"force of the pads over the acceleration; {_NEEDS}"))
+        features.append(
+            Feature(f"{signal}_decay", "1/s", f"rate at which it fades after the shake; {_NEEDS}")
+        )
+    return (*features, Feature("moved_mass", "kg", f"force of the pads over the acceleration; {_NEEDS}"))
 
 
 @frozen(kw_only=True)
@@ -134,11 +136,11 @@ class ShakeFeatures(FeatureSet[ShakeConfig]):
         return begin_s, end_s, last_s
 
 
-def _add(name: str, found: float | str, values: dict[str, float], reasons: dict[str, str]) -> None:
-    if isinstance(found, str):
-        reasons[name] = found
+def _add(name: str, value: float | str, values: dict[str, float], reasons: dict[str, str]) -> None:
+    if isinstance(value, str):
+        reasons[name] = value
     else:
-        values[name] = found
+        values[name] = value
 
 
 def _signal(trace: Trace, name: str, begin_s: float, end_s: float) -> Signal | str:
@@ -169,14 +171,14 @@ def density(signal: Signal, padded: int = 1) -> tuple[Floats, Floats]:
     n = len(signal.values)
     window = np.hanning(n + 1)[:-1]
     spectrum = np.fft.rfft(signal.values * window[:, np.newaxis], n * padded, axis=0)
-    found: Floats = 2.0 * (np.abs(spectrum) ** 2).sum(axis=1) / (signal.rate_hz * (window**2).sum())
-    return np.fft.rfftfreq(n * padded, 1.0 / signal.rate_hz).astype(np.float64), found
+    power: Floats = 2.0 * (np.abs(spectrum) ** 2).sum(axis=1) / (signal.rate_hz * (window**2).sum())
+    return np.fft.rfftfreq(n * padded, 1.0 / signal.rate_hz).astype(np.float64), power
 
 
 def rms(signal: Signal, low_hz: float, high_hz: float) -> float:
     """Return the rms of a signal in a band."""
-    frequency, found = density(signal)
-    of_band = found[(frequency >= low_hz) & (frequency < high_hz)]
+    frequency, power = density(signal)
+    of_band = power[(frequency >= low_hz) & (frequency < high_hz)]
     return float(np.sqrt(of_band.sum() * signal.rate_hz / len(signal.values)))
 
 
@@ -191,9 +193,9 @@ def _rms_or_reason(signal: Signal | str, band: str) -> float | str:
 
 def peak_hz(signal: Signal) -> float:
     """Return the frequency of the largest density."""
-    frequency, found = density(signal, PADDED)
+    frequency, power = density(signal, PADDED)
     within = (frequency >= PEAK_HZ[0]) & (frequency <= min(PEAK_HZ[1], 0.5 * signal.rate_hz))
-    return float(frequency[within][found[within].argmax()]) if within.any() else 0.0
+    return float(frequency[within][power[within].argmax()]) if within.any() else 0.0
 
 
 def decay_1_s(signal: Signal) -> float | str:

@@ -105,9 +105,9 @@ def sampled(coefficients: Filters, pad: PadSignal, force_n: float) -> PadSignal:
     return PadSignal(1, force_n, high_n, band_passed(coefficients.low, pad.low, force_n))
 
 
-def felt(coefficients: Filters, before: Acceleration, samples: Samples) -> Acceleration:
+def felt(coefficients: Filters, earlier: Acceleration, samples: Samples) -> Acceleration:
     """Return the acceleration after the samples of a tick."""
-    present, x, y, z, norm = before.present, before.x, before.y, before.z, 0.0
+    present, x, y, z, norm = earlier.present, earlier.x, earlier.y, earlier.z, 0.0
     for k in range(samples.new):
         row = samples.values[k]
         row = row if len(row) == 3 else (row[0], 0.0, 0.0)  # a sensor of one axis
@@ -118,21 +118,21 @@ def felt(coefficients: Filters, before: Acceleration, samples: Samples) -> Accel
     return Acceleration(present, x, y, z, norm)
 
 
-def felt_if_measured(coefficients: Filters, before: Acceleration, signals: Any) -> Acceleration:
+def felt_if_measured(coefficients: Filters, earlier: Acceleration, signals: Any) -> Acceleration:
     """Return the acceleration after a tick; of a gripper without an accelerometer, that of before: none."""
     if len(signals) == 0:  # a compiler leaves the rest out
-        return before
+        return earlier
     if hasattr(signals, "acceleration"):
-        return felt(coefficients, before, signals.acceleration)
-    return before
+        return felt(coefficients, earlier, signals.acceleration)
+    return earlier
 
 
-def updated(coefficients: Filters, before: Signals, reading: Reading) -> Signals:
+def updated(coefficients: Filters, earlier: Signals, reading: Reading) -> Signals:
     """Return the signals after this reading."""
     frame: Frame = reading.frame
     fresh = 0
-    sampled_s, left, right = before.sampled_s, before.left, before.right
-    edge_left, edge_right = before.edge_left, before.edge_right
+    sampled_s, left, right = earlier.sampled_s, earlier.left, earlier.right
+    edge_left, edge_right = earlier.edge_left, earlier.edge_right
     if left.begun == 0 or frame.t_s - sampled_s >= coefficients.sample_s - 0.5 * frame.dt_s:
         fresh, sampled_s = 1, frame.t_s
         left, right = (
@@ -143,10 +143,10 @@ def updated(coefficients: Filters, before: Signals, reading: Reading) -> Signals
             sampled(coefficients, edge_left, frame.edge_left_n),
             sampled(coefficients, edge_right, frame.edge_right_n),
         )
-    speed, rate = before.speed_m_s, before.rate_m_s
+    speed, rate = earlier.speed_m_s, earlier.rate_m_s
     if frame.velocity_m_s == frame.velocity_m_s:
         b, a = low_pass(coefficients.speed_hz, min(frame.dt_s, LONGEST_S))
         speed = b * (frame.velocity_m_s + rate) - a * speed
         rate = frame.velocity_m_s
-    acceleration = felt_if_measured(coefficients, before.acceleration, reading.signals)
+    acceleration = felt_if_measured(coefficients, earlier.acceleration, reading.signals)
     return Signals(fresh, sampled_s, left, right, edge_left, edge_right, acceleration, speed, rate)

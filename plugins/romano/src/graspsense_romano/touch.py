@@ -44,9 +44,9 @@ def _moved(start_s: float, begin_m: float, end_m: float, speed_m_s: float) -> li
     travel_s = max(abs(end_m - begin_m) / speed_m_s, STARTING_S + 1e-3)
     speed_m_s = abs(end_m - begin_m) / travel_s
     starting = 0.5 * share**2 * STARTING_S * speed_m_s
-    first = zip(start_s + share * STARTING_S, begin_m + sign * starting, strict=True)
+    starts = zip(start_s + share * STARTING_S, begin_m + sign * starting, strict=True)
     last = zip(start_s + travel_s + share * STARTING_S, end_m - sign * starting[::-1], strict=True)
-    return [[round(float(t), 5), round(float(z), 7)] for t, z in (*first, *last)]
+    return [[round(float(t), 5), round(float(z), 7)] for t, z in (*starts, *last)]
 
 
 @frozen(kw_only=True)
@@ -199,10 +199,10 @@ def touch(params: Mapping[str, Any], seed: int) -> TouchRow:
             extract=lambda trace: measured(trace, scene),
             workers=1,
         )[0]
-    report, found = grasped.report, dict(grasped.extracted)
+    report, quantities = grasped.report, dict(grasped.extracted)
     law, pulled_n = settings.controller.component.name, (scene.mass_kg + scene.fill_kg) * 9.81 + scene.tug_n
     if law != "force-servo":
-        found |= {"slip_high_n": None, "slip_wide_n": None}
+        quantities |= {"slip_high_n": None, "slip_wide_n": None}
     return TouchRow(
         outcome=grasped.outcome.name.lower(),
         law=law,
@@ -213,13 +213,13 @@ def touch(params: Mapping[str, Any], seed: int) -> TouchRow:
         broken=bool(report.get("broken", False)),
         lifted_m=float(report.get("highest_m", 0.0)),
         slip_m=float(report.get("slip_m", 0.0)),
-        **found,
+        **quantities,
     )
 
 
 def followed(trace: Trace) -> list[Signals]:
     """Return the signals after each frame of a trace."""
-    coefficients, now, found = filters(), no_signals(), []
+    coefficients, now, signals_by_frame = filters(), no_signals(), []
     fast = trace.signals.get("acceleration")
     counts = np.zeros(0, int) if fast is None else np.searchsorted(fast.t_s, trace.t_s, side="right")
     nan, begun = float("nan"), 0
@@ -236,8 +236,8 @@ def followed(trace: Trace) -> list[Signals]:
             float(trace.edge_left_n[k]), float(trace.edge_right_n[k]), 0,
         )  # fmt: skip
         now = updated(coefficients, now, Reading(frame, NO_PADS, signals))
-        found.append(now)
-    return found
+        signals_by_frame.append(now)
+    return signals_by_frame
 
 
 class _Fast(NamedTuple):
@@ -254,9 +254,9 @@ def measured(trace: Trace, scene: TouchSettings) -> dict[str, Any]:
         return {}
     t_s, since_s = trace.t_s, contacts[0]
     weaker = np.minimum(trace.force_left_n, trace.force_right_n)
-    first = int(np.searchsorted(t_s, since_s))
+    contact = int(np.searchsorted(t_s, since_s))
     row: dict[str, Any] = {
-        "contact_n": float(weaker[first : np.searchsorted(t_s, since_s + 0.05) + 1].max()),
+        "contact_n": float(weaker[contact : np.searchsorted(t_s, since_s + 0.05) + 1].max()),
         "slips": sum(what == "slip" for _, what, _ in told),
         "limited": any(what == "force limit reached" for _, what, _ in told),
     }
@@ -264,7 +264,7 @@ def measured(trace: Trace, scene: TouchSettings) -> dict[str, Any]:
     if not held.any():
         return row
     row["grip_n"], row["greatest_n"] = float(weaker[held][0]), float(weaker[held].max())
-    row["deformed_m"] = float(trace.gap_m[first] - trace.gap_m[held].min())
+    row["deformed_m"] = float(trace.gap_m[contact] - trace.gap_m[held].min())
     signals, from_s = followed(trace), since_s + scene.disturbed_s
     kept = held & (t_s > from_s - 0.2) & (t_s < t_s[held][-1] - LAST_S)
     for key, low_n in (("slip_high_n", PUBLISHED_LOW_N), ("slip_wide_n", WIDE_LOW_N)):
@@ -272,19 +272,19 @@ def measured(trace: Trace, scene: TouchSettings) -> dict[str, Any]:
     shocks = np.array([signal.acceleration.norm_m_s2 for signal in signals])
     down_s = since_s + scene.down_s
     if down_s == down_s:
-        at = (t_s > down_s + AROUND_S[0]) & (t_s < down_s + AROUND_S[1])
-        before = held & (t_s > from_s - 0.1) & (t_s <= down_s + AROUND_S[0])
-        row["shock_before_m_s2"] = _greatest(shocks, before)
-        row["shock_at_m_s2"] = _greatest(shocks, at) if held[at].all() else None
+        placing = (t_s > down_s + AROUND_S[0]) & (t_s < down_s + AROUND_S[1])
+        lowering = held & (t_s > from_s - 0.1) & (t_s <= down_s + AROUND_S[0])
+        row["shock_before_m_s2"] = _greatest(shocks, lowering)
+        row["shock_at_m_s2"] = _greatest(shocks, placing) if held[placing].all() else None
         row["placed_s"] = next((t - down_s for t, what, _ in told if what == "place"), None)
     if scene.bump_at:
         edges = np.array([max(signal.edge_left.high_n, signal.edge_right.high_n) for signal in signals])
         bump_s, lasts_s = since_s + scene.bumped_s, BALL_M / scene.bump_m_s + scene.bump_touch_s + AROUND_S[1]
-        at = held & (t_s > bump_s) & (t_s < bump_s + lasts_s)
-        before = held & (t_s <= bump_s)
-        row["edge_before_n"], row["edge_at_n"] = _greatest(edges, before), _greatest(edges, at)
-        still = before & (t_s > from_s)
-        row["still_m_s2"], row["bump_m_s2"] = _greatest(shocks, still), _greatest(shocks, at)
+        bumped = held & (t_s > bump_s) & (t_s < bump_s + lasts_s)
+        unbumped = held & (t_s <= bump_s)
+        row["edge_before_n"], row["edge_at_n"] = _greatest(edges, unbumped), _greatest(edges, bumped)
+        still = unbumped & (t_s > from_s)
+        row["still_m_s2"], row["bump_m_s2"] = _greatest(shocks, still), _greatest(shocks, bumped)
     return row
 
 

@@ -74,8 +74,8 @@ class ActionServer:
         with self._lock:
             accepted = uuid not in self._goals and self._accept(request.goal)
             if accepted:
-                for before in self._goals.values():
-                    before.stop.set()
+                for earlier in self._goals.values():
+                    earlier.stop.set()
                 goal = Goal(uuid, request.goal, lambda values: self._tell(uuid, values))
                 self._goals[uuid] = goal
                 while len(self._goals) > KEPT_GOALS:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import os
 import time
-from collections import deque
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from math import inf, isfinite, nan
 from types import MappingProxyType
 from typing import Final, final
 
+from graspsense.gripper_api import Polling
 from graspsense.plugin_api import (
     FORCE,
     NO_PADS,
@@ -20,7 +20,6 @@ from graspsense.plugin_api import (
     ConfigError,
     DeviceInfo,
     DeviceLost,
-    Frame,
     NoDevice,
     Pads,
     Reading,
@@ -32,7 +31,6 @@ from graspsense_ros2.message_types import is_known
 from graspsense_ros2.newest_messages import NewestMessage
 from graspsense_ros2.node import Node, ServiceFailed, open_node
 
-SLOPE_FRAMES: Final = 6
 GOAL_PERIOD_S: Final = 0.05
 """Time between two goals while the target moves."""
 AHEAD_M: Final = 0.004
@@ -62,7 +60,7 @@ class Ros2Backend(SensorBackend[Ros2Config]):
         self._node: Node | None = None
         self._action: GripperAction | None = None
         self._topics: dict[str, NewestMessage] = {}
-        self._frames = 0
+        self._polling = Polling(config.rate_hz)
         self._report: dict[str, float | int | str | bool] = {}
 
     @property
@@ -84,9 +82,8 @@ class Ros2Backend(SensorBackend[Ros2Config]):
                 if not newest.wait(max(0.0, until - time.monotonic())):
                     raise NoDevice(f"no message on {newest.topic}, although it is announced{_damage(newest)}")
             self._action = self._answering(until)
-            self._began_s = self._last_s = self._due_s = time.monotonic()
-            self._good = dict.fromkeys(self._numbers, (nan, self._began_s))
-            self._recent: deque[tuple[float, float]] = deque(maxlen=SLOPE_FRAMES)
+            self._polling = Polling(self.config.rate_hz)
+            self._good = dict.fromkeys(self._numbers, (nan, self._polling.began_s))
             self._gap_m = self._measured()["gap"]
         except (DeviceLost, ConfigError) as error:
             self.close()
@@ -94,7 +91,6 @@ class Ros2Backend(SensorBackend[Ros2Config]):
         except NoDevice:
             self.close()
             raise
-        self._frames = 0
         self._target_m, self._opening = self._gap_m, True
         self._sent: Target | None = None
         self._sent_s = -inf
@@ -104,24 +100,19 @@ class Ros2Backend(SensorBackend[Ros2Config]):
         """Wait for the next frame, and return the newest numbers. Raises DeviceLost."""
         if self._action is None:
             raise DeviceLost("the gripper behind ROS 2 is not open")
-        wait_s = self._due_s - time.monotonic()
-        time.sleep(max(0.0, min(wait_s, timeout_s)))
-        if wait_s > timeout_s:
+        if not self._polling.wait(timeout_s):
             return None
-        self._due_s = max(self._due_s, time.monotonic()) + 1.0 / self.config.rate_hz
         if self._action.failures >= MOST_FAILURES:
             raise DeviceLost(f"{MOST_FAILURES} goals in a row failed: {self._action.said}")
         numbers = self._measured()
-        now_s = time.monotonic()
-        t_s, dt_s, self._last_s = now_s - self._began_s, now_s - self._last_s, now_s
         self._gap_m = numbers["gap"]
-        self._recent.append((t_s, self._gap_m))
-        (start_s, start_m), span = self._recent[0], len(self._recent)
-        slope = (self._gap_m - start_m) / (t_s - start_s) if span > 1 else 0.0
-        velocity, effort = numbers.get("velocity", slope), numbers.get("effort", nan)
-        left, right = numbers.get("force_left", nan), numbers.get("force_right", nan)
-        self._frames += 1
-        return Reading(Frame(t_s, dt_s, self._gap_m, velocity, effort, left, right, nan, nan, 0), NO_PADS)
+        frame = self._polling.frame(self._gap_m, numbers.get("effort", nan))
+        frame = frame._replace(
+            velocity_m_s=numbers.get("velocity", frame.velocity_m_s),
+            force_left_n=numbers.get("force_left", nan),
+            force_right_n=numbers.get("force_right", nan),
+        )
+        return Reading(frame, NO_PADS)
 
     def apply(self, command: Command) -> None:
         """Send the goal that this command becomes, unless it was sent already."""
@@ -165,7 +156,7 @@ class Ros2Backend(SensorBackend[Ros2Config]):
             if self._sent is not None and not self._opening:
                 self._report["told_to_open"] = self._told_to_open(action)
             self._report |= {
-                "frames": self._frames,
+                "frames": self._polling.frames,
                 "goals": action.goals,
                 "damaged_messages": sum(newest.damaged for newest in self._topics.values()),
                 "late_messages": sum(newest.late for newest in self._topics.values()),

@@ -111,15 +111,15 @@ class Ros2Config:
 
     def numbers(self) -> dict[str, MessageNumber]:
         """Return what is measured, by the name of its channel. Raises ConfigError."""
-        found = {
+        numbers = {
             "gap": MessageNumber(self.gap, "gap"),
             **{f"force_{side}": MessageNumber(text, "force") for side, text in self._forces() if text},
         }
         if self.effort:
-            found["effort"] = MessageNumber(self.effort, "effort")
+            numbers["effort"] = MessageNumber(self.effort, "effort")
         if self.velocity:
-            found["velocity"] = MessageNumber(self.velocity, "velocity")
-        return found
+            numbers["velocity"] = MessageNumber(self.velocity, "velocity")
+        return numbers
 
     def _forces(self) -> tuple[tuple[str, str], ...]:
         return ("left", self.left), ("right", self.right)

@@ -157,9 +157,9 @@ def _parsed(definitions: Mapping[str, str]) -> Typesdict:
 
     parsed: Typesdict = {}
     for name, definition in definitions.items():
-        found = get_types_from_msg(definition, name)
+        types = get_types_from_msg(definition, name)
         # rosbags puts `msg` into the name of a service's message, which is not in the name that ROS hashes.
-        ((constants, fields),) = found.values()
+        ((constants, fields),) = types.values()
         parsed[name] = (constants, fields)
     return parsed
 

@@ -95,8 +95,8 @@ class ZenohNode:
 
     def types_of(self, topic: str) -> Sequence[str]:
         """Return the types that a topic is published with."""
-        found = self._session.liveliness().get(publishers_of(self._names.domain, topic), timeout=LISTING_S)
-        types = (type_in(str(reply.ok.key_expr)) for reply in found if reply.ok is not None)
+        replies = self._session.liveliness().get(publishers_of(self._names.domain, topic), timeout=LISTING_S)
+        types = (type_in(str(reply.ok.key_expr)) for reply in replies if reply.ok is not None)
         return tuple(dict.fromkeys(filter(None, types)))
 
     def service(self, name: str, type_name: str, answer: Callable[[bytes], bytes]) -> None:

@@ -47,19 +47,21 @@ SUCCEEDED = 4
 
 def wait_for_services(port, process):
     """Wait until all services are listed, several times in a row: the tokens come one after the other."""
-    until, in_a_row, found = time.monotonic() + 60.0, 0, {}
+    until, in_a_row, services = time.monotonic() + 60.0, 0, {}
     while in_a_row < 5:
         assert process.poll() is None, process.returncode
-        assert time.monotonic() < until, found
-        found = {name: types[0] for name, types in get_service_names_and_types(router_port=port, timeout=0.5)}
-        in_a_row = in_a_row + 1 if found == EXPECTED else 0
+        assert time.monotonic() < until, services
+        services = {
+            name: types[0] for name, types in get_service_names_and_types(router_port=port, timeout=0.5)
+        }
+        in_a_row = in_a_row + 1 if services == EXPECTED else 0
         time.sleep(0.2)
 
 
-def listed(found):
+def listed(look):
     """Return what this finds; on a slow machine, the time to list is over before the answers come."""
     until = time.monotonic() + 60.0
-    while (info := found()) is None:
+    while (info := look()) is None:
         assert time.monotonic() < until
     return info
 

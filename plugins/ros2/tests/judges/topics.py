@@ -74,10 +74,10 @@ def asked_to_grasp(port):
     return json.loads(answer.message)
 
 
-def wait_for(found, what):
+def wait_for(look, what):
     """Wait until this returns something true, and return it."""
     until = time.monotonic() + PATIENCE_S
-    while not (result := found()):
+    while not (result := look()):
         assert time.monotonic() < until, what
         time.sleep(0.2)
     return result

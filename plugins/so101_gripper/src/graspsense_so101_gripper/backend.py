@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import time
-from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from math import inf, isnan, nan
+from math import inf, isnan
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final, TypeVar, final
 
 from attrs import evolve
 
-from graspsense.gripper_api import calibrations_of
+from graspsense.gripper_api import BackendWithEmulator, Polling, calibrations_of
 from graspsense.plugin_api import (
     FORCE,
     NO_PADS,
@@ -23,13 +22,9 @@ from graspsense.plugin_api import (
     Command,
     DeviceInfo,
     DeviceLost,
-    Frame,
     NoDevice,
-    ObjectKind,
     Pads,
     Reading,
-    SensorBackend,
-    create,
     signal_type,
 )
 from graspsense_so101_gripper.arm_calibration import read_arm_calibration
@@ -55,8 +50,6 @@ from graspsense_so101_gripper.registers import (
 )
 
 RATE_HZ: Final = 100.0
-ATTEMPTS: Final = 3
-SLOPE_FRAMES: Final = 6
 SPEED_LIMIT_M_S: Final = 0.3
 FORCE_SPEED_M_S: Final = 0.02
 """Speed of a closing that only a force was asked for."""
@@ -79,7 +72,7 @@ ReplyT = TypeVar("ReplyT")
 
 
 @final
-class So101Backend(SensorBackend[So101Config]):
+class So101Backend(BackendWithEmulator[So101Config]):
     """Turns commands into a goal with a speed and a torque limit; each read is one packet."""
 
     channels = CHANNELS
@@ -100,25 +93,9 @@ class So101Backend(SensorBackend[So101Config]):
         self.least_speed_m_s = self.least_step_m
         self._bus: ServoBus | None = None
         self._emulated: LockStepBus | None = None
-        self._time: Any = time
+        self._polling = Polling(RATE_HZ)
         self._found: MotorRequest | None = None
         self._asked: MotorRequest | None = None
-        self._frames = self._retries = 0
-        self._exchange_s = 0.0
-        self._body_report: Mapping[str, float | int | str | bool] = {}
-
-    def objects(self) -> Sequence[ObjectKind]:
-        """Return what the body of the emulated arm can hold."""
-        config = self.config
-        if config.port != "emulated":
-            return ()
-        return tuple(create("sensor-backend", config.body, **config.body_config).objects())
-
-    def with_object(self, name: str) -> SensorBackend[So101Config]:
-        """Return the emulated gripper with this object. Raises ConfigError for a real one."""
-        if self.config.port != "emulated":
-            return super().with_object(name)
-        return So101Backend(evolve(self.config, object=name))
 
     def open(self, seed: int) -> DeviceInfo:
         """Open the bus, compare the motor with what is known of it, and hold it where it is. Raises NoDevice."""
@@ -127,13 +104,11 @@ class So101Backend(SensorBackend[So101Config]):
         arm = read_arm_calibration(Path(config.arm_calibration)) if config.arm_calibration else None
         serial = serial_number(config, config.port)
         numbers = {"jaw_length_m": config.jaw_length_m, "force_from": config.force_from}
-        found = calibrations_of(config.calibration, serial, numbers)
-        self._force = ForceOfMotor(config, found)
-        self._frames = self._retries = 0
-        self._exchange_s = 0.0
+        stored = calibrations_of(config.calibration, serial, numbers)
+        self._force = ForceOfMotor(config, stored)
         try:
-            self._emulated = LockStepBus(config, seed) if config.port == "emulated" else None
-            self._time = self._emulated or time
+            self._emulated = LockStepBus(config, seed) if config.emulated else None
+            self._polling = Polling(RATE_HZ, self._emulated or time)
             self._bus = ServoBus(config.port, config.reply_timeout_s, self._emulated)
             memory = self._tried(lambda bus: bus.read(config.motor, *IDENTITY))
             self._jaw = jaw_of(memory, config, arm)
@@ -146,34 +121,19 @@ class So101Backend(SensorBackend[So101Config]):
                 f"no gripper of an SO-101 arm at {config.port}, motor {config.motor}: {error}. Look at the arm's power "
                 "and cable, at gripper.port and gripper.motor; on Linux be in the group dialout"
             ) from error
-        self._began_s = self._last_s = self._due_s = self._time.monotonic()
-        self._recent: deque[tuple[float, float]] = deque(maxlen=SLOPE_FRAMES)
+        self._polling.begin()
         firmware = [REGISTERS[f"firmware_{part}_version"].number(memory) for part in ("major", "minor")]
-        return self._described(serial, ".".join(map(str, firmware)), numbers, found)
+        return self._described(serial, ".".join(map(str, firmware)), numbers, stored)
 
     def read(self, timeout_s: float) -> Reading | None:
         """Wait for the next multiple of 10 ms, then read the motor. Raises DeviceLost."""
-        wait_s = self._due_s - self._time.monotonic()
-        if wait_s > timeout_s:
-            self._time.sleep(timeout_s)
+        if not self._polling.wait(timeout_s):
             return None
-        if wait_s > 0.0:
-            self._time.sleep(wait_s)
-        # On a grid of times, so that the duration of an exchange does not lower the rate; lost time is not made up.
-        self._due_s = max(self._due_s + 1.0 / RATE_HZ, self._time.monotonic())
-        asked_s = self._time.monotonic()
         state = self._still_ours(self._kept(self._state))
-        now_s = self._time.monotonic()
-        self._exchange_s = max(self._exchange_s, now_s - asked_s)
-        t_s, dt_s, self._last_s = now_s - self._began_s, now_s - self._last_s, now_s
         self._position = state.position
-        gap_m = self._jaw.gap_m(state.position)
-        self._recent.append((t_s, gap_m))
-        (start_s, start_m), span = self._recent[0], len(self._recent)
-        velocity = (gap_m - start_m) / (t_s - start_s) if span > 1 else 0.0
         load = state.load * self._jaw.opens / FULL_LOAD
         effort_n, error_n = self._force.estimate(self._force.push(state, self._jaw.opens))
-        self._frames += 1
+        frame = self._polling.frame(self._jaw.gap_m(state.position), effort_n, state.status)
         signals = SIGNALS(
             error_n,
             load,
@@ -182,7 +142,6 @@ class So101Backend(SensorBackend[So101Config]):
             state.voltage * VOLTS_A_STEP,
             state.temperature + KELVIN,
         )
-        frame = Frame(t_s, dt_s, gap_m, velocity, effort_n, nan, nan, nan, nan, state.status)
         return Reading(frame, NO_PADS, signals)
 
     def apply(self, command: Command) -> None:
@@ -213,25 +172,18 @@ class So101Backend(SensorBackend[So101Config]):
         if bus is not None:
             if self._found is not None:
                 self._give_back(bus, self._found)
-            if self._emulated is not None:
-                self._body_report = self._emulated.arm.body_report
             bus.close()
-        self._found = self._asked = self._emulated = None
+        self._found = self._asked = None
 
     def report(self) -> dict[str, float | int | str | bool]:
         """Return the number of frames, and of repeated exchanges, with what the emulated body knows."""
-        body = self._body_report if self._emulated is None else self._emulated.arm.body_report
-        return {
-            **body,
-            "frames": self._frames,
-            "repeated": self._retries,
-            "frame_uncertainty_s": self._exchange_s,
-        }
+        body = {} if self._emulated is None else self._emulated.arm.body_report
+        return {**body, **self._polling.report()}
 
     def dry_run_backend(self) -> So101Backend:
         """Return the emulated gripper."""
         config = self.config
-        if config.port == "emulated":
+        if config.emulated:
             return So101Backend(config)
         return So101Backend(evolve(config, port="emulated", arm_calibration="", calibration="none"))
 
@@ -252,10 +204,8 @@ class So101Backend(SensorBackend[So101Config]):
         with suppress(NoStatusPacket, OSError):
             position = motor_state(bus.read(motor, *STATE)).position
         stop = request._replace(goal_position=position, goal_time=0).written()
-        for _ in range(ATTEMPTS):
-            with suppress(NoStatusPacket, OSError):
-                bus.write(motor, STATE[0], stop)
-                return
+        with suppress(NoStatusPacket, OSError):
+            self._polling.tried(lambda: bus.write(motor, STATE[0], stop), NoStatusPacket, OSError)
 
     def _state(self) -> MotorState:
         return motor_state(self._tried(lambda bus: bus.read(self.config.motor, *STATE)))
@@ -275,12 +225,9 @@ class So101Backend(SensorBackend[So101Config]):
 
     def _tried(self, exchange: Callable[[ServoBus], ReplyT]) -> ReplyT:
         """Return the result of an exchange, which is repeated without a reply. Raises NoStatusPacket, OSError."""
-        assert self._bus is not None
-        for _ in range(ATTEMPTS - 1):
-            with suppress(NoStatusPacket):
-                return exchange(self._bus)
-            self._retries += 1
-        return exchange(self._bus)
+        bus = self._bus
+        assert bus is not None
+        return self._polling.tried(lambda: exchange(bus), NoStatusPacket)
 
     def _kept(self, exchange: Callable[[], ReplyT]) -> ReplyT:
         """Return the result of an exchange with an open gripper. Raises DeviceLost."""
@@ -295,9 +242,9 @@ class So101Backend(SensorBackend[So101Config]):
             ) from error
 
     def _described(
-        self, serial: str, firmware: str, numbers: Mapping[str, float | str], found: Mapping[str, Any]
+        self, serial: str, firmware: str, numbers: Mapping[str, float | str], stored: Mapping[str, Any]
     ) -> DeviceInfo:
-        emulated, config = self._emulated is not None, self.config
+        config = self.config
         measured = (
             f"effort is estimated from the motor's {config.force_from} by a load cell; effort_error is how far off it "
             "is in nine of ten readings"
@@ -305,19 +252,19 @@ class So101Backend(SensorBackend[So101Config]):
             else f"effort is the motor's {config.force_from} times its stall torque over gripper.jaw_length_m: an "
             "assumption, off by up to the full force until `graspsense calibrate load-cell`"
         )
-        return DeviceInfo(
-            name="emulated SO-101 gripper" if emulated else "SO-101 gripper",
+        info = DeviceInfo(
+            name="SO-101 gripper",
             serial=serial,
             firmware=firmware,
-            clock="virtual" if emulated else "device",
-            simulated=emulated,
+            clock="device",
             rate_hz=RATE_HZ,
             effort_limit_n=config.full_force_n * config.largest_load,
             speed_limit_m_s=SPEED_LIMIT_M_S,
             opening=Command(POSITION, self._jaw.stroke_m, inf, 0.05),
             relaxed=Command(VELOCITY, 0.0, inf, inf),
-            calibration={kind: one.sha256 for kind, one in found.items()},
+            calibration={kind: calibration.sha256 for kind, calibration in stored.items()},
             numbers=numbers,
             status_bits=STATUS_BITS,
-            notes=(measured, *(("emulated: no gripper was touched",) if emulated else ())),
+            notes=(measured,),
         )
+        return self.marked(info)

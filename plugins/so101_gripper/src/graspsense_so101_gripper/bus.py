@@ -9,13 +9,13 @@ that a late or repeated reply is known by its length.
 
 from __future__ import annotations
 
-import os
 import select
 import time
 from collections.abc import Callable
 from contextlib import suppress
 from typing import Any, Final, final
 
+from graspsense.gripper_api import why_not_opened
 from graspsense_so101_gripper.emulator.lock_step import LockStepBus
 
 BAUD: Final = 1_000_000
@@ -82,7 +82,7 @@ class ServoBus:
         try:
             self._line = line or SerialLine(port, timeout_s)
         except (OSError, ValueError) as error:
-            raise OSError(_why_not(port)) from error
+            raise OSError(why_not_opened(port)) from error
 
     def read(self, motor: int, address: int, count: int) -> bytes:
         """Return `count` bytes of a motor's memory. Raises NoStatusPacket, OSError."""
@@ -120,11 +120,3 @@ class ServoBus:
             if packet[2] == motor and packet[3] == length + OVERHEAD:
                 return bytes(packet[5 : 5 + length])
             # A reply of another motor, or to an earlier request.
-
-
-def _why_not(port: str) -> str:
-    if not os.path.exists(port):
-        return "there is no such port"
-    if not os.access(port, os.R_OK | os.W_OK):
-        return "no permission to open it"
-    return "it cannot be opened, perhaps because another program uses it"

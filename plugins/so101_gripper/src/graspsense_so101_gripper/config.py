@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Literal
 
 from attrs import frozen
 
-from graspsense.gripper_api import SerialFaults
-from graspsense.plugin_api import NAMES_INPUT, setting
+from graspsense.gripper_api import EmulatorSettings, SerialFaults, own_keys_first
+from graspsense.plugin_api import setting
 from graspsense_so101_gripper.registers import MODEL_NUMBER
 
 
@@ -23,9 +23,9 @@ class So101Faults(SerialFaults):
     )
 
 
-@frozen(kw_only=True)
-class So101Config:
-    """The gripper of an arm and its bus. The keys from `body` on are for `port = "emulated"` only."""
+@frozen(kw_only=True, field_transformer=own_keys_first)
+class So101Config(EmulatorSettings):
+    """The gripper of an arm and its bus; with `port = "emulated"` an arm in software."""
 
     port: str = setting(
         default="/dev/ttyACM0", meaning="The serial port of the arm's bus; or emulated, an arm in software."
@@ -84,32 +84,9 @@ class So101Config:
     reply_timeout_s: float = setting(
         default=0.1, unit="s", above=0.0, plausible=(1e-3, 120.0), meaning="Longest wait for a reply."
     )
-    body: str = setting(
-        default="sim",
-        meaning="Emulated only: a backend with a virtual clock that takes an effort, which the motor moves.",
-    )
-    body_config: dict[str, Any] = setting(
-        factory=dict, meaning="Emulated only: settings of that backend, as in its table [gripper]."
-    )
-    object: str | None = setting(
-        default=None,
-        effect=NAMES_INPUT,
-        meaning="Emulated only: the object between the jaws; not set: the default of body.",
-    )
     faults: So101Faults = setting(factory=So101Faults, meaning="Emulated only: faults of the arm.")
 
     @property
     def full_force_n(self) -> float:
         """The force at the tip at full load."""
         return self.stall_torque_nm / self.jaw_length_m
-
-    def __attrs_post_init__(self) -> None:
-        if self.port == "emulated":
-            return
-        defaults = So101Config(port="emulated")
-        for key in ("object", "body", "body_config", "faults"):
-            if getattr(self, key) != getattr(defaults, key):
-                raise ValueError(
-                    f"{key} is for the emulated arm, but port is {self.port!r}: leave it out, or set gripper.port to "
-                    "emulated"
-                )

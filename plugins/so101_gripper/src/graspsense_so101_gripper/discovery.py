@@ -26,7 +26,7 @@ def serial_number(config: So101Config, port: str) -> str:
     """Return the name by which calibrations are kept: that of the bus board at this port, and the motor."""
     from serial.tools.list_ports import comports
 
-    board = "emulated" if config.port == "emulated" else "unknown"
+    board = "emulated" if config.emulated else "unknown"
     for comport in comports():
         if os.path.realpath(comport.device) == os.path.realpath(port) and comport.serial_number:
             board = re.sub(r"[^\w+-]", "_", comport.serial_number)
@@ -49,7 +49,7 @@ def diagnose(config: object, timeout_s: float) -> Iterator[Finding]:
 
 
 def _asked(config: So101Config, timeout_s: float) -> Iterator[Finding]:
-    if config.port == "emulated":
+    if config.emulated:
         yield Finding("so101", "note", "gripper.port is emulated, so no device is searched")
         return
     try:

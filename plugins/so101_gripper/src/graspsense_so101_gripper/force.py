@@ -21,9 +21,9 @@ class ForceEstimate(NamedTuple):
 class ForceOfMotor:
     """Turns what the motor measures into a force, by the stored load-cell tables, or by the stall torque."""
 
-    def __init__(self, config: So101Config, found: Mapping[str, Any]) -> None:
+    def __init__(self, config: So101Config, stored: Mapping[str, Any]) -> None:
         self._config = config
-        self._tables = stored_motor_tables(found["load-cell"]) if "load-cell" in found else None
+        self._tables = stored_motor_tables(stored["load-cell"]) if "load-cell" in stored else None
 
     @property
     def calibrated(self) -> bool:

@@ -61,9 +61,9 @@ def drive(port: str) -> None:
     # The handshake finds every motor, with its model and firmware.
     bus.connect()
     assert bus.broadcast_ping() == dict.fromkeys(range(1, 7), 777)
-    found = bus.read_calibration()
-    assert found["gripper"].homing_offset == -120, found["gripper"]
-    bus.calibration = found
+    calibration = bus.read_calibration()
+    assert calibration["gripper"].homing_offset == -120, calibration["gripper"]
+    bus.calibration = calibration
     assert bus.is_calibrated
     with bus.torque_disabled():
         bus.configure_motors()

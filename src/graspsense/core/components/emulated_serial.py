@@ -27,24 +27,38 @@ MOODS: Final = {
 
 
 @frozen(kw_only=True)
-class SerialFaults:
-    """Faults of an emulated gripper on a line, by default none. Times are counted from its activation."""
+class EmulatorFaults:
+    """Faults of an emulated gripper, by default none. Times are counted from its activation.
+
+    A subclass says by a `Literal` type of `mood` which moods it has.
+    """
 
     unplug_at_s: float = setting(
         default=inf, unit="s", minimum=0.0, meaning="Time at which the cable is pulled; inf: never."
     )
-    mood: Literal["well", "silent", "damaged", "late", "repeated"] = setting(
-        default="well",
-        meaning="silent: no reply. damaged: a bit of each reply is flipped. late: each reply comes after late_s. "
-        "repeated: each reply comes twice.",
-    )
+    mood: str = setting(default="well", meaning="How it behaves.")
     mood_at_s: float = setting(default=0.0, unit="s", minimum=0.0, meaning="Time from which on mood acts.")
     late_s: float = setting(
         default=0.3,
         unit="s",
         above=0.0,
         plausible=(1e-4, 10.0),
-        meaning="Time by which a late reply is late.",
+        meaning="Time by which what it sends is late.",
+    )
+
+    def mood_at(self, active_s: float) -> str:
+        """Return the mood after this time (s) of activity."""
+        return self.mood if active_s >= self.mood_at_s else "well"
+
+
+@frozen(kw_only=True)
+class SerialFaults(EmulatorFaults):
+    """Faults of an emulated gripper on a line, by default none."""
+
+    mood: Literal["well", "silent", "damaged", "late", "repeated"] = setting(
+        default="well",
+        meaning="silent: no reply. damaged: a bit of each reply is flipped. late: each reply comes after late_s. "
+        "repeated: each reply comes twice.",
     )
 
 
@@ -151,9 +165,7 @@ class EmulatedSerial(EmulatedDevice):
         return time.monotonic() - self._began_s
 
     def _mood_at(self, now_s: float) -> str:
-        if self._told:
-            return self._told
-        return self._faults.mood if self.active_s(now_s) >= self._faults.mood_at_s else "well"
+        return self._told or self._faults.mood_at(self.active_s(now_s))
 
     def _moved_on(self) -> bytes:
         with self._lock:

@@ -51,6 +51,15 @@ def converter_findings(converters: Sequence[FoundDevice], backend: str, gripper:
         yield Finding(backend, "ok" if device.ready else "problem", words, device.advice)
 
 
+def why_not_opened(port: str) -> str:
+    """Return in words why this serial port could not be opened."""
+    if not os.path.exists(port):
+        return "there is no such port"
+    if not os.access(port, os.R_OK | os.W_OK):
+        return "no permission to open it"
+    return "it cannot be opened, perhaps because another program uses it"
+
+
 def port_failed(backend: str, port: str, error: Exception) -> Finding:
     """Return the finding about a port that cannot be opened."""
     advice = NO_PERMISSION if "permission" in str(error) else "look at gripper.port, power and cable"

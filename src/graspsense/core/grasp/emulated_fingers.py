@@ -6,9 +6,7 @@ from collections.abc import Mapping
 from math import inf
 from typing import Any, Final, NamedTuple
 
-from graspsense.core.components.config import create
-from graspsense.core.components.roles import SensorBackend
-from graspsense.core.values.errors import ConfigError
+from graspsense.core.grasp.emulated_body import opened_body
 from graspsense.core.values.signals import EFFORT, Command
 
 GAIN_N_S_M: Final = 15000.0
@@ -45,15 +43,7 @@ class EmulatedFingers:
         seed: int,
         stroke_m: float | None = None,
     ) -> None:
-        values = {**settings, **({} if scene is None else {"object": scene})}
-        self.body: SensorBackend[Any] = create("sensor-backend", body, **values)
-        info = self.body.open(seed)
-        if info.clock != "virtual":
-            self.body.close()
-            raise ConfigError(
-                f"gripper.body {body!r} has a clock of its own, so no gripper can be emulated over it: name a "
-                "gripper with a virtual clock, such as sim"
-            )
+        self.body, info = opened_body(body, settings, scene, seed)
         self.tick_s = 1.0 / info.rate_hz
         self.rest_s = 0.0
         """For how long (s) the fingers have been at rest on their way."""

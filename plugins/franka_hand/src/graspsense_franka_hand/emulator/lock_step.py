@@ -15,7 +15,7 @@ _COMMANDS = {orders.GRASP: protocol.GRASP, orders.MOVE: protocol.MOVE, orders.ST
 
 @final
 class LockStepHand:
-    """An emulated hand of these settings. Raises HandGone if it is to be another version, ConfigError for its body."""
+    """An emulated hand of these settings. Raises HandGone if it gives no state, ConfigError for its body."""
 
     def __init__(self, config: FrankaConfig, seed: int) -> None:
         self._faults = config.faults
@@ -23,9 +23,16 @@ class LockStepHand:
         self._now_s = 0.0
         self._done = 0
         self._refused = ""
-        if self._faults.mood == "old":
-            self.close()
-            raise HandGone("it speaks another version of the protocol")
+        try:
+            if self._faults.mood == "old":
+                raise HandGone("it speaks another version of the protocol")
+            state = self.newest(0.0)
+            if state is None:
+                raise HandGone("no state came")
+        except HandGone:
+            self.hand.close()
+            raise
+        self.first = state
 
     @property
     def body_report(self) -> Mapping[str, float | int | str | bool]:

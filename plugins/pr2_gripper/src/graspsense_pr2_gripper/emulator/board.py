@@ -178,15 +178,15 @@ class EmulatedBoard(EmulatedDevice):
 
 def nodes(serial: str) -> set[str]:
     """Return the hidraw nodes of devices with this serial number, as the kernel lists them."""
-    found = set()
+    paths = set()
     for entry in Path("/sys/class/hidraw").glob("*"):
         try:
             about = (entry / "device" / "uevent").read_text()
         except OSError:
             continue  # gone meanwhile
         if f"HID_UNIQ={serial}\n" in about:
-            found.add(f"/dev/{entry.name}")
-    return found
+            paths.add(f"/dev/{entry.name}")
+    return paths
 
 
 def _uhid(board: EmulatedBoard, plug: Plug) -> Port:
@@ -209,10 +209,10 @@ def _way_in(wire: str) -> str:
     """Return this wire, or the first that is available. Raises NoDevice with the reason for each wire."""
     wires = (wire,) if wire else tuple(_PORTS)
     reasons = {port: _WHY_NOT[port]() for port in wires}
-    for one, reason in reasons.items():
+    for port, reason in reasons.items():
         if not reason:
-            return one
-    told = "\n".join(f"{one}: {reason}" for one, reason in reasons.items())
+            return port
+    told = "\n".join(f"{port}: {reason}" for port, reason in reasons.items())
     raise NoDevice(
         f"the emulated gripper cannot be connected to this computer\n{told}\n"
         "to emulate it within one process, without a device of the system:\n"

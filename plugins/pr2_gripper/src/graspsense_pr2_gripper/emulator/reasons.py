@@ -59,7 +59,12 @@ def container() -> str:
     except OSError:
         return ""
     return next(
-        (one[10:].decode(errors="replace") for one in environment if one.startswith(b"container=")), ""
+        (
+            variable[10:].decode(errors="replace")
+            for variable in environment
+            if variable.startswith(b"container=")
+        ),
+        "",
     )
 
 

@@ -57,16 +57,16 @@ class UhidPort(Port):
 
     def plug(self) -> None:
         """Create the device."""
-        one = self._plug
+        plug = self._plug
         request = _CREATE2_REQUEST.pack(
             _CREATE2,
-            one.product.encode(),
+            plug.product.encode(),
             b"graspsense",
-            one.serial.encode(),
+            plug.serial.encode(),
             len(REPORT_DESCRIPTOR),
             _BUS_USB,
-            one.vendor_id,
-            one.product_id,
+            plug.vendor_id,
+            plug.product_id,
             0x0100,
             0,
             REPORT_DESCRIPTOR,
@@ -126,8 +126,8 @@ class UhidPort(Port):
             os.write(self._node, _GET_REPLY.pack(_GET_REPORT_REPLY, request, failed, len(data)) + data)
         elif kind == _SET_REPORT:
             request, _, _, size = _SET.unpack_from(event, _KIND.size)
-            first = _KIND.size + _SET.size
-            device.output(event[first : first + size])
+            start = _KIND.size + _SET.size
+            device.output(event[start : start + size])
             os.write(
                 self._node, _SET_REPLY.pack(_SET_REPORT_REPLY, request, errno.EIO if device.stalled else 0)
             )

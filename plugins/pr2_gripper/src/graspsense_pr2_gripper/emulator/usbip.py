@@ -106,7 +106,7 @@ class UsbipServer:
 
     def _unlink(self, number: int, victim: int) -> None:
         with self._lock:
-            left = [one for one in self._waiting if one.number != victim]
+            left = [submission for submission in self._waiting if submission.number != victim]
             status = -errno.ECONNRESET if len(left) < len(self._waiting) else 0
             self._waiting = left
             self._write(_RETURN_UNLINK.pack(RET_UNLINK, number, 0, 0, 0, status))
@@ -116,25 +116,28 @@ class UsbipServer:
         if self._device.stalled:
             return
         waiting, self._waiting = self._waiting, []
-        for one in waiting:
-            if one.endpoint == 0:
-                answer = self._usb.control(one.setup, one.data)
+        for submission in waiting:
+            if submission.endpoint == 0:
+                answer = self._usb.control(submission.setup, submission.data)
                 if answer is None:
-                    self._return(one, -errno.EPIPE, 0, b"")
+                    self._return(submission, -errno.EPIPE, 0, b"")
                 else:
                     self._return(
-                        one, 0, len(answer) if one.is_in else one.length, answer if one.is_in else b""
+                        submission,
+                        0,
+                        len(answer) if submission.is_in else submission.length,
+                        answer if submission.is_in else b"",
                     )
-            elif not one.is_in:
-                self._device.output(one.data)
-                self._return(one, 0, one.length, b"")
+            elif not submission.is_in:
+                self._device.output(submission.data)
+                self._return(submission, 0, submission.length, b"")
             elif self._usb.halted:
-                self._return(one, -errno.EPIPE, 0, b"")
+                self._return(submission, -errno.EPIPE, 0, b"")
             elif self._armed:
-                report, self._armed = self._armed[: one.length], b""
-                self._return(one, 0, len(report), report)
+                report, self._armed = self._armed[: submission.length], b""
+                self._return(submission, 0, len(report), report)
             else:
-                self._waiting.append(one)
+                self._waiting.append(submission)
 
     def _return(self, waiting: _Waiting, status: int, length: int, data: bytes) -> None:
         self._write(RETURN.pack(RET_SUBMIT, waiting.number, 0, 0, 0, status, length, 0, 0, 0) + data)

@@ -8,6 +8,7 @@ from contextlib import suppress
 from importlib import import_module
 from typing import Any, Final, final
 
+from graspsense.gripper_api import set_option
 from graspsense.plugin_api import PluginUnavailable
 from graspsense_pr2_gripper.config import Pr2Config
 from graspsense_pr2_gripper.protocol import REPORT_SIZE
@@ -29,18 +30,18 @@ def find(config: Pr2Config) -> list[Any]:
     try:
         core, util = import_module("usb.core"), import_module("usb.util")
         devices = core.find(find_all=True, idVendor=config.vendor_id, idProduct=config.product_id)
-        found = list(devices)
+        plugged = list(devices)
     except ImportError as error:
         raise PluginUnavailable(f"transport pyusb needs pyusb: {error}\n  try: pip install pyusb") from error
     except core.NoBackendError as error:
         raise PluginUnavailable(
             "transport pyusb needs the system library libusb-1.0, which pyusb cannot find\n"
-            "  try: apt install libusb-1.0-0, or -o gripper.transport=hidraw"
+            f"  try: apt install libusb-1.0-0, or {set_option('gripper.transport=hidraw')}"
         ) from error
     if not config.serial:
-        return found
+        return plugged
     wanted = []
-    for device in found:
+    for device in plugged:
         try:
             serial = util.get_string(device, device.iSerialNumber)
         except (ValueError, core.USBError):

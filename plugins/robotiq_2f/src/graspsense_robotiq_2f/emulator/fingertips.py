@@ -104,13 +104,13 @@ class EmulatedFingertips:
 
     def _measured(self, now_s: float) -> bytes:
         pressed = now_s >= self._pressed_s
-        before = self._last
+        earlier = self._last
         if pressed:
             self._pressed_s = now_s + PRESSURE_S
             self._last = self._felt()
         fields = []
         for number, finger in enumerate(self.fingers):
-            force_n, before_n = self._last[finger], before[finger]
+            force_n, before_n = self._last[finger], earlier[finger]
             fields.append(Field(TIMESTAMP, number, (round(now_s * 1e6),)))
             if pressed:
                 fields.append(Field(PRESSURE, number, self._cells(finger, force_n)))
@@ -124,8 +124,8 @@ class EmulatedFingertips:
     def _cells(self, finger: int, force_n: float) -> tuple[int, ...]:
         counts = max(force_n, 0.0) * COUNTS_PER_N / _TOTAL
         return tuple(
-            min(max(round(rest + counts * share + self._random.gauss(0.0, NOISE_COUNTS)), 0), 0xFFFF)
-            for rest, share in zip(self.rest[finger], _SHAPE, strict=True)
+            min(max(round(zero + counts * share + self._random.gauss(0.0, NOISE_COUNTS)), 0), 0xFFFF)
+            for zero, share in zip(self.rest[finger], _SHAPE, strict=True)
         )
 
 

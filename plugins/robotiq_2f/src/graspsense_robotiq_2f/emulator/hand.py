@@ -62,10 +62,10 @@ class Hand:
             raise IndexError
         was_active = request_of(self._registers).active
         self.look(now_s)
-        before = request_of(self._registers)
+        earlier = request_of(self._registers)
         self._registers[start : start + len(values)] = values
         request = request_of(self._registers)
-        if request.position != before.position or not request.go:
+        if request.position != earlier.position or not request.go:
             self.fingers.rest_s = 0.0
         if request.active and not was_active:
             self.active_since_s = now_s

@@ -57,8 +57,8 @@ class LockStepGripper:
         """Return the input registers. Raises NoReply, OSError."""
         self._check_plug()
         self.sleep(EXCHANGE_S)
-        faults, active_s = self._config.faults, self._now_s - self._hand.active_since_s
-        mood = faults.mood if active_s >= faults.mood_at_s else "well"
+        faults = self._config.faults
+        mood = faults.mood_at(self._now_s - self._hand.active_since_s)
         if mood == "late":
             self.sleep(min(faults.late_s, self._config.reply_timeout_s))
         if mood in ("silent", "damaged") or (mood == "late" and faults.late_s > self._config.reply_timeout_s):

@@ -1,0 +1,103 @@
+"""A gripper that has to be asked for each frame: when it is asked, and what its frames say."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from graspsense.gripper_api import Polling
+
+PERIOD_S = 0.01
+
+
+class OwnTime:
+    """A clock that passes while somebody sleeps."""
+
+    def __init__(self) -> None:
+        self.now_s = 0.0
+
+    def monotonic(self) -> float:
+        return self.now_s
+
+    def sleep(self, seconds: float) -> None:
+        self.now_s += seconds
+
+
+@given(st.lists(st.floats(0.0, 0.009), min_size=2, max_size=50))
+def test_the_duration_of_an_exchange_does_not_lower_the_rate(exchanges_s):
+    clock = OwnTime()
+    polling, asked_s = Polling(1.0 / PERIOD_S, clock), []
+    for exchange_s in exchanges_s:
+        assert polling.wait(1.0)
+        asked_s.append(clock.now_s)
+        clock.sleep(exchange_s)
+        polling.frame(0.05)
+    assert asked_s == pytest.approx([k * PERIOD_S for k in range(len(exchanges_s))])
+    assert polling.report() == {
+        "frames": len(exchanges_s),
+        "repeated": 0,
+        "frame_uncertainty_s": pytest.approx(max(exchanges_s)),
+    }
+
+
+def test_lost_time_is_not_made_up():
+    clock = OwnTime()
+    polling = Polling(1.0 / PERIOD_S, clock)
+    polling.wait(1.0)
+    clock.sleep(0.095)
+    polling.frame(0.05)
+    asked_s = [clock.now_s for _ in range(4) if polling.wait(1.0)]
+    assert asked_s == pytest.approx([0.095, 0.095, 0.105, 0.115])
+
+
+def test_a_wait_that_is_too_long_ends_at_its_time():
+    clock = OwnTime()
+    polling = Polling(1.0 / PERIOD_S, clock)
+    assert polling.wait(0.0)
+    assert not polling.wait(0.004)
+    assert clock.now_s == pytest.approx(0.004)
+    assert polling.wait(0.1)
+    assert clock.now_s == pytest.approx(PERIOD_S)
+
+
+@pytest.mark.parametrize("speed_m_s", [-0.02, 0.0, 0.05])
+def test_the_rate_of_the_gap_is_that_of_the_newest_frames(speed_m_s):
+    clock = OwnTime()
+    polling = Polling(1.0 / PERIOD_S, clock)
+    frames = []
+    for tick in range(30):
+        polling.wait(1.0)
+        clock.sleep(0.001 * (tick % 3))
+        # The fingers turn after ten frames: what was before them is forgotten.
+        gap_m = 0.05 + (speed_m_s if tick > 10 else -0.1) * clock.now_s
+        frames.append(polling.frame(gap_m, 3.0, 4))
+    assert frames[0].velocity_m_s == 0.0
+    assert frames[-1].velocity_m_s == pytest.approx(speed_m_s, abs=1e-9)
+    assert frames[-1].t_s - frames[-2].t_s == pytest.approx(frames[-1].dt_s)
+    assert (frames[-1].effort_n, frames[-1].status) == (3.0, 4)
+
+
+@pytest.mark.parametrize("failures", [0, 1, 2, 3])
+def test_an_exchange_is_repeated_twice(failures):
+    polling, left = Polling(1.0 / PERIOD_S, OwnTime()), [failures]
+
+    def exchange():
+        left[0] -= 1
+        if left[0] >= 0:
+            raise TimeoutError
+        return "reply"
+
+    if failures < 3:
+        assert polling.tried(exchange, TimeoutError) == "reply"
+    else:
+        with pytest.raises(TimeoutError):
+            polling.tried(exchange, TimeoutError)
+    assert polling.repeated == min(failures, 2)
+
+
+def test_another_error_is_not_repeated():
+    polling = Polling(1.0 / PERIOD_S, OwnTime())
+    with pytest.raises(ZeroDivisionError):
+        polling.tried(lambda: 1 // 0, TimeoutError)
+    assert polling.repeated == 0
