@@ -161,9 +161,9 @@ def test_files_that_a_manifest_describes_count_wherever_they_are(tmp_path):
     data = tmp_path / "there" / "can.csv"
     data.write_text("t,gap,F\n0,0.1,0\n")
     name = f"manifest:{manifest}"
-    before = contents_of([name])[name]
+    content = contents_of([name])[name]
     data.write_text("t,gap,F\n0,0.2,0\n")
-    assert contents_of([name])[name] != before
+    assert contents_of([name])[name] != content
 
 
 def test_the_calibrations_of_a_gripper_count_with_and_without_their_setting(tmp_path, monkeypatch):

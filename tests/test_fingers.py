@@ -245,10 +245,10 @@ def test_every_finger_is_in_trace_recording_and_replay(grasped):
         note for note in trial.device.notes if "fingers" in note
     ]
     for jaw in JAWS:
-        before = trial.trace.signals[jaw.name]
-        assert before.max() > 1.0
-        assert np.array_equal(before, recorded.trace().signals[jaw.name])
-        assert np.array_equal(before, replayed.trace.signals[jaw.name])
+        signal = trial.trace.signals[jaw.name]
+        assert signal.max() > 1.0
+        assert np.array_equal(signal, recorded.trace().signals[jaw.name])
+        assert np.array_equal(signal, replayed.trace.signals[jaw.name])
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".npz"])

@@ -63,11 +63,11 @@ def test_the_feature_that_tells_the_labels_apart_contributes_most(name):
 
 def test_words_of_contributions_are_points_or_factors_of_the_odds():
     width = FeatureValue("p_first", 0.0661, "m")
-    rest = FeatureValue("f_steady", None, "N")
+    value = FeatureValue("f_steady", None, "N")
 
     shares = contribution_reasons([((width,), 0.25)], 0.3, scale="probability", label="can")
     odds = contribution_reasons(
-        [((width,), -math.log(4.0)), ((width, rest), math.log(10.0))],
+        [((width,), -math.log(4.0)), ((width, value), math.log(10.0))],
         0.0,
         scale="log-odds",
         label="can",

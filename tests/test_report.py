@@ -416,9 +416,9 @@ def test_a_verdict_says_one_of_three_things(difference, words):
 
 def test_the_recording_explains_nothing_only_where_the_rate_is_shown_to_be_higher():
     def told(low):
-        before = Measurement(what="w", rate=RecognitionRate(30, 60), difference=Difference(0.1, (low, 0.3)))
+        measurement = Measurement(what="w", rate=RecognitionRate(30, 60), difference=Difference(0.1, (low, 0.3)))
         found = evaluated(60, Difference(0.3, (0.2, 0.4)))
-        return verdict(evolve(found, controls={**found.controls, "before_contact": before}))
+        return verdict(evolve(found, controls={**found.controls, "before_contact": measurement}))
 
     assert "so the recording does not explain the rate" in told(0.05)
     assert "whether the recording explains the rate cannot be told" in told(-0.1)

@@ -51,11 +51,11 @@ def test_a_store_of_imports_has_a_first_line_and_no_order(tmp_path):
     found = labelled_store(str(tmp_path / "trials"))
     assert found.order is None
     assert "3 of 4 trials were imported without the time" in found.no_order
-    first = found.first_line.table
-    assert first.names[:2] == ("gap_first", "velocity_first")
-    assert first.values[0, :4].tolist() == [frame(0).gap_m, frame(0).velocity_m_s, frame(0).effort_n, 0.0]
+    table = found.first_line.table
+    assert table.names[:2] == ("gap_first", "velocity_first")
+    assert table.values[0, :4].tolist() == [frame(0).gap_m, frame(0).velocity_m_s, frame(0).effort_n, 0.0]
     # The third import is damaged, and the fourth trial was not imported.
-    assert (first.values[2:] != first.values[2:]).all()
+    assert (table.values[2:] != table.values[2:]).all()
 
 
 def test_grasps_of_our_own_have_an_order_and_no_first_line(tmp_path):

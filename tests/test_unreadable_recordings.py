@@ -65,8 +65,8 @@ def with_header(path, header):
     with zipfile.ZipFile(path) as archive:
         members = {name: archive.read(name) for name in archive.namelist()}
     text = header.encode().ljust(117) + b"\n"
-    first = next(iter(members))
-    members[first] = b"\x93NUMPY\x01\x00" + struct.pack("<H", len(text)) + text + members[first][128:]
+    member = next(iter(members))
+    members[member] = b"\x93NUMPY\x01\x00" + struct.pack("<H", len(text)) + text + members[member][128:]
     with zipfile.ZipFile(path, "w") as archive:
         for name, content in members.items():
             archive.writestr(name, content)

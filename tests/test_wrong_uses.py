@@ -236,13 +236,13 @@ def test_trials_without_any_feature_have_no_rate():
 
 def test_a_long_compilation_is_told_and_a_short_one_is_not():
     told = []
-    before = compile_notice._said
+    said = compile_notice._said
     compile_notice.tell_compiling(told.append)
     try:
         compile_notice.compiling_begins("stored_grasp", 60_000)
         compile_notice.compiling_begins("seed_state", 1_000)
     finally:
-        compile_notice.tell_compiling(before)
+        compile_notice.tell_compiling(said)
     (line,) = told
     assert "compiling stored grasp" in line
     assert "60 s" in line
