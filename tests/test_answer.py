@@ -14,7 +14,7 @@ from graspsense.experiments.task_results import ClassifierResult
 def condition(name, *rates, n=100, simulated=True):
     """Return a case with these rates of its seeds."""
 
-    def of(rate):
+    def rated(rate):
         predicted = ["can:full"] * round(rate * n) + ["can:empty"] * (n - round(rate * n))
         return ClassifierResult.of("c45", "both", "stratified_10_fold", ["can:full"] * n, predicted)
 
@@ -22,7 +22,7 @@ def condition(name, *rates, n=100, simulated=True):
         case=SimpleNamespace(name=name, part="", learners=(), at={"force": name}),
         classifier="c45",
         target="both",
-        by_seed={seed: of(rate) for seed, rate in enumerate(rates)},
+        by_seed={seed: rated(rate) for seed, rate in enumerate(rates)},
         simulated=simulated,
     )
 

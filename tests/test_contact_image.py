@@ -23,11 +23,11 @@ PLACES = np.indices((ROWS, COLUMNS)).astype(np.float64)
 def bump(row, column, long, short, angle):
     """A pressure whose first axis has this angle from the direction of a row; `long` and `short` are deviations."""
     down, along = PLACES[0] - row, PLACES[1] - column
-    first, second = (
+    left_bump, right_bump = (
         along * math.cos(angle) + down * math.sin(angle),
         down * math.cos(angle) - along * math.sin(angle),
     )
-    return np.exp(-0.5 * ((first / long) ** 2 + (second / short) ** 2))
+    return np.exp(-0.5 * ((left_bump / long) ** 2 + (right_bump / short) ** 2))
 
 
 def grasp(images, phases=(Phase.APPROACH, Phase.SQUEEZE, Phase.HOLD, Phase.RELEASE)):
@@ -121,14 +121,14 @@ def test_several_arrays_have_the_features_of_each_with_its_name_in_front():
     )
     layout = {"rows": ROWS, "columns": COLUMNS}
     features = create("feature-set", "contact-image", array="tactile, thumb", **layout)
-    one = create("feature-set", "contact-image", array="tactile", **layout).extract(both)
+    layout_features = create("feature-set", "contact-image", array="tactile", **layout).extract(both)
     f = features.extract(both)
 
     assert [channel.name for channel in features.requires] == ["tactile", "thumb"]
     assert set(f.names) == {feature.name for feature in features.features}
-    assert f["tactile_total"] == one["total"]
-    assert f["thumb_total"] == pytest.approx(2.0 * one["total"])
-    assert f["thumb_centre_row"] == pytest.approx(one["centre_row"])
+    assert f["tactile_total"] == layout_features["total"]
+    assert f["thumb_total"] == pytest.approx(2.0 * layout_features["total"])
+    assert f["thumb_centre_row"] == pytest.approx(layout_features["centre_row"])
 
 
 def test_a_camera_counts_how_much_its_colours_change_in_either_direction():

@@ -199,9 +199,9 @@ def in_backticks(pattern):
         for glob in ("README.md", "CONTRIBUTING.md", "docs/*.md", "specs/*.md")
         for path in ROOT.glob(glob)
     )
-    found = {(page.name, name) for page in pages for name in re.findall(rf"`({pattern})`", page.read_text())}
-    assert found
-    return sorted(found)
+    names = {(page.name, name) for page in pages for name in re.findall(rf"`({pattern})`", page.read_text())}
+    assert names
+    return sorted(names)
 
 
 METADATA = ("graspsense.device", "graspsense.trial")

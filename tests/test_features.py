@@ -19,9 +19,9 @@ from graspsense.plugins.features.chitta import NAMES, ChittaConfig, ChittaFeatur
 FEATURES = ChittaFeatures(ChittaConfig())
 
 
-def squeeze(before=100, during=400, after=200, p0=0.0600, p1=0.0540, f0=0.625, f1=8.0):
+def squeeze(approach_ticks=100, during=400, after=200, p0=0.0600, p1=0.0540, f0=0.625, f1=8.0):
     """Contact after `before` ticks, a straight squeeze of `during` ticks from p0 to p1, then rest."""
-    rows = [(p0 + 1e-5 * (before - k), 0.0, 0.0) for k in range(before)]
+    rows = [(p0 + 1e-5 * (approach_ticks - k), 0.0, 0.0) for k in range(approach_ticks)]
     rows += [
         (p0 + (p1 - p0) * k / during, f0 + (f1 - f0) * k / during, f0 + (f1 - f0) * k / during)
         for k in range(during)

@@ -229,7 +229,7 @@ def test_a_grasp_with_three_fingers_says_of_which_fingers_its_features_are(grasp
 
     assert trial.outcome.words == "steady"
     assert not isnan(trial.features.as_dict()["f_steady"])
-    (note,) = [one for one in trial.device.notes if "fingers" in one]
+    (note,) = [text for text in trial.device.notes if "fingers" in text]
     assert "left force is of thumb" in note
     assert "index and ring" in note
 
@@ -319,15 +319,15 @@ def five_fingers(folder, manifest_lines, offset_n=0.0):
     (folder / "cup-1.csv").write_text("\n".join(["t,gap,F1,F2,F3,F4,F5", *rows]) + "\n")
     text = ['files = "{label}-{order:d}.csv"', 'time = "t [s]"', 'gap = "gap [mm]"', *manifest_lines]
     (folder / "manifest.toml").write_text("\n".join(text) + "\n")
-    found = list(readable_or_not("manifest", str(folder / "manifest.toml")))
-    for recording in found:
+    recordings = list(readable_or_not("manifest", str(folder / "manifest.toml")))
+    for recording in recordings:
         if isinstance(recording, UnreadableRecording):
             raise recording.error
-    return found
+    return recordings
 
 
-def last_frame(found):
-    return found[0].recording.readings[-1].frame
+def last_frame(recording):
+    return recording[0].recording.readings[-1].frame
 
 
 @pytest.mark.parametrize(
@@ -341,9 +341,9 @@ def test_a_recording_of_five_fingers_has_the_forces_of_its_rule(tmp_path, touch,
 
 
 def test_each_finger_of_a_recording_has_its_own_zero(tmp_path):
-    found = five_fingers(tmp_path, [NAMED, 'touch = "thumb"', 'zero = "10 samples"'], offset_n=0.7)
+    recordings = five_fingers(tmp_path, [NAMED, 'touch = "thumb"', 'zero = "10 samples"'], offset_n=0.7)
 
-    last = found[0].recording.readings[-1]
+    last = recordings[0].recording.readings[-1]
     assert [getattr(last.signals, f"force_{name}") for name in FINGERS] == pytest.approx(
         list(LOADS_N.values())
     )
@@ -351,8 +351,8 @@ def test_each_finger_of_a_recording_has_its_own_zero(tmp_path):
 
 
 def test_a_resampled_recording_keeps_the_rule(tmp_path):
-    found = five_fingers(tmp_path, [NAMED, 'touch = "each"', "resample_hz = 37.0"])
-    (recording,) = (finger.recording for finger in found)
+    recordings = five_fingers(tmp_path, [NAMED, 'touch = "each"', "resample_hz = 37.0"])
+    (recording,) = (finger.recording for finger in recordings)
 
     for reading in recording.readings:
         assert reading.frame.force_left_n == min(reading.signals)
@@ -374,7 +374,7 @@ def test_an_imported_trial_of_five_fingers_says_of_which_fingers_its_features_ar
     (path,) = (tmp_path / "store" / "recordings").glob("*.mcap")
     recorded = read_recorded(path)
     assert [finger.finger for finger in fingers_of(recorded.channels)] == list(FINGERS)
-    (note,) = [one for one in recorded.device.notes if "fingers" in one]
+    (note,) = [text for text in recorded.device.notes if "fingers" in text]
     assert "left force is of thumb" in note
     assert recorded.record().result.features.values
 

@@ -100,7 +100,9 @@ def test_hook_graspsense_sensor_backends():
 
 def test_the_documented_hand_has_the_channels_of_its_fingers():
     (code,) = (
-        one for one in re.findall(r"```python\n(from .*?)```", DOCS, re.DOTALL) if "class LabHand(" in one
+        source
+        for source in re.findall(r"```python\n(from .*?)```", DOCS, re.DOTALL)
+        if "class LabHand(" in source
     )
     names: dict = {}
     exec(compile(code, "hooks.md", "exec", dont_inherit=True), names)
@@ -233,10 +235,10 @@ def test_hook_graspsense_diagnose():
     plugins.add(example("graspsense_diagnose"), "lab-b")
     plugins.add(Told(), "lab-c")
 
-    failed, found, told = plugins.diagnose("these settings", 0.25)
+    failed, diagnoses, told = plugins.diagnose("these settings", 0.25)
 
     assert (failed.findings, failed.error) == ((), "PermissionError: cannot list the bus")
-    assert (found.findings[0].state, found.findings[0].numbers) == ("problem", {"baud": 115200})
+    assert (diagnoses.findings[0].state, diagnoses.findings[0].numbers) == ("problem", {"baud": 115200})
     assert told.findings[0].found == "these settings for 0.25 s"
 
 
@@ -265,11 +267,11 @@ def test_hook_graspsense_probe_devices():
     plugins.add(example("graspsense_probe_devices"), "lab-b")
     plugins.add(Timed(), "lab-c")
 
-    failed, found, timed = plugins.probe_devices(0.25)
+    failed, devices, timed = plugins.probe_devices(0.25)
 
     assert (failed.distribution, failed.found) == ("lab-a", ())
     assert failed.error == "PermissionError: cannot list the bus"
-    assert (found.error, found.found[0].advice) == ("", "add yourself to the group dialout")
+    assert (devices.error, devices.found[0].advice) == ("", "add yourself to the group dialout")
     assert timed.found[0].serial == "0.25"
 
 

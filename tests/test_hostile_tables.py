@@ -79,8 +79,8 @@ def test_a_pattern_that_is_too_large_or_malformed_is_refused(pattern):
 def test_named_groups_are_fields(tmp_path):
     started = f"grasp jar 7\n{GRASP}grasp can 8\n{GRASP}"
     text = MANIFEST.replace('label = "jar"\n', r"start = 'grasp (?P<label>\w+) (?P<order>\d+)'")
-    found = list(read_recordings(str(manifest(tmp_path, text, started))))
-    assert [(recording.label, recording.order) for recording in found] == [("jar", 7.0), ("can", 8.0)]
+    recordings = list(read_recordings(str(manifest(tmp_path, text, started))))
+    assert [(recording.label, recording.order) for recording in recordings] == [("jar", 7.0), ("can", 8.0)]
 
 
 @pytest.mark.parametrize(
@@ -363,11 +363,11 @@ def test_an_option_out_of_bounds_is_wrong_use(value):
 def test_a_key_of_a_manifest_out_of_bounds_is_answered(tmp_path, key):
     path = manifest(tmp_path, MANIFEST + key + "\n")
     try:
-        found = list(read_recordings(str(path)))
+        answers = list(read_recordings(str(path)))
     except ConfigError as error:
-        found = [error]
-    assert len(found) == 1
-    assert not isinstance(found[0], ConfigError) or "manifest.toml" in str(found[0])
+        answers = [error]
+    assert len(answers) == 1
+    assert not isinstance(answers[0], ConfigError) or "manifest.toml" in str(answers[0])
 
 
 @pytest.mark.parametrize("rate_hz", ["1e9", "1e300", "9223372036854775807"])
@@ -526,14 +526,14 @@ def fuzzed(seed, number):
 
 
 def test_changed_texts_are_answered_by_a_result_or_an_error_that_names_the_file():
-    found = fuzzed(seed=57, number=25)
-    assert found["read"] == 250
-    assert found["bad"] == []
+    answers = fuzzed(seed=57, number=25)
+    assert answers["read"] == 250
+    assert answers["bad"] == []
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_many_changed_texts_are_answered_by_a_result_or_an_error_that_names_the_file(seed):
-    found = fuzzed(seed, number=400)
-    assert found["read"] == 4000
-    assert found["bad"] == []
+    answers = fuzzed(seed, number=400)
+    assert answers["read"] == 4000
+    assert answers["bad"] == []

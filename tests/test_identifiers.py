@@ -117,9 +117,9 @@ def table(path, column, values, measured=True):
 
 def test_an_identifier_is_said_and_used_only_where_it_is_named(tmp_path):
     path = table(tmp_path / "t.csv", "trial_id", range(N)[::-1])
-    found = read_labelled(path, "object")
-    assert found.table.names == ("s",)
-    assert any("trial_id" in note and "to include them" in note for note in found.notes)
+    trials = read_labelled(path, "object")
+    assert trials.table.names == ("s",)
+    assert any("trial_id" in note and "to include them" in note for note in trials.notes)
     chosen = read_labelled(path, "object", features=["trial_id", "s"])
     assert chosen.table.names == ("trial_id", "s")
     assert any("trial_id" in note and "reveal" in note for note in chosen.notes)
@@ -198,10 +198,10 @@ def test_texts_that_describe_an_object_are_a_feature():
 
 def test_hashes_are_texts_although_some_have_digits_alone(tmp_path):
     hashes = [f"{(i + 1) * 2654435761 % 2**32:08x}" for i in range(N - 2)] + ["12345678", "1234e567"]
-    found = read_labelled(table(tmp_path / "t.csv", "hash", hashes), "object")
-    assert found.table.names == ("s",)
+    trials = read_labelled(table(tmp_path / "t.csv", "hash", hashes), "object")
+    assert trials.table.names == ("s",)
 
 
 def test_a_column_that_says_the_label_in_other_words_is_told(tmp_path):
-    found = read_labelled(table(tmp_path / "t.csv", "class", [1] * 30 + [2] * 30), "object")
-    assert any("class" in note and "label" in note for note in found.notes)
+    trials = read_labelled(table(tmp_path / "t.csv", "class", [1] * 30 + [2] * 30), "object")
+    assert any("class" in note and "label" in note for note in trials.notes)

@@ -117,24 +117,24 @@ def test_a_subpackage_knows_only_the_subpackages_it_may():
 
 def modules() -> dict[str, Path]:
     """Return the path of each module of graspsense."""
-    found = {}
+    names = {}
     for path in files(SOURCE):
         parts = ("graspsense", *path.relative_to(SOURCE).with_suffix("").parts)
-        found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
-    return found
+        names[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
+    return names
 
 
 def imports_of(name: str, known: dict[str, Path]) -> set[str]:
     """Return the modules that a module imports in any way: at its beginning, late, or for types alone."""
-    found = set()
+    imported = set()
     for node in statements(parsed(known[name])):
         if isinstance(node, ast.Import):
-            found |= {alias.name for alias in node.names}
+            imported |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
             assert not node.level, f"{name} imports from a package without its full name"
             inner = {f"{node.module}.{alias.name}" for alias in node.names}
-            found |= inner & known.keys() or {node.module}
-    return found & known.keys()
+            imported |= inner & known.keys() or {node.module}
+    return imported & known.keys()
 
 
 def test_a_room_of_core_knows_those_before_it_only():
@@ -142,9 +142,11 @@ def test_a_room_of_core_knows_those_before_it_only():
     for name in known:
         if name.startswith("graspsense.core."):
             room = name.split(".")[2]
-            allowed = {f"graspsense.core.{one}" for one in ROOMS[: ROOMS.index(room) + 1]}
-            within = [one for one in imports_of(name, known) if one.startswith("graspsense.core.")]
-            assert {".".join(one.split(".")[:3]) for one in within} <= allowed, name
+            allowed = {f"graspsense.core.{name_of}" for name_of in ROOMS[: ROOMS.index(room) + 1]}
+            within = [
+                name_of for name_of in imports_of(name, known) if name_of.startswith("graspsense.core.")
+            ]
+            assert {".".join(name_of.split(".")[:3]) for name_of in within} <= allowed, name
 
 
 def test_no_module_imports_itself_through_others():

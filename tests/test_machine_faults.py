@@ -50,10 +50,10 @@ def failing(tmp_path):
 
 @needs_proc
 def test_verify_tells_a_disk_that_fails_from_damage(failing):
-    found = verify_store(failing)
-    assert found.problems == ()
-    assert [line.partition(":")[0] for line in found.unread] == ["trial 1"]
-    assert not found.as_json()["intact"]
+    findings = verify_store(failing)
+    assert findings.problems == ()
+    assert [line.partition(":")[0] for line in findings.unread] == ["trial 1"]
+    assert not findings.as_json()["intact"]
     done = graspsense("verify", str(failing))
     assert done.returncode == 2
     said = done.stdout
@@ -131,8 +131,8 @@ def test_a_grasp_recorded_in_any_year_is_read_and_recovered(tmp_path, monkeypatc
     with Store.open(tmp_path / "t") as store:
         keep(store, ticks=150)
         write_recording(store.recordings / "late.mcap", 150, finish=False)._out.close()
-        found = recover_store(store)
-        assert [recovered.what for recovered in found] == ["recovered"]
+        recoveries = recover_store(store)
+        assert [recovered.what for recovered in recoveries] == ["recovered"]
         assert sorted(len(read_recorded(path)) for path in store.recordings.glob("*.mcap"))[1] == 150
     assert verify_store(tmp_path / "t").problems == ()
 

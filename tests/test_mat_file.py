@@ -28,12 +28,12 @@ VARIABLES = {
 OTHERS = {"waves": np.array([1j]), "cells": np.array([[1, "a"]], dtype=object), "table": {"a": 1.0}}
 
 
-def assert_same(found, expected):
-    assert list(found) == list(expected)
+def assert_same(content, expected):
+    assert list(content) == list(expected)
     for name, array in expected.items():
-        assert found[name].shape == array.shape
-        assert found[name].dtype.kind == array.dtype.kind
-        assert (found[name] == array).all()
+        assert content[name].shape == array.shape
+        assert content[name].dtype.kind == array.dtype.kind
+        assert (content[name] == array).all()
 
 
 @pytest.mark.parametrize("compressed", [False, True])
@@ -99,8 +99,8 @@ def test_a_shape_without_its_numbers_allocates_nothing(tmp_path):
     path = tmp_path / "a.mat"
     savemat(path, {"t": np.arange(7.0)})
     data = path.read_bytes()
-    at = data.index(struct.pack("<ii", 1, 7))
+    position = data.index(struct.pack("<ii", 1, 7))
     for shape in ((2**31 - 1, 2**31 - 1), (-1, -7), (0, 7)):
-        path.write_bytes(data[:at] + struct.pack("<ii", *shape) + data[at + 8 :])
+        path.write_bytes(data[:position] + struct.pack("<ii", *shape) + data[position + 8 :])
         with pytest.raises(DataDamaged, match="shape"):
             mat_variables(path)

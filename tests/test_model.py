@@ -79,8 +79,8 @@ def test_a_pipeline_reads_a_model_once_and_again_when_its_file_has_changed(tmp_p
     path = tmp_path / "kept.json"
     write_model(path, model("knn", NAMES[:2]))  # those that the pipeline has
     settings = resolve("default", options=["classifier.type=knn", f"classifier.model={path}"])
-    first = model_for(settings, installed())
-    assert model_for(settings, installed()) is first
+    first_read = model_for(settings, installed())
+    assert model_for(settings, installed()) is first_read
 
     rewritten(path, target="object")
 

@@ -67,8 +67,8 @@ def stored(tmp_path, data):
 def test_tables_are_kept_as_they_were(tmp_path):
     closing, opening = motor_table(readings(1, 20)), motor_table(readings(2, 20))
     data = {
-        name: {"motor": list(one.table.pad_n), "load_n": list(one.table.load_n), "error_n": one.error_n}
-        for name, one in (("closing", closing), ("opening", opening))
+        name: {"motor": list(table.table.pad_n), "load_n": list(table.table.load_n), "error_n": table.error_n}
+        for name, table in (("closing", closing), ("opening", opening))
     }
     assert stored_motor_tables(stored(tmp_path, data)) == (closing, opening)
 

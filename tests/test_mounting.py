@@ -85,8 +85,8 @@ def test_a_trial_without_a_mounting_is_stored_as_before_there_was_one():
 def test_another_mounting_is_no_other_experiment(tmp_path):
     with Store.open(tmp_path / "trials") as store:
         record_grasp(store, settings(), installed(), labels={}, origin="run")
-        before = newest_grasp(store)
+        grasp = newest_grasp(store)
 
         check_settings(
-            store, before, settings(f'run.mounting.tool="{TOOL}"')
+            store, grasp, settings(f'run.mounting.tool="{TOOL}"')
         )  # raises ConfigError if they differ

@@ -192,7 +192,7 @@ def test_the_public_modules_are_enough_for_what_the_documentation_shows(path):
     text = path.read_text(encoding="utf-8")
     if path.suffix == ".md":
         text = "\n".join(re.findall(r"```python\n(.*?)```", text, re.DOTALL))
-    used = {first or second for first, second in imports_of_graspsense(text)}
+    used = {module or package for module, package in imports_of_graspsense(text)}
 
     assert used - {"graspsense", "graspsense.plugin_api", *(f"graspsense.{name}" for name in SPECIAL)} <= {
         name for name in used if name.split(".")[0] != "graspsense"

@@ -234,9 +234,9 @@ def test_no_number_of_a_controller_passes_the_limits(command):
     gripper = Scripted(squeezing, bottle)
     run_grasp(gripper, law(lambda usual, state: (command, state), after=900), RUN)
     squeezed = gripper.commands[1000:]
-    assert all(type(one) is Command for one in squeezed)
-    assert {type(number) for one in squeezed for number in one} <= {int, float}
-    assert max(float.__float__(one.value) for one in squeezed) <= 100.0
+    assert all(type(commanded) is Command for commanded in squeezed)
+    assert {type(number) for commanded in squeezed for number in commanded} <= {int, float}
+    assert max(float.__float__(commanded.value) for commanded in squeezed) <= 100.0
 
 
 @pytest.mark.parametrize("value", ["20", None, [20.0]])

@@ -221,9 +221,9 @@ def test_a_motor_within_a_quarter_of_its_command_is_sound():
 
 
 def test_a_motor_that_gives_five_times_its_command_ends_the_grasp_at_once():
-    first = next((t, fault) for t, fault in answered(20.0, 100.0) if fault.ends)
-    assert first[1].name == "motor too strong"
-    assert first[0] < 0.1
+    fault_at = next((t, fault) for t, fault in answered(20.0, 100.0) if fault.ends)
+    assert fault_at[1].name == "motor too strong"
+    assert fault_at[0] < 0.1
 
 
 def test_a_motor_that_gives_half_as_much_again_warns_and_then_ends_the_grasp():
@@ -301,10 +301,10 @@ def test_a_clock_that_stands_still_ends_the_grasp_after_a_tenth_of_a_second_of_f
 def test_images_that_stop_end_the_grasp():
     reports = Reports(1000.0, 25.0)
     faults = [reports.see(reading(0.001 * k, counter=min(1 + k // 40, 5)), SQUEEZE) for k in range(1000)]
-    first = [fault is not None for fault in faults].index(True)
+    onset = [fault is not None for fault in faults].index(True)
     # The fifth image came at 0.16 s, and five periods are allowed.
-    assert first == pytest.approx(160 + 200, abs=2)
-    assert faults[first].ends
+    assert onset == pytest.approx(160 + 200, abs=2)
+    assert faults[onset].ends
 
 
 def test_lost_frames_are_told_with_their_share():

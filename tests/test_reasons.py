@@ -53,11 +53,11 @@ def test_contributions_in_log_odds_add_up_to_the_odds(name, value, classes):
 @pytest.mark.parametrize("name", ["forest", "boosted", "ebm"])
 def test_the_feature_that_tells_the_labels_apart_contributes_most(name):
     said = fitted(name, *trials()).explain(FULL_CAN)
-    first = said.because[0]
+    largest = said.because[0]
 
-    assert first.features == (FeatureValue("p_first", 0.0661, "m"),)
-    assert first.words.startswith("p_first = 66.1 mm: ")
-    assert first.contribution.value > 0.0
+    assert largest.features == (FeatureValue("p_first", 0.0661, "m"),)
+    assert largest.words.startswith("p_first = 66.1 mm: ")
+    assert largest.contribution.value > 0.0
     assert all(reason.features[0].name != "noise" for reason in said.because[:1])
 
 
@@ -103,13 +103,13 @@ def test_a_text_becomes_a_reason_and_json_has_what_a_reason_has():
 
     for name in ("forest", "boosted", "ebm", "c45", "knn", "mlp", "backprop", "svm", "tree"):
         listed = json.loads(json.dumps(fitted(name, *trials()).explain(MISSING).as_json()))["because"]
-        assert all(one["words"] for one in listed)
-        missing = [one for one in listed if "is missing" in one["words"]]
+        assert all(reason["words"] for reason in listed)
+        missing = [reason for reason in listed if "is missing" in reason["words"]]
         assert missing[0]["features"][0] == {"name": "f_steady", "value": None, "unit": "N"}
         if name in ("c45", "tree"):
-            assert any("rule" in one for one in listed)
+            assert any("rule" in reason for reason in listed)
         if name not in ("c45", "tree"):
-            assert any(one.get("contribution", {}).get("label") == "can:full" for one in listed)
+            assert any(reason.get("contribution", {}).get("label") == "can:full" for reason in listed)
 
 
 def test_a_boosted_model_comes_back_from_json_with_its_settings():

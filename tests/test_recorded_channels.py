@@ -46,7 +46,7 @@ def ran(*args):
 
 
 def options(*given):
-    return [word for one in given for word in ("-o", one)]
+    return [word for option in given for word in ("-o", option)]
 
 
 def proposed(words):
@@ -56,7 +56,7 @@ def proposed(words):
 
 def labels_in(store):
     with Store.read(store) as opened:
-        return [one.source for one in opened.page(limit=100)]
+        return [summary.source for summary in opened.page(limit=100)]
 
 
 @pytest.mark.parametrize("command", ["import", "check", "evaluate", "train", "compare"])

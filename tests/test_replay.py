@@ -113,11 +113,11 @@ def test_thumb_is_left_and_the_strongest_finger_is_right(tmp_path: Path) -> None
 def test_gap_falls_as_thumb_and_fingers_flex(
     tmp_path: Path, joints: dict[str, float], closed_mm: float
 ) -> None:
-    first, last = frames_of(write(tmp_path / "g.txt", frame_lines(), frame_lines(moved(**joints))))
-    assert first.gap_m == 0.08
-    assert (first.gap_m - last.gap_m) * 1e3 == pytest.approx(closed_mm)
-    assert last.velocity_m_s == pytest.approx(last.gap_m - first.gap_m)
-    assert first.velocity_m_s == 0.0
+    opened, last = frames_of(write(tmp_path / "g.txt", frame_lines(), frame_lines(moved(**joints))))
+    assert opened.gap_m == 0.08
+    assert (opened.gap_m - last.gap_m) * 1e3 == pytest.approx(closed_mm)
+    assert last.velocity_m_s == pytest.approx(last.gap_m - opened.gap_m)
+    assert opened.velocity_m_s == 0.0
 
 
 def test_what_was_not_recorded_is_missing(tmp_path: Path) -> None:
@@ -280,13 +280,13 @@ def test_backend_says_that_times_are_frames_and_units_nominal(tmp_path: Path) ->
 
 def test_backend_closes_twice_and_plays_again(tmp_path: Path) -> None:
     backend, _ = opened(write(tmp_path / "g.txt", frame_lines()))
-    first = backend.read(timeout_s=0.0)
+    frame = backend.read(timeout_s=0.0)
     backend.close()
     backend.close()
     with pytest.raises(DeviceLost, match="not open"):
         backend.read(timeout_s=0.0)
     backend.open(seed=1)
-    assert repr(backend.read(timeout_s=0.0)) == repr(first)
+    assert repr(backend.read(timeout_s=0.0)) == repr(frame)
 
 
 @real_data
@@ -398,8 +398,8 @@ def test_a_replayed_trial_has_the_trace_of_the_grasp_to_the_last_bit(
 
     assert Phase.RELEASE in grasp.trial.trace.phase
     for name in (*TICK_COLUMNS, *PAD_COLUMNS):
-        before, now = getattr(grasp.trial.trace, name), getattr(replayed.trace, name)
-        assert before.tobytes() == now.tobytes(), name
+        original, now = getattr(grasp.trial.trace, name), getattr(replayed.trace, name)
+        assert original.tobytes() == now.tobytes(), name
     assert replayed.features.values == grasp.trial.features.values
     assert replayed.outcome == grasp.trial.outcome
 

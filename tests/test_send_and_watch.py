@@ -95,8 +95,12 @@ def test_it_approaches_gently_stops_raises_the_force_in_steps_and_waits_for_rest
     assert grasp.outcome is Outcome.STEADY, grasp.reason
     trace = grasp.trace
     kind = {"position": POSITION, "velocity": VELOCITY, "force": FORCE}[sends]
-    closing = [one for one in body.sent if one.kind == kind and (kind == FORCE or one.effort_limit_n < 25.0)]
-    forces = [one.value if kind == FORCE else one.effort_limit_n for one in closing]
+    closing = [
+        command
+        for command in body.sent
+        if command.kind == kind and (kind == FORCE or command.effort_limit_n < 25.0)
+    ]
+    forces = [command.value if kind == FORCE else command.effort_limit_n for command in closing]
     assert list(dict.fromkeys(forces)) == [5.0, 10.0, 15.0, 20.0]
     approach = trace.phase == Phase.APPROACH
     assert -trace.velocity_m_s[approach].min() < 0.0105
@@ -123,7 +127,7 @@ def test_hybrid_approaches_gently_and_raises_the_force_in_steps(thing, keys):
     assert grasp.outcome is Outcome.STEADY, grasp.reason
     trace = grasp.trace
     assert -trace.velocity_m_s[trace.phase == Phase.APPROACH].min() < 0.0105
-    closing = [one.effort_limit_n for one in body.sent if one.effort_limit_n < 25.0]
+    closing = [command.effort_limit_n for command in body.sent if command.effort_limit_n < 25.0]
     assert [force for force in dict.fromkeys(closing) if force < 19.5] == [5.0, 10.0, 15.0]
     assert held_n(trace) == pytest.approx(20.0, abs=0.5)
     # Until the first step, the fingers stop where both pads touched.

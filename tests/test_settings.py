@@ -207,13 +207,13 @@ def test_config_show_tells_meaning_unit_range_default_and_origin_of_each_key(tmp
     text = to_toml(settings, origins=True)
 
     lines = text.splitlines()
-    at = next(k for k, line in enumerate(lines) if line.startswith("probing_force_n = 15.0"))
-    assert lines[at].endswith(f"# {file}:3")
+    index = next(k for k, line in enumerate(lines) if line.startswith("probing_force_n = 15.0"))
+    assert lines[index].endswith(f"# {file}:3")
     assert (
-        lines[at - 2]
+        lines[index - 2]
         == "# The effort of the squeeze; with loop = closed, the force on each pad. [N; above 0; plausible 0.1"
     )
-    assert lines[at - 1] == "#   to 200 N; default 20.0]"
+    assert lines[index - 1] == "#   to 200 N; default 20.0]"
     assert any(line.startswith("ramp_s = 0.1") and line.endswith("# -o") for line in lines)
     assert any(line.startswith("hold_s = 0.25") and line.endswith("# default") for line in lines)
     assert tomllib.loads(text) == tomllib.loads(to_toml(settings))
@@ -229,10 +229,10 @@ def test_config_show_describes_the_keys_of_a_table():
 
 def test_the_contact_threshold_stands_once():
     """Features use that of the controller, unless they are given another one."""
-    one = resolve(options=["controller.contact_force_n=1.25"])
-    assert one.values["features"]["contact_force_n"] == 1.25
-    assert one.origins["features.contact_force_n"] == "controller.contact_force_n"
-    assert tick_params(INFO, one.controller.create(), one.run).guard.contact_force_n == 1.25
+    setting = resolve(options=["controller.contact_force_n=1.25"])
+    assert setting.values["features"]["contact_force_n"] == 1.25
+    assert setting.origins["features.contact_force_n"] == "controller.contact_force_n"
+    assert tick_params(INFO, setting.controller.create(), setting.run).guard.contact_force_n == 1.25
     other = resolve(options=["controller.contact_force_n=1.25", "features.contact_force_n=0.5"])
     assert other.values["features"]["contact_force_n"] == 0.5
     assert resolve().origins["features.contact_force_n"] == "default"

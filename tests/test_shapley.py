@@ -32,9 +32,9 @@ def by_definition(trial, medians):
     for order in orders:
         row = medians.copy()
         for k in order:
-            before = interacting(row[np.newaxis])[0]
+            base = interacting(row[np.newaxis])[0]
             row[k] = trial[k]
-            parts[k] += (interacting(row[np.newaxis])[0] - before) / len(orders)
+            parts[k] += (interacting(row[np.newaxis])[0] - base) / len(orders)
     return parts
 
 
@@ -80,7 +80,7 @@ def test_contributions_add_up_to_the_probability(name, features):
 @pytest.mark.filterwarnings("ignore::sklearn.exceptions.ConvergenceWarning")
 @pytest.mark.parametrize("name", NAMES)
 def test_the_feature_that_tells_the_labels_apart_contributes_most(name):
-    first = fitted(name, *trials()).explain(FULL_CAN).because[0]
+    reason = fitted(name, *trials()).explain(FULL_CAN).because[0]
 
-    assert first.features == (FeatureValue("p_first", 0.0661, "m"),)
-    assert first.words.startswith("p_first = 66.1 mm: +")
+    assert reason.features == (FeatureValue("p_first", 0.0661, "m"),)
+    assert reason.words.startswith("p_first = 66.1 mm: +")

@@ -112,7 +112,7 @@ def test_without_skops_it_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "skops", None)
     monkeypatch.setitem(sys.modules, "skops.io", None)
     classifier = create("classifier", "tree", kept_as="skops")
-    found = trials()
-    classifier.fit(found.table, found.labels, 0)
+    labelled = trials()
+    classifier.fit(labelled.table, labelled.labels, 0)
     with pytest.raises(PluginUnavailable, match=r"graspsense\[skops\]"):
         classifier.to_json()

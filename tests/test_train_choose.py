@@ -66,7 +66,9 @@ def test_among_all_candidates_one_that_knows_the_hold_is_chosen(store, tmp_path)
 
     assert load["rate"]["rate"] >= 0.9
     assert load["rate"]["instances"] == 12
-    candidates = {(one["classifier"], one["features"]) for one in load["ranking"]["candidates"]}
+    candidates = {
+        (candidate["classifier"], candidate["features"]) for candidate in load["ranking"]["candidates"]
+    }
     assert ("extra-trees", "union") in candidates
     assert len(candidates) >= 24
     runs(store, tmp_path / "own.toml")
@@ -152,7 +154,7 @@ def test_recordings_without_contact_are_told_apart_by_the_features_that_need_non
     assert code == 0, err
     choice = json.loads(told)["choice"]
 
-    assert {one["features"] for one in choice["ranking"]["candidates"]} == {"quant"}
+    assert {candidate["features"] for candidate in choice["ranking"]["candidates"]} == {"quant"}
     assert choice["rate"]["rate"] >= 0.9
     assert sum(choice["right"]) == choice["rate"]["correct"]
     assert any("curve" in note and "0 of 24" in note for note in choice["ranking"]["notes"])
@@ -165,5 +167,5 @@ def test_sets_of_many_features_are_left_to_classifiers_that_take_them_quickly(st
     assert code == 0, err
     ranking = json.loads(told)["choice"]["ranking"]
 
-    assert not {"quant", "union of all"} & {one["features"] for one in ranking["candidates"]}
+    assert not {"quant", "union of all"} & {candidate["features"] for candidate in ranking["candidates"]}
     assert any("quant" in note and "knn" in note for note in ranking["notes"])

@@ -384,10 +384,10 @@ def test_a_ros2_bag_that_computes_is_refused(tmp_path, statement):
     connection = sqlite3.connect(path)
     connection.executescript(statement)
     connection.close()
-    before = path.read_bytes()
+    original = path.read_bytes()
     with pytest.raises(DataDamaged, match="is computed"):
         read_bag(tmp_path / "bag")
-    assert path.read_bytes() == before
+    assert path.read_bytes() == original
 
 
 @pytest.mark.parametrize(
