@@ -7,6 +7,7 @@ import sys
 import h5py
 import numpy as np
 import pytest
+from cases import every_case
 from commands import printed
 from scipy.io import savemat
 
@@ -41,7 +42,7 @@ def solid(grasps=3):
 COLUMNS = 'time = "c1"\ngap = "c2"\nforce = "c3"\n'
 
 
-@pytest.mark.parametrize("ending", ["npy", "npz", "mat", "h5"])
+@every_case("ending", ["npy", "npz", "mat", "h5"])
 def test_an_array_of_three_dimensions_is_read_alike_in_every_file_and_asked_about(ending, tmp_path):
     path = tmp_path / f"jar.{ending}"
     if ending == "npy":

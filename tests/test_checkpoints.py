@@ -7,6 +7,7 @@ import threading
 import numpy as np
 import pytest
 from attrs import evolve
+from cases import every_case
 
 from graspsense.core.components.config import SelectedComponent, build, resolve
 from graspsense.core.components.registry import installed
@@ -272,7 +273,7 @@ def test_a_checkpoint_of_a_model_of_other_objects_is_refused(model, trials, lear
         load_model(str(tmp_path / "mixed.json"), installed())
 
 
-@pytest.mark.parametrize("text", ["", "soon", "0", "-0.1", "0.2,0.1", "0.1,0.1", "nan", "inf"])
+@every_case("text", ["", "soon", "0", "-0.1", "0.2,0.1", "0.1,0.1", "nan", "inf"])
 def test_checkpoints_that_are_no_times(text):
     with pytest.raises(ConfigError, match=r"as in 0.1,0.2,0.4"):
         checkpoints_of(text)

@@ -9,6 +9,7 @@ import sys
 
 import numpy as np
 import pytest
+from cases import every_case
 
 from graspsense.core.values.errors import ConfigError
 from graspsense.core.values.features import Features, FeatureTable
@@ -130,7 +131,7 @@ class TestEvery:
             create("classifier", name).from_json(damage)
 
 
-@pytest.mark.parametrize("name", ALL[1:])
+@every_case("name", ALL[1:])
 def test_one_label_is_refused(name):
     table, labels = trials()
     with pytest.raises(ValueError, match="nothing to tell apart"):

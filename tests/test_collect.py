@@ -6,6 +6,7 @@ import sys
 from collections import Counter
 
 import pytest
+from cases import every_case
 from commands import graspsense
 
 from graspsense.core.values.errors import ConfigError
@@ -261,8 +262,8 @@ def test_a_label_of_an_individual_object_selects_this_object_on_an_emulated_pr2(
     assert held(tmp_path / "t") == [("can:full_open", "can:full_open#2", True)]
 
 
-@pytest.mark.parametrize("gripper", [(), EMULATED], ids=["sim", "pr2"])
-@pytest.mark.parametrize("told", [("--object", "toy"), ("-o", "gripper.object=toy")], ids=["flag", "option"])
+@every_case("gripper", [(), EMULATED])
+@every_case("told", [("--object", "toy"), ("-o", "gripper.object=toy")])
 def test_an_object_that_contradicts_a_label_is_refused(tmp_path, gripper, told):
     done = collect(tmp_path / "t", "\n", labels="block", more=(*gripper, *told))
 

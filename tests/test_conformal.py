@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 from attrs import evolve
+from cases import every_case
 from commands import printed
 from test_evaluate import judged, labelled, learner
 
@@ -42,7 +43,7 @@ def model_of(trials, name):
     return calibrated(model, learner(name), trials, 0)
 
 
-@pytest.mark.parametrize(("coverage", "needed"), [(0.9, 9), (0.95, 19), (0.8, 4), (0.99, 99)])
+@every_case(("coverage", "needed"), [(0.9, 9), (0.95, 19), (0.8, 4), (0.99, 99)])
 def test_units_needed_are_the_smallest_n_with_a_finite_quantile(coverage, needed):
     assert units_needed(coverage) == needed
 

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 from attrs import evolve
+from cases import every_case
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -159,7 +160,7 @@ def test_a_recording_without_phases_begins_with_its_zero():
     assert f["total"] == pytest.approx(float(np.sum(pressed)))
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("images", "missing"),
     [
         ([np.zeros(ROWS * COLUMNS)], {"total", "area"}),
@@ -167,7 +168,6 @@ def test_a_recording_without_phases_begins_with_its_zero():
         ([np.zeros(ROWS * COLUMNS), -np.ones(ROWS * COLUMNS)], {"area", "centre_row"}),
         ([np.zeros(ROWS * COLUMNS), np.eye(1, ROWS * COLUMNS, 20)[0]], {"angle"}),
     ],
-    ids=["one image", "no change", "all cells fall", "a single cell"],
 )
 def test_what_an_image_does_not_show_is_missing_with_a_reason(images, missing):
     f = extract(images)

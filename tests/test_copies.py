@@ -6,6 +6,7 @@ import json
 
 import numpy as np
 import pytest
+from cases import every_case
 from commands import graspsense, printed
 from hypothesis import given
 from hypothesis import strategies as st
@@ -59,7 +60,7 @@ def test_trials_without_copies_stay_as_they_are():
     assert without_copies(trials) is trials
 
 
-@pytest.mark.parametrize(
+@every_case(
     "values",
     [
         np.random.default_rng(1).integers(0, 4, size=(60, 1)),  # counts

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import wayward
 from attrs import evolve
+from cases import every_case
 from kept import keep
 
 from graspsense.core.values.errors import ConfigError
@@ -138,7 +139,7 @@ def test_files_that_a_file_names_count(tmp_path):
         assert contents_of(params) != contents
 
 
-@pytest.mark.parametrize(
+@every_case(
     "source", ["s", "s/store.sqlite", "store:s", "manifest:m.toml", "identified:m.toml,n.toml", "t.parquet"]
 )
 def test_paths_are_relative_to_the_folder_of_the_file_wherever_it_is_read(tmp_path, monkeypatch, source):
@@ -214,7 +215,7 @@ def test_what_is_no_file_is_no_input():
     }
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("sweep", "key"),
     [
         ('"controller.probing_force_n" = [17.0, 20.0]', "controller.probing_force_n"),

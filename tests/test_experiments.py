@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 import wayward
+from cases import every_case
 from commands import graspsense
 from hypothesis import given
 from hypothesis import strategies as st
@@ -90,7 +91,7 @@ def test_what_lies_beside_the_results_gives_the_same_again(file, tmp_path):
     assert len(results_in(tmp_path / "out")) == 4
 
 
-@pytest.mark.parametrize("name", sorted(shipped()))
+@every_case("name", sorted(shipped()))
 def test_what_is_shipped_resolves_to_itself(name, tmp_path):
     planned = read_experiment(name, ["seeds=2"])
     results = Results(tmp_path)
@@ -211,7 +212,7 @@ def test_one_run_at_a_time_writes_to_a_folder(file, tmp_path):
         run_experiment(read_experiment(str(file)), Results(tmp_path / "out"), Serial)
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("text", "said"),
     [
         ('title = "x"\nsedes = 2', r"mine.toml:2: sedes: .*Did you mean 'seeds'"),

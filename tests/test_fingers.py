@@ -9,6 +9,7 @@ from math import isnan, nan, sqrt
 import numpy as np
 import pytest
 from attrs import evolve, frozen
+from cases import every_case
 from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.figure import Figure
@@ -196,7 +197,7 @@ def test_a_finger_without_a_number_is_no_contact_of_its_side_or_of_every_finger(
     assert opposed_forces(five("any", thumb="left"))(forces) == (5.0, 5.0)
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("fingers", "says"),
     [
         (five("sides"), "one of two sides"),
@@ -204,7 +205,6 @@ def test_a_finger_without_a_number_is_no_contact_of_its_side_or_of_every_finger(
         (five("each")[:1], "two or more"),
         ((*five("each"), FingerForce("force_sixth", "N", touch="any")), "one rule"),
     ],
-    ids=["all on one side", "none opposed", "one finger", "two rules"],
 )
 def test_fingers_that_cannot_touch_are_refused(fingers, says):
     with pytest.raises(ValueError, match=says):
@@ -330,7 +330,7 @@ def last_frame(recording):
     return recording[0].recording.readings[-1].frame
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("touch", "left_n", "right_n"),
     [("thumb", 10.0, 9.0), ("thumb, index", 14.0, 5.0), ("each", 0.0, 10.0), ("any", 10.0, 4.0)],
 )
@@ -379,7 +379,7 @@ def test_an_imported_trial_of_five_fingers_says_of_which_fingers_its_features_ar
     assert recorded.record().result.features.values
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("lines", "says"),
     [
         ([NAMED], 'touch = "thumb"'),
@@ -391,7 +391,6 @@ def test_an_imported_trial_of_five_fingers_says_of_which_fingers_its_features_ar
         (['fingers = { thumb = "F1 [N]", index = "F2 [counts]" }'], "one unit"),
         (['fingers = { thumb = "F1 [N]", index = "F9 [N]" }'], "fingers.index"),
     ],
-    ids=["no rule", "no such finger", "two meanings", "no fingers", "one", "name", "units", "no such column"],
 )
 def test_a_manifest_with_fingers_that_cannot_be_is_refused(tmp_path, lines, says):
     with pytest.raises(ConfigError, match=says):

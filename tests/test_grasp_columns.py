@@ -7,6 +7,7 @@ from math import isnan
 import numpy as np
 import pytest
 from attrs import evolve
+from cases import every_case
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -106,7 +107,7 @@ def test_numbers_of_a_fast_channel_are_axes_or_samples_as_shapes_says(shape, sam
 LONG = np.ones(N + 1)
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("more", "says"),
     [
         ({"left_n": LONG}, "'left_n' has 101 samples, and t_s has 100"),

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import click
 import pytest
+from cases import every_case
 
 from graspsense.core.components import hookspecs
 from graspsense.core.components.entries import Finding, FoundDevice
@@ -55,18 +56,18 @@ def trial() -> Trial:
     )
 
 
-@pytest.mark.parametrize("hook", HOOKS)
+@every_case("hook", HOOKS)
 def test_every_hook_has_a_test(hook):
     assert f"test_hook_{hook}" in globals()
 
 
-@pytest.mark.parametrize("hook", HOOKS)
+@every_case("hook", HOOKS)
 def test_every_hook_is_documented_with_its_exact_signature(hook):
     signature = f"{hook}{inspect.signature(HOOKS[hook])}".replace("'", "")
     assert f"\n## {signature}\n" in DOCS
 
 
-@pytest.mark.parametrize("hook", HOOKS)
+@every_case("hook", HOOKS)
 def test_every_hook_says_what_it_is_for(hook):
     assert inspect.getdoc(HOOKS[hook])
 
@@ -76,7 +77,7 @@ def test_the_documentation_knows_no_other_hook():
     assert sorted(documented) == sorted(HOOKS)
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("role", "hook", "name"),
     [
         ("sensor-backend", "graspsense_sensor_backends", "lab-hand"),

@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from cases import every_case
 from grippers import bottle, squeezing
 from wayward import CSV
 
@@ -266,7 +267,7 @@ def test_objects_that_are_missing_are_not_fetched(checkout, tmp_path):
     assert not (tmp_path / "ran").exists()
 
 
-@pytest.mark.parametrize(
+@every_case(
     "head",
     [
         "",

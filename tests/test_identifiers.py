@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from cases import every_case
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -38,8 +39,8 @@ COUNTERS = {
 ORDERS = {"as it is": list, "falling": lambda values: list(values)[::-1], "a swap": swapped, "a tie": tied}
 
 
-@pytest.mark.parametrize("order", ORDERS)
-@pytest.mark.parametrize("counter", COUNTERS)
+@every_case("order", ORDERS)
+@every_case("counter", COUNTERS)
 def test_a_counter_or_a_time_is_no_feature_in_any_order(counter, order):
     assert identifies("x", "", ORDERS[order](list(COUNTERS[counter])), LABELS)
 
@@ -53,7 +54,7 @@ def test_nor_where_the_lines_are_shuffled(seed, counter):
     assert identifies("x", "", np.array(COUNTERS[counter])[order], [LABELS[i] for i in order])
 
 
-@pytest.mark.parametrize("name", ["trial_id", "runNumber", "No", "index", "file"])
+@every_case("name", ["trial_id", "runNumber", "No", "index", "file"])
 def test_a_number_with_gaps_is_known_by_its_name_where_the_lines_are_shuffled(name):
     order = np.random.default_rng(1).permutation(N)
     values = np.array(COUNTERS["with large gaps"])[order]
@@ -143,7 +144,7 @@ REPEATED = {
 }
 
 
-@pytest.mark.parametrize("counter", REPEATED)
+@every_case("counter", REPEATED)
 def test_numbers_that_several_lines_share_are_no_feature_in_any_order(counter):
     assert identifies("x", "", REPEATED[counter], LABELS)
     assert identifies("x", "", *shuffled(REPEATED[counter]))
@@ -183,7 +184,7 @@ SESSIONS = {
 }
 
 
-@pytest.mark.parametrize("texts", SESSIONS)
+@every_case("texts", SESSIONS)
 def test_texts_that_name_a_session_or_an_object_are_no_feature(texts):
     assert text_identifies(SESSIONS[texts], LABELS)
 

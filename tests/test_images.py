@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 from attrs import evolve, frozen
+from cases import every_case
 from kept import begun
 from mcap.reader import make_reader
 
@@ -270,7 +271,7 @@ def test_a_gripper_with_cameras_conforms(seen):
     }
 
 
-@pytest.mark.parametrize("array", IMAGES, ids=lambda declared: declared.name)
+@every_case("array", IMAGES)
 def test_a_recording_shows_the_shape_of_its_images_without_the_declaration(array, tmp_path):
     recorder = Recorder(tmp_path / "g.mcap")
     recorder.metadata(START, begun().section(START))
@@ -284,7 +285,7 @@ def test_a_recording_shows_the_shape_of_its_images_without_the_declaration(array
     assert np.array_equal(grasp.trace().signals[array.name].cells[0], image.cells)
 
 
-@pytest.mark.parametrize(
+@every_case(
     "definition",
     ["uint8[4] t_s", "float64 t_s\nuint8 x", "float64 t_s\nuint8[3] x\nint64 y", "float64 t_s\nint8[3] x"],
 )
@@ -315,7 +316,7 @@ def fixed(array):
     return array
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("image", "word"),
     [
         (fixed(np.zeros((8, 6, 3), np.uint8)), "8 x 6 x 3 instead of the shape 6 x 8 x 3"),

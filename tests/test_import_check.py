@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cases import every_case
 from commands import graspsense
 from scipy.io import savemat
 
@@ -251,7 +252,7 @@ RIGHT = {
 }
 
 
-@pytest.mark.parametrize("make", RIGHT, ids=lambda make: make.__name__)
+@every_case("make", RIGHT)
 def test_at_least_half_of_a_suggested_manifest_is_right_and_nothing_is_wrong_in_silence(make, tmp_path):
     folder = tmp_path / "set"
     make(folder)

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from cases import every_case
 from sources import parsed, statements
 
 import graspsense
@@ -208,7 +209,7 @@ def _is_target(text: str) -> bool:
     )
 
 
-@pytest.mark.parametrize("folder", distributions(), ids=lambda folder: folder.name)
+@every_case("folder", distributions())
 def test_a_distribution_knows_the_door_for_authors_only(folder):
     (package,) = [path for path in (folder / "src").iterdir() if path.is_dir() and path.name != "__pycache__"]
     for path in files(package):
@@ -221,7 +222,7 @@ def test_a_distribution_knows_the_door_for_authors_only(folder):
         assert known <= allowed, f"{path.relative_to(folder)} imports {sorted(known - allowed)}"
 
 
-@pytest.mark.parametrize("folder", distributions(), ids=lambda folder: folder.name)
+@every_case("folder", distributions())
 def test_a_distribution_knows_no_other(folder):
     others = {f"graspsense_{distribution.name}" for distribution in distributions()} - {
         f"graspsense_{folder.name}"
@@ -305,19 +306,19 @@ def test_listing_plugins_loads_no_driver_and_nothing_heavy(arguments):
 PUBLIC_MODULES = [graspsense, *(importlib.import_module(f"graspsense.{door}") for door in DOORS)]
 
 
-@pytest.mark.parametrize("door", PUBLIC_MODULES, ids=lambda door: door.__name__)
+@every_case("door", PUBLIC_MODULES)
 def test_type_checkers_see_the_names_of_the_tables(door):
     stub = "__init__" if door is graspsense else door.__name__.removeprefix("graspsense.")
     assert (SOURCE / f"{stub}.pyi").read_text() == door.PUBLIC.stub() + "\n"
 
 
-@pytest.mark.parametrize("door", PUBLIC_MODULES, ids=lambda door: door.__name__)
+@every_case("door", PUBLIC_MODULES)
 def test_each_public_module_lists_a_name_once(door):
     names = [name for homes in door.PUBLIC.table.values() for part in homes.values() for name in part]
     assert sorted(names) == door.PUBLIC.names == sorted(set(names))
 
 
-@pytest.mark.parametrize("door", PUBLIC_MODULES, ids=lambda door: door.__name__)
+@every_case("door", PUBLIC_MODULES)
 def test_every_name_of_a_door_can_be_imported(door):
     for name in door.__all__:
         assert getattr(door, name) is not None

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from cases import every_case
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -9,7 +10,7 @@ from graspsense.evaluation.intervals import RecognitionRate, difference, rate_of
 from graspsense.evaluation.json_codec import from_json, to_json
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("correct", "n", "low", "high"),
     [
         # Rates of Chitta, Piccoli and Sturm (ICRA 2010) with their 95 % Wilson intervals, worked out apart from us.
@@ -87,8 +88,8 @@ def counted(counts, trials=8):
     return right, [f"bottle#{i}" for i in range(len(counts)) for _ in range(trials)]
 
 
-@pytest.mark.parametrize("instances", [6, 12])
-@pytest.mark.parametrize("correlation", [0.1, 0.3])
+@every_case("instances", [6, 12])
+@every_case("correlation", [0.1, 0.3])
 def test_the_interval_over_instances_covers_where_that_of_the_trials_does_not(instances, correlation):
     """benchmarks/interval_coverage.py prints the whole table."""
     rng = np.random.default_rng(0)

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from cases import every_case
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -118,7 +119,7 @@ def test_a_time_of_onset_can_be_a_column_of_the_recording(tmp_path):
     assert events_in(tmp_path, events='events = { slip = "slip [s]" }') == {"slip": []}
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("slips", "events", "says"),
     [
         (2 * flags((1.0, 2.0)), 'events = { slip = "slip" }', "line 202.* is 2; it must be 0 or 1"),
@@ -333,7 +334,7 @@ def test_an_acceleration_of_one_axis_is_told_and_its_threshold_can_be_set(tmp_pa
     assert scored(capsys, source, *high)["kinds"]["acceleration"]["given"]["found"] == 0
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("arguments", "code", "says"),
     [
         (("--events", "--png", "x.png"), 2, "--png"),

@@ -6,6 +6,7 @@ import json
 
 import numpy as np
 import pytest
+from cases import every_case
 from commands import graspsense
 
 
@@ -139,7 +140,7 @@ def test_the_picture_of_the_confusion(csv, tmp_path):
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("arguments", "code", "said"),
     [
         (

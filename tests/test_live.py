@@ -27,6 +27,7 @@ from graspsense.live.feeds import LiveFeed
 
 pytest.importorskip("websockets")
 
+from cases import every_case
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
@@ -226,7 +227,7 @@ def test_a_port_that_is_taken_is_an_error_before_the_grasp(tmp_path):
     assert not (tmp_path / "store").exists()
 
 
-@pytest.mark.parametrize("address", ["", ":80", "127.0.0.1:x", "127.0.0.1:70000", "[::1]:-1"])
+@every_case("address", ["", ":80", "127.0.0.1:x", "127.0.0.1:70000", "[::1]:-1"])
 def test_an_address_that_is_none_is_wrong_use(address):
     with pytest.raises(click.UsageError):
         _host_and_port(address)

@@ -10,6 +10,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
+from cases import every_case
 from commands import graspsense
 from kept import keep, write_recording
 
@@ -123,7 +124,7 @@ def test_recover_says_that_the_database_is_malformed_and_touches_nothing(tmp_pat
     assert not part.exists()
 
 
-@pytest.mark.parametrize("year", [2262, 2300, 2500, 2600])
+@every_case("year", [2262, 2300, 2500, 2600])
 def test_a_grasp_recorded_in_any_year_is_read_and_recovered(tmp_path, monkeypatch, year):
     now_ns = int(datetime(year, 6, 1, tzinfo=UTC).timestamp()) * 10**9
     ticks = itertools.count(now_ns, 1_000_000)

@@ -9,6 +9,7 @@ from textwrap import dedent
 
 import numpy as np
 import pytest
+from cases import every_case
 from commands import graspsense
 from scipy.io import savemat
 
@@ -272,7 +273,7 @@ def texts(separator, decimal=".", comment=""):
     return "\n".join(lines) + "\n"
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("name", "text"),
     [
         ("jar.csv", texts(",")),
@@ -403,10 +404,10 @@ def test_squeezes_are_found_from_the_force(tmp_path):
     assert [squeeze.source for squeeze in squeezes] == [f"jar.csv, squeeze {k}" for k in (1, 2, 3)]
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("spoilt", "value"), [("force", 1e6), ("force", np.nan), ("force", np.inf), ("gap", 900.0), ("time", 0.0)]
 )
-@pytest.mark.parametrize("samples", [1, 40])
+@every_case("samples", [1, 40])
 def test_a_fault_in_one_squeeze_is_of_that_squeeze(tmp_path, spoilt, value, samples):
     gap, force = squeezing()
     columns = {
@@ -461,7 +462,7 @@ def test_a_list_names_files_and_rows_with_their_facts(tmp_path):
 # What looks wrong.
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("columns", "says"),
     [
         ({"gap": 0.1 - squeezing()[0]}, 'the gap rises while the force rises: .*gap = "0.1 - POSITION"'),
@@ -488,7 +489,7 @@ def test_a_gap_in_millimetres_and_counts_called_newtons_are_refused(tmp_path):
         recordings(tmp_path, PLAIN)
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("text", "says"),
     [
         ('files = "{label}.csv"\ngap = "g"', r"manifest.toml: a grasp needs its force"),

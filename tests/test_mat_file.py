@@ -6,6 +6,7 @@ import struct
 
 import numpy as np
 import pytest
+from cases import every_case
 from scipy.io import loadmat, savemat
 
 from graspsense.core.values.errors import ConfigError, DataDamaged
@@ -77,7 +78,7 @@ def test_the_other_order_of_bytes(tmp_path):
     assert mat_variables(path)["t"].tolist() == [[1.5], [-2.0]]
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("content", "says"),
     [
         (b"", "header"),

@@ -8,6 +8,7 @@ import math
 
 import pytest
 from attrs import evolve
+from cases import every_case
 from commands import graspsense
 from test_classifiers import NAMES, UNITS, trials
 from test_conformal import bottles
@@ -320,7 +321,7 @@ def test_a_classifier_without_a_model_says_how_to_get_one():
     assert model_for(evolve(settings, classifier=None), installed()) is None
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("key", "value", "words"),
     [
         ("probing_force_n", 20.0, ("probing force", "20 N")),

@@ -7,6 +7,7 @@ from math import inf
 
 import numpy as np
 import pytest
+from cases import every_case
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -73,7 +74,7 @@ def test_tables_are_kept_as_they_were(tmp_path):
     assert stored_motor_tables(stored(tmp_path, data)) == (closing, opening)
 
 
-@pytest.mark.parametrize(
+@every_case(
     "changed", [{"error_n": -1.0}, {"error_n": None}, {"motor": [0.0, 1.0, 1.0]}, {"load_n": [0.0, 2.0, 1.0]}]
 )
 def test_damaged_tables_are_told(tmp_path, changed):

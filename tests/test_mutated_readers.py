@@ -21,6 +21,7 @@ import mutated_files as change
 import pytest
 import recorded_files as write
 from attrs import frozen
+from cases import every_case
 
 from graspsense.core.components.config import Flag, resolve
 from graspsense.core.components.registry import installed
@@ -204,7 +205,7 @@ def numbers(name, count):
     return range(count) if not wanted else [int(number)] if wanted == name else []
 
 
-@pytest.mark.parametrize("name", FORMATS)
+@every_case("name", FORMATS)
 def test_a_sample_of_each_format(name, tmp_path):
     pattern = pattern_of(name, tmp_path / "pattern")
     for number in numbers(name, QUICK):

@@ -7,6 +7,7 @@ from math import nan
 import numpy as np
 import pytest
 from attrs import evolve
+from cases import every_case
 
 from graspsense.core.control.contact import CONTACT_FORCE_N, REST_SPEED_M_S, REST_WINDOW_S, first_rest
 from graspsense.core.values.signals import NO_PADS, Frame, Reading
@@ -103,7 +104,7 @@ def in_units(recording, units, force=1.0, gap=1.0, time=1.0, offset=0.0):
     return evolve(recording, readings=readings, units=renamed)
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("factors", "units"),
     [
         ({"force": 250.0, "offset": 2000.0}, {"force": "counts"}),
@@ -111,7 +112,6 @@ def in_units(recording, units, force=1.0, gap=1.0, time=1.0, offset=0.0):
         ({"force": 250.0, "time": 100.0}, {"force": "counts", "t": "sample"}),
         ({"force": 1e-3, "gap": 40.0, "time": 100.0}, {"force": "V", "gap": "V", "t": "sample"}),
     ],
-    ids=["counts", "degrees", "samples", "all"],
 )
 def test_thresholds_follow_from_recordings_in_any_unit(factors, units):
     """The same squeezes in other units have the contact at the same time, and come to rest."""
@@ -162,8 +162,8 @@ def slow_squeeze(hold_s, step_s=0.0222, seed=0):
     return Recording(name="slow", rate_hz=1.0 / step_s, readings=readings)
 
 
-@pytest.mark.parametrize("step_s", [0.0222, 0.1])
-@pytest.mark.parametrize(("step_m", "hold_s"), [(1e-4, 1.5), (1e-4, 0.8), (5e-5, 1.0)])
+@every_case("step_s", [0.0222, 0.1])
+@every_case(("step_m", "hold_s"), [(1e-4, 1.5), (1e-4, 0.8), (5e-5, 1.0)])
 def test_the_window_of_rest_is_that_of_a_step_of_the_gap(step_s, step_m, hold_s):
     recordings = [coarse(slow_squeeze(hold_s, step_s, seed=k), step_m) for k in range(5)]
     chosen = thresholds_for(recordings)

@@ -6,6 +6,7 @@ import json
 
 import numpy as np
 import pytest
+from cases import every_case
 from commands import graspsense
 from hypothesis import given
 from hypothesis import strategies as st
@@ -177,7 +178,7 @@ def test_a_store_that_is_exported_to_arff_can_be_read(weather):
         load_trials(str(weather), label="x")
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("texts", "said"),
     [
         ([f"grasp_{i:04d}.csv" for i in range(40)], "hardly repeat"),

@@ -6,6 +6,7 @@ import json
 
 import pytest
 from attrs import evolve
+from cases import every_case
 from click.testing import CliRunner
 from grippers import Scripted, bottle, squeezing
 
@@ -108,8 +109,8 @@ def test_a_grasp_of_a_pair_is_the_grasp_alone():
     assert any("beside scripted" in note for note in left.device.notes)
 
 
-@pytest.mark.parametrize("lost", ["lose_at", "silent_from"])
-@pytest.mark.parametrize("place", [0, 1])
+@every_case("lost", ["lose_at", "silent_from"])
+@every_case("place", [0, 1])
 def test_both_let_go_if_one_is_lost(lost, place):
     sound, broken = Scripted(squeezing, bottle), Scripted(squeezing, bottle, **{lost: 1300})
     both = [sound, broken] if place else [broken, sound]

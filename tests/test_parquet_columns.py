@@ -7,6 +7,7 @@ from contextlib import suppress
 
 import numpy as np
 import pytest
+from cases import every_case
 
 pyarrow = pytest.importorskip("pyarrow", reason="needs the extra parquet")
 pq = pytest.importorskip("pyarrow.parquet", reason="needs the extra parquet")
@@ -71,7 +72,7 @@ def test_the_footer_is_what_pyarrow_says(tmp_path):
     assert size.unpacked_bytes == sum(column.total_uncompressed_size for column in columns)
 
 
-@pytest.mark.parametrize("position", range(20, 400, 7))
+@every_case("position", range(20, 400, 7))
 def test_a_damaged_footer_is_told_and_never_ends_the_process(position, tmp_path):
     """pyarrow calls abort for some of these when it is asked for a column of its metadata."""
     path = tmp_path / "a.parquet"

@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 import pytest
+from cases import every_case
 from test_classifiers import NAMES, UNITS, fitted, trials
 
 from graspsense.core.values.features import Features, FeatureTable, Prediction
@@ -33,9 +34,9 @@ def test_contributions_of_a_forest_add_up_to_the_probability(features):
     assert given[-1].words.endswith(" % for can:full")
 
 
-@pytest.mark.parametrize("classes", [2, 3])
-@pytest.mark.parametrize("value", [0.0661, 0.0580])
-@pytest.mark.parametrize("name", ["boosted", "ebm"])
+@every_case("classes", [2, 3])
+@every_case("value", [0.0661, 0.0580])
+@every_case("name", ["boosted", "ebm"])
 def test_contributions_in_log_odds_add_up_to_the_odds(name, value, classes):
     table, labels = trials(missing=0.1)
     if classes == 2:

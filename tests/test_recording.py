@@ -13,6 +13,7 @@ from collections import namedtuple
 from itertools import pairwise
 
 import pytest
+from cases import every_case
 from kept import begun, command, ended, frame, pads, write_recording
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
@@ -194,7 +195,7 @@ def test_a_grasp_that_ends_without_a_word_leaves_what_was_felt(tmp_path):
     assert len(read_recorded(tmp_path / "felt.mcap.part", salvage=True)) == 10
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("spoil", "says"),
     [
         (lambda data: b"", "EndOfFile"),

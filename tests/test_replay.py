@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cases import every_case
 from commands import Done, graspsense
 from hypothesis import given
 from hypothesis import strategies as st
@@ -96,7 +97,7 @@ def test_thumb_is_left_and_the_strongest_finger_is_right(tmp_path: Path) -> None
     assert [frame.force_right_n for frame in frames] == pytest.approx([0.0, 0.9, 4.0])
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("joints", "closed_mm"),
     [
         ({"j9": 8.0}, 2.0),  # half the mean of two joints of the thumb
@@ -186,7 +187,7 @@ def damaged_files() -> list[tuple[str, bytes, str]]:
     ]
 
 
-@pytest.mark.parametrize(("name", "content", "says"), damaged_files(), ids=lambda value: str(value)[:20])
+@every_case(("name", "content", "says"), damaged_files())
 def test_damaged_file_is_told_with_its_line(tmp_path: Path, name: str, content: bytes, says: str) -> None:
     path = tmp_path / f"{name}.txt"
     path.write_bytes(content)

@@ -15,6 +15,7 @@ import kept
 import pytest
 import wayward
 from attrs import evolve
+from cases import every_case
 from commands import graspsense, printed
 from kept import keep
 
@@ -203,8 +204,8 @@ TEXTS = [
 ]
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize(("ink", "ground"), TEXTS)
+@every_case("scheme", ["light", "dark"])
+@every_case(("ink", "ground"), TEXTS)
 def test_texts_stand_out_from_their_ground(scheme, ink, ground):
     """4.5 to 1: what WCAG 2 asks of text (success criterion 1.4.3)."""
     assert contrast(colours(scheme)[ink], colours(scheme)[ground]) >= 4.5
@@ -218,7 +219,7 @@ def test_pictures_and_the_style_sheet_have_the_same_colours():
         assert light[name] in (fallback, "#" + "".join(2 * digit for digit in fallback[1:])), name
 
 
-@pytest.mark.parametrize("share", [k / 40 for k in range(1, 41)])
+@every_case("share", [k / 40 for k in range(1, 41)])
 def test_more_of_a_row_has_a_stronger_colour(share):
     true = ["a"] * 40 + ["b"]
     predicted = ["a"] * round(40 * share) + ["b"] * (41 - round(40 * share))
@@ -227,7 +228,7 @@ def test_more_of_a_row_has_a_stronger_colour(share):
     assert int(levels[0]) == math.ceil(8 * share)
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("words", "kind"),
     [("agrees", 'good">✓'), ("differs", 'bad">✗'), ("yes", 'good">✓'), ("not known", None)],
 )
@@ -237,7 +238,7 @@ def test_verdicts_have_a_mark_a_colour_and_words(words, kind):
     assert (f'<span class="{kind} {words}</span>' if kind else f"<td>{words}</td>") in text
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("rates", "axis"),
     [
         ([(0.872, (0.767, 0.976)), (0.875, (0.823, 0.927))], (75.0, 100.0)),
@@ -264,7 +265,7 @@ def test_every_count_of_a_confusion_matrix_is_in_its_table():
     assert re.findall(r'class="n">(\d+) %', text) == ["50", "100", "0"]
 
 
-@pytest.mark.parametrize(("low", "high"), [(0.0, 1.0), (-3.0, 2000.0), (1e-6, 3e-6), (57.1, 57.2)])
+@every_case(("low", "high"), [(0.0, 1.0), (-3.0, 2000.0), (1e-6, 3e-6), (57.1, 57.2)])
 def test_ticks_are_round_and_within(low, high):
     ticks = AxisScale(low, high, 0.0, 100.0).ticks()
 
@@ -404,7 +405,7 @@ def test_the_headline_of_an_evaluation_compares_with_guessing(rate, words):
     assert headline(evaluation).endswith(words)
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("difference", "words"),
     [
         (Difference(0.3, (0.2, 0.4)), "better than always"),

@@ -24,6 +24,7 @@ from graspsense.recording.layout import TICK_FIELDS
 
 pytest.importorskip("rerun")
 
+from cases import every_case
 from rerun.chunk import RrdReader
 
 PATIENCE_S = 60.0
@@ -153,9 +154,7 @@ def test_without_a_viewer_the_command_says_so_before_the_grasp(tmp_path):
         LiveFeed(RERUN, [str(tmp_path / "missing" / "grasp.rrd")])
 
 
-@pytest.mark.parametrize(
-    "target", ["", "grasp.txt", "http://127.0.0.1:9876", "rerun+http://127.0.0.1:x/proxy"]
-)
+@every_case("target", ["", "grasp.txt", "http://127.0.0.1:9876", "rerun+http://127.0.0.1:x/proxy"])
 def test_a_target_that_is_neither_a_file_nor_a_viewer_is_wrong_use(target):
     with pytest.raises(click.UsageError):
         _rerun_target(target)

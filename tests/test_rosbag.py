@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cases import every_case
 
 rosbags = pytest.importorskip("rosbags", reason="rosbags is the extra `ros`")
 
@@ -170,7 +171,7 @@ def test_the_accelerometer_of_a_bag_is_a_fast_channel_with_every_sample(ros, def
     assert signal.t_s[-1] == pytest.approx(recording.readings[-1].frame.t_s, abs=1e-6)
 
 
-@pytest.mark.parametrize("case", CASES)
+@every_case("case", CASES)
 def test_bag_is_the_grasp_that_was_written(case: str, grasp: Any, tmp_path: Path) -> None:
     path = tmp_path / ("grasp.bag" if "ros1" in case else "grasp")
     write(path, grasp, **CASES[case])  # type: ignore[arg-type]

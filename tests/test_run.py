@@ -9,6 +9,7 @@ from math import inf
 
 import pytest
 from attrs import evolve
+from cases import every_case
 from commands import graspsense
 from grippers import Scripted, bottle, squeezing
 
@@ -66,7 +67,7 @@ def test_nothing_there_is_an_outcome_with_reasons_and_exit_code_0():
     assert "no pad felt" in result["reasons"]["p_first"]
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("arguments", "code", "says"),
     [
         (["--gripper", "pr3"], 2, "Did you mean 'pr2'?"),

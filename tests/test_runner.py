@@ -10,6 +10,7 @@ from types import SimpleNamespace
 
 import pytest
 from attrs import evolve
+from cases import every_case
 from grippers import CONTACT_S, REST_S, Scripted, bottle, squeezing
 
 from graspsense.core.components.roles import Controller
@@ -86,7 +87,7 @@ def let_go(gripper):
     return values[-1] == 0.0 and -20.0 in values[-110:]
 
 
-@pytest.mark.parametrize("phase", [0, 1, 50, 200, 600, 1200, 1600])
+@every_case("phase", [0, 1, 50, 200, 600, 1200, 1600])
 def test_a_device_lost_in_any_phase_is_an_outcome_with_the_trace_to_the_last_frame(phase):
     gripper = Scripted(squeezing, bottle, lose_at=phase)
     grasp = run_grasp(gripper, HYBRID, RUN)
@@ -155,10 +156,8 @@ def fail():
     raise ZeroDivisionError("float division by zero")
 
 
-@pytest.mark.parametrize(
-    ("act", "reason"), [(interrupt, "interrupted"), (fail, "ZeroDivisionError: float div")]
-)
-@pytest.mark.parametrize("after", [1, 900, 1100])
+@every_case(("act", "reason"), [(interrupt, "interrupted"), (fail, "ZeroDivisionError: float div")])
+@every_case("after", [1, 900, 1100])
 def test_whatever_stops_the_loop_the_fingers_are_opened(act, reason, after):
     gripper = Scripted(squeezing, bottle)
     grasp = run_grasp(gripper, controller_that(act, after), RUN)
@@ -271,7 +270,7 @@ def recorded(length):
     return Recorded(squeezing, bottle)
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("length", "outcome"),
     [
         (0, Outcome.NOTHING_THERE),

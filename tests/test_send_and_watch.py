@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from attrs import evolve
+from cases import every_case
 from parts import HandConfig
 
 from graspsense import WiringError, load_pipeline
@@ -79,7 +80,7 @@ def grasped(names=PADLESS, thing="a soft object", run=RUN, **keys):
     return body, run_grasp(body, SendAndWatchController(SendAndWatchConfig(**keys)), run)
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("names", "thing", "sends"),
     [
         (PADLESS, "a soft object", "position"),
@@ -119,8 +120,8 @@ def held_n(trace):
 HYBRIDS = [{"sends": "position"}, {"sends": "position", "loop": "closed"}]
 
 
-@pytest.mark.parametrize("keys", HYBRIDS)
-@pytest.mark.parametrize("thing", ["a soft object", "a hard object"])
+@every_case("keys", HYBRIDS)
+@every_case("thing", ["a soft object", "a hard object"])
 def test_hybrid_approaches_gently_and_raises_the_force_in_steps(thing, keys):
     body = Body(WITH_PADS, thing)
     grasp = run_grasp(body, HybridController(HybridConfig(**keys)), RUN)

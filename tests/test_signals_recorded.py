@@ -10,6 +10,7 @@ from math import inf, isnan
 import numpy as np
 import pytest
 from attrs import frozen
+from cases import every_case
 from click.testing import CliRunner
 from kept import begun
 
@@ -362,7 +363,7 @@ def test_the_images_of_every_array_are_counted(recorded, tmp_path):
     assert json.loads(done.stdout)["images"] == len(trial.trace.signals["palm"].t_s) > 20
 
 
-@pytest.mark.parametrize("cells", [0, 1, 5, 22, 300])
+@every_case("cells", [0, 1, 5, 22, 300])
 def test_fingertips_of_any_size_are_recorded_and_read(tmp_path, cells):
     recorder = Recorder(tmp_path / "g.mcap")
     recorder.metadata(START, begun().section(START))

@@ -7,6 +7,7 @@ from importlib import import_module
 
 import numpy as np
 import pytest
+from cases import every_case
 
 from graspsense.core.components.registry import installed
 from graspsense.core.learn.labelled import Labelled
@@ -92,7 +93,7 @@ def test_a_tree_that_leads_out_of_its_arrays_is_refused(tmp_path):
         load_model(str(tmp_path / "m.json"), installed())
 
 
-@pytest.mark.parametrize(
+@every_case(
     "text",
     [
         "",

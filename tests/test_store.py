@@ -9,6 +9,7 @@ import threading
 from contextlib import suppress
 
 import pytest
+from cases import every_case
 from kept import ended, keep, write_recording
 
 from graspsense.core.values.errors import ConfigError, DataDamaged
@@ -349,7 +350,7 @@ def test_a_word_says_class_state_and_thing(word, labels):
     assert labels_of(word) == labels
 
 
-@pytest.mark.parametrize("word", ["", "a b", "can:", "can:full:open", "unknown", "unknown:x", "#2"])
+@every_case("word", ["", "a b", "can:", "can:full:open", "unknown", "unknown:x", "#2"])
 def test_a_word_that_is_no_label_is_refused(word):
     with pytest.raises(ConfigError, match="is not a label"):
         labels_of(word)

@@ -8,6 +8,7 @@ import math
 
 import numpy as np
 import pytest
+from cases import every_case
 from commands import graspsense
 from kept import keep
 
@@ -319,7 +320,7 @@ def test_simulated_trials_have_no_numbers():
     assert "has no numbers to predict: they are in a CSV file or in a store" in err
 
 
-@pytest.mark.parametrize("text", ["fill", "=3", "fill [ml]=", "fill=much", "label=3", "fill=inf"])
+@every_case("text", ["fill", "=3", "fill [ml]=", "fill=much", "label=3", "fill=inf"])
 def test_a_number_of_a_trial_is_name_and_number(text):
     with pytest.raises(ConfigError, match="is not a number of a trial"):
         value_label(text)

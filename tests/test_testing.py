@@ -6,6 +6,7 @@ import mutants
 import parts
 import pytest
 from attrs import evolve
+from cases import every_case
 
 from graspsense.core.components.registry import Component, IsolatedPlugins
 from graspsense.plugin_api import Feature, hookimpl
@@ -93,13 +94,13 @@ def test_a_read_that_other_work_held_up_once_is_within_its_timeout():
     assert outcome_of(check, hand, {}).state == "passed"
 
 
-@pytest.mark.parametrize("role", ROLES)
+@every_case("role", ROLES)
 def test_every_check_has_a_mutant(role):
     caught = {mutant.check for mutant in mutants.MUTANTS if mutant.role in (role, "feature-set")}
     assert {check.id for check in CHECKS[role]} - caught == set()
 
 
-@pytest.mark.parametrize("role", CHECKS)
+@every_case("role", CHECKS)
 def test_most_checks_of_a_role_must_run_and_each_says_what_it_demands(role):
     assert len(CHECKS[role]) / 3 < MINIMUM_CHECKS[role] <= len(CHECKS[role])
     for check in CHECKS[role]:

@@ -5,6 +5,7 @@ import json
 
 import numpy as np
 import pytest
+from cases import every_case
 from commands import printed
 
 from graspsense.core.learn.labelled import Labelled
@@ -79,7 +80,7 @@ VARIANTS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("lines", VARIANTS.values(), ids=VARIANTS.keys())
+@every_case("lines", VARIANTS.values())
 def test_a_recording_is_read_as_instruments_write_it(lines, tmp_path):
     path = tmp_path / "jar.csv"
     path.write_text("\n".join(lines) + "\n")
@@ -122,7 +123,7 @@ def test_a_compressed_text_has_the_limits_of_a_text(tmp_path, monkeypatch):
         read(path)
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("lines", "end", "left", "note"),
     [
         (spoiled(150, "1.500,48.5,NaN,NaN"), "\n", 199, r"1 sample without a number \(line 152\)"),
@@ -220,7 +221,7 @@ def trials(folder, lines, **given):
     return read_labelled(path, "what", **given)
 
 
-@pytest.mark.parametrize(
+@every_case(
     "lines",
     [
         ["what,p,q", *TRIALS],

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import pytest
+from cases import every_case
 from kept import frame, keep
 
 from graspsense.store.dataset import labelled_store
@@ -32,7 +32,7 @@ def test_a_manifest_may_number_its_trials_instead():
     assert order_recorded([MADE] * 2, ["import"] * 2, stated) == ((1, 0), "")
 
 
-@pytest.mark.parametrize("text", ["not JSON", '{"recorded_at": "yesterday"}', '{"recorded_at": 5}', "[]"])
+@every_case("text", ["not JSON", '{"recorded_at": "yesterday"}', '{"recorded_at": 5}', "[]"])
 def test_a_time_that_cannot_be_read_is_none(text):
     assert order_recorded([MADE], ["import"], [text])[0] is None
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cases import every_case
 
 from graspsense.core.values.errors import DataDamaged
 from graspsense.recording.labelled_recording import LabelledRecording, UnreadableRecording
@@ -47,8 +48,8 @@ CLOCKS = {
 }
 
 
-@pytest.mark.parametrize("clock", CLOCKS)
-@pytest.mark.parametrize("swapped", [False, True])
+@every_case("clock", CLOCKS)
+@every_case("swapped", [False, True])
 def test_headers_of_another_clock_are_not_used(clock: str, swapped: bool) -> None:
     topics = {"/hand": HEALTHY, "/tip": messages(T_S, CLOCKS[clock])}
     common = common_clock("bag", dict(reversed(topics.items())) if swapped else topics)

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from cases import every_case
 
 from graspsense.evaluation.equivalence import verdict_on
 from graspsense.experiments.executors.serial import Serial
@@ -93,7 +94,7 @@ def test_a_single_seed_recommends_nothing():
     assert advice.cells[2] == "cannot be told"
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("interval", "says"),
     [
         ((-0.01, 0.015), "agrees"),

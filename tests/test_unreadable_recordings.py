@@ -12,6 +12,7 @@ import zipfile
 import numpy as np
 import pytest
 from attrs import evolve
+from cases import every_case
 from commands import graspsense
 from kept import ended, frame, keep, write_recording
 
@@ -212,7 +213,7 @@ CRAFTED = {
 }
 
 
-@pytest.mark.parametrize("kind", CRAFTED)
+@every_case("kind", CRAFTED)
 def test_impossible_contents_are_damage_of_this_recording(tmp_path, kind):
     path = tmp_path / "g.mcap"
     crafted(path, **CRAFTED[kind])
@@ -220,7 +221,7 @@ def test_impossible_contents_are_damage_of_this_recording(tmp_path, kind):
         read_recorded(path).record()
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("name", "array"),
     [
         ("gap_m", np.zeros((30, 2))),

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from cases import every_case
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -14,7 +15,7 @@ def numbers(*cells, **others):
     return columns_of_numbers({"x": cells, **others})["x"]
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("cells", "values"),
     [
         (["0", "1.5", "1.500"], [0, 1.5, 1.5]),
@@ -34,7 +35,7 @@ def test_a_column_has_one_notation(cells, values):
     assert numbers(*cells).tolist() == pytest.approx(values, nan_ok=True)
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("cells", "row"),
     [
         (["1.5", "0.25", "3,5"], 2),

@@ -10,6 +10,7 @@ from textwrap import dedent
 
 import numpy as np
 import pytest
+from cases import every_case
 from click.testing import CliRunner
 from unverified import sample, unverified_setup
 
@@ -118,7 +119,7 @@ def test_a_parameter_with_a_spread_varies_between_instances_and_alone():
     assert sample(spec, 8, 3).terms == one.terms != sample(spec, None).terms
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("terms", "says"),
     [
         ('type = "fracture"', "give force_n or compression_m"),
