@@ -11,6 +11,7 @@ from importlib import import_module
 
 import click
 import pytest
+from cases import every_case
 from commands import graspsense
 
 from graspsense import __version__
@@ -82,7 +83,7 @@ def test_version_is_that_of_the_distribution():
         assert tomllib.load(file)["project"]["version"] == __version__
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("arguments", "said"),
     [
         (
@@ -460,7 +461,7 @@ class TestCompletion:
         assert ran.returncode == 0
         assert f"_GRASPSENSE_COMPLETE={shell}_complete" in ran.stdout
 
-    @pytest.mark.parametrize(
+    @every_case(
         ("words", "offered"),
         [
             ("graspsense ", list(COMMANDS)),

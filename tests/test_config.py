@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from attrs import asdict, evolve
+from cases import every_case
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -381,7 +382,7 @@ def test_a_validator_that_looks_at_other_keys_keeps_its_words(plugins, write):
     )
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("option", "said"),
     [
         ("gripper.retries=3.0", "expected a whole number, found 3.0 (a number)"),
@@ -414,7 +415,7 @@ def test_nothing_is_coerced(plugins, write, option, said):
     assert complaint(write(BASE), options=[option]) == f"-o {option}: {said}"
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("typed", "value"),
     [
         ("usb", "usb"),
@@ -478,7 +479,7 @@ class TestFiles:
             "lab.toml:2: not UTF-8 text (byte 0xff): TOML files are UTF-8; is this the right file?"
         )
 
-    @pytest.mark.parametrize(
+    @every_case(
         ("text", "said"),
         [
             (

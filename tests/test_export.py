@@ -8,6 +8,7 @@ import tomllib
 import numpy as np
 import pytest
 from attrs import evolve
+from cases import every_case
 from commands import graspsense, printed
 from kept import ended, frame, keep, pads, write_recording
 from scipy.io import arff
@@ -134,9 +135,7 @@ def test_nothing_is_ever_overwritten(folder, tmp_path):
     assert "already exists" in err
 
 
-@pytest.mark.parametrize(
-    ("source", "target"), [("", "t.xlsx"), ("", "t.mcap"), ("#1", "t.arff"), ("#9", "t.csv")]
-)
+@every_case(("source", "target"), [("", "t.xlsx"), ("", "t.mcap"), ("#1", "t.arff"), ("#9", "t.csv")])
 def test_what_cannot_be_written_is_told(folder, tmp_path, source, target):
     code, err = export(f"{folder}{source}", tmp_path / target)
     assert code == 2

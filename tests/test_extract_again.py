@@ -6,6 +6,7 @@ import json
 import re
 
 import pytest
+from cases import every_case
 from commands import graspsense
 from kept import frame, keep
 
@@ -63,7 +64,7 @@ def test_the_settings_of_an_experiment_are_used_for_a_store(folder):
     assert left.table.columns(["p_first"]).values[0, 0] == gap_at(0.5)
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("option", "says"),
     [
         (

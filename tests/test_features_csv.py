@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from cases import every_case
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -38,9 +39,9 @@ def test_names_units_labels_and_the_width(csv):
     assert trials.no_instances == "no column names the instance (instance=COLUMN)"
 
 
-@pytest.mark.parametrize("separator", [",", ";", "\t"])
-@pytest.mark.parametrize("prefix", ["", "\ufeff"])
-@pytest.mark.parametrize("ending", ["\n", "\r\n"])
+@every_case("separator", [",", ";", "\t"])
+@every_case("prefix", ["", "\ufeff"])
+@every_case("ending", ["\n", "\r\n"])
 def test_separators_byte_order_marks_and_line_ends(csv, separator, prefix, ending):
     text = prefix + GOOD.replace(",", separator).replace("\n", ending)
 
@@ -50,7 +51,7 @@ def test_separators_byte_order_marks_and_line_ends(csv, separator, prefix, endin
     )
 
 
-@pytest.mark.parametrize("gap", ["", "nan", "NaN", "NA", "?", "null", " "])
+@every_case("gap", ["", "nan", "NaN", "NA", "?", "null", " "])
 def test_what_counts_as_missing(csv, gap):
     trials = read_labelled(csv(GOOD.replace("a,0.05,6", f"a,{gap},6", 1)), "what")
 
@@ -58,7 +59,7 @@ def test_what_counts_as_missing(csv, gap):
     assert any(note.endswith("of all values are missing") for note in trials.notes)
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("content", "error", "said"),
     [
         ("", DataDamaged, "is empty: it needs a header line"),

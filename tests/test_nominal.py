@@ -154,7 +154,7 @@ def test_arff_is_read_as_it_is_written(tmp_path):
     assert "class=b" in read_labelled(path, "level").table.names
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("old", "new", "line"),
     [
         ("sunny,85,85,FALSE,no", "snowy,85,85,FALSE,no", "line 11.*snowy"),

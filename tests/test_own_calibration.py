@@ -6,6 +6,7 @@ import sys
 
 import pytest
 from attrs import evolve, frozen
+from cases import every_case
 from commands import graspsense
 from parts import CHANNELS_OF_HAND, Hand, HandConfig, channels
 
@@ -109,7 +110,7 @@ def test_the_gain_of_each_cell_is_fitted_stored_and_used(calibrate, tmp_path):
     assert cells_force(pressed, zero, left, 7) == pytest.approx(6.0)
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("text", "said"),
     [
         (gains_text(cells=21), "21"),

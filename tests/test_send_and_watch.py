@@ -263,7 +263,7 @@ LAWS = [
 ]
 
 
-@pytest.mark.parametrize(("law", "sends"), LAWS)
+@every_case(("law", "sends"), LAWS)
 def test_what_every_law_becomes_is_told(pipeline, law, sends):
     loaded = pipeline(f"controller.type={law}", f"controller.sends={sends}")
     assert any(f"as a {sends}, the controller sends" in note for note in loaded.grasp().device.notes)

@@ -292,7 +292,7 @@ def test_an_export_and_a_csv_of_other_programs_give_the_same(folder, tmp_path):
     assert ["fill", "ml"] not in other["features"]
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("arguments", "says"),
     [
         (("--target-value", "fil"), "There are: fill. Did you mean 'fill'"),

@@ -10,6 +10,7 @@ import sys
 
 import pytest
 from attrs import evolve
+from cases import every_case
 from commands import graspsense
 from kept import BENCH, keep
 
@@ -128,7 +129,6 @@ def test_trials_that_are_set_aside_are_not_used_until_they_are_brought_back(stor
         (("aside", "#1", "--why", " "), "--why is empty"),
         (("aside", "1", "--why", "x"), "write DIR#NUMBER"),
     ],
-    ids=str,
 )
 def test_a_change_that_is_wrong_for_one_trial_changes_none(store, command, says):
     keep(store, "toy", device=REAL)
@@ -297,7 +297,7 @@ def test_a_number_is_changed_given_and_restored(store):
     assert [change.action for change in changes.history(store)] == ["value"] * 4
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("given", "says"),
     [
         (

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from attrs import evolve, fields
+from cases import every_case
 from commands import graspsense
 from hypothesis import given
 from hypothesis import strategies as st
@@ -47,7 +48,7 @@ def run(monkeypatch, tmp_path):
     return graspsense
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("typed", "meant"),
     [
         ("run -o probing_force_n=17", "'controller.probing_force_n'"),
@@ -176,7 +177,7 @@ def test_an_error_in_python_names_arguments_and_not_options_of_commands(tmp_path
     assert "--" not in str(refused.value)
 
 
-@pytest.mark.parametrize(
+@every_case(
     "options",
     [
         ["nonsense"],

@@ -159,7 +159,7 @@ def test_every_shipped_scene_is_grasped_and_stays_steady(name):
     assert 10.0 < done.state.peak_n < 40.0
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("text", "says"),
     [
         ("width_m = 0.2", r"bottle.toml: width_m: 0.2 m wide .* fingers open to 0.086 m"),

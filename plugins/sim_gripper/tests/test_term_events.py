@@ -244,8 +244,8 @@ def stuff(tmp_path, monkeypatch):
     return scene
 
 
-@pytest.mark.parametrize("pads_n_m", [3e4, math.inf])
-@pytest.mark.parametrize(("law", "value"), [(not_a_number, "nan"), (infinite, "inf")])
+@every_case("pads_n_m", [3e4, math.inf])
+@every_case(("law", "value"), [(not_a_number, "nan"), (infinite, "inf")])
 def test_a_force_that_is_not_finite_ends_the_grasp_with_the_name_of_the_term(stuff, law, value, pads_n_m):
     config = SimConfig(spread=False, sensor="ideal", pad_stiffness_n_m=pads_n_m)
     done = run_many(config, create("controller", "hybrid"), [stuff(law)], [0], compiled=False)[0]
