@@ -424,7 +424,7 @@ def test_a_report_that_fails_costs_nothing_else():
     ],
 )
 def test_a_gripper_that_cannot_be_opened_is_named(opened, says, monkeypatch):
-    monkeypatch.setattr(Unready, "opened", staticmethod(opened))
+    monkeypatch.setattr(Unready, "answer", staticmethod(opened))
     with pytest.raises((OSError, TypeError)) as raised:
         run_grasp(Unready(squeezing, bottle), HYBRID, RUN)
     *_, text = str(raised.value), *getattr(raised.value, "__notes__", [])
@@ -432,10 +432,10 @@ def test_a_gripper_that_cannot_be_opened_is_named(opened, says, monkeypatch):
 
 
 class Unready(Scripted):
-    opened = None
+    answer = None
 
     def open(self, seed):
-        return self.opened()
+        return self.answer()
 
 
 def test_no_garbage_is_collected_within_a_grasp_and_again_after_it():
