@@ -1,4 +1,4 @@
-"""What holds for all tests here: none judges how fast this machine is, byte code is kept, and algebra has one thread."""
+"""What holds for all tests here: none judges how fast this machine is, byte code stays, algebra has one thread."""
 
 import os
 import sys
@@ -16,6 +16,6 @@ settings.load_profile("any-machine")
 sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
-# Before numpy is imported: the arrays of tests are small, and idle threads of the algebra spin on the cores of other workers.
+# Before numpy is imported: the arrays of tests are small, and idle threads of the algebra spin on cores of others.
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(name, "1")

@@ -199,13 +199,13 @@ def interrupting(monkeypatch, after):
     return begun
 
 
-@pytest.fixture
-def recordings(tmp_path):
-    """Return the folder of a store with three trials, and CSV files of the same grasps."""
-    store = tmp_path / "t"
+@pytest.fixture(scope="module")
+def recordings(tmp_path_factory):
+    """Return the folder of a store with three trials, with CSV files of the same grasps beside it."""
+    store = tmp_path_factory.mktemp("recordings") / "t"
     for seed in ("1", "2", "3"):
         printed("run", "--label", "block", "--seed", seed, "-o", "classifier.type=none", "--save", store)
-        printed("export", f"{store}#{seed}", "--to", tmp_path / f"{seed}.csv")
+        printed("export", f"{store}#{seed}", "--to", store.parent / f"{seed}.csv")
     return store
 
 
@@ -213,7 +213,7 @@ def recordings(tmp_path):
 def test_ctrl_c_in_an_import_stores_no_aborted_grasp_and_is_told(recordings, tmp_path, monkeypatch, after):
     """Each recording is tried before it is imported: the second one is opened for the third and fourth time."""
     begun = interrupting(monkeypatch, after=after)
-    files = [str(tmp_path / f"{k}.csv") for k in (1, 2)]
+    files = [str(recordings.parent / f"{k}.csv") for k in (1, 2)]
     importing = [graspsense("import", file, "--label", "block", "--save", tmp_path / "i") for file in files]
     assert [done.returncode for done in importing] == [0, 130]
     assert len(begun) == after
