@@ -1,4 +1,4 @@
-"""What holds for all tests here: none of them judges how fast this machine is, and byte code is kept."""
+"""What holds for all tests here: none judges how fast this machine is, byte code stays, algebra has one thread."""
 
 import os
 import sys
@@ -15,3 +15,7 @@ settings.load_profile("any-machine")
 # pytest would rewrite every file of tests in each worker of each run.
 sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+
+# Before numpy is imported: the arrays of tests are small, and idle threads of the algebra spin on cores of others.
+for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+    os.environ.setdefault(name, "1")

@@ -55,7 +55,7 @@ class Site:
             patch.setenv("XDG_CONFIG_HOME", str(self.folder / "no config"))
             for name, value in environ.items():
                 patch.setenv(name, value)
-            patch.setattr(sys, "path", [one for one in sys.path if "site-packages" not in one])
+            patch.setattr(sys, "path", [entry for entry in sys.path if "site-packages" not in entry])
             return Plugins.discover()
 
 

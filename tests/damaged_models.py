@@ -36,8 +36,8 @@ def sealed(content: object) -> bytes:
     """The content as a file with the hash that fits; NaN and infinity as Python's JSON writes them."""
     if not isinstance(content, dict):
         return json.dumps(content).encode()
-    rest = {key: value for key, value in content.items() if key != "sha256"}
-    return json.dumps({**rest, "sha256": digest(rest)}).encode()
+    fields = {key: value for key, value in content.items() if key != "sha256"}
+    return json.dumps({**fields, "sha256": digest(fields)}).encode()
 
 
 def answered(path: Path) -> None:
@@ -69,8 +69,8 @@ def read_all(path: Path, seed: int, places: int, damages: int) -> int:
     answered(path)  # imports what this model needs
     resource.setrlimit(resource.RLIMIT_AS, (used_memory() + MEMORY, resource.RLIM_INFINITY))
     rng = random.Random(seed)
-    found = list(paths({key: value for key, value in good.items() if key != "sha256"}))
-    chosen = rng.sample(found, min(places, len(found))) if places else found
+    keys_of_good = list(paths({key: value for key, value in good.items() if key != "sha256"}))
+    chosen = rng.sample(keys_of_good, min(places, len(keys_of_good))) if places else keys_of_good
     count = 0
     for place in chosen:
         others = list(damaged_at(good, place))

@@ -149,19 +149,19 @@ class Fault:
         sys.addaudithook(self.event)
 
     def counted_write(self, fd, data):
-        self.at(os.readlink(f"/proc/self/fd/{fd}"))
+        self.count(os.readlink(f"/proc/self/fd/{fd}"))
         return self.write(fd, data)
 
     def counted_fsync(self, fd):
-        self.at(os.readlink(f"/proc/self/fd/{fd}"))
+        self.count(os.readlink(f"/proc/self/fd/{fd}"))
         return self.fsync(fd)
 
     def event(self, name, arguments):
         writes = name == "open" and (arguments[2] or 0) & (os.O_WRONLY | os.O_RDWR | os.O_CREAT)
         if writes or name in CHANGES:
-            self.at(arguments[0])
+            self.count(arguments[0])
 
-    def at(self, path):
+    def count(self, path):
         if str(path).startswith(self.folder):
             self.writes += 1
             if self.writes == self.fail_at:

@@ -325,8 +325,8 @@ def main() -> None:
     with open("/proc/self/statm") as file:
         own = int(file.read().split()[0]) * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_AS, (own + MEMORY_BYTES, own + MEMORY_BYTES))
-    found = {"read": number * len(FORMATS), "bad": list(bad_answers(seed, number))}
-    sys.stdout.write(json.dumps(found))
+    answers = {"read": number * len(FORMATS), "bad": list(bad_answers(seed, number))}
+    sys.stdout.write(json.dumps(answers))
 
 
 if __name__ == "__main__":

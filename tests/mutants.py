@@ -1077,7 +1077,7 @@ class Dicing(Nearest):
 @mutant("classifier", "survives-json", "keep every number in full")
 class Rounded(Nearest):
     def to_json(self):
-        return {**self._model, "mean": [round(one, 2) for one in self._model["mean"]]}
+        return {**self._model, "mean": [round(mean, 2) for mean in self._model["mean"]]}
 
 
 @mutant("classifier", "survives-json", "what JSON cannot hold")
@@ -1096,9 +1096,9 @@ class Relative(Nearest):
 @mutant("classifier", "handles-missing-values", "fill or skip them")
 class Strict(Nearest):
     def probabilities(self, table):
-        found = super().probabilities(table)
-        found[np.isnan(table.values).any(axis=1)] = nan
-        return found
+        shares = super().probabilities(table)
+        shares[np.isnan(table.values).any(axis=1)] = nan
+        return shares
 
 
 @mutant("classifier", "one-label-is-refused-or-certain", "raise ValueError, or learn it")

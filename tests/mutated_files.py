@@ -65,24 +65,24 @@ _TOKEN = re.compile(r"[A-Za-z_]+|-?\d+\.?\d*(?:e-?\d+)?|\s+|.", re.DOTALL)
 def bytes_of(data: bytes, rng: random.Random) -> bytes:
     """Return the bytes cut short, with some changed, a piece missing, twice there, or zeroed."""
     changed = bytearray(data)
-    at = rng.randrange(max(len(changed), 1))
-    length = min(rng.choice([1, 4, 64, 4096]), len(changed) - at)
+    position = rng.randrange(max(len(changed), 1))
+    length = min(rng.choice([1, 4, 64, 4096]), len(changed) - position)
     match rng.randrange(6):
         case 0:
-            del changed[at:]
+            del changed[position:]
         case 1:
             for _ in range(rng.choice([1, 1, 4, 40])):
                 if changed:
                     changed[rng.randrange(len(changed))] = rng.randrange(256)
         case 2:
-            del changed[at : at + length]
+            del changed[position : position + length]
         case 3:
-            changed[at:at] = changed[at : at + length]
+            changed[position:position] = changed[position : position + length]
         case 4:
-            changed[at : at + length] = bytes(length)
+            changed[position : position + length] = bytes(length)
         case _:
             if changed:
-                changed[at] ^= 1 << rng.randrange(8)
+                changed[position] ^= 1 << rng.randrange(8)
     return bytes(changed)
 
 
@@ -91,13 +91,13 @@ def numbers_of(data: bytes, rng: random.Random) -> bytes:
     changed = bytearray(data)
     if len(changed) < 8:
         return bytes_of(data, rng)
-    at = rng.randrange(len(changed) - 7)
+    position = rng.randrange(len(changed) - 7)
     if rng.random() < 0.4:
-        changed[at : at + 8] = struct.pack("<d", rng.choice(HOSTILE_FLOATS))
+        changed[position : position + 8] = struct.pack("<d", rng.choice(HOSTILE_FLOATS))
     else:
         width = rng.choice((1, 2, 4, 8))
         number = rng.choice(HOSTILE_NUMBERS) & ((1 << 8 * width) - 1)
-        changed[at : at + width] = number.to_bytes(width, "little")
+        changed[position : position + width] = number.to_bytes(width, "little")
     return bytes(changed)
 
 
@@ -186,11 +186,11 @@ _MAGIC = b"\x89MCAP0\r\n"
 
 
 def _records(data: bytes) -> list[tuple[int, bytes]]:
-    records, at = [], 0
-    while at + 9 <= len(data):
-        opcode, length = struct.unpack_from("<BQ", data, at)
-        records.append((opcode, data[at + 9 : at + 9 + length]))
-        at += 9 + length
+    records, offset = [], 0
+    while offset + 9 <= len(data):
+        opcode, length = struct.unpack_from("<BQ", data, offset)
+        records.append((opcode, data[offset + 9 : offset + 9 + length]))
+        offset += 9 + length
     return records
 
 
@@ -257,13 +257,13 @@ def _mutated_records(records: list[tuple[int, bytes]], rng: random.Random) -> li
 
 def _metadata(body: bytes, rng: random.Random) -> bytes:
     """Return a record of metadata one of whose texts has other tokens, or is JSON with another value."""
-    texts, at = [], 0
-    (length,) = struct.unpack_from("<I", body, at)
-    name, at = body[4 : 4 + length], 4 + length + 4
-    while at < len(body):
-        (length,) = struct.unpack_from("<I", body, at)
-        texts.append(body[at + 4 : at + 4 + length].decode())
-        at += 4 + length
+    texts, offset = [], 0
+    (length,) = struct.unpack_from("<I", body, offset)
+    name, offset = body[4 : 4 + length], 4 + length + 4
+    while offset < len(body):
+        (length,) = struct.unpack_from("<I", body, offset)
+        texts.append(body[offset + 4 : offset + 4 + length].decode())
+        offset += 4 + length
     i = rng.randrange(1, len(texts), 2) if len(texts) > 1 else 0
     texts[i] = json_text(texts[i], rng) if rng.random() < 0.6 else tokens_of(texts[i], rng)
     encoded = [text.encode("utf-8", "replace") for text in texts]
@@ -393,17 +393,17 @@ def mat_file(path: Path, rng: random.Random) -> None:
 
     data = path.read_bytes()
     if rng.random() < 0.5:
-        head, out, at = data[:128], b"", 128
-        while at + 8 <= len(data):
-            kind, size = struct.unpack_from("<II", data, at)
-            body = data[at + 8 : at + 8 + size]
+        head, out, offset = data[:128], b"", 128
+        while offset + 8 <= len(data):
+            kind, size = struct.unpack_from("<II", data, offset)
+            body = data[offset + 8 : offset + 8 + size]
             if kind == 15 and rng.random() < 0.5:
                 with suppress(zlib.error):
                     body = zlib.compress(_either(zlib.decompress(body), rng))
             elif rng.random() < 0.3:
                 body = _either(body, rng)
             out += struct.pack("<II", kind, len(body)) + body
-            at += 8 + size
+            offset += 8 + size
         path.write_bytes(head + out)
         return
     variables = {
@@ -430,7 +430,7 @@ def bag_file(path: Path, rng: random.Random) -> None:
 
 def ros2_folder(path: Path, rng: random.Random) -> None:
     """Change the description of a ROS 2 bag, or its file."""
-    (file,) = (one for one in path.iterdir() if one.suffix in (".db3", ".mcap"))
+    (file,) = (part for part in path.iterdir() if part.suffix in (".db3", ".mcap"))
     if rng.random() < 0.3:
         text_file(path / "metadata.yaml", rng)
     elif file.suffix == ".db3":

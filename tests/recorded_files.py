@@ -127,10 +127,12 @@ def ros_mcap(path: Path) -> None:
             schema = writer.register_schema(kind, "ros2msg", definition.encode())
             channels.append(writer.register_channel(topic, "cdr", schema))
         for t_s, gap, force in zip(T_S, GAP_M, FORCE_N, strict=True):
-            at = 10**18 + round(t_s * 1e9)
+            stamp_ns = 10**18 + round(t_s * 1e9)
             forces = store.types[several](layout, np.array([force, force]))
-            writer.add_message(channels[0], at, bytes(store.serialize_cdr(store.types[name](gap), name)), at)
-            writer.add_message(channels[1], at, bytes(store.serialize_cdr(forces, several)), at)
+            writer.add_message(
+                channels[0], stamp_ns, bytes(store.serialize_cdr(store.types[name](gap), name)), stamp_ns
+            )
+            writer.add_message(channels[1], stamp_ns, bytes(store.serialize_cdr(forces, several)), stamp_ns)
         writer.finish()
 
 
@@ -145,10 +147,10 @@ def _write_hand(writer: object, ros1: bool) -> None:
         width = writer.add_connection("/hand/width", name, typestore=store)  # type: ignore[attr-defined]
         forces = writer.add_connection("/hand/forces", several, typestore=store)  # type: ignore[attr-defined]
         for t_s, gap, force in zip(T_S, GAP_M, FORCE_N, strict=True):
-            at = 10**18 + round(t_s * 1e9)
-            writer.write(width, at, encode(store.types[name](gap), name))  # type: ignore[attr-defined]
+            stamp_ns = 10**18 + round(t_s * 1e9)
+            writer.write(width, stamp_ns, encode(store.types[name](gap), name))  # type: ignore[attr-defined]
             message = store.types[several](layout, np.array([force, force]))
-            writer.write(forces, at, encode(message, several))  # type: ignore[attr-defined]
+            writer.write(forces, stamp_ns, encode(message, several))  # type: ignore[attr-defined]
 
 
 def pr2_bag(path: Path) -> None:
@@ -167,12 +169,14 @@ def pr2_bag(path: Path) -> None:
         state = writer.add_connection("/r_gripper_controller/state", states, typestore=store)
         image = writer.add_connection("/pressure/r_gripper_motor", images, typestore=store)
         for k, (t_s, gap, force) in enumerate(zip(T_S, GAP_M, FORCE_N, strict=True)):
-            at = 10**18 + round(t_s * 1e9)
-            stamp = header(k, time(at // 10**9, at % 10**9), "")
+            stamp_ns = 10**18 + round(t_s * 1e9)
+            stamp = header(k, time(stamp_ns // 10**9, stamp_ns % 10**9), "")
             cells = np.full(22, 3000 + round(100 * force) + k, dtype=np.int16)
             moved = store.types[states](stamp, 0.0, gap, 0.0, 0.0, 0.01, -1.0, 0.0, 0.0, 0.0, 0.0)
-            writer.write(state, at, store.serialize_ros1(moved, states))
-            writer.write(image, at, store.serialize_ros1(store.types[images](stamp, cells, cells), images))
+            writer.write(state, stamp_ns, store.serialize_ros1(moved, states))
+            writer.write(
+                image, stamp_ns, store.serialize_ros1(store.types[images](stamp, cells, cells), images)
+            )
 
 
 def store(folder: Path) -> None:

@@ -18,6 +18,6 @@ def statements(node: ast.AST) -> Iterator[ast.AST]:
     for part in ("body", "handlers", "cases", "orelse", "finalbody"):
         inner = getattr(node, part, ())
         # In a lambda and in `a if b else c`, which are expressions, they are no lists.
-        for one in inner if isinstance(inner, list) else ():
-            yield one
-            yield from statements(one)
+        for child in inner if isinstance(inner, list) else ():
+            yield child
+            yield from statements(child)

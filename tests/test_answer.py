@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
-import pytest
+from cases import every_case
 
 from graspsense.experiments.answer import answer, headline
 from graspsense.experiments.summary import ConditionResult
@@ -14,7 +14,7 @@ from graspsense.experiments.task_results import ClassifierResult
 def condition(name, *rates, n=100, simulated=True):
     """Return a case with these rates of its seeds."""
 
-    def of(rate):
+    def rated(rate):
         predicted = ["can:full"] * round(rate * n) + ["can:empty"] * (n - round(rate * n))
         return ClassifierResult.from_answers("c45", "both", "stratified_10_fold", ["can:full"] * n, predicted)
 
@@ -22,12 +22,12 @@ def condition(name, *rates, n=100, simulated=True):
         case=SimpleNamespace(name=name, part="", learners=(), levels={"force": name}),
         classifier="c45",
         target="both",
-        by_seed={seed: of(rate) for seed, rate in enumerate(rates)},
+        by_seed={seed: rated(rate) for seed, rate in enumerate(rates)},
         simulated=simulated,
     )
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("weak", "strong", "told", "above"),
     [
         ((0.50, 0.52, 0.51), (0.90, 0.91, 0.92), "20 N is better than 17 N", "highest rate"),
@@ -57,7 +57,7 @@ def test_equal_rates_of_few_grasps_are_not_said_to_agree():
     assert "cannot be told" not in told(0.5, 0.6, 0.7, n=2000)
 
 
-@pytest.mark.parametrize("rates", [(0.8, 1.0), (1.0, 0.8), (0.5,), (1.0, 1.0, 0.0)])
+@every_case("rates", [(0.8, 1.0), (1.0, 0.8), (0.5,), (1.0, 1.0, 0.0)])
 def test_the_interval_of_recorded_trials_in_several_folds_is_around_their_mean(rates):
     rate = condition("17 N", *rates, n=20, simulated=False).rate
     low, high = rate.interval

@@ -7,6 +7,7 @@ import sys
 import h5py
 import numpy as np
 import pytest
+from cases import every_case
 from commands import printed
 from scipy.io import savemat
 
@@ -27,8 +28,11 @@ def recordings(folder, text):
     return list(read_recordings(str(folder / "m.toml")))
 
 
-def peaks(found):
-    return [max(reading.frame.force_left_n for reading in one.recording.readings) for one in found]
+def peaks(recordings):
+    return [
+        max(reading.frame.force_left_n for reading in recording.recording.readings)
+        for recording in recordings
+    ]
 
 
 def solid(grasps=3):
@@ -38,7 +42,7 @@ def solid(grasps=3):
 COLUMNS = 'time = "c1"\ngap = "c2"\nforce = "c3"\n'
 
 
-@pytest.mark.parametrize("ending", ["npy", "npz", "mat", "h5"])
+@every_case("ending", ["npy", "npz", "mat", "h5"])
 def test_an_array_of_three_dimensions_is_read_alike_in_every_file_and_asked_about(ending, tmp_path):
     path = tmp_path / f"jar.{ending}"
     if ending == "npy":
@@ -51,12 +55,12 @@ def test_an_array_of_three_dimensions_is_read_alike_in_every_file_and_asked_abou
         with h5py.File(path, "w") as file:
             file["data"] = solid()
     text = f'files = "{{label}}.{ending}"\norder = "{{part}}"\n{COLUMNS}'
-    found = recordings(tmp_path, text)
-    assert peaks(found) == pytest.approx([FORCE.max() * k for k in (1, 2, 3)])
-    assert [recording.order for recording in found] == [0, 1, 2]
-    assert all(any("axes" in notice for notice in recording.notices) for recording in found)
+    grasps = recordings(tmp_path, text)
+    assert peaks(grasps) == pytest.approx([FORCE.max() * k for k in (1, 2, 3)])
+    assert [recording.order for recording in grasps] == [0, 1, 2]
+    assert all(any("axes" in notice for notice in recording.notices) for recording in grasps)
     confirmed = recordings(tmp_path, text + 'axes = "grasp, time, column"\n')
-    assert peaks(confirmed) == peaks(found)
+    assert peaks(confirmed) == peaks(grasps)
     assert not any("axes" in notice for recording in confirmed for notice in recording.notices)
     if ending == "npz":
         numbered = recordings(
@@ -67,8 +71,8 @@ def test_an_array_of_three_dimensions_is_read_alike_in_every_file_and_asked_abou
 
 def test_the_order_of_the_axes_is_that_of_the_manifest(tmp_path):
     np.save(tmp_path / "jar.npy", np.transpose(solid(), (2, 0, 1)))
-    found = recordings(tmp_path, f'files = "{{label}}.npy"\naxes = "column, grasp, time"\n{COLUMNS}')
-    assert peaks(found) == pytest.approx([FORCE.max() * k for k in (1, 2, 3)])
+    grasps = recordings(tmp_path, f'files = "{{label}}.npy"\naxes = "column, grasp, time"\n{COLUMNS}')
+    assert peaks(grasps) == pytest.approx([FORCE.max() * k for k in (1, 2, 3)])
     images = np.random.default_rng(0).normal(size=(4, 5, N))
     np.savez(tmp_path / "cup.npz", gap=GAP, force=FORCE, palm=images)
     text = 'files = "{label}.npz"\nrate_hz = 100\ngap = "gap"\nforce = "force"\nchannels = { palm = "palm [counts]" }\n'
@@ -91,12 +95,12 @@ def test_hundreds_of_named_arrays_are_told_apart_by_a_pattern(ending, tmp_path):
     save(tmp_path / f"all.{ending}", {**parts, "t": T_S})
     text = f'files = "all.{ending}"\narrays = "{{label}}_{{order:d}}_{{column}}"\n'
     text += 'time = "t"\ngap = "gap"\nforce = "force"\n'
-    found = recordings(tmp_path, text)
-    assert len(found) == 200
-    assert {recording.label for recording in found} == {"jar", "tin_can"}
+    grasps = recordings(tmp_path, text)
+    assert len(grasps) == 200
+    assert {recording.label for recording in grasps} == {"jar", "tin_can"}
     by_order = sorted(
         (recording.order, peak)
-        for recording, peak in zip(found, peaks(found), strict=True)
+        for recording, peak in zip(grasps, peaks(grasps), strict=True)
         if recording.label == "jar"
     )
     assert [peak for _, peak in by_order] == pytest.approx([k * FORCE.max() / 10.0 for k in range(1, 101)])
@@ -107,8 +111,8 @@ def test_hundreds_of_named_arrays_are_told_apart_by_a_pattern(ending, tmp_path):
 
 def test_arrays_without_a_column_have_numbered_columns(tmp_path):
     savemat(tmp_path / "all.mat", {f"jar_{k}": solid()[k] for k in range(3)})
-    found = recordings(tmp_path, f'files = "all.mat"\narrays = "{{label}}_{{order:d}}"\n{COLUMNS}')
-    assert peaks(found) == pytest.approx([FORCE.max() * k for k in (1, 2, 3)])
+    grasps = recordings(tmp_path, f'files = "all.mat"\narrays = "{{label}}_{{order:d}}"\n{COLUMNS}')
+    assert peaks(grasps) == pytest.approx([FORCE.max() * k for k in (1, 2, 3)])
 
 
 def test_groups_of_hdf5_are_grasps(tmp_path):
@@ -126,9 +130,9 @@ def test_groups_of_hdf5_are_grasps(tmp_path):
         force = "force"
         instance = "{who}"
         """
-    found = recordings(tmp_path, text)
-    assert peaks(found) == pytest.approx([FORCE.max(), 2 * FORCE.max()])
-    assert {recording.instance for recording in found} == {"Ann"}
+    grasps = recordings(tmp_path, text)
+    assert peaks(grasps) == pytest.approx([FORCE.max(), 2 * FORCE.max()])
+    assert {recording.instance for recording in grasps} == {"Ann"}
 
 
 def test_a_mat_file_of_version_7_3_is_read_in_the_axes_of_matlab(tmp_path):
@@ -140,11 +144,11 @@ def test_a_mat_file_of_version_7_3_is_read_in_the_axes_of_matlab(tmp_path):
         )
     with (tmp_path / "jar.mat").open("r+b") as file:
         file.write(b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM")
-    found = recordings(
+    grasps = recordings(
         tmp_path, 'files = "*.mat"\nlabel = "{kind}"\nrate_hz = 100\ngap = "gap"\nforce = "data[2]"\n'
     )
-    assert [recording.label for recording in found] == ["ja"]
-    assert peaks(found) == pytest.approx([2 * FORCE.max()])
+    assert [recording.label for recording in grasps] == ["ja"]
+    assert peaks(grasps) == pytest.approx([2 * FORCE.max()])
 
 
 def test_nothing_outside_of_an_hdf5_file_is_read(tmp_path):
@@ -201,10 +205,10 @@ def test_a_gap_that_does_not_change_is_no_width(gaps, tmp_path):
         np.savez(tmp_path / f"{label}.npz", data=data, nominal=np.full((4, N), float(gap)))
     text = 'files = "{label}.npz"\naxes = "grasp, time, column"\ntime = "data[0]"\ngap = "nominal"\nforce = "data[1]"\n'
     (tmp_path / "m.toml").write_text(text)
-    found = load_trials(f"manifest:{tmp_path / 'm.toml'}")
-    assert len(found) == 8
-    assert found.width is None
-    assert "no width" in found.no_width
+    trials = load_trials(f"manifest:{tmp_path / 'm.toml'}")
+    assert len(trials) == 8
+    assert trials.width is None
+    assert "no width" in trials.no_width
 
 
 @pytest.mark.parametrize("begin_s", [0.0, 0.3])
@@ -217,6 +221,6 @@ def test_a_store_of_recordings_with_a_constant_gap_has_no_width(begin_s, tmp_pat
     text = 'files = "{label}.npz"\naxes = "grasp, time, column"\ntime = "data[0]"\ngap = "nominal"\nforce = "data[1]"\n'
     (tmp_path / "m.toml").write_text(text)
     assert "of their beginning" not in printed("import", tmp_path / "m.toml", "--save", tmp_path / "store")
-    found = load_trials(f"store:{tmp_path / 'store'}")
-    assert found.width is None
-    assert "no width" in found.no_width
+    trials = load_trials(f"store:{tmp_path / 'store'}")
+    assert trials.width is None
+    assert "no width" in trials.no_width

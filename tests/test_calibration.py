@@ -1,6 +1,7 @@
 """From counts to newtons, and when a tare is refused."""
 
 import pytest
+from cases import every_case
 
 from graspsense.core.grasp.calibration import edge_force, masked, pad_force, tare, zero_of
 from graspsense.core.values.errors import TareRefused
@@ -30,8 +31,8 @@ def test_edge_force_is_the_largest_single_edge_cell_each_with_its_own_scale():
     assert edge_force(cells, zero, EDGE_COUNTS_PER_N) == pytest.approx(0.25)
 
 
-@pytest.mark.parametrize("place", [0, 10, CELLS - 1])
-@pytest.mark.parametrize("reading", [0.0, 65535.0, float("nan")])
+@every_case("place", [0, 10, CELLS - 1])
+@every_case("reading", [0.0, 65535.0, float("nan")])
 def test_a_cell_that_does_not_answer_is_left_out_wherever_it_is(place, reading):
     zero = tuple(3000.0 + i for i in range(CELLS))
     cells = [3500.0] * CELLS

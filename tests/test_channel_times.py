@@ -30,10 +30,10 @@ def fed(offset_s, drift, jitter_s, seed):
 
 @settings(max_examples=15, deadline=None)
 @given(st.floats(-1e-4, 1e-4), st.floats(-1e-4, 1e-4), st.integers(0, 10_000))
-def test_two_clocks_are_not_further_apart_than_is_said(first, second, seed):
+def test_two_clocks_are_not_further_apart_than_is_said(leading, trailing, seed):
     """Two fingertips with clocks of their own, with delays that nobody knows: both err, and the sum bounds it."""
     report, errors = {}, []
-    for name, drift in (("left", first), ("right", second)):
+    for name, drift in (("left", leading), ("right", trailing)):
         clock, off = fed(5.0, drift, 0.001, seed)
         report |= clock_report(name, clock, (f"cells_{name}",))
         # What came in the first second is corrected by nobody.

@@ -7,6 +7,7 @@ import threading
 import numpy as np
 import pytest
 from attrs import evolve
+from cases import every_case
 
 from graspsense.core.components.config import SelectedComponent, build, resolve
 from graspsense.core.components.registry import installed
@@ -271,7 +272,7 @@ def test_a_checkpoint_of_a_model_of_other_objects_is_refused(model, trials, lear
         load_model(str(tmp_path / "mixed.json"), installed())
 
 
-@pytest.mark.parametrize("text", ["", "soon", "0", "-0.1", "0.2,0.1", "0.1,0.1", "nan", "inf"])
+@every_case("text", ["", "soon", "0", "-0.1", "0.2,0.1", "0.1,0.1", "nan", "inf"])
 def test_checkpoints_that_are_no_times(text):
     with pytest.raises(ConfigError, match=r"as in 0.1,0.2,0.4"):
         checkpoints_of(text)
@@ -296,25 +297,25 @@ def test_a_checkpoint_that_hardly_any_grasp_reaches(traces):
 
 def test_recognition_against_seconds_and_newtons(trials, learner):
     """The later the answer, the more it costs; a sure squeeze costs no more than a whole one."""
-    found = early_recognition(learner, split_checkpoints(trials, CHECKPOINTS))
-    rows = {row.name: row for row in found.rows}
+    recognition = early_recognition(learner, split_checkpoints(trials, CHECKPOINTS))
+    rows = {row.name: row for row in recognition.rows}
     assert list(rows) == ["0.02 s", "0.05 s", WHOLE, SURE]
-    assert found.protocol == "instance_held_out"
-    first, second, whole, sure = rows.values()
-    assert first.seconds < second.seconds < whole.seconds
-    assert first.newtons < second.newtons < whole.newtons
+    assert recognition.protocol == "instance_held_out"
+    earliest, halfway, whole, sure = rows.values()
+    assert earliest.seconds < halfway.seconds < whole.seconds
+    assert earliest.newtons < halfway.newtons < whole.newtons
     assert whole.rate.correct >= 18, "the stiffness tells them apart"
     # Every grasp that is ended early saves what is between its checkpoint and its end.
     early = sure.single.correct
     assert early > 0
-    assert first.seconds <= sure.seconds < whole.seconds
+    assert earliest.seconds <= sure.seconds < whole.seconds
     assert sure.newtons < whole.newtons
     assert sure.covered.n == early
 
 
 def test_trials_without_enough_instances_have_rates_but_no_sets(trials, learner):
     few = trials.rows(np.array([0, 1, 2, 10, 11, 12]))
-    found = early_recognition(learner, split_checkpoints(few, CHECKPOINTS), folds=3)
-    assert [row.name for row in found.rows] == ["0.02 s", "0.05 s", WHOLE]
-    assert "90 % needs 9" in found.reason
-    assert all(row.covered is None for row in found.rows)
+    recognition = early_recognition(learner, split_checkpoints(few, CHECKPOINTS), folds=3)
+    assert [row.name for row in recognition.rows] == ["0.02 s", "0.05 s", WHOLE]
+    assert "90 % needs 9" in recognition.reason
+    assert all(row.covered is None for row in recognition.rows)

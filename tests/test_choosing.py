@@ -54,14 +54,14 @@ NEAREST = {"nearest": Made(Nearest)}
 
 def test_the_features_that_tell_the_labels_are_chosen_in_each_fold():
     noise = objects()
-    found = choose(LEARNERS, {"noise": noise, "informed": informed(noise)})
+    choice = choose(LEARNERS, {"noise": noise, "informed": informed(noise)})
 
-    assert (found.best.classifier, found.best.features) == ("tree", "informed")
-    assert found.chosen_in == {"tree with informed": 5}
-    assert found.rate.rate == 1.0
-    assert found.ranking.protocol == "instance_held_out"
+    assert (choice.best.classifier, choice.best.features) == ("tree", "informed")
+    assert choice.chosen_in == {"tree with informed": 5}
+    assert choice.rate.rate == 1.0
+    assert choice.ranking.protocol == "instance_held_out"
     assert {
-        candidate.standing for candidate in found.ranking.candidates if candidate.features == "noise"
+        candidate.standing for candidate in choice.ranking.candidates if candidate.features == "noise"
     } == {"worse"}
 
 
@@ -69,9 +69,9 @@ def test_a_feature_that_names_the_object_does_not_pass_for_one_of_the_label():
     """Whole objects are held out of the choice: knowing an object again is of no use there."""
     noise = objects(each=6)
     known = evolve(noise, table=evolve(noise.table, values=1e-3 * noise.table.values))
-    found = choose({"knn": learner("knn")}, {"noise": known, "informed": informed(noise)})
+    choice = choose({"knn": learner("knn")}, {"noise": known, "informed": informed(noise)})
 
-    assert found.best.features == "informed"
+    assert choice.best.features == "informed"
 
 
 def test_each_trial_is_predicted_by_a_model_that_was_chosen_and_trained_without_it():
@@ -85,16 +85,16 @@ def test_each_trial_is_predicted_by_a_model_that_was_chosen_and_trained_without_
     noise = objects()
     choose({"watching": Made(Watching)}, {"noise": noise})
     rows = [tuple(row) for row in noise.table.values.tolist()]
-    sizes = sorted(len(one) for one in seen)
+    sizes = sorted(len(training_rows) for training_rows in seen)
 
     # Five models without one fold, and ten without two.
     assert len(seen) == 15
     assert sizes[:10] < sizes[10:]
     for row, instance in zip(rows, noise.instances, strict=True):
-        apart = [one for one in seen if row not in one]
+        apart = [training_rows for training_rows in seen if row not in training_rows]
         same = {r for r, other in zip(rows, noise.instances, strict=True) if other == instance}
         assert len(apart) == 1 + 4
-        assert all(not same & one for one in apart)
+        assert all(not same & training_rows for training_rows in apart)
 
 
 def test_the_rate_of_labels_without_information_is_that_of_guessing():
@@ -104,10 +104,10 @@ def test_the_rate_of_labels_without_information_is_that_of_guessing():
     for repeat in range(20):
         labels = [f"l{k}" for k in rng.permutation(np.repeat(np.arange(2), 20))]
         sets = {f"set{k}": trials(rng.normal(size=(40, 2)), labels) for k in range(12)}
-        found = choose(NEAREST, sets, seed=repeat)
-        right += found.rate.correct
-        best += found.best.rates[found.ranking.protocol].correct
-        total += found.rate.n
+        choice = choose(NEAREST, sets, seed=repeat)
+        right += choice.rate.correct
+        best += choice.best.rates[choice.ranking.protocol].correct
+        total += choice.rate.n
     low, high = binom.interval(0.999, total, 0.5)
 
     assert right <= high
@@ -122,10 +122,10 @@ class Failing(Nearest):
 
 def test_a_classifier_that_fails_is_told_and_left_out():
     noise = objects()
-    found = choose({"broken": Made(Failing), **NEAREST}, {"informed": informed(noise)})
+    choice = choose({"broken": Made(Failing), **NEAREST}, {"informed": informed(noise)})
 
-    assert {candidate.classifier for candidate in found.ranking.candidates} == {"nearest"}
-    assert any("broken" in note and "it broke" in note for note in found.ranking.notes)
+    assert {candidate.classifier for candidate in choice.ranking.candidates} == {"nearest"}
+    assert any("broken" in note and "it broke" in note for note in choice.ranking.notes)
     with pytest.raises(ConfigError, match="it broke"):
         choose({"broken": Made(Failing)}, {"informed": informed(noise)})
 
@@ -150,19 +150,19 @@ def test_too_little_to_choose_by_is_refused():
 
 
 def test_a_label_with_a_single_object_is_cross_validated_by_trials():
-    found = choose(NEAREST, {"informed": informed(objects(instances=1, each=6))})
+    choice = choose(NEAREST, {"informed": informed(objects(instances=1, each=6))})
 
-    assert found.ranking.protocol == "stratified_5_fold"
-    assert any("single instance" in note for note in found.ranking.notes)
+    assert choice.ranking.protocol == "stratified_5_fold"
+    assert any("single instance" in note for note in choice.ranking.notes)
 
 
 def test_the_same_seed_gives_the_same_choice():
     noise = objects()
     sets = {"noise": noise, "other": objects(seed=3)}
-    first, second = (choose({"tree": learner("tree")}, sets, seed=4) for _ in range(2))
+    choice, repeated = (choose({"tree": learner("tree")}, sets, seed=4) for _ in range(2))
 
-    assert (first.rate, first.chosen_in, first.best.name) == (
-        second.rate,
-        second.chosen_in,
-        second.best.name,
+    assert (choice.rate, choice.chosen_in, choice.best.name) == (
+        repeated.rate,
+        repeated.chosen_in,
+        repeated.best.name,
     )

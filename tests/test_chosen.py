@@ -36,7 +36,7 @@ def unequal(rng, candidates):
     return rng.random((candidates, 150)) < rates[:, np.newaxis], rates, None
 
 
-SLOW = [pytest.param(*one, marks=pytest.mark.slow) for one in ((4, 100), (12, 60), (32, 40))]
+SLOW = [pytest.param(*shape, marks=pytest.mark.slow) for shape in ((4, 100), (12, 60), (32, 40))]
 
 
 @pytest.mark.parametrize(("candidates", "repeats"), [(4, 15), *SLOW])
@@ -71,7 +71,8 @@ def test_a_candidate_that_is_far_worse_is_told_and_the_rate_of_a_clear_best_stay
     comparisons = comparisons_of(right, None)
 
     assert all(
-        difference(right[0].tolist(), one.tolist(), None, comparisons).interval[0] > 0 for one in right[1:]
+        difference(right[0].tolist(), candidate.tolist(), None, comparisons).interval[0] > 0
+        for candidate in right[1:]
     )
     chosen = rate_of_chosen(right, None)
     assert chosen.rate == pytest.approx(right[0].mean(), abs=0.01)

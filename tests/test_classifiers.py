@@ -9,6 +9,7 @@ import sys
 
 import numpy as np
 import pytest
+from cases import every_case
 
 from graspsense.core.values.errors import ConfigError
 from graspsense.core.values.features import Features, FeatureTable
@@ -104,11 +105,11 @@ class TestEvery:
     def test_two_labels_and_the_same_seed(self, name):
         table, labels = trials()
         two = [label.partition(":")[0] for label in labels]
-        first, again = fitted(name, table, two, seed=5), fitted(name, table, two, seed=5)
+        result, again = fitted(name, table, two, seed=5), fitted(name, table, two, seed=5)
 
-        assert first.classes() == ("bottle", "can")
-        assert rate(first, table, two) > 0.95
-        assert (first.probabilities(table) == again.probabilities(table)).all()
+        assert result.classes() == ("bottle", "can")
+        assert rate(result, table, two) > 0.95
+        assert (result.probabilities(table) == again.probabilities(table)).all()
 
     def test_it_comes_back_from_json_the_same(self, name):
         classifier = fitted(name, *trials(missing=0.1), seed=3)
@@ -130,7 +131,7 @@ class TestEvery:
             create("classifier", name).from_json(damage)
 
 
-@pytest.mark.parametrize("name", ALL[1:])
+@every_case("name", ALL[1:])
 def test_one_label_is_refused(name):
     table, labels = trials()
     with pytest.raises(ValueError, match="nothing to tell apart"):
@@ -253,9 +254,9 @@ def test_the_network_takes_the_steps_of_the_published_rule():
         slope = [(loss(weights + d, i) - loss(weights - d, i)) / 2e-5 for d in 1e-5 * np.eye(6)]
         change = -0.3 * np.array(slope) + 0.2 * change
         weights = weights + change
-    found = train(x, wanted, hidden, output, (0.3, 0.2), 2)
+    layers = train(x, wanted, hidden, output, (0.3, 0.2), 2)
 
-    assert np.concatenate([one.ravel() for one in found]) == pytest.approx(weights, abs=1e-9)
+    assert np.concatenate([layer.ravel() for layer in layers]) == pytest.approx(weights, abs=1e-9)
 
 
 def test_the_network_has_half_as_many_units_as_features_and_labels():

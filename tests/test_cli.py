@@ -11,6 +11,7 @@ from importlib import import_module
 
 import click
 import pytest
+from cases import every_case
 from commands import graspsense
 
 from graspsense import __version__
@@ -82,7 +83,7 @@ def test_version_is_that_of_the_distribution():
         assert tomllib.load(file)["project"]["version"] == __version__
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("arguments", "said"),
     [
         (
@@ -346,10 +347,10 @@ class TestPluginsShow:
 
 class TestConfig:
     def test_show_prints_a_file_that_shows_the_same(self, run, tmp_path):
-        first = run("config", "show", *REPLAY, "--seed", "3")
-        assert (first.returncode, first.stderr) == (0, "")
+        shown = run("config", "show", *REPLAY, "--seed", "3")
+        assert (shown.returncode, shown.stderr) == (0, "")
         file = tmp_path / "again.toml"
-        file.write_text(first.stdout)
+        file.write_text(shown.stdout)
 
         again = run("config", "show", str(file), "--json").json
         asked = run("config", "show", *REPLAY, "--seed", "3", "--json").json
@@ -358,7 +359,7 @@ class TestConfig:
         assert asked["origins"]["run.seed"] == "--seed"
         assert asked["origins"]["controller.probing_force_n"].startswith("pipeline graspsense/default:")
         assert asked["origins"]["controller.ramp_s"] == "default"
-        assert "seed = 3                                  # --seed\n" in first.stdout
+        assert "seed = 3                                  # --seed\n" in shown.stdout
 
     def test_show_takes_the_pipeline_either_way(self, run):
         assert run("config", "show", "default", *REPLAY).stdout == run("config", "show", *REPLAY).stdout
@@ -460,7 +461,7 @@ class TestCompletion:
         assert ran.returncode == 0
         assert f"_GRASPSENSE_COMPLETE={shell}_complete" in ran.stdout
 
-    @pytest.mark.parametrize(
+    @every_case(
         ("words", "offered"),
         [
             ("graspsense ", list(COMMANDS)),

@@ -6,6 +6,7 @@ import sys
 from collections import Counter
 
 import pytest
+from cases import every_case
 from commands import graspsense
 
 from graspsense.core.values.errors import ConfigError
@@ -22,7 +23,9 @@ def collect(folder, answers, labels="can:full_open,block", each=2, more=()):
 
 def trials_in(folder):
     with Store.read(folder) as store:
-        return [(one.id, one.label, one.set_aside) for one in reversed(store.page(set_aside=None))]
+        return [
+            (summary.id, summary.label, summary.set_aside) for summary in reversed(store.page(set_aside=None))
+        ]
 
 
 @pytest.mark.slow
@@ -65,11 +68,11 @@ def test_classes_come_in_rounds_so_that_none_is_recorded_in_one_go(tmp_path):
 
 @pytest.mark.slow
 def test_it_goes_on_where_it_was_with_new_draws(tmp_path):
-    first = json.loads(collect(tmp_path / "t", "\n\nq\n").stdout)
-    assert not first["complete"]
-    second = json.loads(collect(tmp_path / "t", "\n\n\n\n").stdout)
-    assert second["trials"] == [3, 4]
-    assert second["complete"]
+    session = json.loads(collect(tmp_path / "t", "\n\nq\n").stdout)
+    assert not session["complete"]
+    continued = json.loads(collect(tmp_path / "t", "\n\n\n\n").stdout)
+    assert continued["trials"] == [3, 4]
+    assert continued["complete"]
     with Store.read(tmp_path / "t") as store:
         values = [store.trial(number).result.features.values for number in (1, 2, 3, 4)]
         seeds = [store.trial(number).record.provenance["seed"] for number in (1, 2, 3, 4)]
@@ -234,7 +237,7 @@ EMULATED = ("--gripper", "pr2", "-o", "gripper.transport=emulated")
 def held(folder):
     """Return label, object and whether it is simulated of each trial, in their order."""
     with Store.read(folder) as store:
-        trials = [store.trial(one.id) for one in reversed(store.page())]
+        trials = [store.trial(summary.id) for summary in reversed(store.page())]
     return [
         (trial.summary.label, trial.record.settings["gripper"]["object"], trial.summary.simulated)
         for trial in trials
@@ -259,8 +262,8 @@ def test_a_label_of_an_individual_object_selects_this_object_on_an_emulated_pr2(
     assert held(tmp_path / "t") == [("can:full_open", "can:full_open#2", True)]
 
 
-@pytest.mark.parametrize("gripper", [(), EMULATED], ids=["sim", "pr2"])
-@pytest.mark.parametrize("told", [("--object", "toy"), ("-o", "gripper.object=toy")], ids=["flag", "option"])
+@every_case("gripper", [(), EMULATED])
+@every_case("told", [("--object", "toy"), ("-o", "gripper.object=toy")])
 def test_an_object_that_contradicts_a_label_is_refused(tmp_path, gripper, told):
     done = collect(tmp_path / "t", "\n", labels="block", more=(*gripper, *told))
 
@@ -347,10 +350,10 @@ def test_a_setting_that_is_newer_than_the_trial_had_its_default(tmp_path):
 
     with Store.open(tmp_path / "t") as store:
         keep(store, settings=SETTINGS)
-        before = newest_grasp(store)
-        check_settings(store, before, resolve("default"))
+        default_grasp = newest_grasp(store)
+        check_settings(store, default_grasp, resolve("default"))
         with pytest.raises(ConfigError, match=r"controller\.ramp_s was 0\.0 and is 0\.1"):
-            check_settings(store, before, resolve("default", options=["controller.ramp_s=0.1"]))
+            check_settings(store, default_grasp, resolve("default", options=["controller.ramp_s=0.1"]))
 
 
 @pytest.mark.parametrize("label", ["my can:full", "can:full open", "can#2 b"])

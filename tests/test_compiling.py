@@ -141,7 +141,10 @@ def test_a_fingerprint_covers_the_functions_that_generate_the_code_of_an_intrins
 
         return intrinsic(bind(half, helper_of_half=helper))
 
-    prints = [fingerprint(bind(_calls_half, half=declared(one))) for one in (_half_type, _other_half_type)]
+    prints = [
+        fingerprint(bind(_calls_half, half=declared(result_type)))
+        for result_type in (_half_type, _other_half_type)
+    ]
     assert prints[0] != prints[1]
     assert prints[0] == fingerprint(bind(_calls_half, half=declared(_half_type)))
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from attrs import asdict, evolve
+from cases import every_case
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -296,7 +297,7 @@ class TestClassifier:
 
         assert settings.classifier is not None
         assert settings.classifier.config.force_n == 3.0
-        assert [one.component.table for one in settings.chosen] == [
+        assert [choice.component.table for choice in settings.chosen] == [
             "gripper",
             "controller",
             "features",
@@ -381,7 +382,7 @@ def test_a_validator_that_looks_at_other_keys_keeps_its_words(plugins, write):
     )
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("option", "said"),
     [
         ("gripper.retries=3.0", "expected a whole number, found 3.0 (a number)"),
@@ -414,7 +415,7 @@ def test_nothing_is_coerced(plugins, write, option, said):
     assert complaint(write(BASE), options=[option]) == f"-o {option}: {said}"
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("typed", "value"),
     [
         ("usb", "usb"),
@@ -478,7 +479,7 @@ class TestFiles:
             "lab.toml:2: not UTF-8 text (byte 0xff): TOML files are UTF-8; is this the right file?"
         )
 
-    @pytest.mark.parametrize(
+    @every_case(
         ("text", "said"),
         [
             (
@@ -544,7 +545,7 @@ def test_a_recipe_makes_the_same_component_again():
 
 class TestToToml:
     def test_the_file_resolves_by_itself_to_the_same_values(self, plugins, write):
-        first = resolve(
+        resolved = resolve(
             write(BASE),
             options=[
                 'gripper.port="C:\\\\tty\\n\\u007f\\"x\\" ü 🤖"',
@@ -557,15 +558,15 @@ class TestToToml:
                 "classifier.type=guess",
             ],
         )
-        again = resolve(write(to_toml(first), "again.toml"))
+        again = resolve(write(to_toml(resolved), "again.toml"))
 
-        assert again.values == first.values
-        assert again.gripper.config == first.gripper.config
-        assert again.run == first.run
+        assert again.values == resolved.values
+        assert again.gripper.config == resolved.gripper.config
+        assert again.run == resolved.run
         assert set(again.origins.values()) - {"default"} == {
             origin for origin in again.origins.values() if origin.startswith("again.toml:")
         }
-        assert to_toml(again).replace("again.toml", "lab.toml") == to_toml(first)
+        assert to_toml(again).replace("again.toml", "lab.toml") == to_toml(resolved)
 
     def test_with_origins_it_is_still_the_same_file(self, plugins, write):
         settings = resolve(write(BASE), options=["gripper.filter.order=3"])
@@ -600,13 +601,13 @@ def test_any_plain_value_survives_being_written_as_toml(values):
 
 def paths(value, path=()):
     if isinstance(value, dict):
-        for key, one in value.items():
+        for key, child in value.items():
             yield (*path, key)
-            yield from paths(one, (*path, key))
+            yield from paths(child, (*path, key))
     elif isinstance(value, list):
-        for index, one in enumerate(value):
+        for index, child in enumerate(value):
             yield (*path, index)
-            yield from paths(one, (*path, index))
+            yield from paths(child, (*path, index))
 
 
 @pytest.mark.slow
@@ -650,7 +651,7 @@ n = 2
     lines = key_lines(text)
 
     assert set(lines) == set(paths(tomllib.loads(text)))
-    at = {
+    placed = {
         ("a", "b", "c.d"): 1,
         ("text",): 2,
         ("raw",): 6,
@@ -665,4 +666,4 @@ n = 2
         ("s", 1, "deep", 1): 20,
         ("s", 1, "deep", 1, ""): 21,
     }
-    assert {path: lines[path] for path in at} == at
+    assert {path: lines[path] for path in placed} == placed

@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 from attrs import evolve
+from cases import every_case
 from commands import printed
 from test_evaluate import judged, labelled, learner
 
@@ -42,7 +43,7 @@ def model_of(trials, name):
     return calibrated(model, learner(name), trials, 0)
 
 
-@pytest.mark.parametrize(("coverage", "needed"), [(0.9, 9), (0.95, 19), (0.8, 4), (0.99, 99)])
+@every_case(("coverage", "needed"), [(0.9, 9), (0.95, 19), (0.8, 4), (0.99, 99)])
 def test_units_needed_are_the_smallest_n_with_a_finite_quantile(coverage, needed):
     assert units_needed(coverage) == needed
 
@@ -188,9 +189,12 @@ def test_predictions_say_which_labels_are_in_every_set():
 
     assert not any("in every set" in text for text in model.predict(trials.table.row(0)).warnings)
     said = [lacking.predict(trials.table.row(i)) for i in range(0, len(trials), 7)]
-    known = [one for one in said if one.label != UNKNOWN]
-    assert all("empty" in one.prediction_set for one in known)
-    assert all(any("in every set" in text and "empty" in text for text in one.warnings) for one in known)
+    known = [prediction for prediction in said if prediction.label != UNKNOWN]
+    assert all("empty" in prediction.prediction_set for prediction in known)
+    assert all(
+        any("in every set" in text and "empty" in text for text in prediction.warnings)
+        for prediction in known
+    )
 
 
 @pytest.mark.slow
@@ -249,7 +253,7 @@ def test_every_classifier_has_sets_that_loading_keeps_exactly(name, tmp_path):
 
     assert model.sets is not None
     assert loaded.sets == model.sets
-    assert {one.units for one in model.sets.thresholds.values()} == {14}
+    assert {threshold.units for threshold in model.sets.thresholds.values()} == {14}
     for i in range(0, len(trials), 5):
         said, again = model.predict(trials.table.row(i)), loaded.predict(trials.table.row(i))
         assert said.prediction_set == again.prediction_set
@@ -282,45 +286,45 @@ def test_thresholds_of_other_labels_are_refused(tmp_path):
 
 
 def test_evaluate_measures_coverage_size_and_reliability_with_instances_held_out():
-    found = judged(bottles(20, spread=0.7), "knn", controls=False, learning_curve=False)
-    again = from_json(to_json(found), Evaluation)
+    evaluation = judged(bottles(20, spread=0.7), "knn", controls=False, learning_curve=False)
+    again = from_json(to_json(evaluation), Evaluation)
 
-    assert again == found
-    assert found.sets.unit == "instances"
-    assert found.sets.covered.rate >= 0.85
-    assert found.sets.covered.rate >= found.headline.rate
-    assert 1.0 < found.sets.mean_size < 2.0
-    assert sum(point.rate.n for point in found.reliability.curve) == 120
-    assert 0.0 < found.reliability.brier < 0.5
-    assert found.reliability.calibration_error < 0.15
+    assert again == evaluation
+    assert evaluation.sets.unit == "instances"
+    assert evaluation.sets.covered.rate >= 0.85
+    assert evaluation.sets.covered.rate >= evaluation.headline.rate
+    assert 1.0 < evaluation.sets.mean_size < 2.0
+    assert sum(point.rate.n for point in evaluation.reliability.curve) == 120
+    assert 0.0 < evaluation.reliability.brier < 0.5
+    assert evaluation.reliability.calibration_error < 0.15
 
 
 def test_noise_gives_sets_of_both_labels():
     trials = bottles(20)
     noise = evolve(trials.table, values=np.random.default_rng(3).normal(size=trials.table.values.shape))
 
-    found = judged(evolve(trials, table=noise), "svm", controls=False, learning_curve=False)
+    evaluation = judged(evolve(trials, table=noise), "svm", controls=False, learning_curve=False)
 
-    assert found.sets.mean_size > 1.7
-    assert found.sets.covered.rate > 0.85
+    assert evaluation.sets.mean_size > 1.7
+    assert evaluation.sets.covered.rate > 0.85
 
 
 def test_too_few_instances_have_no_coverage_with_the_reason():
-    found = judged(bottles(4), "tree", controls=False, learning_curve=False)
+    evaluation = judged(bottles(4), "tree", controls=False, learning_curve=False)
 
-    assert found.sets.covered is None
-    assert "90 % needs 9" in found.sets.reason
+    assert evaluation.sets.covered is None
+    assert "90 % needs 9" in evaluation.sets.reason
 
 
 def test_states_within_classes_are_covered_too():
     labels = [f"{cls}:{state}" for cls in ("can", "jar") for state in ("full", "empty") for _ in range(30)]
     rng = np.random.default_rng(0)
     force = [(3.0 if label.endswith("full") else 0.0) + rng.normal() for label in labels]
-    found = judged(labelled(labels, force), "knn", target="state", controls=False, learning_curve=False)
+    evaluation = judged(labelled(labels, force), "knn", target="state", controls=False, learning_curve=False)
 
-    assert found.sets.unit == "trials"
-    assert found.sets.covered.rate > 0.85
-    assert found.sets.mean_size <= 2.0  # only states of the class of a trial are possible
+    assert evaluation.sets.unit == "trials"
+    assert evaluation.sets.covered.rate > 0.85
+    assert evaluation.sets.mean_size <= 2.0  # only states of the class of a trial are possible
 
 
 def test_equal_probabilities_are_told_apart_by_the_closeness_of_the_training_trials():
@@ -359,8 +363,11 @@ def test_the_commands_print_and_keep_the_sets(csv_file, tmp_path, monkeypatch):
     assert "of the held-out trials are called unknown (false alarms)" in trained
     assert "90 % SET" in listed
     assert " or " in listed
-    known = [one for one in asked["predictions"] if one["label"] != UNKNOWN]
-    assert all(one["label"] in one["prediction_set"] and one["coverage"] == 0.9 for one in known)
+    known = [prediction for prediction in asked["predictions"] if prediction["label"] != UNKNOWN]
+    assert all(
+        prediction["label"] in prediction["prediction_set"] and prediction["coverage"] == 0.9
+        for prediction in known
+    )
     assert "contain the true label; 90 % asked for, by instances" in measured
     assert "Brier score" in measured
     assert "expected calibration error" in measured
@@ -371,10 +378,10 @@ def test_the_commands_print_and_keep_the_sets(csv_file, tmp_path, monkeypatch):
 def test_the_page_shows_coverage_and_reliability():
     from graspsense.report.evaluation_sections import doubt_section
 
-    found = judged(bottles(20), "forest", controls=False, learning_curve=False)
+    evaluation = judged(bottles(20), "forest", controls=False, learning_curve=False)
     few = judged(bottles(4), "tree", controls=False, learning_curve=False)
-    section = doubt_section(found.sets, found.reliability)
+    section = doubt_section(evaluation.sets, evaluation.reliability)
 
-    assert found.sets.covered.words in section.body
+    assert evaluation.sets.covered.words in section.body
     assert "<svg" in section.body
     assert "Not measured here: 7 calibration instances" in doubt_section(few.sets, few.reliability).body

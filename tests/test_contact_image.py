@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 from attrs import evolve
+from cases import every_case
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -23,11 +24,11 @@ PLACES = np.indices((ROWS, COLUMNS)).astype(np.float64)
 def bump(row, column, long, short, angle):
     """A pressure whose first axis has this angle from the direction of a row; `long` and `short` are deviations."""
     down, along = PLACES[0] - row, PLACES[1] - column
-    first, second = (
+    left_bump, right_bump = (
         along * math.cos(angle) + down * math.sin(angle),
         down * math.cos(angle) - along * math.sin(angle),
     )
-    return np.exp(-0.5 * ((first / long) ** 2 + (second / short) ** 2))
+    return np.exp(-0.5 * ((left_bump / long) ** 2 + (right_bump / short) ** 2))
 
 
 def grasp(images, phases=(Phase.APPROACH, Phase.SQUEEZE, Phase.HOLD, Phase.RELEASE)):
@@ -121,14 +122,14 @@ def test_several_arrays_have_the_features_of_each_with_its_name_in_front():
     )
     layout = {"rows": ROWS, "columns": COLUMNS}
     features = create("feature-set", "contact-image", array="tactile, thumb", **layout)
-    one = create("feature-set", "contact-image", array="tactile", **layout).extract(both)
+    layout_features = create("feature-set", "contact-image", array="tactile", **layout).extract(both)
     f = features.extract(both)
 
     assert [channel.name for channel in features.requires] == ["tactile", "thumb"]
     assert set(f.names) == {feature.name for feature in features.features}
-    assert f["tactile_total"] == one["total"]
-    assert f["thumb_total"] == pytest.approx(2.0 * one["total"])
-    assert f["thumb_centre_row"] == pytest.approx(one["centre_row"])
+    assert f["tactile_total"] == layout_features["total"]
+    assert f["thumb_total"] == pytest.approx(2.0 * layout_features["total"])
+    assert f["thumb_centre_row"] == pytest.approx(layout_features["centre_row"])
 
 
 def test_a_camera_counts_how_much_its_colours_change_in_either_direction():
@@ -159,7 +160,7 @@ def test_a_recording_without_phases_begins_with_its_zero():
     assert f["total"] == pytest.approx(float(np.sum(pressed)))
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("images", "missing"),
     [
         ([np.zeros(ROWS * COLUMNS)], {"total", "area"}),
@@ -167,7 +168,6 @@ def test_a_recording_without_phases_begins_with_its_zero():
         ([np.zeros(ROWS * COLUMNS), -np.ones(ROWS * COLUMNS)], {"area", "centre_row"}),
         ([np.zeros(ROWS * COLUMNS), np.eye(1, ROWS * COLUMNS, 20)[0]], {"angle"}),
     ],
-    ids=["one image", "no change", "all cells fall", "a single cell"],
 )
 def test_what_an_image_does_not_show_is_missing_with_a_reason(images, missing):
     f = extract(images)

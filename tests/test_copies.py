@@ -6,6 +6,7 @@ import json
 
 import numpy as np
 import pytest
+from cases import every_case
 from commands import graspsense, printed
 from hypothesis import given
 from hypothesis import strategies as st
@@ -49,9 +50,9 @@ def test_measured_trials_count_once_however_often_they_are_pasted(seed, times, f
     values = np.array([[float(f"{v:.{digits}g}") for v in row] for row in measured(30, features, seed)])
     rng = np.random.default_rng(seed)
     order = rng.permutation(np.tile(np.arange(30), times))
-    found = without_copies(labelled(values[order], [f"{i % 2}" for i in order]))
-    assert sorted(map(tuple, found.table.values)) == sorted(map(tuple, values))
-    assert copies_said(found)
+    kept = without_copies(labelled(values[order], [f"{i % 2}" for i in order]))
+    assert sorted(map(tuple, kept.table.values)) == sorted(map(tuple, values))
+    assert copies_said(kept)
 
 
 def test_trials_without_copies_stay_as_they_are():
@@ -59,7 +60,7 @@ def test_trials_without_copies_stay_as_they_are():
     assert without_copies(trials) is trials
 
 
-@pytest.mark.parametrize(
+@every_case(
     "values",
     [
         np.random.default_rng(1).integers(0, 4, size=(60, 1)),  # counts
@@ -70,9 +71,9 @@ def test_trials_without_copies_stay_as_they_are():
     ],
 )
 def test_coarse_features_that_are_equal_by_chance_count_and_it_is_said(values):
-    found = without_copies(labelled(values))
-    assert len(found) == len(values)
-    assert any("by chance" in note for note in found.notes)
+    kept = without_copies(labelled(values))
+    assert len(kept) == len(values)
+    assert any("by chance" in note for note in kept.notes)
 
 
 def test_copies_of_coarse_trials_are_found_where_chance_cannot_make_them():
@@ -89,23 +90,23 @@ def test_a_trial_without_any_feature_is_no_copy():
 def test_of_a_grasp_with_a_damaged_copy_the_one_with_more_features_is_kept():
     values = measured(4)
     values[1, 1:] = np.nan
-    found = without_copies(labelled(values, "abab", content=("", "x", "x", "")))
-    assert found.table.values.tolist() == np.delete(values, 1, axis=0).tolist()
+    kept = without_copies(labelled(values, "abab", content=("", "x", "x", "")))
+    assert kept.table.values.tolist() == np.delete(values, 1, axis=0).tolist()
 
 
 def test_a_copy_with_another_label_is_said():
     values = measured(10)
-    found = without_copies(labelled(np.concatenate([values, values[:1]]), [*"ababababab", "b"]))
-    assert len(found) == 10
-    assert "another label" in copies_said(found)[0]
+    kept = without_copies(labelled(np.concatenate([values, values[:1]]), [*"ababababab", "b"]))
+    assert len(kept) == 10
+    assert "another label" in copies_said(kept)[0]
 
 
 def test_trials_that_were_learned_from_are_not_tested_on():
     training, others = labelled(measured(seed=0)), measured(seed=1)
     mixed = labelled(np.concatenate([others, training.table.values[:7]]))
-    found = apart_from(mixed, training)
-    assert found.table.values.tolist() == others.tolist()
-    assert "7 trials" in copies_said(found)[0]
+    kept = apart_from(mixed, training)
+    assert kept.table.values.tolist() == others.tolist()
+    assert "7 trials" in copies_said(kept)[0]
     with pytest.raises(ConfigError, match="every trial"):
         apart_from(training, training)
 
@@ -133,14 +134,14 @@ def table_of_noise(path, copies):
 
 
 def test_doubling_the_lines_of_a_table_changes_no_rate(tmp_path):
-    found = []
+    rates = []
     for copies in (1, 2):
         path = table_of_noise(tmp_path / f"{copies}.csv", copies)
         done = graspsense("evaluate", path, "--label", "object", "--json")
         assert done.returncode == 0
-        found.append(json.loads(done.stdout))
-    assert found[0]["headline"] == found[1]["headline"]
-    assert any("copies" in note for note in found[1]["notes"])
+        rates.append(json.loads(done.stdout))
+    assert rates[0]["headline"] == rates[1]["headline"]
+    assert any("copies" in note for note in rates[1]["notes"])
 
 
 def test_each_grasp_that_run_saves_is_another_one_unless_a_seed_is_given(tmp_path):
@@ -177,8 +178,8 @@ def test_a_damaged_recording_and_its_recovered_copy_are_one_trial(tmp_path):
 def test_equal_features_of_recordings_that_were_compared_and_differ_are_no_copies():
     """A feature that hardly varies, such as the gap at the contact of presses that begin alike, makes no copies."""
     values = [[0.018499999999999999, np.nan]] * 4 + [[0.019000000000000003, np.nan]] * 4
-    found = without_copies(labelled(values, content=tuple("abcdefgh")))
-    assert len(found) == 8
+    kept = without_copies(labelled(values, content=tuple("abcdefgh")))
+    assert len(kept) == 8
     assert len(without_copies(labelled(values, content=tuple("aaaaefgh")))) == 5
 
 
@@ -190,7 +191,7 @@ def test_copies_with_one_value_changed_are_told(change):
     edited[:, 2] = np.nan if change == "a missing value" else edited[:, 2] + 0.5
     labels = ("a",) * 20 + ("b",) * 20
     table = FeatureTable(names=("x", "y", "z"), units=("",) * 3, values=np.concatenate([values, edited]))
-    found = without_copies(Labelled(source="t", table=table, labels=labels * 2))
-    assert any("single feature: 40 (trial 41 from trial 1)" in note for note in found.notes)
+    kept = without_copies(Labelled(source="t", table=table, labels=labels * 2))
+    assert any("single feature: 40 (trial 41 from trial 1)" in note for note in kept.notes)
     alone = FeatureTable(names=("x", "y", "z"), units=("",) * 3, values=values)
     assert without_copies(Labelled(source="t", table=alone, labels=labels)).notes == ()

@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 import pytest
+from cases import every_case
 from commands import graspsense
 from hypothesis import given
 from hypothesis import strategies as st
@@ -49,7 +50,7 @@ def runs(cell):
     return False
 
 
-@pytest.mark.parametrize("text", FORMULAS)
+@every_case("text", FORMULAS)
 def test_no_cell_is_a_formula_however_it_is_divided(text):
     for separator in ",;\t":
         assert not any(map(runs, cells_of(csv_text([["label", text], [text, 1.5]]), separator)))
@@ -68,7 +69,7 @@ def test_numbers_stay_numbers_of_the_same_bits(value):
     assert row[0] == ("" if math.isnan(value) else repr(value))
 
 
-@pytest.mark.parametrize("text", ["-3", "+1.5e-3", "-.5", "7."])
+@every_case("text", ["-3", "+1.5e-3", "-.5", "7."])
 def test_a_text_that_is_a_number_stays_as_it_is(text):
     assert cells_of(csv_text([[text]])) == [text]
 

@@ -30,7 +30,15 @@ RELEASE_NAMES = {
 
 
 def grasp(
-    t_s, *, stiffness=4000.0, exponent=1.0, relaxing=0.2, tau_s=0.08, second=0.9, noise=0.0, units=SI_UNITS
+    t_s,
+    *,
+    stiffness=4000.0,
+    exponent=1.0,
+    relaxing=0.2,
+    tau_s=0.08,
+    second_share=0.9,
+    noise=0.0,
+    units=SI_UNITS,
 ):
     """A grasp sampled at these times: touch at 0.5 s, 4 mm of squeeze until 1 s, hold until 1.6 s, release until 2.2 s.
 
@@ -42,7 +50,7 @@ def grasp(
     x = np.maximum(0.060 - gap, 0.0)
     lost = np.where(t_s > 1.0, relaxing * (1.0 - np.exp(-(t_s - 1.0) / tau_s)), 0.0)
     left = stiffness * 0.004 * (x / 0.004) ** exponent * (1.0 - lost)
-    pads = [left, second * left]
+    pads = [left, second_share * left]
     if noise:
         rng = np.random.default_rng(3)
         pads = [pad + noise * rng.normal(size=len(t_s)) for pad in pads]
@@ -167,8 +175,8 @@ def test_repeated_forces_between_cell_images_do_not_shift_the_curve():
 
 @settings(max_examples=20, deadline=None)
 @given(st.floats(0.3, 1.0), st.floats(0.6, 2.0))
-def test_swapping_the_fingers_changes_nothing(second, exponent):
-    trace = grasp(EVEN[::4], second=second, exponent=exponent)
+def test_swapping_the_fingers_changes_nothing(second_share, exponent):
+    trace = grasp(EVEN[::4], second_share=second_share, exponent=exponent)
     swapped = evolve(trace, force_left_n=trace.force_right_n, force_right_n=trace.force_left_n)
     assert FEATURES.extract(swapped).values == pytest.approx(FEATURES.extract(trace).values, nan_ok=True)
 
@@ -186,12 +194,12 @@ def test_features_scale_with_their_units(length, force, time):
         force_right_n=trace.force_right_n * force,
     )
     config = CurveConfig(contact_force_n=0.625 * force, window_s=0.05 * time, least_travel_m=2e-5 * length)
-    of = {
+    scaled_by = {
         "1": 1.0, "m": length, "N": force, "s": time, "J": force * length, "N/m": force / length,
     }  # fmt: skip
-    before, after = FEATURES.extract(trace), CurveFeatures(config).extract(scaled)
-    for name, unit, a, b in zip(NAMES, before.units, before.values, after.values, strict=True):
-        assert b == pytest.approx(a * of[unit], rel=1e-6, abs=1e-9 * of[unit]), name
+    plain, converted = FEATURES.extract(trace), CurveFeatures(config).extract(scaled)
+    for name, unit, a, b in zip(NAMES, plain.units, plain.values, converted.values, strict=True):
+        assert b == pytest.approx(a * scaled_by[unit], rel=1e-6, abs=1e-9 * scaled_by[unit]), name
 
 
 def test_noise_of_the_pads_does_not_bias_stiffness_and_force():
@@ -226,7 +234,7 @@ def test_a_recording_without_phases_has_the_same_features():
 @pytest.mark.parametrize("absent", [math.nan, 0.0])
 def test_a_single_pad_suffices(absent):
     """The other pad gives no number, or touches nothing."""
-    both = grasp(EVEN, second=1.0)
+    both = grasp(EVEN, second_share=1.0)
     alone = evolve(both, force_right_n=np.full(len(both), absent))
     f, expected = FEATURES.extract(alone), FEATURES.extract(both)
     assert set(f.reasons) == {"pad_difference"}

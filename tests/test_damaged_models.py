@@ -16,6 +16,7 @@ import numpy as np
 import parts
 import pytest
 from attrs import evolve
+from cases import every_case
 from parts import Nearest
 from test_classifiers import trials
 
@@ -119,7 +120,7 @@ def test_damages_of_a_model_kept_as_skops_are_refused_or_answer(tmp_path, name, 
     assert read_damaged(*damages, tmp_path / "m.json") >= least
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("name", "setting", "value"),
     [
         ("mlp", "hidden", 10**9),
@@ -149,7 +150,7 @@ def test_settings_that_would_take_all_memory_or_time_are_refused(tmp_path, name,
         load_model(str(path), installed())
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("text", "says"),
     [
         ("[" * 100_000 + "]" * 100_000, "nested too deeply"),
@@ -168,7 +169,7 @@ def test_what_is_no_strict_json_is_refused(tmp_path, text, says):
     assert not is_regression(str(tmp_path / "m.json"))
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("place", "value"),
     [
         ("provenance.simulated", 1),
@@ -252,7 +253,7 @@ class TestKeptAsSkops:
         with pytest.raises(DataDamaged, match=r"model\.skops"):
             load_model(str(path), installed())
 
-    @pytest.mark.parametrize(
+    @every_case(
         ("attribute", "change"),
         [
             ("support_vectors_", lambda values: values[:-1]),
@@ -282,7 +283,7 @@ class TestKeptAsSkops:
 
         self.refused(tmp_path, "svm", damage)
 
-    @pytest.mark.parametrize(
+    @every_case(
         "change",
         [
             lambda network: network.coefs_.pop(),
@@ -297,7 +298,7 @@ class TestKeptAsSkops:
     def test_a_network(self, tmp_path, change):
         self.refused(tmp_path, "mlp", change)
 
-    @pytest.mark.parametrize(
+    @every_case(
         ("column", "row", "value"),
         [
             ("left_child", 0, 10**6),
@@ -309,7 +310,7 @@ class TestKeptAsSkops:
             ("n_node_samples", 0, 0),
         ],
     )
-    @pytest.mark.parametrize("name", ["tree", "forest"])
+    @every_case("name", ["tree", "forest"])
     def test_a_tree(self, tmp_path, name, column, row, value):
         def damage(estimator):
             tree = estimator.estimators_[1].tree_ if name == "forest" else estimator.tree_

@@ -83,7 +83,7 @@ def component(role, entry):
     return Component(entry, "lab", "0.1", role)
 
 
-def of(cls, role="feature-set", entry=FeatureSetEntry, **given):
+def part(cls, role="feature-set", entry=FeatureSetEntry, **given):
     return component(role, entry("a", f"{__name__}:{cls.__name__}", "a thing", **given))
 
 
@@ -93,7 +93,7 @@ def importable(monkeypatch):
 
 
 def test_an_entry_is_completed_by_the_class():
-    peak = of(Summit)
+    peak = part(Summit)
 
     assert peak.config_class() is PeakConfig
     assert peak.declared().requires == (Channel("force_left", "N"),)
@@ -103,7 +103,7 @@ def test_an_entry_is_completed_by_the_class():
 
 
 def test_the_config_class_is_that_of_the_nearest_base():
-    hand = of(Fingers, "sensor-backend", SensorBackendEntry)
+    hand = part(Fingers, "sensor-backend", SensorBackendEntry)
 
     assert hand.config_class() is FingersConfig
 
@@ -116,7 +116,7 @@ def test_a_class_that_does_not_say_what_its_settings_are(monkeypatch):
     monkeypatch.setattr(HERE, "Bare", Bare, raising=False)
 
     with pytest.raises(PluginUnavailable, match=r"write class Bare\(FeatureSet\[Config\]\), where Config"):
-        of(Bare).config_class()
+        part(Bare).config_class()
 
 
 def test_a_class_that_does_not_declare_what_is_missing(monkeypatch):
@@ -132,9 +132,9 @@ def test_a_class_that_does_not_declare_what_is_missing(monkeypatch):
     with pytest.raises(
         PluginUnavailable, match=r"Mute does not declare `features`: write features = \(Feature"
     ):
-        of(Mute).declared()
+        part(Mute).declared()
     with pytest.raises(PluginUnavailable, match=r"Wrong: 'requires' must be <class '.*Channel'>"):
-        of(Wrong).declared()
+        part(Wrong).declared()
 
 
 class Sided(Peak, FeatureSet[PeakConfig]):
@@ -148,7 +148,7 @@ class Sided(Peak, FeatureSet[PeakConfig]):
 
 
 def test_what_features_and_laws_require_may_depend_on_their_settings():
-    sided = of(Sided)
+    sided = part(Sided)
 
     assert sided.declared().requires == (Channel("force_left", "N"),)
     assert sided.declared(PeakConfig(side="right")).requires == (Channel("force_right", "N"),)
@@ -156,7 +156,7 @@ def test_what_features_and_laws_require_may_depend_on_their_settings():
 
 
 def test_what_entry_and_class_declare_is_told():
-    assert of(Summit, requires=()).declared_twice() == ("requires",)
+    assert part(Summit, requires=()).declared_twice() == ("requires",)
 
 
 def test_the_result_has_the_declared_names_and_units():

@@ -39,12 +39,12 @@ def test_offset_and_drift_are_found_and_the_ages_are_the_delays(drift, offset_s,
 def test_a_stall_of_the_host_moves_neither_offset_nor_drift():
     clock = DeviceClock()
     fed(clock, 10.0, 5e-5, 3.0, 1)
-    before = clock.line()
+    line_before = clock.line()
     # For two seconds everything is half a second late, as after a stall with a full buffer.
     ages = [clock.age_s(t, t * (1.0 + 5e-5) + 3.5) for t in np.arange(10.0, 12.0, 0.005).tolist()]
     assert min(ages[1:]) > 0.49
-    assert clock.line().drift == pytest.approx(before.drift, abs=5e-6)
-    assert clock.line().host_s(12.0) == pytest.approx(before.host_s(12.0), abs=5e-4)
+    assert clock.line().drift == pytest.approx(line_before.drift, abs=5e-6)
+    assert clock.line().host_s(12.0) == pytest.approx(line_before.host_s(12.0), abs=5e-4)
     assert clock.line().uncertainty_s > 0.4, "the late blocks are part of how far off it can be"
 
 

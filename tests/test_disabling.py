@@ -121,15 +121,15 @@ def test_the_list_says_what_is_to_be_done(home, site):
 
 def test_a_distribution_that_is_installed_twice_is_told_of(site, tmp_path, monkeypatch):
     site.install("lab-peak", FEATURES.format(name="peak"))
-    second = tmp_path / "second" / "lab_peak-0.1.dist-info"
-    second.mkdir(parents=True)
-    (second / "METADATA").write_text("Metadata-Version: 2.1\nName: lab-peak\nVersion: 0.1\n")
-    (second / "entry_points.txt").write_text("[graspsense.plugins]\nmain = lab_peak_plugin\n")
+    copy_info = tmp_path / "second" / "lab_peak-0.1.dist-info"
+    copy_info.mkdir(parents=True)
+    (copy_info / "METADATA").write_text("Metadata-Version: 2.1\nName: lab-peak\nVersion: 0.1\n")
+    (copy_info / "entry_points.txt").write_text("[graspsense.plugins]\nmain = lab_peak_plugin\n")
     monkeypatch.syspath_prepend(tmp_path / "second")
 
     mine = [source for source in installed_sources() if source.distribution == "lab-peak"]
     loaded = Plugins([builtin_source(), *mine], {})
-    (row,) = [one for one in _rows(loaded) if one["distribution"] == "lab-peak"]
+    (row,) = [plugin_row for plugin_row in _rows(loaded) if plugin_row["distribution"] == "lab-peak"]
 
     assert len(mine) == 1
     assert "installed 2 times" in row["advice"][0]

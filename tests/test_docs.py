@@ -14,7 +14,7 @@ from pathlib import Path
 
 import click
 import numpy
-import pytest
+from cases import every_case
 from test_imports import DOORS, MAY_KNOW, ROOMS
 
 from graspsense import plugin_api, simulator_api
@@ -35,7 +35,7 @@ PAGES = script("role_pages")
 DRAWING = script("package_drawing")
 
 
-@pytest.mark.parametrize("role", PAGES.TITLES)
+@every_case("role", PAGES.TITLES)
 def test_the_page_of_a_role_is_what_the_code_says(role):
     written = (ROOT / "docs" / "roles" / f"{role}.md").read_text()
     assert written == PAGES.page(role), "run: python docs/role_pages.py"
@@ -97,7 +97,7 @@ def test_the_page_of_moved_names_has_each_of_them():
 HELPERS = [name for names in PAGES.HELPERS.values() for name in names if callable(PAGES.public(name))]
 
 
-@pytest.mark.parametrize("name", HELPERS)
+@every_case("name", HELPERS)
 def test_a_helper_has_an_example_that_holds(name):
     helper = PAGES.public(name)
     finder = doctest.DocTestFinder(recurse=False)
@@ -199,9 +199,9 @@ def in_backticks(pattern):
         for glob in ("README.md", "CONTRIBUTING.md", "docs/*.md", "specs/*.md")
         for path in ROOT.glob(glob)
     )
-    found = {(page.name, name) for page in pages for name in re.findall(rf"`({pattern})`", page.read_text())}
-    assert found
-    return sorted(found)
+    names = {(page.name, name) for page in pages for name in re.findall(rf"`({pattern})`", page.read_text())}
+    assert names
+    return sorted(names)
 
 
 METADATA = ("graspsense.device", "graspsense.trial")

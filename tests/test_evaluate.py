@@ -92,10 +92,10 @@ def test_a_class_of_one_state_is_left_out_of_the_states():
     labels, width, force = four_states()
     labels = ["egg:whole" if label == "jar:full" else label for label in labels]
     labels = ["egg:whole" if label == "jar:empty" else label for label in labels]
-    found = judged(labelled(labels, width, force), target="state")
+    evaluation = judged(labelled(labels, width, force), target="state")
 
-    assert found.headline.n == 60
-    assert "classes left out because they have a single state: egg" in found.notes
+    assert evaluation.headline.n == 60
+    assert "classes left out because they have a single state: egg" in evaluation.notes
     with pytest.raises(ConfigError, match="has no state"):
         judged(labelled(["a", "b"] * 20, width[:40]), target="state")
 
@@ -106,15 +106,15 @@ def test_a_rate_that_is_the_instance_is_found_out():
     things = np.repeat(np.arange(20), 6)
     labels = [("full", "empty")[thing % 2] for thing in things]
     width = rng.normal(size=20)[things] + 1e-3 * rng.normal(size=120)
-    found = judged(labelled(labels, width, instances=tuple(f"thing{k}" for k in things)), "knn")
+    evaluation = judged(labelled(labels, width, instances=tuple(f"thing{k}" for k in things)), "knn")
 
-    assert found.protocol == "instance_held_out"
-    assert found.protocols["stratified_10_fold"].rate.rate > 0.95
-    assert found.headline.rate < 0.75
-    held = found.controls["instance_held_out"]
-    assert held.rate == found.headline
+    assert evaluation.protocol == "instance_held_out"
+    assert evaluation.protocols["stratified_10_fold"].rate.rate > 0.95
+    assert evaluation.headline.rate < 0.75
+    held = evaluation.controls["instance_held_out"]
+    assert held.rate == evaluation.headline
     assert held.difference.interval[0] > 0.2
-    assert any("having seen the same objects" in warning for warning in found.warnings)
+    assert any("having seen the same objects" in warning for warning in evaluation.warnings)
 
 
 def test_a_rate_that_is_the_moment_of_the_recording_is_found_out():
@@ -123,12 +123,12 @@ def test_a_rate_that_is_the_moment_of_the_recording_is_found_out():
     order = np.arange(120)
     labels = [("full", "empty")[(i // 12) % 2] for i in order]
     drift = 0.1 * order + 1e-3 * rng.normal(size=120)
-    found = judged(labelled(labels, drift, order=tuple(order.tolist())), "knn")
+    evaluation = judged(labelled(labels, drift, order=tuple(order.tolist())), "knn")
 
-    assert found.headline.rate > 0.85
-    assert found.controls["recording_order"].rate.rate < 0.7
-    assert found.controls["recording_order"].difference.interval[0] > 0.2
-    assert any("the time of recording" in warning for warning in found.warnings)
+    assert evaluation.headline.rate > 0.85
+    assert evaluation.controls["recording_order"].rate.rate < 0.7
+    assert evaluation.controls["recording_order"].difference.interval[0] > 0.2
+    assert any("the time of recording" in warning for warning in evaluation.warnings)
 
 
 @pytest.mark.parametrize("leak", [True, False])
@@ -137,48 +137,50 @@ def test_what_is_known_before_the_contact_is_a_warning_only_where_it_tells(leak)
     rng = np.random.default_rng(2)
     posture = (width if leak else rng.normal(size=120)) + 0.0
     control = ControlFeatures(table=table(posture, names=("posture",)), what="posture before the grasp")
-    found = judged(labelled(labels, width, force, before_contact=control))
+    evaluation = judged(labelled(labels, width, force, before_contact=control))
 
-    assert any("before contact" in warning for warning in found.warnings) is leak
-    assert found.controls["before_contact"].what == "posture before the grasp"
-    assert (found.controls["before_contact"].rate.rate > 0.4) is leak
+    assert any("before contact" in warning for warning in evaluation.warnings) is leak
+    assert evaluation.controls["before_contact"].what == "posture before the grasp"
+    assert (evaluation.controls["before_contact"].rate.rate > 0.4) is leak
 
 
-def before(values, **more):
+def control_of(values, **more):
     return ControlFeatures(table=table(values, names=("gap_at_start",)), what="the gap at the start", **more)
 
 
 def test_a_control_without_any_feature_is_not_measured_instead_of_passing():
     """Sixty trials that begin in contact: their control from before contact would be chance, which proves nothing."""
     labels, width, force = four_states(15)
-    control = before(np.full(60, np.nan), missing="a pad felt a force in the first 0.6 s of the approach")
-    found = judged(labelled(labels, width, force, before_contact=control))
+    control = control_of(np.full(60, np.nan), missing="a pad felt a force in the first 0.6 s of the approach")
+    evaluation = judged(labelled(labels, width, force, before_contact=control))
 
-    measured = found.controls["before_contact"]
+    measured = evaluation.controls["before_contact"]
     assert measured.rate is None
     assert measured.reason == (
         "0 of 60 trials have such features: a pad felt a force in the first 0.6 s of the approach"
     )
-    assert f"was not measured: {measured.reason}" in verdict(found)
+    assert f"was not measured: {measured.reason}" in verdict(evaluation)
 
 
 def test_a_control_is_measured_on_the_trials_that_have_its_features():
     """Half of the trials begin in contact. In the others the gap at the start is the label."""
     labels, width, force = four_states()
     leaking = np.where(np.arange(120) < 60, np.nan, np.array([STATES.index(label) for label in labels]))
-    control = before(leaking, missing="a pad felt a force")
-    found = judged(labelled(labels, width, force, before_contact=control)).controls["before_contact"]
+    control = control_of(leaking, missing="a pad felt a force")
+    evaluation = judged(labelled(labels, width, force, before_contact=control)).controls["before_contact"]
 
-    assert (found.rate.correct, found.rate.n) == (60, 60)
-    assert found.what == "the gap at the start; 60 of 120 trials have such features: a pad felt a force"
+    assert (evaluation.rate.correct, evaluation.rate.n) == (60, 60)
+    assert evaluation.what == "the gap at the start; 60 of 120 trials have such features: a pad felt a force"
     # The headline of the same sixty trials, of which it misses some.
-    assert -0.5 < found.difference.value < 0.0
+    assert -0.5 < evaluation.difference.value < 0.0
 
 
 def test_too_few_trials_with_a_feature_are_not_measured():
     labels, width, force = four_states()
-    one = np.where(np.arange(120) == 7, 0.08, np.nan)
-    control = judged(labelled(labels, width, force, before_contact=before(one))).controls["before_contact"]
+    sparse = np.where(np.arange(120) == 7, 0.08, np.nan)
+    control = judged(labelled(labels, width, force, before_contact=control_of(sparse))).controls[
+        "before_contact"
+    ]
     assert control.rate is None
     assert control.reason == "1 of 120 trials have such features; these are too few to learn from"
 
@@ -189,9 +191,9 @@ def test_the_first_line_of_imported_recordings_is_a_control_of_its_own(leak):
     labels, width, force = four_states()
     gap = width if leak else np.random.default_rng(3).normal(size=120)
     control = ControlFeatures(table=table(gap, names=("gap_first",)), what="the first frame")
-    found = judged(labelled(labels, width, force, first_line=control))
-    assert any("from the first line of the recording" in warning for warning in found.warnings) is leak
-    assert ("The first line of the recording alone" in verdict(found)) is leak
+    evaluation = judged(labelled(labels, width, force, first_line=control))
+    assert any("from the first line of the recording" in warning for warning in evaluation.warnings) is leak
+    assert ("The first line of the recording alone" in verdict(evaluation)) is leak
     assert "first_line" not in judged(labelled(labels, width, force)).controls
 
 
@@ -202,20 +204,20 @@ def test_a_width_that_is_as_good_as_all_features_is_a_warning(squeeze_adds):
     width = np.array([60.0, 55.0] * 60) + 3.0 * rng.normal(size=120)
     force = np.array([9.0, 3.0 if squeeze_adds else 9.0] * 60) + rng.normal(size=120)
     control = ControlFeatures(table=table(width, names=("p_first",)), what="p_first alone")
-    found = judged(labelled(labels, width, force, width=control))
-    assert any("the width alone reaches" in warning for warning in found.warnings) is not squeeze_adds
+    evaluation = judged(labelled(labels, width, force, width=control))
+    assert any("the width alone reaches" in warning for warning in evaluation.warnings) is not squeeze_adds
 
 
 def test_what_cannot_be_measured_is_null_with_a_reason():
     labels, width, force = four_states()
-    found = to_json(judged(labelled(labels, width, force, no_instances="one thing a class")))
+    evaluation = to_json(judged(labelled(labels, width, force, no_instances="one thing a class")))
 
-    assert found["protocol"] == "stratified_10_fold"
-    assert found["controls"]["instance_held_out"]["rate"] is None
-    assert found["controls"]["instance_held_out"]["reason"] == "one thing a class"
+    assert evaluation["protocol"] == "stratified_10_fold"
+    assert evaluation["controls"]["instance_held_out"]["rate"] is None
+    assert evaluation["controls"]["instance_held_out"]["reason"] == "one thing a class"
     for name in ("before_contact", "width_only", "recording_order"):
-        assert found["controls"][name]["rate"] is None
-        assert found["controls"][name]["reason"]
+        assert evaluation["controls"][name]["rate"] is None
+        assert evaluation["controls"][name]["reason"]
 
 
 def test_one_instance_of_a_label_cannot_be_held_out():
@@ -237,41 +239,41 @@ def names_in(value):
 def test_the_json_is_whole_and_stable():
     labels, width, force = four_states()
     trials = labelled(labels, width, force, order=tuple(range(120)))
-    first, again = (json.dumps(to_json(judged(trials, seed=2)), allow_nan=False) for _ in range(2))
-    found = json.loads(first)
+    text, again = (json.dumps(to_json(judged(trials, seed=2)), allow_nan=False) for _ in range(2))
+    evaluation = json.loads(text)
 
-    assert first == again
-    assert found.keys() >= {
+    assert text == again
+    assert evaluation.keys() >= {
         "protocol",
         "headline",
         "confusion",
         "controls",
         "learning_curve",
     }
-    assert found["headline"].keys() == {"correct", "n", "rate", "interval", "no_interval", "instances"}
-    assert list(found["controls"])[:5] == [
+    assert evaluation["headline"].keys() == {"correct", "n", "rate", "interval", "no_interval", "instances"}
+    assert list(evaluation["controls"])[:5] == [
         "before_contact",
         "width_only",
         "instance_held_out",
         "recording_order",
         "majority_class",
     ]
-    counts, headline = found["confusion"]["counts"], found["headline"]
+    counts, headline = evaluation["confusion"]["counts"], evaluation["headline"]
     assert sum(map(sum, counts)) == headline["n"] == 120
     assert sum(counts[k][k] for k in range(4)) == headline["correct"] == round(headline["rate"] * 120)
     page = (Path(__file__).parents[1] / "docs" / "evaluation.md").read_text()
     sample = re.search(r"^## JSON\n.*?```text\n(.*?)```", page, re.DOTALL | re.MULTILINE)[1]
-    assert set(re.findall(r'"(\w+)":', sample)) <= names_in(found) | {"stratified_10_fold"}
+    assert set(re.findall(r'"(\w+)":', sample)) <= names_in(evaluation) | {"stratified_10_fold"}
     # A row is the truth: every label was there thirty times.
     assert [sum(row) for row in counts] == [30] * 4
 
 
 def test_the_learning_curve_ends_at_the_headline_and_grows():
     labels, width, force = four_states(n=60)
-    found = judged(labelled(labels, width, force))
-    curve = found.learning_curve
+    evaluation = judged(labelled(labels, width, force))
+    curve = evaluation.learning_curve
 
-    assert curve[-1].rate == found.headline
+    assert curve[-1].rate == evaluation.headline
     assert [round(point.trained_on) for point in curve] == [20, 44, 88, 152, 216]
     # Of few trials a tenth and a fifth come to the same ones: that is one point.
     labels, width, force = four_states(n=4)
@@ -324,12 +326,13 @@ def test_a_fit_that_refuses_few_trials_costs_its_figure_only():
     labels, width, force = four_states()
     trials = labelled(labels, width, force)
 
-    found = evaluate(Choosy(60), trials, classifier="choosy")
+    evaluation = evaluate(Choosy(60), trials, classifier="choosy")
 
-    assert found.headline.rate > 0.95
-    assert [point.trained_on >= 60 for point in found.learning_curve] == [True, True]
+    assert evaluation.headline.rate > 0.95
+    assert [point.trained_on >= 60 for point in evaluation.learning_curve] == [True, True]
     assert any(
-        "no point at 10% of the trials" in note and "60 trials are needed" in note for note in found.notes
+        "no point at 10% of the trials" in note and "60 trials are needed" in note
+        for note in evaluation.notes
     )
     with pytest.raises(ConfigError, match="refused 108 training trials of 4 labels: 1000 trials are needed"):
         evaluate(Choosy(1000), trials, classifier="choosy")
@@ -355,11 +358,11 @@ def test_a_smaller_share_lies_within_a_larger_one_and_keeps_every_label():
 
 
 def test_a_confusion_has_every_label_of_either_side():
-    found = confusion(["a", "b", "b"], ["a", "c", "b"])
+    matrix = confusion(["a", "b", "b"], ["a", "c", "b"])
 
-    assert found.labels == ("a", "b", "c")
-    assert found.counts == ((1, 0, 0), (0, 1, 1), (0, 0, 0))
-    assert (found.correct, found.n) == (2, 3)
+    assert matrix.labels == ("a", "b", "c")
+    assert matrix.counts == ((1, 0, 0), (0, 1, 1), (0, 0, 0))
+    assert (matrix.correct, matrix.n) == (2, 3)
 
 
 def test_an_evaluation_is_read_back_from_its_json():
@@ -389,7 +392,7 @@ def test_warnings_of_scikit_learn_are_one_line_each_with_a_count(recwarn):
     labels, width, force = four_states(10)
     learner_of_test = learner("knn")
     warning = Unconverged(learner_of_test.component, learner_of_test.config)
-    found = evaluate(
+    evaluation = evaluate(
         warning,
         labelled(labels, width, force),
         classifier="knn",
@@ -398,7 +401,7 @@ def test_warnings_of_scikit_learn_are_one_line_each_with_a_count(recwarn):
         learning_curve=False,
     )
     # Four folds of the headline and four of the shuffled labels.
-    (note,) = [one for one in found.notes if "iterations ended" in one]
+    (note,) = [text for text in evaluation.notes if "iterations ended" in text]
     assert "8 times" in note
     assert "lbfgs" not in note
-    assert not [one for one in recwarn if "onverge" in str(one.message)]
+    assert not [text for text in recwarn if "onverge" in str(text.message)]

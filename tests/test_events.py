@@ -112,7 +112,7 @@ def test_a_killed_grasp_keeps_its_events(tmp_path):
     with Store.open(tmp_path / "trials") as store:
         while (recovered := recover_store(store))[0].what == "busy":
             pass
-        assert [one.what for one in recovered] == ["recovered"]
+        assert [recovery.what for recovery in recovered] == ["recovered"]
         recording = store.trial(1).recording
     trace = read_recorded(recording).trace()
     (event,) = trace.events

@@ -71,11 +71,11 @@ class Lab:
 
     def results(self, out):
         """Return state and result of each task in a folder, by name."""
-        found = {}
+        tasks = {}
         for path in (self.folder / out / "results").glob("*.json"):
             done = json.loads(path.read_text())
-            found[done["name"]] = (done["state"], done["result"])
-        return found
+            tasks[done["name"]] = (done["state"], done["result"])
+        return tasks
 
     def until(self, condition, process):
         """Wait until something is there; fail where the process has ended before."""
@@ -100,25 +100,25 @@ def lab(tmp_path):
 def test_whatever_a_task_does_the_others_are_kept(lab, executor):
     lab.write("fine", "kills", "kills once", "raises", "prints", "exits")
     how = ("-o", "seeds=1", "--executor", executor, "--workers", "2")
-    code, found, stderr = lab.run("out", *how)
+    code, summary, stderr = lab.run("out", *how)
 
     assert code == 1, stderr
-    assert found["stopped"] is None
-    assert found["missing"] == 0
+    assert summary["stopped"] is None
+    assert summary["missing"] == 0
     states = {name: state for name, (state, _) in lab.results("out").items()}
     expected = {"fine": "done", "kills once": "done", "prints": "done", "kills": "failed", "raises": "failed"}
     expected["exits"] = "failed"
     assert states == {f"{name}, seed 0": state for name, state in expected.items()}
-    reasons = {one["task"]: one["reason"] for one in found["failed"]}
+    reasons = {failure["task"]: failure["reason"] for failure in summary["failed"]}
     assert "Unpicklable: as it is told to" in reasons["raises, seed 0"]
     assert reasons["exits, seed 0"] == "SystemExit: 3"
     assert "it ended its worker" in reasons["kills, seed 0"]
 
     kept = lab.results("out")
-    code, found, stderr = lab.run("out", *how, "--resume", WAYWARD_TAMED="1")
+    code, summary, stderr = lab.run("out", *how, "--resume", WAYWARD_TAMED="1")
 
     assert code == 0, stderr
-    assert (found["kept"], found["done"], found["complete"]) == (3, 3, True)
+    assert (summary["kept"], summary["done"], summary["complete"]) == (3, 3, True)
     assert all(lab.results("out")[name] == result for name, result in kept.items() if result[0] == "done")
 
 
@@ -135,16 +135,16 @@ def test_a_run_that_is_ended_goes_on_where_it_was(lab, how):
     stdout, _ = process.communicate(timeout=300)
     if how != "SIGKILL":
         assert process.returncode == 130
-        found = json.loads(stdout)
-        assert found["stopped"] == "interrupted"
-        assert 1 <= found["done"] < 4
-    before = lab.results("out")
+        summary = json.loads(stdout)
+        assert summary["stopped"] == "interrupted"
+        assert 1 <= summary["done"] < 4
+    results = lab.results("out")
     lab.go()
-    code, found, stderr = lab.run("out", "--executor", "processes", "--workers", "2", "--resume")
+    code, summary, stderr = lab.run("out", "--executor", "processes", "--workers", "2", "--resume")
 
     assert code == 0, stderr
-    assert found["kept"] == len(before) < 4
-    assert found["complete"]
+    assert summary["kept"] == len(results) < 4
+    assert summary["complete"]
     lab.run("undisturbed", "--executor", "serial")
     assert lab.results("out") == lab.results("undisturbed")
 
@@ -222,14 +222,14 @@ def test_a_scheduler_that_is_stopped_ends_the_run_with_an_account(lab, cluster):
     stdout, stderr = process.communicate(timeout=300)
 
     assert process.returncode == 1, stderr
-    found = json.loads(stdout)
-    assert "scheduler" in found["stopped"]
-    assert found["done"] >= 1
+    summary = json.loads(stdout)
+    assert "scheduler" in summary["stopped"]
+    assert summary["done"] >= 1
     lab.go()
-    code, found, stderr = lab.run("out", "--executor", "serial", "--resume")
+    code, summary, stderr = lab.run("out", "--executor", "serial", "--resume")
     assert code == 0, stderr
-    assert found["kept"] >= 1
-    assert found["complete"]
+    assert summary["kept"] >= 1
+    assert summary["complete"]
 
 
 def test_workers_with_other_versions_are_refused(lab, cluster):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import wayward
 from attrs import evolve
+from cases import every_case
 from kept import keep
 
 from graspsense.core.values.errors import ConfigError
@@ -114,11 +115,11 @@ def test_files_and_folders_are_known_by_their_content(tmp_path, scene, name):
     (tmp_path / "mug.toml").write_text("")
     name = name.format(tmp_path, tmp_path)
     params = {"data": {"named": {"cup": name}}}
-    before = contents_of(params)
-    assert name in before
-    assert contents_of(params) == before
+    contents = contents_of(params)
+    assert name in contents
+    assert contents_of(params) == contents
     scene.write_text("width_m = 0.07\n")
-    assert contents_of(params)[name] != before[name]
+    assert contents_of(params)[name] != contents[name]
 
 
 def test_files_that_a_file_names_count(tmp_path):
@@ -132,13 +133,13 @@ def test_files_that_a_file_names_count(tmp_path):
     mesh.write_text("1")
     params = {"gripper": {"file": str(tmp_path / "gripper.toml")}}
     for part in (mesh, tmp_path / "part.xml", tmp_path / "gripper.xml"):
-        before = contents_of(params)
-        assert contents_of(params) == before
+        contents = contents_of(params)
+        assert contents_of(params) == contents
         part.write_text(part.read_text() + " ")
-        assert contents_of(params) != before
+        assert contents_of(params) != contents
 
 
-@pytest.mark.parametrize(
+@every_case(
     "source", ["s", "s/store.sqlite", "store:s", "manifest:m.toml", "identified:m.toml,n.toml", "t.parquet"]
 )
 def test_paths_are_relative_to_the_folder_of_the_file_wherever_it_is_read(tmp_path, monkeypatch, source):
@@ -161,9 +162,9 @@ def test_files_that_a_manifest_describes_count_wherever_they_are(tmp_path):
     data = tmp_path / "there" / "can.csv"
     data.write_text("t,gap,F\n0,0.1,0\n")
     name = f"manifest:{manifest}"
-    before = contents_of([name])[name]
+    content = contents_of([name])[name]
     data.write_text("t,gap,F\n0,0.2,0\n")
-    assert contents_of([name])[name] != before
+    assert contents_of([name])[name] != content
 
 
 def test_the_calibrations_of_a_gripper_count_with_and_without_their_setting(tmp_path, monkeypatch):
@@ -173,9 +174,9 @@ def test_the_calibrations_of_a_gripper_count_with_and_without_their_setting(tmp_
     for given in ("", str(folder.parent)):
         params = {"gripper": {"calibration": given}}
         (folder / "tare.json").write_text("1")
-        before = contents_of(params)
+        contents = contents_of(params)
         (folder / "tare.json").write_text("2")
-        assert contents_of(params) != before
+        assert contents_of(params) != contents
 
 
 def test_the_code_of_a_plugin_and_its_version_count(tmp_path, monkeypatch):
@@ -190,11 +191,11 @@ def test_the_code_of_a_plugin_and_its_version_count(tmp_path, monkeypatch):
         module._hash_of_code.cache_clear()  # as in another process
         return module._hash_of_code(version, "my_plugin.law")
 
-    before = content("1.0")
-    assert content("1.0") == before
-    assert content("1.1") != before
+    known = content("1.0")
+    assert content("1.0") == known
+    assert content("1.1") != known
     law.write_text("a = 22")
-    assert content("1.0") != before
+    assert content("1.0") != known
 
 
 def test_the_components_of_a_task_are_inputs(tmp_path):
@@ -214,7 +215,7 @@ def test_what_is_no_file_is_no_input():
     }
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("sweep", "key"),
     [
         ('"controller.probing_force_n" = [17.0, 20.0]', "controller.probing_force_n"),

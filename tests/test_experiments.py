@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 import wayward
+from cases import every_case
 from commands import graspsense
 from hypothesis import given
 from hypothesis import strategies as st
@@ -56,21 +57,21 @@ def file(tmp_path):
 
 def results_in(folder):
     """Return what came of each task, without where and when."""
-    found = {}
+    results = {}
     for path in (Path(folder) / "results").glob("*.json"):
         done = json.loads(path.read_text())
-        found[path.name] = (done["state"], done["result"])
-    return found
+        results[path.name] = (done["state"], done["result"])
+    return results
 
 
 def test_an_experiment_is_a_file_and_ends_in_a_page(file, tmp_path):
     code, out, _ = graspsense("experiment", file, "--out", tmp_path / "out", "--executor", "serial", "--json")
-    found = json.loads(out)
+    answer = json.loads(out)
 
     assert code == 0
-    assert found["complete"]
-    assert found["tasks"] == 4
-    assert {(one["case"], one["classifier"]) for one in found["conditions"]} == {
+    assert answer["complete"]
+    assert answer["tasks"] == 4
+    assert {(condition["case"], condition["classifier"]) for condition in answer["conditions"]} == {
         (case, learner) for case in ("folds 2", "folds 4") for learner in ("c45", "near")
     }
     page = (tmp_path / "out" / "report.html").read_text()
@@ -90,7 +91,7 @@ def test_what_lies_beside_the_results_gives_the_same_again(file, tmp_path):
     assert len(results_in(tmp_path / "out")) == 4
 
 
-@pytest.mark.parametrize("name", sorted(shipped()))
+@every_case("name", sorted(shipped()))
 def test_what_is_shipped_resolves_to_itself(name, tmp_path):
     planned = read_experiment(name, ["seeds=2"])
     results = Results(tmp_path)
@@ -133,9 +134,9 @@ def test_two_plugins_may_ship_an_experiment_of_one_name():
 def test_resume_does_what_is_missing_and_nothing_else(file, tmp_path):
     planned, results = read_experiment(str(file)), Results(tmp_path / "out")
     run_experiment(planned, results, Serial)
-    before = results_in(results.folder)
+    kept = results_in(results.folder)
     stamps = {path.name: path.stat().st_mtime_ns for path in (results.folder / "results").glob("*.json")}
-    lost, broken = sorted(before)[:2]
+    lost, broken = sorted(kept)[:2]
     (results.folder / "results" / lost).unlink()
     (results.folder / "results" / broken).write_text('{"key": "cut o')
 
@@ -144,7 +145,7 @@ def test_resume_does_what_is_missing_and_nothing_else(file, tmp_path):
     account = run_experiment(planned, results, Serial, resume=True)
 
     assert (account.kept, account.done, account.complete) == (2, 2, True)
-    assert results_in(results.folder) == before
+    assert results_in(results.folder) == kept
     for path in (results.folder / "results").glob("*.json"):
         assert (path.stat().st_mtime_ns == stamps[path.name]) is (path.name not in (lost, broken))
 
@@ -211,7 +212,7 @@ def test_one_run_at_a_time_writes_to_a_folder(file, tmp_path):
         run_experiment(read_experiment(str(file)), Results(tmp_path / "out"), Serial)
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("text", "said"),
     [
         ('title = "x"\nsedes = 2', r"mine.toml:2: sedes: .*Did you mean 'seeds'"),
@@ -249,7 +250,7 @@ def test_identified_scenes_of_an_experiment_bring_their_fingertips(tmp_path):
     assert case.settings.gripper.config.pad_stiffness_n_m == 8000.0
     # What the file says itself holds: it may be what the experiment varies.
     path.write_text(f"{text}[sweep]\n'gripper.pad_stiffness_n_m' = [2000.0, 4000.0]\n")
-    stiff = [one.settings.gripper.config.pad_stiffness_n_m for one in read_experiment(str(path)).cases]
+    stiff = [loaded.settings.gripper.config.pad_stiffness_n_m for loaded in read_experiment(str(path)).cases]
     assert stiff == [2000.0, 4000.0]
     path.write_text(f'{text}[test]\nsource = "identified:{tmp_path}/other.toml"\n')
     with pytest.raises(ConfigError, match="different fingertips"):
@@ -501,25 +502,32 @@ def test_experiments_are_compared_on_one_page(compared, tmp_path):
     folders = [compared / name for name in ("weak", "strong", "more")]
     code, out, _ = graspsense("experiment", "compare", *folders, "--out", page)
     _, told, _ = graspsense("experiment", "compare", *folders, "--out", page, "--json")
-    found = json.loads(told)
+    answer = json.loads(told)
 
     assert code == 0
-    settings = {one["key"]: [one[name] for name in ("weak", "strong", "more")] for one in found["settings"]}
+    settings = {row["key"]: [row[name] for name in ("weak", "strong", "more")] for row in answer["settings"]}
     assert settings == {
         "controller.probing_force_n": ["14", "20", "14"],
         "data.trials": ["2", "2", "3"],
         "experiment.seeds": ["0, 1", "0, 1", "0, 1, 2"],
     }
-    paired, unpaired = found["differences"]
-    rates = {name: found["experiments"][name]["conditions"][0]["rate"] for name in ("weak", "strong", "more")}
+    paired, unpaired = answer["differences"]
+    rates = {
+        name: answer["experiments"][name]["conditions"][0]["rate"] for name in ("weak", "strong", "more")
+    }
     assert paired["difference"] == pytest.approx(rates["strong"] - rates["weak"])
     assert unpaired["difference"] == pytest.approx(rates["more"] - rates["weak"])
     assert paired["how"] == "paired over 2 common seeds, corrected for 2 comparisons"
     assert unpaired["how"] == "unpaired: the trials differ, corrected for 2 comparisons"
-    for one in found["differences"]:
-        assert one["interval"][0] <= one["difference"] <= one["interval"][1]
+    for row in answer["differences"]:
+        assert row["interval"][0] <= row["difference"] <= row["interval"][1]
     text = page.read_text()
-    for part in (found["headline"], "probing_force_n", "Settings that differ", "unpaired: the trials differ"):
+    for part in (
+        answer["headline"],
+        "probing_force_n",
+        "Settings that differ",
+        "unpaired: the trials differ",
+    ):
         assert part in text, part
         assert part == "Settings that differ" or part in out, part
     assert "closing_speed_m_s" not in text
@@ -531,17 +539,17 @@ def test_each_case_is_compared_with_that_of_the_same_name(file, tmp_path):
     _, told, _ = graspsense(
         "experiment", "compare", tmp_path / "a", tmp_path / "b", "--out", tmp_path / "c.html", "--json"
     )
-    found = json.loads(told)
+    answer = json.loads(told)
 
-    assert [one["case"] for one in found["differences"]] == [
+    assert [difference["case"] for difference in answer["differences"]] == [
         "folds 2, c45",
         "folds 2, near",
         "folds 4, c45",
         "folds 4, near",
     ]
-    for one in found["differences"]:
-        assert one["how"].startswith("unpaired: recorded trials are not paired")
-        assert one["verdict"] == "not shown to differ"
+    for difference in answer["differences"]:
+        assert difference["how"].startswith("unpaired: recorded trials are not paired")
+        assert difference["verdict"] == "not shown to differ"
 
 
 def test_a_report_of_results_with_other_settings_says_what_happened_and_what_to_do(strong, tmp_path):

@@ -8,6 +8,7 @@ import tomllib
 import numpy as np
 import pytest
 from attrs import evolve
+from cases import every_case
 from commands import graspsense, printed
 from kept import ended, frame, keep, pads, write_recording
 from scipy.io import arff
@@ -56,22 +57,22 @@ def test_a_csv_of_ours_is_a_table_to_learn_from(folder, tmp_path):
     with Store.open(folder) as store:
         set_aside(store, [3], "no label")
     export(folder, tmp_path / "t.csv")
-    found = read_labelled(
+    trials = read_labelled(
         tmp_path / "t.csv", "label", instance="instance", order="trial", features=["p_first"]
     )
-    assert found.labels == ("can:full_open", "can:it's open")
-    assert found.table.units == ("m",)
+    assert trials.labels == ("can:full_open", "can:it's open")
+    assert trials.table.units == ("m",)
 
 
 def test_an_exported_csv_comes_back_as_the_trials_of_the_store(folder, tmp_path):
     export(folder, tmp_path / "t.csv")
-    found, stored = read_labelled(tmp_path / "t.csv", "label"), labelled_store(str(folder))
+    trials, stored = read_labelled(tmp_path / "t.csv", "label"), labelled_store(str(folder))
 
-    assert found.table.names == stored.table.names
-    assert found.table.units == stored.table.units
-    assert found.table.values.tobytes() == stored.table.values.tobytes()
-    assert (found.labels, found.instances, found.order) == (stored.labels, stored.instances, (0, 1))
-    assert found.provenance["simulated"] == stored.provenance["simulated"]
+    assert trials.table.names == stored.table.names
+    assert trials.table.units == stored.table.units
+    assert trials.table.values.tobytes() == stored.table.values.tobytes()
+    assert (trials.labels, trials.instances, trials.order) == (stored.labels, stored.instances, (0, 1))
+    assert trials.provenance["simulated"] == stored.provenance["simulated"]
 
 
 def test_an_empty_column_of_an_export_is_not_a_feature(tmp_path):
@@ -79,10 +80,10 @@ def test_an_empty_column_of_an_export_is_not_a_feature(tmp_path):
         for k in range(4):
             keep(store, ("can:full", "can:empty")[k % 2], None, values=(0.05 + 0.01 * (k % 2), None))
     export(tmp_path / "trials", tmp_path / "t.csv")
-    found = read_labelled(tmp_path / "t.csv", "label")
+    trials = read_labelled(tmp_path / "t.csv", "label")
 
-    assert found.table.names == ("p_first", "f_steady")
-    assert found.instances is None
+    assert trials.table.names == ("p_first", "f_steady")
+    assert trials.instances is None
 
 
 def test_the_table_as_arff_is_read_by_scipy(folder, tmp_path):
@@ -98,11 +99,11 @@ def test_the_table_as_arff_is_read_by_scipy(folder, tmp_path):
 
 def test_the_table_as_npz(folder, tmp_path):
     assert export(folder, tmp_path / "t.npz")[0] == 0
-    with np.load(tmp_path / "t.npz", allow_pickle=False) as found:
-        assert found["features"].tolist() == ["p_first", "f_steady"]
-        assert found["units"].tolist() == ["m", "N"]
-        assert found["values"][:2].tolist()[0] == [0.066, 5.5]
-        assert found["label"].tolist() == ["can:full_open", "can:it's open", "", "can:full_open"]
+    with np.load(tmp_path / "t.npz", allow_pickle=False) as arrays:
+        assert arrays["features"].tolist() == ["p_first", "f_steady"]
+        assert arrays["units"].tolist() == ["m", "N"]
+        assert arrays["values"][:2].tolist()[0] == [0.066, 5.5]
+        assert arrays["label"].tolist() == ["can:full_open", "can:it's open", "", "can:full_open"]
 
 
 def test_one_grasp_tick_by_tick(folder, tmp_path):
@@ -114,8 +115,8 @@ def test_one_grasp_tick_by_tick(folder, tmp_path):
     assert {row["edge_left_n"] for row in rows} == {""}
     with (tmp_path / "one-pads.csv").open(newline="") as file:
         assert float(next(csv.DictReader(file))["right_00"]) == pads(0).right[0]
-    with np.load(tmp_path / "one.npz", allow_pickle=False) as found:
-        assert found["pad_left"].shape == (3, 22)
+    with np.load(tmp_path / "one.npz", allow_pickle=False) as arrays:
+        assert arrays["pad_left"].shape == (3, 22)
     (recording,) = [
         path
         for path in (folder / "recordings").iterdir()
@@ -134,9 +135,7 @@ def test_nothing_is_ever_overwritten(folder, tmp_path):
     assert "already exists" in err
 
 
-@pytest.mark.parametrize(
-    ("source", "target"), [("", "t.xlsx"), ("", "t.mcap"), ("#1", "t.arff"), ("#9", "t.csv")]
-)
+@every_case(("source", "target"), [("", "t.xlsx"), ("", "t.mcap"), ("#1", "t.arff"), ("#9", "t.csv")])
 def test_what_cannot_be_written_is_told(folder, tmp_path, source, target):
     code, err = export(f"{folder}{source}", tmp_path / target)
     assert code == 2
@@ -164,18 +163,18 @@ def test_parquet_is_read_by_pyarrow(folder, tmp_path):
 
 
 def test_labelled_trials_of_a_store_are_a_data_set(folder):
-    found = labelled_store(str(folder))
-    assert found.labels == ("can:full_open", "can:it's open")
-    assert found.instances == ("can#1", "can#2")
-    assert found.order == (0, 1)
-    assert found.table.names == ("p_first", "f_steady")
-    assert found.table.values[0].tolist() == [0.066, 5.5]
-    assert math.isnan(found.table.values[1, 1])
-    assert found.before_contact.table.values.tolist() == [[0.08], [0.08]]
-    assert found.width.table.names == ("p_first",)
-    assert found.provenance["simulated"]
-    assert any("simulated" in note for note in found.notes)
-    assert found.provenance["settings"]["controller"]["probing_force_n"] == 20.0
+    trials = labelled_store(str(folder))
+    assert trials.labels == ("can:full_open", "can:it's open")
+    assert trials.instances == ("can#1", "can#2")
+    assert trials.order == (0, 1)
+    assert trials.table.names == ("p_first", "f_steady")
+    assert trials.table.values[0].tolist() == [0.066, 5.5]
+    assert math.isnan(trials.table.values[1, 1])
+    assert trials.before_contact.table.values.tolist() == [[0.08], [0.08]]
+    assert trials.width.table.names == ("p_first",)
+    assert trials.provenance["simulated"]
+    assert any("simulated" in note for note in trials.notes)
+    assert trials.provenance["settings"]["controller"]["probing_force_n"] == 20.0
 
 
 def test_a_store_without_labels_says_how_to_get_some(tmp_path):
@@ -189,9 +188,9 @@ def a_store_of_everything(folder):
     """Trials of both origins, with times, numbers to predict, one incomplete, one aborted, one with other features."""
     other = {"features": (("p_other", "m"),), "values": (0.05,)}
     with Store.open(folder) as store:
-        first = ended(label="can:full")
-        alone = evolve(first, result=evolve(first.result, features=FeatureValues(**other)))
-        path = store.new_recording(first.made_at)
+        trial_id = ended(label="can:full")
+        alone = evolve(trial_id, result=evolve(trial_id.result, features=FeatureValues(**other)))
+        path = store.new_recording(trial_id.made_at)
         write_recording(path, 5, alone)
         store.add(alone, RecordingInfo.hashed(path, 5, 1))
         for k in range(24):
@@ -207,16 +206,16 @@ def test_evaluate_gives_the_same_figures_for_a_store_and_its_export(tmp_path):
     a_store_of_everything(folder)
     assert export(folder, tmp_path / "t.csv")[0] == 0
     component = select_component("classifier", "c45")
-    stored, found = (
+    stored, from_export = (
         to_json(evaluate(component, trials, classifier="c45", folds=3, learning_curve=False))
         for trials in (labelled_store(str(folder)), read_labelled(tmp_path / "t.csv", "label"))
     )
     for own in ("source", "notes"):
-        stored.pop(own), found.pop(own)
+        stored.pop(own), from_export.pop(own)
     assert stored["headline"]["n"] == 24
     assert {"before_contact", "first_line", "recording_order"} <= stored["controls"].keys()
     assert all(stored["controls"][name]["rate"] for name in ("first_line", "recording_order", "width_only"))
-    assert found == stored
+    assert from_export == stored
 
 
 def test_an_export_of_an_earlier_version_still_opens(folder, tmp_path):
@@ -228,10 +227,10 @@ def test_an_export_of_an_earlier_version_still_opens(folder, tmp_path):
         writer = csv.DictWriter(file, names, extrasaction="ignore")
         writer.writeheader()
         writer.writerows(rows)
-    found = read_labelled(tmp_path / "old.csv", "label")
-    assert found.table.names == ("p_first", "f_steady")
-    assert (found.labels, found.order) == (("can:full_open", "can:it's open"), (0, 1))
-    assert found.before_contact is None
+    trials = read_labelled(tmp_path / "old.csv", "label")
+    assert trials.table.names == ("p_first", "f_steady")
+    assert (trials.labels, trials.order) == (("can:full_open", "can:it's open"), (0, 1))
+    assert trials.before_contact is None
 
 
 @pytest.mark.parametrize("ending", ["csv", "npz", "parquet"])

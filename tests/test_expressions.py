@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from cases import every_case
 
 from graspsense.sources.manifest.expression import ExpressionError, parse
 
@@ -20,7 +21,7 @@ def value(text):
     return parse(text).numbers(COLUMNS, 3).tolist()
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("text", "expected"),
     [
         ("0.06 - Pos*0.001", [0.05, 0.04, 0.03]),
@@ -48,7 +49,7 @@ def test_a_unit_stands_behind_in_brackets_and_an_index_is_no_unit():
     assert (parse("taxels[1]").unit, parse("taxels[1] [N]").unit) == ("", "N")
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("text", "says"),
     [
         (
@@ -76,7 +77,7 @@ def test_what_is_wrong_is_shown_with_its_place(text, says):
         value(text)
 
 
-@pytest.mark.parametrize(
+@every_case(
     "text",
     [
         "__import__('os').system('true')",

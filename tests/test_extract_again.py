@@ -6,6 +6,7 @@ import json
 import re
 
 import pytest
+from cases import every_case
 from commands import graspsense
 from kept import frame, keep
 
@@ -63,7 +64,7 @@ def test_the_settings_of_an_experiment_are_used_for_a_store(folder):
     assert left.table.columns(["p_first"]).values[0, 0] == gap_at(0.5)
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("option", "says"),
     [
         (
@@ -85,9 +86,9 @@ def test_what_cannot_be_changed_is_told(folder, option, says):
 def test_a_lost_recording_is_told(folder):
     with Store.read(folder) as store:
         store.recording_path(store.summary(3).recording).unlink()
-    found = labelled_store(folder, ["features.force=left"])
-    assert len(found) == 5
-    (told,) = (note for note in found.notes if "cannot be read" in note)
+    trials = labelled_store(folder, ["features.force=left"])
+    assert len(trials) == 5
+    (told,) = (note for note in trials.notes if "cannot be read" in note)
     assert re.search(r"1 of 6 .* the recording of trial 3 .* is lost", told)
     with Store.read(folder) as store:
         for path in store.recordings.iterdir():
@@ -103,7 +104,7 @@ def test_the_command_compares_and_keeps(folder, tmp_path):
     assert code == 0, err
     told = json.loads(out)
     # The left pad reaches 1.19 N at most.
-    assert [one for one in told["features"] if one["name"] == "p_first"] == [
+    assert [row for row in told["features"] if row["name"] == "p_first"] == [
         {
             "name": "p_first",
             "unit": "m",

@@ -9,6 +9,7 @@ import warnings
 import numpy as np
 import pytest
 from attrs import evolve
+from cases import every_case
 from commands import graspsense
 from test_classifiers import NAMES, UNITS, trials
 from test_damaged_models import KINDS, labelled, trained
@@ -24,7 +25,7 @@ EXTREMES = (1e308, -1e308, 1.7e308, 1e154, 1e39, 5e-324, -5e-324, 0.0)
 
 
 @pytest.mark.filterwarnings("error::RuntimeWarning")
-@pytest.mark.parametrize("name", KINDS)
+@every_case("name", KINDS)
 def test_a_trial_of_extreme_features_has_probabilities_and_is_unknown_where_it_is_far_away(name):
     model = trained(name)
     rows = [[value, 8.0, 0.0] for value in EXTREMES] + [[value] * 3 for value in EXTREMES]
@@ -40,7 +41,7 @@ def test_a_trial_of_extreme_features_has_probabilities_and_is_unknown_where_it_i
         assert model.classifier.explain(Features(names=NAMES, values=tuple(row), units=UNITS)).because
 
 
-@pytest.mark.parametrize("value", [1e308, -1e308, math.inf, 1e101])
+@every_case("value", [1e308, -1e308, math.inf, 1e101])
 def test_features_too_large_to_learn_from_are_refused_by_name(value):
     given = labelled()
     values = given.table.values.copy()
@@ -55,8 +56,8 @@ def test_a_number_too_large_to_predict_is_refused_by_name():
 
 
 @pytest.mark.filterwarnings("error::RuntimeWarning")
-@pytest.mark.parametrize("name", KINDS)
-@pytest.mark.parametrize("factor", [1e-320, 1e-300, 1e90])
+@every_case("name", KINDS)
+@every_case("factor", [1e-320, 1e-300, 1e90])
 def test_features_of_any_usual_size_are_learned(name, factor):
     """Those below the square root of the least number may count as constant; the answer is still one."""
     table, labels = trials(n=6)
@@ -109,7 +110,7 @@ def test_commands_answer_or_name_the_column(table, tmp_path, name):
 
 
 @pytest.mark.filterwarnings("error::RuntimeWarning")
-@pytest.mark.parametrize("name", ESTIMATORS)
+@every_case("name", ESTIMATORS)
 def test_a_number_is_predicted_from_extreme_features(name):
     given = labelled()
     target = TargetValue(name="force", unit="N", values=tuple(float(i % 7) for i in range(len(given))))

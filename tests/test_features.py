@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from attrs import evolve
+from cases import every_case
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from traces import made_trace
@@ -19,9 +20,9 @@ from graspsense.plugins.features.chitta import NAMES, ChittaConfig, ChittaFeatur
 FEATURES = ChittaFeatures(ChittaConfig())
 
 
-def squeeze(before=100, during=400, after=200, p0=0.0600, p1=0.0540, f0=0.625, f1=8.0):
+def squeeze(approach_ticks=100, during=400, after=200, p0=0.0600, p1=0.0540, f0=0.625, f1=8.0):
     """Contact after `before` ticks, a straight squeeze of `during` ticks from p0 to p1, then rest."""
-    rows = [(p0 + 1e-5 * (before - k), 0.0, 0.0) for k in range(before)]
+    rows = [(p0 + 1e-5 * (approach_ticks - k), 0.0, 0.0) for k in range(approach_ticks)]
     rows += [
         (p0 + (p1 - p0) * k / during, f0 + (f1 - f0) * k / during, f0 + (f1 - f0) * k / during)
         for k in range(during)
@@ -50,7 +51,7 @@ def test_contact_counts_only_once_both_fingers_touch():
     assert FEATURES.extract(made_trace(rows))["p_first"] == pytest.approx(0.0600)
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("choice", "expected"), [("mean", 5.0), ("left", 4.0), ("right", 6.0), ("min", 4.0), ("sum", 10.0)]
 )
 def test_which_force(choice, expected):
@@ -67,7 +68,7 @@ def missing_of(trace):
     return {n for n, v in zip(f.names, f.values, strict=True) if v != v}, f.reasons
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("rows", "why"),
     [
         ([], "empty"),
@@ -193,7 +194,7 @@ def test_a_set_with_another_extract_is_not_extracted_by_the_compiled_form_of_its
     assert compiled_extraction(Doubled(ChittaConfig()).extract) is None
 
 
-@pytest.mark.parametrize("seed", range(20))
+@every_case("seed", range(20))
 def test_the_compiled_form_finds_contact_and_rest_where_the_search_in_the_interpreter_does(seed):
     rng = np.random.default_rng(seed)
     n = 400
@@ -235,8 +236,8 @@ def coarse_squeeze(rate_hz, step_m, hold_s, measured_hz=1e9):
     return made_trace(zip(gap.tolist(), force.tolist(), force.tolist(), strict=True), dt=1.0 / rate_hz)
 
 
-@pytest.mark.parametrize("rate_hz", [10.0, 45.0, 1000.0])
-@pytest.mark.parametrize("step_m", [5e-5, 1e-4, 2e-4])
+@every_case("rate_hz", [10.0, 45.0, 1000.0])
+@every_case("step_m", [5e-5, 1e-4, 2e-4])
 def test_a_coarse_gap_that_repeats_a_number_is_not_at_rest(rate_hz, step_m):
     f = FEATURES.extract(coarse_squeeze(rate_hz, step_m, hold_s=3.0))
     assert f["f_steady"] == pytest.approx(8.0)

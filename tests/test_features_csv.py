@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from cases import every_case
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -28,19 +29,19 @@ def csv(tmp_path):
 
 
 def test_names_units_labels_and_the_width(csv):
-    found = read_labelled(csv(GOOD), "what")
+    trials = read_labelled(csv(GOOD), "what")
 
-    assert found.table.names == ("p_first", "f_steady")
-    assert found.table.units == ("m", "")
-    assert found.labels == ("a", "b") * 4
-    assert found.width is not None
-    assert found.instances is None
-    assert found.no_instances == "no column names the instance (instance=COLUMN)"
+    assert trials.table.names == ("p_first", "f_steady")
+    assert trials.table.units == ("m", "")
+    assert trials.labels == ("a", "b") * 4
+    assert trials.width is not None
+    assert trials.instances is None
+    assert trials.no_instances == "no column names the instance (instance=COLUMN)"
 
 
-@pytest.mark.parametrize("separator", [",", ";", "\t"])
-@pytest.mark.parametrize("prefix", ["", "\ufeff"])
-@pytest.mark.parametrize("ending", ["\n", "\r\n"])
+@every_case("separator", [",", ";", "\t"])
+@every_case("prefix", ["", "\ufeff"])
+@every_case("ending", ["\n", "\r\n"])
 def test_separators_byte_order_marks_and_line_ends(csv, separator, prefix, ending):
     text = prefix + GOOD.replace(",", separator).replace("\n", ending)
 
@@ -50,15 +51,15 @@ def test_separators_byte_order_marks_and_line_ends(csv, separator, prefix, endin
     )
 
 
-@pytest.mark.parametrize("gap", ["", "nan", "NaN", "NA", "?", "null", " "])
+@every_case("gap", ["", "nan", "NaN", "NA", "?", "null", " "])
 def test_what_counts_as_missing(csv, gap):
-    found = read_labelled(csv(GOOD.replace("a,0.05,6", f"a,{gap},6", 1)), "what")
+    trials = read_labelled(csv(GOOD.replace("a,0.05,6", f"a,{gap},6", 1)), "what")
 
-    assert math.isnan(found.table.values[0, 0])
-    assert any(note.endswith("of all values are missing") for note in found.notes)
+    assert math.isnan(trials.table.values[0, 0])
+    assert any(note.endswith("of all values are missing") for note in trials.notes)
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("content", "error", "said"),
     [
         ("", DataDamaged, "is empty: it needs a header line"),
@@ -127,39 +128,39 @@ def test_counters_and_texts_are_no_features_unless_asked_for(csv):
     lines = [f"{'ab'[i % 2]},{i},{100.5 + i * i},{i % 3},x{i}" for i in range(8)]
     path = csv("what,trial,time,p,comment\n" + "\n".join(lines) + "\n")
 
-    found = read_labelled(path, "what")
-    assert found.table.names == ("p",)
-    assert any("trial, time (use columns to include them)" in note for note in found.notes)
-    assert any("hardly repeat" in note and "comment" in note for note in found.notes)
+    trials = read_labelled(path, "what")
+    assert trials.table.names == ("p",)
+    assert any("trial, time (use columns to include them)" in note for note in trials.notes)
+    assert any("hardly repeat" in note and "comment" in note for note in trials.notes)
     assert read_labelled(path, "what", features=["trial", "p"]).table.names == ("trial", "p")
 
 
 def test_constant_and_empty_columns_are_noted(csv):
     lines = [f"{'ab'[i % 2]},{i % 3},7,," for i in range(8)]
-    found = read_labelled(
+    trials = read_labelled(
         csv("what,p,same,empty,\n".replace(",\n", ",void\n") + "\n".join(lines) + "\n"), "what"
     )
 
-    assert "constant, and so without information: same" in found.notes
-    assert "not used, because they have no values: empty, void (use columns to include them)" in found.notes
-    assert found.table.names == ("p", "same")
+    assert "constant, and so without information: same" in trials.notes
+    assert "not used, because they have no values: empty, void (use columns to include them)" in trials.notes
+    assert trials.table.names == ("p", "same")
 
 
 def test_labels_that_differ_in_case_only_are_noted(csv):
-    found = read_labelled(csv(GOOD.replace("a,0.05,6", "A,0.05,6", 1)), "what")
+    trials = read_labelled(csv(GOOD.replace("a,0.05,6", "A,0.05,6", 1)), "what")
 
-    assert any("differ in case only" in note for note in found.notes)
+    assert any("differ in case only" in note for note in trials.notes)
 
 
 def test_instances_order_and_what_is_known_before_the_contact(csv):
     lines = [f"{'ab'[i % 2]},thing{i % 4},{100 - i},{i % 3},{i % 5}" for i in range(12)]
     path = csv("what,thing,when,start,p\n" + "\n".join(lines) + "\n")
-    found = read_labelled(path, "what", instance="thing", order="when", known_before=["start"])
+    trials = read_labelled(path, "what", instance="thing", order="when", known_before=["start"])
 
-    assert found.instances == ("thing0", "thing1", "thing2", "thing3") * 3
-    assert found.order == tuple(range(11, -1, -1))
-    assert found.before_contact is not None
-    assert found.before_contact.table.names == ("start",)
+    assert trials.instances == ("thing0", "thing1", "thing2", "thing3") * 3
+    assert trials.order == tuple(range(11, -1, -1))
+    assert trials.before_contact is not None
+    assert trials.before_contact.table.names == ("start",)
     with pytest.raises(ConfigError, match="'when' cannot be a feature"):
         read_labelled(path, "what", order="when", features=["when", "p"])
 
@@ -183,7 +184,7 @@ def test_what_is_written_reads_back_to_the_bit(tmp_path_factory, rows):
 
 
 def test_a_table_without_labels(csv):
-    found = read_table(csv(GOOD), ["f_steady", "p_first"])
+    trials = read_table(csv(GOOD), ["f_steady", "p_first"])
 
-    assert found.names == ("f_steady", "p_first")
-    assert found.values[0].tolist() == [6.0, 0.05]
+    assert trials.names == ("f_steady", "p_first")
+    assert trials.values[0].tolist() == [6.0, 0.05]

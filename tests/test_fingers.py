@@ -9,6 +9,7 @@ from math import isnan, nan, sqrt
 import numpy as np
 import pytest
 from attrs import evolve, frozen
+from cases import every_case
 from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.figure import Figure
@@ -196,7 +197,7 @@ def test_a_finger_without_a_number_is_no_contact_of_its_side_or_of_every_finger(
     assert opposed_forces(five("any", thumb="left"))(forces) == (5.0, 5.0)
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("fingers", "says"),
     [
         (five("sides"), "one of two sides"),
@@ -204,7 +205,6 @@ def test_a_finger_without_a_number_is_no_contact_of_its_side_or_of_every_finger(
         (five("each")[:1], "two or more"),
         ((*five("each"), FingerForce("force_sixth", "N", touch="any")), "one rule"),
     ],
-    ids=["all on one side", "none opposed", "one finger", "two rules"],
 )
 def test_fingers_that_cannot_touch_are_refused(fingers, says):
     with pytest.raises(ValueError, match=says):
@@ -229,7 +229,7 @@ def test_a_grasp_with_three_fingers_says_of_which_fingers_its_features_are(grasp
 
     assert trial.outcome.words == "steady"
     assert not isnan(trial.features.as_dict()["f_steady"])
-    (note,) = [one for one in trial.device.notes if "fingers" in one]
+    (note,) = [text for text in trial.device.notes if "fingers" in text]
     assert "left force is of thumb" in note
     assert "index and ring" in note
 
@@ -245,10 +245,10 @@ def test_every_finger_is_in_trace_recording_and_replay(grasped):
         note for note in trial.device.notes if "fingers" in note
     ]
     for jaw in JAWS:
-        before = trial.trace.signals[jaw.name]
-        assert before.max() > 1.0
-        assert np.array_equal(before, recorded.trace().signals[jaw.name])
-        assert np.array_equal(before, replayed.trace.signals[jaw.name])
+        signal = trial.trace.signals[jaw.name]
+        assert signal.max() > 1.0
+        assert np.array_equal(signal, recorded.trace().signals[jaw.name])
+        assert np.array_equal(signal, replayed.trace.signals[jaw.name])
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".npz"])
@@ -319,18 +319,18 @@ def five_fingers(folder, manifest_lines, offset_n=0.0):
     (folder / "cup-1.csv").write_text("\n".join(["t,gap,F1,F2,F3,F4,F5", *rows]) + "\n")
     text = ['files = "{label}-{order:d}.csv"', 'time = "t [s]"', 'gap = "gap [mm]"', *manifest_lines]
     (folder / "manifest.toml").write_text("\n".join(text) + "\n")
-    found = list(readable_or_not("manifest", str(folder / "manifest.toml")))
-    for recording in found:
+    recordings = list(readable_or_not("manifest", str(folder / "manifest.toml")))
+    for recording in recordings:
         if isinstance(recording, UnreadableRecording):
             raise recording.error
-    return found
+    return recordings
 
 
-def last_frame(found):
-    return found[0].recording.readings[-1].frame
+def last_frame(recording):
+    return recording[0].recording.readings[-1].frame
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("touch", "left_n", "right_n"),
     [("thumb", 10.0, 9.0), ("thumb, index", 14.0, 5.0), ("each", 0.0, 10.0), ("any", 10.0, 4.0)],
 )
@@ -341,9 +341,9 @@ def test_a_recording_of_five_fingers_has_the_forces_of_its_rule(tmp_path, touch,
 
 
 def test_each_finger_of_a_recording_has_its_own_zero(tmp_path):
-    found = five_fingers(tmp_path, [NAMED, 'touch = "thumb"', 'zero = "10 samples"'], offset_n=0.7)
+    recordings = five_fingers(tmp_path, [NAMED, 'touch = "thumb"', 'zero = "10 samples"'], offset_n=0.7)
 
-    last = found[0].recording.readings[-1]
+    last = recordings[0].recording.readings[-1]
     assert [getattr(last.signals, f"force_{name}") for name in FINGERS] == pytest.approx(
         list(LOADS_N.values())
     )
@@ -351,8 +351,8 @@ def test_each_finger_of_a_recording_has_its_own_zero(tmp_path):
 
 
 def test_a_resampled_recording_keeps_the_rule(tmp_path):
-    found = five_fingers(tmp_path, [NAMED, 'touch = "each"', "resample_hz = 37.0"])
-    (recording,) = (finger.recording for finger in found)
+    recordings = five_fingers(tmp_path, [NAMED, 'touch = "each"', "resample_hz = 37.0"])
+    (recording,) = (finger.recording for finger in recordings)
 
     for reading in recording.readings:
         assert reading.frame.force_left_n == min(reading.signals)
@@ -374,12 +374,12 @@ def test_an_imported_trial_of_five_fingers_says_of_which_fingers_its_features_ar
     (path,) = (tmp_path / "store" / "recordings").glob("*.mcap")
     recorded = read_recorded(path)
     assert [finger.finger for finger in fingers_of(recorded.channels)] == list(FINGERS)
-    (note,) = [one for one in recorded.device.notes if "fingers" in one]
+    (note,) = [text for text in recorded.device.notes if "fingers" in text]
     assert "left force is of thumb" in note
     assert recorded.record().result.features.values
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("lines", "says"),
     [
         ([NAMED], 'touch = "thumb"'),
@@ -391,7 +391,6 @@ def test_an_imported_trial_of_five_fingers_says_of_which_fingers_its_features_ar
         (['fingers = { thumb = "F1 [N]", index = "F2 [counts]" }'], "one unit"),
         (['fingers = { thumb = "F1 [N]", index = "F9 [N]" }'], "fingers.index"),
     ],
-    ids=["no rule", "no such finger", "two meanings", "no fingers", "one", "name", "units", "no such column"],
 )
 def test_a_manifest_with_fingers_that_cannot_be_is_refused(tmp_path, lines, says):
     with pytest.raises(ConfigError, match=says):

@@ -20,8 +20,8 @@ def test_stratified_folds_are_equal_in_size_and_in_every_label(labels, k, seed):
     sizes = np.bincount(folds, minlength=k)
     assert sizes.max() - sizes.min() <= 1
     for label in set(labels):
-        of = np.bincount(folds[np.array(labels) == label], minlength=k)
-        assert of.max() - of.min() <= 1
+        counts = np.bincount(folds[np.array(labels) == label], minlength=k)
+        assert counts.max() - counts.min() <= 1
     assert folds.tolist() == stratified(labels, k, seed).tolist()
 
 
@@ -42,7 +42,7 @@ def test_an_instance_lies_in_one_fold_whatever_its_labels(trials, seed):
     folds = instance_held_out(labels, things, 10, seed)
 
     for thing in set(things):
-        assert len({fold for fold, one in zip(folds, things, strict=True) if one == thing}) == 1
+        assert len({fold for fold, other in zip(folds, things, strict=True) if other == thing}) == 1
     assert set(folds.tolist()) == set(range(min(10, len(set(things)))))
 
 

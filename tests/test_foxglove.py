@@ -64,20 +64,22 @@ def test_the_brightest_cell_is_the_one_that_is_pressed_hardest(recording, tmp_pa
     write_pictures(tmp_path / "p.mcap", read_recorded(path))
     left = [value for topic, _, _, value in decoded(tmp_path / "p.mcap") if topic.endswith("pads_left")]
     rise = trial.trace.pad_left - trial.trace.pad_left[0]
-    at = int(np.argmax(rise[:, 7:].max(axis=1)))
-    picture = np.frombuffer(bytes(left[at].data), np.uint8).reshape(left[at].height, left[at].width)
+    brightest = int(np.argmax(rise[:, 7:].max(axis=1)))
+    picture = np.frombuffer(bytes(left[brightest].data), np.uint8).reshape(
+        left[brightest].height, left[brightest].width
+    )
     cells = picture[CELL_PIXELS // 2 :: CELL_PIXELS, CELL_PIXELS // 2 :: CELL_PIXELS]
-    assert np.argmax(cells) == np.argmax(rise[at, 7:])
+    assert np.argmax(cells) == np.argmax(rise[brightest, 7:])
 
 
 def test_a_recording_with_pictures_is_read_like_the_recording(recording, tmp_path):
     _, path = recording
     write_pictures(tmp_path / "p.mcap", read_recorded(path))
     write_mcap(tmp_path / "copy.mcap", read_recorded(path))
-    before, now = read_recorded(tmp_path / "copy.mcap"), read_recorded(tmp_path / "p.mcap")
-    assert repr(now.readings()) == repr(before.readings())
-    assert now.metadata == before.metadata
-    assert now.ticks.tobytes() == before.ticks.tobytes()
+    recorded, now = read_recorded(tmp_path / "copy.mcap"), read_recorded(tmp_path / "p.mcap")
+    assert repr(now.readings()) == repr(recorded.readings())
+    assert now.metadata == recorded.metadata
+    assert now.ticks.tobytes() == recorded.ticks.tobytes()
 
 
 def test_without_tactile_images_there_is_nothing_to_draw(tmp_path):

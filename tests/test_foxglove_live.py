@@ -127,12 +127,12 @@ def shown(feed, n=20):
     feed.told("outcome", {"outcome": "steady", "reason": ""})
 
 
-def check_complete(found, n=20):
-    times = [struct.unpack_from("<4xd", data)[0] for _, data in found["/grasp/tick"]]
+def check_complete(messages, n=20):
+    times = [struct.unpack_from("<4xd", data)[0] for _, data in messages["/grasp/tick"]]
     assert times == [k / 1000 for k in range(n)]
-    skin = [struct.unpack_from("<4xdq6d", data)[2:] for _, data in found["/grasp/signals/skin"]]
+    skin = [struct.unpack_from("<4xdq6d", data)[2:] for _, data in messages["/grasp/signals/skin"]]
     assert skin == [tuple(float(k + i) for i in range(6)) for k in range(n)]
-    assert len(found["/grasp/signals/sound"]) == len(found["/grasp/scalars"]) == n
+    assert len(messages["/grasp/signals/sound"]) == len(messages["/grasp/scalars"]) == n
 
 
 def test_viewers_receive_the_messages_and_schemas_of_the_recording_and_late_ones_too(feed, tmp_path):
@@ -153,13 +153,16 @@ def test_viewers_receive_the_messages_and_schemas_of_the_recording_and_late_ones
     feed.close()
     assert {"/grasp/tick", "/grasp/pads"} <= recorded.keys()
     for viewer in (early, late):
-        found = viewer.ended()
-        data = {topic: [body for _, body in messages] for topic, messages in found.items()}
+        received = viewer.ended()
+        data = {topic: [body for _, body in messages] for topic, messages in received.items()}
         assert data == {topic: [body for _, body in messages] for topic, messages in recorded.items()}
         keys = ("schemaName", "schemaEncoding", "schema", "encoding")
-        assert {one["topic"]: tuple(map(one.get, keys)) for one in viewer.topics.values()} == schemas
+        assert {
+            channel["topic"]: tuple(map(channel.get, keys)) for channel in viewer.topics.values()
+        } == schemas
         spans = [
-            messages[-1][0] - messages[0][0] for messages in (found["/grasp/tick"], recorded["/grasp/tick"])
+            messages[-1][0] - messages[0][0]
+            for messages in (received["/grasp/tick"], recorded["/grasp/tick"])
         ]
         assert spans[0] == spans[1]
 
@@ -297,14 +300,14 @@ def test_rubbish_and_a_thousand_connections_disturb_nobody(feed):
     good = Viewer(feed)
     crowd = []
     for k in range(1000):
-        one = socket.create_connection(("127.0.0.1", port_of(feed)))
-        crowd.append(one)
+        connection = socket.create_connection(("127.0.0.1", port_of(feed)))
+        crowd.append(connection)
         if k % 100 == 0:
-            one.sendall(os.urandom(20_000))
+            connection.sendall(os.urandom(20_000))
     shown(feed)
     good.wait_for_all()
-    for one in crowd:
-        one.close()
+    for connection in crowd:
+        connection.close()
     feed.close()
     check_complete(good.ended())
 
@@ -333,7 +336,7 @@ def test_the_layouts_show_fields_that_a_recording_has():
     folder = files("graspsense.live")
     layout = json.loads((folder / "foxglove_layout.json").read_text())
     panels = layout["configById"]
-    paths = [one["value"] for panel in panels.values() for one in panel.get("paths", ())]
+    paths = [series["value"] for panel in panels.values() for series in panel.get("paths", ())]
     paths += [panel["xAxisPath"]["value"] for panel in panels.values() if "xAxisPath" in panel]
     root = ElementTree.fromstring((folder / "plotjuggler_layout.xml").read_text())
     curves = [curve.get("name") for curve in root.iter("curve")]

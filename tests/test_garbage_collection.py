@@ -15,7 +15,7 @@ def test_of_contexts_that_overlap_in_threads_the_last_restores_what_was_before(c
             inside.set()
             leave.wait(60.0)
 
-    before = gc.isenabled()
+    was_enabled = gc.isenabled()
     (gc.enable if collects else gc.disable)()
     try:
         inside, leave = threading.Event(), threading.Event()
@@ -29,7 +29,7 @@ def test_of_contexts_that_overlap_in_threads_the_last_restores_what_was_before(c
         other.join()
         assert gc.isenabled() == collects
     finally:
-        (gc.enable if before else gc.disable)()
+        (gc.enable if was_enabled else gc.disable)()
 
 
 def test_what_is_there_is_not_collected_and_what_comes_is():

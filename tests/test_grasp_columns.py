@@ -7,6 +7,7 @@ from math import isnan
 import numpy as np
 import pytest
 from attrs import evolve
+from cases import every_case
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -29,14 +30,14 @@ def trace(recording):
     readings = recording.readings
     frames = [reading.frame for reading in readings]
     return trace_of(
-        frames, [2] * len(frames), [0.0] * len(frames), [], signals=[one.signals for one in readings]
+        frames, [2] * len(frames), [0.0] * len(frames), [], signals=[tick.signals for tick in readings]
     )
 
 
 def test_a_fast_channel_with_its_own_times_keeps_every_sample_axis_and_time():
-    at = np.arange(0.003, 0.95, 1.0 / 330.0)
-    values = np.column_stack([np.arange(len(at)), np.full(len(at), -1.0), at])
-    given_ = columns(arrays={"imu": values}, fast=frozenset({"imu"}), times={"imu": at})
+    times_s = np.arange(0.003, 0.95, 1.0 / 330.0)
+    values = np.column_stack([np.arange(len(times_s)), np.full(len(times_s), -1.0), times_s])
+    given_ = columns(arrays={"imu": values}, fast=frozenset({"imu"}), times={"imu": times_s})
     recording = checked_recording(given_)
     (channel,) = recording.channels
     assert channel.axes == ("x", "y", "z")
@@ -44,18 +45,18 @@ def test_a_fast_channel_with_its_own_times_keeps_every_sample_axis_and_time():
     assert channel.samples == 4  # 3.3 a tick
     imu = trace(recording).signals["imu"]
     assert np.array_equal(imu.values, values)
-    assert imu.t_s == pytest.approx(at, abs=1e-6)
+    assert imu.t_s == pytest.approx(times_s, abs=1e-6)
     assert imu.lost == 0
 
 
 def test_images_and_numbers_with_their_own_times_hold_until_the_next():
-    at = np.array([0.2, 0.4001, 0.9])
+    times_s = np.array([0.2, 0.4001, 0.9])
     cells = np.arange(18.0).reshape(3, 6)
     given_ = columns(
         arrays={"palm": cells},
         scalars={"heat": np.array([300.0, 301.0, 302.0])},
         shapes={"palm": (2, 3)},
-        times={"palm": at, "heat": at},
+        times={"palm": times_s, "heat": times_s},
         units={"heat": "K"},
     )
     recording = checked_recording(given_)
@@ -71,18 +72,20 @@ def test_images_and_numbers_with_their_own_times_hold_until_the_next():
 
 @given(st.lists(st.floats(0.0, 0.99), min_size=1, max_size=60, unique=True), st.integers(1, 4))
 def test_no_sample_within_the_grasp_is_lost(times, axes):
-    at = np.array(sorted(times))
-    values = np.arange(len(at) * axes, dtype=float).reshape(len(at), axes)
-    given_ = columns(arrays={"imu": values}, fast=frozenset({"imu"}), times={"imu": at})
+    sampled_s = np.array(sorted(times))
+    values = np.arange(len(sampled_s) * axes, dtype=float).reshape(len(sampled_s), axes)
+    given_ = columns(arrays={"imu": values}, fast=frozenset({"imu"}), times={"imu": sampled_s})
     assert np.array_equal(trace(checked_recording(given_)).signals["imu"].values, values)
 
 
 def test_samples_outside_of_the_grasp_are_left_out_and_counted():
-    at = np.arange(-0.5, 1.5, 0.01)
-    given_ = columns(arrays={"imu": np.ones((len(at), 3))}, fast=frozenset({"imu"}), times={"imu": at})
+    sampled_s = np.arange(-0.5, 1.5, 0.01)
+    given_ = columns(
+        arrays={"imu": np.ones((len(sampled_s), 3))}, fast=frozenset({"imu"}), times={"imu": sampled_s}
+    )
     recording = checked_recording(given_)
     (note,) = [note for note in recording.notes if "imu" in note]
-    left_out = len(at) - len(trace(recording).signals["imu"].t_s)
+    left_out = len(sampled_s) - len(trace(recording).signals["imu"].t_s)
     assert note.startswith(f"{left_out} samples of imu")
     assert left_out == pytest.approx(100, abs=2)
 
@@ -104,7 +107,7 @@ def test_numbers_of_a_fast_channel_are_axes_or_samples_as_shapes_says(shape, sam
 LONG = np.ones(N + 1)
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("more", "says"),
     [
         ({"left_n": LONG}, "'left_n' has 101 samples, and t_s has 100"),
@@ -135,9 +138,9 @@ def test_lengths_and_shapes_are_errors_with_names(more, says):
 
 
 def test_a_part_of_the_samples_takes_the_part_of_each_channel():
-    at = np.arange(0.0, 0.99, 0.002)
+    times_s = np.arange(0.0, 0.99, 0.002)
     given_ = columns(
-        arrays={"imu": np.column_stack([at, at])}, fast=frozenset({"imu"}), times={"imu": at}
+        arrays={"imu": np.column_stack([times_s, times_s])}, fast=frozenset({"imu"}), times={"imu": times_s}
     ).rows(slice(20, 40), "squeeze 1")
     imu = trace(checked_recording(given_)).signals["imu"].values[:, 0]
     assert (imu[0], imu[-1]) == (pytest.approx(0.2, abs=2e-3), pytest.approx(0.39, abs=2e-3))

@@ -129,13 +129,13 @@ def test_answers_that_are_late_are_asked_for_again_and_counted(plugins):
     assert f"{trial.counts['lost_frames']} frames" in trial.reason
 
 
-@pytest.mark.parametrize("second", [nan, 0.0])
-def test_a_second_pad_without_a_force_never_touches(hand, plugins, monkeypatch, second):
+@pytest.mark.parametrize("right_force_n", [nan, 0.0])
+def test_a_second_pad_without_a_force_never_touches(hand, plugins, monkeypatch, right_force_n):
     read = hand.TcpHand.read
 
     def one_pad(self, timeout_s):
         reading = read(self, timeout_s)
-        return reading and Reading(reading.frame._replace(force_right_n=second), reading.pads)
+        return reading and Reading(reading.frame._replace(force_right_n=right_force_n), reading.pads)
 
     monkeypatch.setattr(hand.TcpHand, "read", one_pad)
     trial = grasp(plugins)

@@ -4,6 +4,7 @@ import math
 from math import inf, nan
 
 import pytest
+from cases import every_case
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -19,7 +20,7 @@ def frame(velocity=0.0, left=0.0, right=0.0):
     return Frame(0.0, 0.001, 0.05, velocity, 0.0, left, right, 0.0, 0.0, 0)
 
 
-@pytest.mark.parametrize(("asked", "given_"), [(150.0, 100.0), (-150.0, -100.0), (99.0, 99.0), (inf, 100.0)])
+@every_case(("asked", "given_"), [(150.0, 100.0), (-150.0, -100.0), (99.0, 99.0), (inf, 100.0)])
 def test_effort_is_clamped_to_the_gripper_both_ways(asked, given_):
     command, state = guard(LIMITS, FRESH, frame(), Command(EFFORT, asked, inf, inf))
     assert command.value == given_
@@ -31,7 +32,7 @@ def test_the_commands_own_limit_is_tighter():
     assert command.value == 10.0
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("effort", "velocity", "expected"),
     [(20.0, -0.21, 0.0), (20.0, -0.19, 20.0), (-20.0, 0.21, 0.0), (-20.0, -0.3, -20.0), (20.0, 0.3, 20.0)],
 )
@@ -123,7 +124,7 @@ def test_a_kind_nobody_knows_or_a_place_nobody_can_reach_stops_the_grasp(command
     assert (halted.kind, halted.value, state.stopped) == (EFFORT, 0.0, 1)
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("command", "counts"),
     [
         (Command(VELOCITY, -0.01, 60.0, inf), True),

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import click
 import pytest
+from cases import every_case
 
 from graspsense.core.components import hookspecs
 from graspsense.core.components.entries import Finding, FoundDevice
@@ -55,18 +56,18 @@ def trial() -> Trial:
     )
 
 
-@pytest.mark.parametrize("hook", HOOKS)
+@every_case("hook", HOOKS)
 def test_every_hook_has_a_test(hook):
     assert f"test_hook_{hook}" in globals()
 
 
-@pytest.mark.parametrize("hook", HOOKS)
+@every_case("hook", HOOKS)
 def test_every_hook_is_documented_with_its_exact_signature(hook):
     signature = f"{hook}{inspect.signature(HOOKS[hook])}".replace("'", "")
     assert f"\n## {signature}\n" in DOCS
 
 
-@pytest.mark.parametrize("hook", HOOKS)
+@every_case("hook", HOOKS)
 def test_every_hook_says_what_it_is_for(hook):
     assert inspect.getdoc(HOOKS[hook])
 
@@ -76,7 +77,7 @@ def test_the_documentation_knows_no_other_hook():
     assert sorted(documented) == sorted(HOOKS)
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("role", "hook", "name"),
     [
         ("sensor-backend", "graspsense_sensor_backends", "lab-hand"),
@@ -100,7 +101,9 @@ def test_hook_graspsense_sensor_backends():
 
 def test_the_documented_hand_has_the_channels_of_its_fingers():
     (code,) = (
-        one for one in re.findall(r"```python\n(from .*?)```", DOCS, re.DOTALL) if "class LabHand(" in one
+        source
+        for source in re.findall(r"```python\n(from .*?)```", DOCS, re.DOTALL)
+        if "class LabHand(" in source
     )
     names: dict = {}
     exec(compile(code, "hooks.md", "exec", dont_inherit=True), names)
@@ -233,10 +236,10 @@ def test_hook_graspsense_diagnose():
     plugins.add(example("graspsense_diagnose"), "lab-b")
     plugins.add(Told(), "lab-c")
 
-    failed, found, told = plugins.diagnose("these settings", 0.25)
+    failed, diagnoses, told = plugins.diagnose("these settings", 0.25)
 
     assert (failed.findings, failed.error) == ((), "PermissionError: cannot list the bus")
-    assert (found.findings[0].state, found.findings[0].numbers) == ("problem", {"baud": 115200})
+    assert (diagnoses.findings[0].state, diagnoses.findings[0].numbers) == ("problem", {"baud": 115200})
     assert told.findings[0].words == "these settings for 0.25 s"
 
 
@@ -265,11 +268,11 @@ def test_hook_graspsense_probe_devices():
     plugins.add(example("graspsense_probe_devices"), "lab-b")
     plugins.add(Timed(), "lab-c")
 
-    failed, found, timed = plugins.probe_devices(0.25)
+    failed, devices, timed = plugins.probe_devices(0.25)
 
     assert (failed.distribution, failed.devices) == ("lab-a", ())
     assert failed.error == "PermissionError: cannot list the bus"
-    assert (found.error, found.devices[0].advice) == ("", "add yourself to the group dialout")
+    assert (devices.error, devices.devices[0].advice) == ("", "add yourself to the group dialout")
     assert timed.devices[0].serial == "0.25"
 
 

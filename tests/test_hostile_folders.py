@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from cases import every_case
 from grippers import bottle, squeezing
 from wayward import CSV
 
@@ -108,15 +109,15 @@ def test_no_command_imports_from_the_current_folder(folder, command):
 
 def test_every_python_process_is_started_without_the_current_folder():
     """The rule for all the code: whatever starts an interpreter gives it `-P` first."""
-    found = []
+    starts = []
     for path in (*REPOSITORY.glob("src/**/*.py"), *REPOSITORY.glob("plugins/*/src/**/*.py")):
         text = path.read_text()
         for node in ast.walk(ast.parse(text)) if "sys.executable" in text else ():
             words = [ast.unparse(word) for word in getattr(node, "elts", [])]
             if "sys.executable" in words:
-                found.append((str(path), words[:2]))
-    assert len(found) >= 5
-    assert [place for place, words in found if words != ["sys.executable", "'-P'"]] == []
+                starts.append((str(path), words[:2]))
+    assert len(starts) >= 5
+    assert [place for place, words in starts if words != ["sys.executable", "'-P'"]] == []
 
 
 @pytest.mark.parametrize(
@@ -234,14 +235,14 @@ def test_no_program_of_a_checkout_is_run(checkout, tmp_path):
     mark = tmp_path / "ran"
     hostile(checkout, mark)
     os.utime(checkout / "code.py", (1, 1))  # git has to look at the content, which goes through the filter
-    before = {path: path.read_bytes() for path in (checkout / ".git").rglob("*") if path.is_file()}
+    contents = {path: path.read_bytes() for path in (checkout / ".git").rglob("*") if path.is_file()}
 
     assert checkout_state(checkout) == {"commit": head, "dirty": False}
     (checkout / "code.py").write_text("x = 2\n")
     assert checkout_state(checkout) == {"commit": head, "dirty": True}
 
     assert not mark.exists()
-    assert {path: path.read_bytes() for path in before} == before
+    assert {path: path.read_bytes() for path in contents} == contents
     # The trap is a trap: git itself springs it.
     subprocess.run(["git", "status"], cwd=checkout, capture_output=True, check=False)
     assert mark.exists()
@@ -266,7 +267,7 @@ def test_objects_that_are_missing_are_not_fetched(checkout, tmp_path):
     assert not (tmp_path / "ran").exists()
 
 
-@pytest.mark.parametrize(
+@every_case(
     "head",
     [
         "",

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cases import every_case
 from commands import graspsense
 
 from graspsense.core.components.channels import from_json
@@ -63,14 +64,14 @@ def test_a_pattern_that_backtracks_is_matched_in_linear_time():
     assert wildcard("*a*a*a*a*a*a*a*a*a*a*b").fullmatch("a" * 400) is None
 
 
-@pytest.mark.parametrize("pattern", [r"(\w)\1", "(?=x)y", "(?<!x)y", "(?P<a>x)(?P=a)", "(?>a)b", "a++"])
+@every_case("pattern", [r"(\w)\1", "(?=x)y", "(?<!x)y", "(?P<a>x)(?P=a)", "(?>a)b", "a++"])
 def test_what_needs_backtracking_is_refused_with_the_reason(tmp_path, pattern):
     path = manifest(tmp_path, MANIFEST + f"start = '{pattern}'\n")
     with pytest.raises(ConfigError, match=r"manifest\.toml:6: start.*not supported.*RE2"):
         read_manifest(path)
 
 
-@pytest.mark.parametrize("pattern", ["a{1000}{1000}", "x" * 1001, "(", "[z-a]"])
+@every_case("pattern", ["a{1000}{1000}", "x" * 1001, "(", "[z-a]"])
 def test_a_pattern_that_is_too_large_or_malformed_is_refused(pattern):
     with pytest.raises(PatternError):
         regular_expression(pattern)
@@ -79,11 +80,11 @@ def test_a_pattern_that_is_too_large_or_malformed_is_refused(pattern):
 def test_named_groups_are_fields(tmp_path):
     started = f"grasp jar 7\n{GRASP}grasp can 8\n{GRASP}"
     text = MANIFEST.replace('label = "jar"\n', r"start = 'grasp (?P<label>\w+) (?P<order>\d+)'")
-    found = list(read_recordings(str(manifest(tmp_path, text, started))))
-    assert [(recording.label, recording.order) for recording in found] == [("jar", 7.0), ("can", 8.0)]
+    recordings = list(read_recordings(str(manifest(tmp_path, text, started))))
+    assert [(recording.label, recording.order) for recording in recordings] == [("jar", 7.0), ("can", 8.0)]
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("template", "path", "fields"),
     [
         ("{label}/{label}_{order:d}.csv", "jar/jar_3.csv", {"label": "jar", "order": "3"}),
@@ -123,8 +124,8 @@ def test_thousands_of_equal_column_names_are_numbered(tmp_path):
     assert names[1:4] == ["x", "x.1", "x.2"]
 
 
-@pytest.mark.parametrize("read", [CsvColumns, read_text])
-@pytest.mark.parametrize(
+@every_case("read", [CsvColumns, read_text])
+@every_case(
     ("limit", "text"),
     [
         (limits.TEXT_BYTES, "a,b,c\n" + "1,2,3\n" * 20),
@@ -147,7 +148,7 @@ def test_a_table_beyond_a_limit_is_damaged_and_the_limit_can_be_raised(
     read(path)
 
 
-@pytest.mark.parametrize("given", ["0", "-1", "1e6", "lots", "9" * 40, "٣"])
+@every_case("given", ["0", "-1", "1e6", "lots", "9" * 40, "٣"])
 def test_a_limit_that_is_not_a_number_is_refused_by_its_name(monkeypatch, given):
     monkeypatch.setenv(limits.COLUMNS.variable, given)
     with pytest.raises(ConfigError, match=limits.COLUMNS.variable):
@@ -161,7 +162,7 @@ def test_every_limit_is_documented():
         assert f"{limit.default:,}".replace(",", " ") in page
 
 
-@pytest.mark.parametrize(
+@every_case(
     "data",
     [
         b"label,x\na,\x001\n",
@@ -174,7 +175,6 @@ def test_every_limit_is_documented():
         b"label,x\na,1e400\nb,2\na,3\nb,4\n",
         b"label," + b"x" * 600 + b"\na,1\n",
     ],
-    ids=["zero", "utf16", "latin1", "quote", "long cell", "empty", "header", "1e400", "long name"],
 )
 def test_a_table_that_is_none_names_the_file(tmp_path, data):
     path = tmp_path / "table.csv"
@@ -280,7 +280,7 @@ def test_a_seed_out_of_range_is_wrong_use(tmp_path, seed):
 # TOML
 
 
-@pytest.mark.parametrize(
+@every_case(
     "text",
     [
         "x = " + "[" * 5000 + "]" * 5000,
@@ -339,13 +339,13 @@ def test_merging_many_keys_takes_linear_time():
     assert merged.owner.keys() == {(), ("table",)}
 
 
-@pytest.mark.parametrize("value", ["0x" + "f" * 9999, "9" * 5000, str(2**63), "[" * 3000, "a." * 3000])
+@every_case("value", ["0x" + "f" * 9999, "9" * 5000, str(2**63), "[" * 3000, "a." * 3000])
 def test_an_option_out_of_bounds_is_wrong_use(value):
     option_layers([f"run.seed={value}"])
     assert graspsense("run", "-o", f"run.seed={value}").returncode == 2
 
 
-@pytest.mark.parametrize(
+@every_case(
     "key",
     [
         'zero = "99999999999999999999999999 samples"',
@@ -363,11 +363,11 @@ def test_an_option_out_of_bounds_is_wrong_use(value):
 def test_a_key_of_a_manifest_out_of_bounds_is_answered(tmp_path, key):
     path = manifest(tmp_path, MANIFEST + key + "\n")
     try:
-        found = list(read_recordings(str(path)))
+        answers = list(read_recordings(str(path)))
     except ConfigError as error:
-        found = [error]
-    assert len(found) == 1
-    assert not isinstance(found[0], ConfigError) or "manifest.toml" in str(found[0])
+        answers = [error]
+    assert len(answers) == 1
+    assert not isinstance(answers[0], ConfigError) or "manifest.toml" in str(answers[0])
 
 
 @pytest.mark.parametrize("rate_hz", ["1e9", "1e300", "9223372036854775807"])
@@ -387,7 +387,7 @@ def test_a_file_that_is_split_into_too_many_grasps_is_refused(tmp_path, split):
     assert limits.RECORDINGS.variable in str(recording.error)
 
 
-@pytest.mark.parametrize(
+@every_case(
     "text",
     [
         "[data]\ntotal = 9223372036854775808",
@@ -444,7 +444,7 @@ def test_a_channel_of_a_file_has_a_bounded_size(channel):
 # Expressions
 
 
-@pytest.mark.parametrize(
+@every_case(
     "text",
     [
         "9**9**9", "F**2", "1<<9999999", "9" * 1000, "0x" + "f" * 1900, "1e999*F", "1j*F", "(" * 900 + "F" + ")" * 900,
@@ -471,7 +471,7 @@ def test_an_expression_over_more_cells_than_the_limit_is_refused(monkeypatch):
         parse("sum('*', '*')").numbers(columns, 10)
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("text", "body", "unit"),
     [
         ("Pos [mm]", "Pos", "mm"),
@@ -498,7 +498,7 @@ def test_a_long_row_of_arff_takes_linear_time():
         parse_arff(head + "v1, " * 100_000 + "x\n")
 
 
-@pytest.mark.parametrize(
+@every_case(
     "text",
     [
         "@attribute a {" + ", ".join(f"v{k}" for k in range(20_000)) + "}\n@data\nv1\n",
@@ -526,14 +526,14 @@ def fuzzed(seed, number):
 
 
 def test_changed_texts_are_answered_by_a_result_or_an_error_that_names_the_file():
-    found = fuzzed(seed=57, number=25)
-    assert found["read"] == 250
-    assert found["bad"] == []
+    answers = fuzzed(seed=57, number=25)
+    assert answers["read"] == 250
+    assert answers["bad"] == []
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_many_changed_texts_are_answered_by_a_result_or_an_error_that_names_the_file(seed):
-    found = fuzzed(seed, number=400)
-    assert found["read"] == 4000
-    assert found["bad"] == []
+    answers = fuzzed(seed, number=400)
+    assert answers["read"] == 4000
+    assert answers["bad"] == []

@@ -48,22 +48,22 @@ def read(folder, **more):
 
 
 def test_labels_order_and_what_is_left_out(folder):
-    found = read(folder)
+    trials = read(folder)
 
-    assert found.labels == ("can",) * 3 + ("none",) * 3
-    assert found.order == (1, 2, 3) * 2
-    assert found.instances is None
-    assert found.no_instances
+    assert trials.labels == ("can",) * 3 + ("none",) * 3
+    assert trials.order == (1, 2, 3) * 2
+    assert trials.instances is None
+    assert trials.no_instances
     assert any(
-        "3 grasps of full_coke left out: their author calls them unreliable" in note for note in found.notes
+        "3 grasps of full_coke left out: their author calls them unreliable" in note for note in trials.notes
     )
-    assert any("times are frame numbers" in note for note in found.notes)
+    assert any("times are frame numbers" in note for note in trials.notes)
     assert read(folder, unreliable=True).labels == ("can",) * 3 + ("full_coke",) * 3 + ("none",) * 3
 
 
 def test_features_are_relative_to_the_first_frame_and_the_variant_adds_it_back(folder):
-    found = read(folder)
-    relative, absolute = found.table, found.variants["absolute"].table
+    trials = read(folder)
+    relative, absolute = trials.table, trials.variants["absolute"].table
 
     # Contact in the third frame: six degrees on from the first, hence 80 - 6 mm; there it stays.
     # The frame after it shows the rest, with 20 counts (2 N) on either side.
@@ -74,7 +74,7 @@ def test_features_are_relative_to_the_first_frame_and_the_variant_adds_it_back(f
     assert absolute.values[:3, 2] - relative.values[:3, 2] == pytest.approx(0.1 * 15 * 12)
     assert (absolute.values[:3, 3:] == relative.values[:3, 3:])[~np.isnan(relative.values[:3, 3:])].all()
     assert np.isnan(relative.values[3:]).all()
-    assert any("3 of 6 grasps have no contact as the feature set needs it" in note for note in found.notes)
+    assert any("3 of 6 grasps have no contact as the feature set needs it" in note for note in trials.notes)
     assert relative.units == ("m", "m", "N", "frame", "m/frame", "N/frame")
 
 
@@ -92,9 +92,11 @@ def test_a_folder_without_grasps_and_a_damaged_file(folder, tmp_path):
     with pytest.raises(ConfigError, match="contains no file of the iCub Grasp Dataset"):
         read(tmp_path / "empty")
     (folder / "can_2.txt").write_text((folder / "can_2.txt").read_text()[:-40])
-    found = read(folder)
-    assert len(found) == 5
-    assert any(re.search(r"1 of 6 recordings cannot be read.*can_2\.txt, line", note) for note in found.notes)
+    trials = read(folder)
+    assert len(trials) == 5
+    assert any(
+        re.search(r"1 of 6 recordings cannot be read.*can_2\.txt, line", note) for note in trials.notes
+    )
     for path in folder.glob("*.txt"):
         path.write_text("nothing\n")
     with pytest.raises(DataDamaged, match=r"none of 6 .*_1\.txt, line"):
@@ -102,7 +104,7 @@ def test_a_folder_without_grasps_and_a_damaged_file(folder, tmp_path):
 
 
 @pytest.fixture(scope="module")
-def found():
+def evaluation():
     labelled = read(os.environ["GRASPSENSE_ICUB"])
     component = installed().find("classifier", "c45")
     return evaluate(SelectedComponent(component, component.config_class()()), labelled, classifier="c45")
@@ -110,43 +112,46 @@ def found():
 
 @pytest.mark.slow
 @real_data
-def test_the_first_frame_alone_gives_the_class_away_before_any_touch(found):
-    leak = found.controls["before_contact"]
+def test_the_first_frame_alone_gives_the_class_away_before_any_touch(evaluation):
+    leak = evaluation.controls["before_contact"]
 
     assert leak.rate.n == 203
     assert leak.rate.rate >= 0.9
-    assert any("from before contact" in warning for warning in found.warnings)
+    assert any("from before contact" in warning for warning in evaluation.warnings)
 
 
 @pytest.mark.slow
 @real_data
-def test_features_relative_to_it_are_a_tenth_below_the_absolute_ones(found):
-    assert found.protocol == "stratified_10_fold"
-    assert found.headline.rate <= found.controls["absolute"].rate.rate - 0.1
-    assert found.headline.rate > found.controls["majority_class"].rate.rate + 0.2
+def test_features_relative_to_it_are_a_tenth_below_the_absolute_ones(evaluation):
+    assert evaluation.protocol == "stratified_10_fold"
+    assert evaluation.headline.rate <= evaluation.controls["absolute"].rate.rate - 0.1
+    assert evaluation.headline.rate > evaluation.controls["majority_class"].rate.rate + 0.2
 
 
 @pytest.mark.slow
 @real_data
-def test_rates_are_split_by_contact_and_do_not_pretend_to_generalise(found):
+def test_rates_are_split_by_contact_and_do_not_pretend_to_generalise(evaluation):
     """Every class there is one object in one session, so no number of grasps tells of another object."""
-    touched, untouched = found.by_features["with features"], found.by_features["without any feature"]
+    touched, untouched = (
+        evaluation.by_features["with features"],
+        evaluation.by_features["without any feature"],
+    )
 
     assert (touched.n, untouched.n) == (133, 70)
-    assert touched.correct + untouched.correct == found.headline.correct
-    assert found.unknown.correct >= 70
-    assert found.headline.interval is None
-    assert "one session" in found.headline.no_interval
-    assert any("class, object and session are the same" in note for note in found.notes)
+    assert touched.correct + untouched.correct == evaluation.headline.correct
+    assert evaluation.unknown.correct >= 70
+    assert evaluation.headline.interval is None
+    assert "one session" in evaluation.headline.no_interval
+    assert any("class, object and session are the same" in note for note in evaluation.notes)
 
 
 @pytest.mark.slow
 @real_data
-def test_blocks_of_recording_order_are_reported_with_their_interval(found):
-    blocks = found.controls["recording_order"]
+def test_blocks_of_recording_order_are_reported_with_their_interval(evaluation):
+    blocks = evaluation.controls["recording_order"]
 
     assert blocks.rate.n == 203
-    assert blocks.difference.value == pytest.approx(found.headline.rate - blocks.rate.rate)
+    assert blocks.difference.value == pytest.approx(evaluation.headline.rate - blocks.rate.rate)
     low, high = blocks.difference.interval
     assert low < blocks.difference.value < high
     assert blocks.difference_of == "stratified_10_fold"
@@ -154,8 +159,8 @@ def test_blocks_of_recording_order_are_reported_with_their_interval(found):
 
 @pytest.mark.slow
 @real_data
-def test_no_instance_can_be_held_out_there(found):
-    held = found.controls["instance_held_out"]
+def test_no_instance_can_be_held_out_there(evaluation):
+    held = evaluation.controls["instance_held_out"]
 
     assert held.rate is None
     assert held.reason == "every class of this data set is a single object, so none can be held out"

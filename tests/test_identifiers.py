@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from cases import every_case
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -38,8 +39,8 @@ COUNTERS = {
 ORDERS = {"as it is": list, "falling": lambda values: list(values)[::-1], "a swap": swapped, "a tie": tied}
 
 
-@pytest.mark.parametrize("order", ORDERS)
-@pytest.mark.parametrize("counter", COUNTERS)
+@every_case("order", ORDERS)
+@every_case("counter", COUNTERS)
 def test_a_counter_or_a_time_is_no_feature_in_any_order(counter, order):
     assert identifies("x", "", ORDERS[order](list(COUNTERS[counter])), LABELS)
 
@@ -53,7 +54,7 @@ def test_nor_where_the_lines_are_shuffled(seed, counter):
     assert identifies("x", "", np.array(COUNTERS[counter])[order], [LABELS[i] for i in order])
 
 
-@pytest.mark.parametrize("name", ["trial_id", "runNumber", "No", "index", "file"])
+@every_case("name", ["trial_id", "runNumber", "No", "index", "file"])
 def test_a_number_with_gaps_is_known_by_its_name_where_the_lines_are_shuffled(name):
     order = np.random.default_rng(1).permutation(N)
     values = np.array(COUNTERS["with large gaps"])[order]
@@ -117,9 +118,9 @@ def table(path, column, values, measured=True):
 
 def test_an_identifier_is_said_and_used_only_where_it_is_named(tmp_path):
     path = table(tmp_path / "t.csv", "trial_id", range(N)[::-1])
-    found = read_labelled(path, "object")
-    assert found.table.names == ("s",)
-    assert any("trial_id" in note and "to include them" in note for note in found.notes)
+    trials = read_labelled(path, "object")
+    assert trials.table.names == ("s",)
+    assert any("trial_id" in note and "to include them" in note for note in trials.notes)
     chosen = read_labelled(path, "object", features=["trial_id", "s"])
     assert chosen.table.names == ("trial_id", "s")
     assert any("trial_id" in note and "reveal" in note for note in chosen.notes)
@@ -143,7 +144,7 @@ REPEATED = {
 }
 
 
-@pytest.mark.parametrize("counter", REPEATED)
+@every_case("counter", REPEATED)
 def test_numbers_that_several_lines_share_are_no_feature_in_any_order(counter):
     assert identifies("x", "", REPEATED[counter], LABELS)
     assert identifies("x", "", *shuffled(REPEATED[counter]))
@@ -183,7 +184,7 @@ SESSIONS = {
 }
 
 
-@pytest.mark.parametrize("texts", SESSIONS)
+@every_case("texts", SESSIONS)
 def test_texts_that_name_a_session_or_an_object_are_no_feature(texts):
     assert text_identifies(SESSIONS[texts], LABELS)
 
@@ -198,10 +199,10 @@ def test_texts_that_describe_an_object_are_a_feature():
 
 def test_hashes_are_texts_although_some_have_digits_alone(tmp_path):
     hashes = [f"{(i + 1) * 2654435761 % 2**32:08x}" for i in range(N - 2)] + ["12345678", "1234e567"]
-    found = read_labelled(table(tmp_path / "t.csv", "hash", hashes), "object")
-    assert found.table.names == ("s",)
+    trials = read_labelled(table(tmp_path / "t.csv", "hash", hashes), "object")
+    assert trials.table.names == ("s",)
 
 
 def test_a_column_that_says_the_label_in_other_words_is_told(tmp_path):
-    found = read_labelled(table(tmp_path / "t.csv", "class", [1] * 30 + [2] * 30), "object")
-    assert any("class" in note and "label" in note for note in found.notes)
+    trials = read_labelled(table(tmp_path / "t.csv", "class", [1] * 30 + [2] * 30), "object")
+    assert any("class" in note and "label" in note for note in trials.notes)

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 from attrs import evolve, frozen
+from cases import every_case
 from kept import begun
 from mcap.reader import make_reader
 
@@ -202,11 +203,11 @@ def seen(tmp_path_factory):
 
 def demand_same(signals, trace):
     for array in IMAGES:
-        before, now = signals[array.name], trace.signals[array.name]
-        assert now.cells.dtype == before.cells.dtype == array.dtype
-        assert now.cells.shape == (len(before.t_s), *array.shape)
-        assert now.cells.tobytes() == before.cells.tobytes()
-        assert now.t_s.tobytes() == before.t_s.tobytes()
+        recorded, now = signals[array.name], trace.signals[array.name]
+        assert now.cells.dtype == recorded.cells.dtype == array.dtype
+        assert now.cells.shape == (len(recorded.t_s), *array.shape)
+        assert now.cells.tobytes() == recorded.cells.tobytes()
+        assert now.t_s.tobytes() == recorded.t_s.tobytes()
 
 
 def replayed(recording):
@@ -254,10 +255,10 @@ def test_images_come_back_from_an_export_as_they_were(seen, tmp_path, ending, wr
 def test_an_export_as_columns_has_the_images_of_a_camera_in_a_file_of_arrays(seen, tmp_path):
     trial, path, _ = seen
     write_csv(tmp_path / "grasp.csv", read_recorded(path))
-    with np.load(tmp_path / "grasp-eye.csv.npz") as found:
-        assert np.array_equal(found["cells"], trial.trace.signals["eye"].cells)
-        assert set(np.diff(found["counter"])) == {1}
-        assert found["t_s"].tobytes() == trial.trace.signals["eye"].t_s.tobytes()
+    with np.load(tmp_path / "grasp-eye.csv.npz") as arrays:
+        assert np.array_equal(arrays["cells"], trial.trace.signals["eye"].cells)
+        assert set(np.diff(arrays["counter"])) == {1}
+        assert arrays["t_s"].tobytes() == trial.trace.signals["eye"].t_s.tobytes()
 
 
 @pytest.mark.slow
@@ -270,7 +271,7 @@ def test_a_gripper_with_cameras_conforms(seen):
     }
 
 
-@pytest.mark.parametrize("array", IMAGES, ids=lambda one: one.name)
+@every_case("array", IMAGES)
 def test_a_recording_shows_the_shape_of_its_images_without_the_declaration(array, tmp_path):
     recorder = Recorder(tmp_path / "g.mcap")
     recorder.metadata(START, begun().section(START))
@@ -284,7 +285,7 @@ def test_a_recording_shows_the_shape_of_its_images_without_the_declaration(array
     assert np.array_equal(grasp.trace().signals[array.name].cells[0], image.cells)
 
 
-@pytest.mark.parametrize(
+@every_case(
     "definition",
     ["uint8[4] t_s", "float64 t_s\nuint8 x", "float64 t_s\nuint8[3] x\nint64 y", "float64 t_s\nint8[3] x"],
 )
@@ -315,7 +316,7 @@ def fixed(array):
     return array
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("image", "word"),
     [
         (fixed(np.zeros((8, 6, 3), np.uint8)), "8 x 6 x 3 instead of the shape 6 x 8 x 3"),
@@ -407,11 +408,11 @@ def test_images_for_which_the_disk_has_no_room_stay_in_memory(monkeypatch):
     write = os.pwrite
     left = [3]
 
-    def pwrite(fd, data, at):
+    def pwrite(fd, data, offset):
         if not left[0]:
             raise OSError(errno.ENOSPC, "No space left on device")
         left[0] -= 1
-        return write(fd, data, at)
+        return write(fd, data, offset)
 
     monkeypatch.setattr(os, "pwrite", pwrite)
     kept = KeptImages(np.zeros((2, 3), np.uint16))
@@ -437,7 +438,7 @@ def test_the_trace_of_a_running_grasp_grows_and_keeps_what_it_had():
     assert [len(cells) for cells in traces] == [0, 1, 2, 3, 4, 5]
     assert all(cells.tobytes() == traces[-1][: len(cells)].tobytes() for cells in traces)
     # The same from readings at hand, without a file.
-    again = trace_of([frame] * 6, [2] * 6, [0.0] * 6, [], signals=[one.signals for one in readings])
+    again = trace_of([frame] * 6, [2] * 6, [0.0] * 6, [], signals=[sample.signals for sample in readings])
     assert again.signals["depth"].cells.tobytes() == traces[-1].tobytes()
 
 
@@ -451,7 +452,7 @@ def test_the_trace_of_a_running_grasp_holds_no_image_in_memory():
         held.append(weakref.ref(image.cells))
         recorder.add(Reading(frame, NO_PADS, make(image)), 2, Command(EFFORT, 0.0, inf, inf))
         del image
-    assert [one() for one in held] == [None] * 50
+    assert [reference() for reference in held] == [None] * 50
     assert recorder.trace().signals["depth"].cells[:, 0, 0].tolist() == list(range(50))
 
 
@@ -460,18 +461,18 @@ class Reference(NamedTuple):
     outcome: int
     gentle: GentleState
     counter: int
-    before: Any
+    image: Any
 
 
 def step_with_reference(params, state, reading):
     """Closes gently until an image differs much from the first one."""
     command, gentle = gentle_step(params, state.gentle, reading)
     image = reading.signals.eye
-    before = image.cells if state.counter == 0 and image.counter else state.before
+    reference = image.cells if state.counter == 0 and image.counter else state.image
     new = image.counter > state.counter
-    changed = new and float(abs(image.cells.astype(float) - before).mean()) > 40.0
+    changed = new and float(abs(image.cells.astype(float) - reference).mean()) > 40.0
     phase, outcome = (HOLD, STEADY) if changed else (gentle.phase, gentle.outcome)
-    return command, Reference(phase, outcome, gentle, max(state.counter, image.counter), before)
+    return command, Reference(phase, outcome, gentle, max(state.counter, image.counter), reference)
 
 
 @frozen(kw_only=True)
@@ -519,9 +520,9 @@ def test_the_state_of_a_law_holds_images_that_nobody_changes(seen, monkeypatch):
     state_holds_everything(watching(plugins))
     sound = Watching.init
     monkeypatch.setattr(
-        Watching, "init", lambda self: sound(self)._replace(before=np.zeros(EYE.shape, EYE.dtype))
+        Watching, "init", lambda self: sound(self)._replace(image=np.zeros(EYE.shape, EYE.dtype))
     )
-    with pytest.raises(CheckFailed, match=r"state\.before is an array that can be changed"):
+    with pytest.raises(CheckFailed, match=r"state\.image is an array that can be changed"):
         state_is_numbers(watching(plugins))
 
 

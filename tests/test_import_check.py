@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cases import every_case
 from commands import graspsense
 from scipy.io import savemat
 
@@ -44,7 +45,7 @@ def test_check_on_a_table_tells_each_channel_and_draws_its_squeezes(tmp_path):
     )
     assert code == 0, err
     (load,) = json.loads(out)
-    by_name = {one["name"]: one for one in load["channels"]}
+    by_name = {channel["name"]: channel for channel in load["channels"]}
     assert by_name["pos (mm)"]["unit"] == "mm"
     assert by_name["F (N)"]["rate_hz"] == pytest.approx(100.0)
     assert by_name["still"]["resolution"] is None
@@ -78,7 +79,7 @@ def test_check_on_a_bag_shows_a_topic_that_died(tmp_path):
         "import", tmp_path / "jar.bag", "--check", "--json", "--plot", tmp_path / "x.png"
     )
     assert code == 0, err
-    by_name = {one["name"]: one for one in json.loads(out)[0]["channels"]}
+    by_name = {channel["name"]: channel for channel in json.loads(out)[0]["channels"]}
     assert by_name["/hand/gap.data"]["rate_hz"] == pytest.approx(100.0)
     assert by_name["/hand/force.data"]["rate_hz"] == pytest.approx(50.0)
     assert by_name["/hand/force.data"]["age_s"] > 1.5
@@ -93,7 +94,7 @@ def test_check_of_a_manifest_tells_each_channel(tmp_path):
         "import", tmp_path / "m.toml", "--check", "--json", "--plot", tmp_path / "x.png"
     )
     assert code == 0, err
-    by_name = {one["name"]: one for one in json.loads(out)["measured"]}
+    by_name = {channel["name"]: channel for channel in json.loads(out)["measured"]}
     assert by_name["gap"]["resolution"] == pytest.approx(1e-4)
     assert by_name["gap"]["age_s"] == pytest.approx(1.99)
     assert by_name["force_left"]["unit"] == "N"
@@ -251,7 +252,7 @@ RIGHT = {
 }
 
 
-@pytest.mark.parametrize("make", RIGHT, ids=lambda make: make.__name__)
+@every_case("make", RIGHT)
 def test_at_least_half_of_a_suggested_manifest_is_right_and_nothing_is_wrong_in_silence(make, tmp_path):
     folder = tmp_path / "set"
     make(folder)
@@ -268,9 +269,9 @@ def test_at_least_half_of_a_suggested_manifest_is_right_and_nothing_is_wrong_in_
     if not {"force", "left", "right"} & set(suggested) and make in (glove, presses):
         assert "# force" in text  # no column is called a force, so a person names it
         return
-    found = list(read_recordings(str(place)))
-    assert found
-    assert not [recording.error for recording in found if hasattr(recording, "error")]
+    recordings = list(read_recordings(str(place)))
+    assert recordings
+    assert not [recording.error for recording in recordings if hasattr(recording, "error")]
 
 
 def test_what_the_file_states_is_not_questioned(tmp_path):

@@ -5,6 +5,7 @@ import re
 import sys
 
 import pytest
+from cases import every_case
 from commands import graspsense
 from grippers import bottle, squeezing
 
@@ -81,7 +82,7 @@ def test_a_quantity_that_no_gripper_has_is_refused(squeeze, columns, says):
         read_squeeze(name_of(squeeze, **columns))
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("query", "says"),
     [
         ("", "which column of .* is time"),
@@ -104,7 +105,7 @@ def test_a_name_that_makes_no_sense_is_told(squeeze, query, says):
         read_squeeze(f"{squeeze}{query}")
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("line", "says"),
     [
         ("5000;1;1;1;x", "line 4: the time goes from .* it must increase"),

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from cases import every_case
 from sources import parsed, statements
 
 import graspsense
@@ -117,24 +118,24 @@ def test_a_subpackage_knows_only_the_subpackages_it_may():
 
 def modules() -> dict[str, Path]:
     """Return the path of each module of graspsense."""
-    found = {}
+    names = {}
     for path in files(SOURCE):
         parts = ("graspsense", *path.relative_to(SOURCE).with_suffix("").parts)
-        found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
-    return found
+        names[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
+    return names
 
 
 def imports_of(name: str, known: dict[str, Path]) -> set[str]:
     """Return the modules that a module imports in any way: at its beginning, late, or for types alone."""
-    found = set()
+    imported = set()
     for node in statements(parsed(known[name])):
         if isinstance(node, ast.Import):
-            found |= {alias.name for alias in node.names}
+            imported |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
             assert not node.level, f"{name} imports from a package without its full name"
             inner = {f"{node.module}.{alias.name}" for alias in node.names}
-            found |= inner & known.keys() or {node.module}
-    return found & known.keys()
+            imported |= inner & known.keys() or {node.module}
+    return imported & known.keys()
 
 
 def test_a_room_of_core_knows_those_before_it_only():
@@ -142,9 +143,11 @@ def test_a_room_of_core_knows_those_before_it_only():
     for name in known:
         if name.startswith("graspsense.core."):
             room = name.split(".")[2]
-            allowed = {f"graspsense.core.{one}" for one in ROOMS[: ROOMS.index(room) + 1]}
-            within = [one for one in imports_of(name, known) if one.startswith("graspsense.core.")]
-            assert {".".join(one.split(".")[:3]) for one in within} <= allowed, name
+            allowed = {f"graspsense.core.{name_of}" for name_of in ROOMS[: ROOMS.index(room) + 1]}
+            within = [
+                name_of for name_of in imports_of(name, known) if name_of.startswith("graspsense.core.")
+            ]
+            assert {".".join(name_of.split(".")[:3]) for name_of in within} <= allowed, name
 
 
 def test_no_module_imports_itself_through_others():
@@ -206,7 +209,7 @@ def _is_target(text: str) -> bool:
     )
 
 
-@pytest.mark.parametrize("folder", distributions(), ids=lambda folder: folder.name)
+@every_case("folder", distributions())
 def test_a_distribution_knows_the_door_for_authors_only(folder):
     (package,) = [path for path in (folder / "src").iterdir() if path.is_dir() and path.name != "__pycache__"]
     for path in files(package):
@@ -219,7 +222,7 @@ def test_a_distribution_knows_the_door_for_authors_only(folder):
         assert known <= allowed, f"{path.relative_to(folder)} imports {sorted(known - allowed)}"
 
 
-@pytest.mark.parametrize("folder", distributions(), ids=lambda folder: folder.name)
+@every_case("folder", distributions())
 def test_a_distribution_knows_no_other(folder):
     others = {f"graspsense_{distribution.name}" for distribution in distributions()} - {
         f"graspsense_{folder.name}"
@@ -303,19 +306,19 @@ def test_listing_plugins_loads_no_driver_and_nothing_heavy(arguments):
 PUBLIC_MODULES = [graspsense, *(importlib.import_module(f"graspsense.{door}") for door in DOORS)]
 
 
-@pytest.mark.parametrize("door", PUBLIC_MODULES, ids=lambda door: door.__name__)
+@every_case("door", PUBLIC_MODULES)
 def test_type_checkers_see_the_names_of_the_tables(door):
     stub = "__init__" if door is graspsense else door.__name__.removeprefix("graspsense.")
     assert (SOURCE / f"{stub}.pyi").read_text() == door.PUBLIC.stub() + "\n"
 
 
-@pytest.mark.parametrize("door", PUBLIC_MODULES, ids=lambda door: door.__name__)
+@every_case("door", PUBLIC_MODULES)
 def test_each_public_module_lists_a_name_once(door):
     names = [name for homes in door.PUBLIC.table.values() for part in homes.values() for name in part]
     assert sorted(names) == door.PUBLIC.names == sorted(set(names))
 
 
-@pytest.mark.parametrize("door", PUBLIC_MODULES, ids=lambda door: door.__name__)
+@every_case("door", PUBLIC_MODULES)
 def test_every_name_of_a_door_can_be_imported(door):
     for name in door.__all__:
         assert getattr(door, name) is not None

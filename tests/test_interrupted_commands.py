@@ -114,14 +114,16 @@ class Lab:
         """Nothing that was finished is lost, nothing is half, and nobody was shown a traceback."""
         assert done.killed or done.code in (0, 1, 2, 5), done.said
         assert "Traceback" not in done.said, done.said
-        found = recovered(self.store)
-        assert [one for one in found if one.what == "failed"] == []
+        recoveries = recovered(self.store)
+        assert [summary for summary in recoveries if summary.what == "failed"] == []
         verified = verify_store(self.store)
         assert verified.problems == ()
         assert verified.unfinished == ()
         with Store.read(self.store) as store:
-            assert {one.id for one in store.page(limit=10_000, set_aside=None)} >= set(range(1, TRIALS + 1))
-            complete = sum(one.complete for one in store.page(limit=10_000))
+            assert {summary.id for summary in store.page(limit=10_000, set_aside=None)} >= set(
+                range(1, TRIALS + 1)
+            )
+            complete = sum(summary.complete for summary in store.page(limit=10_000))
             labels = {store.trial(number).summary.label for number in (1, 3)}
         assert len(labels) == 1, "both or neither were relabelled"
         if kind in ("run", "import") and not done.killed and done.code == 0:
@@ -281,8 +283,10 @@ def cut_what_was_not_synced(copy, synced, rng):
 
 def check_copy(copy, announced):
     with Store.open(copy) as store:
-        found = recover_store(store)
-        assert [one for one in found if one.what == "failed"] == []
-        assert {one.id for one in store.page(limit=10_000) if one.complete} >= set(range(1, announced + 1))
+        recoveries = recover_store(store)
+        assert [summary for summary in recoveries if summary.what == "failed"] == []
+        assert {summary.id for summary in store.page(limit=10_000) if summary.complete} >= set(
+            range(1, announced + 1)
+        )
     verified = verify_store(copy)
     assert (verified.problems, verified.unfinished) == ((), ())

@@ -77,10 +77,10 @@ def signalled():
 @pytest.fixture(autouse=True)
 def listening():
     """Handle SIGTERM and SIGHUP as the command line does, whatever the tests were started with."""
-    before = {end: signal.signal(end, signal.default_int_handler) for end in ENDS}
+    handlers = {end: signal.signal(end, signal.default_int_handler) for end in ENDS}
     yield
-    for one, handler in before.items():
-        signal.signal(one, handler)
+    for number, handler in handlers.items():
+        signal.signal(number, handler)
 
 
 def collection_of(store, settings, answers):
@@ -108,7 +108,7 @@ def test_a_signal_in_a_squeeze_stops_the_collection_with_the_grasp_stored_as_abo
         assert len(store.counts("collect")) == 0
     assert gripper.begun == 1
     assert gripper.commanded[-1].value == 0.0
-    assert any(one.value == -20.0 for one in gripper.commanded[IN_THE_SQUEEZE:])
+    assert any(command.value == -20.0 for command in gripper.commanded[IN_THE_SQUEEZE:])
 
 
 def test_a_signal_while_the_gripper_is_let_go_stores_the_finished_grasp_and_stops(signalled, tmp_path):
@@ -152,7 +152,7 @@ def test_a_repeated_trial_keeps_the_label_of_the_session_whatever_became_of_the_
             relabel(store, [1], {"label": "cup:empty"}, "by another operator")
 
         collection.run()
-        assert [(one.id, one.label, one.set_aside) for one in store.page(set_aside=None)] == [
+        assert [(summary.id, summary.label, summary.set_aside) for summary in store.page(set_aside=None)] == [
             (2, "jar:full", None),
             (1, "cup:empty", "repeated by the operator"),
         ]
@@ -199,13 +199,13 @@ def interrupting(monkeypatch, after):
     return begun
 
 
-@pytest.fixture
-def recordings(tmp_path):
-    """Return the folder of a store with three trials, and CSV files of the same grasps."""
-    store = tmp_path / "t"
+@pytest.fixture(scope="module")
+def recordings(tmp_path_factory):
+    """Return the folder of a store with three trials, with CSV files of the same grasps beside it."""
+    store = tmp_path_factory.mktemp("recordings") / "t"
     for seed in ("1", "2", "3"):
         printed("run", "--label", "block", "--seed", seed, "-o", "classifier.type=none", "--save", store)
-        printed("export", f"{store}#{seed}", "--to", tmp_path / f"{seed}.csv")
+        printed("export", f"{store}#{seed}", "--to", store.parent / f"{seed}.csv")
     return store
 
 
@@ -213,12 +213,12 @@ def recordings(tmp_path):
 def test_ctrl_c_in_an_import_stores_no_aborted_grasp_and_is_told(recordings, tmp_path, monkeypatch, after):
     """Each recording is tried before it is imported: the second one is opened for the third and fourth time."""
     begun = interrupting(monkeypatch, after=after)
-    files = [str(tmp_path / f"{k}.csv") for k in (1, 2)]
+    files = [str(recordings.parent / f"{k}.csv") for k in (1, 2)]
     importing = [graspsense("import", file, "--label", "block", "--save", tmp_path / "i") for file in files]
     assert [done.returncode for done in importing] == [0, 130]
     assert len(begun) == after
     with Store.read(tmp_path / "i") as store:
-        assert [one.outcome for one in store.page()] == ["steady"]
+        assert [summary.outcome for summary in store.page()] == ["steady"]
     assert "interrupted" in importing[1].stderr
 
 
@@ -261,8 +261,8 @@ def test_a_process_that_collects_with_piped_answers_stops_at_the_first_signal(tm
     result = json.loads(out)
     assert sum(result["counts"].values()) == 0
     with Store.open(tmp_path / "t") as store:
-        assert {one.outcome for one in store.page()} <= {"aborted"}
-        assert result["trials"] == [one.id for one in store.page()]
+        assert {summary.outcome for summary in store.page()} <= {"aborted"}
+        assert result["trials"] == [summary.id for summary in store.page()]
 
 
 def operator(folder, labels):
@@ -292,8 +292,8 @@ def operator(folder, labels):
 def test_two_operators_on_a_store_undo_and_repeat_only_what_each_has_grasped(tmp_path):
     folder = tmp_path / "t"
     Store.open(folder).close()
-    first, says_first = operator(folder, "block")
-    second, says_second = operator(folder, "toy")
+    block_operator, says_first = operator(folder, "block")
+    toy_operator, says_second = operator(folder, "toy")
     says_first("", "trial 1, block")
     says_second("", "trial 2, toy")
     says_second("", "trial 3, toy")
@@ -303,11 +303,13 @@ def test_two_operators_on_a_store_undo_and_repeat_only_what_each_has_grasped(tmp
     assert "no trial to undo" in says_first("r", "no trial")
     retaken = says_second("r", "trial 4, toy")
     assert "trial 3, toy: set aside" in retaken
-    for process in (first, second):
+    for process in (block_operator, toy_operator):
         _, err = process.communicate("q\n", timeout=300)
         assert process.returncode == 0, err
     with Store.read(folder) as store:
-        kept = {one.id: (one.label, one.set_aside is None) for one in store.page(set_aside=None)}
+        kept = {
+            summary.id: (summary.label, summary.set_aside is None) for summary in store.page(set_aside=None)
+        }
     assert kept == {1: ("block", False), 2: ("toy", True), 3: ("toy", False), 4: ("toy", True)}
 
 
@@ -320,7 +322,7 @@ def test_a_second_session_leaves_the_trials_of_an_earlier_one_alone(tmp_path):
     assert done.returncode == 0
     assert done.stderr.count("no trial to undo") == 2
     with Store.read(folder) as store:
-        assert [one.set_aside for one in store.page(set_aside=None)] == [None]
+        assert [summary.set_aside for summary in store.page(set_aside=None)] == [None]
 
 
 @pytest.mark.slow
@@ -343,4 +345,4 @@ def test_a_terminal_that_goes_ends_the_collection_though_nothing_can_be_printed(
     process.send_signal(signal.SIGHUP)
     assert process.wait(timeout=300) == 130
     with Store.open(tmp_path / "t") as store:
-        assert {one.outcome for one in store.page()} <= {"aborted"}
+        assert {summary.outcome for summary in store.page()} <= {"aborted"}

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from cases import every_case
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -9,7 +10,7 @@ from graspsense.evaluation.intervals import RecognitionRate, difference, rate_of
 from graspsense.evaluation.json_codec import from_json, to_json
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("correct", "n", "low", "high"),
     [
         # Rates of Chitta, Piccoli and Sturm (ICRA 2010) with their 95 % Wilson intervals, worked out apart from us.
@@ -46,20 +47,20 @@ def test_what_is_no_rate_is_refused(correct, n):
 
 @given(st.lists(st.tuples(st.booleans(), st.booleans()), min_size=1, max_size=60))
 def test_a_difference_turns_its_sign_with_its_sides(pairs):
-    first, second = [a for a, _ in pairs], [b for _, b in pairs]
-    one, other = difference(first, second), difference(second, first)
+    left, right = [a for a, _ in pairs], [b for _, b in pairs]
+    forward, other = difference(left, right), difference(right, left)
 
-    assert one.value == pytest.approx((sum(first) - sum(second)) / len(pairs))
-    assert one.interval[0] <= one.value <= one.interval[1]
-    assert other.value == pytest.approx(-one.value)
-    assert other.interval == (pytest.approx(-one.interval[1]), pytest.approx(-one.interval[0]))
+    assert forward.value == pytest.approx((sum(left) - sum(right)) / len(pairs))
+    assert forward.interval[0] <= forward.value <= forward.interval[1]
+    assert other.value == pytest.approx(-forward.value)
+    assert other.interval == (pytest.approx(-forward.interval[1]), pytest.approx(-forward.interval[0]))
 
 
 def test_equal_judgements_differ_by_nothing():
-    found = difference([True, False] * 20, [True, False] * 20)
+    gain = difference([True, False] * 20, [True, False] * 20)
 
-    assert found.value == 0.0
-    assert found.interval[0] < 0.0 < found.interval[1]
+    assert gain.value == 0.0
+    assert gain.interval[0] < 0.0 < gain.interval[1]
 
 
 def test_the_interval_of_a_difference_covers_the_true_one_nineteen_times_in_twenty():
@@ -68,9 +69,9 @@ def test_the_interval_of_a_difference_covers_the_true_one_nineteen_times_in_twen
     covered, runs = 0, 2000
     for _ in range(runs):
         u = rng.random(100)
-        first = u < both + only_first
-        second = (u < both) | ((u >= both + only_first) & (u < both + only_first + only_second))
-        low, high = difference(first.tolist(), second.tolist()).interval
+        left = u < both + only_first
+        right = (u < both) | ((u >= both + only_first) & (u < both + only_first + only_second))
+        low, high = difference(left.tolist(), right.tolist()).interval
         covered += low <= only_first - only_second <= high
 
     assert 0.93 < covered / runs < 0.98
@@ -87,8 +88,8 @@ def counted(counts, trials=8):
     return right, [f"bottle#{i}" for i in range(len(counts)) for _ in range(trials)]
 
 
-@pytest.mark.parametrize("instances", [6, 12])
-@pytest.mark.parametrize("correlation", [0.1, 0.3])
+@every_case("instances", [6, 12])
+@every_case("correlation", [0.1, 0.3])
 def test_the_interval_over_instances_covers_where_that_of_the_trials_does_not(instances, correlation):
     """benchmarks/interval_coverage.py prints the whole table."""
     rng = np.random.default_rng(0)
@@ -111,11 +112,11 @@ def test_the_difference_over_instances_covers_too():
     runs, covered, by_trials = 400, 0, 0
     for _ in range(runs):
         shift = rng.choice([-0.25, 0.25], 12)
-        first, names = counted(rng.binomial(8, 0.6 + shift))
-        second, _ = counted(rng.binomial(8, 0.6 - shift))
-        low, high = difference(first, second, names).interval
+        left, names = counted(rng.binomial(8, 0.6 + shift))
+        right, _ = counted(rng.binomial(8, 0.6 - shift))
+        low, high = difference(left, right, names).interval
         covered += low <= 0.0 <= high
-        low, high = difference(first, second).interval
+        low, high = difference(left, right).interval
         by_trials += low <= 0.0 <= high
 
     assert covered / runs > 0.92

@@ -32,21 +32,21 @@ TICKS = 400
 HERE = Path(__file__).parent
 
 
-def report(name, **found):
+def report(name, **figures):
     path = os.environ.get("GRASPSENSE_KILLS_REPORT")
     if path:
         with Path(path).open("a") as file:
-            file.write(json.dumps({"test": name, "kills": KILLS, **found}) + "\n")
+            file.write(json.dumps({"test": name, "kills": KILLS, **figures}) + "\n")
 
 
 def at_work(folder):
     """Return the processes that were started for this folder: writers, and what is about to become one."""
-    found = []
+    folders = []
     for path in Path("/proc").glob("[0-9]*/cmdline"):
         with suppress(OSError):
             if str(folder).encode() in path.read_bytes():
-                found.append(path.parent.name)
-    return found
+                folders.append(path.parent.name)
+    return folders
 
 
 def recovered(folder):
@@ -83,15 +83,17 @@ def until_tick(progress, number, process):
 
 def check(folder, announced):
     """Every announced trial is there and counts, every file opens, and SQLite and all hashes are well."""
-    found = recovered(folder)
-    assert [one for one in found if one.what == "failed"] == []
+    recoveries = recovered(folder)
+    assert [recovery for recovery in recoveries if recovery.what == "failed"] == []
     with Store.read(folder) as store:
-        there = {one.instance or one.label for one in store.page(limit=10_000) if one.complete}
+        there = {
+            recovery.instance or recovery.label for recovery in store.page(limit=10_000) if recovery.complete
+        }
         assert announced <= there
     verified = verify_store(folder)
     assert verified.problems == ()
     assert verified.unfinished == ()
-    return found
+    return recoveries
 
 
 def test_a_recorder_killed_with_its_writer_loses_at_most_100_ms_of_the_running_trial(tmp_path):
@@ -119,14 +121,14 @@ def test_a_recorder_killed_with_its_writer_loses_at_most_100_ms_of_the_running_t
             printed = process.stdout.read()
         trial, last, writer_now = PROGRESS.unpack(progress.read_bytes())
         announced = {f"can#{line.split()[1]}" for line in printed.splitlines()}
-        found = check(folder, announced)
+        recoveries = check(folder, announced)
         if f"can#{trial}" in announced or writer_now != writer:
             continue  # nothing was running, or a new writer had begun between the look and the kill
         with Store.read(folder) as store:
-            running = [one for one in store.page(limit=1000) if one.instance == f"can#{trial}"]
+            running = [summary for summary in store.page(limit=1000) if summary.instance == f"can#{trial}"]
             ticks = len(read_recorded(store.recording_path(running[0].recording))) if running else 0
         if ticks == 0:
-            assert [one.what for one in found] in ([], ["empty"])
+            assert [summary.what for summary in recoveries] in ([], ["empty"])
         missing.append((last + 1 - ticks) / 1000.0)
     report("recorder", running=len(missing), most_missing_s=max(missing), missing_s=sorted(missing))
     assert len(missing) >= KILLS // 3
@@ -152,22 +154,22 @@ def test_a_killed_collect_loses_no_trial_and_goes_on(tmp_path):
             process.stdin.write("\n" * 2 * each)
             process.stdin.flush()
             said, wanted = [], rng.randrange(4)
-            while sum(map(is_kept, said)) < wanted or not any("next:" in one for one in said):
+            while sum(map(is_kept, said)) < wanted or not any("next:" in summary for summary in said):
                 said.append(process.stderr.readline())
                 assert said[-1], "collect ended by itself"
             time.sleep(rng.uniform(0.0, 0.3))
             kill(process.pid)
             said += process.stderr.readlines()
         announced += sum(map(is_kept, said))
-        found = check(folder, set())
-        recovered_trials += sum(one.what in ("added", "recovered") for one in found)
+        recoveries = check(folder, set())
+        recovered_trials += sum(summary.what in ("added", "recovered") for summary in recoveries)
         with Store.read(folder) as store:
             assert sum(store.counts("collect").values()) >= announced
     report("collect", announced=announced, recovered=recovered_trials)
     assert announced > 0
     with Store.read(folder) as store:
-        numbers = [one.id for one in store.page(set_aside=None, limit=10_000)]
+        numbers = [summary.id for summary in store.page(set_aside=None, limit=10_000)]
         assert numbers == sorted(set(numbers), reverse=True)
-        for one in store.page(limit=10_000):
-            trial = store.trial(one.id)
+        for summary in store.page(limit=10_000):
+            trial = store.trial(summary.id)
             assert len(read_recorded(trial.recording)) == trial.recorder["ticks"]

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from cases import every_case
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -72,9 +73,9 @@ def events_in(folder, **keys):
 
 def test_a_column_of_0_and_1_gives_begin_and_end_of_each_event(tmp_path):
     write(tmp_path, "box_1", force(), flags((1.0, 1.5), (3.0, 3.0)))
-    found = events_in(tmp_path)
-    assert found["slip"] == [(1.0, 1.5), (3.0, 3.0)]
-    assert found["slip not known"] == []
+    events = events_in(tmp_path)
+    assert events["slip"] == [(1.0, 1.5), (3.0, 3.0)]
+    assert events["slip not known"] == []
 
 
 def test_an_event_from_the_start_or_behind_a_missing_label_has_no_known_begin(tmp_path):
@@ -82,9 +83,9 @@ def test_an_event_from_the_start_or_behind_a_missing_label_has_no_known_begin(tm
     slips[(T_S >= 2.5) & (T_S < 2.8)] = math.nan
     slips[(T_S >= 4.0) & (T_S < 4.5)] = math.nan
     write(tmp_path, "box_1", force(), slips)
-    found = events_in(tmp_path)
-    assert found["slip"] == [(2.0, 2.495)]
-    assert found["slip not known"] == [(0.0, 0.5), (2.5, 3.0), (4.0, 5.0)]
+    events = events_in(tmp_path)
+    assert events["slip"] == [(2.0, 2.495)]
+    assert events["slip not known"] == [(0.0, 0.5), (2.5, 3.0), (4.0, 5.0)]
 
 
 def test_times_come_from_a_list_on_the_clock_of_the_file(tmp_path):
@@ -118,7 +119,7 @@ def test_a_time_of_onset_can_be_a_column_of_the_recording(tmp_path):
     assert events_in(tmp_path, events='events = { slip = "slip [s]" }') == {"slip": []}
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("slips", "events", "says"),
     [
         (2 * flags((1.0, 2.0)), 'events = { slip = "slip" }', "line 202.* is 2; it must be 0 or 1"),
@@ -173,9 +174,9 @@ def test_an_imported_trial_keeps_the_labels_among_its_events(tmp_path, capsys):
     assert {"t_s": 1.0, "phase": "approach", "what": "slip", "source": "label", "until_s": 1.5} in events
     assert [event["t_s"] for event in events] == sorted(event["t_s"] for event in events)
     # The second was looked at as well, so its detections count.
-    one = scored(capsys, f"store:{tmp_path / 'trials'}")
-    assert one == scored(capsys, f"manifest:{path}")
-    assert (one["recordings"], one["kinds"]["slip"]["given"]["labelled"]) == (2, 1)
+    score = scored(capsys, f"store:{tmp_path / 'trials'}")
+    assert score == scored(capsys, f"manifest:{path}")
+    assert (score["recordings"], score["kinds"]["slip"]["given"]["labelled"]) == (2, 1)
 
 
 @given(st.builds(GraspEvent, st.floats(0, 1e6), st.sampled_from(Phase), st.just("slip"),
@@ -189,15 +190,15 @@ def test_an_event_is_the_same_after_json(event):
 
 
 def test_each_label_is_found_once_and_each_detection_finds_one():
-    found = outcomes([(1.0, 1.0)], [], [0.9, 1.1], 0.25)
-    assert (found.delays_s, found.false_alarms, found.repeated) == (pytest.approx((-0.1,)), 1, 0)
-    found = outcomes([(1.0, 1.0), (1.2, 1.2)], [], [1.1], 0.25)
-    assert (len(found.delays_s), found.missed, found.false_alarms) == (1, 1, 0)
+    outcome = outcomes([(1.0, 1.0)], [], [0.9, 1.1], 0.25)
+    assert (outcome.delays_s, outcome.false_alarms, outcome.repeated) == (pytest.approx((-0.1,)), 1, 0)
+    outcome = outcomes([(1.0, 1.0), (1.2, 1.2)], [], [1.1], 0.25)
+    assert (len(outcome.delays_s), outcome.missed, outcome.false_alarms) == (1, 1, 0)
 
 
 def test_what_is_told_while_an_event_goes_on_is_no_false_alarm_and_finds_nothing_when_late():
-    found = outcomes([(1.0, 3.0)], [], [2.0, 2.5, 3.2], 0.25)
-    assert (found.delays_s, found.missed, found.repeated, found.false_alarms) == ((), 1, 2, 1)
+    outcome = outcomes([(1.0, 3.0)], [], [2.0, 2.5, 3.2], 0.25)
+    assert (outcome.delays_s, outcome.missed, outcome.repeated, outcome.false_alarms) == ((), 1, 2, 1)
 
 
 def test_nothing_counts_where_the_labels_are_missing():
@@ -210,10 +211,10 @@ times = st.lists(st.floats(0, 10), max_size=8)
 
 @given(times, times, st.floats(0.01, 2))
 def test_every_label_and_every_detection_has_one_outcome(labels, told, tolerance_s):
-    found = outcomes([(label, label) for label in labels], [], told, tolerance_s)
-    assert len(found.delays_s) + found.missed == len(labels)
-    assert len(found.delays_s) + found.false_alarms + found.repeated == len(told)
-    assert all(abs(delay) <= tolerance_s for delay in found.delays_s)
+    outcome = outcomes([(label, label) for label in labels], [], told, tolerance_s)
+    assert len(outcome.delays_s) + outcome.missed == len(labels)
+    assert len(outcome.delays_s) + outcome.false_alarms + outcome.repeated == len(told)
+    assert all(abs(delay) <= tolerance_s for delay in outcome.delays_s)
 
 
 # The score.
@@ -222,9 +223,9 @@ def test_every_label_and_every_detection_has_one_outcome(labels, told, tolerance
 def scored(capsys, *arguments):
     code, out, err = run(capsys, "evaluate", *arguments, "--events", "--json")
     assert code == 0, err
-    found = json.loads(out)
-    del found["source"]
-    return found
+    scores = json.loads(out)
+    del scores["source"]
+    return scores
 
 
 def thresholds(kinds=8, each=3):
@@ -248,14 +249,14 @@ def thresholds(kinds=8, each=3):
 
 def test_the_fitted_threshold_is_the_best_one_next_to_that_of_the_unit():
     recordings, told = thresholds()
-    one = evaluate_kind("slip", recordings, told, factor=10.0, tolerance_s=0.1, folds=10, seed=0)
-    assert one.factors == pytest.approx([10 * 10**-0.75] * 8)  # the largest of the steps that is at most 3
-    assert (one.fitted.detected, one.fitted.labelled, one.fitted.false_alarms) == (24, 24, 0)
-    assert one.fitted.delay.median_s == pytest.approx(0.05)
-    assert one.fitted.delay.interval == pytest.approx((0.05, 0.05))
-    assert one.fitted.recall.instances == 8
-    assert one.fitted.recall.interval[0] < 0.8  # 24 trials of 8 groups say no more than 8
-    assert one.chance.detected == 0
+    score = evaluate_kind("slip", recordings, told, factor=10.0, tolerance_s=0.1, folds=10, seed=0)
+    assert score.factors == pytest.approx([10 * 10**-0.75] * 8)  # the largest of the steps that is at most 3
+    assert (score.fitted.detected, score.fitted.labelled, score.fitted.false_alarms) == (24, 24, 0)
+    assert score.fitted.delay.median_s == pytest.approx(0.05)
+    assert score.fitted.delay.interval == pytest.approx((0.05, 0.05))
+    assert score.fitted.recall.instances == 8
+    assert score.fitted.recall.interval[0] < 0.8  # 24 trials of 8 groups say no more than 8
+    assert score.chance.detected == 0
 
 
 def test_the_threshold_of_a_group_does_not_come_from_its_own_recordings():
@@ -265,18 +266,18 @@ def test_the_threshold_of_a_group_does_not_come_from_its_own_recordings():
     def odd(k, factor):
         return told(k, factor * (1.0 if recordings[k].group == "g0" else 100.0))
 
-    one = evaluate_kind("slip", recordings, odd, factor=1.0, tolerance_s=0.1, folds=10, seed=0)
-    assert one.by_group == {"g0": (3, 3, 6), "g1": (0, 3, 0)}
-    assert one.fitted.recall.interval is None
-    assert "2 instances" in one.fitted.recall.no_interval
+    score = evaluate_kind("slip", recordings, odd, factor=1.0, tolerance_s=0.1, folds=10, seed=0)
+    assert score.by_group == {"g0": (3, 3, 6), "g1": (0, 3, 0)}
+    assert score.fitted.recall.interval is None
+    assert "2 instances" in score.fitted.recall.no_interval
 
 
 def test_one_group_alone_has_no_fitted_score():
     recordings, told = thresholds(kinds=1)
-    one = evaluate_kind("slip", recordings, told, factor=1.0, tolerance_s=0.1, folds=10, seed=0)
-    assert one.fitted is None
-    assert "none can be held out" in one.not_fitted
-    assert one.given.detected == 3
+    score = evaluate_kind("slip", recordings, told, factor=1.0, tolerance_s=0.1, folds=10, seed=0)
+    assert score.fitted is None
+    assert "none can be held out" in score.not_fitted
+    assert score.given.detected == 3
 
 
 def boxes(folder, newtons=0.15):
@@ -297,13 +298,13 @@ def test_slips_of_a_force_are_found_and_what_cannot_be_told_is_said(tmp_path, ca
     boxes(tmp_path)
     path = manifest(tmp_path, events='events = { slip = "slip", jump = "slip" }')
     source = f"manifest:{path}"
-    found = scored(capsys, source)
-    slip = found["kinds"]["slip"]["given"]
+    scores = scored(capsys, source)
+    slip = scores["kinds"]["slip"]["given"]
     assert (slip["labelled"], slip["found"]) == (8, 8)
     assert 0.0 <= slip["delay"]["median_s"] <= 0.05  # the pads are sampled each 41 ms
-    assert found["held_out"] == "label"
-    assert found["not_told"] == ["jump"]
-    assert found["not_labelled"]["no acceleration is measured: placing is told by force alone"] == 4
+    assert scores["held_out"] == "label"
+    assert scores["not_told"] == ["jump"]
+    assert scores["not_labelled"]["no acceleration is measured: placing is told by force alone"] == 4
     code, out, err = run(capsys, "evaluate", source, "--events", "--tolerance", "0.1")
     assert code == 0, err
     assert "8 of 8" in out
@@ -316,9 +317,9 @@ def test_a_force_in_another_unit_is_scored_by_fitted_thresholds(tmp_path, capsys
     boxes(tmp_path, newtons=150.0)
     path = manifest(tmp_path)
     path.write_text(path.read_text().replace('"F"', '"F [counts]"'))
-    found = scored(capsys, f"manifest:{path}")
-    assert found["kinds"]["slip"]["fitted"]["found"] == 8
-    assert any("counts" in note for note in found["notes"])
+    scores = scored(capsys, f"manifest:{path}")
+    assert scores["kinds"]["slip"]["fitted"]["found"] == 8
+    assert any("counts" in note for note in scores["notes"])
 
 
 def test_an_acceleration_of_one_axis_is_told_and_its_threshold_can_be_set(tmp_path, capsys):
@@ -333,7 +334,7 @@ def test_an_acceleration_of_one_axis_is_told_and_its_threshold_can_be_set(tmp_pa
     assert scored(capsys, source, *high)["kinds"]["acceleration"]["given"]["found"] == 0
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("arguments", "code", "says"),
     [
         (("--events", "--png", "x.png"), 2, "--png"),
@@ -355,20 +356,20 @@ def test_wrong_uses_are_told(arguments, code, says, tmp_path, capsys):
 def test_a_copy_of_a_recording_counts_once(tmp_path, capsys):
     boxes(tmp_path)
     (tmp_path / "can_3.csv").write_text((tmp_path / "can_1.csv").read_text())
-    found = scored(capsys, f"manifest:{manifest(tmp_path)}")
-    assert (found["recordings"], found["kinds"]["slip"]["given"]["labelled"]) == (4, 8)
-    assert any("same content" in note for note in found["notes"])
+    scores = scored(capsys, f"manifest:{manifest(tmp_path)}")
+    assert (scores["recordings"], scores["kinds"]["slip"]["given"]["labelled"]) == (4, 8)
+    assert any("same content" in note for note in scores["notes"])
 
 
 def test_the_squeezes_of_a_file_get_the_labels_of_their_own_time(tmp_path):
     held = ((T_S > 1.0) & (T_S < 2.5)) | ((T_S > 3.5) & (T_S < 5.0))
     write(tmp_path, "box_1", 5.0 * held, flags((1.5, 1.6), (4.0, 4.2), (4.5, 4.6)))
     path = manifest(tmp_path, more='split = "force"')
-    first, second = (
+    squeeze, next_squeeze = (
         recording.recording.events["slip"] for recording in readable_or_not("manifest", str(path))
     )
-    assert [event.t_s for event in first] == [1.5]
-    assert [(event.t_s, event.until_s) for event in second] == [(4.0, 4.2), (4.5, 4.6)]
+    assert [event.t_s for event in squeeze] == [1.5]
+    assert [(event.t_s, event.until_s) for event in next_squeeze] == [(4.0, 4.2), (4.5, 4.6)]
 
 
 def test_recordings_without_labels_are_an_error_or_a_note(tmp_path, capsys):
@@ -377,9 +378,9 @@ def test_recordings_without_labels_are_an_error_or_a_note(tmp_path, capsys):
     assert code == 2
     assert "no event is labelled" in err
     write(tmp_path, "box_2", force(level=6.0), np.full(len(T_S), math.nan))
-    found = scored(capsys, f"manifest:{manifest(tmp_path)}")
-    assert found["recordings"] == 1
-    assert any("1 of 2 recordings left out" in note for note in found["notes"])
+    scores = scored(capsys, f"manifest:{manifest(tmp_path)}")
+    assert scores["recordings"] == 1
+    assert any("1 of 2 recordings left out" in note for note in scores["notes"])
     for source in ("simulated", "icub", str(tmp_path / "box_1.csv")):
         code, _, err = run(capsys, "evaluate", source, "--events")
         assert (code, "recordings" in err) == (2, True), err

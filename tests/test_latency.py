@@ -109,7 +109,7 @@ def test_without_a_block_or_enough_force_it_is_said_why_there_is_none():
 
 def test_doctor_measures_any_gripper_and_needs_its_name():
     told = json.loads(printed("doctor", "--gripper", "sim", "--latency", "2", "--json"))
-    [diagnosis] = [one for one in told["diagnoses"] if one["distribution"] == "graspsense-sim-gripper/sim"]
+    [diagnosis] = [row for row in told["diagnoses"] if row["distribution"] == "graspsense-sim-gripper/sim"]
     motion, force = diagnosis["findings"]
     # The simulated fingers need some ms to get going against their friction.
     assert 0.001 < motion["numbers"]["median_s"] < 0.1

@@ -6,6 +6,7 @@ import json
 
 import numpy as np
 import pytest
+from cases import every_case
 from commands import graspsense
 
 
@@ -48,15 +49,15 @@ def test_its_json(csv):
     code, out, _ = graspsense(
         "evaluate", csv, "--label", "what", "--json", "--classifier", "knn", "-o", "classifier.neighbours=3"
     )
-    found = json.loads(out)
+    answer = json.loads(out)
 
     assert code == 0
-    assert found["classifier"].startswith("graspsense/knn ")
-    assert found["settings"] == {"neighbours": 3}
-    assert found["protocol"] == "stratified_10_fold"
-    assert found["headline"]["n"] == 120
-    assert found["confusion"]["labels"] == ["can:empty", "can:full", "jar:empty", "jar:full"]
-    assert found["controls"]["width_only"]["rate"]["rate"] < 0.8 < found["headline"]["rate"]
+    assert answer["classifier"].startswith("graspsense/knn ")
+    assert answer["settings"] == {"neighbours": 3}
+    assert answer["protocol"] == "stratified_10_fold"
+    assert answer["headline"]["n"] == 120
+    assert answer["confusion"]["labels"] == ["can:empty", "can:full", "jar:empty", "jar:full"]
+    assert answer["controls"]["width_only"]["rate"]["rate"] < 0.8 < answer["headline"]["rate"]
 
 
 @pytest.mark.slow
@@ -79,12 +80,18 @@ def test_train_then_predict(csv, tmp_path):
     new = tmp_path / "new.csv"
     new.write_text("f_steady,p_first,comment\n9.1,0.0661,a\n4.2,0.0549,b\n9.0,0.0300,c\n,0.066,d\n")
     code, out, _ = graspsense("predict", model, new, "--json")
-    found = json.loads(out)
+    answer = json.loads(out)
     assert code == 0
-    assert [one["label"] for one in found["predictions"]][:3] == ["can:full", "jar:empty", "unknown"]
-    assert found["unknown"] == 1
-    assert found["rate"] is None
-    assert any("f_steady is missing" in one["words"] for one in found["predictions"][3]["because"])
+    assert [prediction["label"] for prediction in answer["predictions"]][:3] == [
+        "can:full",
+        "jar:empty",
+        "unknown",
+    ]
+    assert answer["unknown"] == 1
+    assert answer["rate"] is None
+    assert any(
+        "f_steady is missing" in prediction["words"] for prediction in answer["predictions"][3]["because"]
+    )
 
     code, out, _ = graspsense("predict", model, csv, "--label", "what")
     assert code == 0
@@ -103,23 +110,23 @@ def test_a_model_of_states_or_classes(csv, tmp_path):
     assert json.loads(model.read_text())["target"] == "state"
     again = ("train", csv, "--label", "what", "--out", model, "--target", "class", "--json")
     assert graspsense(*again, "--overwrite")[0] == 0
-    found = json.loads(graspsense("predict", model, csv, "--label", "what", "--json")[1])
-    assert found["rate"]["rate"] > 0.9
+    answer = json.loads(graspsense("predict", model, csv, "--label", "what", "--json")[1])
+    assert answer["rate"]["rate"] > 0.9
 
 
 @pytest.mark.slow
 def test_features_are_kept(csv, tmp_path):
     kept = tmp_path / "kept.csv"
     graspsense("evaluate", csv, "--label", "what", "--instance", "thing", "--keep", kept)
-    first = json.loads(graspsense("evaluate", csv, "--label", "what", "--instance", "thing", "--json")[1])
+    result = json.loads(graspsense("evaluate", csv, "--label", "what", "--instance", "thing", "--json")[1])
     again = json.loads(
         graspsense(
             "evaluate", kept, "--label", "label", "--instance", "instance", "--order", "order", "--json"
         )[1]
     )
 
-    assert again["confusion"] == first["confusion"]
-    assert again["controls"]["recording_order"] == first["controls"]["recording_order"]
+    assert again["confusion"] == result["confusion"]
+    assert again["controls"]["recording_order"] == result["controls"]["recording_order"]
 
 
 @pytest.mark.slow
@@ -133,7 +140,7 @@ def test_the_picture_of_the_confusion(csv, tmp_path):
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("arguments", "code", "said"),
     [
         (
@@ -224,14 +231,14 @@ def test_simulated_trials_small_and_whole():
         "2",
         "--json",
     )
-    found = json.loads(out)
+    answer = json.loads(out)
 
     assert code == 0
-    assert found["headline"]["n"] == 12
-    assert found["protocol"] == "instance_held_out"
-    assert found["controls"]["before_contact"]["rate"]["n"] == 12
-    assert any("simulated" in note for note in found["notes"])
-    assert "each instance is grasped in all of its states" in found["notes"]
+    assert answer["headline"]["n"] == 12
+    assert answer["protocol"] == "instance_held_out"
+    assert answer["controls"]["before_contact"]["rate"]["n"] == 12
+    assert any("simulated" in note for note in answer["notes"])
+    assert "each instance is grasped in all of its states" in answer["notes"]
 
 
 def test_simulated_trials_with_each_instance_in_one_state_only(tmp_path):
@@ -300,7 +307,7 @@ def test_train_replaces_no_file_unless_told(csv, tmp_path):
     model, kept = tmp_path / "model.json", tmp_path / "kept.csv"
     command = ("train", csv, "--label", "what", "--out", model, "--keep", kept)
     assert graspsense(*command)[0] == 0
-    before = model.read_bytes(), kept.read_bytes()
+    contents = model.read_bytes(), kept.read_bytes()
 
     code, _, err = graspsense(*command, "--classifier", "knn")
     assert code == 2
@@ -308,10 +315,10 @@ def test_train_replaces_no_file_unless_told(csv, tmp_path):
     model.rename(tmp_path / "other.json")
     assert f"{kept} already exists" in graspsense(*command)[2]
     (tmp_path / "other.json").rename(model)
-    assert (model.read_bytes(), kept.read_bytes()) == before
+    assert (model.read_bytes(), kept.read_bytes()) == contents
 
     assert graspsense(*command, "--classifier", "knn", "--overwrite")[0] == 0
-    assert model.read_bytes() != before[0]
+    assert model.read_bytes() != contents[0]
 
 
 @pytest.mark.parametrize("option", ["--out", "--keep"])
@@ -327,7 +334,7 @@ def test_train_finds_out_before_the_grasps_that_it_cannot_write(mounted, tmp_pat
     files[option] = place / files[option].name
 
     code, _, err = graspsense(
-        "train", "simulated", "--instances", "1000000", *(one for pair in files.items() for one in pair)
+        "train", "simulated", "--instances", "1000000", *(word for pair in files.items() for word in pair)
     )
 
     assert code == 2

@@ -76,7 +76,7 @@ def parameters(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
 
 
 def fields(node: ast.ClassDef) -> int:
-    return sum(isinstance(one, ast.AnnAssign) for one in node.body)
+    return sum(isinstance(statement, ast.AnnAssign) for statement in node.body)
 
 
 def compare(over: dict[str, int], exceptions: dict[str, str], limit: str) -> None:

@@ -27,6 +27,7 @@ from graspsense.live.feeds import LiveFeed
 
 pytest.importorskip("websockets")
 
+from cases import every_case
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
@@ -46,10 +47,10 @@ def frames_of(feed):
 
 def received(viewer, until):
     """Return the messages up to the first of this kind."""
-    found = []
-    while not any(message["kind"] == until for message in found):
-        found += json.loads(viewer.recv(timeout=PATIENCE_S))
-    return found
+    messages = []
+    while not any(message["kind"] == until for message in messages):
+        messages += json.loads(viewer.recv(timeout=PATIENCE_S))
+    return messages
 
 
 def refused(address, headers=None):
@@ -72,8 +73,8 @@ def column(messages, kind, name):
 
 def check_received(messages, n=20):
     sent = [reading(k) for k in range(n)]
-    assert column(messages, "ticks", "t_s") == [one.frame.t_s for one in sent]
-    assert column(messages, "ticks", "gap_m") == [one.frame.gap_m for one in sent]
+    assert column(messages, "ticks", "t_s") == [row.frame.t_s for row in sent]
+    assert column(messages, "ticks", "gap_m") == [row.frame.gap_m for row in sent]
     assert column(messages, "ticks", "force_left_n") == [None] * n
     assert column(messages, "scalars", "temperature") == [300.0 + k for k in range(n)]
     assert column(messages, "samples", "values") == [[[k + i / 4, -1.0] for i in range(3)] for k in range(n)]
@@ -132,14 +133,14 @@ def test_rubbish_and_a_thousand_connections_disturb_nobody(feed):
     with connect(frames_of(feed)) as good:
         crowd = []
         for k in range(1000):
-            one = socket.create_connection(("127.0.0.1", port_of(feed)))
-            crowd.append(one)
+            connection = socket.create_connection(("127.0.0.1", port_of(feed)))
+            crowd.append(connection)
             if k % 100 == 0:
-                one.sendall(os.urandom(2000))
+                connection.sendall(os.urandom(2000))
         shown(feed)
         check_received(received(good, "outcome"))
-        for one in crowd:
-            one.close()
+        for connection in crowd:
+            connection.close()
 
 
 def test_viewers_beyond_the_limit_are_refused(feed):
@@ -226,7 +227,7 @@ def test_a_port_that_is_taken_is_an_error_before_the_grasp(tmp_path):
     assert not (tmp_path / "store").exists()
 
 
-@pytest.mark.parametrize("address", ["", ":80", "127.0.0.1:x", "127.0.0.1:70000", "[::1]:-1"])
+@every_case("address", ["", ":80", "127.0.0.1:x", "127.0.0.1:70000", "[::1]:-1"])
 def test_an_address_that_is_none_is_wrong_use(address):
     with pytest.raises(click.UsageError):
         _host_and_port(address)
@@ -269,8 +270,8 @@ def test_a_trial_is_stored_as_without_a_page(tmp_path):
         done = graspsense(*asked)
         assert done.returncode == 0, done.stderr
         said.append(json.loads(done.stdout))
-    for one in said:
-        del one["seconds_wall"], one["kept"]["store"]
+    for line in said:
+        del line["seconds_wall"], line["kept"]["store"]
     assert said[0] == said[1]
 
 

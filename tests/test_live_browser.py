@@ -48,8 +48,8 @@ def shown(browser, script, wanted):
       }};
       look();
     }})"""
-    found = browser.run(waiting)
-    assert found is True, found
+    answer = browser.run(waiting)
+    assert answer is True, answer
     return True
 
 
@@ -91,19 +91,21 @@ def test_the_page_shows_what_was_sent(browser, feed, tmp_path, dark, width):
     events = browser.run("[...document.querySelectorAll('#events li')].map((one) => one.textContent)")
     assert events == [f"{event.t_s:.3f} s  {event.what}" for event in trial.events]
     browser.screenshot(tmp_path / "page.png")
-    found = browser.run(
+    answer = browser.run(
         "({across: document.documentElement.scrollWidth, ground: getComputedStyle(document.body).backgroundColor})"
     )
-    assert found["across"] <= width
-    assert found["ground"] == ("rgb(20, 23, 26)" if dark else "rgb(255, 255, 255)")
+    assert answer["across"] <= width
+    assert answer["ground"] == ("rgb(20, 23, 26)" if dark else "rgb(255, 255, 255)")
     asked = [
-        one["params"]["request"]["url"]
-        for one in browser.events
-        if one.get("method") == "Network.requestWillBeSent"
+        logged["params"]["request"]["url"]
+        for logged in browser.events
+        if logged.get("method") == "Network.requestWillBeSent"
     ]
     assert all(url.startswith(feed.answer["address"]) for url in asked)
     assert [
-        one for one in browser.events if one.get("method") in ("Log.entryAdded", "Runtime.exceptionThrown")
+        logged
+        for logged in browser.events
+        if logged.get("method") in ("Log.entryAdded", "Runtime.exceptionThrown")
     ] == []
 
 

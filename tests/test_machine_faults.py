@@ -10,6 +10,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
+from cases import every_case
 from commands import graspsense
 from kept import keep, write_recording
 
@@ -50,10 +51,10 @@ def failing(tmp_path):
 
 @needs_proc
 def test_verify_tells_a_disk_that_fails_from_damage(failing):
-    found = verify_store(failing)
-    assert found.problems == ()
-    assert [line.partition(":")[0] for line in found.unread] == ["trial 1"]
-    assert not found.as_json()["intact"]
+    findings = verify_store(failing)
+    assert findings.problems == ()
+    assert [line.partition(":")[0] for line in findings.unread] == ["trial 1"]
+    assert not findings.as_json()["intact"]
     done = graspsense("verify", str(failing))
     assert done.returncode == 2
     said = done.stdout
@@ -123,7 +124,7 @@ def test_recover_says_that_the_database_is_malformed_and_touches_nothing(tmp_pat
     assert not part.exists()
 
 
-@pytest.mark.parametrize("year", [2262, 2300, 2500, 2600])
+@every_case("year", [2262, 2300, 2500, 2600])
 def test_a_grasp_recorded_in_any_year_is_read_and_recovered(tmp_path, monkeypatch, year):
     now_ns = int(datetime(year, 6, 1, tzinfo=UTC).timestamp()) * 10**9
     ticks = itertools.count(now_ns, 1_000_000)
@@ -131,8 +132,8 @@ def test_a_grasp_recorded_in_any_year_is_read_and_recovered(tmp_path, monkeypatc
     with Store.open(tmp_path / "t") as store:
         keep(store, ticks=150)
         write_recording(store.recordings / "late.mcap", 150, finish=False)._out.close()
-        found = recover_store(store)
-        assert [recovered.what for recovered in found] == ["recovered"]
+        recoveries = recover_store(store)
+        assert [recovered.what for recovered in recoveries] == ["recovered"]
         assert sorted(len(read_recorded(path)) for path in store.recordings.glob("*.mcap"))[1] == 150
     assert verify_store(tmp_path / "t").problems == ()
 

@@ -9,6 +9,7 @@ from textwrap import dedent
 
 import numpy as np
 import pytest
+from cases import every_case
 from commands import graspsense
 from scipy.io import savemat
 
@@ -40,15 +41,15 @@ def manifest(folder, text):
 
 
 def recordings(folder, text):
-    found = list(readable_or_not("manifest", str(manifest(folder, text))))
-    for recording in found:
+    grasps = list(readable_or_not("manifest", str(manifest(folder, text))))
+    for recording in grasps:
         if isinstance(recording, UnreadableRecording):
             raise recording.error
-    return found
+    return grasps
 
 
-def column(one, name):
-    return np.array([getattr(reading.frame, name) for reading in one.recording.readings])
+def column(recording, name):
+    return np.array([getattr(reading.frame, name) for reading in recording.recording.readings])
 
 
 def pandas_csv(path, columns):
@@ -90,9 +91,9 @@ def test_fruit_squeezed_until_it_breaks(tmp_path):
         "20241124_151319",
     )
     assert (kiwi.values, banana.values) == ({"break_force [N]": 2.62}, {})
-    for one in (banana, kiwi):
-        assert column(one, "gap_m") == pytest.approx(gap[:180], abs=1e-12)
-        assert len(one.recording.readings) == 180  # up to the largest force before the rupture
+    for fruit in (banana, kiwi):
+        assert column(fruit, "gap_m") == pytest.approx(gap[:180], abs=1e-12)
+        assert len(fruit.recording.readings) == 180  # up to the largest force before the rupture
     assert any(
         "10 samples with the time of the one before were dropped" in note for note in kiwi.recording.notes
     )
@@ -122,21 +123,21 @@ def jaco(path):
 def test_three_fingers_in_blocks_of_one_file_are_folded_and_kept(tmp_path):
     gap, force = jaco(tmp_path / "000_real_life_data.csv")
 
-    first, second = recordings(tmp_path, JACO)
+    finger_grasp, next_grasp = recordings(tmp_path, JACO)
 
-    assert (first.label, second.label, first.order) == ("object17", "object3", 0.0)
-    assert first.recorded_at == "2020-06-15T15:11:27.442126+00:00"
-    assert column(first, "t_s") == pytest.approx(T_S, abs=1e-6)
-    assert column(first, "gap_m") == pytest.approx(gap)
-    assert column(second, "force_left_n") == pytest.approx(0.5 * force)
-    assert column(second, "force_right_n") == pytest.approx(0.5 * force)
-    channels = [(channel.name, channel.unit) for channel in first.recording.channels]
+    assert (finger_grasp.label, next_grasp.label, finger_grasp.order) == ("object17", "object3", 0.0)
+    assert finger_grasp.recorded_at == "2020-06-15T15:11:27.442126+00:00"
+    assert column(finger_grasp, "t_s") == pytest.approx(T_S, abs=1e-6)
+    assert column(finger_grasp, "gap_m") == pytest.approx(gap)
+    assert column(next_grasp, "force_left_n") == pytest.approx(0.5 * force)
+    assert column(next_grasp, "force_right_n") == pytest.approx(0.5 * force)
+    channels = [(channel.name, channel.unit) for channel in finger_grasp.recording.channels]
     assert channels[:4] == [("finger1", "N"), ("finger2", "N"), ("finger3", "N"), ("position1", "mm")]
-    assert first.recording.readings[0].signals.position1 == pytest.approx(
+    assert finger_grasp.recording.readings[0].signals.position1 == pytest.approx(
         37.0
     )  # 3 less than the mean of the three
-    assert first.recording.readings[-1].signals.finger2 == pytest.approx(0.5 * force[-1])
-    assert "the left pad is max(finger1, finger2), the right pad is finger3" in first.recording.notes
+    assert finger_grasp.recording.readings[-1].signals.finger2 == pytest.approx(0.5 * force[-1])
+    assert "the left pad is max(finger1, finger2), the right pad is finger3" in finger_grasp.recording.notes
 
 
 BIOTAC = shipped("pr2_biotac")
@@ -152,16 +153,16 @@ def test_matrices_of_a_mat_file_become_columns_and_arrays(tmp_path):
     for trial in (2, 10):
         savemat(tmp_path / f"data/black_foam_110_{trial}_HOLD.mat", variables)
 
-    second, tenth = recordings(tmp_path, BIOTAC)
+    later_press, tenth = recordings(tmp_path, BIOTAC)
 
-    assert (second.order, tenth.order) == (2.0, 10.0)  # not in the order of the texts
-    assert second.label == "black_foam"
-    assert second.recording.units == {"force_left": "counts", "force_right": "counts"}
-    assert column(second, "effort_n") == pytest.approx(force)
-    array, other = second.recording.channels
+    assert (later_press.order, tenth.order) == (2.0, 10.0)  # not in the order of the texts
+    assert later_press.label == "black_foam"
+    assert later_press.recording.units == {"force_left": "counts", "force_right": "counts"}
+    assert column(later_press, "effort_n") == pytest.approx(force)
+    array, other = later_press.recording.channels
     assert (array.name, array.unit, array.cells) == ("left_electrodes", "counts", 19)
     assert other.name == "right_electrodes"
-    assert second.recording.readings[5].signals.left_electrodes.cells == tuple(
+    assert later_press.recording.readings[5].signals.left_electrodes.cells == tuple(
         5.0 + 300.0 * k for k in range(19)
     )
 
@@ -239,11 +240,11 @@ def test_taps_in_one_array_are_split_by_a_column(tmp_path):
         taxels=np.tile(np.outer(10.0 * force, np.full(24, 1 / 24)) + 7.0, (2, 1)),
     )
 
-    first, second = recordings(tmp_path, TAPS)
+    tap, next_tap = recordings(tmp_path, TAPS)
 
-    assert (first.label, first.order, second.order) == ("felt", 1.0, 2.0)
-    assert column(second, "force_left_n") == pytest.approx(force, abs=1e-9)
-    assert second.recording.readings[0].signals.fingertip.cells == pytest.approx((0.0,) * 24)
+    assert (tap.label, tap.order, next_tap.order) == ("felt", 1.0, 2.0)
+    assert column(next_tap, "force_left_n") == pytest.approx(force, abs=1e-9)
+    assert next_tap.recording.readings[0].signals.fingertip.cells == pytest.approx((0.0,) * 24)
 
 
 def test_the_page_of_public_data_sets_shows_these_manifests():
@@ -272,7 +273,7 @@ def texts(separator, decimal=".", comment=""):
     return "\n".join(lines) + "\n"
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("name", "text"),
     [
         ("jar.csv", texts(",")),
@@ -303,11 +304,11 @@ def test_columns_without_names_have_numbers(tmp_path):
 def test_npy_of_three_dimensions_has_a_grasp_for_each_index(tmp_path):
     gap, force = squeezing()
     np.save(tmp_path / "jar.npy", np.stack([np.column_stack([T_S, gap, k * force]) for k in (1, 2)]))
-    first, second = recordings(
+    grasp, next_grasp = recordings(
         tmp_path, 'files = "{label}.npy"\ntime = "c1"\ngap = "c2"\nforce = "c3"\norder = "{part}"'
     )
-    assert (first.order, second.order) == (0.0, 1.0)
-    assert column(second, "force_left_n") == pytest.approx(2 * force)
+    assert (grasp.order, next_grasp.order) == (0.0, 1.0)
+    assert column(next_grasp, "force_left_n") == pytest.approx(2 * force)
 
 
 def test_pickled_objects_are_never_loaded(tmp_path):
@@ -348,11 +349,11 @@ def test_ros_bags_with_topics_of_different_rates(kind, tmp_path):
         width = writer.add_connection("/hand/width", "std_msgs/msg/Float64", typestore=store)
         forces = writer.add_connection("/hand/forces", "std_msgs/msg/Float64MultiArray", typestore=store)
         for k, t_s in enumerate(T_S):
-            at = 10**18 + round(t_s * 1e9)
-            writer.write(width, at, encode(number(gap[k]), "std_msgs/msg/Float64"))
+            stamp_ns = 10**18 + round(t_s * 1e9)
+            writer.write(width, stamp_ns, encode(number(gap[k]), "std_msgs/msg/Float64"))
             if k % 2 == 0:
                 message = several(layout, np.array([force[k], 2 * force[k]]))
-                writer.write(forces, at, encode(message, "std_msgs/msg/Float64MultiArray"))
+                writer.write(forces, stamp_ns, encode(message, "std_msgs/msg/Float64MultiArray"))
     if not ros1:
         (next(place.glob("*.mcap"))).rename(tmp_path / "jar.mcap")
         (place / "metadata.yaml").unlink()
@@ -387,24 +388,26 @@ def plain(folder, extra, *, force=None, gap=None, time=None):
 def test_zero_is_taken_from_the_first_samples_or_seconds(tmp_path):
     _, force = squeezing()
     for zero in ("20 samples", "0.2 s", "200 ms"):
-        (one,) = plain(tmp_path, f'zero = "{zero}"', force=force + 5.0)
-        assert column(one, "force_left_n") == pytest.approx(force, abs=1e-9)
+        (recording,) = plain(tmp_path, f'zero = "{zero}"', force=force + 5.0)
+        assert column(recording, "force_left_n") == pytest.approx(force, abs=1e-9)
 
 
 def test_squeezes_are_found_from_the_force(tmp_path):
     gap, force = squeezing()
     there_and_back = np.concatenate([force, force[::-1]] * 3)
     gaps = np.concatenate([gap, gap[::-1]] * 3)
-    found = plain(tmp_path, 'split = "force"', force=there_and_back, gap=gaps, time=np.arange(1800) / RATE_HZ)
-    assert len(found) == 3
-    assert all(column(one, "force_left_n").max() == pytest.approx(20.0) for one in found)
-    assert [one.source for one in found] == [f"jar.csv, squeeze {k}" for k in (1, 2, 3)]
+    squeezes = plain(
+        tmp_path, 'split = "force"', force=there_and_back, gap=gaps, time=np.arange(1800) / RATE_HZ
+    )
+    assert len(squeezes) == 3
+    assert all(column(squeeze, "force_left_n").max() == pytest.approx(20.0) for squeeze in squeezes)
+    assert [squeeze.source for squeeze in squeezes] == [f"jar.csv, squeeze {k}" for k in (1, 2, 3)]
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("spoilt", "value"), [("force", 1e6), ("force", np.nan), ("force", np.inf), ("gap", 900.0), ("time", 0.0)]
 )
-@pytest.mark.parametrize("samples", [1, 40])
+@every_case("samples", [1, 40])
 def test_a_fault_in_one_squeeze_is_of_that_squeeze(tmp_path, spoilt, value, samples):
     gap, force = squeezing()
     columns = {
@@ -416,25 +419,25 @@ def test_a_fault_in_one_squeeze_is_of_that_squeeze(tmp_path, spoilt, value, samp
     pandas_csv(
         tmp_path / "jar.csv", {"t": columns["time"], "gap": columns["gap"] * 1e3, "F": columns["force"]}
     )
-    found = list(readable_or_not("manifest", str(manifest(tmp_path, PLAIN + 'split = "force"'))))
-    assert [recording.source for recording in found] == [f"jar.csv, squeeze {k}" for k in range(1, 7)]
-    bad = [k for k, recording in enumerate(found, 1) if isinstance(recording, UnreadableRecording)]
+    squeezes = list(readable_or_not("manifest", str(manifest(tmp_path, PLAIN + 'split = "force"'))))
+    assert [recording.source for recording in squeezes] == [f"jar.csv, squeeze {k}" for k in range(1, 7)]
+    bad = [k for k, recording in enumerate(squeezes, 1) if isinstance(recording, UnreadableRecording)]
     assert bad == ([] if np.isnan(value) else [3])  # samples without a number are left out
-    good = [recording for k, recording in enumerate(found, 1) if k != 3]
-    assert all(column(one, "force_left_n").max() == pytest.approx(20.0) for one in good)
+    good = [recording for k, recording in enumerate(squeezes, 1) if k != 3]
+    assert all(column(squeeze, "force_left_n").max() == pytest.approx(20.0) for squeeze in good)
 
 
 def test_a_grasp_is_cut_at_its_release(tmp_path):
     _, force = squeezing()
     force[250:] = 0.0
-    (one,) = plain(tmp_path, 'cut = "release"', force=force)
-    assert len(one.recording.readings) == 250
+    (recording,) = plain(tmp_path, 'cut = "release"', force=force)
+    assert len(recording.recording.readings) == 250
 
 
 def test_it_is_resampled(tmp_path):
-    (one,) = plain(tmp_path, "resample_hz = 50")
-    assert one.recording.rate_hz == pytest.approx(50.0)
-    assert column(one, "gap_m") == pytest.approx(squeezing()[0][::2], abs=1e-9)
+    (recording,) = plain(tmp_path, "resample_hz = 50")
+    assert recording.recording.rate_hz == pytest.approx(50.0)
+    assert column(recording, "gap_m") == pytest.approx(squeezing()[0][::2], abs=1e-9)
 
 
 def test_a_list_names_files_and_rows_with_their_facts(tmp_path):
@@ -444,17 +447,22 @@ def test_a_list_names_files_and_rows_with_their_facts(tmp_path):
         "file,label,instance,recorded,order,first_row,last_row\n"
         "all.csv,jar:full,3,2024-11-24T15:13:19,1,1,300\nall.csv,jar:open,4,1732461199,2,301,600\n"
     )
-    first, second = recordings(tmp_path, 'list = "list.csv"\nrate_hz = 100\ngap = "gap"\nforce = "F"')
-    assert (first.label, first.instance, second.label, second.order) == ("jar:full", "3", "jar:open", 2.0)
-    assert first.recorded_at == second.recorded_at == "2024-11-24T15:13:19+00:00"
-    assert first.source == "all.csv, rows 1 to 300"
-    assert column(second, "gap_m") == pytest.approx(gap)
+    grasp, next_grasp = recordings(tmp_path, 'list = "list.csv"\nrate_hz = 100\ngap = "gap"\nforce = "F"')
+    assert (grasp.label, grasp.instance, next_grasp.label, next_grasp.order) == (
+        "jar:full",
+        "3",
+        "jar:open",
+        2.0,
+    )
+    assert grasp.recorded_at == next_grasp.recorded_at == "2024-11-24T15:13:19+00:00"
+    assert grasp.source == "all.csv, rows 1 to 300"
+    assert column(next_grasp, "gap_m") == pytest.approx(gap)
 
 
 # What looks wrong.
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("columns", "says"),
     [
         ({"gap": 0.1 - squeezing()[0]}, 'the gap rises while the force rises: .*gap = "0.1 - POSITION"'),
@@ -466,8 +474,8 @@ def test_a_list_names_files_and_rows_with_their_facts(tmp_path):
     ],
 )  # fmt: skip
 def test_what_looks_wrong_is_noticed_with_its_remedy(columns, says, tmp_path):
-    (one,) = plain(tmp_path, "", **columns)
-    assert [notice for notice in one.notices if re.search(says, notice)], one.notices
+    (recording,) = plain(tmp_path, "", **columns)
+    assert [notice for notice in recording.notices if re.search(says, notice)], recording.notices
     (fine,) = plain(tmp_path, "")
     assert fine.notices == ()
 
@@ -481,7 +489,7 @@ def test_a_gap_in_millimetres_and_counts_called_newtons_are_refused(tmp_path):
         recordings(tmp_path, PLAIN)
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("text", "says"),
     [
         ('files = "{label}.csv"\ngap = "g"', r"manifest.toml: a grasp needs its force"),
@@ -535,7 +543,7 @@ def test_a_whole_set_is_imported_evaluated_and_replayed(tmp_path):
     code, out, err = graspsense("import", described, "--save", store, "-o", "classifier.type=none", "--json")
 
     assert code == 0, err
-    assert [one["trial"] for one in json.loads(out)["trials"]] == [1, 2]
+    assert [trial["trial"] for trial in json.loads(out)["trials"]] == [1, 2]
     with Store.read(store) as opened:
         labels = [dict(opened.trial(number).record.labels) for number in (1, 2)]
         recording = read_recorded(opened.trial(1).recording)
@@ -599,10 +607,10 @@ def test_a_bad_file_does_not_stop_an_import_and_a_second_run_takes_only_what_is_
 
     (tmp_path / "jar_2.csv").write_text(whole)
     code, out, _ = graspsense(*command, "--json")
-    found = json.loads(out)
+    answer = json.loads(out)
     assert code == 0
-    assert [one["source"] for one in found["trials"]] == ["jar_2.csv"]
-    assert (len(found["refused"]), found["unreadable"]) == (3, [])
+    assert [trial["source"] for trial in answer["trials"]] == ["jar_2.csv"]
+    assert (len(answer["refused"]), answer["unreadable"]) == (3, [])
 
 
 def test_where_no_file_can_be_read_the_first_error_is_told(tmp_path):
@@ -638,8 +646,8 @@ def test_a_recording_without_a_gap_is_a_trial_of_its_force(tmp_path):
     assert [line for line in err.splitlines() if not line.startswith("grasps imported: ")] == []
     assert "8 force only" in out
     with Store.read(tmp_path / "trials") as store:
-        (one, *_) = store.page(limit=100)
-        stored = store.trial(one.id)
+        (summary, *_) = store.page(limit=100)
+        stored = store.trial(summary.id)
     result = read_recorded(stored.recording).record().result
     assert result.outcome == "force only"
     assert "no gap" in result.reason
@@ -660,8 +668,8 @@ def test_a_recording_without_a_gap_is_a_trial_of_its_force(tmp_path):
 
 
 def test_the_squeeze_without_a_gap_ends_where_its_force_falls(tmp_path):
-    found = load_trials(f"manifest:{force_only(tmp_path)}", options=["features.type=curve"])
-    table, labels = found.table, found.labels
+    trials = load_trials(f"manifest:{force_only(tmp_path)}", options=["features.type=curve"])
+    table, labels = trials.table, trials.labels
     held = table.values[np.array([label == "soft" for label in labels]), table.names.index("hold_t75")]
     assert held == pytest.approx(0.9 * 8.0, rel=0.02)  # the mean of both pads
 

@@ -37,12 +37,12 @@ def test_all_at_once_is_one_by_one(rows, name):
     model = train(component, create("classifier", name).config, labelled, name="m")
     far = np.array([[50.0, 0.0, 0.0], [np.nan, np.nan, np.nan], [0.0, np.nan, -70.0]])
     asked = table(np.concatenate((rows, rows + 2.0, far)))
-    found, shares = model.answers(asked)
+    predicted, shares = model.answers(asked)
     alone = [model.predict(asked.row(i)) for i in range(len(asked))]
-    assert found == [one.label for one in alone]
-    assert UNKNOWN in found
-    assert set(found) > {"a:x", "b:y", "c:z"}
-    expected = [list(one.probabilities.values()) for one in alone]
+    assert predicted == [prediction.label for prediction in alone]
+    assert UNKNOWN in predicted
+    assert set(predicted) > {"a:x", "b:y", "c:z"}
+    expected = [list(prediction.probabilities.values()) for prediction in alone]
     np.testing.assert_allclose(shares, expected, atol=1e-12)
 
 
@@ -63,8 +63,8 @@ def test_predict_answers_many_without_reasons_and_says_so(rows, tmp_path):
     source, model = str(tmp_path / "t.csv"), str(tmp_path / "m.json")
 
     printed("train", source, "--label", "label", "--classifier", "tree", "--out", model)
-    found = json.loads(printed("predict", model, source, "--label", "label", "--json"))
-    assert found["n"] == len(found["predictions"]) == 1200
-    assert any("the predictions have no reasons" in note for note in found["notes"])
-    right = sum(one["label"] == one["truth"] for one in found["predictions"])
-    assert found["rate"]["correct"] == right > 600
+    answer = json.loads(printed("predict", model, source, "--label", "label", "--json"))
+    assert answer["n"] == len(answer["predictions"]) == 1200
+    assert any("the predictions have no reasons" in note for note in answer["notes"])
+    right = sum(prediction["label"] == prediction["truth"] for prediction in answer["predictions"])
+    assert answer["rate"]["correct"] == right > 600

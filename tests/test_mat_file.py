@@ -6,6 +6,7 @@ import struct
 
 import numpy as np
 import pytest
+from cases import every_case
 from scipy.io import loadmat, savemat
 
 from graspsense.core.values.errors import ConfigError, DataDamaged
@@ -28,12 +29,12 @@ VARIABLES = {
 OTHERS = {"waves": np.array([1j]), "cells": np.array([[1, "a"]], dtype=object), "table": {"a": 1.0}}
 
 
-def assert_same(found, expected):
-    assert list(found) == list(expected)
+def assert_same(content, expected):
+    assert list(content) == list(expected)
     for name, array in expected.items():
-        assert found[name].shape == array.shape
-        assert found[name].dtype.kind == array.dtype.kind
-        assert (found[name] == array).all()
+        assert content[name].shape == array.shape
+        assert content[name].dtype.kind == array.dtype.kind
+        assert (content[name] == array).all()
 
 
 @pytest.mark.parametrize("compressed", [False, True])
@@ -77,7 +78,7 @@ def test_the_other_order_of_bytes(tmp_path):
     assert mat_variables(path)["t"].tolist() == [[1.5], [-2.0]]
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("content", "says"),
     [
         (b"", "header"),
@@ -99,8 +100,8 @@ def test_a_shape_without_its_numbers_allocates_nothing(tmp_path):
     path = tmp_path / "a.mat"
     savemat(path, {"t": np.arange(7.0)})
     data = path.read_bytes()
-    at = data.index(struct.pack("<ii", 1, 7))
+    position = data.index(struct.pack("<ii", 1, 7))
     for shape in ((2**31 - 1, 2**31 - 1), (-1, -7), (0, 7)):
-        path.write_bytes(data[:at] + struct.pack("<ii", *shape) + data[at + 8 :])
+        path.write_bytes(data[:position] + struct.pack("<ii", *shape) + data[position + 8 :])
         with pytest.raises(DataDamaged, match="shape"):
             mat_variables(path)

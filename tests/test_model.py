@@ -8,6 +8,7 @@ import math
 
 import pytest
 from attrs import evolve
+from cases import every_case
 from commands import graspsense
 from test_classifiers import NAMES, UNITS, trials
 from test_conformal import bottles
@@ -79,8 +80,8 @@ def test_a_pipeline_reads_a_model_once_and_again_when_its_file_has_changed(tmp_p
     path = tmp_path / "kept.json"
     write_model(path, model("knn", NAMES[:2]))  # those that the pipeline has
     settings = resolve("default", options=["classifier.type=knn", f"classifier.model={path}"])
-    first = model_for(settings, installed())
-    assert model_for(settings, installed()) is first
+    first_read = model_for(settings, installed())
+    assert model_for(settings, installed()) is first_read
 
     rewritten(path, target="object")
 
@@ -320,7 +321,7 @@ def test_a_classifier_without_a_model_says_how_to_get_one():
     assert model_for(evolve(settings, classifier=None), installed()) is None
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("key", "value", "words"),
     [
         ("probing_force_n", 20.0, ("probing force", "20 N")),

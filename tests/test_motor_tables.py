@@ -7,6 +7,7 @@ from math import inf
 
 import numpy as np
 import pytest
+from cases import every_case
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -67,13 +68,13 @@ def stored(tmp_path, data):
 def test_tables_are_kept_as_they_were(tmp_path):
     closing, opening = motor_table(readings(1, 20)), motor_table(readings(2, 20))
     data = {
-        name: {"motor": list(one.table.pad_n), "load_n": list(one.table.load_n), "error_n": one.error_n}
-        for name, one in (("closing", closing), ("opening", opening))
+        name: {"motor": list(table.table.pad_n), "load_n": list(table.table.load_n), "error_n": table.error_n}
+        for name, table in (("closing", closing), ("opening", opening))
     }
     assert stored_motor_tables(stored(tmp_path, data)) == (closing, opening)
 
 
-@pytest.mark.parametrize(
+@every_case(
     "changed", [{"error_n": -1.0}, {"error_n": None}, {"motor": [0.0, 1.0, 1.0]}, {"load_n": [0.0, 2.0, 1.0]}]
 )
 def test_damaged_tables_are_told(tmp_path, changed):

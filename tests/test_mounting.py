@@ -7,6 +7,7 @@ from math import pi
 
 import pytest
 from attrs import evolve
+from cases import every_case
 
 from graspsense import load_pipeline
 from graspsense.core.components.registry import installed
@@ -38,9 +39,7 @@ def test_a_pose_is_in_metres_and_radians_whatever_it_was_written_in():
     )
 
 
-@pytest.mark.parametrize(
-    "text", ["tool0", "1 2 mm", "1 2 3", "1 2 3 in", "1 2 nan m", "0 0 0 m, 0 0 1 turns", ""]
-)
+@every_case("text", ["tool0", "1 2 mm", "1 2 3", "1 2 3 in", "1 2 nan m", "0 0 0 m, 0 0 1 turns", ""])
 def test_what_is_no_mounting_is_refused_with_the_form_of_one(text):
     with pytest.raises(ConfigError, match=r"tool0 of arm\.urdf"):
         settings(f'run.mounting.tool="{text}"')
@@ -85,8 +84,8 @@ def test_a_trial_without_a_mounting_is_stored_as_before_there_was_one():
 def test_another_mounting_is_no_other_experiment(tmp_path):
     with Store.open(tmp_path / "trials") as store:
         record_grasp(store, settings(), installed(), labels={}, origin="run")
-        before = newest_grasp(store)
+        grasp = newest_grasp(store)
 
         check_settings(
-            store, before, settings(f'run.mounting.tool="{TOOL}"')
+            store, grasp, settings(f'run.mounting.tool="{TOOL}"')
         )  # raises ConfigError if they differ

@@ -21,6 +21,7 @@ import mutated_files as change
 import pytest
 import recorded_files as write
 from attrs import frozen
+from cases import every_case
 
 from graspsense.core.components.config import Flag, resolve
 from graspsense.core.components.registry import installed
@@ -93,7 +94,7 @@ def bounded():
 
     used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     soft, hard = resource.getrlimit(resource.RLIMIT_AS)
-    before = signal.signal(signal.SIGVTALRM, stop)
+    handler = signal.signal(signal.SIGVTALRM, stop)
     resource.setrlimit(resource.RLIMIT_AS, (used + MEMORY, hard))
     signal.setitimer(signal.ITIMER_VIRTUAL, WORK_S)
     try:
@@ -102,7 +103,7 @@ def bounded():
             yield
     finally:
         signal.setitimer(signal.ITIMER_VIRTUAL, 0)
-        signal.signal(signal.SIGVTALRM, before)
+        signal.signal(signal.SIGVTALRM, handler)
         resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
 
 
@@ -145,15 +146,15 @@ def import_into(folder, recordings):
 
 def read_set(folder, fmt, imported):
     """Read a set of a good file and a changed one by its manifest."""
-    found = load_trials(f"manifest:{folder / 'manifest.toml'}")
-    left_out = [note for note in found.notes if "cannot be read" in note]
+    trials = load_trials(f"manifest:{folder / 'manifest.toml'}")
+    left_out = [note for note in trials.notes if "cannot be read" in note]
     # The changed file may still hold the same grasp: then one of them is left out as a copy.
-    copies = any("another label" in note for note in found.notes)
-    assert "good" in found.labels or copies
-    assert "bad" in found.labels or copies or any("bad_2" in note for note in left_out)
+    copies = any("another label" in note for note in trials.notes)
+    assert "good" in trials.labels or copies
+    assert "bad" in trials.labels or copies or any("bad_2" in note for note in left_out)
     if imported:
         recordings, unreadable = recordings_to_import([str(folder / "manifest.toml")], {}, None)
-        assert all("bad_2" in one.line for one in unreadable)
+        assert all("bad_2" in damage.line for damage in unreadable)
         import_into(folder / "trials", recordings)
 
 
@@ -162,7 +163,7 @@ def read_alone(folder, fmt, imported):
     good, bad = (f"{fmt.prefix}{folder / name}{fmt.ending}" for name in ("good_1", "bad_2"))
     recordings, unreadable = recordings_to_import([good, bad], {}, "can:full")
     assert recordings[0].source == good
-    assert all("bad_2" in one.line for one in unreadable)
+    assert all("bad_2" in damage.line for damage in unreadable)
     if imported:
         import_into(folder / "trials", recordings)
 
@@ -204,7 +205,7 @@ def numbers(name, count):
     return range(count) if not wanted else [int(number)] if wanted == name else []
 
 
-@pytest.mark.parametrize("name", FORMATS)
+@every_case("name", FORMATS)
 def test_a_sample_of_each_format(name, tmp_path):
     pattern = pattern_of(name, tmp_path / "pattern")
     for number in numbers(name, QUICK):

@@ -52,10 +52,10 @@ def test_recordings(tmp_path):
         bad = bytes_of(good, rng)
         path.write_bytes(bad)
         try:
-            found = read_recorded(path)
-            found.record()
-            assert found.ticks.tobytes() == whole.ticks.tobytes()
-            assert found.pads.tobytes() == whole.pads.tobytes()
+            recording = read_recorded(path)
+            recording.record()
+            assert recording.ticks.tobytes() == whole.ticks.tobytes()
+            assert recording.pads.tobytes() == whole.pads.tobytes()
         except GraspsenseError:
             told += 1
         copy = tmp_path / "copy.mcap"
@@ -86,13 +86,13 @@ def test_stores(tmp_path):
         for path in folder.glob("store.sqlite*"):
             path.unlink()
         (folder / "store.sqlite").write_bytes(bytes_of(good, rng))
-        before = digests(folder)
+        digests_before = digests(folder)
         try:
             problems = verify_store(folder).problems
             with Store.read(folder) as store:
-                for one in store.page(set_aside=None):
+                for summary in store.page(set_aside=None):
                     with suppress(GraspsenseError):
-                        store.trial(one.id)
+                        store.trial(summary.id)
                 rows = store.query("SELECT * FROM trial")
                 same = rows == good_rows and store.query("SELECT * FROM detail") == good_details
             labelled_store(str(folder))
@@ -103,7 +103,7 @@ def test_stores(tmp_path):
                 silent += 1
         except GraspsenseError:
             told += 1
-        assert digests(folder) == before
+        assert digests(folder) == digests_before
     assert told > silent
 
 

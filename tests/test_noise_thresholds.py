@@ -7,6 +7,7 @@ from math import nan
 import numpy as np
 import pytest
 from attrs import evolve
+from cases import every_case
 
 from graspsense.core.control.contact import CONTACT_FORCE_N, REST_SPEED_M_S, REST_WINDOW_S, first_rest
 from graspsense.core.values.signals import NO_PADS, Frame, Reading
@@ -76,7 +77,7 @@ def test_recordings_that_begin_close_to_the_object_are_not_too_wide():
 def test_a_force_that_grows_from_the_first_sample_is_not_taken_for_noise():
     """Recordings that begin in contact: the first third of a slow squeeze up to 25 N reaches 1.6 N."""
     whole = [squeeze(peak_n=25.0, seed=k) for k in range(5)]
-    squeezed = [evolve(one, readings=one.readings[1000:]) for one in whole]
+    squeezed = [evolve(recording, readings=recording.readings[1000:]) for recording in whole]
     assert "controller.contact_force_n" not in thresholds_for(squeezed).settings
 
 
@@ -85,7 +86,7 @@ def test_forces_that_are_no_more_than_noise_are_doubted():
     assert "check the unit and the zero" in chosen.words
 
 
-def in_units(one, units, force=1.0, gap=1.0, time=1.0, offset=0.0):
+def in_units(recording, units, force=1.0, gap=1.0, time=1.0, offset=0.0):
     """The recording with its numbers in other units; `offset` is the force of a sensor without a load."""
     names = {"force": ("force_left", "force_right"), "gap": ("gap",), "t": ("t",)}
     readings = tuple(
@@ -97,13 +98,13 @@ def in_units(one, units, force=1.0, gap=1.0, time=1.0, offset=0.0):
                 force_right_n=reading.frame.force_right_n * force + offset,
             )
         )
-        for reading in one.readings
+        for reading in recording.readings
     )
     renamed = {name: unit for quantity, unit in units.items() for name in names[quantity]}
-    return evolve(one, readings=readings, units=renamed)
+    return evolve(recording, readings=readings, units=renamed)
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("factors", "units"),
     [
         ({"force": 250.0, "offset": 2000.0}, {"force": "counts"}),
@@ -111,7 +112,6 @@ def in_units(one, units, force=1.0, gap=1.0, time=1.0, offset=0.0):
         ({"force": 250.0, "time": 100.0}, {"force": "counts", "t": "sample"}),
         ({"force": 1e-3, "gap": 40.0, "time": 100.0}, {"force": "V", "gap": "V", "t": "sample"}),
     ],
-    ids=["counts", "degrees", "samples", "all"],
 )
 def test_thresholds_follow_from_recordings_in_any_unit(factors, units):
     """The same squeezes in other units have the contact at the same time, and come to rest."""
@@ -124,10 +124,12 @@ def test_thresholds_follow_from_recordings_in_any_unit(factors, units):
             np.array([getattr(reading.frame, name) for reading in recording.readings])
             for name in ("t_s", "gap_m", "force_left_n", "force_right_n")
         )
-        at = int((np.minimum(left, right) >= settings.get("contact_force_n", CONTACT_FORCE_N)).argmax())
-        assert 1.0 < at * 0.01 < 1.1
-        since, _ = first_rest(times[at:], gap[at:], np.ones(len(times) - at, dtype=bool), speed, window)
-        assert (at + since) * 0.01 == pytest.approx(1.5, abs=0.05)
+        onset = int((np.minimum(left, right) >= settings.get("contact_force_n", CONTACT_FORCE_N)).argmax())
+        assert 1.0 < onset * 0.01 < 1.1
+        since, _ = first_rest(
+            times[onset:], gap[onset:], np.ones(len(times) - onset, dtype=bool), speed, window
+        )
+        assert (onset + since) * 0.01 == pytest.approx(1.5, abs=0.05)
         if "gap" in units:
             assert settings["closed_gap_m"] < gap.min()
             assert settings["too_wide_m"] < 0.0
@@ -139,10 +141,10 @@ def test_a_data_set_that_counts_frames_keeps_the_defaults():
     assert thresholds_for(frames).settings == {}
 
 
-def coarse(one, step_m):
-    return evolve(one, readings=tuple(
+def coarse(recording, step_m):
+    return evolve(recording, readings=tuple(
         reading._replace(frame=reading.frame._replace(gap_m=round(reading.frame.gap_m / step_m) * step_m))
-        for reading in one.readings
+        for reading in recording.readings
     ))  # fmt: skip
 
 
@@ -160,8 +162,8 @@ def slow_squeeze(hold_s, step_s=0.0222, seed=0):
     return Recording(name="slow", rate_hz=1.0 / step_s, readings=readings)
 
 
-@pytest.mark.parametrize("step_s", [0.0222, 0.1])
-@pytest.mark.parametrize(("step_m", "hold_s"), [(1e-4, 1.5), (1e-4, 0.8), (5e-5, 1.0)])
+@every_case("step_s", [0.0222, 0.1])
+@every_case(("step_m", "hold_s"), [(1e-4, 1.5), (1e-4, 0.8), (5e-5, 1.0)])
 def test_the_window_of_rest_is_that_of_a_step_of_the_gap(step_s, step_m, hold_s):
     recordings = [coarse(slow_squeeze(hold_s, step_s, seed=k), step_m) for k in range(5)]
     chosen = thresholds_for(recordings)
@@ -211,11 +213,11 @@ def test_slow_recordings_whose_gap_is_still_at_rest_keep_the_thresholds_of_rest(
     """Coarse steps while the fingers move are not noise: with these thresholds rest is where the gap stays."""
     slow = [squeeze(step_s=0.05, seed=k) for k in range(5)]
     coarse = [
-        evolve(one, readings=tuple(
+        evolve(slow_recording, readings=tuple(
             reading._replace(frame=reading.frame._replace(gap_m=round(reading.frame.gap_m / 2e-4) * 2e-4))
-            for reading in one.readings
+            for reading in slow_recording.readings
         ))
-        for one in slow
+        for slow_recording in slow
     ]  # fmt: skip
     for recordings in (slow, coarse):
         assert thresholds_for(recordings).settings == {}
@@ -242,13 +244,13 @@ def test_recordings_that_begin_in_contact_with_different_forces_are_in_contact_f
     """Pressures in counts that hold from the first sample: their offsets differ by more than their noise."""
     held = []
     for k, offset in enumerate((950.0, 1000.0, 1050.0, 1200.0, 1400.0)):
-        one = squeeze(seed=k, units={"force_left": "counts", "force_right": "counts"})
-        noise = np.random.default_rng(k).normal(size=len(one.readings))
+        recording = squeeze(seed=k, units={"force_left": "counts", "force_right": "counts"})
+        noise = np.random.default_rng(k).normal(size=len(recording.readings))
         readings = tuple(
             reading._replace(frame=reading.frame._replace(force_left_n=offset + n, force_right_n=offset + n))
-            for reading, n in zip(one.readings, noise.tolist(), strict=True)
+            for reading, n in zip(recording.readings, noise.tolist(), strict=True)
         )
-        held.append(evolve(one, readings=readings))
-    found = thresholds_for(held)
-    assert 0.0 < found.settings["controller.contact_force_n"] <= 950.0
-    assert "from the beginning" in found.words
+        held.append(evolve(recording, readings=readings))
+    thresholds = thresholds_for(held)
+    assert 0.0 < thresholds.settings["controller.contact_force_n"] <= 950.0
+    assert "from the beginning" in thresholds.words

@@ -6,6 +6,7 @@ import json
 
 import numpy as np
 import pytest
+from cases import every_case
 from commands import graspsense
 from hypothesis import given
 from hypothesis import strategies as st
@@ -74,7 +75,7 @@ def shapes(folder, seed=0, trials=60):
 def test_a_text_reaches_every_classifier(tmp_path, classifier):
     trials = read_labelled(shapes(tmp_path), "what")
     assert trials.table.names == ("colour=blue", "colour=green", "colour=red", "weight")
-    found = evaluate(
+    evaluation = evaluate(
         select_component("classifier", classifier),
         trials,
         classifier=classifier,
@@ -83,7 +84,7 @@ def test_a_text_reaches_every_classifier(tmp_path, classifier):
         learning_curve=False,
     )
     # The weight alone decides for one of three colours: 2 of 3 and no more are right without the colour.
-    assert found.headline.rate > 0.8
+    assert evaluation.headline.rate > 0.8
 
 
 def test_c45_grows_the_published_tree_of_the_weather_data(weather):
@@ -120,7 +121,7 @@ def test_a_model_of_nominal_features_predicts_from_other_tables(weather, tmp_pat
     done = graspsense("predict", model, other, "--json")
     assert done.returncode == 0
     load = json.loads(done.stdout)["predictions"]
-    assert [one["label"] for one in load[:2]] == ["yes", "no"]
+    assert [prediction["label"] for prediction in load[:2]] == ["yes", "no"]
     # A value that the training did not have is as a missing one.
     assert any("outlook is missing" in reason["words"] for reason in load[2]["because"])
 
@@ -140,20 +141,20 @@ def test_arff_is_read_as_it_is_written(tmp_path):
         "4 '?' x '2026-11-28' b\r\n"
         "4 '?' x '2026-11-28' ?\r\n" * 4
     )
-    found = read_labelled(path, None)
-    assert found.labels == ("a", "b", "a", "b") * 4
+    trials = read_labelled(path, None)
+    assert trials.labels == ("a", "b", "a", "b") * 4
     nominal = ("level=1", "level=2", "level=none", "level=?", "note=it's", "note=x")
-    assert found.table.names == ("p first", *nominal)
-    assert found.table.units[0] == "m"
-    np.testing.assert_array_equal(found.table.values[:4, 0], [1.5e-3, np.nan, 2.5, 4.0])
-    np.testing.assert_array_equal(found.table.values[:4, 1:5].argmax(axis=1), [0, 2, 1, 3])
-    assert np.isnan(found.table.values[1, 5:]).all()
-    assert any("4 trials" in note for note in found.notes)
-    assert any("weights" in note for note in found.notes)
+    assert trials.table.names == ("p first", *nominal)
+    assert trials.table.units[0] == "m"
+    np.testing.assert_array_equal(trials.table.values[:4, 0], [1.5e-3, np.nan, 2.5, 4.0])
+    np.testing.assert_array_equal(trials.table.values[:4, 1:5].argmax(axis=1), [0, 2, 1, 3])
+    assert np.isnan(trials.table.values[1, 5:]).all()
+    assert any("4 trials" in note for note in trials.notes)
+    assert any("weights" in note for note in trials.notes)
     assert "class=b" in read_labelled(path, "level").table.names
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("old", "new", "line"),
     [
         ("sunny,85,85,FALSE,no", "snowy,85,85,FALSE,no", "line 11.*snowy"),
@@ -177,7 +178,7 @@ def test_a_store_that_is_exported_to_arff_can_be_read(weather):
         load_trials(str(weather), label="x")
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("texts", "said"),
     [
         ([f"grasp_{i:04d}.csv" for i in range(40)], "hardly repeat"),
@@ -191,9 +192,9 @@ def test_texts_that_identify_trials_are_no_features(tmp_path, texts, said):
     lines = [f"{'ab'[i // 20]},{text},{i % 7}.25" for i, text in enumerate(texts)]
     path = tmp_path / "t.csv"
     path.write_text("what,text,w\n" + "\n".join(lines) + "\n")
-    found = read_labelled(path, "what")
-    assert found.table.names == ("w",)
-    assert any("text" in note and said in note for note in found.notes)
+    trials = read_labelled(path, "what")
+    assert trials.table.names == ("w",)
+    assert any("text" in note and said in note for note in trials.notes)
 
 
 @given(
@@ -207,19 +208,19 @@ def test_a_nominal_feature_is_found_again_in_its_columns(codes, values):
         units=("", "", "", "", "m"),
         values=np.column_stack([columns, np.arange(len(codes))]),
     )
-    found, coded = with_codes(table)
-    assert [(one.name, one.unit, one.values) for one in found] == [
+    features, coded = with_codes(table)
+    assert [(nominal.name, nominal.unit, nominal.values) for nominal in features] == [
         ("colour", "", tuple(values)),
         ("w", "m", None),
     ]
     np.testing.assert_array_equal(coded[:, 0], [np.nan if k is None else k for k in codes])
-    np.testing.assert_array_equal(codes_of(found, table), coded)
+    np.testing.assert_array_equal(codes_of(features, table), coded)
 
 
 def test_numbers_with_an_equal_sign_in_their_name_stay_numbers():
     table = FeatureTable(names=("a=1", "a=2"), units=("m", ""), values=np.array([[0.5, 1.0], [1.0, 0.0]]))
-    found, coded = with_codes(table)
-    assert [one.name for one in found] == ["a=1", "a=2"]
+    features, coded = with_codes(table)
+    assert [nominal.name for nominal in features] == ["a=1", "a=2"]
     np.testing.assert_array_equal(coded, table.values)
 
 

@@ -10,6 +10,7 @@ from xml.etree import ElementTree
 
 import pytest
 from attrs import evolve
+from cases import every_case
 
 from graspsense import Evaluation, Features, Prediction, load_pipeline
 from graspsense.core.components.moved_names import SPECIAL
@@ -187,12 +188,12 @@ def imports_of_graspsense(text):
     return re.findall(r"^\s*(?:from (graspsense[\w.]*) import|import (graspsense[\w.]*))", text, re.MULTILINE)
 
 
-@pytest.mark.parametrize("path", [*PAGES, *SOURCES], ids=lambda path: str(path.relative_to(ROOT)))
+@every_case("path", [*PAGES, *SOURCES])
 def test_the_public_modules_are_enough_for_what_the_documentation_shows(path):
     text = path.read_text(encoding="utf-8")
     if path.suffix == ".md":
         text = "\n".join(re.findall(r"```python\n(.*?)```", text, re.DOTALL))
-    used = {first or second for first, second in imports_of_graspsense(text)}
+    used = {module or package for module, package in imports_of_graspsense(text)}
 
     assert used - {"graspsense", "graspsense.plugin_api", *(f"graspsense.{name}" for name in SPECIAL)} <= {
         name for name in used if name.split(".")[0] != "graspsense"

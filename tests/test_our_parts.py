@@ -77,7 +77,7 @@ class TestChitta(Conformance):
 
 def test_the_class_has_a_test_for_each_check_and_one_for_their_number():
     tests = {name for name in vars(TestChitta) if name.startswith("test_")}
-    wanted = {f"test_{one.id.replace('-', '_')}" for one in CHECKS["feature-set"]}
+    wanted = {f"test_{check.id.replace('-', '_')}" for check in CHECKS["feature-set"]}
     assert tests == wanted | {"test_enough_checks_ran"}
 
 

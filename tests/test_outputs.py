@@ -35,7 +35,7 @@ def test_evaluate_replaces_no_file_without_being_asked(table, tmp_path):
 
 @pytest.mark.parametrize("command", ["evaluate", "train"])
 def test_no_command_replaces_its_own_source(table, tmp_path, command, monkeypatch):
-    before = table.read_text()
+    original = table.read_text()
     monkeypatch.chdir(tmp_path)
     more = EVALUATE if command == "evaluate" else (*TRAIN, "--out", tmp_path / "m.json")
     (tmp_path / "link.csv").symlink_to(table)
@@ -44,7 +44,7 @@ def test_no_command_replaces_its_own_source(table, tmp_path, command, monkeypatc
         done = graspsense(command, table, *more, "--keep", name, "--overwrite")
         assert done.returncode == 2
         assert "what is read" in done.stderr
-    assert table.read_text() == before
+    assert table.read_text() == original
     assert not (tmp_path / "m.json").exists()
 
 
@@ -99,11 +99,11 @@ def test_a_picture_that_is_no_file_is_refused_before_the_grasp(tmp_path, monkeyp
 
 
 def test_a_matrix_is_drawn_into_pictures_only(table):
-    before = table.read_text()
+    original = table.read_text()
     done = graspsense("evaluate", table, *EVALUATE, "--png", table)
     assert done.returncode == 2
     assert ".png" in done.stderr
-    assert table.read_text() == before
+    assert table.read_text() == original
 
 
 @pytest.fixture
@@ -120,22 +120,22 @@ def experiment(table, tmp_path):
         == 0
     )
     shutil.copytree(tmp_path / "out", tmp_path / "whole")
-    first, second, *_ = sorted((tmp_path / "out" / "results").glob("*.json"))
-    first.write_text("{")
-    second.unlink()
-    second.mkdir()
+    result, other, *_ = sorted((tmp_path / "out" / "results").glob("*.json"))
+    result.write_text("{")
+    other.unlink()
+    other.mkdir()
     return tmp_path / "out"
 
 
 def test_a_result_that_cannot_be_read_is_told(experiment, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    first, second, *_ = sorted((experiment / "results").glob("*.json"))
+    result, other, *_ = sorted((experiment / "results").glob("*.json"))
     done = graspsense("report", experiment)
     assert done.returncode == 0
     said = done.stdout + done.stderr
     assert "2 results cannot be read" in said
-    assert first.name in said
-    assert second.name in said
+    assert result.name in said
+    assert other.name in said
     assert "2 results cannot be read" in (experiment / "report.html").read_text()
     done = graspsense("experiment", "compare", experiment, tmp_path / "whole")
     assert done.returncode == 0

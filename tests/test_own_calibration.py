@@ -6,6 +6,7 @@ import sys
 
 import pytest
 from attrs import evolve, frozen
+from cases import every_case
 from commands import graspsense
 from parts import CHANNELS_OF_HAND, Hand, HandConfig, channels
 
@@ -76,10 +77,10 @@ def test_zero_and_force_are_stored_and_found_by_serial_number(calibrate, tmp_pat
     assert calibrate("counting", "tare", *folder) == (0, "")
     assert calibrate("counting", "load-cell", str(readings), *folder)[0] == 0
 
-    found = calibrations_of(tmp_path, "H7", NUMBERS)
-    left, right = stored_zero(found["tare"])
+    calibrations = calibrations_of(tmp_path, "H7", NUMBERS)
+    left, right = stored_zero(calibrations["tare"])
     assert (len(left), set(left), set(right)) == (22, {3000.0}, {3000.0})
-    left_table, _ = stored_tables(found["load-cell"])
+    left_table, _ = stored_tables(calibrations["load-cell"])
     assert load_of(left_table, 1.5) == (pytest.approx(1.65), True)
 
 
@@ -109,7 +110,7 @@ def test_the_gain_of_each_cell_is_fitted_stored_and_used(calibrate, tmp_path):
     assert cells_force(pressed, zero, left, 7) == pytest.approx(6.0)
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("text", "said"),
     [
         (gains_text(cells=21), "21"),

@@ -6,6 +6,7 @@ import json
 
 import pytest
 from attrs import evolve
+from cases import every_case
 from click.testing import CliRunner
 from grippers import Scripted, bottle, squeezing
 
@@ -98,18 +99,18 @@ def test_a_grasp_of_a_pair_is_the_grasp_alone():
     run = RunConfig(hold_s=0.05)
     alone = run_grasp(Scripted(squeezing, bottle), create("controller", "hybrid"), run)
 
-    first, second = run_pair(
+    left, right = run_pair(
         grasping(Scripted(squeezing, bottle)), grasping(Scripted(squeezing, bottle, clock="device"))
     )
 
-    assert first.outcome == second.outcome == alone.outcome
-    assert first.trace.t_s.tolist() == alone.trace.t_s.tolist()
-    assert first.trace.force_left_n.tolist() == alone.trace.force_left_n.tolist()
-    assert any("beside scripted" in note for note in first.device.notes)
+    assert left.outcome == right.outcome == alone.outcome
+    assert left.trace.t_s.tolist() == alone.trace.t_s.tolist()
+    assert left.trace.force_left_n.tolist() == alone.trace.force_left_n.tolist()
+    assert any("beside scripted" in note for note in left.device.notes)
 
 
-@pytest.mark.parametrize("lost", ["lose_at", "silent_from"])
-@pytest.mark.parametrize("place", [0, 1])
+@every_case("lost", ["lose_at", "silent_from"])
+@every_case("place", [0, 1])
 def test_both_let_go_if_one_is_lost(lost, place):
     sound, broken = Scripted(squeezing, bottle), Scripted(squeezing, bottle, **{lost: 1300})
     both = [sound, broken] if place else [broken, sound]
@@ -179,9 +180,9 @@ def test_the_trials_of_a_pair_are_kept_and_name_each_other(tmp_path):
     result = CliRunner().invoke(cli, ["run", *options, "--json"])
 
     assert result.exit_code == 0, result.output
-    first, second = json.loads(result.stdout)["grippers"]
-    assert {first["kept"]["trial"], second["kept"]["trial"]} == {1, 2}
-    named = {first["labels"]["beside"], second["labels"]["beside"]}
+    left, right = json.loads(result.stdout)["grippers"]
+    assert {left["kept"]["trial"], right["kept"]["trial"]} == {1, 2}
+    named = {left["labels"]["beside"], right["labels"]["beside"]}
     assert named == {path.name for path in (store / "recordings").glob("*.mcap")}
     for path in (store / "recordings").glob("*.mcap"):
         assert named - {read_recorded(path).record().labels["beside"]} == {path.name}

@@ -7,6 +7,7 @@ from contextlib import suppress
 
 import numpy as np
 import pytest
+from cases import every_case
 
 pyarrow = pytest.importorskip("pyarrow", reason="needs the extra parquet")
 pq = pytest.importorskip("pyarrow.parquet", reason="needs the extra parquet")
@@ -45,14 +46,14 @@ def test_columns(tmp_path, rows_of_a_group):
     path = tmp_path / "a.parquet"
     table = pyarrow.table({name: column for name, (column, _) in COLUMNS.items()})
     pq.write_table(table, path, row_group_size=rows_of_a_group)
-    (found,) = read_parquet(path)
-    assert len(found) == 3
+    (columns,) = read_parquet(path)
+    assert len(columns) == 3
     for name, (_, expected) in COLUMNS.items():
         if isinstance(expected[0], str):
-            assert list(found.texts[name]) == expected
+            assert list(columns.texts[name]) == expected
         else:
-            np.testing.assert_array_equal(found.numbers[name], expected)
-    assert found.shapes == {"image": (2, 2)}
+            np.testing.assert_array_equal(columns.numbers[name], expected)
+    assert columns.shapes == {"image": (2, 2)}
 
 
 def test_the_footer_is_what_pyarrow_says(tmp_path):
@@ -71,13 +72,13 @@ def test_the_footer_is_what_pyarrow_says(tmp_path):
     assert size.unpacked_bytes == sum(column.total_uncompressed_size for column in columns)
 
 
-@pytest.mark.parametrize("at", range(20, 400, 7))
-def test_a_damaged_footer_is_told_and_never_ends_the_process(at, tmp_path):
+@every_case("position", range(20, 400, 7))
+def test_a_damaged_footer_is_told_and_never_ends_the_process(position, tmp_path):
     """pyarrow calls abort for some of these when it is asked for a column of its metadata."""
     path = tmp_path / "a.parquet"
     pq.write_table(pyarrow.table({"a": [[1.0, 2.0], [3.0, 4.0]], "b": ["x", "y"]}), path)
     data = bytearray(path.read_bytes())
-    data[-at] ^= 0x15
+    data[-position] ^= 0x15
     path.write_bytes(data)
     with suppress(DataDamaged):
         assert len(read_parquet(path)[0]) <= 2

@@ -55,13 +55,13 @@ def test_a_part_that_does_not():
         code, out, _ = graspsense("plugins", "check", "peak", "--json")
 
     assert code == 1
-    found = json.loads(out)
-    assert found["conforms"] is False
-    (failure,) = found["failures"]
+    answer = json.loads(out)
+    assert answer["conforms"] is False
+    (failure,) = answer["failures"]
     assert failure.startswith(
         "graspsense-test/peak: requires-what-it-reads: without the channels it does not"
     )
-    assert {one["state"] for one in found["results"]} == {"passed", "failed"}
+    assert {check["state"] for check in answer["results"]} == {"passed", "failed"}
 
 
 def test_settings_reach_the_part_that_is_checked():

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from attrs import evolve, field, frozen
+from cases import every_case
 from commands import graspsense
 from grippers import Scripted, bottle, squeezing
 
@@ -46,7 +47,7 @@ def released(gripper):
     return gripper.closed == 1 and gripper.commands[-1].value == 0.0
 
 
-@pytest.mark.parametrize("method", ["read", "apply", "tare", "close", "report"])
+@every_case("method", ["read", "apply", "tare", "close", "report"])
 def test_a_gripper_that_ends_the_program_ends_the_grasp_and_keeps_the_trace(method):
     class Leaving(Scripted):
         pass
@@ -96,7 +97,7 @@ def test_a_sink_that_ends_the_program_is_dropped():
     assert any("SystemExit" in event.what for event in grasp.events)
 
 
-@pytest.mark.parametrize("outcome", [99, -1, None, "steady"])
+@every_case("outcome", [99, -1, None, "steady"])
 def test_an_outcome_that_there_is_not_aborts_the_grasp_and_keeps_the_trace(outcome):
     gripper = Scripted(squeezing, bottle)
     grasp = run_grasp(gripper, law(lambda command, state: (command, state._replace(outcome=outcome))), RUN)
@@ -219,7 +220,7 @@ class TwoFaced(Command):
     value = 1e6
 
 
-@pytest.mark.parametrize(
+@every_case(
     "command",
     [
         Command(EFFORT, Deceitful(1e6), math.inf, math.inf),
@@ -228,15 +229,14 @@ class TwoFaced(Command):
         Command(np.int64(EFFORT), 10**6, math.inf, math.inf),
         TwoFaced(EFFORT, 5.0, math.inf, math.inf),
     ],
-    ids=["value", "limits", "numpy", "integer", "by name"],
 )
 def test_no_number_of_a_controller_passes_the_limits(command):
     gripper = Scripted(squeezing, bottle)
     run_grasp(gripper, law(lambda usual, state: (command, state), after=900), RUN)
     squeezed = gripper.commands[1000:]
-    assert all(type(one) is Command for one in squeezed)
-    assert {type(number) for one in squeezed for number in one} <= {int, float}
-    assert max(float.__float__(one.value) for one in squeezed) <= 100.0
+    assert all(type(commanded) is Command for commanded in squeezed)
+    assert {type(number) for commanded in squeezed for number in commanded} <= {int, float}
+    assert max(float.__float__(commanded.value) for commanded in squeezed) <= 100.0
 
 
 @pytest.mark.parametrize("value", ["20", None, [20.0]])

@@ -6,6 +6,7 @@ import sys
 import types
 
 import pytest
+from cases import every_case
 
 from graspsense.core.components.config import select_component
 from graspsense.core.components.registry import IsolatedPlugins, canonical, installed
@@ -91,7 +92,7 @@ def test_built_in_parts_need_no_metadata(site):
     assert entry.width == "p_first"
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("role", "name"),
     [
         ("controller", "velocity"),

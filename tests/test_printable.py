@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 
 import pytest
+from cases import every_case
 from commands import graspsense
 from hypothesis import given
 from hypothesis import strategies as st
@@ -123,9 +124,7 @@ COMMANDS = [
 ]
 
 
-@pytest.mark.parametrize(
-    "command", COMMANDS, ids=lambda command: " ".join(command[:2]).encode("unicode_escape").decode()
-)
+@every_case("command", COMMANDS)
 def test_no_command_prints_what_acts(store, command):
     code, out, err = graspsense(*[word.format(store) for word in command])
     assert acts(out + err) == []

@@ -4,6 +4,7 @@ from math import inf, nan
 
 import numpy as np
 import pytest
+from cases import every_case
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -59,7 +60,7 @@ def gripper(**changes):
     return DeviceInfo(**{**given_, **changes})
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("controller", "run", "ceiling_n"),
     [
         # A quarter over the probing force, plus the friction.
@@ -219,9 +220,9 @@ def test_a_motor_within_a_quarter_of_its_command_is_sound():
 
 
 def test_a_motor_that_gives_five_times_its_command_ends_the_grasp_at_once():
-    first = next((t, fault) for t, fault in answered(20.0, 100.0) if fault.ends)
-    assert first[1].name == "motor too strong"
-    assert first[0] < 0.1
+    fault_at = next((t, fault) for t, fault in answered(20.0, 100.0) if fault.ends)
+    assert fault_at[1].name == "motor too strong"
+    assert fault_at[0] < 0.1
 
 
 def test_a_motor_that_gives_half_as_much_again_warns_and_then_ends_the_grasp():
@@ -299,10 +300,10 @@ def test_a_clock_that_stands_still_ends_the_grasp_after_a_tenth_of_a_second_of_f
 def test_images_that_stop_end_the_grasp():
     reports = Reports(1000.0, 25.0)
     faults = [reports.see(reading(0.001 * k, counter=min(1 + k // 40, 5)), SQUEEZE) for k in range(1000)]
-    first = [fault is not None for fault in faults].index(True)
+    onset = [fault is not None for fault in faults].index(True)
     # The fifth image came at 0.16 s, and five periods are allowed.
-    assert first == pytest.approx(160 + 200, abs=2)
-    assert faults[first].ends
+    assert onset == pytest.approx(160 + 200, abs=2)
+    assert faults[onset].ends
 
 
 def test_lost_frames_are_told_with_their_share():
@@ -333,8 +334,8 @@ def seen(pads):
     return [tips.see(image, True) for image in pads][-1]
 
 
-@pytest.mark.parametrize("noise", [0.0, 0.4, 2.0, 15.0])
-@pytest.mark.parametrize("seed", range(5))
+@every_case("noise", [0.0, 0.4, 2.0, 15.0])
+@every_case("seed", range(5))
 def test_sound_cells_are_never_frozen(noise, seed):
     assert seen(images(100, noise=noise, seed=seed)) == []
 
@@ -407,7 +408,7 @@ def test_a_contact_within_a_millimetre_is_no_drift():
     assert drifted(lambda t: max(0.0, 6.0 * (t - 1.0)), None, seconds=1.1) is None
 
 
-@pytest.mark.parametrize("seed", range(5))
+@every_case("seed", range(5))
 def test_noise_is_no_drift(seed):
     assert drifted(lambda t: 0.0, all_cells if seed % 2 else None, seed=seed) is None
 
@@ -499,8 +500,8 @@ def test_frames_that_come_unevenly_are_not_lost():
     assert faults == [None] * 1000
 
 
-@pytest.mark.parametrize("share", [0.5, 0.8])
-@pytest.mark.parametrize("seed", range(6))
+@every_case("share", [0.5, 0.8])
+@every_case("seed", range(6))
 def test_cells_that_change_now_and_then_are_not_frozen(share, seed):
     rng, tips = np.random.default_rng(seed), Fingertips()
     cells = 1000.0 * np.arange(1.0, 9.0).reshape(2, 4)
@@ -590,7 +591,7 @@ def test_fingers_that_move_with_less_than_their_friction(effort, ends):
     assert eased(effort).ends is ends
 
 
-@pytest.mark.parametrize(
+@every_case(
     "sound",
     [
         {"effort": 5.0},
@@ -627,10 +628,8 @@ def test_a_gap_that_stands_still_while_the_fingers_move_ends_the_grasp():
     assert travelled(lambda t: -0.01, lambda t: 0.09 - 0.01 * min(t, 0.4)).ends
 
 
-@pytest.mark.parametrize("speed", [0.002, 0.01, 0.1])
-@pytest.mark.parametrize(
-    ("dt", "step", "late_s"), [(0.001, 0.0, 0.02), (0.01, 0.0004, 0.05), (0.04, 0.0004, 0.08)]
-)
+@every_case("speed", [0.002, 0.01, 0.1])
+@every_case(("dt", "step", "late_s"), [(0.001, 0.0, 0.02), (0.01, 0.0004, 0.05), (0.04, 0.0004, 0.08)])
 def test_a_late_velocity_and_a_gap_in_steps_agree(speed, dt, step, late_s):
     def gap(t):
         exact = 0.2 - speed * t

@@ -19,13 +19,13 @@ MANIFESTS = Path(__file__).parents[1] / "docs" / "manifests"
 def recordings(folder, name):
     path = folder / "manifest.toml"
     path.write_text((MANIFESTS / f"{name}.toml").read_text())
-    found = list(readable_or_not("manifest", str(path)))
-    assert not [recording.error for recording in found if isinstance(recording, UnreadableRecording)]
-    return found
+    grasps = list(readable_or_not("manifest", str(path)))
+    assert not [recording.error for recording in grasps if isinstance(recording, UnreadableRecording)]
+    return grasps
 
 
-def forces(one):
-    return np.array([(r.frame.force_left_n, r.frame.force_right_n) for r in one.recording.readings])
+def forces(recording):
+    return np.array([(r.frame.force_left_n, r.frame.force_right_n) for r in recording.recording.readings])
 
 
 def test_presses_in_named_arrays_of_three_dimensions_beside_arrays_of_other_shapes(tmp_path):
@@ -38,17 +38,17 @@ def test_presses_in_named_arrays_of_three_dimensions_beside_arrays_of_other_shap
     (tmp_path / "data").mkdir()
     savemat(tmp_path / "data" / "properties_exp.mat", {"nodules": np.ones((4, 4, 4)), **turns, **arrays})
 
-    found = recordings(tmp_path, "palpation")
+    grasps = recordings(tmp_path, "palpation")
 
-    assert sorted((recording.label, recording.order) for recording in found) == [
+    assert sorted((recording.label, recording.order) for recording in grasps) == [
         (f"place{i}{j}", k) for i in (1, 2) for j in (1, 2) for k in (0.0, 1.0, 2.0)
     ]
-    second = next(recording for recording in found if (recording.label, recording.order) == ("place21", 1.0))
-    gaps = [reading.frame.gap_m for reading in second.recording.readings]
+    press = next(recording for recording in grasps if (recording.label, recording.order) == ("place21", 1.0))
+    gaps = [reading.frame.gap_m for reading in press.recording.readings]
     assert gaps == pytest.approx(0.02 - 0.001 * depth)
     # The mean of 1 to 7 is 4; the zero is the first sample.
-    assert forces(second)[:, 0] == pytest.approx(2 * 4.0 * depth)
-    assert second.recording.units["force_left"] == "counts"
+    assert forces(press)[:, 0] == pytest.approx(2 * 4.0 * depth)
+    assert press.recording.units["force_left"] == "counts"
 
 
 def test_a_glove_without_a_gap_and_without_names_of_columns(tmp_path):
@@ -63,12 +63,12 @@ def test_a_glove_without_a_gap_and_without_names_of_columns(tmp_path):
         lines = [f"{row[0]:.0f}, {', '.join(map(str, row[1:]))}" for row in rows]
         (tmp_path / "datasets/dataset" / label / "7.txt").write_text("\n".join(lines) + "\n")
 
-    bottle, rest = recordings(tmp_path, "dataglove")
+    bottle, other_bottles = recordings(tmp_path, "dataglove")
 
-    assert (bottle.label, bottle.order, rest.label) == ("bottle", 7.0, "rest")
+    assert (bottle.label, bottle.order, other_bottles.label) == ("bottle", 7.0, "rest")
     assert bottle.recording.units["gap"] == NO_GAP
     assert forces(bottle).tolist() == [[0.0, 0.0]] * 25 + [[300.0, 300.0]] * 25
-    assert not forces(rest).any()
+    assert not forces(other_bottles).any()
     little = signals_of([reading.signals for reading in bottle.recording.readings])["little"]
     assert np.ravel(little).tolist() == list(range(50))
 

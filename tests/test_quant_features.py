@@ -21,8 +21,10 @@ def extract(trace):
 
 def trace(t_s, gap, left, right):
     frames = [
-        Frame(t, 0.01, g, 0.0, 0.0, one, other, math.nan, math.nan, 0)
-        for t, g, one, other in zip(t_s.tolist(), gap.tolist(), left.tolist(), right.tolist(), strict=True)
+        Frame(t, 0.01, g, 0.0, 0.0, force_n, other, math.nan, math.nan, 0)
+        for t, g, force_n, other in zip(
+            t_s.tolist(), gap.tolist(), left.tolist(), right.tolist(), strict=True
+        )
     ]
     return trace_of(frames, [Phase.APPROACH] * len(frames), [0.0] * len(frames), [])
 

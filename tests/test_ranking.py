@@ -26,27 +26,27 @@ def crossed(**other):
 
 
 def test_features_without_information_are_worse_and_the_same_trials_are_compared():
-    found = crossed()
+    ranking = crossed()
 
-    assert found.protocol == "instance_held_out"
-    assert found.candidates[0].standing == "best"
-    assert found.candidates[0].features == "force"
-    assert {candidate.standing for candidate in found.candidates if candidate.features == "noise"} == {
+    assert ranking.protocol == "instance_held_out"
+    assert ranking.candidates[0].standing == "best"
+    assert ranking.candidates[0].features == "force"
+    assert {candidate.standing for candidate in ranking.candidates if candidate.features == "noise"} == {
         "worse"
     }
-    assert {candidate.rates["instance_held_out"].n for candidate in found.candidates} == {180}
-    assert found.candidates[0].name in found.verdict
-    assert found.chosen.candidates == 6
-    assert found.chosen.rate <= found.candidates[0].rates["instance_held_out"].rate
-    assert found.candidates[0].rates["instance_held_out"].interval == found.chosen.interval
-    assert found.chosen.words in found.verdict
+    assert {candidate.rates["instance_held_out"].n for candidate in ranking.candidates} == {180}
+    assert ranking.candidates[0].name in ranking.verdict
+    assert ranking.chosen.candidates == 6
+    assert ranking.chosen.rate <= ranking.candidates[0].rates["instance_held_out"].rate
+    assert ranking.candidates[0].rates["instance_held_out"].interval == ranking.chosen.interval
+    assert ranking.chosen.words in ranking.verdict
 
 
 def test_intervals_are_wider_for_more_comparisons():
     right, wrong = [True] * 90 + [False] * 10, [True] * 80 + [False] * 20
-    one, ten = difference(right, wrong).interval, difference(right, wrong, comparisons=10).interval
+    single, ten = difference(right, wrong).interval, difference(right, wrong, comparisons=10).interval
 
-    assert ten[0] < one[0] < one[1] < ten[1]
+    assert ten[0] < single[0] < single[1] < ten[1]
 
 
 @pytest.mark.slow
@@ -63,7 +63,7 @@ def test_the_command_names_the_best_and_refuses_feature_sets_of_a_csv(tmp_path):
 
     assert "has the highest rate" in shown
     assert "RECORDING ORDER" in shown
-    assert {one["classifier"] for one in listed["candidates"]} == {"tree", "knn"}
+    assert {candidate["classifier"] for candidate in listed["candidates"]} == {"tree", "knn"}
     assert listed["verdict"].startswith(listed["candidates"][0]["classifier"])
     for option, says in (
         ("--feature-sets", "not for a CSV"),
@@ -80,29 +80,29 @@ def test_features_from_before_the_contact_are_a_control_and_not_compared():
 
     trials = bottles(12)
     width = ControlFeatures(table=trials.table, what="the same numbers")
-    found = rank({"tree": learner("tree")}, {"force": evolve(trials, before_contact=width)})
+    ranking = rank({"tree": learner("tree")}, {"force": evolve(trials, before_contact=width)})
 
-    assert [candidate.standing for candidate in found.candidates] == ["best", "control"]
-    assert found.candidates[1].loss is None
-    assert "From before the contact alone, tree recognises" in found.verdict
+    assert [candidate.standing for candidate in ranking.candidates] == ["best", "control"]
+    assert ranking.candidates[1].loss is None
+    assert "From before the contact alone, tree recognises" in ranking.verdict
 
 
 def test_answers_from_outside_are_compared_like_any_other():
     trials = bottles(30, spread=0.3)
     perfect = OutsideAnswers(predicted={"instance_held_out": trials.labels}, training_s=1.0)
-    found = rank({"knn": learner("knn")}, {"force": trials}, outside={("oracle", "all"): perfect})
+    ranking = rank({"knn": learner("knn")}, {"force": trials}, outside={("oracle", "all"): perfect})
 
-    assert [candidate.name for candidate in found.candidates] == ["oracle with all", "knn with force"]
-    assert found.candidates[0].rates["instance_held_out"].rate == 1.0
-    assert found.candidates[0].sets is None
-    assert found.candidates[1].loss.value > 0.0
+    assert [candidate.name for candidate in ranking.candidates] == ["oracle with all", "knn with force"]
+    assert ranking.candidates[0].rates["instance_held_out"].rate == 1.0
+    assert ranking.candidates[0].sets is None
+    assert ranking.candidates[1].loss.value > 0.0
 
 
 @pytest.mark.slow
 def test_the_sets_of_every_candidate_are_measured_on_the_same_folds():
-    found = crossed()
+    ranking = crossed()
 
-    for candidate in found.candidates:
+    for candidate in ranking.candidates:
         assert candidate.sets.covered.n == 180
         assert 0.8 < candidate.sets.covered.rate <= 1.0
 
@@ -148,12 +148,12 @@ def test_the_headline_of_the_page_has_the_rate_without_the_luck_of_the_choice():
         )
         for k in range(32)
     }
-    found = ranking_of(measured, "folds", trials, ())
-    best = found.candidates[0].rates["folds"].rate
+    ranking = ranking_of(measured, "folds", trials, ())
+    best = ranking.candidates[0].rates["folds"].rate
 
-    assert best > found.chosen.rate + 0.05
-    headline = ranking_page(found, "graspsense compare").headline
-    assert in_hundred(found.chosen.rate) in headline
+    assert best > ranking.chosen.rate + 0.05
+    headline = ranking_page(ranking, "graspsense compare").headline
+    assert in_hundred(ranking.chosen.rate) in headline
     assert in_hundred(best) not in headline
 
 
@@ -165,8 +165,8 @@ def test_a_default_that_is_worse_is_told_with_what_to_do(sign, tmp_path, capsys)
     product = x[:, 0] * x[:, 1] if sign > 0 else x[:, 0]
     lines = ["what,a [N],b [N]"]
     lines += [
-        f"{'high' if one > 0.0 else 'low'},{a:.4f},{b:.4f}"
-        for one, (a, b) in zip(product.tolist(), x.tolist(), strict=True)
+        f"{'high' if factor > 0.0 else 'low'},{a:.4f},{b:.4f}"
+        for factor, (a, b) in zip(product.tolist(), x.tolist(), strict=True)
     ]
     path = tmp_path / "t.csv"
     path.write_text("\n".join(lines) + "\n")

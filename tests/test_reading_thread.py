@@ -70,7 +70,7 @@ def test_the_newest_value_is_given_once_and_the_replaced_are_counted(wire, readi
 
 
 def test_values_that_nobody_asked_for_are_joined(wire, reading):
-    thread = reading(joined=lambda before, now: before + now)
+    thread = reading(joined=lambda earlier, now: earlier + now)
     for value in ([1], [2], [3]):
         wire.values.put(value)
     wire.drained()

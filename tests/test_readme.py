@@ -15,8 +15,8 @@ README = (Path(__file__).parents[1] / "README.md").read_text()
 
 
 def block(language: str) -> str:
-    (found,) = re.findall(rf"```{language}\n(.*?)```", README, flags=re.DOTALL)
-    return str(found)
+    (code,) = re.findall(rf"```{language}\n(.*?)```", README, flags=re.DOTALL)
+    return str(code)
 
 
 @pytest.fixture

@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 import pytest
+from cases import every_case
 from test_classifiers import NAMES, UNITS, fitted, trials
 
 from graspsense.core.values.features import Features, FeatureTable, Prediction
@@ -33,9 +34,9 @@ def test_contributions_of_a_forest_add_up_to_the_probability(features):
     assert given[-1].words.endswith(" % for can:full")
 
 
-@pytest.mark.parametrize("classes", [2, 3])
-@pytest.mark.parametrize("value", [0.0661, 0.0580])
-@pytest.mark.parametrize("name", ["boosted", "ebm"])
+@every_case("classes", [2, 3])
+@every_case("value", [0.0661, 0.0580])
+@every_case("name", ["boosted", "ebm"])
 def test_contributions_in_log_odds_add_up_to_the_odds(name, value, classes):
     table, labels = trials(missing=0.1)
     if classes == 2:
@@ -53,21 +54,21 @@ def test_contributions_in_log_odds_add_up_to_the_odds(name, value, classes):
 @pytest.mark.parametrize("name", ["forest", "boosted", "ebm"])
 def test_the_feature_that_tells_the_labels_apart_contributes_most(name):
     said = fitted(name, *trials()).explain(FULL_CAN)
-    first = said.because[0]
+    largest = said.because[0]
 
-    assert first.features == (FeatureValue("p_first", 0.0661, "m"),)
-    assert first.words.startswith("p_first = 66.1 mm: ")
-    assert first.contribution.value > 0.0
+    assert largest.features == (FeatureValue("p_first", 0.0661, "m"),)
+    assert largest.words.startswith("p_first = 66.1 mm: ")
+    assert largest.contribution.value > 0.0
     assert all(reason.features[0].name != "noise" for reason in said.because[:1])
 
 
 def test_words_of_contributions_are_points_or_factors_of_the_odds():
     width = FeatureValue("p_first", 0.0661, "m")
-    rest = FeatureValue("f_steady", None, "N")
+    value = FeatureValue("f_steady", None, "N")
 
     shares = contribution_reasons([((width,), 0.25)], 0.3, scale="probability", label="can")
     odds = contribution_reasons(
-        [((width,), -math.log(4.0)), ((width, rest), math.log(10.0))],
+        [((width,), -math.log(4.0)), ((width, value), math.log(10.0))],
         0.0,
         scale="log-odds",
         label="can",
@@ -103,13 +104,13 @@ def test_a_text_becomes_a_reason_and_json_has_what_a_reason_has():
 
     for name in ("forest", "boosted", "ebm", "c45", "knn", "mlp", "backprop", "svm", "tree"):
         listed = json.loads(json.dumps(fitted(name, *trials()).explain(MISSING).as_json()))["because"]
-        assert all(one["words"] for one in listed)
-        missing = [one for one in listed if "is missing" in one["words"]]
+        assert all(reason["words"] for reason in listed)
+        missing = [reason for reason in listed if "is missing" in reason["words"]]
         assert missing[0]["features"][0] == {"name": "f_steady", "value": None, "unit": "N"}
         if name in ("c45", "tree"):
-            assert any("rule" in one for one in listed)
+            assert any("rule" in reason for reason in listed)
         if name not in ("c45", "tree"):
-            assert any(one.get("contribution", {}).get("label") == "can:full" for one in listed)
+            assert any(reason.get("contribution", {}).get("label") == "can:full" for reason in listed)
 
 
 def test_a_boosted_model_comes_back_from_json_with_its_settings():

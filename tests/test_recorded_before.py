@@ -33,8 +33,8 @@ def exported():
 
 
 def test_an_old_store_is_whole(store):
-    found = verify_store(store)
-    assert (found.trials, found.recordings, found.problems) == (2, 2, ())
+    findings = verify_store(store)
+    assert (findings.trials, findings.recordings, findings.problems) == (2, 2, ())
 
 
 @pytest.mark.parametrize("row", exported(), ids=lambda row: row["trial"])

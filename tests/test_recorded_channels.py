@@ -7,6 +7,7 @@ import re
 
 import numpy as np
 import pytest
+from cases import every_case
 from click.testing import CliRunner
 
 from graspsense.cli.main import cli
@@ -46,7 +47,7 @@ def ran(*args):
 
 
 def options(*given):
-    return [word for one in given for word in ("-o", one)]
+    return [word for option in given for word in ("-o", option)]
 
 
 def proposed(words):
@@ -54,12 +55,7 @@ def proposed(words):
     return options(*ast.literal_eval(re.search(r"For its array palm: options=(\[.*?\])", words)[1]))
 
 
-def labels_in(store):
-    with Store.read(store) as opened:
-        return [one.source for one in opened.page(limit=100)]
-
-
-@pytest.mark.parametrize("command", ["import", "check", "evaluate", "train", "compare"])
+@every_case("command", ["import", "check", "evaluate", "train", "compare"])
 def test_an_array_that_the_features_do_not_name_is_told_with_the_options_that_choose_it(tmp_path, command):
     source = manifest(tmp_path, "set")
     arguments = {

@@ -13,6 +13,7 @@ from collections import namedtuple
 from itertools import pairwise
 
 import pytest
+from cases import every_case
 from kept import begun, command, ended, frame, pads, write_recording
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
@@ -31,13 +32,13 @@ OPTIONS = ["classifier.type=none", "gripper.object=can:full_open"]
 
 def decoded(path):
     """Return topic to its messages in order, as somebody else's reader gives them."""
-    found = {}
+    messages = {}
     with path.open("rb") as file:
         for _, channel, message, value in make_reader(
             file, validate_crcs=True, decoder_factories=[DecoderFactory()]
         ).iter_decoded_messages(log_time_order=False):
-            found.setdefault(channel.topic, []).append((message, value))
-    return found
+            messages.setdefault(channel.topic, []).append((message, value))
+    return messages
 
 
 def same(a, b):
@@ -48,8 +49,8 @@ def test_a_grasp_is_recorded_tick_by_tick_as_another_reader_sees_it(tmp_path):
     recorder = Recorder(tmp_path / "g.mcap")
     trial = load_pipeline("default", options=OPTIONS).grasp(sinks=[recorder])
     recorded = recorder.finish()
-    found = decoded(tmp_path / "g.mcap")
-    ticks = [value for _, value in found["/grasp/tick"]]
+    messages = decoded(tmp_path / "g.mcap")
+    ticks = [value for _, value in messages["/grasp/tick"]]
     assert len(ticks) == len(trial.trace) == recorded.ticks
     for name in (
         "t_s",
@@ -63,7 +64,7 @@ def test_a_grasp_is_recorded_tick_by_tick_as_another_reader_sees_it(tmp_path):
     ):
         column = getattr(trial.trace, name).tolist()
         assert all(same(getattr(tick, name), value) for tick, value in zip(ticks, column, strict=True)), name
-    images = [value for _, value in found["/grasp/pads"]]
+    images = [value for _, value in messages["/grasp/pads"]]
     assert [image.t_s for image in images] == trial.trace.pad_t_s.tolist()
     assert [image.right_21 for image in images] == trial.trace.pad_right[:, 21].tolist()
     assert recorded.sha256 == hashlib.sha256((tmp_path / "g.mcap").read_bytes()).hexdigest()
@@ -71,10 +72,10 @@ def test_a_grasp_is_recorded_tick_by_tick_as_another_reader_sees_it(tmp_path):
 
 
 def test_times_are_the_gripper_s_on_the_wall_clock_and_a_chunk_closes_every_50_ms(tmp_path):
-    before = time.time_ns()
+    began_ns = time.time_ns()
     write_recording(tmp_path / "g.mcap", ticks=400)
     messages = [message for message, _ in decoded(tmp_path / "g.mcap")["/grasp/tick"]]
-    assert before - 1e9 < messages[0].log_time < time.time_ns()
+    assert began_ns - 1e9 < messages[0].log_time < time.time_ns()
     steps = {b.log_time - a.log_time for a, b in pairwise(messages)}
     assert max(abs(step - 1_000_000) for step in steps) <= 2
     with (tmp_path / "g.mcap").open("rb") as file:
@@ -170,8 +171,8 @@ def test_messages_of_a_tick_that_the_pipe_takes_in_part_only_are_whole(tmp_path)
     grasp = read_recorded(tmp_path / "g.mcap")
     assert grasp.ticks["t_s"].tolist() == [frame(k).t_s for k in range(ticks)]
     read = [reading.signals for reading in grasp.readings()]
-    assert [one.palm.cells[1999] for one in read] == [k + 999.5 for k in range(ticks)]
-    assert [one.acceleration.values[1][0] for one in read] == [k + 0.2 for k in range(ticks)]
+    assert [tick.palm.cells[1999] for tick in read] == [k + 999.5 for k in range(ticks)]
+    assert [tick.acceleration.values[1][0] for tick in read] == [k + 0.2 for k in range(ticks)]
 
 
 def test_a_writer_that_has_died_does_not_stop_the_grasp(tmp_path):
@@ -194,7 +195,7 @@ def test_a_grasp_that_ends_without_a_word_leaves_what_was_felt(tmp_path):
     assert len(read_recorded(tmp_path / "felt.mcap.part", salvage=True)) == 10
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("spoil", "says"),
     [
         (lambda data: b"", "EndOfFile"),

@@ -6,7 +6,7 @@ from math import nan
 from typing import Any
 
 import numpy as np
-import pytest
+from cases import every_case
 
 from graspsense.core.values.signals import NO_PADS, Frame, Reading
 from graspsense.recording.labelled_recording import LabelledRecording
@@ -30,15 +30,14 @@ def noticed(left: Any, right: Any) -> tuple[str, ...]:
 LEFT, RIGHT = LOAD_N + NOISE_N
 
 
-@pytest.mark.parametrize("side", ["left", "right", "both"])
-@pytest.mark.parametrize(
+@every_case("side", ["left", "right", "both"])
+@every_case(
     ("spoilt", "says"),
     [
         (np.full(300, 4.5), "does not change"),
         (np.full(300, nan), "has no number"),
         (LEFT[np.minimum(np.arange(300), 120)], "repeats its last value"),
     ],
-    ids=["constant", "absent", "stopped"],
 )
 def test_a_sensor_that_says_nothing_is_noticed(spoilt: Any, says: str, side: str) -> None:
     (notice,) = noticed(

@@ -67,9 +67,9 @@ def test_a_cut_recording_becomes_a_trial_that_does_not_count(store):
 def test_recovering_twice_changes_nothing(store):
     part(store)
     recover_store(store)
-    before = sorted(path.name for path in store.recordings.iterdir())
+    names = sorted(path.name for path in store.recordings.iterdir())
     assert recover_store(store) == []
-    assert sorted(path.name for path in store.recordings.iterdir()) == before
+    assert sorted(path.name for path in store.recordings.iterdir()) == names
 
 
 def test_a_finished_trial_that_only_lacks_its_row_counts(store):
@@ -102,8 +102,8 @@ def test_recovery_that_was_killed_itself_is_done_again(store):
 
 def test_a_recording_that_is_being_written_is_left_alone(store):
     file = write_recording(store.recordings / "a.mcap", 100, ended(), finish=False)
-    (found,) = recover_store(store)
-    assert (found.what, found.why) == ("busy", "it is being written")
+    (recovery,) = recover_store(store)
+    assert (recovery.what, recovery.why) == ("busy", "it is being written")
     assert verify_store(store.folder).unfinished == ()
     file.finish()
     assert [recovered.what for recovered in recover_store(store)] == ["added"]
@@ -112,11 +112,11 @@ def test_a_recording_that_is_being_written_is_left_alone(store):
 def test_a_recording_is_not_replaced_by_an_unfinished_one_of_its_name(store):
     keep(store)
     path = store.trial(1).recording
-    before = path.read_bytes()
+    original = path.read_bytes()
     write_recording(store.recordings / "b.mcap", 100, ended(), finish=False).leave()
     (store.recordings / "b.mcap.part").rename(path.with_name(f"{path.name}.part"))
     (recovered,) = recover_store(store)
-    assert (recovered.what, path.read_bytes()) == ("failed", before)
+    assert (recovered.what, path.read_bytes()) == ("failed", original)
     assert verify_store(store.folder).problems == ()
 
 
@@ -147,14 +147,20 @@ def test_a_feature_set_that_is_not_installed_does_not_lose_the_trial(store):
 
 def test_a_lost_database_is_made_again_from_the_recordings(store):
     numbers = [keep(store, label) for label in ("can:full_open", "can:empty_open", "toy")]
-    before = [(one.label, one.outcome, store.trial(one.id).result.features.values) for one in store.page()]
+    trials = [
+        (summary.label, summary.outcome, store.trial(summary.id).result.features.values)
+        for summary in store.page()
+    ]
     store.close()
     for path in store.folder.glob("store.sqlite*"):
         path.rename(path.with_name("old-" + path.name))
     with Store.open(store.folder) as new:
         assert [recovered.what for recovered in recover_store(new)] == ["added"] * len(numbers)
-        after = [(one.label, one.outcome, new.trial(one.id).result.features.values) for one in new.page()]
-    assert sorted(after) == sorted(before)
+        after = [
+            (summary.label, summary.outcome, new.trial(summary.id).result.features.values)
+            for summary in new.page()
+        ]
+    assert sorted(after) == sorted(trials)
 
 
 def test_recordings_without_a_database_get_their_numbers_in_the_order_of_recording(store):
@@ -163,7 +169,7 @@ def test_recordings_without_a_database_get_their_numbers_in_the_order_of_recordi
         write_recording(store.recordings / name, 60, record)
     recover_store(store)
 
-    assert [one.label for one in reversed(store.page())] == ["hour:9", "hour:10", "hour:11"]
+    assert [summary.label for summary in reversed(store.page())] == ["hour:9", "hour:10", "hour:11"]
 
 
 def test_a_damaged_file_alone_is_written_anew_as_far_as_it_can_be_read(tmp_path):
@@ -172,14 +178,14 @@ def test_a_damaged_file_alone_is_written_anew_as_far_as_it_can_be_read(tmp_path)
     data = path.read_bytes()
     middle = data[: len(data) // 2] + b"\0\0\0\0" + data[len(data) // 2 + 4 :]
     path.write_bytes(middle)
-    found = recover_file(path)
+    recovery = recover_file(path)
     assert path.read_bytes() == middle
-    assert found.recording == tmp_path / "g-recovered.mcap"
+    assert recovery.recording == tmp_path / "g-recovered.mcap"
     # One chunk of 51 ticks is lost and no other; the ticks that are there are right.
-    again = read_recorded(found.recording)
+    again = read_recorded(recovery.recording)
     assert 240 <= len(again) < 300
     assert set(again.ticks["t_s"].tolist()) <= {10.0 + k * 0.001 for k in range(300)}
-    assert "messages in it are lost" in found.why
+    assert "messages in it are lost" in recovery.why
     with pytest.raises(SaveFailed, match="already exists"):
         recover_file(path)
 

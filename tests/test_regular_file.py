@@ -4,6 +4,7 @@ import os
 from pathlib import Path
 
 import pytest
+from cases import every_case
 from commands import graspsense
 
 from graspsense.core.files.regular_file import NotAFile, first_bytes
@@ -33,7 +34,7 @@ def test_no_more_is_read_than_asked(tmp_path):
     assert len(first_bytes(path, 100)) == 101
 
 
-@pytest.mark.parametrize(
+@every_case(
     "command",
     [
         ("import", "{}", "--check"),

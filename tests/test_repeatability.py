@@ -29,9 +29,9 @@ def squeeze(stiffness_n_m, depth_m, hysteresis=0.8):
 def test_squeezes_are_compared_at_equal_compression_while_they_are_loaded():
     # Springs of 1000 and 1200 N/m differ by 200 N/m: a standard deviation of 141 N/m times the compression.
     fits = [squeeze(1000.0, 0.01), squeeze(1200.0, 0.02, hysteresis=0.1)]
-    at = np.linspace(0.001, 0.01, 20)
+    compression_m = np.linspace(0.001, 0.01, 20)
 
-    expected = 200.0 / math.sqrt(2.0) * math.sqrt(np.mean(at**2)) / 17.0
+    expected = 200.0 / math.sqrt(2.0) * math.sqrt(np.mean(compression_m**2)) / 17.0
 
     assert repeatability(fits) == pytest.approx(expected, rel=1e-9)
 

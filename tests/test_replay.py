@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cases import every_case
 from commands import Done, graspsense
 from hypothesis import given
 from hypothesis import strategies as st
@@ -96,7 +97,7 @@ def test_thumb_is_left_and_the_strongest_finger_is_right(tmp_path: Path) -> None
     assert [frame.force_right_n for frame in frames] == pytest.approx([0.0, 0.9, 4.0])
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("joints", "closed_mm"),
     [
         ({"j9": 8.0}, 2.0),  # half the mean of two joints of the thumb
@@ -113,11 +114,11 @@ def test_thumb_is_left_and_the_strongest_finger_is_right(tmp_path: Path) -> None
 def test_gap_falls_as_thumb_and_fingers_flex(
     tmp_path: Path, joints: dict[str, float], closed_mm: float
 ) -> None:
-    first, last = frames_of(write(tmp_path / "g.txt", frame_lines(), frame_lines(moved(**joints))))
-    assert first.gap_m == 0.08
-    assert (first.gap_m - last.gap_m) * 1e3 == pytest.approx(closed_mm)
-    assert last.velocity_m_s == pytest.approx(last.gap_m - first.gap_m)
-    assert first.velocity_m_s == 0.0
+    opened, last = frames_of(write(tmp_path / "g.txt", frame_lines(), frame_lines(moved(**joints))))
+    assert opened.gap_m == 0.08
+    assert (opened.gap_m - last.gap_m) * 1e3 == pytest.approx(closed_mm)
+    assert last.velocity_m_s == pytest.approx(last.gap_m - opened.gap_m)
+    assert opened.velocity_m_s == 0.0
 
 
 def test_what_was_not_recorded_is_missing(tmp_path: Path) -> None:
@@ -186,7 +187,7 @@ def damaged_files() -> list[tuple[str, bytes, str]]:
     ]
 
 
-@pytest.mark.parametrize(("name", "content", "says"), damaged_files(), ids=lambda value: str(value)[:20])
+@every_case(("name", "content", "says"), damaged_files())
 def test_damaged_file_is_told_with_its_line(tmp_path: Path, name: str, content: bytes, says: str) -> None:
     path = tmp_path / f"{name}.txt"
     path.write_bytes(content)
@@ -280,13 +281,13 @@ def test_backend_says_that_times_are_frames_and_units_nominal(tmp_path: Path) ->
 
 def test_backend_closes_twice_and_plays_again(tmp_path: Path) -> None:
     backend, _ = opened(write(tmp_path / "g.txt", frame_lines()))
-    first = backend.read(timeout_s=0.0)
+    frame = backend.read(timeout_s=0.0)
     backend.close()
     backend.close()
     with pytest.raises(DeviceLost, match="not open"):
         backend.read(timeout_s=0.0)
     backend.open(seed=1)
-    assert repr(backend.read(timeout_s=0.0)) == repr(first)
+    assert repr(backend.read(timeout_s=0.0)) == repr(frame)
 
 
 @real_data
@@ -398,8 +399,8 @@ def test_a_replayed_trial_has_the_trace_of_the_grasp_to_the_last_bit(
 
     assert Phase.RELEASE in grasp.trial.trace.phase
     for name in (*TICK_COLUMNS, *PAD_COLUMNS):
-        before, now = getattr(grasp.trial.trace, name), getattr(replayed.trace, name)
-        assert before.tobytes() == now.tobytes(), name
+        original, now = getattr(grasp.trial.trace, name), getattr(replayed.trace, name)
+        assert original.tobytes() == now.tobytes(), name
     assert replayed.features.values == grasp.trial.features.values
     assert replayed.outcome == grasp.trial.outcome
 

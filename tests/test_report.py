@@ -15,6 +15,7 @@ import kept
 import pytest
 import wayward
 from attrs import evolve
+from cases import every_case
 from commands import graspsense, printed
 from kept import keep
 
@@ -108,7 +109,7 @@ def test_a_page_loads_nothing_and_runs_only_its_own_script(page):
     assert "@import" not in page
     assert NASTY not in page
     assert "How hard " + NASTY in reader.text
-    policy = next(one["content"] for one in reader.all("meta") if "http-equiv" in one)
+    policy = next(element["content"] for element in reader.all("meta") if "http-equiv" in element)
     digest = base64.b64encode(hashlib.sha256(scripts[0].encode()).digest()).decode()
     assert policy.startswith("default-src 'none'")
     assert f"script-src 'sha256-{digest}'" in policy
@@ -155,16 +156,16 @@ def test_a_page_can_be_read_aloud(page):
     assert reader.all("html")[0]["lang"] == "en"
     assert len(reader.all("main")) == len(reader.all("h1")) == 1
     assert levels[0] == 1
-    assert all(after <= before + 1 for before, after in pairwise(levels))
+    assert all(after <= level + 1 for level, after in pairwise(levels))
     assert len(ids) == len(set(ids))
-    assert {one["href"][1:] for one in reader.all("a")} <= set(ids)
+    assert {element["href"][1:] for element in reader.all("a")} <= set(ids)
     pictures = reader.all("svg")
     assert len(pictures) == 10
     for picture in pictures:
         assert picture["role"] == "img"
         assert len(picture["aria-label"]) > 40
-    for one in reader.all("th"):
-        assert one["scope"] in ("row", "col")
+    for element in reader.all("th"):
+        assert element["scope"] in ("row", "col")
     for _, attrs in reader.elements:
         if attrs.get("class") == "wide":
             assert (attrs["tabindex"], attrs["role"]) == ("0", "region")
@@ -176,8 +177,8 @@ def luminance(colour):
     return 0.2126 * parts[0] + 0.7152 * parts[1] + 0.0722 * parts[2]
 
 
-def contrast(one, other):
-    high, low = sorted((luminance(one), luminance(other)), reverse=True)
+def contrast(colour, other):
+    high, low = sorted((luminance(colour), luminance(other)), reverse=True)
     return (high + 0.05) / (low + 0.05)
 
 
@@ -185,10 +186,12 @@ def colours(scheme):
     """Return the colours of the style sheet by name, of the light or the dark page."""
     style = files("graspsense.report").joinpath("page.css").read_text()
     blocks = re.findall(r":root\{(.*?)\}", style, flags=re.DOTALL)
-    found = {}
+    colours_of = {}
     for block in blocks[: 1 if scheme == "light" else 2]:
-        found |= dict(re.findall(r"--([\w-]+):(#\w+)", block))
-    return {k: v if len(v) == 7 else "#" + "".join(2 * one for one in v[1:]) for k, v in found.items()}
+        colours_of |= dict(re.findall(r"--([\w-]+):(#\w+)", block))
+    return {
+        k: v if len(v) == 7 else "#" + "".join(2 * digit for digit in v[1:]) for k, v in colours_of.items()
+    }
 
 
 TEXTS = [
@@ -201,8 +204,8 @@ TEXTS = [
 ]
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize(("ink", "ground"), TEXTS)
+@every_case("scheme", ["light", "dark"])
+@every_case(("ink", "ground"), TEXTS)
 def test_texts_stand_out_from_their_ground(scheme, ink, ground):
     """4.5 to 1: what WCAG 2 asks of text (success criterion 1.4.3)."""
     assert contrast(colours(scheme)[ink], colours(scheme)[ground]) >= 4.5
@@ -213,10 +216,10 @@ def test_pictures_and_the_style_sheet_have_the_same_colours():
 
     for colour in (*INKS, QUIET, TEXT, GROUND, GRID):
         name, fallback = re.fullmatch(r"var\(--(\w+),(#\w+)\)", colour).groups()
-        assert light[name] in (fallback, "#" + "".join(2 * one for one in fallback[1:])), name
+        assert light[name] in (fallback, "#" + "".join(2 * digit for digit in fallback[1:])), name
 
 
-@pytest.mark.parametrize("share", [k / 40 for k in range(1, 41)])
+@every_case("share", [k / 40 for k in range(1, 41)])
 def test_more_of_a_row_has_a_stronger_colour(share):
     true = ["a"] * 40 + ["b"]
     predicted = ["a"] * round(40 * share) + ["b"] * (41 - round(40 * share))
@@ -225,17 +228,17 @@ def test_more_of_a_row_has_a_stronger_colour(share):
     assert int(levels[0]) == math.ceil(8 * share)
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("words", "kind"),
     [("agrees", 'good">✓'), ("differs", 'bad">✗'), ("yes", 'good">✓'), ("not known", None)],
 )
 def test_verdicts_have_a_mark_a_colour_and_words(words, kind):
-    found = table("x", ("claim", "result"), [("c", words)], verdicts=(1,))
+    text = table("x", ("claim", "result"), [("c", words)], verdicts=(1,))
 
-    assert (f'<span class="{kind} {words}</span>' if kind else f"<td>{words}</td>") in found
+    assert (f'<span class="{kind} {words}</span>' if kind else f"<td>{words}</td>") in text
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("rates", "axis"),
     [
         ([(0.872, (0.767, 0.976)), (0.875, (0.823, 0.927))], (75.0, 100.0)),
@@ -256,19 +259,19 @@ def test_a_rate_axis_shows_the_difference_and_says_where_it_is_cut(rates, axis):
 
 
 def test_every_count_of_a_confusion_matrix_is_in_its_table():
-    found = confusion_table(confusion(["a", "a", "b", "c"], ["a", "b", "b", "a"]), "x")
+    text = confusion_table(confusion(["a", "a", "b", "c"], ["a", "b", "b", "a"]), "x")
 
-    assert re.findall(r"<td[^>]*>(\d+|·)</td>", found) == ["1", "1", "·", "·", "1", "·", "1", "·", "·"]
-    assert re.findall(r'class="n">(\d+) %', found) == ["50", "100", "0"]
+    assert re.findall(r"<td[^>]*>(\d+|·)</td>", text) == ["1", "1", "·", "·", "1", "·", "1", "·", "·"]
+    assert re.findall(r'class="n">(\d+) %', text) == ["50", "100", "0"]
 
 
-@pytest.mark.parametrize(("low", "high"), [(0.0, 1.0), (-3.0, 2000.0), (1e-6, 3e-6), (57.1, 57.2)])
+@every_case(("low", "high"), [(0.0, 1.0), (-3.0, 2000.0), (1e-6, 3e-6), (57.1, 57.2)])
 def test_ticks_are_round_and_within(low, high):
     ticks = AxisScale(low, high, 0.0, 100.0).ticks()
 
     assert 2 <= len(ticks) <= 7
     assert low - 1e-9 <= ticks[0] <= ticks[-1] <= high + 1e-9 * max(1.0, abs(high))
-    assert len({f"{one:.3g}" for one in (b - a for a, b in pairwise(ticks))}) == 1
+    assert len({f"{width:.3g}" for width in (b - a for a, b in pairwise(ticks))}) == 1
 
 
 def test_the_page_of_an_empty_answer():
@@ -295,10 +298,10 @@ def test_the_page_of_a_store(tmp_path):
     assert "one line per grasp" in reader.text
     assert "All trials" in reader.text
     # The newest trial of each label is drawn; the other small curves can be chosen.
-    boxes = [one for one in reader.all("input") if one.get("type") == "checkbox"]
+    boxes = [element for element in reader.all("input") if element.get("type") == "checkbox"]
     assert [box["value"] for box in boxes] == [str(k) for k in range(8, 0, -1)]
     assert [box["value"] for box in boxes if "checked" in box] == ["8", "7"]
-    lines = [one for one in reader.all("polyline") if "data-trial" in one]
+    lines = [element for element in reader.all("polyline") if "data-trial" in element]
     assert {line["data-trial"] for line in lines if "class" not in line} == {"8", "7"}
 
 
@@ -394,13 +397,15 @@ def evaluated(right, difference, width=None):
 )
 def test_the_headline_of_an_evaluation_compares_with_guessing(rate, words):
     right = round(rate * 100)
-    found = evaluated(right, Difference(rate - 0.5, (rate - 0.6, rate - 0.4)))
+    evaluation = evaluated(right, Difference(rate - 0.5, (rate - 0.6, rate - 0.4)))
 
-    assert headline(found).startswith(f"{right} of 100 grasps tell the object and its state ({right} of 100)")
-    assert headline(found).endswith(words)
+    assert headline(evaluation).startswith(
+        f"{right} of 100 grasps tell the object and its state ({right} of 100)"
+    )
+    assert headline(evaluation).endswith(words)
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("difference", "words"),
     [
         (Difference(0.3, (0.2, 0.4)), "better than always"),
@@ -416,9 +421,11 @@ def test_a_verdict_says_one_of_three_things(difference, words):
 
 def test_the_recording_explains_nothing_only_where_the_rate_is_shown_to_be_higher():
     def told(low):
-        before = Measurement(what="w", rate=RecognitionRate(30, 60), difference=Difference(0.1, (low, 0.3)))
-        found = evaluated(60, Difference(0.3, (0.2, 0.4)))
-        return verdict(evolve(found, controls={**found.controls, "before_contact": before}))
+        measurement = Measurement(
+            what="w", rate=RecognitionRate(30, 60), difference=Difference(0.1, (low, 0.3))
+        )
+        evaluation = evaluated(60, Difference(0.3, (0.2, 0.4)))
+        return verdict(evolve(evaluation, controls={**evaluation.controls, "before_contact": measurement}))
 
     assert "so the recording does not explain the rate" in told(0.05)
     assert "whether the recording explains the rate cannot be told" in told(-0.1)

@@ -134,24 +134,24 @@ MEASURE = """(() => {
 def test_nothing_overflows_or_is_clipped(browser, pages, name, width, dark):
     browser.show(pages[name], width, dark=dark)
     browser.run("document.querySelectorAll('details').forEach((one) => { one.open = true; })")
-    found = browser.run(MEASURE)
+    answer = browser.run(MEASURE)
 
-    assert found["across"] <= found["room"] <= width
-    assert found["outside"] == []
-    assert found["clipped"] == []
-    assert [one["words"] for one in found["texts"] if one["out"] > 2.0] == []
-    assert min(one["size"] for one in found["texts"]) >= 9.0
-    assert found["font"] >= 16
-    assert found["widest"] >= 0.9 * width
-    tops = [box["top"] for box in found["sections"]]
+    assert answer["across"] <= answer["room"] <= width
+    assert answer["outside"] == []
+    assert answer["clipped"] == []
+    assert [text["words"] for text in answer["texts"] if text["out"] > 2.0] == []
+    assert min(text["size"] for text in answer["texts"]) >= 9.0
+    assert answer["font"] >= 16
+    assert answer["widest"] >= 0.9 * width
+    tops = [box["top"] for box in answer["sections"]]
     assert tops == sorted(tops)
-    assert (found["ground"], found["text"]) == (
+    assert (answer["ground"], answer["text"]) == (
         ("rgb(20, 23, 26)", "rgb(232, 232, 232)") if dark else ("rgb(255, 255, 255)", "rgb(26, 26, 26)")
     )
     if name == "experiment":
-        assert found["top"] < 450
-        rows = {round(box["top"]) for box in found["pictures"]}
-        assert (len(rows) == len(found["pictures"])) is (width == 390)
+        assert answer["top"] < 450
+        rows = {round(box["top"]) for box in answer["pictures"]}
+        assert (len(rows) == len(answer["pictures"])) is (width == 390)
 
 
 def test_a_page_runs_its_script_under_its_own_policy_and_loads_nothing(browser, pages):
@@ -165,7 +165,7 @@ def test_a_page_runs_its_script_under_its_own_policy_and_loads_nothing(browser, 
     ]
 
     assert browser.run("document.documentElement.className") == "scripted"
-    assert [one for one in asked if not one.endswith("report.html")] == []
+    assert [address for address in asked if not address.endswith("report.html")] == []
     assert [
         event
         for event in browser.events
@@ -182,13 +182,13 @@ COLUMN = (
 def test_a_click_on_a_heading_sorts_a_table(browser, pages):
     browser.show(pages["long"], 1280)
     click = "document.querySelectorAll('#claims thead th button')[3].click()"
-    before = browser.run(COLUMN)
+    column = browser.run(COLUMN)
     browser.run(click)
     once = browser.run(COLUMN)
     browser.run(click)
 
-    assert before != sorted(before, key=float) == once
-    assert browser.run(COLUMN) == sorted(before, key=float, reverse=True)
+    assert column != sorted(column, key=float) == once
+    assert browser.run(COLUMN) == sorted(column, key=float, reverse=True)
     assert browser.run("document.querySelectorAll('#claims th')[3].getAttribute('aria-sort')") == "descending"
 
 
@@ -265,15 +265,15 @@ def test_a_drag_enlarges_a_part_of_a_picture_and_a_double_click_restores_it(brow
 @pytest.mark.parametrize("name", ["experiment", "long", "signals"])
 def test_a_page_is_printed_light_whole_and_without_what_is_only_for_the_screen(browser, pages, name):
     browser.show(pages[name], 720, dark=True, media="print")
-    found = browser.run(MEASURE)
+    answer = browser.run(MEASURE)
     hidden = browser.run(
         "['nav', '.filter', '.tip', '.reset'].flatMap((what) => [...document.querySelectorAll(what)])"
         ".filter((one) => one.getClientRects().length).length"
     )
 
-    assert found["ground"] == "rgb(255, 255, 255)"
-    assert found["text"] == "rgb(26, 26, 26)"
-    assert found["clipped"] == []
+    assert answer["ground"] == "rgb(255, 255, 255)"
+    assert answer["text"] == "rgb(26, 26, 26)"
+    assert answer["clipped"] == []
     assert hidden == 0
     rows = "[...document.querySelectorAll('table.rows')].filter((one) => !one.closest('details'))"
     assert browser.run(rows + ".every((one) => one.getBoundingClientRect().right <= innerWidth + 1)")

@@ -58,8 +58,8 @@ def grasp():
 
 def cells_of(figure):
     """The values that the cells of a figure show under the pointer, by moment and cell."""
-    found = re.findall(r"<title>([^<]*), cell (\d+): (\S+) [^<]*</title>", figure)
-    return {(moment, int(cell)): float(value.replace("−", "-")) for moment, cell, value in found}
+    cells = re.findall(r"<title>([^<]*), cell (\d+): (\S+) [^<]*</title>", figure)
+    return {(moment, int(cell)): float(value.replace("−", "-")) for moment, cell, value in cells}
 
 
 def test_an_array_is_shown_at_contact_peak_and_rest_as_its_change_since_before_contact():

@@ -24,6 +24,7 @@ from graspsense.recording.layout import TICK_FIELDS
 
 pytest.importorskip("rerun")
 
+from cases import every_case
 from rerun.chunk import RrdReader
 
 PATIENCE_S = 60.0
@@ -32,18 +33,20 @@ RERUN = "graspsense.live.rerun_process"
 
 def logged(path):
     """Return for each entity its times in nanoseconds and its values, by the reader of Rerun."""
-    found = {}
+    columns = {}
     for chunk in RrdReader(path).stream().to_chunks():
         batch = chunk.to_record_batch()
         if "t" not in batch.schema.names:
             continue
         name = next(
-            one for one in batch.schema.names if one.endswith((":scalars", ":text", ":data", ":buffer"))
+            column
+            for column in batch.schema.names
+            if column.endswith((":scalars", ":text", ":data", ":buffer"))
         )
         values = [value[0] for value in batch.column(name).to_pylist()]
         times = batch.column("t").cast("int64").to_pylist()
-        found.setdefault(chunk.entity_path, []).extend(zip(times, values, strict=True))
-    return {path: ([t for t, _ in rows], [v for _, v in rows]) for path, rows in found.items()}
+        columns.setdefault(chunk.entity_path, []).extend(zip(times, values, strict=True))
+    return {path: ([t for t, _ in rows], [v for _, v in rows]) for path, rows in columns.items()}
 
 
 def shown(feed, n=20):
@@ -53,19 +56,19 @@ def shown(feed, n=20):
     feed.told("outcome", {"outcome": "steady", "reason": ""})
 
 
-def check_complete(found, n=20):
+def check_complete(columns, n=20):
     sent = [reading(k) for k in range(n)]
     times = [k * 1_000_000 for k in range(n)]
-    assert found["/grasp/tick/gap_m"] == (times, [one.frame.gap_m for one in sent])
-    assert found["/grasp/scalars/temperature"] == (times, [300.0 + k for k in range(n)])
-    skin_t, skin = found["/grasp/signals/skin"]
+    assert columns["/grasp/tick/gap_m"] == (times, [image.frame.gap_m for image in sent])
+    assert columns["/grasp/scalars/temperature"] == (times, [300.0 + k for k in range(n)])
+    skin_t, skin = columns["/grasp/signals/skin"]
     assert skin_t == times
-    assert [one["shape"] for one in skin] == [[2, 3]] * n
-    assert [one["buffer"] for one in skin] == [[float(k + i) for i in range(6)] for k in range(n)]
-    sound_t, sound = found["/grasp/signals/sound/x"]
+    assert [image["shape"] for image in skin] == [[2, 3]] * n
+    assert [image["buffer"] for image in skin] == [[float(k + i) for i in range(6)] for k in range(n)]
+    sound_t, sound = columns["/grasp/signals/sound/x"]
     assert sound == [k + i / 4 for k in range(n) for i in range(3)]
     assert sound_t == [k * 1_000_000 - (2 - i) * 250_000 for k in range(n) for i in range(3)]
-    assert found["/grasp/events"][1][-1] == "outcome: steady"
+    assert columns["/grasp/events"][1][-1] == "outcome: steady"
 
 
 def test_the_reader_of_rerun_finds_the_whole_grasp(tmp_path):
@@ -74,16 +77,16 @@ def test_the_reader_of_rerun_finds_the_whole_grasp(tmp_path):
     trial = load_pipeline("default").grasp(sinks=[feed])
     feed.finished(trial)
     assert feed.close() == ""
-    found, trace = logged(path), trial.trace
-    assert {f"/grasp/tick/{name}" for name in TICK_FIELDS if name != "t_s"} <= found.keys()
+    columns, trace = logged(path), trial.trace
+    assert {f"/grasp/tick/{name}" for name in TICK_FIELDS if name != "t_s"} <= columns.keys()
     for name in ("gap_m", "effort_n", "force_left_n", "force_right_n", "phase"):
-        times, values = found[f"/grasp/tick/{name}"]
+        times, values = columns[f"/grasp/tick/{name}"]
         assert times == [round(t_s * 1e9) for t_s in trace.t_s]
         assert np.array_equal(values, getattr(trace, name), equal_nan=True)
-    left = [one["buffer"] for one in found["/grasp/pads/left"][1]]
+    left = [image["buffer"] for image in columns["/grasp/pads/left"][1]]
     assert np.array_equal(left, trace.pad_left, equal_nan=True)
-    assert found["/grasp/events"][1][:-1] == [event.what for event in trial.events]
-    text = found["/grasp/prediction"][1][-1]
+    assert columns["/grasp/events"][1][:-1] == [event.what for event in trial.events]
+    text = columns["/grasp/prediction"][1][-1]
     assert text.startswith(trial.prediction.label)
     assert all(reason.words in text for reason in trial.prediction.because)
 
@@ -151,9 +154,7 @@ def test_without_a_viewer_the_command_says_so_before_the_grasp(tmp_path):
         LiveFeed(RERUN, [str(tmp_path / "missing" / "grasp.rrd")])
 
 
-@pytest.mark.parametrize(
-    "target", ["", "grasp.txt", "http://127.0.0.1:9876", "rerun+http://127.0.0.1:x/proxy"]
-)
+@every_case("target", ["", "grasp.txt", "http://127.0.0.1:9876", "rerun+http://127.0.0.1:x/proxy"])
 def test_a_target_that_is_neither_a_file_nor_a_viewer_is_wrong_use(target):
     with pytest.raises(click.UsageError):
         _rerun_target(target)

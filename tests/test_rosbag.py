@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cases import every_case
 
 rosbags = pytest.importorskip("rosbags", reason="rosbags is the extra `ros`")
 
@@ -111,9 +112,9 @@ def write(
                       "velocity": np.array([9.0, velocity]), "effort": np.array([9.0, effort])}  # fmt: skip
             bag.add(source, kind_, t_s + 0.001, header=bag.header(t_s), **fields)
         elif source == "/r_gripper_controller/state":
-            rest = dict.fromkeys(("set_point", "error", "time_step", "p", "i", "d", "i_clamp"), 0.0)
+            others = dict.fromkeys(("set_point", "error", "time_step", "p", "i", "d", "i_clamp"), 0.0)
             bag.add(source, CONTROLLER_STATE, t_s + 0.001, header=bag.header(t_s), process_value=gap,
-                    process_value_dot=velocity, command=effort, **rest)  # fmt: skip
+                    process_value_dot=velocity, command=effort, **others)  # fmt: skip
         else:
             bag.add(source, STATE_2009, t_s, joint_commanded_effort=0.0, joint_applied_effort=effort,
                     joint_name="r_gripper_joint", joint_position=gap, joint_velocity=velocity)  # fmt: skip
@@ -140,7 +141,7 @@ def test_the_accelerometer_of_a_bag_is_a_fast_channel_with_every_sample(ros, def
     path = tmp_path / ("grasp.bag" if ros == 1 else "grasp")
     bag = Bag(path, ros, definitions)
     kind = "pr2_msgs/msg/AccelerometerState", "std_msgs/Header header\ngeometry_msgs/Vector3[] samples\n"
-    rest = dict.fromkeys(("set_point", "error", "time_step", "p", "i", "d", "i_clamp"), 0.0)
+    others = dict.fromkeys(("set_point", "error", "time_step", "p", "i", "d", "i_clamp"), 0.0)
     sampled = 0
     for tick in range(100):
         t_s = BEGAN_S + 0.001 * tick
@@ -148,7 +149,7 @@ def test_the_accelerometer_of_a_bag_is_a_fast_channel_with_every_sample(ros, def
             pressure(bag, t_s, np.full(22, ZERO), np.full(22, ZERO), PRESSURE_NOW)
         if tick % 10 == 0:
             bag.add("/r_gripper_controller/state", CONTROLLER_STATE, t_s, header=bag.header(t_s),
-                    process_value=0.05, process_value_dot=0.0, command=0.0, **rest)  # fmt: skip
+                    process_value=0.05, process_value_dot=0.0, command=0.0, **others)  # fmt: skip
         vector = bag.store.types["geometry_msgs/msg/Vector3"]
         new = 2 if tick % 4 == 3 else 3
         samples = [vector(float(sampled + k), -1.0, 9.81) for k in range(new)]
@@ -170,7 +171,7 @@ def test_the_accelerometer_of_a_bag_is_a_fast_channel_with_every_sample(ros, def
     assert signal.t_s[-1] == pytest.approx(recording.readings[-1].frame.t_s, abs=1e-6)
 
 
-@pytest.mark.parametrize("case", CASES)
+@every_case("case", CASES)
 def test_bag_is_the_grasp_that_was_written(case: str, grasp: Any, tmp_path: Path) -> None:
     path = tmp_path / ("grasp.bag" if "ros1" in case else "grasp")
     write(path, grasp, **CASES[case])  # type: ignore[arg-type]

@@ -9,6 +9,7 @@ from math import inf
 
 import pytest
 from attrs import evolve
+from cases import every_case
 from commands import graspsense
 from grippers import Scripted, bottle, squeezing
 
@@ -52,8 +53,8 @@ def test_json_has_the_promised_keys_and_says_nothing_else_on_stdout():
 
 @pytest.mark.slow
 def test_the_same_seed_prints_the_same_features():
-    one, again = (json.loads(graspsense("run", "--json", "--seed", "3").stdout) for _ in range(2))
-    assert one["features"] == again["features"]
+    answer, again = (json.loads(graspsense("run", "--json", "--seed", "3").stdout) for _ in range(2))
+    assert answer["features"] == again["features"]
 
 
 @pytest.mark.slow
@@ -66,7 +67,7 @@ def test_nothing_there_is_an_outcome_with_reasons_and_exit_code_0():
     assert "no pad felt" in result["reasons"]["p_first"]
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("arguments", "code", "says"),
     [
         (["--gripper", "pr3"], 2, "Did you mean 'pr2'?"),
@@ -113,11 +114,11 @@ def test_a_dry_run_opens_nothing_and_says_what_would_be_done():
 @pytest.mark.slow
 def test_a_trial_that_is_kept_runs_again_from_its_recording_and_from_its_settings(tmp_path):
     store = tmp_path / "kept"
-    first = graspsense(
+    run = graspsense(
         "run", "--json", "--seed", "5", "--object", "toy", "--save", str(store), "--label", "toy#1"
     )
-    assert first.returncode == 0, first.stderr
-    kept = json.loads(first.stdout)
+    assert run.returncode == 0, run.stderr
+    kept = json.loads(run.stdout)
     assert kept["kept"]["trial"] == 1
     assert kept["kept"]["recorder"]["dropped"] == 0
     assert kept["kept"]["recorder"]["ticks"] == kept["counts"]["ticks"]
@@ -130,7 +131,7 @@ def test_a_trial_that_is_kept_runs_again_from_its_recording_and_from_its_setting
     assert json.loads(again.stdout)["features"] == kept["features"]
     graspsense("run", "--save", str(store))
     with Store.read(store) as opened:
-        assert [(one.id, one.label, one.instance) for one in opened.page()] == [
+        assert [(summary.id, summary.label, summary.instance) for summary in opened.page()] == [
             (2, None, None),
             (1, "toy", "toy#1"),
         ]
@@ -151,8 +152,8 @@ def test_the_picture_of_a_grasp_is_a_png_of_the_grasp_that_was_printed(tmp_path)
 @pytest.mark.slow
 def test_a_recording_is_drawn_as_the_grasp_itself_was(tmp_path):
     pytest.importorskip("matplotlib", reason="drawing needs the extra `plot`")
-    first, again, store = tmp_path / "first.png", tmp_path / "again.png", tmp_path / "kept"
-    done = graspsense("run", "--save", str(store), "--plot", str(first))
+    picture, again, store = tmp_path / "first.png", tmp_path / "again.png", tmp_path / "kept"
+    done = graspsense("run", "--save", str(store), "--plot", str(picture))
     assert done.returncode == 0, done.stderr
     done = graspsense("replay", f"{store}#1", "--plot", str(again))
     assert done.returncode == 0, done.stderr

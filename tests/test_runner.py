@@ -10,6 +10,7 @@ from types import SimpleNamespace
 
 import pytest
 from attrs import evolve
+from cases import every_case
 from grippers import CONTACT_S, REST_S, Scripted, bottle, squeezing
 
 from graspsense.core.components.roles import Controller
@@ -86,14 +87,14 @@ def let_go(gripper):
     return values[-1] == 0.0 and -20.0 in values[-110:]
 
 
-@pytest.mark.parametrize("at", [0, 1, 50, 200, 600, 1200, 1600])
-def test_a_device_lost_in_any_phase_is_an_outcome_with_the_trace_to_the_last_frame(at):
-    gripper = Scripted(squeezing, bottle, lose_at=at)
+@every_case("phase", [0, 1, 50, 200, 600, 1200, 1600])
+def test_a_device_lost_in_any_phase_is_an_outcome_with_the_trace_to_the_last_frame(phase):
+    gripper = Scripted(squeezing, bottle, lose_at=phase)
     grasp = run_grasp(gripper, HYBRID, RUN)
     assert grasp.outcome is Outcome.DEVICE_LOST
     assert "unplugged" in grasp.reason
     assert gripper.closed == 1
-    assert len(grasp.trace) == 0 or grasp.trace.t_s[-1] == pytest.approx((at - 1) * 0.001)
+    assert len(grasp.trace) == 0 or grasp.trace.t_s[-1] == pytest.approx((phase - 1) * 0.001)
 
 
 def test_a_slow_gripper_has_three_of_its_own_periods_for_a_frame():
@@ -155,10 +156,8 @@ def fail():
     raise ZeroDivisionError("float division by zero")
 
 
-@pytest.mark.parametrize(
-    ("act", "reason"), [(interrupt, "interrupted"), (fail, "ZeroDivisionError: float div")]
-)
-@pytest.mark.parametrize("after", [1, 900, 1100])
+@every_case(("act", "reason"), [(interrupt, "interrupted"), (fail, "ZeroDivisionError: float div")])
+@every_case("after", [1, 900, 1100])
 def test_whatever_stops_the_loop_the_fingers_are_opened(act, reason, after):
     gripper = Scripted(squeezing, bottle)
     grasp = run_grasp(gripper, controller_that(act, after), RUN)
@@ -271,7 +270,7 @@ def recorded(length):
     return Recorded(squeezing, bottle)
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("length", "outcome"),
     [
         (0, Outcome.NOTHING_THERE),
@@ -299,8 +298,8 @@ def test_late_frames_are_counted_on_a_device_clock_only():
 def test_a_real_gripper_is_held_weak_until_first_contact():
     gripper = Scripted(squeezing, bottle, clock="device")
     run_grasp(gripper, HYBRID, RUN)
-    before = [c.value for c in gripper.commands[: int(CONTACT_S * 1000)]]
-    assert max(before) <= RUN.first_effort_n
+    held = [c.value for c in gripper.commands[: int(CONTACT_S * 1000)]]
+    assert max(held) <= RUN.first_effort_n
     assert max(c.value for c in gripper.commands) == 20.0
 
 
@@ -368,12 +367,12 @@ def test_other_ends_of_a_session_let_go_too_and_tell_who_listened_before(number)
             return super().read(timeout_s)
 
     heard = []
-    before = signal.signal(number, lambda number, frame: heard.append(number))
+    handler = signal.signal(number, lambda number, frame: heard.append(number))
     try:
         gripper = Ended(squeezing, bottle)
         grasp = run_grasp(gripper, HYBRID, RUN)
     finally:
-        signal.signal(number, before)
+        signal.signal(number, handler)
     assert (grasp.outcome, heard) == (Outcome.ABORTED, [number])
     assert let_go(gripper)
 
@@ -425,7 +424,7 @@ def test_a_report_that_fails_costs_nothing_else():
     ],
 )
 def test_a_gripper_that_cannot_be_opened_is_named(opened, says, monkeypatch):
-    monkeypatch.setattr(Unready, "found", staticmethod(opened))
+    monkeypatch.setattr(Unready, "answer", staticmethod(opened))
     with pytest.raises((OSError, TypeError)) as raised:
         run_grasp(Unready(squeezing, bottle), HYBRID, RUN)
     *_, text = str(raised.value), *getattr(raised.value, "__notes__", [])
@@ -433,10 +432,10 @@ def test_a_gripper_that_cannot_be_opened_is_named(opened, says, monkeypatch):
 
 
 class Unready(Scripted):
-    found = None
+    answer = None
 
     def open(self, seed):
-        return self.found()
+        return self.answer()
 
 
 def test_no_garbage_is_collected_within_a_grasp_and_again_after_it():

@@ -40,7 +40,7 @@ def test_recordings_are_compared_by_name(tmp_path: Path):
     count, unlike = differences(tmp_path / "before.npz", tmp_path / "after.npz")
 
     assert count == 2
-    assert [one.name for one in unlike] == ["hybrid/outcome"]
+    assert [difference.name for difference in unlike] == ["hybrid/outcome"]
 
 
 def test_every_object_of_the_catalogue_is_compared_in_every_state():

@@ -9,6 +9,7 @@ import sys
 import tomllib
 
 import pytest
+from cases import every_case
 
 import graspsense_sim_gripper.plugin
 from graspsense.core.components.registry import IsolatedPlugins
@@ -41,7 +42,7 @@ def test_a_package_is_whole(roles, tmp_path):
     assert (folder / "tests" / "test_conformance.py").is_file()
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("name", "role", "says"),
     [
         (
@@ -147,7 +148,7 @@ def test_a_new_gripper_grasps_with_the_default_pipeline_at_once(tmp_path, monkey
             )
 
 
-@pytest.mark.parametrize("name", ["lab hand", "lab-hand ", " lab", "lab\thand"])
+@every_case("name", ["lab hand", "lab-hand ", " lab", "lab\thand"])
 def test_a_name_with_a_space_is_refused_with_the_reason(tmp_path, name):
     with pytest.raises(ConfigError, match="without spaces, as in lab-hand"):
         make(name, ["sensor-backend"], tmp_path / "made")

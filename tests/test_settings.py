@@ -6,6 +6,7 @@ from typing import Literal
 
 import pytest
 from attrs import frozen
+from cases import every_case
 from commands import graspsense
 
 from graspsense import load_pipeline
@@ -49,7 +50,7 @@ class Squeeze:
     loop: Literal["open", "closed"] = setting(default="open", meaning="Loop.")
 
 
-@pytest.mark.parametrize(
+@every_case(
     "value",
     [
         {"speed_m_s": 0.0},
@@ -62,7 +63,6 @@ class Squeeze:
         {"stiffness_n_m": -math.inf},
         {"loop": "ajar"},
     ],
-    ids=str,
 )
 def test_a_value_outside_of_what_is_declared_is_refused(value):
     with pytest.raises((ValueError, TypeError), match=next(iter(value))):
@@ -73,7 +73,7 @@ def test_every_value_within_what_is_declared_is_accepted():
     Squeeze(speed_m_s=10.0, times=9, limit_n=None, stiffness_n_m=math.inf, loop="closed")
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("declaration", "says"),
     [
         ({"default": 1.0}, "meaning"),
@@ -99,7 +99,7 @@ def all_keys(keys, above=""):
         yield from all_keys(declaration.get("keys", {}), f"{above}{key}.")
 
 
-@pytest.mark.parametrize("table", ["run", *(component.qualified for component in installed().components())])
+@every_case("table", ["run", *(component.qualified for component in installed().components())])
 def test_every_shipped_setting_declares_its_meaning_and_the_unit_of_its_name(table):
     known = {component.qualified: component for component in installed().components()}
     keys = keys_of(RunConfig if table == "run" else known[table].config_class())
@@ -148,7 +148,7 @@ def test_an_implausible_value_is_listed_with_the_other_errors():
     assert "'ramp_s' must be >= 0.0" in str(refused.value)
 
 
-@pytest.mark.parametrize(
+@every_case(
     "command",
     [
         ("run",),
@@ -158,7 +158,6 @@ def test_an_implausible_value_is_listed_with_the_other_errors():
         ("evaluate", "simulated"),
         ("experiment", "probing_force", "--dry-run"),
     ],
-    ids=lambda words: words[0],
 )
 def test_every_command_with_settings_refuses_an_implausible_one_and_names_force(
     tmp_path, monkeypatch, command
@@ -207,13 +206,13 @@ def test_config_show_tells_meaning_unit_range_default_and_origin_of_each_key(tmp
     text = to_toml(settings, origins=True)
 
     lines = text.splitlines()
-    at = next(k for k, line in enumerate(lines) if line.startswith("probing_force_n = 15.0"))
-    assert lines[at].endswith(f"# {file}:3")
+    index = next(k for k, line in enumerate(lines) if line.startswith("probing_force_n = 15.0"))
+    assert lines[index].endswith(f"# {file}:3")
     assert (
-        lines[at - 2]
+        lines[index - 2]
         == "# The effort of the squeeze; with loop = closed, the force on each pad. [N; above 0; plausible 0.1"
     )
-    assert lines[at - 1] == "#   to 200 N; default 20.0]"
+    assert lines[index - 1] == "#   to 200 N; default 20.0]"
     assert any(line.startswith("ramp_s = 0.1") and line.endswith("# -o") for line in lines)
     assert any(line.startswith("hold_s = 0.25") and line.endswith("# default") for line in lines)
     assert tomllib.loads(text) == tomllib.loads(to_toml(settings))
@@ -229,10 +228,10 @@ def test_config_show_describes_the_keys_of_a_table():
 
 def test_the_contact_threshold_stands_once():
     """Features use that of the controller, unless they are given another one."""
-    one = resolve(options=["controller.contact_force_n=1.25"])
-    assert one.values["features"]["contact_force_n"] == 1.25
-    assert one.origins["features.contact_force_n"] == "controller.contact_force_n"
-    assert tick_params(INFO, one.controller.create(), one.run).guard.contact_force_n == 1.25
+    setting = resolve(options=["controller.contact_force_n=1.25"])
+    assert setting.values["features"]["contact_force_n"] == 1.25
+    assert setting.origins["features.contact_force_n"] == "controller.contact_force_n"
+    assert tick_params(INFO, setting.controller.create(), setting.run).guard.contact_force_n == 1.25
     other = resolve(options=["controller.contact_force_n=1.25", "features.contact_force_n=0.5"])
     assert other.values["features"]["contact_force_n"] == 0.5
     assert resolve().origins["features.contact_force_n"] == "default"

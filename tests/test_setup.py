@@ -94,20 +94,20 @@ def test_constraints_pin_everything_that_is_installed_with_us() -> None:
         todo += map(Requirement, [*project["dependencies"], *(line for extra in extras for line in extra)])
     ours, versions, seen = {"graspsense", *PLUGINS}, pinned(), set()
     while todo:
-        one = todo.pop()
-        name = canonicalize_name(one.name)
-        if (name, *sorted(one.extras)) in seen or name in ours:
+        requirement = todo.pop()
+        name = canonicalize_name(requirement.name)
+        if (name, *sorted(requirement.extras)) in seen or name in ours:
             continue
-        seen.add((name, *sorted(one.extras)))
-        assert name in versions, f"{one} is not pinned in constraints.txt"
-        assert versions[name] in one.specifier, (
-            f"constraints.txt has {name}=={versions[name]}, asked is {one}"
+        seen.add((name, *sorted(requirement.extras)))
+        assert name in versions, f"{requirement} is not pinned in constraints.txt"
+        assert versions[name] in requirement.specifier, (
+            f"constraints.txt has {name}=={versions[name]}, asked is {requirement}"
         )
         try:
             further = map(Requirement, requires(name) or [])
         except PackageNotFoundError:
             continue  # an extra that is not installed here
-        contexts = [{"extra": extra} for extra in one.extras or {""}]
+        contexts = [{"extra": extra} for extra in requirement.extras or {""}]
         todo += [r for r in further if r.marker is None or any(map(r.marker.evaluate, contexts))]
     assert len(seen) > len(requirement_lines())
 

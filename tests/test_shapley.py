@@ -7,6 +7,7 @@ from itertools import permutations
 
 import numpy as np
 import pytest
+from cases import every_case
 from test_classifiers import fitted, trials
 from test_reasons import FULL_CAN, MISSING, total
 
@@ -32,9 +33,9 @@ def by_definition(trial, medians):
     for order in orders:
         row = medians.copy()
         for k in order:
-            before = interacting(row[np.newaxis])[0]
+            base = interacting(row[np.newaxis])[0]
             row[k] = trial[k]
-            parts[k] += (interacting(row[np.newaxis])[0] - before) / len(orders)
+            parts[k] += (interacting(row[np.newaxis])[0] - base) / len(orders)
     return parts
 
 
@@ -63,8 +64,8 @@ def test_many_features_are_sampled_alike_in_every_call_and_add_up():
 
 
 @pytest.mark.filterwarnings("ignore::sklearn.exceptions.ConvergenceWarning")
-@pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("features", [FULL_CAN, MISSING])
+@every_case("name", NAMES)
+@every_case("features", [FULL_CAN, MISSING])
 def test_contributions_add_up_to_the_probability(name, features):
     said = fitted(name, *trials(missing=0.1)).explain(features)
 
@@ -78,9 +79,9 @@ def test_contributions_add_up_to_the_probability(name, features):
 
 
 @pytest.mark.filterwarnings("ignore::sklearn.exceptions.ConvergenceWarning")
-@pytest.mark.parametrize("name", NAMES)
+@every_case("name", NAMES)
 def test_the_feature_that_tells_the_labels_apart_contributes_most(name):
-    first = fitted(name, *trials()).explain(FULL_CAN).because[0]
+    reason = fitted(name, *trials()).explain(FULL_CAN).because[0]
 
-    assert first.features == (FeatureValue("p_first", 0.0661, "m"),)
-    assert first.words.startswith("p_first = 66.1 mm: +")
+    assert reason.features == (FeatureValue("p_first", 0.0661, "m"),)
+    assert reason.words.startswith("p_first = 66.1 mm: +")

@@ -10,6 +10,7 @@ from math import inf, isnan
 import numpy as np
 import pytest
 from attrs import frozen
+from cases import every_case
 from click.testing import CliRunner
 from kept import begun
 
@@ -179,11 +180,11 @@ def recorded(tmp_path_factory):
         yield trial, path, plugins
 
 
-def same(before, now):
-    if isinstance(before, np.ndarray):
-        return before.tobytes() == now.tobytes()
-    arrays = ("t_s", "cells") if isinstance(before, ImageTrace) else ("t_s", "values")
-    return all(getattr(before, name).tobytes() == getattr(now, name).tobytes() for name in arrays)
+def same(expected, now):
+    if isinstance(expected, np.ndarray):
+        return expected.tobytes() == now.tobytes()
+    arrays = ("t_s", "cells") if isinstance(expected, ImageTrace) else ("t_s", "values")
+    return all(getattr(expected, name).tobytes() == getattr(now, name).tobytes() for name in arrays)
 
 
 def test_the_trace_has_each_sample_and_image_once_and_counts_the_lost_ones(recorded):
@@ -247,14 +248,14 @@ def test_an_exported_grasp_comes_back_with_the_same_features_arrays_and_samples(
         load_pipeline(options=["gripper.type=replay", *options], plugins=plugins).settings, plugins
     )
     assert again.features.values == trial.features.values
-    before, now = trial.trace, again.trace
-    assert now.gap_m.tobytes() == before.gap_m.tobytes()
-    assert same(before.signals["palm"], now.signals["palm"])
-    assert same(before.signals["motor_temperature"], now.signals["motor_temperature"])
+    original, now = trial.trace, again.trace
+    assert now.gap_m.tobytes() == original.gap_m.tobytes()
+    assert same(original.signals["palm"], now.signals["palm"])
+    assert same(original.signals["motor_temperature"], now.signals["motor_temperature"])
     # The file does not say which samples were lost, so only their number and the spacing beside them differ.
     acceleration = now.signals["acceleration"]
-    assert acceleration.values.tobytes() == before.signals["acceleration"].values.tobytes()
-    assert acceleration.t_s == pytest.approx(before.signals["acceleration"].t_s, abs=1e-3)
+    assert acceleration.values.tobytes() == original.signals["acceleration"].values.tobytes()
+    assert acceleration.t_s == pytest.approx(original.signals["acceleration"].t_s, abs=1e-3)
     assert acceleration.lost == 0
 
 
@@ -266,12 +267,12 @@ def test_columns_of_an_exported_grasp_come_back_as_its_arrays_do(recorded, tmp_p
     grasp = read_recorded(path)
     write_npz(tmp_path / "grasp.npz", grasp)
     write(tmp_path / f"grasp.{ending}", grasp)
-    before = read_exported(str(tmp_path / "grasp.npz"))
+    exported = read_exported(str(tmp_path / "grasp.npz"))
     now = read_named(ending, str(tmp_path / f"grasp.{ending}"))
     # Texts, in which NaN equals NaN and every number has all its digits.
-    assert repr(now.readings) == repr(before.readings)
-    assert (now.rate_hz, now.units, now.commands) == (before.rate_hz, before.units, before.commands)
-    assert (now.channels, now.has_release) == (before.channels, before.has_release)
+    assert repr(now.readings) == repr(exported.readings)
+    assert (now.rate_hz, now.units, now.commands) == (exported.rate_hz, exported.units, exported.commands)
+    assert (now.channels, now.has_release) == (exported.channels, exported.has_release)
 
     (tmp_path / f"grasp-palm.{ending}").unlink()
     with pytest.raises(ConfigError, match=f"grasp-palm.{ending} cannot be read"):
@@ -362,7 +363,7 @@ def test_the_images_of_every_array_are_counted(recorded, tmp_path):
     assert json.loads(done.stdout)["images"] == len(trial.trace.signals["palm"].t_s) > 20
 
 
-@pytest.mark.parametrize("cells", [0, 1, 5, 22, 300])
+@every_case("cells", [0, 1, 5, 22, 300])
 def test_fingertips_of_any_size_are_recorded_and_read(tmp_path, cells):
     recorder = Recorder(tmp_path / "g.mcap")
     recorder.metadata(START, begun().section(START))

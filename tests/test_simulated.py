@@ -68,7 +68,7 @@ def test_a_trial_is_simulated_where_the_gripper_says_so_and_not_by_its_settings(
         for label in ("cup:full", "cup:empty"):
             record_grasp(store, settings, plugins, labels=labels_of(label), origin="run")
 
-        assert [one.simulated for one in store.page()] == [emulated] * 2
+        assert [summary.simulated for summary in store.page()] == [emulated] * 2
     assert labelled_store(str(tmp_path / "trials")).provenance["simulated"] is emulated
 
 

@@ -7,6 +7,7 @@ from importlib import import_module
 
 import numpy as np
 import pytest
+from cases import every_case
 
 from graspsense.core.components.registry import installed
 from graspsense.core.learn.labelled import Labelled
@@ -92,7 +93,7 @@ def test_a_tree_that_leads_out_of_its_arrays_is_refused(tmp_path):
         load_model(str(tmp_path / "m.json"), installed())
 
 
-@pytest.mark.parametrize(
+@every_case(
     "text",
     [
         "",
@@ -112,7 +113,7 @@ def test_without_skops_it_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "skops", None)
     monkeypatch.setitem(sys.modules, "skops.io", None)
     classifier = create("classifier", "tree", kept_as="skops")
-    found = trials()
-    classifier.fit(found.table, found.labels, 0)
+    labelled = trials()
+    classifier.fit(labelled.table, labelled.labels, 0)
     with pytest.raises(PluginUnavailable, match=r"graspsense\[skops\]"):
         classifier.to_json()

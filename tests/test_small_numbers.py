@@ -24,7 +24,7 @@ def measured(factor):
 )
 @pytest.mark.parametrize("factor", [1e-6, 1e-12])
 def test_a_classifier_recognises_what_differs_by_micrometres(classifier, factor):
-    found = evaluate(
+    evaluation = evaluate(
         select_component("classifier", classifier),
         measured(factor),
         classifier=classifier,
@@ -32,7 +32,7 @@ def test_a_classifier_recognises_what_differs_by_micrometres(classifier, factor)
         controls=False,
         learning_curve=False,
     )
-    assert found.headline.rate >= 0.9
+    assert evaluation.headline.rate >= 0.9
 
 
 def test_a_table_whose_columns_vary_by_little_is_read_with_a_note(tmp_path):

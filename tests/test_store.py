@@ -9,6 +9,7 @@ import threading
 from contextlib import suppress
 
 import pytest
+from cases import every_case
 from kept import ended, keep, write_recording
 
 from graspsense.core.values.errors import ConfigError, DataDamaged
@@ -55,15 +56,15 @@ def test_numbers_are_kept_to_the_last_bit(store):
 def test_a_page_holds_the_newest_that_fit_newest_first(store):
     for k in range(7):
         keep(store, "can:full_open" if k % 2 else "can:empty_open")
-    assert [one.id for one in store.page(limit=3)] == [7, 6, 5]
-    assert [one.id for one in store.page(label="can:empty_open")] == [7, 5, 3, 1]
+    assert [summary.id for summary in store.page(limit=3)] == [7, 6, 5]
+    assert [summary.id for summary in store.page(label="can:empty_open")] == [7, 5, 3, 1]
 
 
 def test_what_is_set_aside_stays_but_does_not_count(store):
-    first, second = keep(store), keep(store)
-    set_aside(store, [first], "undone")
-    assert [one.id for one in store.page()] == [second]
-    assert [(one.id, one.set_aside) for one in store.page(set_aside=True)] == [(first, "undone")]
+    undone, counted = keep(store), keep(store)
+    set_aside(store, [undone], "undone")
+    assert [summary.id for summary in store.page()] == [counted]
+    assert [(summary.id, summary.set_aside) for summary in store.page(set_aside=True)] == [(undone, "undone")]
     assert store.counts() == {("can:full_open", None): 1}
     assert verify_store(store.folder).problems == ()
 
@@ -111,7 +112,7 @@ def test_writers_wait_for_one_another(store):
         thread.start()
     for thread in threads:
         thread.join()
-    assert sorted(one.id for one in store.page(limit=100)) == list(range(1, 41))
+    assert sorted(summary.id for summary in store.page(limit=100)) == list(range(1, 41))
 
 
 def test_a_recording_gets_one_row_whoever_writes_it(store):
@@ -135,12 +136,12 @@ def test_a_newer_store_is_refused_and_not_a_byte_of_it_changes(store):
     connection.execute("ALTER TABLE trial ADD COLUMN mood TEXT")
     connection.commit()
     connection.close()
-    before = bytes_in(store.folder)
+    contents = bytes_in(store.folder)
     for opened in (Store.open, Store.read):
         with pytest.raises(ConfigError, match=f"version {schema.NEWEST + 1}.*Update graspsense") as told:
             opened(store.folder)
         assert told.value.exit_code == 2
-    assert bytes_in(store.folder) == before
+    assert bytes_in(store.folder) == contents
 
 
 def test_a_newer_version_that_only_the_log_knows_is_refused(store):
@@ -178,12 +179,12 @@ def test_a_migration_that_fails_leaves_the_store_as_it_was(tmp_path, monkeypatch
         keep(store)
     newer = (*schema.VERSIONS, ("ALTER TABLE trial ADD COLUMN mood TEXT", "CREATE TABLE trial (id)"))
     connection = sqlite3.connect(tmp_path / "trials" / "store.sqlite", isolation_level=None)
-    before = schema.tables_in(connection)
+    tables = schema.tables_in(connection)
     monkeypatch.setattr(schema, "VERSIONS", newer)
     monkeypatch.setattr(schema, "NEWEST", len(newer))
     with pytest.raises(sqlite3.OperationalError, match="already exists"):
         schema.migrate(connection, len(newer) - 1)
-    assert schema.tables_in(connection) == before
+    assert schema.tables_in(connection) == tables
     assert connection.execute("PRAGMA user_version").fetchone() == (len(newer) - 1,)
     connection.close()
 
@@ -226,10 +227,10 @@ def test_somebody_else_s_sqlite_file_is_left_alone(tmp_path):
     connection.execute("CREATE TABLE trial (id)")
     connection.commit()
     connection.close()
-    before = (tmp_path / "store.sqlite").read_bytes()
+    original = (tmp_path / "store.sqlite").read_bytes()
     with pytest.raises(DataDamaged, match="is not a store of graspsense"):
         Store.open(tmp_path)
-    assert (tmp_path / "store.sqlite").read_bytes() == before
+    assert (tmp_path / "store.sqlite").read_bytes() == original
 
 
 def test_reading_makes_no_store(tmp_path):
@@ -271,13 +272,13 @@ def test_verify_finds_what_became_of_recordings(store):
     data = paths[2].read_bytes()
     paths[2].write_bytes(data[:2000] + b"\0\0\0\0" + data[2004:])
     write_recording(store.recordings / "loose.mcap", 5, ended())
-    found = verify_store(store.folder)
-    assert [problem.partition(":")[0] for problem in found.problems] == ["trial 1", "trial 2", "trial 3"]
-    assert "is missing" in found.problems[0]
-    assert "bytes and had" in found.problems[1]
-    assert "damaged" in found.problems[2]
-    assert found.unfinished == ("loose.mcap has no row",)
-    assert verify_file(store.folder / "store.sqlite") == found
+    findings = verify_store(store.folder)
+    assert [problem.partition(":")[0] for problem in findings.problems] == ["trial 1", "trial 2", "trial 3"]
+    assert "is missing" in findings.problems[0]
+    assert "bytes and had" in findings.problems[1]
+    assert "damaged" in findings.problems[2]
+    assert findings.unfinished == ("loose.mcap has no row",)
+    assert verify_file(store.folder / "store.sqlite") == findings
 
 
 @pytest.mark.parametrize("log", [False, True], ids=["closed", "with a log"])
@@ -313,8 +314,8 @@ def test_a_disk_that_is_full_is_told_and_what_was_kept_stays(mounted):
         assert kept >= 1
     with suppress(OSError):  # and every last byte
         (disk / "filler").write_bytes(b"x" * 10_000_000)
-    found = verify_store(disk)
-    assert (found.trials, found.problems) == (kept, ())
+    findings = verify_store(disk)
+    assert (findings.trials, findings.problems) == (kept, ())
     assert verify_file(disk / "store.sqlite").trials == kept
 
 
@@ -346,7 +347,7 @@ def test_a_word_says_class_state_and_thing(word, labels):
     assert labels_of(word) == labels
 
 
-@pytest.mark.parametrize("word", ["", "a b", "can:", "can:full:open", "unknown", "unknown:x", "#2"])
+@every_case("word", ["", "a b", "can:", "can:full:open", "unknown", "unknown:x", "#2"])
 def test_a_word_that_is_no_label_is_refused(word):
     with pytest.raises(ConfigError, match="is not a label"):
         labels_of(word)

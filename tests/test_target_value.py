@@ -8,6 +8,7 @@ import math
 
 import numpy as np
 import pytest
+from cases import every_case
 from commands import graspsense
 from kept import keep
 
@@ -32,17 +33,17 @@ def table(*columns, names=("p_first", "f_steady")):
 def bottles(objects=20, each=4, seed=0, noise=0.1, **more):
     """Bottles whose stiffness is their fill level; the width says nothing about it."""
     rng = np.random.default_rng(seed)
-    of = np.repeat(np.arange(objects), each)
-    fill = rng.uniform(0.0, 10.0, objects)[of]
-    width = 0.06 + 0.001 * rng.normal(size=objects)[of]
-    force = fill + noise * rng.normal(size=len(of))
+    object_numbers = np.repeat(np.arange(objects), each)
+    fill = rng.uniform(0.0, 10.0, objects)[object_numbers]
+    width = 0.06 + 0.001 * rng.normal(size=objects)[object_numbers]
+    force = fill + noise * rng.normal(size=len(object_numbers))
     features = table(width, force)
     return Labelled(
         source="bottles",
         table=features,
-        labels=("bottle",) * len(of),
-        instances=tuple(f"bottle#{k}" for k in of),
-        order=tuple(rng.permutation(len(of)).tolist()),
+        labels=("bottle",) * len(object_numbers),
+        instances=tuple(f"bottle#{k}" for k in object_numbers),
+        order=tuple(rng.permutation(len(object_numbers)).tolist()),
         width=ControlFeatures(table=features.columns(["p_first"]), what="p_first alone"),
         value=TargetValue(name="fill", unit="ml", values=tuple(fill.tolist())),
         **more,
@@ -56,32 +57,32 @@ def measured(trials, estimator="ridge", **more):
 @pytest.mark.slow
 @pytest.mark.parametrize("estimator", ESTIMATORS)
 def test_every_estimator_predicts_what_a_feature_tells(estimator):
-    found = measured(bottles(each=2), estimator, permutations=1)
-    assert found.protocol == "instance_held_out"
-    assert found.headline.instances == 20
-    assert found.headline.mean_absolute < 0.5 * found.controls["mean_only"].error.mean_absolute
-    assert found.controls["mean_only"].difference.is_positive
-    assert found.controls["width_only"].difference.is_positive
-    assert not [warning for warning in found.warnings if "mean" in warning or "width" in warning]
-    assert found.explained > 0.7
+    evaluation = measured(bottles(each=2), estimator, permutations=1)
+    assert evaluation.protocol == "instance_held_out"
+    assert evaluation.headline.instances == 20
+    assert evaluation.headline.mean_absolute < 0.5 * evaluation.controls["mean_only"].error.mean_absolute
+    assert evaluation.controls["mean_only"].difference.is_positive
+    assert evaluation.controls["width_only"].difference.is_positive
+    assert not [warning for warning in evaluation.warnings if "mean" in warning or "width" in warning]
+    assert evaluation.explained > 0.7
 
 
 def test_the_error_is_that_of_the_predictions_and_its_interval_that_of_the_instances():
-    found = measured(bottles(noise=1.0))
-    errors = np.array([predicted - true for true, predicted in found.predictions])
-    assert found.headline.mean_absolute == pytest.approx(np.abs(errors).mean())
-    assert found.headline.root_mean_square == pytest.approx(math.sqrt((errors**2).mean()))
+    evaluation = measured(bottles(noise=1.0))
+    errors = np.array([predicted - true for true, predicted in evaluation.predictions])
+    assert evaluation.headline.mean_absolute == pytest.approx(np.abs(errors).mean())
+    assert evaluation.headline.root_mean_square == pytest.approx(math.sqrt((errors**2).mean()))
     # With as many trials in each instance, this is Student's interval of the means of the instances.
     means = np.abs(errors).reshape(20, 4).mean(axis=1)
     half = 2.093024054408263 * means.std(ddof=1) / math.sqrt(20)
-    assert found.headline.interval == pytest.approx((means.mean() - half, means.mean() + half))
+    assert evaluation.headline.interval == pytest.approx((means.mean() - half, means.mean() + half))
 
 
 @pytest.mark.slow
 def test_noise_is_not_predicted_and_said_so():
     trials = bottles()
     rng = np.random.default_rng(3)
-    found = measured(
+    evaluation = measured(
         Labelled(
             source="noise",
             table=table(rng.normal(size=80), rng.normal(size=80)),
@@ -92,10 +93,11 @@ def test_noise_is_not_predicted_and_said_so():
         permutations=19,
     )
     assert any(
-        "not shown to be below that of always predicting the mean" in warning for warning in found.warnings
+        "not shown to be below that of always predicting the mean" in warning
+        for warning in evaluation.warnings
     )
-    assert found.explained < 0.2
-    assert found.controls["shuffled_values"].permutation_p > 0.05
+    assert evaluation.explained < 0.2
+    assert evaluation.controls["shuffled_values"].permutation_p > 0.05
     assert measured(bottles(), permutations=19).controls["shuffled_values"].permutation_p == 0.05
 
 
@@ -104,7 +106,7 @@ def test_a_number_that_is_the_instance_is_found_out():
     trials = bottles()
     rng = np.random.default_rng(1)
     fingerprint = rng.normal(size=20).repeat(4) + 1e-4 * rng.normal(size=80)
-    found = measured(
+    evaluation = measured(
         Labelled(
             source="fingerprints",
             table=table(fingerprint),
@@ -114,14 +116,14 @@ def test_a_number_that_is_the_instance_is_found_out():
         ),
         "tree",
     )
-    assert found.protocols["5_fold"].error.mean_absolute < 0.5 * found.headline.mean_absolute
-    assert any("having seen the same objects" in warning for warning in found.warnings)
+    assert evaluation.protocols["5_fold"].error.mean_absolute < 0.5 * evaluation.headline.mean_absolute
+    assert any("having seen the same objects" in warning for warning in evaluation.warnings)
 
 
 def test_what_the_width_or_the_recording_tells_is_a_warning():
     trials = bottles()
     told = ControlFeatures(table=trials.table.columns(["f_steady"]), what="all of it")
-    found = measured(
+    evaluation = measured(
         Labelled(
             source="told",
             table=trials.table,
@@ -134,11 +136,12 @@ def test_what_the_width_or_the_recording_tells_is_a_warning():
         )
     )
     assert any(
-        "the error with the width alone is not shown to be larger" in warning for warning in found.warnings
+        "the error with the width alone is not shown to be larger" in warning
+        for warning in evaluation.warnings
     )
-    assert any("from before contact alone" in warning for warning in found.warnings)
-    assert found.controls["first_line"].reason == "0 of 80 trials have such features"
-    assert found.controls["recording_order"].error is None
+    assert any("from before contact alone" in warning for warning in evaluation.warnings)
+    assert evaluation.controls["first_line"].reason == "0 of 80 trials have such features"
+    assert evaluation.controls["recording_order"].error is None
 
 
 @pytest.mark.slow
@@ -153,10 +156,10 @@ def test_prediction_intervals_contain_nine_of_ten_new_objects():
 
 def test_the_evaluation_is_json_and_repeatable():
     trials = bottles(each=1)
-    first, again = (
+    text, again = (
         json.dumps(to_json(measured(trials, "tree", permutations=1)), allow_nan=False) for _ in range(2)
     )
-    assert first == again
+    assert text == again
 
 
 @pytest.mark.slow
@@ -228,12 +231,12 @@ def test_a_store_is_trained_on_predicted_and_evaluated(folder, tmp_path):
         "evaluate", f"store:{folder}", "--target-value", "fill", "--classifier", "ridge", "--json"
     )
     assert code == 0, err
-    found = json.loads(out)
-    assert (found["unit"], found["headline"]["n"], found["headline"]["instances"]) == ("ml", 22, 11)
+    answer = json.loads(out)
+    assert (answer["unit"], answer["headline"]["n"], answer["headline"]["instances"]) == ("ml", 22, 11)
     assert (
-        found["headline"]["mean_absolute"] < 10.0 < found["controls"]["mean_only"]["error"]["mean_absolute"]
+        answer["headline"]["mean_absolute"] < 10.0 < answer["controls"]["mean_only"]["error"]["mean_absolute"]
     )
-    assert "2 trials left out: no fill" in found["notes"]
+    assert "2 trials left out: no fill" in answer["notes"]
 
     model = tmp_path / "m.json"
     arguments = (
@@ -281,15 +284,15 @@ def test_an_export_and_a_csv_of_other_programs_give_the_same(folder, tmp_path):
             (tmp_path / "other.csv", ("--instance", "bottle")),
         )
     )
-    for found in (stored, exported):
-        found.pop("source"), found.pop("notes")
+    for trials in (stored, exported):
+        trials.pop("source"), trials.pop("notes")
     assert exported == stored
     assert other["headline"] == stored["headline"]
     assert other["unit"] == "ml"
     assert ["fill", "ml"] not in other["features"]
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("arguments", "says"),
     [
         (("--target-value", "fil"), "There are: fill. Did you mean 'fill'"),
@@ -317,7 +320,7 @@ def test_simulated_trials_have_no_numbers():
     assert "has no numbers to predict: they are in a CSV file or in a store" in err
 
 
-@pytest.mark.parametrize("text", ["fill", "=3", "fill [ml]=", "fill=much", "label=3", "fill=inf"])
+@every_case("text", ["fill", "=3", "fill [ml]=", "fill=much", "label=3", "fill=inf"])
 def test_a_number_of_a_trial_is_name_and_number(text):
     with pytest.raises(ConfigError, match="is not a number of a trial"):
         value_label(text)

@@ -47,8 +47,8 @@ def test_the_order_of_the_labels_stays_and_probabilities_sum_to_one(raw, tempera
     calibrated = at_temperature(given, temperature)
 
     assert calibrated.sum(axis=1) == pytest.approx(1.0)
-    for before, after in zip(given, calibrated, strict=True):
-        assert (np.diff(after[np.argsort(before)]) >= 0.0).all()
+    for uncalibrated, after in zip(given, calibrated, strict=True):
+        assert (np.diff(after[np.argsort(uncalibrated)]) >= 0.0).all()
 
 
 def test_a_label_that_is_not_possible_stays_so():
@@ -66,11 +66,11 @@ def test_few_trials_leave_the_probabilities_as_they_are():
 
 
 def test_evaluate_measures_the_calibrated_probabilities_and_those_before():
-    found = judged(bottles(20, spread=1.2), "tree", controls=False, learning_curve=False)
+    evaluation = judged(bottles(20, spread=1.2), "tree", controls=False, learning_curve=False)
 
     # A full-grown tree gives 100 % to every prediction, and a third of them are wrong.
-    assert found.reliability.uncalibrated_error > 0.1
-    assert found.reliability.calibration_error < 0.6 * found.reliability.uncalibrated_error
+    assert evaluation.reliability.uncalibrated_error > 0.1
+    assert evaluation.reliability.calibration_error < 0.6 * evaluation.reliability.uncalibrated_error
 
 
 def test_a_model_keeps_its_temperature_and_gives_calibrated_probabilities(tmp_path):

@@ -8,6 +8,7 @@ import subprocess
 import sys
 
 import pytest
+from cases import every_case
 from commands import graspsense, printed
 from hypothesis import given
 from hypothesis import strategies as st
@@ -30,7 +31,7 @@ echo_table(
 """
 
 
-@pytest.mark.parametrize("width", [40, *WIDTHS])
+@every_case("width", [40, *WIDTHS])
 def test_a_table_fits_the_terminal_and_keeps_every_word(width):
     shown = in_terminal([TABLE], width, program=[sys.executable, "-c"])
 

@@ -6,6 +6,7 @@ import mutants
 import parts
 import pytest
 from attrs import evolve
+from cases import every_case
 
 from graspsense.core.components.registry import Component, IsolatedPlugins
 from graspsense.plugin_api import Feature, hookimpl
@@ -33,8 +34,10 @@ SLOW_CHECKS = {
 @pytest.mark.parametrize(
     "role",
     [
-        pytest.param(one, marks=pytest.mark.slow if one in ("controller", "sensor-backend") else ())
-        for one in ROLES
+        pytest.param(
+            role_name, marks=pytest.mark.slow if role_name in ("controller", "sensor-backend") else ()
+        )
+        for role_name in ROLES
     ],
 )
 def test_a_sound_part_passes_every_check(role):
@@ -45,20 +48,20 @@ def test_a_sound_part_passes_every_check(role):
 
 
 @pytest.mark.parametrize(
-    "one",
+    "broken",
     [
         pytest.param(mutant, marks=pytest.mark.slow if mutant.check in SLOW_CHECKS else ())
         for mutant in mutants.MUTANTS
     ],
-    ids=lambda one: f"{one.role}-{one.check}",
+    ids=lambda broken: f"{broken.role}-{broken.check}",
 )
-def test_a_check_catches_its_mutant(one):
-    (check,) = [check for check in CHECKS[one.role] if check.id == one.check]
+def test_a_check_catches_its_mutant(broken):
+    (check,) = [check for check in CHECKS[broken.role] if check.id == broken.check]
 
-    result = outcome_of(check, subject(one.role, one.entry, one.keys), {})
+    result = outcome_of(check, subject(broken.role, broken.entry, broken.keys), {})
 
     assert result.state == "failed"
-    assert one.says in result.text
+    assert broken.says in result.text
 
 
 @pytest.mark.parametrize(
@@ -81,19 +84,23 @@ def test_another_sound_feature_set_passes_every_check(changes):
 
 def test_a_read_that_other_work_held_up_once_is_within_its_timeout():
     hand = subject("sensor-backend", parts.ENTRIES["sensor-backend"])
-    (check,) = (one for one in CHECKS["sensor-backend"] if one.id == "read-returns-within-its-timeout")
+    (check,) = (
+        timeout_check
+        for timeout_check in CHECKS["sensor-backend"]
+        if timeout_check.id == "read-returns-within-its-timeout"
+    )
     hand.session.longest_read_s = 1.2
 
     assert outcome_of(check, hand, {}).state == "passed"
 
 
-@pytest.mark.parametrize("role", ROLES)
+@every_case("role", ROLES)
 def test_every_check_has_a_mutant(role):
     caught = {mutant.check for mutant in mutants.MUTANTS if mutant.role in (role, "feature-set")}
-    assert {one.id for one in CHECKS[role]} - caught == set()
+    assert {check.id for check in CHECKS[role]} - caught == set()
 
 
-@pytest.mark.parametrize("role", CHECKS)
+@every_case("role", CHECKS)
 def test_most_checks_of_a_role_must_run_and_each_says_what_it_demands(role):
     assert len(CHECKS[role]) / 3 < MINIMUM_CHECKS[role] <= len(CHECKS[role])
     for check in CHECKS[role]:
@@ -114,7 +121,7 @@ def test_a_part_of_which_most_was_skipped_does_not_conform():
 
 def test_an_expected_failure_is_no_failure_and_an_unexpected_pass_is_one():
     peak = subject("feature-set", parts.ENTRIES["feature-set"])
-    checks = {one.id: one for one in CHECKS["feature-set"]}
+    checks = {check.id: check for check in CHECKS["feature-set"]}
     (broken,) = [mutant for mutant in mutants.MUTANTS if mutant.check == "same-trace-same-features"]
     expected = {"same-trace-same-features": "counts on purpose"}
 

@@ -88,11 +88,11 @@ def check(site, name, plugin=SOUND, features="chitta", reader=READER):
     (site.folder / "lab_pipes" / "lab.toml").write_text(PIPELINE.format(features=features))
     site.modules.append("lab_pipes")
     package = package_of("lab-thing", site.discover(), data={"lab-data": str(examples)})
-    (one,) = [one for one in CHECKS["distribution"] if one.id == name]
-    return outcome_of(one, package, {})
+    (chosen,) = [check for check in CHECKS["distribution"] if check.id == name]
+    return outcome_of(chosen, package, {})
 
 
-@pytest.mark.parametrize("name", [one.id for one in CHECKS["distribution"]])
+@pytest.mark.parametrize("name", [sound.id for sound in CHECKS["distribution"]])
 def test_a_sound_distribution_passes(site, name):
     result = check(site, name)
 
@@ -166,11 +166,13 @@ def test_the_owner_of_a_hook_contributes_checks_of_it(site, most, state, text):
     site.install("lab-thing", SOUND)
     plugins = site.discover()
 
-    (one,) = [one for one in checks_for(package_of("lab-thing", plugins)) if one.id == "parts-are-few"]
-    result = outcome_of(one, package_of("lab-thing", plugins), {})
+    (check,) = [
+        check for check in checks_for(package_of("lab-thing", plugins)) if check.id == "parts-are-few"
+    ]
+    result = outcome_of(check, package_of("lab-thing", plugins), {})
 
     assert (result.title, result.state, result.text) == ("few parts", state, text)
-    assert all(one.id != "parts-are-few" for one in checks_for(package_of("lab-owner", plugins)))
+    assert all(check.id != "parts-are-few" for check in checks_for(package_of("lab-owner", plugins)))
 
 
 def test_an_observer_that_raises_or_returns_is_caught(site):
@@ -224,7 +226,7 @@ def test_a_check_catches_a_reader_that_is_broken(site, name, sound, broken, says
 
 def test_every_check_of_a_distribution_has_a_mutant():
     others = {"wheel-is-complete", "pipelines-fit-together", *(name for name, *_ in READERS)}
-    assert {one.id for one in CHECKS["distribution"]} == set(MUTANTS) | others
+    assert {check.id for check in CHECKS["distribution"]} == set(MUTANTS) | others
     assert "numpy" in HEAVY
 
 
@@ -276,9 +278,9 @@ def graspsense_pipelines():
     (site.folder / "lab_thing-0.2.dist-info" / "direct_url.json").write_text(
         json.dumps({"url": folder.as_uri(), "dir_info": {"editable": True}})
     )
-    (one,) = [one for one in CHECKS["distribution"] if one.id == "wheel-is-complete"]
+    (check,) = [check for check in CHECKS["distribution"] if check.id == "wheel-is-complete"]
 
-    result = outcome_of(one, package_of("lab-thing", site.discover()), {})
+    result = outcome_of(check, package_of("lab-thing", site.discover()), {})
 
     assert result.state == ("failed" if says else "passed")
     assert says in result.text

@@ -5,6 +5,7 @@ import json
 
 import numpy as np
 import pytest
+from cases import every_case
 from commands import printed
 
 from graspsense.core.learn.labelled import Labelled
@@ -35,10 +36,10 @@ def stamped(write, rows=ROWS):
 
 def iso(k):
     """Return a time in CET, and from 03:00 on in CEST: the clock jumps, the instant does not."""
-    second = 59.0 + k * 0.01
-    if second < 60.0:
-        return f"2026-03-29T01:59:{second:09.6f}+01:00"
-    return f"2026-03-29T03:00:{second - 60.0:09.6f}+02:00"
+    seconds = 59.0 + k * 0.01
+    if seconds < 60.0:
+        return f"2026-03-29T01:59:{seconds:09.6f}+01:00"
+    return f"2026-03-29T03:00:{seconds - 60.0:09.6f}+02:00"
 
 
 def read(path, **columns):
@@ -79,13 +80,13 @@ VARIANTS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("lines", VARIANTS.values(), ids=VARIANTS.keys())
+@every_case("lines", VARIANTS.values())
 def test_a_recording_is_read_as_instruments_write_it(lines, tmp_path):
     path = tmp_path / "jar.csv"
     path.write_text("\n".join(lines) + "\n")
-    found = read(path)
-    assert times(found) == pytest.approx(T_S, abs=1e-6)
-    frames = [reading.frame for reading in found.readings]
+    recording = read(path)
+    assert times(recording) == pytest.approx(T_S, abs=1e-6)
+    frames = [reading.frame for reading in recording.readings]
     assert [frame.gap_m for frame in frames] == pytest.approx(GAP_MM * 1e-3, abs=1e-7)
     assert [frame.force_left_n for frame in frames] == pytest.approx(FORCE_N, abs=1e-3)
 
@@ -101,10 +102,10 @@ def test_compressed_text_and_json_lines_are_read(tmp_path):
     ]
     path = tmp_path / "jar.jsonl"
     path.write_text("\n".join(lines) + '\n{"t": 2.0, "po')
-    found = read(path, force=["pads.left".join("''"), "'pads.both.1'"])
-    assert times(found) == pytest.approx(T_S)
-    assert found.readings[-1].frame.force_right_n == pytest.approx(2 * FORCE_N[-1])
-    assert [note for note in found.notes if "line 201 is cut off" in note]
+    recording = read(path, force=["pads.left".join("''"), "'pads.both.1'"])
+    assert times(recording) == pytest.approx(T_S)
+    assert recording.readings[-1].frame.force_right_n == pytest.approx(2 * FORCE_N[-1])
+    assert [note for note in recording.notes if "line 201 is cut off" in note]
     path.write_text("\n".join([*lines[:5], "[1]", *lines[5:]]))
     with pytest.raises(DataDamaged, match="line 6"):
         read(path)
@@ -122,7 +123,7 @@ def test_a_compressed_text_has_the_limits_of_a_text(tmp_path, monkeypatch):
         read(path)
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("lines", "end", "left", "note"),
     [
         (spoiled(150, "1.500,48.5,NaN,NaN"), "\n", 199, r"1 sample without a number \(line 152\)"),
@@ -136,9 +137,9 @@ def test_a_compressed_text_has_the_limits_of_a_text(tmp_path, monkeypatch):
 def test_what_is_left_out_is_told_and_the_recording_is_kept(lines, end, left, note, tmp_path):
     path = tmp_path / "jar.csv"
     path.write_text("\n".join(lines) + end)
-    found = read(path)
-    assert len(found.readings) == left
-    assert any(__import__("re").search(note, one) for one in found.notes) or not note
+    recording = read(path)
+    assert len(recording.readings) == left
+    assert any(__import__("re").search(note, told) for told in recording.notes) or not note
 
 
 def recordings(folder, lines, text=""):
@@ -152,9 +153,9 @@ def recordings(folder, lines, text=""):
 def test_a_part_of_a_file_that_cannot_be_read_leaves_the_others(bad, tmp_path):
     keys = 'files = "{day}.csv"\nstart = "^grasp (?P<label>\\\\w+)"\ntime = "t"\ngap = "pos [mm]"\nforce = "f1"\n'
     lines = ["grasp can", HEADER, *ROWS, "grasp cup", *bad, "grasp jar", HEADER, *ROWS]
-    found = recordings(tmp_path, lines, keys)
-    assert [getattr(recording, "label", "none") for recording in found] == ["can", "none", "jar"]
-    assert "line" in str(found[1].error)
+    grasps = recordings(tmp_path, lines, keys)
+    assert [getattr(recording, "label", "none") for recording in grasps] == ["can", "none", "jar"]
+    assert "line" in str(grasps[1].error)
 
 
 def test_a_large_loss_is_a_warning(tmp_path):
@@ -220,7 +221,7 @@ def trials(folder, lines, **given):
     return read_labelled(path, "what", **given)
 
 
-@pytest.mark.parametrize(
+@every_case(
     "lines",
     [
         ["what,p,q", *TRIALS],
@@ -236,10 +237,10 @@ def trials(folder, lines, **given):
     ],
 )
 def test_a_table_of_trials_is_read_by_the_same_rules(lines, tmp_path):
-    found = trials(tmp_path, lines)
-    assert found.table.names == ("p", "q")
-    assert found.labels == ("a", "b") * 6
-    assert found.table.values[:, 0].tolist() == [k % 5 + 0.25 for k in range(12)]
+    labelled = trials(tmp_path, lines)
+    assert labelled.table.names == ("p", "q")
+    assert labelled.labels == ("a", "b") * 6
+    assert labelled.table.values[:, 0].tolist() == [k % 5 + 0.25 for k in range(12)]
 
 
 def test_thousands_are_the_same_number_in_evaluate_as_in_import(tmp_path):
@@ -257,10 +258,10 @@ def test_words_for_a_missing_number_are_labels(tmp_path):
 def test_labels_that_look_the_same_are_the_same(tmp_path):
     same = ["cafe\u0301", "caf\u00e9", "caf\u00e9\u200b", "\ufeffcaf\u00e9", "caf\u00e9\u00a0", "caf\u00e9"]
     lines = ["what,p,q", *(f"{same[k // 2] if k % 2 else '1.0' if k % 4 else '1'},{k},2" for k in range(12))]
-    found = trials(tmp_path, lines, features=["p"])
-    assert found.classes == ("1", "caf\u00e9")
+    labelled = trials(tmp_path, lines, features=["p"])
+    assert labelled.classes == ("1", "caf\u00e9")
     assert labels_of("cafe\u0301:1.0#2") == {"label": "caf\u00e9:1", "instance": "caf\u00e9#2"}
-    assert isinstance(found, Labelled)
+    assert isinstance(labelled, Labelled)
 
 
 def test_evaluate_and_train_read_what_pandas_wrote(tmp_path):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import pytest
+from cases import every_case
 from kept import frame, keep
 
 from graspsense.store.dataset import labelled_store
@@ -32,7 +32,7 @@ def test_a_manifest_may_number_its_trials_instead():
     assert order_recorded([MADE] * 2, ["import"] * 2, stated) == ((1, 0), "")
 
 
-@pytest.mark.parametrize("text", ["not JSON", '{"recorded_at": "yesterday"}', '{"recorded_at": 5}', "[]"])
+@every_case("text", ["not JSON", '{"recorded_at": "yesterday"}', '{"recorded_at": 5}', "[]"])
 def test_a_time_that_cannot_be_read_is_none(text):
     assert order_recorded([MADE], ["import"], [text])[0] is None
 
@@ -48,20 +48,20 @@ def test_a_store_of_imports_has_a_first_line_and_no_order(tmp_path):
             keep(store, label, origin="import")
         keep(store, "jar")
         (store.folder / "recordings" / store.page(limit=4)[1].recording).write_bytes(b"damaged")
-    found = labelled_store(str(tmp_path / "trials"))
-    assert found.order is None
-    assert "3 of 4 trials were imported without the time" in found.no_order
-    first = found.first_line.table
-    assert first.names[:2] == ("gap_first", "velocity_first")
-    assert first.values[0, :4].tolist() == [frame(0).gap_m, frame(0).velocity_m_s, frame(0).effort_n, 0.0]
+    labelled = labelled_store(str(tmp_path / "trials"))
+    assert labelled.order is None
+    assert "3 of 4 trials were imported without the time" in labelled.no_order
+    table = labelled.first_line.table
+    assert table.names[:2] == ("gap_first", "velocity_first")
+    assert table.values[0, :4].tolist() == [frame(0).gap_m, frame(0).velocity_m_s, frame(0).effort_n, 0.0]
     # The third import is damaged, and the fourth trial was not imported.
-    assert (first.values[2:] != first.values[2:]).all()
+    assert (table.values[2:] != table.values[2:]).all()
 
 
 def test_grasps_of_our_own_have_an_order_and_no_first_line(tmp_path):
     with Store.open(tmp_path / "trials") as store:
         for label in ("can", "jar"):
             keep(store, label)
-    found = labelled_store(str(tmp_path / "trials"))
-    assert found.order == (0, 1)
-    assert found.first_line is None
+    labelled = labelled_store(str(tmp_path / "trials"))
+    assert labelled.order == (0, 1)
+    assert labelled.first_line is None

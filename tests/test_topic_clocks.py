@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cases import every_case
 
 from graspsense.core.values.errors import DataDamaged
 from graspsense.recording.labelled_recording import LabelledRecording, UnreadableRecording
@@ -30,10 +31,10 @@ force = "'/tip.data'[0]"
 
 def messages(t_s: Any, stamped_s: Any = None, delay_s: float = 0.002) -> Messages:
     """Messages that were recorded shortly after these times; without `stamped_s` their headers have these times."""
-    found = Messages()
-    for at, stamp in zip(t_s, t_s if stamped_s is None else stamped_s, strict=True):
-        found.add(BEGAN_NS + round((at + delay_s) * S), BEGAN_NS + round(stamp * S))
-    return found
+    joined = Messages()
+    for time_s, stamp in zip(t_s, t_s if stamped_s is None else stamped_s, strict=True):
+        joined.add(BEGAN_NS + round((time_s + delay_s) * S), BEGAN_NS + round(stamp * S))
+    return joined
 
 
 HEALTHY = messages(T_S)
@@ -47,8 +48,8 @@ CLOCKS = {
 }
 
 
-@pytest.mark.parametrize("clock", CLOCKS)
-@pytest.mark.parametrize("swapped", [False, True])
+@every_case("clock", CLOCKS)
+@every_case("swapped", [False, True])
 def test_headers_of_another_clock_are_not_used(clock: str, swapped: bool) -> None:
     topics = {"/hand": HEALTHY, "/tip": messages(T_S, CLOCKS[clock])}
     common = common_clock("bag", dict(reversed(topics.items())) if swapped else topics)
@@ -70,17 +71,17 @@ def test_headers_of_one_clock_are_used_whatever_the_delay_of_the_recording(delay
 
 
 def test_a_header_without_a_time_has_that_of_its_recording_on_the_clock_of_its_topic() -> None:
-    found = messages(T_S, delay_s=3600.0)
-    found.stamped_ns[0] = found.stamped_ns[150] = 0
-    common = common_clock("bag", {"/hand": messages(T_S, delay_s=3600.0), "/tip": found})
+    topics = messages(T_S, delay_s=3600.0)
+    topics.stamped_ns[0] = topics.stamped_ns[150] = 0
+    common = common_clock("bag", {"/hand": messages(T_S, delay_s=3600.0), "/tip": topics})
     assert np.array_equal(common.topics["/tip"].ns, common.topics["/hand"].ns)
 
 
 def test_a_recorder_that_was_late_once_changes_nothing() -> None:
-    found = messages(T_S)
+    topics = messages(T_S)
     held_up = BEGAN_NS + round(1.8 * S)
-    found.recorded_ns[100:170] = [max(ns, held_up + k) for k, ns in enumerate(found.recorded_ns[100:170])]
-    common = common_clock("bag", {"/hand": HEALTHY, "/tip": found})
+    topics.recorded_ns[100:170] = [max(ns, held_up + k) for k, ns in enumerate(topics.recorded_ns[100:170])]
+    common = common_clock("bag", {"/hand": HEALTHY, "/tip": topics})
     assert common.notices == ()
     assert np.array_equal(common.topics["/tip"].ns, common.topics["/hand"].ns)
 
@@ -133,20 +134,20 @@ def written(tmp_path: Path) -> Any:
                 state = store.types[joint](
                     header(t_s), ["r_gripper_joint"], np.array([gap]), np.zeros(1), np.zeros(1)
                 )
-                at = BEGAN_NS + round(t_s * S) + 10**6
-                writer.write(hand, at, store.serialize_cdr(state, joint))
+                stamp_ns = BEGAN_NS + round(t_s * S) + 10**6
+                writer.write(hand, stamp_ns, store.serialize_cdr(state, joint))
                 if not kept[k]:
                     continue
                 if pr2:
                     load = np.full(22, 3000 + round(FORCE_N[k] * 100) + k % 3, dtype=np.int16)
                     message = store.types[cells](header(stamped_s[k]), load, load)
-                    writer.write(force, at, store.serialize_cdr(message, cells))
+                    writer.write(force, stamp_ns, store.serialize_cdr(message, cells))
                 else:
                     message = store.types[tip](header(stamped_s[k]), np.array([FORCE_N[k], 0.0]))
-                    writer.write(force, at, store.serialize_cdr(message, tip))
+                    writer.write(force, stamp_ns, store.serialize_cdr(message, tip))
         if pr2:
-            (found,), _ = recordings_to_import([f"rosbag:{tmp_path / 'jar'}"], {}, None)
-            return found.labelled
+            (imported,), _ = recordings_to_import([f"rosbag:{tmp_path / 'jar'}"], {}, None)
+            return imported.labelled
         (recording,) = readable_or_not("manifest", str(tmp_path / "m.toml"))
         return recording
 
@@ -162,45 +163,45 @@ def frames(recording: Recording, name: str) -> Any:
 
 @pytest.mark.parametrize("pr2", [False, True], ids=["manifest", "pr2"])
 def test_a_topic_that_dies_ends_the_recording(written: Any, pr2: bool) -> None:
-    one = written(T_S < 1.5, pr2=pr2)
-    assert len(one.recording.readings) == pytest.approx(151, abs=1)
-    assert [notice for notice in one.notices if "ends before the other topics" in notice]
-    assert any("150 messages from 0.000 to 1.490 s" in note for note in one.recording.notes)
+    recording = written(T_S < 1.5, pr2=pr2)
+    assert len(recording.recording.readings) == pytest.approx(151, abs=1)
+    assert [notice for notice in recording.notices if "ends before the other topics" in notice]
+    assert any("150 messages from 0.000 to 1.490 s" in note for note in recording.recording.notes)
 
 
 @pytest.mark.parametrize("pr2", [False, True], ids=["manifest", "pr2"])
 def test_a_topic_that_begins_late_shortens_the_recording(written: Any, pr2: bool) -> None:
-    one = written(T_S >= 0.03, pr2=pr2)
-    assert len(one.recording.readings) == pytest.approx(297, abs=1)
-    assert one.notices == ()
-    assert np.isfinite(frames(one.recording, "force_left_n")).all()
+    recording = written(T_S >= 0.03, pr2=pr2)
+    assert len(recording.recording.readings) == pytest.approx(297, abs=1)
+    assert recording.notices == ()
+    assert np.isfinite(frames(recording.recording, "force_left_n")).all()
 
 
 @pytest.mark.parametrize("pr2", [False, True], ids=["manifest", "pr2"])
 def test_the_force_of_a_tip_on_another_clock_is_that_of_its_time(written: Any, pr2: bool) -> None:
-    one = written(ALL, T_S - 20.0, pr2=pr2)
-    assert [notice for notice in one.notices if "another clock" in notice]
-    force = frames(one.recording, "force_left_n")
+    recording = written(ALL, T_S - 20.0, pr2=pr2)
+    assert [notice for notice in recording.notices if "another clock" in notice]
+    force = frames(recording.recording, "force_left_n")
     assert len(force) >= 299
     scale = 15 * 100 / 1600 if pr2 else 1.0
     assert force[-1] == pytest.approx(scale * FORCE_N[-1], abs=0.1)
 
 
 def test_a_silence_while_the_force_rises_is_told(written: Any) -> None:
-    one = written((T_S < 1.5) | (T_S > 2.0))
-    words = one.line if isinstance(one, UnreadableRecording) else " ".join(one.notices)
+    recording = written((T_S < 1.5) | (T_S > 2.0))
+    words = recording.line if isinstance(recording, UnreadableRecording) else " ".join(recording.notices)
     assert "/tip was silent" in words
 
 
 def test_the_pads_of_a_pr2_give_no_number_in_a_silence(written: Any) -> None:
-    one = written((T_S < 1.5) | (T_S > 2.0), pr2=True)
-    force, t_s = (frames(one.recording, name) for name in ("force_left_n", "t_s"))
+    recording = written((T_S < 1.5) | (T_S > 2.0), pr2=True)
+    force, t_s = (frames(recording.recording, name) for name in ("force_left_n", "t_s"))
     assert np.isnan(force[(t_s > 1.65) & (t_s < 1.95)]).all()
     assert np.isfinite(force[(t_s < 1.5) | (t_s > 2.05)]).all()
 
 
 def test_a_value_that_is_the_same_after_a_silence_held(written: Any) -> None:
     """As of a topic that is published where its value changes only."""
-    one = written((T_S < 0.3) | (T_S > 0.8))
-    assert len(one.recording.readings) == 300
-    assert np.isfinite(frames(one.recording, "force_left_n")).all()
+    recording = written((T_S < 0.3) | (T_S > 0.8))
+    assert len(recording.recording.readings) == 300
+    assert np.isfinite(frames(recording.recording, "force_left_n")).all()

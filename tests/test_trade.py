@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from cases import every_case
 
 from graspsense.evaluation.equivalence import verdict_on
 from graspsense.experiments.executors.serial import Serial
@@ -29,7 +30,7 @@ from graspsense.experiments.trade.trade_point import advise, trade_points
 def case(name, cost, *rates, n=100):
     """Return a case with these rates of its seeds; the rest of a condition is not needed here."""
 
-    def of(rate):
+    def rated(rate):
         predicted = ["can:full"] * round(rate * n) + ["can:empty"] * (n - round(rate * n))
         return ClassifierResult.from_answers(
             "c45", "state", "stratified_10_fold", ["can:full"] * n, predicted, cost=cost
@@ -39,7 +40,7 @@ def case(name, cost, *rates, n=100):
         case=SimpleNamespace(name=name, part="", learners=()),
         classifier="c45",
         target="state",
-        by_seed={seed: of(rate) for seed, rate in enumerate(rates)},
+        by_seed={seed: rated(rate) for seed, rate in enumerate(rates)},
         simulated=True,
     )
 
@@ -49,51 +50,51 @@ def test_a_cheap_case_is_recommended_only_if_it_is_shown_to_lose_little():
     near = case("weak", 2.0, 0.89, 0.90, 0.90, 0.90)
     far = case("feeble", 1.0, 0.40, 0.42, 0.41, 0.40)
 
-    found = advise(trade_points([far, near, best], True), "Force", "N")
-    assert found.recommended.name == "weak"
-    assert "of a known object (can)" in found.text
+    advice = advise(trade_points([far, near, best], True), "Force", "N")
+    assert advice.recommended.name == "weak"
+    assert "of a known object (can)" in advice.text
 
-    found = advise(trade_points([far, best], True), "Force", "N", "not for a robot")
-    assert found.recommended is found.best
-    assert "above those of all cheaper cases; not for a robot." in found.text
+    advice = advise(trade_points([far, best], True), "Force", "N", "not for a robot")
+    assert advice.recommended is advice.best
+    assert "above those of all cheaper cases; not for a robot." in advice.text
 
 
 def test_where_no_difference_is_shown_the_cheapest_is_taken_and_that_is_said():
     best = case("strong", 2.0, 0.70, 0.95, 0.80, 0.99)
     other = case("weak", 1.0, 0.95, 0.70, 0.90, 0.77)
     points = trade_points([other, best], True)
-    found = advise(points, "Force", "N")
-    assert (found.recommended.name, found.shown) == ("weak", False)
-    assert "no difference to the best is shown; take the cheapest, weak" in found.text
-    assert "100 grasps of each of 4 seeds" in found.text
-    assert found.cells[2] == "weak, no difference shown"
+    advice = advise(points, "Force", "N")
+    assert (advice.recommended.name, advice.shown) == ("weak", False)
+    assert "no difference to the best is shown; take the cheapest, weak" in advice.text
+    assert "100 grasps of each of 4 seeds" in advice.text
+    assert advice.cells[2] == "weak, no difference shown"
     assert [point.on_front for point in points] == ["yes", "not decided"]
 
 
 def test_a_case_that_is_the_cheapest_and_the_best_is_not_called_better():
     cheap, dear = case("weak", 1.0, 0.90, 0.91, 0.90, 0.92), case("strong", 2.0, 0.90, 0.90, 0.91, 0.91)
-    found = advise(trade_points([cheap, dear], True), "Force", "N")
-    assert (found.recommended.name, found.loss) == ("weak", None)
-    assert "take the cheapest" in found.text
-    assert "highest" not in found.text
+    advice = advise(trade_points([cheap, dear], True), "Force", "N")
+    assert (advice.recommended.name, advice.loss) == ("weak", None)
+    assert "take the cheapest" in advice.text
+    assert "highest" not in advice.text
 
 
 def test_a_case_that_lost_much_is_not_taken_because_few_seeds_show_nothing():
     best, poor = case("strong", 2.0, 0.90, 0.95), case("weak", 1.0, 0.50, 0.90)
-    found = advise(trade_points([poor, best], True), "Force", "N")
-    assert (found.recommended.name, found.shown) == ("strong", False)
-    assert "no cheaper case comes within 5 points, although 2 seeds do not show" in found.text
-    assert found.cells[2] == "strong"
+    advice = advise(trade_points([poor, best], True), "Force", "N")
+    assert (advice.recommended.name, advice.shown) == ("strong", False)
+    assert "no cheaper case comes within 5 points, although 2 seeds do not show" in advice.text
+    assert advice.cells[2] == "strong"
 
 
 def test_a_single_seed_recommends_nothing():
-    found = advise(trade_points([case("weak", 1.0, 0.8), case("strong", 2.0, 0.9)], True), "Force", "N")
-    assert found.recommended is None
-    assert "cannot be told" in found.text
-    assert found.cells[2] == "cannot be told"
+    advice = advise(trade_points([case("weak", 1.0, 0.8), case("strong", 2.0, 0.9)], True), "Force", "N")
+    assert advice.recommended is None
+    assert "cannot be told" in advice.text
+    assert advice.cells[2] == "cannot be told"
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("interval", "says"),
     [
         ((-0.01, 0.015), "agrees"),
@@ -191,12 +192,12 @@ def test_each_trade_runs_and_gives_advice(tmp_path, kind, more, trials):
     results = Results(tmp_path / "out")
     account = run_experiment(planned, results, Serial)
     assert account.complete, account.failed
-    found = findings_of(summarise(planned, results))
-    assert found.answer
-    assert found.tables[0].rows
+    findings = findings_of(summarise(planned, results))
+    assert findings.answer
+    assert findings.tables[0].rows
     if kind == "early":
-        at = {row[0]: float(row[2]) for row in found.tables[0].rows}
-        assert at["0 s"] == 0.0 < at["1 s"] < 1.0  # at rest before a second is over
+        steps_of = {row[0]: float(row[2]) for row in findings.tables[0].rows}
+        assert steps_of["0 s"] == 0.0 < steps_of["1 s"] < 1.0  # at rest before a second is over
 
 
 def test_a_grasp_lasts_until_the_rest_window_has_shown_the_rest():
@@ -234,8 +235,8 @@ def test_controls_stand_beside_the_rates_of_a_trade(tmp_path):
     planned = read_experiment(str(tmp_path / "small.toml"))
     results = Results(tmp_path / "out")
     run_experiment(planned, results, Serial)
-    found = findings_of(summarise(planned, results))
-    (controls,) = (table for table in found.tables if table.id == "controls")
+    findings = findings_of(summarise(planned, results))
+    (controls,) = (table for table in findings.tables if table.id == "controls")
     assert len(controls.rows) == 2
     assert controls.header[-5:] == (
         "most frequent label",

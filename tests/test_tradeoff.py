@@ -105,11 +105,11 @@ def test_the_simulator_gets_better_with_finer_steps(capsys, tmp_path):
     page = tmp_path / "page.md"
     arguments = ["--scene", "can:empty_open", "--seeds", "1", "--markdown", str(page), "--json"]
     assert ended(["tradeoff", "simulation", *arguments]) == 0
-    found = json.loads(capsys.readouterr().out)
-    points = found["points"]
+    answer = json.loads(capsys.readouterr().out)
+    points = answer["points"]
     assert [p["role"] for p in points].count("reference") == 1
     assert {p["failure"] for p in points} == {""}
-    assert found["quantities"][-2:] == [PEAK, TRACE]
+    assert answer["quantities"][-2:] == [PEAK, TRACE]
     assert all(p["seconds"] > 0.0 for p in points)
     curve = [p for p in points if p["method"] == "even steps" and p["role"] == "curve"]
     assert [p["step"] for p in curve] == ["1 ms", "0.5 ms", "0.2 ms", "0.1 ms"]
@@ -126,8 +126,8 @@ def test_the_condition_of_features_is_told_and_sensors_make_it_worse(capsys):
     assert ended(["tradeoff", "condition", *arguments]) == 0
     ideal, pads = json.loads(capsys.readouterr().out)
     assert (ideal["sensor"], pads["sensor"]) == ("ideal", "pads")
-    finest = {one["feature"]: one["finest"] for one in ideal["features"]}
-    jumpy = {one["feature"]: one["finest"] for one in pads["features"]}
+    finest = {feature["feature"]: feature["finest"] for feature in ideal["features"]}
+    jumpy = {feature["feature"]: feature["finest"] for feature in pads["features"]}
     # With ideal sensors the physics is well conditioned; the reading of cell images is not.
     assert max(finest.values()) < 1e-3
     assert jumpy["delta_t"] > 1e-3
@@ -161,10 +161,10 @@ def test_recognition_and_distances_of_variants_against_the_reference(tmp_path):
     softer = {**variants[-1].settings, "pad_stiffness_n_m": 3000.0}
     variants.append(evolve(variants[-1], step="soft fingertips", settings=softer))
     trade = sensed_trade(settings, objects=["can"], instances=6, seeds=(1, 2), variants=variants)
-    points = {one.step: one for one in trade.points}
+    points = {point.step: point for point in trade.points}
     worse, fine = points["soft fingertips"], points["0.0001"]
     # This feature is well conditioned, so that its distance is due to the model.
-    far, near = (next(d for d in one.distances if d.feature == "p_steady") for one in (worse, fine))
+    far, near = (next(d for d in point.distances if d.feature == "p_steady") for point in (worse, fine))
     assert far.distance > 10.0 * near.distance
     assert trade.grasps == 18
     # Two seeds show no equivalence, and that is said.

@@ -10,6 +10,7 @@ import sys
 
 import pytest
 from attrs import evolve
+from cases import every_case
 from commands import graspsense
 from kept import BENCH, keep
 
@@ -32,7 +33,7 @@ def store(tmp_path):
 
 
 def labels(store):
-    return [(one.id, one.label, one.instance) for one in reversed(store.page(set_aside=None))]
+    return [(summary.id, summary.label, summary.instance) for summary in reversed(store.page(set_aside=None))]
 
 
 def test_a_relabelled_trial_has_its_new_label_everywhere_and_the_store_is_intact(store):
@@ -61,7 +62,7 @@ def test_a_relabelled_trial_has_its_new_label_everywhere_and_the_store_is_intact
 def test_a_label_is_restored_as_it_was_recorded_also_none(store):
     keep(store, "can:full_open", "can#2", device=REAL)
     keep(store, None, device=REAL)
-    before = [store.trial(number).record for number in (1, 2)]
+    records = [store.trial(number).record for number in (1, 2)]
 
     for label in ("toy", "can:empty_open#9"):
         assert (
@@ -70,7 +71,7 @@ def test_a_label_is_restored_as_it_was_recorded_also_none(store):
         )
     assert graspsense("trials", "relabel", f"{store.folder}#1", f"{store.folder}#2", "--as-recorded")[0] == 0
 
-    assert [store.trial(number).record for number in (1, 2)] == before
+    assert [store.trial(number).record for number in (1, 2)] == records
     assert [(change.old, change.new) for change in changes.history(store, 2)] == [
         (None, "toy"),
         ("toy", "can:empty_open#9"),
@@ -128,20 +129,19 @@ def test_trials_that_are_set_aside_are_not_used_until_they_are_brought_back(stor
         (("aside", "#1", "--why", " "), "--why is empty"),
         (("aside", "1", "--why", "x"), "write DIR#NUMBER"),
     ],
-    ids=str,
 )
 def test_a_change_that_is_wrong_for_one_trial_changes_none(store, command, says):
     keep(store, "toy", device=REAL)
     keep(store, "block", device=REAL)
     changes.set_aside(store, [2], "earlier")
-    before = (labels(store), changes.history(store))
+    state = (labels(store), changes.history(store))
 
     refs = [f"{store.folder}{word}" if word.startswith("#") else word for word in command]
     code, _, err = graspsense("trials", *refs)
 
     assert code == 2
     assert says in err
-    assert (labels(store), changes.history(store)) == before
+    assert (labels(store), changes.history(store)) == state
 
 
 def test_a_simulated_trial_keeps_the_label_of_its_object(store):
@@ -242,7 +242,7 @@ def test_a_store_of_the_first_version_keeps_what_was_set_aside_in_it(tmp_path):
     with Store.read(tmp_path / "old") as store:
         (change,) = changes.history(store)
         assert (change.trial, change.words, change.why) == (1, "set aside", "undone by the operator")
-        assert [one.id for one in store.page()] == [2]
+        assert [summary.id for summary in store.page()] == [2]
     assert verify_store(tmp_path / "old").problems == ()
 
 
@@ -297,7 +297,7 @@ def test_a_number_is_changed_given_and_restored(store):
     assert [change.action for change in changes.history(store)] == ["value"] * 4
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("given", "says"),
     [
         (

@@ -17,14 +17,14 @@ def union(**settings):
 
 
 def test_each_set_gives_what_it_gives_alone():
-    found = union(sets=("curve", "quantiles")).extract(squeeze())
+    features = union(sets=("curve", "quantiles")).extract(squeeze())
     curve, quantiles = (create("feature-set", name).extract(squeeze()) for name in ("curve", "quantiles"))
 
-    assert found.values == pytest.approx((*curve.values, *quantiles.values), nan_ok=True)
-    assert found.names[: len(curve.names)] == curve.names
-    assert len(set(found.names)) == len(found.names)
+    assert features.values == pytest.approx((*curve.values, *quantiles.values), nan_ok=True)
+    assert features.names[: len(curve.names)] == curve.names
+    assert len(set(features.names)) == len(features.names)
     # Both sets have a gap at the contact: that of the second is named after its set.
-    assert found["quantiles_contact_gap"] == found["contact_gap"]
+    assert features["quantiles_contact_gap"] == features["contact_gap"]
 
 
 def test_the_thresholds_of_the_union_are_those_of_its_sets():

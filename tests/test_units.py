@@ -1,11 +1,12 @@
 """Numbers as people read them: none is shown as zero that is not."""
 
 import pytest
+from cases import every_case
 
 from graspsense.core.values.units import display_unit, in_column, in_words
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("value", "unit", "words"),
     [
         (2.5e-4, "m2", "250 mm2"),
@@ -19,8 +20,8 @@ def test_areas_and_volumes_are_in_units_of_a_grasp(value, unit, words):
     assert in_words(value, unit) == words
 
 
-@pytest.mark.parametrize("value", [1e-12, -4e-5, 6e-4, 0.0012, 0.0578, 12.3, 99_999.0, 1e9])
-@pytest.mark.parametrize("unit", ["m2", "m3", "s", "1/Pa", "kg"])
+@every_case("value", [1e-12, -4e-5, 6e-4, 0.0012, 0.0578, 12.3, 99_999.0, 1e9])
+@every_case("unit", ["m2", "m3", "s", "1/Pa", "kg"])
 def test_a_column_shows_no_number_as_zero(value, unit):
     _, factor = display_unit(unit)
     shown = in_column(value * factor)

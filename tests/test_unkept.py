@@ -112,7 +112,7 @@ def plainly(*arguments, answers=""):
 
 def numbers_in(folder):
     with Store.read(folder) as store:
-        return [one.id for one in store.page(set_aside=None)]
+        return [summary.id for summary in store.page(set_aside=None)]
 
 
 def test_a_grasp_whose_recorder_fails_is_not_kept_and_its_outcome_says_why(plugins, tmp_path):

@@ -15,6 +15,7 @@ import lz4.frame
 import numpy as np
 import pytest
 import zstandard
+from cases import every_case
 from kept import ended, write_recording
 from mcap.writer import CompressionType
 from mcap.writer import Writer as McapWriter
@@ -163,10 +164,8 @@ def test_npz(tmp_path):
     assert_refused(read_with_little_memory(f"read_arrays(Path({str(path)!r}))"), path)
 
 
-@pytest.mark.parametrize(
-    "shape", [(10**15,), (2**62, 4), (-5,), (10**9, 0, 0), (0, 10**12), (3.5,), (2**70,), (True,)]
-)
-@pytest.mark.parametrize("ending", ["npy", "npz"])
+@every_case("shape", [(10**15,), (2**62, 4), (-5,), (10**9, 0, 0), (0, 10**12), (3.5,), (2**70,), (True,)])
+@every_case("ending", ["npy", "npz"])
 def test_an_array_that_says_more_than_there_is(tmp_path, ending, shape):
     path = tmp_path / f"a.{ending}"
     header = f"{{'descr': '<f8', 'fortran_order': False, 'shape': {shape!r}, }}".encode().ljust(117) + b"\n"
@@ -180,7 +179,7 @@ def test_an_array_that_says_more_than_there_is(tmp_path, ending, shape):
         read_arrays(path)
 
 
-@pytest.mark.parametrize("descr", ["|O", "|V0", "<U0", "|S0", [("a", "|O")]])
+@every_case("descr", ["|O", "|V0", "<U0", "|S0", [("a", "|O")]])
 def test_an_array_of_what_is_no_number_is_refused(tmp_path, descr):
     path = tmp_path / "a.npy"
     header = (
@@ -366,7 +365,7 @@ def test_ros2_bags(tmp_path, compression, monkeypatch):
 ENDLESS = "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n)"
 
 
-@pytest.mark.parametrize(
+@every_case(
     "statement",
     [
         f"DROP TABLE schema; CREATE VIEW schema AS {ENDLESS} SELECT count(*) AS schema_version FROM n",
@@ -384,10 +383,10 @@ def test_a_ros2_bag_that_computes_is_refused(tmp_path, statement):
     connection = sqlite3.connect(path)
     connection.executescript(statement)
     connection.close()
-    before = path.read_bytes()
+    original = path.read_bytes()
     with pytest.raises(DataDamaged, match="is computed"):
         read_bag(tmp_path / "bag")
-    assert path.read_bytes() == before
+    assert path.read_bytes() == original
 
 
 @pytest.mark.parametrize(

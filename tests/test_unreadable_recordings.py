@@ -12,6 +12,7 @@ import zipfile
 import numpy as np
 import pytest
 from attrs import evolve
+from cases import every_case
 from commands import graspsense
 from kept import ended, frame, keep, write_recording
 
@@ -55,8 +56,8 @@ def flipped_in_the_middle(path):
     data = bytearray(path.read_bytes())
     with zipfile.ZipFile(path) as archive:
         info = archive.infolist()[0]
-    at = info.header_offset + 30 + len(info.filename) + 60
-    data[at : at + 8] = b"\xff" * 8
+    offset = info.header_offset + 30 + len(info.filename) + 60
+    data[offset : offset + 8] = b"\xff" * 8
     path.write_bytes(data)
 
 
@@ -65,8 +66,8 @@ def with_header(path, header):
     with zipfile.ZipFile(path) as archive:
         members = {name: archive.read(name) for name in archive.namelist()}
     text = header.encode().ljust(117) + b"\n"
-    first = next(iter(members))
-    members[first] = b"\x93NUMPY\x01\x00" + struct.pack("<H", len(text)) + text + members[first][128:]
+    member = next(iter(members))
+    members[member] = b"\x93NUMPY\x01\x00" + struct.pack("<H", len(text)) + text + members[member][128:]
     with zipfile.ZipFile(path, "w") as archive:
         for name, content in members.items():
             archive.writestr(name, content)
@@ -104,9 +105,9 @@ SPOIL = {
 def test_of_a_manifest(folder, kind):
     spoilt = folder / "can_2.npz"
     SPOIL[kind](spoilt)
-    one = list(readable_or_not("manifest", str(folder / "manifest.toml")))
-    (bad,) = (recording for recording in one if isinstance(recording, UnreadableRecording))
-    assert len(one) == 6
+    readings = list(readable_or_not("manifest", str(folder / "manifest.toml")))
+    (bad,) = (recording for recording in readings if isinstance(recording, UnreadableRecording))
+    assert len(readings) == 6
     assert "can_2.npz" in bad.line
     if kind == "disk":
         assert "disk" in bad.line
@@ -119,9 +120,9 @@ def test_of_a_manifest(folder, kind):
     assert [line for line in told["unreadable"] if "can_2.npz" in line] == told["unreadable"]
     assert len(told["unreadable"]) == 1
 
-    found = load_trials(f"manifest:{folder / 'manifest.toml'}")
-    assert len(found) == 5
-    assert any(re.search(r"1 of 6 recordings cannot be read.*can_2\.npz", note) for note in found.notes)
+    trials = load_trials(f"manifest:{folder / 'manifest.toml'}")
+    assert len(trials) == 5
+    assert any(re.search(r"1 of 6 recordings cannot be read.*can_2\.npz", note) for note in trials.notes)
 
 
 def test_an_absolute_path_and_one_outside_are_read_and_a_wrong_row_is_of_its_own(folder):
@@ -140,9 +141,18 @@ def test_an_absolute_path_and_one_outside_are_read_and_a_wrong_row_is_of_its_own
     (folder / "set" / "list.csv").write_text("file,label,first_row,last_row\n" + "\n".join(rows) + "\n")
     manifest = folder / "set" / "m.toml"
     manifest.write_text('list = "list.csv"\ntime = "t"\ngap = "gap [mm]"\nforce = "f"\n')
-    found = list(readable_or_not("manifest", str(manifest)))
-    assert [getattr(recording, "label", "") for recording in found] == ["a", "b", "c", "", "", "", "", "h"]
-    lines = [recording.line for recording in found if isinstance(recording, UnreadableRecording)]
+    recordings = list(readable_or_not("manifest", str(manifest)))
+    assert [getattr(recording, "label", "") for recording in recordings] == [
+        "a",
+        "b",
+        "c",
+        "",
+        "",
+        "",
+        "",
+        "h",
+    ]
+    lines = [recording.line for recording in recordings if isinstance(recording, UnreadableRecording)]
     for line, words in zip(
         lines, ("line 5: there is no file", "/dev/zero", "first_row", "first_row"), strict=True
     ):
@@ -203,7 +213,7 @@ CRAFTED = {
 }
 
 
-@pytest.mark.parametrize("kind", CRAFTED)
+@every_case("kind", CRAFTED)
 def test_impossible_contents_are_damage_of_this_recording(tmp_path, kind):
     path = tmp_path / "g.mcap"
     crafted(path, **CRAFTED[kind])
@@ -211,7 +221,7 @@ def test_impossible_contents_are_damage_of_this_recording(tmp_path, kind):
         read_recorded(path).record()
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("name", "array"),
     [
         ("gap_m", np.zeros((30, 2))),
@@ -259,13 +269,13 @@ def test_of_a_store(tmp_path):
     crafted(folder / "recordings" / "phase.mcap", ticks=[tick(phase=100)])
     (folder / "recordings" / names[3]).write_bytes((folder / "recordings" / "phase.mcap").read_bytes())
 
-    found = load_trials(f"store:{folder}")
-    assert len(found) == 3
-    assert any("3 trials left out as damaged" in note for note in found.notes)
+    trials = load_trials(f"store:{folder}")
+    assert len(trials) == 3
+    assert any("3 trials left out as damaged" in note for note in trials.notes)
 
-    found = load_trials(f"store:{folder}", options=["features.force=left"])
-    assert len(found) == 2
-    assert any("1 of 3 recordings cannot be read" in note and "phase" in note for note in found.notes)
+    trials = load_trials(f"store:{folder}", options=["features.force=left"])
+    assert len(trials) == 2
+    assert any("1 of 3 recordings cannot be read" in note and "phase" in note for note in trials.notes)
 
     problems = verify_store(folder).problems
     for number in (2, 3, 4, 6):
@@ -282,8 +292,8 @@ def test_of_icub(tmp_path):
     for k in range(1, 5):
         (tmp_path / f"can_{k}.txt").write_text("\n".join(["-10000", *frames * 5]) + "\n")
     (tmp_path / "can_2.txt").write_bytes(b"\xff\x00")
-    found = list(readable_or_not("icub", str(tmp_path)))
-    assert [isinstance(recording, UnreadableRecording) for recording in found] == [False, True, False, False]
+    grasps = list(readable_or_not("icub", str(tmp_path)))
+    assert [isinstance(recording, UnreadableRecording) for recording in grasps] == [False, True, False, False]
 
 
 def test_what_is_ours_passes_through_and_what_is_not_is_named():
@@ -340,8 +350,8 @@ def test_of_a_plugin(monkeypatch):
         raise ZeroDivisionError("no scale")
 
     dataset_of(fails_after_five, monkeypatch)
-    found = list(readable_or_not("lab", "place"))
-    assert [isinstance(recording, UnreadableRecording) for recording in found] == [
+    recordings = list(readable_or_not("lab", "place"))
+    assert [isinstance(recording, UnreadableRecording) for recording in recordings] == [
         False,
         False,
         True,
@@ -349,9 +359,11 @@ def test_of_a_plugin(monkeypatch):
         False,
         True,
     ]
-    assert "no frames" in found[2].line
-    assert "time" in found[3].line
-    assert re.search(r"behind recording 5.*lab-data/lab failed.*ZeroDivisionError: no scale", found[5].line)
+    assert "no frames" in recordings[2].line
+    assert "time" in recordings[3].line
+    assert re.search(
+        r"behind recording 5.*lab-data/lab failed.*ZeroDivisionError: no scale", recordings[5].line
+    )
 
     def fails_at_once(place):
         raise ZeroDivisionError("no scale")

@@ -63,7 +63,7 @@ def test_folders_are_where_the_variables_say_and_else_in_the_home(monkeypatch, t
     monkeypatch.setenv("XDG_DATA_HOME", "/d")
     monkeypatch.setenv("XDG_CACHE_HOME", "/e")
     assert (config_folder(), data_folder(), cache_folder()) == tuple(
-        Path(one) / "graspsense" for one in ("/c", "/d", "/e")
+        Path(home) / "graspsense" for home in ("/c", "/d", "/e")
     )
     # In a folder of somebody else's data, a relative one would name a part of that data.
     monkeypatch.setenv("XDG_CACHE_HOME", "e")
@@ -94,7 +94,7 @@ def test_commands_work_without_a_home_and_leave_nothing_behind(tmp_path):
 
 def test_disabling_without_a_home_says_what_to_set(site, tmp_path):
     site.install("lab-peak", "GRASPSENSE_API = (2, 0)\n")
-    path = os.pathsep.join(one for one in (str(site.folder), os.environ.get("PYTHONPATH", "")) if one)
+    path = os.pathsep.join(entry for entry in (str(site.folder), os.environ.get("PYTHONPATH", "")) if entry)
     said = graspsense(tmp_path, "plugins", "disable", "lab-peak", code=2, PYTHONPATH=path)
     assert "XDG_CONFIG_HOME" in said
     assert "internal error" not in said

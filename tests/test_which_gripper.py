@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import pytest
+from cases import every_case
 
 from graspsense import read_experiment
 from graspsense.core.grasp.runner import run_grasp
@@ -14,7 +14,7 @@ CASES = read_experiment("which_gripper").cases
 PAGE = (Path(__file__).parents[1] / "docs" / "which_gripper.md").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+@every_case("case", CASES)
 def test_each_gripper_grasps_the_things_of_the_experiment(case):
     settings = case.settings
     check(settings)

@@ -45,29 +45,29 @@ def test_a_reader_of_a_file_that_two_processes_write_always_sees_a_whole_one(tmp
     path = tmp_path / "model.json"
     write_whole(path, b"a" * BYTES)
     reads = torn = changes = 0
-    before = b""
-    with start_writer(path, "b") as one, start_writer(path, "c") as other:
+    shown = b""
+    with start_writer(path, "b") as writer, start_writer(path, "c") as other:
         try:
             while reads < READS or changes < 20:
                 data = path.read_bytes()
                 reads += 1
                 torn += len(data) < BYTES or len(set(data)) != 1
-                changes += data[:1] != before
-                before = data[:1]
-                assert one.poll() is other.poll() is None
+                changes += data[:1] != shown
+                shown = data[:1]
+                assert writer.poll() is other.poll() is None
         finally:
             (tmp_path / "stop").touch()
-    assert (one.returncode, other.returncode, torn) == (0, 0, 0)
+    assert (writer.returncode, other.returncode, torn) == (0, 0, 0)
     assert entries(tmp_path) == ["model.json", "stop"]
 
 
 def test_the_mode_is_that_of_a_new_file_less_the_mask_of_the_user(tmp_path):
     for mask, mode in ((0o022, 0o644), (0o002, 0o664), (0o077, 0o600)):
-        before = os.umask(mask)
+        old_mask = os.umask(mask)
         try:
             write_whole(tmp_path / f"{mask}", b"x")
         finally:
-            os.umask(before)
+            os.umask(old_mask)
         assert stat.S_IMODE((tmp_path / f"{mask}").stat().st_mode) == mode
 
 
@@ -278,13 +278,13 @@ def test_all_of_the_code_replaces_files_in_one_place():
     """A second place would be a second rule: only recordings, which have an owner each, are renamed elsewhere."""
     repository = Path(__file__).parent.parent
     sources = [*repository.glob("src/**/*.py"), *repository.glob("plugins/*/src/**/*.py")]
-    found = {
+    writers = {
         path.relative_to(repository).as_posix()
         for path in sources
         if any(word in path.read_text() for word in ("os.replace(", "os.rename(", ".savefig(path"))
     }
     assert len(sources) > 200
-    assert found == {"src/graspsense/core/files/whole_file.py", "src/graspsense/recording/writer.py"}
+    assert writers == {"src/graspsense/core/files/whole_file.py", "src/graspsense/recording/writer.py"}
 
 
 def test_a_link_in_place_of_the_lock_of_an_experiment_is_not_followed(tmp_path):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 
 import pytest
+from cases import every_case
 from parts import CHANNELS_OF_HAND, Hand, HandConfig, Law, LawConfig, channels
 
 from graspsense import load_pipeline
@@ -175,7 +176,7 @@ def test_every_misfit_is_told_at_once(misfit):
     ]
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("controller", "features", "says"),
     [
         ("still", "shaken", ""),  # features see the samples, whatever their number in a tick
@@ -243,7 +244,7 @@ FIRST = ("run.first_effort_n=30", "run.first_speed_m_s=0.03")
 ASKED = ("controller.probing_force_n=30", "controller.closing_speed_m_s=0.03")
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("options", "says"),
     [
         ((*FIRST, ASKED[1], "controller.probing_force_n=5"), ["force of 5 N", "25 N"]),

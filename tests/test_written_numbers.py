@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from cases import every_case
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -14,7 +15,7 @@ def numbers(*cells, **others):
     return columns_of_numbers({"x": cells, **others})["x"]
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("cells", "values"),
     [
         (["0", "1.5", "1.500"], [0, 1.5, 1.5]),
@@ -34,7 +35,7 @@ def test_a_column_has_one_notation(cells, values):
     assert numbers(*cells).tolist() == pytest.approx(values, nan_ok=True)
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("cells", "row"),
     [
         (["1.5", "0.25", "3,5"], 2),
@@ -49,9 +50,9 @@ def test_a_column_has_one_notation(cells, values):
     ],
 )
 def test_what_fits_no_common_notation_is_refused_with_its_row(cells, row):
-    found = numbers(*cells)
-    assert isinstance(found, NotNumbers)
-    assert (found.row, found.cell) == (row, cells[row])
+    column = numbers(*cells)
+    assert isinstance(column, NotNumbers)
+    assert (column.row, column.cell) == (row, cells[row])
 
 
 def test_the_other_columns_decide_what_a_column_alone_does_not():
@@ -69,17 +70,17 @@ def test_the_other_columns_decide_what_a_column_alone_does_not():
 @given(st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=1), st.sampled_from([".", ","]))
 def test_what_a_program_writes_is_read_to_the_bit(values, sign):
     cells = [repr(value).replace(".", sign) for value in values]
-    found = numbers(*cells, other=[f"0{sign}5"] * len(cells))
-    assert found.tolist() == values
+    column = numbers(*cells, other=[f"0{sign}5"] * len(cells))
+    assert column.tolist() == values
 
 
 @given(st.lists(st.integers(-(10**9), 10**9), min_size=1))
 def test_thousands_are_never_read_as_ones(values):
-    found = numbers(*(f"{value:,}" for value in values))
-    if isinstance(found, NotNumbers):  # only where no cell tells, as in a single 1,234
-        assert "which can be" in found.why
+    column = numbers(*(f"{value:,}" for value in values))
+    if isinstance(column, NotNumbers):  # only where no cell tells, as in a single 1,234
+        assert "which can be" in column.why
     else:
-        assert np.array_equal(found, values)
+        assert np.array_equal(column, values)
 
 
 def test_a_number_on_its_own():

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from attrs import evolve, fields
+from cases import every_case
 from commands import graspsense
 from hypothesis import given
 from hypothesis import strategies as st
@@ -47,7 +48,7 @@ def run(monkeypatch, tmp_path):
     return graspsense
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("typed", "meant"),
     [
         ("run -o probing_force_n=17", "'controller.probing_force_n'"),
@@ -95,8 +96,8 @@ def test_the_right_words_are_told(run, typed, meant):
 
 
 @given(st.text("abcdef_.", min_size=1, max_size=30), st.lists(st.text("abcdef_.", min_size=1), min_size=1))
-def test_the_nearest_path_is_one_that_there_is_and_a_known_path_is_its_own(found, known):
-    assert nearest_path(found, known) in ("", *known)
+def test_the_nearest_path_is_one_that_there_is_and_a_known_path_is_its_own(nearest, known):
+    assert nearest_path(nearest, known) in ("", *known)
     assert nearest_path(known[0], known).rpartition(".")[2] == known[0].rpartition(".")[2]
 
 
@@ -176,7 +177,7 @@ def test_an_error_in_python_names_arguments_and_not_options_of_commands(tmp_path
     assert "--" not in str(refused.value)
 
 
-@pytest.mark.parametrize(
+@every_case(
     "options",
     [
         ["nonsense"],
@@ -211,16 +212,16 @@ def some_trials(values):
 
 
 def test_the_classifier_of_an_evaluation_is_named_once():
-    found = evaluate("c45", some_trials([1.0, 2.0] * 6), folds=2, permutations=1)
-    assert found.classifier.startswith("graspsense-c45/c45 ")
-    assert found.headline.rate == 1.0
+    evaluation = evaluate("c45", some_trials([1.0, 2.0] * 6), folds=2, permutations=1)
+    assert evaluation.classifier.startswith("graspsense-c45/c45 ")
+    assert evaluation.headline.rate == 1.0
 
 
 def test_a_note_on_one_thing_is_in_the_singular():
-    one = evolve(some_trials([1.0, 2.0, 3.0, 4.0]), instances=("a#1",) * 4)
+    trials = evolve(some_trials([1.0, 2.0, 3.0, 4.0]), instances=("a#1",) * 4)
     assert counted(1, "trial is", "trials are") == "1 trial is"
     assert counted(0, "trial") == "0 trials"
-    notes = evaluate("c45", one, folds=2, permutations=1).notes
+    notes = evaluate("c45", trials, folds=2, permutations=1).notes
     assert any("1 instance:" in note for note in notes)
     doubled = some_trials([1.25, 2.5, 3.125, 4.75, 1.25])
     doubled = evolve(doubled, labels=(*doubled.labels[:4], "b"), content=("p", "q", "r", "s", "p"))
@@ -236,13 +237,13 @@ def test_trials_without_any_feature_have_no_rate():
 
 def test_a_long_compilation_is_told_and_a_short_one_is_not():
     told = []
-    before = compile_notice._said
+    said = compile_notice._said
     compile_notice.tell_compiling(told.append)
     try:
         compile_notice.compiling_begins("stored_grasp", 60_000)
         compile_notice.compiling_begins("seed_state", 1_000)
     finally:
-        compile_notice.tell_compiling(before)
+        compile_notice.tell_compiling(said)
     (line,) = told
     assert "compiling stored grasp" in line
     assert "60 s" in line

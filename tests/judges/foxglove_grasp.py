@@ -101,13 +101,13 @@ def main(ticks: int, rate_hz: float, *viewer: str) -> int:
         error = feed.close()
         decoded = json.loads(watching.stdout.read().splitlines()[-1])
     wanted = {name: sent.values() for name, sent in expected(ticks).items()}
-    found = {name: {key: values[key] for key in ("count", "digest")} for name, values in decoded.items()}
-    counts = {name: values["count"] for name, values in found.items()}
+    digests = {name: {key: values[key] for key in ("count", "digest")} for name, values in decoded.items()}
+    counts = {name: values["count"] for name, values in digests.items()}
     say(f"decoded {counts} in {seconds:.0f} s; not handed over: {feed.dropped}")
-    if error or found != wanted:
+    if error or digests != wanted:
         sent = {name: values["count"] for name, values in wanted.items()}
         say(f"sent {sent}. {error}")
-    return int(bool(error) or found != wanted)
+    return int(bool(error) or digests != wanted)
 
 
 if __name__ == "__main__":

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cases import every_case
 
 from graspsense_c45 import ArffError, fit, parse_arff, read_arff
 
@@ -43,7 +44,7 @@ def test_rows_without_a_class_are_not_learned_from_but_seen() -> None:
     assert tree.weighted_n_node_samples[0] == 4.0
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("text", "words"),
     [
         ("hello\n", "<text>:1: found 'hello'"),

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from attrs import fields
+from cases import every_case
 from sklearn.datasets import load_iris
 from sklearn.model_selection import GridSearchCV, cross_val_predict
 from sklearn.pipeline import make_pipeline
@@ -67,10 +68,8 @@ def test_iris_in_pipeline_search_and_cross_validation() -> None:
     assert search.best_estimator_.tree_.n_leaves >= 3
 
 
-@pytest.mark.parametrize(
-    "names",
-    [["no", "yes"], [10, 20], [True, False], np.array(["b", "a"], dtype=object), [-1.0, 1.0]],
-    ids=["strings", "integers", "booleans", "objects", "floats"],
+@every_case(
+    "names", [["no", "yes"], [10, 20], [True, False], np.array(["b", "a"], dtype=object), [-1.0, 1.0]]
 )
 def test_labels_come_back_as_they_were(names: Any) -> None:
     y = np.array([names[0], names[1]] * 4, dtype=object if isinstance(names, np.ndarray) else None)

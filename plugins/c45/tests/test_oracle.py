@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from cases import every_case
 
 from graspsense_c45 import (
     Attribute,
@@ -152,7 +153,7 @@ def test_trees_and_answers(name: str) -> None:
         assert tree.n_leaves == question.answer(variant, "leaves")
 
 
-@pytest.mark.parametrize("name", SETS)
+@every_case("name", SETS)
 def test_text_is_j48s(name: str) -> None:
     question = asked(name)
     dumps = [(variant, question.answer(variant, "text")) for variant in VARIANTS]
@@ -164,7 +165,7 @@ def test_text_is_j48s(name: str) -> None:
             assert to_text(fitted(name, variant)) == body, variant
 
 
-@pytest.mark.parametrize("name", SETS)
+@every_case("name", SETS)
 def test_held_out_rows_are_j48s(name: str) -> None:
     question = asked(name)
     assert sorted(hold_out(question.table.labels, 3).tolist()) == sorted(question.oracle["rep_holdout_N3"])
@@ -194,7 +195,7 @@ def check_cross_validation(name: str, variants: list[str]) -> int:
     return compared
 
 
-@pytest.mark.parametrize("name", WITH_CV)
+@every_case("name", WITH_CV)
 def test_folds_are_wekas(name: str) -> None:
     question = asked(name)
     folds = stratified_folds(question.table.labels)
@@ -203,7 +204,7 @@ def test_folds_are_wekas(name: str) -> None:
         assert [fold.train.tolist() for fold in folds] == question.oracle["folds"]["train_order"]
 
 
-@pytest.mark.parametrize("name", ["arff_contact-lenses", "grasp_4c_40", "sk_iris", "ulps", "xor"])
+@every_case("name", ["arff_contact-lenses", "grasp_4c_40", "sk_iris", "ulps", "xor"])
 def test_cross_validation_on_small_sets(name: str) -> None:
     assert check_cross_validation(name, ["default", "rep"]) >= 1
 

@@ -9,6 +9,7 @@ import re
 import matplotlib as mpl
 import numpy as np
 import pytest
+from cases import every_case
 
 from graspsense_c45 import (
     Attribute,
@@ -129,7 +130,7 @@ def test_json_is_exact_and_says_its_version() -> None:
     assert from_json(to_json(tree)).to_dict() == tree.to_dict()
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("change", "words"),
     [
         ({"format": "x"}, "'format' must be"),
@@ -145,7 +146,7 @@ def test_damaged_json_is_refused(change: dict[str, object], words: str) -> None:
         from_json(json.dumps(to_document(grasp_tree()) | change))
 
 
-@pytest.mark.parametrize("key", ["feature", "n_children", "category", "threshold", "class_weights"])
+@every_case("key", ["feature", "n_children", "category", "threshold", "class_weights"])
 def test_damaged_nodes_are_refused(key: str) -> None:
     # Another number is a threshold too.
     for wrong in ("x", None) if key == "threshold" else (99, "x", -5, None):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
+from cases import every_case
 
 from graspsense.plugin_api import FeatureTable
 from graspsense_c45 import Attribute, Schema, fit, make_table
@@ -21,7 +21,7 @@ def lengths():
     return [*rng.normal(6.0, 0.5, 30), *rng.normal(9.0, 1.0, 30)], ["stiff"] * 30 + ["soft"] * 30
 
 
-@pytest.mark.parametrize("exponent", [-80, -30, -14, -3])
+@every_case("exponent", [-80, -30, -14, -3])
 def test_the_tree_is_the_same_in_every_unit(exponent):
     values, labels = lengths()
     small = fitted(np.ldexp(values, exponent), labels)

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cases import every_case
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -262,7 +263,7 @@ def test_held_out_rows_need_reduced_error_pruning() -> None:
         fit(table([[0.0], [1.0]], [0, 1]), Options(pruning="reduced_error"))
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("option", "value"),
     [
         ("criterion", "gini"),
@@ -289,8 +290,8 @@ def test_a_deep_tree_is_no_trouble() -> None:
 
 
 @pytest.mark.filterwarnings("error::RuntimeWarning")
-@pytest.mark.parametrize("factor", [5e-324, 1e-300, 1e-12, 1e-10, 1e-9, 1e-6, 1e-3, 1.0, 1e9, 1e140])
-@pytest.mark.parametrize("missing", [False, True])
+@every_case("factor", [5e-324, 1e-300, 1e-12, 1e-10, 1e-9, 1e-6, 1e-3, 1.0, 1e9, 1e140])
+@every_case("missing", [False, True])
 def test_weights_of_any_size_give_a_tree(factor: float, missing: bool) -> None:
     values = [[float(i)] for i in range(12)]
     if missing:

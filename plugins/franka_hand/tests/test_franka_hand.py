@@ -8,6 +8,7 @@ from contextlib import suppress
 import numpy as np
 import pytest
 from attrs import evolve
+from cases import every_case
 from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
@@ -186,8 +187,8 @@ def test_who_is_released_is_not_pressed():
     assert not hand.pressing
 
 
-@pytest.mark.parametrize("mood", ["silent", "damaged"])
-@pytest.mark.parametrize("at_s", [0.5, 2.0, 3.0, 4.0])
+@every_case("mood", ["silent", "damaged"])
+@every_case("at_s", [0.5, 2.0, 3.0, 4.0])
 def test_a_hand_lost_in_a_grasp_ends_it(mood, at_s):
     options = [*EMULATED, f"gripper.faults.mood={mood}", f"gripper.faults.mood_at_s={at_s}"]
     trial = load_pipeline("franka", options=options).grasp()

@@ -7,6 +7,7 @@ import tomllib
 import numpy as np
 import pytest
 from attrs import evolve
+from cases import every_case
 from squeezes import DEPTH_M, WIDTH_M, recorded
 
 from graspsense.core.components.identification import RecordedSqueeze
@@ -124,7 +125,7 @@ def test_a_recording_without_contact_is_refused():
         prepared(recorded(lambda closure: 0.0 * closure), 0.0)
 
 
-@pytest.mark.parametrize("seed", range(5))
+@every_case("seed", range(5))
 def test_the_noise_of_pads_that_touch_nothing_is_no_squeeze(seed):
     noisy = recorded(lambda closure: 0.01 * np.random.default_rng(seed).standard_normal(len(closure)))
     with pytest.raises(ConfigError, match="nothing was touched"):
@@ -308,8 +309,8 @@ def fitted_snap(squeeze):
     return fit(model, with_corners(model, snap, [squeeze]), [squeeze])
 
 
-@pytest.mark.parametrize("k2", [1200.0, 2500.0])
-@pytest.mark.parametrize(("critical_m", "period_s"), [(0.0008, 0.041), (0.001, 0.02), (0.001, 0.041)])
+@every_case("k2", [1200.0, 2500.0])
+@every_case(("critical_m", "period_s"), [(0.0008, 0.041), (0.001, 0.02), (0.001, 0.041)])
 def test_a_snap_through_early_in_a_squeeze_is_fitted_though_few_images_show_it(critical_m, period_s, k2):
     squeeze = prepared(recorded(shell(3000.0, critical_m, 1.5, 0.0008, k2), period_s=period_s), 0.0)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from attrs import evolve
+from cases import every_case
 from identify import SCENES, drawn_are_covered, scene_text, seeds_of, squeezes_of
 from identify_intervals import coverage, larger
 
@@ -94,8 +95,8 @@ def test_the_benchmark_knows_the_friction_that_a_squeeze_has_drawn():
         assert drawn_are_covered(row) is within
 
 
-@pytest.mark.parametrize("squeezes", [2, 3, 10])
-@pytest.mark.parametrize("ratio", [1.0, 3.0, 100.0])
+@every_case("squeezes", [2, 3, 10])
+@every_case("ratio", [1.0, 3.0, 100.0])
 def test_an_interval_covers_at_least_what_it_says_however_much_objects_differ(squeezes, ratio):
     assert 0.899 < coverage(larger, squeezes, ratio) < 0.98
 

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from attrs import evolve
+from cases import every_case
 from identify import delayed
 from squeezes import recorded
 
@@ -77,7 +78,7 @@ def test_a_known_delay_comes_back_and_does_not_bias_relaxation(gripper, late_s):
         assert used_s == settings_s
 
 
-@pytest.mark.parametrize("shown_s", [-0.0011, 0.0, 0.0102, 0.03])
+@every_case("shown_s", [-0.0011, 0.0, 0.0102, 0.03])
 def test_the_delay_that_is_reported_is_the_one_that_is_used(shown_s):
     delay = Delay(settings_s=0.0, used_s=0.01, shown_s=shown_s, low_s=shown_s - 1e-3, high_s=shown_s + 1e-3)
     (parameter,) = delay.parameters
@@ -100,7 +101,7 @@ class FoundWithAll(NamedTuple):
         return Lag(lag_s=self.lag_s, error_s=1e-3)
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("found_s", "shown", "used_s"),
     [
         (0.0, lambda used_s: 0.0004, 0.0),

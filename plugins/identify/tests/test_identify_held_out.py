@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from attrs import evolve
+from cases import every_case
 from squeezes import recorded
 from test_identify import scale_of, shell
 
@@ -62,7 +63,7 @@ def fitted_squeeze(force_n, error):
     )
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("forces_n", "held_out", "refused"),
     [
         ((8.0, 8.0), (0.05, 0.3), False),  # one confirms it

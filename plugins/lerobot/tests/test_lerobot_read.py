@@ -9,6 +9,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from cases import every_case
 from click.testing import CliRunner
 from commands import printed
 from lerobot_sets import CELLS, FPS, NAMES, episode, write_lines, write_set
@@ -208,7 +209,7 @@ STYLES = {
 }
 
 
-@pytest.mark.parametrize("style", STYLES)
+@every_case("style", STYLES)
 def test_cells_are_known_in_other_styles_of_names(style):
     names = [STYLES[style](finger, cell, axis) for finger in range(2) for cell in range(4) for axis in "xyz"]
     arrays = meaning_of(["gripper.pos", *names]).arrays
@@ -338,7 +339,7 @@ def _info(**changed):
 DATA, META = "data/chunk-000/file-000.parquet", "meta/info.json"
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("damage", "kind", "word"),
     [
         (_remove(META), ConfigError, "info.json"),
@@ -400,9 +401,7 @@ def test_more_numbers_than_the_memory_should_hold_are_not_read(tmp_path):
         _refusal(folder)
 
 
-@pytest.mark.parametrize(
-    "query", ["fps=0", "fps=x", "speed=3", "repeated=often", "gap=none", "gap_m_per_unit=nan"]
-)
+@every_case("query", ["fps=0", "fps=x", "speed=3", "repeated=often", "gap=none", "gap_m_per_unit=nan"])
 def test_a_wrong_option_is_wrong_use(tmp_path, query):
     folder = write_set(tmp_path / "set", 3)
     with pytest.raises(GraspsenseError) as caught:
@@ -415,8 +414,8 @@ def test_a_folder_that_is_none(tmp_path):
         list(recordings(str(tmp_path / "nothing")))
 
 
-@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1e30])
-@pytest.mark.parametrize("name", NAMES[1:4])
+@every_case("value", [np.nan, np.inf, -np.inf, 1e30])
+@every_case("name", NAMES[1:4])
 def test_a_column_of_impossible_numbers_is_told_without_a_warning_of_numpy(tmp_path, value, name):
     state = episode()
     state[:, NAMES.index(name)] = value
@@ -429,7 +428,7 @@ def test_a_column_of_impossible_numbers_is_told_without_a_warning_of_numpy(tmp_p
     assert all(isinstance(recording, LabelledRecording | UnreadableRecording) for recording in records)
 
 
-@pytest.mark.parametrize("seed", range(12))
+@every_case("seed", range(12))
 def test_damaged_bytes_are_an_error_of_ours(tmp_path, seed):
     folder = write_set(tmp_path / "set", 3, [episode()])
     random = np.random.default_rng(seed)

@@ -7,6 +7,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 from attrs import evolve, fields
+from cases import every_case
 
 from graspsense.core.grasp.runner import run_grasp
 from graspsense.gripper_api import Outcome
@@ -50,7 +51,7 @@ def told(done):
     return [column.tobytes() for column in trace], words, done.seconds_simulated
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("controller", "run", "settings"),
     [
         (FAST, RUN, {"object": "block"}),
@@ -60,7 +61,6 @@ def told(done):
         (FAST, evolve(RUN, grasp_timeout_s=0.2, opening_timeout_s=0.1), {"object": "block"}),
         (FAST, RUN, {"object": "none", "rate_hz": 250.0}),
     ],
-    ids=["rigid", "exact sensors", "shell breaks", "efforts", "overdue", "nothing there"],
 )
 def test_the_runner_and_compiled_ticks_give_one_grasp(controller, run, settings):
     plain, none = grasp(controller, run, grasps=1, **settings)

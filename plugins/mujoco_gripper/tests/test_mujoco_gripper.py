@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 
 import pytest
+from cases import every_case
 from commands import graspsense, printed
 
 from graspsense import ConfigError, load_pipeline
@@ -156,7 +157,7 @@ def test_a_touch_sensor_measures_the_force_of_the_contacts(tmp_path):
     assert trial.features["f_steady"] == pytest.approx(20.0, abs=0.2)
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("changed", "said"),
     [
         ({"actuators": '["nosuch"]'}, ("actuator", "nosuch", "close")),
@@ -201,7 +202,7 @@ def test_a_model_includes_nothing_outside_of_its_folder(tmp_path):
         create("sensor-backend", "mujoco", file=str(gripper_file(inside, inside / "m.xml"))).open(0)
 
 
-@pytest.mark.parametrize("place", ["gripper file", "model", "include", "mesh", "picture", "scene", "thing"])
+@every_case("place", ["gripper file", "model", "include", "mesh", "picture", "scene", "thing"])
 def test_a_pipe_in_the_place_of_a_file_is_refused(tmp_path, place):
     """Whoever opens a pipe without a writer waits for ever; MuJoCo opens meshes and pictures itself."""
     endings = {"gripper file": ".toml", "scene": ".toml", "mesh": ".obj", "picture": ".png"}

@@ -6,6 +6,7 @@ from importlib.resources import files
 
 import mujoco
 import pytest
+from cases import every_case
 
 from graspsense import ConfigError, load_pipeline
 from graspsense.plugin_api import create
@@ -85,7 +86,7 @@ def test_a_sponge_yields_more_than_a_block_and_is_lifted(tmp_path):
     assert trial.report["highest_m"] > 0.03
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("lines", "said"),
     [
         (("table = true",), ("thing",)),

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from cases import every_case
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -120,7 +121,7 @@ def test_a_scene_that_cannot_be_says_why(thing, scene, said):
         read_scene(thing, scene)
 
 
-@pytest.mark.parametrize(
+@every_case(
     "wrong",
     [
         {"amplitude_m": 0.0},

@@ -5,6 +5,7 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 import pytest
+from cases import every_case
 
 from graspsense import ConfigError, load_pipeline
 from graspsense.plugin_api import POSITION, Command, create
@@ -120,7 +121,7 @@ def test_roughness_disturbs_cells_that_slide_and_no_others(tmp_path):
     assert np.std(sliding) > 5.0 * np.std(still)
 
 
-@pytest.mark.parametrize("name", ["tugged", "filled", "placed", "shaken"])
+@every_case("name", ["tugged", "filled", "placed", "shaken"])
 def test_the_scenes_of_the_package_are_read(name):
     assert isinstance(read_scene(name).spec, mujoco.MjSpec)
 
@@ -140,7 +141,7 @@ def test_a_scene_that_cannot_be_says_why(tmp_path, lines, said):
         read_scene(str(path))
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("wrong", "said"),
     [
         (lambda: Finger(geoms=("a",), cells=("a", "b"), rows=1, columns=1), "cells"),
@@ -197,7 +198,7 @@ def test_a_finger_without_an_edge_sensor_is_not_bumped_into(tmp_path):
         create("sensor-backend", "mujoco", object=str(path)).open(0)
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("line", "said"),
     [
         ("speed_m_s = 0.0", "speed_m_s"),

@@ -36,6 +36,8 @@ from graspsense_paper.verdict import within
 
 pytest.importorskip("graspsense_sim_gripper", reason="the paper is done again in simulation")
 pytest.importorskip("graspsense_c45", reason="the paper's classifier")
+from cases import every_case
+
 from graspsense_sim_gripper.run.batch import run_many
 
 
@@ -50,7 +52,7 @@ def test_printed_matrices_have_the_truth_where_it_is_said_to_be():
     assert (paper.matrix("table_5").confusion.correct, paper.matrix("table_6").confusion.correct) == (89, 207)
 
 
-@pytest.mark.parametrize("rate", published().rates, ids=lambda rate: rate.id)
+@every_case("rate", published().rates)
 def test_a_printed_rate_is_its_counts_or_a_note_says_what_is_wrong(rate):
     if rate.correct is None or abs(rate.correct / rate.n - rate.printed) > 0.001:
         assert rate.note
@@ -87,7 +89,7 @@ def test_the_number_of_fitted_parameters_is_that_of_the_catalogue():
     assert fresh.count('origin = "fitted to') == published().fitted.count
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("experiment", "about", "expected"),
     [
         ("table_4", "table_4_17", "predicted"),
@@ -269,7 +271,7 @@ def eggs(broken, n):
     )
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("broken", "n", "verdict"),
     [(0, 4, "cannot be told"), (0, 40, "agrees"), (2, 4, "differs"), (4, 40, "cannot be told")],
 )
@@ -278,7 +280,7 @@ def test_four_unbroken_eggs_are_too_few_to_tell(broken, n, verdict):
     assert (claim.id, claim.verdict, claim.n) == ("egg", verdict, f"{n} grasps")
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("verdicts", "verdict"),
     [
         (("agrees", "agrees"), "agrees"),

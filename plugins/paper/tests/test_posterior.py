@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from attrs import NOTHING, fields
+from cases import every_case
 from scipy.stats import norm
 
 from graspsense.core.values.trace import Trace
@@ -67,7 +68,7 @@ def test_the_page_says_no_more_than_its_particles_and_the_printed_counts_allow()
     assert posterior_page._factor(factor, particles) == "too few particles (1)"
 
 
-@pytest.mark.parametrize("name", paper_model.EXPLANATIONS)
+@every_case("name", paper_model.EXPLANATIONS)
 def test_an_explanation_below_the_middle_is_absent_and_at_one_has_its_full_strength(name):
     explanation = paper_model.EXPLANATIONS[name]
     assert paper_model.strength(name, {name: 0.49}) == explanation.absent

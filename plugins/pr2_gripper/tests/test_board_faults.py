@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+from cases import every_case
 
 from graspsense import load_pipeline
 from graspsense.plugin_api import EFFORT, Command, ConfigError
@@ -60,8 +61,8 @@ def healthy_and_faulty(board: Any, **faults: Any) -> tuple[list[InputReport], li
     return reports(board()), reports(board(faults=FaultConfig(**faults)))
 
 
-@pytest.mark.parametrize("side", SIDES)
-@pytest.mark.parametrize("kind", ["stuck", "numb", "zero"])
+@every_case("side", SIDES)
+@every_case("kind", ["stuck", "numb", "zero"])
 def test_cells_of_a_fingertip_go_wrong_from_a_time_on(board: Any, kind: Any, side: Any) -> None:
     healthy, faulty = healthy_and_faulty(board, pad_fault=kind, pad_side=side, pad_at_s=AT_S)
     good, bad = by_cell(healthy), by_cell(faulty)
@@ -122,7 +123,7 @@ def test_status_bits_are_set_from_a_time_on(board: Any) -> None:
     assert {report.status for report in faulty[200:]} == {0x8005}
 
 
-@pytest.mark.parametrize("gain", [5.0, 0.5, 0.0, -1.0])
+@every_case("gain", [5.0, 0.5, 0.0, -1.0])
 def test_motor_applies_a_multiple_of_the_command_and_the_board_reports_what_it_applies(
     board: Any, gain: float
 ) -> None:
@@ -152,7 +153,7 @@ def test_clock_of_the_device_runs_at_another_rate(board: Any, rate: float) -> No
     assert [report.sequence for report in faulty] == list(range(600))
 
 
-@pytest.mark.parametrize("number", IDENTITY_NUMBERS)
+@every_case("number", IDENTITY_NUMBERS)
 def test_feature_report_has_the_numbers_that_are_set(number: str) -> None:
     body = {"accelerometer_g": 4}.get(number, 77)
     config = Pr2Config(transport="emulated", faults=FaultConfig(identity={number: body}))
@@ -164,7 +165,7 @@ def test_feature_report_can_be_cut_short(board: Any) -> None:
     assert board(faults=FaultConfig(feature_bytes=0)).feature() == b""
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("key", "needed"),
     [
         ("pad_side='left'", "pad_fault"),

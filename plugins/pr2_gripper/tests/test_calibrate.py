@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from cases import every_case
 from commands import graspsense, printed
 
 from graspsense.core.grasp.calibration import load_of, load_table
@@ -153,15 +154,13 @@ def test_load_table_rises_and_goes_on_beyond_its_end() -> None:
     assert values == sorted(values)
 
 
-@pytest.mark.parametrize(
-    "readings", [[], [(1.0, 1.0)], [(1.0, 1.0), (float("nan"), 2.0)], [(-1.0, 1.0), (2.0, 2.0)]]
-)
+@every_case("readings", [[], [(1.0, 1.0)], [(1.0, 1.0), (float("nan"), 2.0)], [(-1.0, 1.0), (2.0, 2.0)]])
 def test_table_that_means_nothing_is_refused(readings: list[tuple[float, float]]) -> None:
     with pytest.raises(ConfigError):
         load_table(readings)
 
 
-@pytest.mark.parametrize("text", ["", "[]", "{}", '{"format": "graspsense-calibration", "version": 2}', "\0"])
+@every_case("text", ["", "[]", "{}", '{"format": "graspsense-calibration", "version": 2}', "\0"])
 def test_what_is_no_calibration_is_damaged(text: str, tmp_path: Path) -> None:
     path = tmp_path / "tare.json"
     path.write_text(text)

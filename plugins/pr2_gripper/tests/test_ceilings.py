@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from cases import every_case
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -47,7 +48,7 @@ IMPLAUSIBLE = [
 ]
 
 
-@pytest.mark.parametrize(("number", "value"), IMPLAUSIBLE)
+@every_case(("number", "value"), IMPLAUSIBLE)
 def test_number_that_no_pr2_gripper_has_is_refused_with_what_is_allowed(number: str, value: int) -> None:
     with pytest.raises(NoDevice) as refused:
         emulated(identity={number: value}).open(0)
@@ -62,8 +63,8 @@ def test_all_numbers_that_are_wrong_are_named_at_once() -> None:
         emulated(identity={"watchdog_ms": 65535, "effort_limit_un": 2_147_000_000}).open(0)
 
 
-@pytest.mark.parametrize("end", ["least", "most"])
-@pytest.mark.parametrize("number", [ceiling.number for ceiling in RANGES])
+@every_case("end", ["least", "most"])
+@every_case("number", [ceiling.number for ceiling in RANGES])
 def test_both_ends_of_a_range_are_allowed(number: str, end: str) -> None:
     (allowed,) = [ceiling for ceiling in RANGES if ceiling.number == number]
     backend = emulated(identity={number: round(getattr(allowed, end))})
@@ -96,8 +97,8 @@ def test_feature_report_that_is_none_is_no_gripper(
     assert machine.open_handles == []
 
 
-@pytest.mark.parametrize("pace", ["lock-step", "device"])
-@pytest.mark.parametrize("count", [0, 1, 63])
+@every_case("pace", ["lock-step", "device"])
+@every_case("count", [0, 1, 63])
 def test_emulated_feature_report_that_is_cut_short_is_no_gripper(pace: Any, count: int) -> None:
     backend = Pr2Backend(Pr2Config(transport="emulated", pace=pace, faults=FaultConfig(feature_bytes=count)))
     with pytest.raises(NoDevice, match=f"64 bytes, this one {count}"):

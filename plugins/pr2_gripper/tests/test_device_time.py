@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 from attrs import evolve
+from cases import every_case
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -81,7 +82,7 @@ def take_all(link: Link, times_us: list[int]) -> None:
         times_us.append(arrival.report.time_us)
 
 
-@pytest.mark.parametrize(("rate", "at_s"), [(0.0, 0.1), (0.0, 1.4), (0.5, 1.0), (3.0, 1.6)])
+@every_case(("rate", "at_s"), [(0.0, 0.1), (0.0, 1.4), (0.5, 1.0), (3.0, 1.6)])
 def test_grasp_ends_soon_after_the_clock_of_the_board_goes_wrong(rate: float, at_s: float) -> None:
     """In lock-step: 50 ms where it stands still, 0.2 s where it loses half.
 
@@ -113,8 +114,8 @@ def test_frozen_clock_of_a_board_in_real_time_is_a_lost_device() -> None:
         backend.close()
 
 
-@pytest.mark.parametrize("kind", [Fast, Fed])
-@pytest.mark.parametrize("jump_us", [-300_000, -1])
+@every_case("kind", [Fast, Fed])
+@every_case("jump_us", [-300_000, -1])
 def test_time_that_goes_back_is_not_handed_on_and_is_told_if_it_stays_behind(kind: Any, jump_us: int) -> None:
     """A single early report is left out; after a jump back of 0.3 s, fifty are."""
     times = [10_000_000 + 1000 * i for i in range(100)]

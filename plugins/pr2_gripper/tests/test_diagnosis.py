@@ -11,6 +11,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from cases import every_case
 from commands import graspsense
 
 import graspsense_pr2_gripper.plugin
@@ -217,7 +218,7 @@ def test_calibrations_are_told_with_their_age(
     assert said["calibration friction"]["advice"] == "graspsense calibrate friction --gripper pr2"
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("platform", "container", "says"),
     [
         ("darwin", "", "uhid is of the Linux kernel, and this is macOS"),

@@ -1,6 +1,7 @@
 """The closed form of the PR2's linkage, against its published table and its own inverse."""
 
 import pytest
+from cases import every_case
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -18,7 +19,7 @@ TABLE = [
 ]
 
 
-@pytest.mark.parametrize(("gap_mm", "revolutions", "rate", "tick_um"), TABLE)
+@every_case(("gap_mm", "revolutions", "rate", "tick_um"), TABLE)
 def test_the_delivered_gripper_matches_its_table(gap_mm, revolutions, rate, tick_um):
     link = LINKAGES["pr2"]
     turns = revolutions_at(link, gap_mm / 1e3)
@@ -29,7 +30,7 @@ def test_the_delivered_gripper_matches_its_table(gap_mm, revolutions, rate, tick
     assert slope * 1e6 / ENCODER_TICKS == pytest.approx(tick_um, abs=6e-4)
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("name", "gap_mm", "rate"),
     [("pr2_2009", 0, 0.263), ("pr2_2009", 50, 0.241), ("pr2_paper", 0, 0.425), ("pr2_paper", 50, 0.390)],
 )

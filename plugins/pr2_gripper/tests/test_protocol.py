@@ -11,6 +11,7 @@ from typing import Any
 from zlib import crc32
 
 import pytest
+from cases import every_case
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -206,7 +207,7 @@ def test_an_image_goes_out_well_within_its_41_ms() -> None:
     assert protocol.SLICES <= 41 // 3, "so that each slice goes out three times"
 
 
-@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, 3000.0])
+@every_case("value", [math.nan, math.inf, -math.inf, 3000.0])
 def test_what_no_report_can_hold_is_refused_before_it_is_sent(value: float) -> None:
     with pytest.raises(ProtocolError):
         micro(value)
@@ -225,7 +226,7 @@ def test_accelerometer_words_hold_three_signed_axes() -> None:
     assert axes(511 | (1024 - 512) << 10 | (1024 - 1) << 20) == (511, -512, -1)
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("changes", "what"),
     [
         ({"serial": ""}, "serial"),

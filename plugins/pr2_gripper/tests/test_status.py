@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from cases import every_case
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -108,14 +109,12 @@ def test_no_frame_has_a_bit_that_is_not_declared(reported: InputReport, image: R
     )
 
 
-@pytest.mark.parametrize(
-    ("result", "bit"), [(0, 0), (1, 0), (CLAMPED, COMMAND_CLAMPED), (REFUSED, COMMAND_REFUSED)]
-)
+@every_case(("result", "bit"), [(0, 0), (1, 0), (CLAMPED, COMMAND_CLAMPED), (REFUSED, COMMAND_REFUSED)])
 def test_result_of_a_command_is_in_the_frame(result: int, bit: int) -> None:
     assert measure(IDENTITY).reading(report(command_result=result), None).frame.status == bit
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("rate_hz", "age_us", "old"),
     [(1000, 61_000, False), (1000, 62_000, True), (1000, 0xFFFF, True), (100, 0xFFFF, False)],
 )
@@ -171,8 +170,8 @@ def test_gap_that_jumps_is_implausible_in_that_frame(step_m: float, time_us: int
     assert statuses == [0, ENCODER_WRONG if wrong else 0, 0]
 
 
-@pytest.mark.parametrize("swap", [False, True])
-@pytest.mark.parametrize("bit", [LEFT_ABSENT, RIGHT_ABSENT])
+@every_case("swap", [False, True])
+@every_case("bit", [LEFT_ABSENT, RIGHT_ABSENT])
 def test_words_name_the_pad_that_has_no_force(bit: int, swap: bool) -> None:
     (declared,) = [status for status in status_bits(swap) if status.mask == bit]
     frame = measure(IDENTITY, swap).reading(report(status=bit), dead()).frame

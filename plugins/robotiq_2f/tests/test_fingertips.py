@@ -11,6 +11,7 @@ from itertools import pairwise
 from types import SimpleNamespace
 
 import pytest
+from cases import every_case
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -298,7 +299,7 @@ def test_a_gripper_and_two_boards_are_three_ports_and_a_trial_tells_how_far_thei
     assert {"tactile_left_drift", "tactile_right_drift"} <= set(trial.report)
 
 
-@pytest.mark.parametrize("where", ["a,b,c", ",", "a,", "emulated,/dev/ttyACM0"])
+@every_case("where", ["a,b,c", ",", "a,", "emulated,/dev/ttyACM0"])
 def test_ports_that_cannot_be_are_refused(where):
     with pytest.raises(ConfigError, match="tactile_port"):
         create("sensor-backend", "robotiq", port="emulated", tactile_port=where)
@@ -413,8 +414,8 @@ def test_what_was_not_asked_for_in_time_is_kept_up_to_three_frames():
     assert (samples.counter, samples.new) == (40, 0)
 
 
-@pytest.mark.parametrize("thing", ["block", "toy"])
-@pytest.mark.parametrize("seed", range(2))
+@every_case("thing", ["block", "toy"])
+@every_case("seed", range(2))
 def test_a_grasp_in_which_one_finger_touches_first_is_not_taken_for_a_fault(seed, thing):
     """Cells without noise were taken for stuck or unplugged ones, and a thing that pressed on all cells for drift."""
     options = [

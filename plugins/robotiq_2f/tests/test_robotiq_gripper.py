@@ -9,6 +9,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from cases import every_case
 from pymodbus import FramerType
 from pymodbus.server import ModbusTcpServer
 from pymodbus.simulator import DataType, SimData, SimDevice
@@ -110,8 +111,8 @@ def test_every_model_closes_with_its_own_limits(model):
     assert gripper.report()["true_peak_force_n"] < 40.0
 
 
-@pytest.mark.parametrize("at_s", [0.02, 0.5, 2.0])
-@pytest.mark.parametrize("fault", ["unplug", "silent"])
+@every_case("at_s", [0.02, 0.5, 2.0])
+@every_case("fault", ["unplug", "silent"])
 def test_a_gripper_lost_in_a_grasp_ends_it_and_is_told(fault, at_s):
     faults = (
         [f"gripper.faults.unplug_at_s={0.2 + at_s}"]
@@ -213,7 +214,7 @@ def test_a_slow_velocity_is_a_target_that_moves():
     assert 0.006 < moved / seconds <= 0.0115
 
 
-@pytest.mark.parametrize(
+@every_case(
     "port", ["/dev/nowhere", "socket:127.0.0.1:1", "socket:nonsense", "ur:127.0.0.1:1", "ur:127.0.0.1:x"]
 )
 def test_no_gripper_is_said_with_what_to_look_at(port):

@@ -8,6 +8,7 @@ import sys
 
 import numpy as np
 import pytest
+from cases import every_case
 from commands import graspsense
 
 from graspsense.plugin_api import create
@@ -23,7 +24,7 @@ def test_conformance(check):
     check.run()
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("arguments", "said"),
     [
         (["--seconds", "0"], "seconds"),

@@ -7,6 +7,7 @@ from math import inf, nan
 from typing import NamedTuple
 
 import pytest
+from cases import every_case
 
 from graspsense.plugin_api import (
     EFFORT,
@@ -81,9 +82,7 @@ def test_a_slip_is_a_disturbance_while_the_force_itself_is_quiet():
     assert slips(PadSignal(1, 100.0, 0.21, quiet), 0.007, 0.048, 0.18)
 
 
-@pytest.mark.parametrize(
-    ("place_by", "with_shock", "with_slip"), [(0, 1, 0), (1, 0, 0), (2, 1, 1), (3, 0, 1), (4, 1, 0)]
-)
+@every_case(("place_by", "with_shock", "with_slip"), [(0, 1, 0), (1, 0, 0), (2, 1, 1), (3, 0, 1), (4, 1, 0)])
 def test_placing_is_told_by_the_published_conditions(place_by, with_shock, with_slip):
     params = THRESHOLDS._replace(place_by=place_by)
     shock, slip = NOTHING._replace(shock=1), NOTHING._replace(place_slip=1)
@@ -209,8 +208,8 @@ def test_the_detector_tells_placing_once_by_an_acceleration_of_one_or_three_axes
         assert EVENTS[7] not in [name for _, name in told]
 
 
-@pytest.mark.parametrize("sends", ["effort", "velocity", "position"])
-@pytest.mark.parametrize("name", CONTROLLERS)
+@every_case("sends", ["effort", "velocity", "position"])
+@every_case("name", CONTROLLERS)
 def test_each_law_sends_each_kind(name, sends):
     law = create("controller", name, sends=sends)
     command, _ = law.step(law.params(), law.init(), reading(0.0, 0.0))

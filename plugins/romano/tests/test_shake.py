@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from cases import every_case
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -95,7 +96,7 @@ def test_a_shaken_thing_gives_its_mass_and_what_follows():
     assert not features.reasons
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("trace", "missing", "there", "said"),
     [
         (grasp(shake=False), ["pads_low", "moved_mass"], [], "shake"),

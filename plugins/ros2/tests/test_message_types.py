@@ -5,6 +5,7 @@ from __future__ import annotations
 from contextlib import suppress
 
 import pytest
+from cases import every_case
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -28,7 +29,7 @@ OF_AN_ACTION = {
 GOAL = "control_msgs/action/GripperCommand_SendGoal_Request"
 
 
-@pytest.mark.parametrize("name", PUBLISHED)
+@every_case("name", PUBLISHED)
 def test_hashes_are_those_of_ros(name):
     assert hash_of(name) == f"RIHS01_{PUBLISHED[name]}"
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cases import every_case
 
 from graspsense.core.components.config import create
 from graspsense.core.pipeline.pipeline import load_pipeline
@@ -33,7 +34,7 @@ def test_the_pipeline_of_the_documentation_is_one(tmp_path):
     ]
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("keys", "words"),
     [
         ({"gap": "'/joint_states.position'[0] [furlong]"}, "furlong"),
@@ -74,7 +75,7 @@ def test_without_a_robot_there_is_no_device(router):
         backend.open(0)
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("variable", "value"),
     [
         ("ROS_DOMAIN_ID", "lab"),

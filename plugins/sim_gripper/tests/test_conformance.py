@@ -6,7 +6,7 @@ import time
 from types import SimpleNamespace
 from typing import NamedTuple
 
-import pytest
+from cases import every_case
 
 from graspsense.core.components.registry import installed
 from graspsense.testing.conformance import checks_for
@@ -37,7 +37,7 @@ def test_a_sound_term_has_no_defect():
     assert list(check_terms([list(TERMS.values())])) == []
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("law", "says"),
     [
         (lambda p, s, d0, d1, h, v1: (0, State(max(d1, s.worst_m))), "gives the force 0 (int)"),

@@ -6,6 +6,7 @@ import itertools
 import math
 
 import pytest
+from cases import every_case
 from unverified import unverified_setup
 
 from graspsense_sim_gripper.config import SimConfig
@@ -45,8 +46,8 @@ def untouched(state):
     return ContactState(0.0, 0.0, 0.0, (state,), 0.0, 0.0)
 
 
-@pytest.mark.parametrize("pads_n_m", [1.5e4, math.inf])
-@pytest.mark.parametrize("closure_m", [1e-9, 1e-7, 1e-5])
+@every_case("pads_n_m", [1.5e4, math.inf])
+@every_case("closure_m", [1e-9, 1e-7, 1e-5])
 def test_the_first_touch_of_a_worn_shell_compresses_it_by_no_more_than_the_fingers_close(closure_m, pads_n_m):
     # A law that pulls at its free surface had the search end where the shell was 14 mm deep and worn by 2 J.
     shell = Worn(2200.0, 0.0, 0.1, 0.9, 0.014, earlier_j=0.2)
@@ -125,7 +126,7 @@ def test_a_power_law_with_a_steep_end_is_balanced(exponent):
         assert now.force_n == pytest.approx(1.5e4 * (closure - now.compression_m), rel=1e-5, abs=1e-6)
 
 
-@pytest.mark.parametrize(("accuracy", "rtol"), [(0.3, 5e-9), (1e-2, 5e-9), (1e-3, 5e-10), (1e-9, 1e-11)])
+@every_case(("accuracy", "rtol"), [(0.3, 5e-9), (1e-2, 5e-9), (1e-3, 5e-10), (1e-9, 1e-11)])
 def test_a_coarser_balance_is_within_its_tolerance_and_evaluates_the_law_less_often(accuracy, rtol):
     evaluated = 0
 

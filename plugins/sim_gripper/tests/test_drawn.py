@@ -4,6 +4,7 @@ import re
 from functools import cache
 
 import pytest
+from cases import every_case
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -95,7 +96,7 @@ def scenes_with(name):
     return scenes_of(CONFIGS[name])
 
 
-@pytest.mark.parametrize("config", CONFIGS)
+@every_case("config", CONFIGS)
 @given(st.sampled_from([name for name in NAMES if name != WIDE]), st.lists(SEEDS, min_size=1, max_size=3))
 @settings(max_examples=40)
 def test_a_drawn_grasp_is_that_of_the_seed(config, name, seeds):

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from cases import every_case
 
 from graspsense.plugin_api import create
 from graspsense_sim_gripper.config import SimConfig
@@ -102,7 +103,7 @@ def test_compiled_and_plain_are_equal():
         np.testing.assert_allclose(compiled.gap_m, plain.gap_m, atol=1e-11)
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("values", "says"),
     [
         ({"t_s": [0, 1]}, "either gap_m or force_n"),

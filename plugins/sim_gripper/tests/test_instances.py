@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import pytest
 from attrs import evolve
+from cases import every_case
 from unverified import sample, unverified_setup
 
 from graspsense.core.values.errors import UnknownName
@@ -62,9 +63,7 @@ def test_a_numbered_instance_has_the_model_of_all_of_its_kind():
     assert numbered is other is spread
 
 
-@pytest.mark.parametrize(
-    "name", ["can:full_open#", "can:full_open#x", "can:full_open#-1", "can:full_open#1.5"]
-)
+@every_case("name", ["can:full_open#", "can:full_open#x", "can:full_open#-1", "can:full_open#1.5"])
 def test_a_wrong_number_is_refused(name):
     with pytest.raises(UnknownName, match="number of an instance"):
         unverified_setup(SimConfig(), name, 0)

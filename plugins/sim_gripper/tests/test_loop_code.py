@@ -4,7 +4,7 @@ import math
 from types import SimpleNamespace
 
 import numpy as np
-import pytest
+from cases import every_case
 
 from graspsense.simulator_api import bind
 from graspsense_sim_gripper.plant.sensing import PadBuffers
@@ -58,7 +58,7 @@ def run(wanted, *, begin=0, is_drawn=1):
     return done, images, seen
 
 
-@pytest.mark.parametrize(
+@every_case(
     "wanted", [0, FIRST_IMAGES - 1, FIRST_IMAGES, FIRST_IMAGES + 1, FIRST_IMAGES + IMAGES_AT_ONCE, MOST - 1]
 )
 def test_noise_is_drawn_as_far_as_a_grasp_comes(wanted):

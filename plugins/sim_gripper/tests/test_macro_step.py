@@ -5,6 +5,7 @@ from math import inf
 
 import numpy as np
 import pytest
+from cases import every_case
 from unverified import unverified_setup
 
 from graspsense.core.components.run_config import RunConfig
@@ -108,7 +109,7 @@ def test_with_the_trend_of_the_one_before_several_are_of_fourth_order(case):
     assert errors[8, True] < 0.7 * errors[8, False]
 
 
-@pytest.mark.parametrize("scene", ["toy", "odwalla:full_open", "water:empty_closed", "block"])
+@every_case("scene", ["toy", "odwalla:full_open", "water:empty_closed", "block"])
 def test_a_step_that_is_taken_is_as_exact_as_its_tolerance_says(scene):
     plant, start = squeezing(scene)
     n = 32

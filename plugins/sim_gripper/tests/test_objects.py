@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from cases import every_case
 from unverified import sample
 
 from graspsense.plugin_api import ConfigError, UnknownName
@@ -63,7 +64,7 @@ def test_every_figure_has_its_reason():
     assert all(len(figure["reason"]) >= 5 for figure in all_figures)
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("name", "says"),
     [
         ("odwala:full_open", r"no object named 'odwala'.*Did you mean 'odwalla'\?"),
@@ -135,7 +136,7 @@ def good():
     return table | {"terms": [{"type": "loss", "damping_n_s_m": dict(figure)}]}
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("change", "says"),
     [
         (lambda t: t.pop("width_m"), "missing .*width_m"),

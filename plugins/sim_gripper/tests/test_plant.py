@@ -6,6 +6,7 @@ from math import inf
 
 import numpy as np
 import pytest
+from cases import every_case
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -76,7 +77,7 @@ def run(params, state, effort, seconds, laws=(elastic,), dt=TICK):
     return state
 
 
-@pytest.mark.parametrize("effort", [-7.99, 0.0, 3.0, 7.99])
+@every_case("effort", [-7.99, 0.0, 3.0, 7.99])
 def test_below_breakaway_nothing_moves_at_all(effort):
     params = PlantParams(drive(), thing(*SPRING), FINE)
     start = plant_at(0.06, (NoState(),))
@@ -490,7 +491,7 @@ def test_covers_and_object_carry_one_force_however_stiff_they_are(stiffness, ski
             assert now.force_n == 0.0
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("name", "params"),
     [
         ("foam", Foam(10.0, 0.01, 1.8, 200.0, 0.02, 100.0, 1.0)),

@@ -10,6 +10,7 @@ from textwrap import dedent
 
 import numpy as np
 import pytest
+from cases import every_case
 from click.testing import CliRunner
 from unverified import sample, unverified_setup
 
@@ -122,7 +123,7 @@ def test_a_parameter_with_a_spread_varies_between_instances_and_alone():
     assert sample(spec, 8, 3).terms == instance.terms != sample(spec, None).terms
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("terms", "says"),
     [
         ('type = "fracture"', "give force_n or compression_m"),
@@ -162,7 +163,7 @@ def test_every_shipped_scene_is_grasped_and_stays_steady(name):
     assert 10.0 < done.state.peak_n < 40.0
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("text", "says"),
     [
         ("width_m = 0.2", r"bottle.toml: width_m: 0.2 m wide .* fingers open to 0.086 m"),

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from cases import every_case
 from click.testing import CliRunner
 from unverified import unverified_setup
 
@@ -46,9 +47,9 @@ def pressed(terms, config=None, seconds=0.1, effort_n=60.0, held=False, **steps)
     return state, np.array(forces)
 
 
-@pytest.mark.parametrize("held", [False, True])
-@pytest.mark.parametrize("forced", [{}, FORCED])
-@pytest.mark.parametrize("pads_n_m", [3e4, math.inf])
+@every_case("held", [False, True])
+@every_case("forced", [{}, FORCED])
+@every_case("pads_n_m", [3e4, math.inf])
 def test_a_rigid_body_breaks_at_its_crush_force(forced, held, pads_n_m):
     config = SimConfig(sensor="ideal", spread=False, open_gap_m=0.051, pad_stiffness_n_m=pads_n_m)
     body = {"rigid": {"hertz_n_m15": 1e8, "crush_force_n": 10.0, "broken_n_m": 100.0}}
@@ -59,8 +60,8 @@ def test_a_rigid_body_breaks_at_its_crush_force(forced, held, pads_n_m):
     assert 0.0 < forces[-1] < 5.0
 
 
-@pytest.mark.parametrize("forced", [{}, FORCED])
-@pytest.mark.parametrize("held", [False, True])
+@every_case("forced", [{}, FORCED])
+@every_case("held", [False, True])
 def test_an_object_of_any_terms_breaks_at_a_force(forced, held):
     terms = {
         "elastic": {"k1_n_m": 2e4, "k3_n_m3": -1e9},
@@ -243,8 +244,8 @@ def stuff(tmp_path, monkeypatch):
     return scene
 
 
-@pytest.mark.parametrize("pads_n_m", [3e4, math.inf])
-@pytest.mark.parametrize(("law", "value"), [(not_a_number, "nan"), (infinite, "inf")])
+@every_case("pads_n_m", [3e4, math.inf])
+@every_case(("law", "value"), [(not_a_number, "nan"), (infinite, "inf")])
 def test_a_force_that_is_not_finite_ends_the_grasp_with_the_name_of_the_term(stuff, law, value, pads_n_m):
     config = SimConfig(spread=False, sensor="ideal", pad_stiffness_n_m=pads_n_m)
     done = run_many(config, create("controller", "hybrid"), [stuff(law)], [0], compiled=False)[0]

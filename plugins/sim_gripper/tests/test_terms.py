@@ -4,6 +4,7 @@ import math
 from itertools import pairwise
 
 import pytest
+from cases import every_case
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -183,8 +184,8 @@ def test_a_pinhole_tends_to_sealed_and_an_open_neck_to_nothing():
     assert follow(leaking(1e-3), 0.5, 0.01, 500)[-1] < 1e-3 * closed
 
 
-@pytest.mark.parametrize("opening", [1e-6, 1e-5, 1e-4, 1e-3])
-@pytest.mark.parametrize("steps", [5, 50, 500])
+@every_case("opening", [1e-6, 1e-5, 1e-4, 1e-3])
+@every_case("steps", [5, 50, 500])
 def test_a_fast_vent_is_the_damper_of_its_orifice_whatever_the_step(opening, steps):
     # All that is swept goes out: p = (v A / (C_d A_o))^2 rho / 2, with the viscous part on top.
     speed, area = 0.02, 1.2e-3
@@ -223,8 +224,8 @@ def test_vent_and_heat_are_of_second_order_in_their_step(gas_):
     assert errors[1] / errors[2] == pytest.approx(4.0, rel=0.2)
 
 
-@pytest.mark.parametrize(("heat", "exponent"), [(1e-9, 1.0), (1e9, 1.4)])
-@pytest.mark.parametrize("bulge", [0.0, 1e-10])
+@every_case(("heat", "exponent"), [(1e-9, 1.0), (1e9, 1.4)])
+@every_case("bulge", [0.0, 1e-10])
 def test_heat_tends_to_isothermal_and_to_adiabatic(heat, exponent, bulge):
     warm = follow(leaking(0.0, 15e-6, bulge, heat), 1.0, 0.005, 500)[-1]
     plain_gas = follow(leaking(0.0, 15e-6, bulge, math.inf, exponent), 1.0, 0.005, 500)[-1]
@@ -317,8 +318,8 @@ def test_an_oscillators_motion_is_exact_whatever_the_step(w, ratio, steps):
     assert pieces.y_m == pytest.approx(whole.y_m, abs=1e-8 * scale)
 
 
-@pytest.mark.parametrize("step_s", [1e-12, 1e-9, 1e-6, 1e-4])
-@pytest.mark.parametrize("ratio", [0.0, 0.3, 1.0, 3.0])
+@every_case("step_s", [1e-12, 1e-9, 1e-6, 1e-4])
+@every_case("ratio", [0.0, 0.3, 1.0, 3.0])
 def test_an_oscillators_motion_in_a_short_step_is_not_rounding(step_s, ratio):
     # A search for a balance tries rates of compression that change at once. The closed form moved the mass of a contact
     # by 0.1 mm in 1e-11 s, which the contact's stiffness made hundreds of newtons of.
@@ -336,7 +337,7 @@ def test_an_oscillators_motion_in_a_short_step_is_not_rounding(step_s, ratio):
     )
 
 
-@pytest.mark.parametrize("ratio", [0.0, 1e-200, 0.7, 1.0, 2.5, 1e3, 1e6])
+@every_case("ratio", [0.0, 1e-200, 0.7, 1.0, 2.5, 1e3, 1e6])
 def test_slosh_is_exact_for_a_rate_that_changes_linearly_whatever_its_damping(ratio):
     mode, forces = Slosh(0.5, 5.0, ratio), []
     for n in (1, 50):
@@ -351,8 +352,8 @@ def test_slosh_is_exact_for_a_rate_that_changes_linearly_whatever_its_damping(ra
         assert forces[0] == pytest.approx(-0.5, rel=1e-3)
 
 
-@pytest.mark.parametrize("stiffness", [1e-6, 300.0, 1e9])
-@pytest.mark.parametrize(
+@every_case("stiffness", [1e-6, 300.0, 1e9])
+@every_case(
     ("law", "params"),
     [
         (liquid, lambda k: Liquid(1.2e-3, 5e-4, 0.08, 1.2e-3**2 / k, viscosity_pa_s=0.1)),
@@ -443,7 +444,7 @@ def test_every_term_has_a_sample_here():
     assert SAMPLES.keys() == TERMS.keys()
 
 
-@pytest.mark.parametrize("name", sorted(VARIANTS))
+@every_case("name", sorted(VARIANTS))
 @settings(max_examples=25, deadline=None)
 @given(
     st.lists(st.floats(0.0, 0.009), min_size=2, max_size=5),
@@ -469,8 +470,8 @@ def test_no_term_ever_gives_back_more_work_than_was_put_in(name, corners, h):
             assert work >= -1.5e-3 * most * 0.01
 
 
-@pytest.mark.parametrize("name", sorted(VARIANTS))
-@pytest.mark.parametrize("h", [0.0, 1e-9, 1e-3, 1.0, 1e6])
+@every_case("name", sorted(VARIANTS))
+@every_case("h", [0.0, 1e-9, 1e-3, 1.0, 1e6])
 def test_every_term_is_finite_and_keeps_its_types_in_pieces_of_any_length(name, h):
     term, state = TERMS[name.split()[0]], TERMS[name.split()[0]].at_rest
     for d0, d1 in pairwise([0.0, 1e-9, 0.005, 0.005, 0.002, -0.001, 0.0]):
@@ -486,7 +487,7 @@ def types_of(state):
     return tuple(types_of(part) if isinstance(part, tuple) else type(part) for part in state)
 
 
-@pytest.mark.parametrize("name", sorted(VARIANTS))
+@every_case("name", sorted(VARIANTS))
 def test_every_term_stands_still_over_a_hold_of_a_million_seconds(name):
     term = TERMS[name.split()[0]]
     _, _, state = along(term.law, VARIANTS[name], term.at_rest, ramp(0.005, 100), 1e-3)
@@ -495,7 +496,7 @@ def test_every_term_stands_still_over_a_hold_of_a_million_seconds(name):
     assert again == pytest.approx(force, rel=1e-6, abs=1e-9)
 
 
-@pytest.mark.parametrize("name", sorted(VARIANTS))
+@every_case("name", sorted(VARIANTS))
 def test_every_term_says_how_fast_it_is(name):
     term, point = TERMS[name.split()[0]], WorkingPoint(0.005, 0.01, 2.0)
     rates = term.rates(VARIANTS[name], point)

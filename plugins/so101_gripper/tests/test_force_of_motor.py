@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 
 import pytest
+from cases import every_case
 
 from graspsense.cli.main import main
 from graspsense.plugin_api import POSITION, Command, create
@@ -98,7 +99,7 @@ def test_the_estimated_force_holds_the_measured_one_within_its_error(tmp_path, c
     assert sum(inside) >= 9
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("rows", "words"),
     [
         ([("closing", 0.1 * i, i) for i in range(9)], "0 readings"),

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from cases import every_case
 
 from graspsense import WiringError, load_pipeline
 from graspsense.core.components import emulated_serial
@@ -144,8 +145,8 @@ def test_it_closes_with_the_torque_limit_of_the_force_and_tells_load_current_and
     assert 0.005 < frame.gap_m < 0.08
 
 
-@pytest.mark.parametrize("at_s", [0.02, 0.5, 2.0])
-@pytest.mark.parametrize("fault", ["unplug", "silent"])
+@every_case("at_s", [0.02, 0.5, 2.0])
+@every_case("fault", ["unplug", "silent"])
 def test_a_gripper_lost_in_a_grasp_ends_it_and_is_told(fault, at_s):
     faults = (
         [f"gripper.faults.unplug_at_s={at_s}"]
@@ -164,7 +165,7 @@ def test_the_emulated_gripper_keeps_its_own_time_so_that_a_grasp_repeats_exactly
     assert trial.trace.t_s[-1] - trial.trace.t_s[0] == pytest.approx((len(trial.trace.t_s) - 1) / 100.0)
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("mood", "late_s", "outcome"),
     [
         ("damaged", 0.3, "device lost"),
@@ -287,7 +288,7 @@ def test_the_calibration_of_lerobot_has_to_be_that_of_this_arm(emulated, tmp_pat
             driver_of(arm, arm_calibration=arm_file(tmp_path / "other.json", **changed)).open(1)
 
 
-@pytest.mark.parametrize(
+@every_case(
     "text",
     [
         "",
