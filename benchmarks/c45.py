@@ -109,9 +109,9 @@ def print_own_peak(name: str, n_rows: int) -> None:
     x, y = grasp_like(n_rows)
     contender(name).fit(x[:200], y[:200])
     Path("/proc/self/clear_refs").write_text("5")
-    before = _status("VmRSS")
+    baseline_bytes = _status("VmRSS")
     contender(name).fit(x, y)
-    print(_status("VmHWM") - before)
+    print(_status("VmHWM") - baseline_bytes)
 
 
 def _status(key: str) -> int:
@@ -213,20 +213,20 @@ def show(rows: list[dict[str, Any]], about: dict[str, Any]) -> None:
     print(
         f"{'rows':>9} {'contender':>10} {'fit s':>10} {'ratio':>7} {'predict s':>10} {'ratio':>7} {'nodes':>8}"
     )
-    before: dict[str, tuple[int, float]] = {}
+    smaller: dict[str, tuple[int, float]] = {}
     for row in rows:
         base = row["contenders"]["sklearn"]
-        for name, one in row["contenders"].items():
-            ratios = one["fit_s"] / base["fit_s"], one["predict_s"] / base["predict_s"]
+        for name, times in row["contenders"].items():
+            ratios = times["fit_s"] / base["fit_s"], times["predict_s"] / base["predict_s"]
             print(
-                f"{row['rows']:>9} {name:>10} {one['fit_s']:>10.4f} {ratios[0]:>7.2f} "
-                f"{one['predict_s']:>10.4f} {ratios[1]:>7.2f} {one['nodes']:>8.0f}",
+                f"{row['rows']:>9} {name:>10} {times['fit_s']:>10.4f} {ratios[0]:>7.2f} "
+                f"{times['predict_s']:>10.4f} {ratios[1]:>7.2f} {times['nodes']:>8.0f}",
                 end="",
             )
-            if name in before:
-                exponent = np.log(one["fit_s"] / before[name][1]) / np.log(row["rows"] / before[name][0])
+            if name in smaller:
+                exponent = np.log(times["fit_s"] / smaller[name][1]) / np.log(row["rows"] / smaller[name][0])
                 print(f"   fit grows as rows^{exponent:.2f}", end="")
-            before[name] = (row["rows"], one["fit_s"])
+            smaller[name] = (row["rows"], times["fit_s"])
             print()
         if row.get("memory_ratio") is not None:
             peaks = ", ".join(f"{name} {peak / 1e6:.0f} MB" for name, peak in row["peak_bytes"].items())

@@ -78,12 +78,12 @@ def pictures() -> list[Any]:
     """Pictures as a camera behind a soft pad has them: a slow change of brightness, a dent, and noise."""
     rng = np.random.default_rng(1)
     y, x = np.mgrid[0:240, 0:320]
-    found = []
+    frames = []
     for k in range(POOL):
         dent = 60.0 * np.exp(-(((x - 160) / 60.0) ** 2) - ((y - 100 - 2 * k) / 45.0) ** 2)
         light = np.stack([90 + 0.2 * x, 110 + 0.2 * y, 150 - 0.1 * x], axis=-1) + dent[..., np.newaxis]
-        found.append(np.clip(np.rint(light + rng.normal(0.0, 1.5, light.shape)), 0, 255).astype(np.uint8))
-    return found
+        frames.append(np.clip(np.rint(light + rng.normal(0.0, 1.5, light.shape)), 0, 255).astype(np.uint8))
+    return frames
 
 
 class Paced(SensorBackend[tuple[TactileArray, ...]]):
@@ -214,7 +214,7 @@ def main() -> None:
         opened_s = time.perf_counter() - began
         images = len(trace.signals["camera_left"].t_s) + len(trace.signals["camera_right"].t_s)
     short_mb, long_mb = memory_mb(given.seconds, given.floats), memory_mb(given.longer, given.floats)
-    mean_ms = {one: 1e3 * float(np.mean(values)) for one, values in took.items()}
+    mean_ms = {case: 1e3 * float(np.mean(values)) for case, values in took.items()}
     result = {
         "date": date.today().isoformat(),
         "machine": f"{platform.processor() or platform.machine()}, {platform.system()} {platform.release()}",

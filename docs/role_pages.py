@@ -261,7 +261,7 @@ def page(role: str) -> str:
         "",
         "| check | requirement |",
         "|---|---|",
-        *(f"| `{one.id}` | {_cell(one.title)} |" for one in CHECKS[role]),
+        *(f"| `{check.id}` | {_cell(check.title)} |" for check in CHECKS[role]),
         "",
     ]
     return "\n".join(lines)
@@ -424,7 +424,7 @@ def _public_row(home: str, name: str) -> str:
 def _fields_of(cls: Any) -> str:
     """Return a class with its fields, without them if it has none."""
     fields = getattr(cls, "_fields", None) or tuple(
-        one.alias for one in getattr(cls, "__attrs_attrs__", ()) if one.init
+        field.alias for field in getattr(cls, "__attrs_attrs__", ()) if field.init
     )
     return f"{cls.__name__}({', '.join(fields)})" if fields else cls.__name__
 
@@ -437,9 +437,9 @@ def _sentence(text: str) -> str:
 def _text_below(home: str, name: str) -> str:
     """Return the docstring that follows the definition of a constant in its module, empty if there is none."""
     body = ast.parse(inspect.getsource(import_module(f"graspsense.{home}"))).body
-    for one, text in pairwise(body):
-        if isinstance(one, ast.Assign | ast.AnnAssign) and isinstance(text, ast.Expr):
-            target = one.targets[0] if isinstance(one, ast.Assign) else one.target
+    for statement, text in pairwise(body):
+        if isinstance(statement, ast.Assign | ast.AnnAssign) and isinstance(text, ast.Expr):
+            target = statement.targets[0] if isinstance(statement, ast.Assign) else statement.target
             if ast.unparse(target) == name:
                 return str(ast.literal_eval(text.value))
     return ""
@@ -450,10 +450,10 @@ def _constant(name: str) -> str:
     value = public(name)
     for module in (signals, contact, tick):
         body = ast.parse(inspect.getsource(module)).body
-        for one, text in pairwise(body):
+        for statement, text in pairwise(body):
             if (
-                isinstance(one, ast.AnnAssign)
-                and ast.unparse(one.target) == name
+                isinstance(statement, ast.AnnAssign)
+                and ast.unparse(statement.target) == name
                 and isinstance(text, ast.Expr)
             ):
                 return f"| `{name}` | {value:g} | {_cell(' '.join(ast.literal_eval(text.value).split()))} |"
@@ -467,15 +467,16 @@ def _attributes(base: Any) -> list[str]:
         return []
     lines = ["## What the class declares", "", "| attribute | type | meaning |", "|---|---|---|"]
     body = ast.parse(inspect.getsource(base)).body[0].body  # type: ignore[attr-defined]
-    for one, text in pairwise(body):
-        if isinstance(one, ast.AnnAssign) and ast.unparse(one.annotation).startswith("ClassVar"):
-            kind = ast.unparse(one.annotation).removeprefix("ClassVar[").removesuffix("]")
+    for statement, text in pairwise(body):
+        if isinstance(statement, ast.AnnAssign) and ast.unparse(statement.annotation).startswith("ClassVar"):
+            kind = ast.unparse(statement.annotation).removeprefix("ClassVar[").removesuffix("]")
             meaning = " ".join(ast.literal_eval(text.value).split())  # type: ignore[attr-defined]
-            lines.append(f"| `{ast.unparse(one.target)}` | {_cell(kind)} | {_cell(meaning)} |")
-    for one in body:
-        if isinstance(one, ast.FunctionDef) and one.name in declared:
-            meaning = " ".join((ast.get_docstring(one) or "").split())
-            lines.append(f"| `{one.name}` | {_cell(ast.unparse(one.returns))} | {_cell(meaning)} |")  # type: ignore[arg-type]
+            lines.append(f"| `{ast.unparse(statement.target)}` | {_cell(kind)} | {_cell(meaning)} |")
+    for statement in body:
+        if isinstance(statement, ast.FunctionDef) and statement.name in declared:
+            meaning = " ".join((ast.get_docstring(statement) or "").split())
+            kind = ast.unparse(statement.returns)  # type: ignore[arg-type]
+            lines.append(f"| `{statement.name}` | {_cell(kind)} | {_cell(meaning)} |")
     return [*lines, ""]
 
 
@@ -500,9 +501,9 @@ def _many() -> list[str]:
     """Return the section on batch backends, with the docstring of each option."""
     body = ast.parse(inspect.getsource(roles.BatchOptions)).body[0].body  # type: ignore[attr-defined]
     options = [
-        f"- `{one.target.id}: {ast.unparse(one.annotation)}`: {' '.join(text.value.value.split())}"
-        for one, text in pairwise(body)
-        if isinstance(one, ast.AnnAssign)
+        f"- `{statement.target.id}: {ast.unparse(statement.annotation)}`: {' '.join(text.value.value.split())}"
+        for statement, text in pairwise(body)
+        if isinstance(statement, ast.AnnAssign)
     ]
     return [
         "## Many grasps at once",
@@ -551,9 +552,9 @@ def _documented_fields(cls: Any) -> list[str]:
     """Return a list of the fields of a class that have a docstring; nothing if none has one."""
     body = ast.parse(inspect.getsource(cls)).body[0].body  # type: ignore[attr-defined]
     lines = [
-        f"- `{ast.unparse(one.target)}`: {' '.join(ast.literal_eval(text.value).split())}"
-        for one, text in pairwise(body)
-        if isinstance(one, ast.AnnAssign) and isinstance(text, ast.Expr)
+        f"- `{ast.unparse(statement.target)}`: {' '.join(ast.literal_eval(text.value).split())}"
+        for statement, text in pairwise(body)
+        if isinstance(statement, ast.AnnAssign) and isinstance(text, ast.Expr)
     ]
     return [*lines, ""] if lines else []
 
@@ -567,9 +568,9 @@ def _entry(cls: Any) -> list[str]:
     lines = ["| field | type | default | meaning |", "|---|---|---|---|"]
     body = ast.parse(inspect.getsource(cls)).body[0].body  # type: ignore[attr-defined]
     meanings = {
-        ast.unparse(one.target): " ".join(ast.literal_eval(text.value).split())
-        for one, text in pairwise(body)
-        if isinstance(one, ast.AnnAssign) and isinstance(text, ast.Expr)
+        ast.unparse(statement.target): " ".join(ast.literal_eval(text.value).split())
+        for statement, text in pairwise(body)
+        if isinstance(statement, ast.AnnAssign) and isinstance(text, ast.Expr)
     }
     attrs.resolve_types(cls)
     for field in attrs.fields(cls):
