@@ -1,4 +1,4 @@
-"""Public data sets through `import` and `evaluate`: the table of docs/other_data.md, for whoever has the data.
+"""Public data sets through `import` and `evaluate`: the first table of benchmarks/results/other_data.md.
 
     python benchmarks/other_data.py FOLDER [--classifier c45] [--sets jaco,fruit] [--short]
 
