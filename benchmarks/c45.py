@@ -11,12 +11,9 @@ process of its own.
 from __future__ import annotations
 
 import argparse
-import datetime
-import importlib.metadata
 import importlib.util
 import json
 import os
-import platform
 import shutil
 import statistics
 import subprocess
@@ -29,6 +26,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from graspsense.experiments.versions import measured_on
 
 N_FEATURES = 6
 N_CLASSES = 11
@@ -180,34 +179,7 @@ def run_size(n_rows: int, repeats: int | None, with_memory: bool) -> dict[str, A
     return row
 
 
-def version_of(distribution: str) -> str | None:
-    try:
-        return importlib.metadata.version(distribution)
-    except importlib.metadata.PackageNotFoundError:
-        return None
-
-
-def machine() -> dict[str, Any]:
-    model = platform.processor() or platform.machine()
-    cpu = Path("/proc/cpuinfo")
-    if cpu.exists():
-        model = next(
-            (x.split(": ")[1] for x in cpu.read_text().splitlines() if x.startswith("model name")), model
-        )
-    versions = {
-        name: version_of(name) for name in ("graspsense-c45", "numpy", "scikit-learn", "numba", "imodels")
-    }
-    date = datetime.datetime.now(datetime.UTC).date().isoformat()
-    return {
-        "date": date,
-        "cpu": model,
-        "cores": os.cpu_count(),
-        "python": platform.python_version(),
-        **versions,
-    }
-
-
-def show(rows: list[dict[str, Any]], about: dict[str, Any]) -> None:
+def show(rows: list[dict[str, Any]], about: dict[str, str]) -> None:
     print(", ".join(f"{key} {value}" for key, value in about.items()))
     print(f"{N_FEATURES} features, {N_CLASSES} classes; CPU seconds, medians; ratios to scikit-learn\n")
     print(
@@ -251,7 +223,7 @@ def main() -> None:
         arguments.rows, arguments.repeats, arguments.no_memory = [1_000], 1, True
     with_memory = not arguments.no_memory and Path("/proc/self/clear_refs").exists()
     rows = [run_size(n, arguments.repeats, with_memory) for n in arguments.rows]
-    about = machine()
+    about = measured_on()
     if arguments.json:
         # NaN is no JSON: a number nobody has is null.
         text = json.dumps({"machine": about, "rows": rows})

@@ -20,23 +20,20 @@ delay, in device time, a report was in the driver's hands.
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import os
-import platform
 import subprocess
 import sys
 import time
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from datetime import date
-from importlib.metadata import version
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 from attrs import evolve
+from paced import tell
 
 from graspsense.core.components.config import resolve
 from graspsense.core.components.registry import installed
@@ -44,6 +41,7 @@ from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.runner import Sink, run_grasp
 from graspsense.core.learn.model import model_for
 from graspsense.core.pipeline.anytime import Anytime, anytime_of
+from graspsense.experiments.versions import measured_on
 from graspsense.live.feeds import FILE_TIMEOUT_S, LiveFeed
 from graspsense.plugin_api import SQUEEZE, DeviceInfo, create
 from graspsense_pr2_gripper import backend as driver
@@ -364,22 +362,14 @@ def main() -> None:
     paced = paced_us(asked.grasps, sent, feature)
     watched = watched_us(asked.grasps, sent, feature)
     result = {
-        "date": date.today().isoformat(),
-        "machine": f"{platform.machine()}, {os.cpu_count()} cores, {platform.system()} {platform.release()}",
-        "load_average": round(os.getloadavg()[0], 2),
+        **measured_on(),
         "scheduler": SCHEDULERS.get(os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK, "other"),
-        "python": platform.python_version(),
-        "graspsense-pr2-gripper": version("graspsense-pr2-gripper"),
         **distribution("tick", ticks_us(asked.grasps, sent, feature)),
         **{key: value for name, us in paced.items() if us for key, value in distribution(name, us).items()},
         **watched,
         **distribution("wake_up", wake_ups_us(asked.seconds)),
     }
-    if asked.json:
-        print(json.dumps(result, indent=2))
-        return
-    for key, value in result.items():
-        print(f"{key:<28}{value}")
+    tell(result, asked.json)
 
 
 if __name__ == "__main__":
