@@ -32,7 +32,6 @@ from graspsense import (
 )
 from graspsense.core.components import compiled_features, entries, hookspecs, roles, strict
 from graspsense.core.components.entries import DECLARED, TABLE_OF_ROLE
-from graspsense.core.components.moved_names import REPLACED, moved
 from graspsense.core.control import contact, free_motion, tick
 from graspsense.core.values import signals
 from graspsense.core.values.channel import Channel, FastChannel, TactileArray
@@ -53,7 +52,6 @@ from graspsense.testing import CHECKS, MINIMUM_CHECKS
 
 DOORS = (plugin_api, gripper_api, classifier_api, experiment_api, testing_api, simulator_api)
 """The public modules for authors of plugins."""
-MOVES = Path(__file__).parent / "from-1-to-2.md"
 DOOR_OF = {name: door for door in DOORS for name in door.__all__}
 FOLDER = Path(__file__).parent / "roles"
 TITLES = {
@@ -383,32 +381,6 @@ def names_page() -> str:
     return "\n".join(lines)
 
 
-def moved_section() -> str:
-    """Return the section on the names that `graspsense.plugin_api` no longer has, for the page from 1 to 2."""
-    by_module: dict[str, list[str]] = {}
-    for name, replacement in moved():
-        by_module.setdefault(replacement.split()[1], []).append(f"`{name}`")
-    lines = [
-        MOVED_TITLE,
-        "",
-        "`graspsense.plugin_api` has what every plugin needs; other names are in modules for few plugins ([public "
-        "names](roles/names.md)). `graspsense plugins check DISTRIBUTION` prints each line that imports a moved name, "
-        "with the new form beside it.",
-        "",
-        "| module | names |",
-        "|---|---|",
-        *(f"| `{module}` | {', '.join(names)} |" for module, names in sorted(by_module.items())),
-        "",
-        "| no longer public | in its place |",
-        "|---|---|",
-        *(f"| `{name}` | {replacement} |" for name, replacement in REPLACED.items()),
-    ]
-    return "\n".join([*lines, ""])
-
-
-MOVED_TITLE = "## Names that moved"
-
-
 def _public_row(home: str, name: str) -> str:
     """Return the row of a name: with its signature if it is called, and the first sentence of its meaning."""
     value = getattr(import_module(f"graspsense.{home}"), name)
@@ -604,8 +576,6 @@ def main() -> None:
     (FOLDER / "hooks.md").write_text(hooks_page(), encoding="utf-8")
     (FOLDER / "helpers.md").write_text(helpers_page(), encoding="utf-8")
     (FOLDER / "names.md").write_text(names_page(), encoding="utf-8")
-    kept = MOVES.read_text(encoding="utf-8").partition(MOVED_TITLE)[0].rstrip()
-    MOVES.write_text(f"{kept}\n\n{moved_section()}", encoding="utf-8")
     (FOLDER / "signals.md").write_text(signals_page(), encoding="utf-8")
 
 
