@@ -1,8 +1,8 @@
-"""A scene of linear contact: a constant mass on a light surface, against an exact solution."""
+"""The scene on which other engines are measured: a constant mass on a light surface, against an exact solution."""
 
 import numpy as np
 import pytest
-from linear_scene import CONFIG, OPEN_M, TICK, Law, exact, exact_closed
+from simulation_scene import CONFIG, OPEN_M, TICK, Law, exact, exact_closed
 from unverified import unverified_setup
 
 from graspsense.simulator_api import RunConfig
@@ -42,8 +42,8 @@ def test_a_grasp_of_linear_contact_has_the_accuracy_that_is_asked_for():
     run, accuracy = RunConfig(hold_s=0.0), CONFIG.accuracy
     done = run_many(CONFIG, Law(None), [CONFIG.object], [0], compiled=False, run=run)[0]
     force = exact_closed().force
-    simulated_n = done.trace.force_left_n[: len(force)]
+    found = done.trace.force_left_n[: len(force)]
     peak = force.max()
-    assert np.sqrt(np.mean((simulated_n - force) ** 2)) < accuracy * peak
+    assert np.sqrt(np.mean((found - force) ** 2)) < accuracy * peak
     assert done.state.peak_n == pytest.approx(peak, rel=accuracy)
     assert done.report()["not_verified"] == []

@@ -101,10 +101,24 @@ class Law(Controller[None]):
 
 @frozen(kw_only=True, eq=False)
 class Run:
-    """One run: gap closed x (m) and force (N) at each millisecond."""
+    """One run: gap closed x (m), force (N) and what was commanded, at each millisecond; processor seconds."""
 
     x: Any
     force: Any
+    u: Any
+    seconds: float = math.nan
+    what: str = ""
+
+    def error(self, reference: Run) -> tuple[float, float]:
+        """Return the rms error of the force over the peak force, and that of the peak, both relative."""
+        peak = float(np.max(reference.force))
+        if not np.all(np.isfinite(self.force)):
+            return math.inf, math.inf
+        rms = float(np.sqrt(np.mean((self.force - reference.force) ** 2))) / peak
+        return rms, abs(float(np.max(self.force)) - peak) / peak
+
+
+# ------------------------------------------------------------------------------------------------ exact
 
 
 def _rates(touching: bool) -> Any:
@@ -128,19 +142,19 @@ def exact(u_of: Callable[[int, float, float, float], float], ticks: int = TICKS)
     rates = {touching: _rates(touching) for touching in (False, True)}
     steps = {touching: expm(a * TICK / PIECES) for touching, a in rates.items()}
     powers = {}
-    for touching, step_matrix in steps.items():
+    for touching, one in steps.items():
         power, rows = np.eye(6), []
         for _ in range(PIECES):
-            power = step_matrix @ power
+            power = one @ power
             rows.append(power)
         powers[touching] = np.array(rows)
     state = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
-    xs, forces = np.zeros(ticks), np.zeros(ticks)
+    xs, forces, us = np.zeros(ticks), np.zeros(ticks), np.zeros(ticks)
     touching = False
     for tick in range(ticks):
         force = KC * max(state[0] - state[2] - X0, 0.0)
         xs[tick], forces[tick] = state[0], force
-        state[4] = u_of(tick, state[0], state[1], force)
+        us[tick] = state[4] = u_of(tick, state[0], state[1], force)
         left = TICK
         while left > 0.0:
             path = powers[touching] @ state
@@ -150,21 +164,21 @@ def exact(u_of: Callable[[int, float, float, float], float], ticks: int = TICKS)
             if not len(turned):
                 if whole:
                     state = path[whole - 1]
-                remainder = left - whole * TICK / PIECES
-                if remainder > 1e-15:
-                    ahead = expm(rates[touching] * remainder) @ state
+                rest = left - whole * TICK / PIECES
+                if rest > 1e-15:
+                    ahead = expm(rates[touching] * rest) @ state
                     if (ahead[0] - ahead[2] > X0) != touching:
-                        spent, state = _turn(rates[touching], state, touching, remainder)
-                        left, touching = remainder - spent, not touching
+                        spent, state = _turn(rates[touching], state, touching, rest)
+                        left, touching = rest - spent, not touching
                         continue
                     state = ahead
                 break
             k = int(turned[0])
-            piece_start = path[k - 1] if k else state
-            spent, state = _turn(rates[touching], piece_start, touching, TICK / PIECES)
+            before = path[k - 1] if k else state
+            spent, state = _turn(rates[touching], before, touching, TICK / PIECES)
             left -= k * TICK / PIECES + spent
             touching = not touching
-    return Run(x=xs, force=forces)
+    return Run(x=xs, force=forces, u=us, what="exact")
 
 
 def _turn(rates: Any, state: Any, touching: bool, span: float) -> tuple[float, Any]:
@@ -189,3 +203,7 @@ def exact_closed() -> Run:
         return u
 
     return exact(u_of)
+
+
+def exact_open(us: Any) -> Run:
+    return exact(lambda tick, x, v, f: float(us[tick]))
