@@ -11,12 +11,9 @@ process of its own.
 from __future__ import annotations
 
 import argparse
-import datetime
-import importlib.metadata
 import importlib.util
 import json
 import os
-import platform
 import shutil
 import statistics
 import subprocess
@@ -29,6 +26,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from graspsense.experiments.versions import measured_on
 
 N_FEATURES = 6
 N_CLASSES = 11
@@ -109,9 +108,9 @@ def print_own_peak(name: str, n_rows: int) -> None:
     x, y = grasp_like(n_rows)
     contender(name).fit(x[:200], y[:200])
     Path("/proc/self/clear_refs").write_text("5")
-    before = _status("VmRSS")
+    baseline_bytes = _status("VmRSS")
     contender(name).fit(x, y)
-    print(_status("VmHWM") - before)
+    print(_status("VmHWM") - baseline_bytes)
 
 
 def _status(key: str) -> int:
@@ -180,53 +179,26 @@ def run_size(n_rows: int, repeats: int | None, with_memory: bool) -> dict[str, A
     return row
 
 
-def version_of(distribution: str) -> str | None:
-    try:
-        return importlib.metadata.version(distribution)
-    except importlib.metadata.PackageNotFoundError:
-        return None
-
-
-def machine() -> dict[str, Any]:
-    model = platform.processor() or platform.machine()
-    cpu = Path("/proc/cpuinfo")
-    if cpu.exists():
-        model = next(
-            (x.split(": ")[1] for x in cpu.read_text().splitlines() if x.startswith("model name")), model
-        )
-    versions = {
-        name: version_of(name) for name in ("graspsense-c45", "numpy", "scikit-learn", "numba", "imodels")
-    }
-    date = datetime.datetime.now(datetime.UTC).date().isoformat()
-    return {
-        "date": date,
-        "cpu": model,
-        "cores": os.cpu_count(),
-        "python": platform.python_version(),
-        **versions,
-    }
-
-
-def show(rows: list[dict[str, Any]], about: dict[str, Any]) -> None:
+def show(rows: list[dict[str, Any]], about: dict[str, str]) -> None:
     print(", ".join(f"{key} {value}" for key, value in about.items()))
     print(f"{N_FEATURES} features, {N_CLASSES} classes; CPU seconds, medians; ratios to scikit-learn\n")
     print(
         f"{'rows':>9} {'contender':>10} {'fit s':>10} {'ratio':>7} {'predict s':>10} {'ratio':>7} {'nodes':>8}"
     )
-    before: dict[str, tuple[int, float]] = {}
+    smaller: dict[str, tuple[int, float]] = {}
     for row in rows:
         base = row["contenders"]["sklearn"]
-        for name, one in row["contenders"].items():
-            ratios = one["fit_s"] / base["fit_s"], one["predict_s"] / base["predict_s"]
+        for name, times in row["contenders"].items():
+            ratios = times["fit_s"] / base["fit_s"], times["predict_s"] / base["predict_s"]
             print(
-                f"{row['rows']:>9} {name:>10} {one['fit_s']:>10.4f} {ratios[0]:>7.2f} "
-                f"{one['predict_s']:>10.4f} {ratios[1]:>7.2f} {one['nodes']:>8.0f}",
+                f"{row['rows']:>9} {name:>10} {times['fit_s']:>10.4f} {ratios[0]:>7.2f} "
+                f"{times['predict_s']:>10.4f} {ratios[1]:>7.2f} {times['nodes']:>8.0f}",
                 end="",
             )
-            if name in before:
-                exponent = np.log(one["fit_s"] / before[name][1]) / np.log(row["rows"] / before[name][0])
+            if name in smaller:
+                exponent = np.log(times["fit_s"] / smaller[name][1]) / np.log(row["rows"] / smaller[name][0])
                 print(f"   fit grows as rows^{exponent:.2f}", end="")
-            before[name] = (row["rows"], one["fit_s"])
+            smaller[name] = (row["rows"], times["fit_s"])
             print()
         if row.get("memory_ratio") is not None:
             peaks = ", ".join(f"{name} {peak / 1e6:.0f} MB" for name, peak in row["peak_bytes"].items())
@@ -251,7 +223,7 @@ def main() -> None:
         arguments.rows, arguments.repeats, arguments.no_memory = [1_000], 1, True
     with_memory = not arguments.no_memory and Path("/proc/self/clear_refs").exists()
     rows = [run_size(n, arguments.repeats, with_memory) for n in arguments.rows]
-    about = machine()
+    about = measured_on()
     if arguments.json:
         # NaN is no JSON: a number nobody has is null.
         text = json.dumps({"machine": about, "rows": rows})

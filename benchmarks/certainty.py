@@ -68,10 +68,10 @@ def main() -> int:
     print(f"{model.in_a_line}\n{len(trials)} new grasps, seed {asked.seed}: {percentage(right.mean())} right")
     classes = {"all": known} if support is None else dict(_classes(rests_on, known))
     rows = [
-        (f"{name}, {10 * tenth} to {10 * tenth + 10} %", right[of], float(certainty[of].mean()))
+        (f"{name}, {10 * tenth} to {10 * tenth + 10} %", right[in_tenth], float(certainty[in_tenth].mean()))
         for name, among in classes.items()
         for tenth in range(10)
-        if (of := among & (np.minimum(np.floor(10.0 * certainty), 9) == tenth)).any()
+        if (in_tenth := among & (np.minimum(np.floor(10.0 * certainty), 9) == tenth)).any()
     ]
     groups = {**classes, "sets of one label": sizes == 1}
     groups |= {label: known & (np.array(trials.labels) == label) for label in trials.classes}

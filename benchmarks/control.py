@@ -20,23 +20,20 @@ delay, in device time, a report was in the driver's hands.
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import os
-import platform
 import subprocess
 import sys
 import time
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from datetime import date
-from importlib.metadata import version
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 from attrs import evolve
+from paced import tell
 
 from graspsense.core.components.config import resolve
 from graspsense.core.components.registry import installed
@@ -44,6 +41,7 @@ from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.runner import Sink, run_grasp
 from graspsense.core.learn.model import model_for
 from graspsense.core.pipeline.anytime import Anytime, anytime_of
+from graspsense.experiments.versions import measured_on
 from graspsense.live.feeds import FILE_TIMEOUT_S, LiveFeed
 from graspsense.plugin_api import SQUEEZE, DeviceInfo, create
 from graspsense_pr2_gripper import backend as driver
@@ -207,12 +205,12 @@ def played(
 
 
 def ticks_us(grasps: int, sent: Sequence[bytes], feature: bytes) -> list[float]:
-    found: list[float] = []
+    ticks: list[float] = []
     for _ in range(grasps):
         wire = Playback(sent, feature)
         played(wire, feature)
-        found += [ns / 1e3 for ns in wire.ticks_ns]
-    return found
+        ticks += [ns / 1e3 for ns in wire.ticks_ns]
+    return ticks
 
 
 def paced_us(grasps: int, sent: Sequence[bytes], feature: bytes) -> dict[str, list[float]]:
@@ -220,7 +218,7 @@ def paced_us(grasps: int, sent: Sequence[bytes], feature: bytes) -> dict[str, li
     settings = resolve("default")
     model = model_for(settings, installed())
     period_s = 1.0 / decode_identity(feature).report_rate_hz
-    found: dict[str, list[float]] = {"paced": [], "paced_with_predictions": [], "predicting": []}
+    times_us: dict[str, list[float]] = {"paced": [], "paced_with_predictions": [], "predicting": []}
     for _ in range(grasps):
         for predicts in (False, True):
             wire = Playback(sent, feature, period_s)
@@ -232,9 +230,9 @@ def paced_us(grasps: int, sent: Sequence[bytes], feature: bytes) -> dict[str, li
                 if anytime is not None:
                     anytime.end()
             us = [ns / 1e3 for ns in wire.ticks_ns]
-            found["paced_with_predictions" if predicts else "paced"] += [us[k] for k in watched.squeeze]
-            found["predicting"] += [us[k] for k in watched.predicting]
-    return found
+            times_us["paced_with_predictions" if predicts else "paced"] += [us[k] for k in watched.squeeze]
+            times_us["predicting"] += [us[k] for k in watched.predicting]
+    return times_us
 
 
 def observe(batches: Iterable[Any]) -> None:
@@ -283,9 +281,9 @@ def watched_us(grasps: int, sent: Sequence[bytes], feature: bytes) -> dict[str, 
                 played(wire, feature, sinks=[sink])
                 for column, ns in {"": wire.working_ns, "_due": wire.ticks_ns}.items():
                     blocks = [[ns[k] / 1e3 for k in block] for block in sink.blocks]
-                    found = pairs.setdefault(name, {}).setdefault(column, [])
+                    block_pairs = pairs.setdefault(name, {}).setdefault(column, [])
                     without, taken = (blocks[k::2] for k in (sink.begins, not sink.begins))
-                    found += zip(without, taken, strict=False)
+                    block_pairs += zip(without, taken, strict=False)
                 spent.setdefault(name, []).extend(sink.us)
     result: dict[str, Any] = {}
     for name, columns in pairs.items():
@@ -331,7 +329,7 @@ def wake_ups_us(seconds: float) -> list[float]:
 def distribution(name: str, values: Sequence[float]) -> dict[str, Any]:
     ordered = sorted(values)
 
-    def at(share: float) -> float:
+    def quantile(share: float) -> float:
         return round(ordered[min(math.ceil(share * len(ordered)), len(ordered)) - 1], 1)
 
     histogram: dict[str, int] = {}
@@ -340,11 +338,11 @@ def distribution(name: str, values: Sequence[float]) -> dict[str, Any]:
         histogram[f"below {below}"] = histogram.get(f"below {below}", 0) + 1
     return {
         f"{name}_count": len(ordered),
-        f"{name}_p50_us": at(0.5),
-        f"{name}_p90_us": at(0.9),
-        f"{name}_p99_us": at(0.99),
-        f"{name}_p999_us": at(0.999),
-        f"{name}_max_us": at(1.0),
+        f"{name}_p50_us": quantile(0.5),
+        f"{name}_p90_us": quantile(0.9),
+        f"{name}_p99_us": quantile(0.99),
+        f"{name}_p999_us": quantile(0.999),
+        f"{name}_max_us": quantile(1.0),
         f"{name}_histogram_us": histogram,
     }
 
@@ -364,22 +362,14 @@ def main() -> None:
     paced = paced_us(asked.grasps, sent, feature)
     watched = watched_us(asked.grasps, sent, feature)
     result = {
-        "date": date.today().isoformat(),
-        "machine": f"{platform.machine()}, {os.cpu_count()} cores, {platform.system()} {platform.release()}",
-        "load_average": round(os.getloadavg()[0], 2),
+        **measured_on(),
         "scheduler": SCHEDULERS.get(os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK, "other"),
-        "python": platform.python_version(),
-        "graspsense-pr2-gripper": version("graspsense-pr2-gripper"),
         **distribution("tick", ticks_us(asked.grasps, sent, feature)),
         **{key: value for name, us in paced.items() if us for key, value in distribution(name, us).items()},
         **watched,
         **distribution("wake_up", wake_ups_us(asked.seconds)),
     }
-    if asked.json:
-        print(json.dumps(result, indent=2))
-        return
-    for key, value in result.items():
-        print(f"{key:<28}{value}")
+    tell(result, asked.json)
 
 
 if __name__ == "__main__":

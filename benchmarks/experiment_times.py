@@ -11,15 +11,13 @@ first experiment alone.
 from __future__ import annotations
 
 import argparse
-import datetime
 import os
-import platform
 import time
-from pathlib import Path
 from statistics import median
 
 from graspsense.experiments.executors.serial import Serial
 from graspsense.experiments.experiment import number_of_trials, read_experiment, shipped
+from graspsense.experiments.versions import where_measured
 
 
 def seconds_per_trial(name: str) -> tuple[str, float]:
@@ -37,16 +35,6 @@ def seconds_per_trial(name: str) -> tuple[str, float]:
     return planned.experiment.kind, done.cpu_seconds / trials
 
 
-def processor() -> str:
-    """Return the model of the processor as Linux names it."""
-    cpuinfo = Path("/proc/cpuinfo")
-    lines = cpuinfo.read_text().splitlines() if cpuinfo.is_file() else []
-    models = [line.partition(": ")[2] for line in lines if line.startswith("model name")]
-    speeds = [line.partition(": ")[2] for line in lines if line.startswith("cpu MHz")]
-    speed = f" at {float(speeds[0]) / 1e3:.1f} GHz" if speeds else ""
-    return (models[0] if models else platform.machine()) + speed
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("names", nargs="*", metavar="NAME")
@@ -62,7 +50,7 @@ def main() -> None:
         print(f"{name}: {share:.3g} s per trial ({taken})", flush=True)
     for kind, shares in of_kind.items():
         print(f"kind {kind}: {median(shares):.3g} s per trial")
-    print(f"{processor()} on {datetime.date.today().isoformat()}")
+    print(where_measured())
 
 
 if __name__ == "__main__":

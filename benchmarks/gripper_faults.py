@@ -57,7 +57,7 @@ class Injected:
 
     name: str
     settings: Mapping[str, Any]
-    at: str
+    time_key: str
     sided: bool = False
     strong_s: float = 0.0
     """Time for which the motor may apply more than the ceiling before the fault is certain."""
@@ -159,7 +159,7 @@ def injected(
         for fault in faults:
             for side in sides if fault.sided else ("both",):
                 for phase, at_s in moments(healthy).items():
-                    settings = {**fault.settings, fault.at: at_s}
+                    settings = {**fault.settings, fault.time_key: at_s}
                     if fault.sided:
                         settings["pad_side"] = side
                     grasp = grasped(controller_named(name), FaultConfig(**settings))

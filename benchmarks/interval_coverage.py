@@ -69,7 +69,7 @@ def evaluated(k: int, repeats: int, classifier: str = "c45") -> dict[str, float]
     """Return the coverage for a classifier that is cross-validated on two states of each of `k` instances."""
     component = installed().find("classifier", classifier)
     learner = SelectedComponent(component, component.config_class()())
-    rates, found = [], []
+    rates, intervals = [], []
     for seed in range(repeats):
         rng = np.random.default_rng([1, k, seed])
         instance = np.repeat(np.arange(k), TRIALS)
@@ -79,19 +79,19 @@ def evaluated(k: int, repeats: int, classifier: str = "c45") -> dict[str, float]
         trials = Labelled(
             source="normal features",
             table=FeatureTable(names=("a", "b"), units=("", ""), values=values),
-            labels=tuple("full" if one else "empty" for one in full),
+            labels=tuple("full" if is_full else "empty" for is_full in full),
             instances=tuple(f"bottle#{i}" for i in instance),
         )
         rate = evaluate(
             learner, trials, classifier=classifier, seed=seed, controls=False, learning_curve=False
         ).headline
         rates.append(rate.rate)
-        found.append((wilson(rate.correct, rate.n), rate.interval or (0.0, 1.0)))
+        intervals.append((wilson(rate.correct, rate.n), rate.interval or (0.0, 1.0)))
     true = float(np.mean(rates))
     return {
         "rate": true,
-        "wilson": float(np.mean([low <= true <= high for (low, high), _ in found])),
-        "graspsense": float(np.mean([low <= true <= high for _, (low, high) in found])),
+        "wilson": float(np.mean([low <= true <= high for (low, high), _ in intervals])),
+        "graspsense": float(np.mean([low <= true <= high for _, (low, high) in intervals])),
     }
 
 
@@ -110,13 +110,18 @@ def main() -> None:
     for k in INSTANCES:
         for rate in (0.6, 0.85, 0.95):
             for correlation in (0.02, 0.1, 0.3):
-                of = coverage(k, rate, correlation, repeats)
-                cells = [f"{of[name]:.3f}" for name in ("wilson", "t", "bootstrap", "graspsense", "width")]
+                shares = coverage(k, rate, correlation, repeats)
+                cells = [
+                    f"{shares[name]:.3f}" for name in ("wilson", "t", "bootstrap", "graspsense", "width")
+                ]
                 print(f"| {k} | {rate} | {correlation} | {' | '.join(cells)} |", flush=True)
     print("\n| instances | true rate | Wilson | graspsense |\n|---|---|---|---|")
     for k in (6, 12, 24):
-        of = evaluated(k, repeats if given.short else max(repeats // 4, 20))
-        print(f"| {k} | {of['rate']:.3f} | {of['wilson']:.3f} | {of['graspsense']:.3f} |", flush=True)
+        shares = evaluated(k, repeats if given.short else max(repeats // 4, 20))
+        print(
+            f"| {k} | {shares['rate']:.3f} | {shares['wilson']:.3f} | {shares['graspsense']:.3f} |",
+            flush=True,
+        )
 
 
 if __name__ == "__main__":

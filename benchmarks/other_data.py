@@ -1,4 +1,4 @@
-"""Public data sets through `import` and `evaluate`: the table of docs/other_data.md, for whoever has the data.
+"""Public data sets through `import` and `evaluate`: the first table of benchmarks/results/other_data.md.
 
     python benchmarks/other_data.py FOLDER [--classifier c45] [--sets jaco,fruit] [--short]
 
@@ -40,13 +40,13 @@ def main() -> int:
     parser.add_argument("--sets", default=",".join(SETS))
     parser.add_argument("--short", action="store_true")
     given = parser.parse_args()
-    found = [name for name in given.sets.split(",") if (given.folder / name).is_dir()]
-    if not found:
+    names = [name for name in given.sets.split(",") if (given.folder / name).is_dir()]
+    if not names:
         print(f"not run: needs the data sets, as {given.folder}/jaco (docs/other_data.md)")
         return 0 if given.short else 1
     print("| set | features | with features | rate | " + " | ".join(ROWS) + " |")
     print("|---|---|---|---|" + "---|" * len(ROWS))
-    for name in found:
+    for name in names:
         report(name, given.folder / name, given.classifier, short=given.short)
     return 0
 
@@ -77,8 +77,11 @@ def labelled(name: str, command: Sequence[str], features: str, classifier: str) 
     cells = [rate_of(result["controls"].get(row, {})) for row in ROWS]
     having = result["by_features"].get("with features", {}) if result["by_features"] else {}
     headline = result["headline"]
-    of = f"{having.get('n', headline['n'])} of {headline['n']}"
-    print(f"| {name} | {features} | {of} | {rate_of({'rate': headline})} | {' | '.join(cells)} |", flush=True)
+    with_features = f"{having.get('n', headline['n'])} of {headline['n']}"
+    print(
+        f"| {name} | {features} | {with_features} | {rate_of({'rate': headline})} | {' | '.join(cells)} |",
+        flush=True,
+    )
 
 
 def rate_of(measured: dict) -> str:

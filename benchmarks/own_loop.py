@@ -104,14 +104,14 @@ def features(name: str, seeds: range, rate_hz: float | None) -> list[dict[str, f
     """Return the features of the grasps of this object: by the effort loop, or by an own loop of this rate."""
     controller = create("controller", "hybrid", sends="effort" if rate_hz is None else "position")
     extract = create("feature-set", "chitta").extract
-    found = []
+    grasps = []
     for seed in seeds:
         body = create("sensor-backend", "sim", object=name)
         gripper = body if rate_hz is None else OwnLoop(body, rate_hz)
         grasp = run_grasp(gripper, controller, RunConfig(seed=seed))
         result = extract(grasp.trace)
-        found.append(dict(zip(result.names, result.values, strict=True)))
-    return found
+        grasps.append(dict(zip(result.names, result.values, strict=True)))
+    return grasps
 
 
 def entry(values: Sequence[float]) -> str:
@@ -139,9 +139,9 @@ def main() -> None:
     heads = ("effort loop", *(f"own loop, {rate_hz:g} Hz" for rate_hz in reversed(RATES_HZ)))
     print(f"| object | feature | {' | '.join(heads)} |\n|{'---|' * (2 + len(heads))}")
     for name in given.objects:
-        found = [features(name, range(1, 1 + given.seeds), rate_hz) for rate_hz in columns]
-        for feature in found[0][0]:
-            entries = (entry([grasp[feature] for grasp in grasps]) for grasps in found)
+        by_column = [features(name, range(1, 1 + given.seeds), rate_hz) for rate_hz in columns]
+        for feature in by_column[0][0]:
+            entries = (entry([grasp[feature] for grasp in grasps]) for grasps in by_column)
             print(f"| {name} | `{feature}` | {' | '.join(entries)} |")
 
 

@@ -66,11 +66,13 @@ def measured(source: str, given: argparse.Namespace, options: Sequence[str]) -> 
         source = asked["source"]
         trials = compared_trials(source, asked["feature_sets"], asked["folds"], progress, asked)
         learners = {name: learner_of(source, name, asked) for name in asked["classifiers"].split(",")}
-    first = next(iter(trials.values()))
-    headline, folds = next(iter(protocols_of(first, asked["folds"], asked["seed"]).items()))
-    outside = answers_of_others(first, whole_curves(source, asked, first), folds, given, asked["seed"])
+    first_trials = next(iter(trials.values()))
+    headline, folds = next(iter(protocols_of(first_trials, asked["folds"], asked["seed"]).items()))
+    outside = answers_of_others(
+        first_trials, whole_curves(source, asked, first_trials), folds, given, asked["seed"]
+    )
     if asked["folds"] == FOLDS and not given.short:
-        outside |= answers_of_choice(source, first, asked["seed"])
+        outside |= answers_of_choice(source, first_trials, asked["seed"])
     return rank(
         learners,
         trials,
@@ -154,7 +156,7 @@ def answers_of_others(
     trials: Labelled, curves: np.ndarray, folds: np.ndarray, given: argparse.Namespace, seed: int
 ) -> dict[tuple[str, str], dict[str, Any]]:
     """Return the predicted labels of the classifiers of others, by their names and that of their input."""
-    found: dict[tuple[str, str], dict[str, Any]] = {}
+    answers_by_name: dict[tuple[str, str], dict[str, Any]] = {}
     with tempfile.TemporaryDirectory() as folder:
         data, answers = Path(folder, "trials.npz"), Path(folder, "answers.json")
         np.savez(
@@ -170,8 +172,8 @@ def answers_of_others(
             if subprocess.run(command, check=False, env=environment).returncode:
                 raise SystemExit(f"{' '.join(command)} failed")
             for name, answer in json.loads(answers.read_text(encoding="utf-8")).items():
-                found[name, CURVES] = answer
-    return found
+                answers_by_name[name, CURVES] = answer
+    return answers_by_name
 
 
 def told(what: str, done: int, total: int) -> None:
@@ -209,18 +211,23 @@ def mean_over(text: str) -> str:
     rates: dict[str, list[float]] = {}
     for name, features, rate in re.findall(r"^\| (\S[^|]*) \| ([^|]+) \| ([0-9.]+) %", text, re.MULTILINE):
         rates.setdefault(f"{name} with {features}", []).append(float(rate))
-    complete = {name: np.array(of) for name, of in rates.items() if len(of) == len(sources)}
+    complete = {name: np.array(shares) for name, shares in rates.items() if len(shares) == len(sources)}
     others = [name for name in complete if name.endswith(CURVES)]
     best = max(others, key=lambda name: complete[name].mean())
     lines = [
         f"| candidate | {' | '.join(Path(source).name for source in sources)} | mean | difference from {best} |",
         "|" + "---|" * (len(sources) + 3),
     ]
-    for name, of in sorted(complete.items(), key=lambda item: -item[1].mean()):
-        apart = of - complete[best]
-        half = stats.t.ppf(0.975, len(of) - 1) * apart.std(ddof=1) / np.sqrt(len(of))
+    for name, shares in sorted(complete.items(), key=lambda item: -item[1].mean()):
+        apart = shares - complete[best]
+        half = stats.t.ppf(0.975, len(shares) - 1) * apart.std(ddof=1) / np.sqrt(len(shares))
         words = f"{apart.mean():+.1f} ({apart.mean() - half:+.1f} to {apart.mean() + half:+.1f})"
-        cells = [name, *(f"{rate:.1f}" for rate in of), f"{of.mean():.1f}", "" if name == best else words]
+        cells = [
+            name,
+            *(f"{rate:.1f}" for rate in shares),
+            f"{shares.mean():.1f}",
+            "" if name == best else words,
+        ]
         lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines)
 

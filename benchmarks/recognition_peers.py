@@ -66,7 +66,7 @@ def catch22(data: dict, training: np.ndarray, test: np.ndarray, seed: int) -> np
     import pycatch22
 
     def characteristics(series: np.ndarray) -> np.ndarray:
-        return np.array([pycatch22.catch22_all(one.tolist(), catch24=True)["values"] for one in series])
+        return np.array([pycatch22.catch22_all(curve.tolist(), catch24=True)["values"] for curve in series])
 
     if "catch22" not in data:
         data["catch22"] = np.nan_to_num(channels_of(data, characteristics), posinf=0.0, neginf=0.0)
@@ -96,10 +96,10 @@ class Hydra:
                 pad = (LENGTH - 1) * dilation // 2
                 padded = np.pad(values, ((0, 0), (0, 0), (pad, pad)))
                 for group, weights in enumerate(self.weights[k, half]):
-                    one = padded[:, self.picked[k, half, group]].sum(axis=1)
-                    span = one.shape[1] - (LENGTH - 1) * dilation
+                    channels = padded[:, self.picked[k, half, group]].sum(axis=1)
+                    span = channels.shape[1] - (LENGTH - 1) * dilation
                     taps = np.stack(
-                        [one[:, j * dilation : j * dilation + span] for j in range(LENGTH)], axis=-1
+                        [channels[:, j * dilation : j * dilation + span] for j in range(LENGTH)], axis=-1
                     )
                     fit = taps @ weights.T
                     best, worst = fit.argmax(axis=-1), fit.argmin(axis=-1)
@@ -113,7 +113,7 @@ class Hydra:
 
 def sparse_scaled(training: np.ndarray, test: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return Hydra's counts as its authors scale them: square roots, and a count of zero stays zero."""
-    roots = [np.sqrt(np.maximum(one, 0.0)) for one in (training, test)]
+    roots = [np.sqrt(np.maximum(counts, 0.0)) for counts in (training, test)]
     spread = roots[0].std(axis=0, ddof=1) + (roots[0] == 0).mean(axis=0) ** 4 + 1e-8
     mean = roots[0].mean(axis=0)
     scaled = [((root - mean) * (root != 0) / spread).astype(np.float32) for root in roots]
@@ -153,7 +153,7 @@ CLASSIFIERS = {
 
 def answers_of(data: dict, seed: int) -> dict:
     """Return for each classifier the predicted labels, and the mean seconds of a fold."""
-    found: dict = {}
+    answers: dict = {}
     has_aeon = importlib.util.find_spec("aeon") is not None
     for name, classifier in (WITH_AEON if has_aeon else CLASSIFIERS).items():
         labels, seconds = np.empty(len(data["folds"]), dtype=data["labels"].dtype), []
@@ -163,8 +163,8 @@ def answers_of(data: dict, seed: int) -> dict:
             labels[test] = classifier(data, np.flatnonzero(data["folds"] != fold), test, seed)
             seconds.append(time.perf_counter() - began)
         print(f"{name}: {sum(seconds):.1f} s", file=sys.stderr, flush=True)
-        found[name] = {"predicted": labels.tolist(), "training_s": float(np.mean(seconds))}
-    return found
+        answers[name] = {"predicted": labels.tolist(), "training_s": float(np.mean(seconds))}
+    return answers
 
 
 def synthetic() -> dict:

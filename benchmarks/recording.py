@@ -2,94 +2,43 @@
 
     python benchmarks/recording.py [--json] [--rounds 10] [--seconds 4] [--short]
 
-Runs with and without a recorder alternate, in an order drawn anew each round. A tick is from the moment the
-gripper's read returns to the moment it is called again: the law, the guard, the trace, and the sinks. The command is
-applied before the sinks, so the time until then is given as well. The intervals are of the difference of the two p99
-over resampled rounds.
+Runs with and without a recorder alternate, in an order drawn anew each round. The command is applied before the sinks,
+so the time until then is given as well. The intervals are of the difference of the two p99 over resampled rounds.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
-import os
-import platform
 import random
 import tempfile
-import time
 from collections.abc import Mapping, Sequence
-from datetime import date
-from importlib.metadata import version
-from math import inf
 from pathlib import Path
 
 import numpy as np
+from paced import Paced, tell
 
-from graspsense.core.components.roles import SensorBackend
 from graspsense.core.components.run_config import RunConfig
 from graspsense.core.grasp.runner import run_grasp
-from graspsense.core.values.device import DeviceInfo
-from graspsense.core.values.errors import RecordingEnded
-from graspsense.core.values.signals import EFFORT, Command, Frame, Pads, Reading
-from graspsense.plugin_api import create
+from graspsense.experiments.versions import measured_on
+from graspsense.plugin_api import Frame, Pads, Reading, create
 from graspsense.recording.layout import TICK_FIELDS, pads_topic
 from graspsense.recording.recorder import Recorder
 from graspsense.recording.recording_info import RecordingInfo
 
-RATE_HZ = 1000.0
 GOAL_US = 20.0
 CELLS = 22
 
 
-class Paced(SensorBackend[None]):
-    """Fingers that close on nothing, on a clock of 1 ms, and how long each tick took."""
+class WithCells(Paced):
+    """Every tick has a new image of the cells."""
 
-    def __init__(self, ticks: int) -> None:
-        super().__init__(None)
-        self.ticks, self.k, self.took, self.until_command = ticks, -1, [], []
-        self.began = self.given = 0.0
-
-    def open(self, seed: int) -> DeviceInfo:
-        self.began = time.perf_counter()
-        return DeviceInfo(
-            name="paced",
-            clock="device",
-            rate_hz=RATE_HZ,
-            effort_limit_n=100.0,
-            speed_limit_m_s=0.2,
-            opening=None,
-            relaxed=Command(EFFORT, 0.0, inf, inf),
-        )
-
-    def read(self, timeout_s: float) -> Reading:
-        now = time.perf_counter()
-        if self.k >= 0:
-            self.took.append(now - self.given)
-        self.k += 1
-        if self.k == self.ticks:
-            raise RecordingEnded
-        t = self.k / RATE_HZ
+    def reading(self, frame: Frame) -> Reading:
         cells = tuple(float((self.k * 7 + i) % 4096) for i in range(CELLS))
-        frame = Frame(t, 1 / RATE_HZ, 0.08 - 0.005 * t, -0.005, 10.0, 0.1 * (self.k % 5), 0.0, 0.0, 0.0, 0)
-        reading = Reading(frame, Pads(t, self.k + 1, cells, cells))
-        while (left := self.began + t - time.perf_counter()) > 0:
-            time.sleep(left)
-        self.given = time.perf_counter()
-        return reading
-
-    def apply(self, command: Command) -> None:
-        if len(self.until_command) <= self.k:
-            self.until_command.append(time.perf_counter() - self.given)
-
-    def tare(self, images: Sequence[Pads]) -> None:
-        pass
-
-    def close(self) -> None:
-        pass
+        return Reading(frame, Pads(frame.t_s, self.k + 1, cells, cells))
 
 
 def one_run(ticks: int, path: Path | None) -> tuple[list[float], list[float], RecordingInfo | None]:
-    gripper = Paced(ticks)
+    gripper = WithCells(ticks)
     controller = create("controller", "hybrid")
     recorder = None
     if path is not None:
@@ -129,7 +78,7 @@ def main() -> None:
     given = parser.parse_args()
     if given.short:
         given.rounds, given.seconds = 1, 1.0
-    ticks = round(given.seconds * RATE_HZ)
+    ticks = round(given.seconds * Paced.rate_hz)
     took: dict[bool, list[list[float]]] = {False: [], True: []}
     until_command: dict[bool, list[list[float]]] = {False: [], True: []}
     written: list[RecordingInfo] = []
@@ -145,12 +94,8 @@ def main() -> None:
     added_us, interval = added(took, generator)
     added_to_command_us, to_command_interval = added(until_command, generator)
     result = {
-        "date": date.today().isoformat(),
-        "machine": f"{platform.processor() or platform.machine()}, {platform.system()} {platform.release()}",
-        "python": platform.python_version(),
-        "mcap": version("mcap"),
-        "load_average": round(os.getloadavg()[0], 2),
-        "rate_hz": RATE_HZ,
+        **measured_on(),
+        "rate_hz": Paced.rate_hz,
         "channels": len(TICK_FIELDS) + len(pads_topic(CELLS).fields),
         "rounds": given.rounds,
         "ticks": given.rounds * ticks,
@@ -170,11 +115,7 @@ def main() -> None:
         "dropped": sum(info.dropped for info in written),
         "bytes_per_second": sum(info.size for info in written) / (given.rounds * given.seconds),
     }
-    if given.json:
-        print(json.dumps(result, indent=2))
-        return
-    for key, value in result.items():
-        print(f"{key:<34}{value if not isinstance(value, float) else round(value, 2)}")
+    tell(result, given.json)
 
 
 if __name__ == "__main__":

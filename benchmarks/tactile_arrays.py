@@ -68,8 +68,8 @@ def short() -> int:
     labels = np.array([label for label in "abc" for _ in range(4)])
     folds = sessions(labels, 2)
     assert all(set(labels[folds == fold]) == set("abc") for fold in (0, 1))
-    found = answered(np.array([[ord(label)] for label in labels], dtype=float), labels, folds)
-    assert (found == labels).all()
+    answers = answered(np.array([[ord(label)] for label in labels], dtype=float), labels, folds)
+    assert (answers == labels).all()
     print(f"short: {len(labels)} of {len(labels)} made recordings recognised")
     return 0
 
@@ -84,7 +84,7 @@ def sessions(labels: np.ndarray, parts: int) -> np.ndarray:
 
 def cells(traces: list, names: list[str]) -> np.ndarray:
     """Return the cells of all arrays at common times, (recordings, cells, times)."""
-    found = []
+    recordings = []
     for trace in traces:
         series = []
         for name in names:
@@ -92,8 +92,8 @@ def cells(traces: list, names: list[str]) -> np.ndarray:
             flat = signal.cells.reshape(len(signal.t_s), -1)
             times = np.linspace(signal.t_s[0], signal.t_s[-1], POINTS)
             series += [np.interp(times, signal.t_s, flat[:, k]) for k in range(flat.shape[1])]
-        found.append(series)
-    return np.array(found)
+        recordings.append(series)
+    return np.array(recordings)
 
 
 def image_features(traces: list, names: list[str]) -> np.ndarray:
@@ -118,7 +118,7 @@ def answered(features: np.ndarray, labels: np.ndarray, folds: np.ndarray) -> np.
     from graspsense.plugin_api import FeatureTable, create
 
     names = tuple(f"f{k}" for k in range(features.shape[1]))
-    found = labels.copy()
+    answers = labels.copy()
     for fold in np.unique(folds):
         test = folds == fold
         model = create("classifier", CLASSIFIER)
@@ -127,8 +127,8 @@ def answered(features: np.ndarray, labels: np.ndarray, folds: np.ndarray) -> np.
             return FeatureTable(names=names, units=("1",) * len(names), values=features[rows])
 
         model.fit(table(~test), labels[~test].tolist(), 0)
-        found[test] = np.array(model.classes())[model.probabilities(table(test)).argmax(axis=1)]
-    return found
+        answers[test] = np.array(model.classes())[model.probabilities(table(test)).argmax(axis=1)]
+    return answers
 
 
 def asked(python: str, series: np.ndarray, labels: np.ndarray, folds: np.ndarray) -> list[str]:
@@ -145,12 +145,12 @@ def minirocket(path: Path) -> int:
 
     data = np.load(path)
     series, labels, folds = data["series"], data["labels"], data["folds"]
-    found = labels.copy()
+    answers = labels.copy()
     for fold in np.unique(folds):
         test = folds == fold
         model = MiniRocketClassifier(random_state=0).fit(series[~test], labels[~test])
-        found[test] = model.predict(series[test])
-    print(json.dumps(found.tolist()))
+        answers[test] = model.predict(series[test])
+    print(json.dumps(answers.tolist()))
     return 0
 
 

@@ -81,13 +81,13 @@ def _used(path: Path, package: str) -> Iterator[str]:
 @cache
 def _imports(path: Path) -> tuple[tuple[str, tuple[str, ...]], ...]:
     """Return the modules that a file imports, each with the names that it imports from it."""
-    found: list[tuple[str, tuple[str, ...]]] = []
+    imported: list[tuple[str, tuple[str, ...]]] = []
     for node in _statements(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
-            found += [(alias.name, ()) for alias in node.names]
+            imported += [(alias.name, ()) for alias in node.names]
         elif isinstance(node, ast.ImportFrom) and node.module and node.level == 0:
-            found.append((node.module, tuple(alias.name for alias in node.names)))
-    return tuple(found)
+            imported.append((node.module, tuple(alias.name for alias in node.names)))
+    return tuple(imported)
 
 
 def _statements(node: ast.AST) -> Iterator[ast.AST]:
@@ -95,9 +95,9 @@ def _statements(node: ast.AST) -> Iterator[ast.AST]:
     checking = isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING")
     for part in PARTS[checking:]:
         inner = getattr(node, part, ())
-        for one in inner if isinstance(inner, list) else ():
-            yield one
-            yield from _statements(one)
+        for statement in inner if isinstance(inner, list) else ():
+            yield statement
+            yield from _statements(statement)
 
 
 def reduced(graph: Graph) -> Graph:
@@ -128,21 +128,21 @@ def _reached(graph: Graph, start: str) -> set[str]:
 
 def levels(graph: Graph) -> dict[str, int]:
     """Return the row of each subpackage, counted from the bottom: one above the highest that it imports from."""
-    found: dict[str, int] = {}
+    row_of: dict[str, int] = {}
 
     def level(subpackage: str, above: tuple[str, ...]) -> int:
-        if subpackage not in found:
+        if subpackage not in row_of:
             below = [
                 level(used, (*above, subpackage))
                 for used in sorted(graph[subpackage])
                 if used not in (*above, subpackage)
             ]
-            found[subpackage] = 1 + max(below, default=-1)
-        return found[subpackage]
+            row_of[subpackage] = 1 + max(below, default=-1)
+        return row_of[subpackage]
 
     for subpackage in sorted(graph):
         level(subpackage, ())
-    return found
+    return row_of
 
 
 @frozen
@@ -216,19 +216,19 @@ def drawing() -> str:
     )
 
 
-def _draw(parts: list[str], one: Panel, title: str, top: float) -> float:
+def _draw(parts: list[str], drawn: Panel, title: str, top: float) -> float:
     """Add a panel below `top` to the parts; return where it ends."""
     parts.append(f'<text x="{MARGIN}" y="{top:.0f}" font-size="15" font-weight="600">{escape(title)}</text>')
     places: dict[str, Place] = {}
-    for k, row in enumerate(one.rows):
+    for k, row in enumerate(drawn.rows):
         widths = [_width(name) for name in row]
         spare = (WIDTH - 2 * MARGIN - sum(widths)) / len(row)
         x = MARGIN + spare / 2
         for name, width in zip(row, widths, strict=True):
             places[name] = x + width / 2, top + 22 + k * ROW
             x += width + spare
-    for arrow in one.arrows:
-        tip, ink = ("wrong", "#c00000") if arrow in one.against else ("tip", "#5c5c5c")
+    for arrow in drawn.arrows:
+        tip, ink = ("wrong", "#c00000") if arrow in drawn.against else ("tip", "#5c5c5c")
         parts.append(
             f'<path d="{_way([places[name] for name in arrow])}" fill="none" stroke="{ink}" stroke-width="1.2" '
             f'marker-end="url(#{tip})"/>'
@@ -242,7 +242,7 @@ def _draw(parts: list[str], one: Panel, title: str, top: float) -> float:
                 f'stroke="#5c5c5c"/><text x="{x:.1f}" y="{y + 20:.1f}" text-anchor="middle" '
                 f'font-size="13">{escape(name)}</text>'
             )
-    return top + 22 + (len(one.rows) - 1) * ROW + BOX + MARGIN
+    return top + 22 + (len(drawn.rows) - 1) * ROW + BOX + MARGIN
 
 
 def _width(name: str) -> float:

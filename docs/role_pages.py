@@ -32,7 +32,6 @@ from graspsense import (
 )
 from graspsense.core.components import compiled_features, entries, hookspecs, roles, strict
 from graspsense.core.components.entries import DECLARED, TABLE_OF_ROLE
-from graspsense.core.components.moved_names import REPLACED, moved
 from graspsense.core.control import contact, free_motion, tick
 from graspsense.core.values import signals
 from graspsense.core.values.channel import Channel, FastChannel, TactileArray
@@ -53,7 +52,6 @@ from graspsense.testing import CHECKS, MINIMUM_CHECKS
 
 DOORS = (plugin_api, gripper_api, classifier_api, experiment_api, testing_api, simulator_api)
 """The public modules for authors of plugins."""
-MOVES = Path(__file__).parent / "from-1-to-2.md"
 DOOR_OF = {name: door for door in DOORS for name in door.__all__}
 FOLDER = Path(__file__).parent / "roles"
 TITLES = {
@@ -261,7 +259,7 @@ def page(role: str) -> str:
         "",
         "| check | requirement |",
         "|---|---|",
-        *(f"| `{one.id}` | {_cell(one.title)} |" for one in CHECKS[role]),
+        *(f"| `{check.id}` | {_cell(check.title)} |" for check in CHECKS[role]),
         "",
     ]
     return "\n".join(lines)
@@ -383,32 +381,6 @@ def names_page() -> str:
     return "\n".join(lines)
 
 
-def moved_section() -> str:
-    """Return the section on the names that `graspsense.plugin_api` no longer has, for the page from 1 to 2."""
-    by_module: dict[str, list[str]] = {}
-    for name, replacement in moved():
-        by_module.setdefault(replacement.split()[1], []).append(f"`{name}`")
-    lines = [
-        MOVED_TITLE,
-        "",
-        "`graspsense.plugin_api` has what every plugin needs; other names are in modules for few plugins ([public "
-        "names](roles/names.md)). `graspsense plugins check DISTRIBUTION` prints each line that imports a moved name, "
-        "with the new form beside it.",
-        "",
-        "| module | names |",
-        "|---|---|",
-        *(f"| `{module}` | {', '.join(names)} |" for module, names in sorted(by_module.items())),
-        "",
-        "| no longer public | in its place |",
-        "|---|---|",
-        *(f"| `{name}` | {replacement} |" for name, replacement in REPLACED.items()),
-    ]
-    return "\n".join([*lines, ""])
-
-
-MOVED_TITLE = "## Names that moved"
-
-
 def _public_row(home: str, name: str) -> str:
     """Return the row of a name: with its signature if it is called, and the first sentence of its meaning."""
     value = getattr(import_module(f"graspsense.{home}"), name)
@@ -424,7 +396,7 @@ def _public_row(home: str, name: str) -> str:
 def _fields_of(cls: Any) -> str:
     """Return a class with its fields, without them if it has none."""
     fields = getattr(cls, "_fields", None) or tuple(
-        one.alias for one in getattr(cls, "__attrs_attrs__", ()) if one.init
+        field.alias for field in getattr(cls, "__attrs_attrs__", ()) if field.init
     )
     return f"{cls.__name__}({', '.join(fields)})" if fields else cls.__name__
 
@@ -437,9 +409,9 @@ def _sentence(text: str) -> str:
 def _text_below(home: str, name: str) -> str:
     """Return the docstring that follows the definition of a constant in its module, empty if there is none."""
     body = ast.parse(inspect.getsource(import_module(f"graspsense.{home}"))).body
-    for one, text in pairwise(body):
-        if isinstance(one, ast.Assign | ast.AnnAssign) and isinstance(text, ast.Expr):
-            target = one.targets[0] if isinstance(one, ast.Assign) else one.target
+    for statement, text in pairwise(body):
+        if isinstance(statement, ast.Assign | ast.AnnAssign) and isinstance(text, ast.Expr):
+            target = statement.targets[0] if isinstance(statement, ast.Assign) else statement.target
             if ast.unparse(target) == name:
                 return str(ast.literal_eval(text.value))
     return ""
@@ -450,10 +422,10 @@ def _constant(name: str) -> str:
     value = public(name)
     for module in (signals, contact, tick):
         body = ast.parse(inspect.getsource(module)).body
-        for one, text in pairwise(body):
+        for statement, text in pairwise(body):
             if (
-                isinstance(one, ast.AnnAssign)
-                and ast.unparse(one.target) == name
+                isinstance(statement, ast.AnnAssign)
+                and ast.unparse(statement.target) == name
                 and isinstance(text, ast.Expr)
             ):
                 return f"| `{name}` | {value:g} | {_cell(' '.join(ast.literal_eval(text.value).split()))} |"
@@ -467,15 +439,16 @@ def _attributes(base: Any) -> list[str]:
         return []
     lines = ["## What the class declares", "", "| attribute | type | meaning |", "|---|---|---|"]
     body = ast.parse(inspect.getsource(base)).body[0].body  # type: ignore[attr-defined]
-    for one, text in pairwise(body):
-        if isinstance(one, ast.AnnAssign) and ast.unparse(one.annotation).startswith("ClassVar"):
-            kind = ast.unparse(one.annotation).removeprefix("ClassVar[").removesuffix("]")
+    for statement, text in pairwise(body):
+        if isinstance(statement, ast.AnnAssign) and ast.unparse(statement.annotation).startswith("ClassVar"):
+            kind = ast.unparse(statement.annotation).removeprefix("ClassVar[").removesuffix("]")
             meaning = " ".join(ast.literal_eval(text.value).split())  # type: ignore[attr-defined]
-            lines.append(f"| `{ast.unparse(one.target)}` | {_cell(kind)} | {_cell(meaning)} |")
-    for one in body:
-        if isinstance(one, ast.FunctionDef) and one.name in declared:
-            meaning = " ".join((ast.get_docstring(one) or "").split())
-            lines.append(f"| `{one.name}` | {_cell(ast.unparse(one.returns))} | {_cell(meaning)} |")  # type: ignore[arg-type]
+            lines.append(f"| `{ast.unparse(statement.target)}` | {_cell(kind)} | {_cell(meaning)} |")
+    for statement in body:
+        if isinstance(statement, ast.FunctionDef) and statement.name in declared:
+            meaning = " ".join((ast.get_docstring(statement) or "").split())
+            kind = ast.unparse(statement.returns)  # type: ignore[arg-type]
+            lines.append(f"| `{statement.name}` | {_cell(kind)} | {_cell(meaning)} |")
     return [*lines, ""]
 
 
@@ -500,9 +473,9 @@ def _many() -> list[str]:
     """Return the section on batch backends, with the docstring of each option."""
     body = ast.parse(inspect.getsource(roles.BatchOptions)).body[0].body  # type: ignore[attr-defined]
     options = [
-        f"- `{one.target.id}: {ast.unparse(one.annotation)}`: {' '.join(text.value.value.split())}"
-        for one, text in pairwise(body)
-        if isinstance(one, ast.AnnAssign)
+        f"- `{statement.target.id}: {ast.unparse(statement.annotation)}`: {' '.join(text.value.value.split())}"
+        for statement, text in pairwise(body)
+        if isinstance(statement, ast.AnnAssign)
     ]
     return [
         "## Many grasps at once",
@@ -551,9 +524,9 @@ def _documented_fields(cls: Any) -> list[str]:
     """Return a list of the fields of a class that have a docstring; nothing if none has one."""
     body = ast.parse(inspect.getsource(cls)).body[0].body  # type: ignore[attr-defined]
     lines = [
-        f"- `{ast.unparse(one.target)}`: {' '.join(ast.literal_eval(text.value).split())}"
-        for one, text in pairwise(body)
-        if isinstance(one, ast.AnnAssign) and isinstance(text, ast.Expr)
+        f"- `{ast.unparse(statement.target)}`: {' '.join(ast.literal_eval(text.value).split())}"
+        for statement, text in pairwise(body)
+        if isinstance(statement, ast.AnnAssign) and isinstance(text, ast.Expr)
     ]
     return [*lines, ""] if lines else []
 
@@ -568,9 +541,9 @@ def _entry(cls: Any) -> list[str]:
     sources = [ast.parse(inspect.getsource(base)) for base in reversed(cls.__mro__[:-1])]
     body = [node for source in sources for node in source.body[0].body]  # type: ignore[attr-defined]
     meanings = {
-        ast.unparse(one.target): " ".join(ast.literal_eval(text.value).split())
-        for one, text in pairwise(body)
-        if isinstance(one, ast.AnnAssign) and isinstance(text, ast.Expr)
+        ast.unparse(statement.target): " ".join(ast.literal_eval(text.value).split())
+        for statement, text in pairwise(body)
+        if isinstance(statement, ast.AnnAssign) and isinstance(text, ast.Expr)
     }
     attrs.resolve_types(cls)
     for field in attrs.fields(cls):
@@ -604,8 +577,6 @@ def main() -> None:
     (FOLDER / "hooks.md").write_text(hooks_page(), encoding="utf-8")
     (FOLDER / "helpers.md").write_text(helpers_page(), encoding="utf-8")
     (FOLDER / "names.md").write_text(names_page(), encoding="utf-8")
-    kept = MOVES.read_text(encoding="utf-8").partition(MOVED_TITLE)[0].rstrip()
-    MOVES.write_text(f"{kept}\n\n{moved_section()}", encoding="utf-8")
     (FOLDER / "signals.md").write_text(signals_page(), encoding="utf-8")
 
 

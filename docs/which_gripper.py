@@ -24,15 +24,15 @@ def of_target(summary: Summary, target: str) -> list[ConditionResult]:
 
 def told_apart(condition: ConditionResult) -> dict[str, str]:
     """Return for each thing how many of its grasps were recognised, and what the others were most often taken for."""
-    matrix, found = condition.confusion, {}
+    matrix, shares = condition.confusion, {}
     for label, row in zip(matrix.labels, matrix.counts, strict=True):
         own = row[matrix.labels.index(label)]
         others = [(count, other) for other, count in zip(matrix.labels, row, strict=True) if other != label]
         count, other = max(others)
         total = sum(row)
         entry = f"{own} of {total}" if total else "-"
-        found[label] = entry + (f" ({count} as {other})" if count else "")
-    return found
+        shares[label] = entry + (f" ({count} as {other})" if count else "")
+    return shares
 
 
 def tables(summary: Summary) -> str:
@@ -44,7 +44,11 @@ def tables(summary: Summary) -> str:
             f"| {condition.name} | {condition.rate.words} | {of_class.rate.words} | {condition.confusion.n} |"
         )
     columns = [told_apart(condition) for condition in both]
-    lines += ["", f"| thing | {' | '.join(one.name for one in both)} |", "|---|" + "---|" * len(both)]
+    lines += [
+        "",
+        f"| thing | {' | '.join(condition.name for condition in both)} |",
+        "|---|" + "---|" * len(both),
+    ]
     for label in both[0].confusion.labels:
         lines.append(f"| `{label}` | {' | '.join(column[label] for column in columns)} |")
     return "\n".join(lines) + "\n"
@@ -59,11 +63,11 @@ def main() -> None:
     results = Results(parser.parse_args().folder)
     summary = summarise(results.experiment(), results)
     text = PAGE.read_text(encoding="utf-8")
-    before, rest = text.split(BEGIN)
-    after = rest.split(END)[1]
+    head, tail = text.split(BEGIN)
+    after = tail.split(END)[1]
     measured = where_measured().partition(", python")[0]
     written = f"{BEGIN}\nMeasured: {measured}.\n\n{tables(summary)}\n{END}"
-    PAGE.write_text(before + written + after, encoding="utf-8")
+    PAGE.write_text(head + written + after, encoding="utf-8")
 
 
 if __name__ == "__main__":

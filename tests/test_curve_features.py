@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -302,10 +301,3 @@ def test_most_features_of_the_icub_recordings_are_defined_where_there_is_contact
 
 def test_the_synthetic_squeeze_of_the_checks_has_all_features():
     assert defined(FEATURES.extract(squeeze())) == set(NAMES)
-
-
-def test_the_documentation_lists_every_feature_with_its_unit():
-    page = (Path(__file__).parents[1] / "docs" / "features.md").read_text(encoding="utf-8")
-    for feature in CurveFeatures.features:
-        row = next(line for line in page.splitlines() if line.startswith("|") and f"`{feature.name}`" in line)
-        assert feature.unit in [unit.strip() for unit in row.split("|")[2].split(",")], feature.name

@@ -89,11 +89,6 @@ def test_every_name_that_all_plugins_share_is_on_a_page_with_its_meaning():
         assert "the value " not in row[1][:10], f"{name} has no docstring"
 
 
-def test_the_page_of_moved_names_has_each_of_them():
-    page = (ROOT / "docs" / "from-1-to-2.md").read_text(encoding="utf-8")
-    assert page.endswith(PAGES.moved_section()), "run: python docs/role_pages.py"
-
-
 HELPERS = [name for names in PAGES.HELPERS.values() for name in names if callable(PAGES.public(name))]
 
 
