@@ -171,6 +171,6 @@ def test_fifty_channels_do_not_grow_the_page_or_its_process(browser, feed, ticks
     assert feed.dropped == 0
     page, process = zip(*kept, strict=True)
     assert max(page) < page[0] + (4 << 20), kept
-    # A tick is some 470 bytes of text: keeping all of them adds 250 MB in ten minutes. What waits to be sent, and what the
-    # allocator does not give back, comes and goes by some 10 MB with the load.
+    # A tick is some 470 bytes of text: keeping all of them adds 250 MB in ten minutes. What waits to be sent comes and
+    # goes by some 10 MB with the load, and so does what the allocator holds.
     assert max(process) < process[0] + (32 << 20), kept
