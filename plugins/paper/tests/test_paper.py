@@ -69,7 +69,7 @@ def test_every_published_rate_has_an_experiment_with_a_case_for_it():
         alone = read_experiment(rate.experiment)
         assert any(case.part == rate.experiment for case in planned.cases)
         assert any(
-            all(case.at.get(key) == value for key, value in rate.settings.items())
+            all(case.levels.get(key) == value for key, value in rate.settings.items())
             and rate.target in case.judge.targets
             for case in alone.cases
         )
@@ -265,7 +265,7 @@ def test_the_difference_of_two_rates_is_not_counted_again_as_a_claim():
 def eggs(broken, n):
     """Return a summary of n grasps of an egg with the hybrid controller, of which so many broke it."""
     planned = read_experiment("controllers", ["seeds=1"])
-    case = next(case for case in planned.cases if case.at.get("variant") == "hybrid")
+    case = next(case for case in planned.cases if case.levels.get("variant") == "hybrid")
     rows = tuple(GraspRow(label="egg", outcome="steady", broken=i < broken) for i in range(n))
     result = GraspResult(source="", simulated=True, rows=rows)
     return Summary(

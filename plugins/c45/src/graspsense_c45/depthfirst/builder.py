@@ -49,7 +49,7 @@ class DepthFirstTreeBuilder:
             np.zeros(n_nodes, dtype=np.int64),
             np.zeros((n_nodes, training.n_classes + 1), dtype=np.int64),
         )
-        workspace = pruning.Workspace(
+        workspace = pruning.PruningSpace(
             np.empty(n_nodes, dtype=np.int64),
             np.empty(n_nodes, dtype=np.int64),
             np.empty(n_nodes, dtype=np.int64),
@@ -74,7 +74,7 @@ def _grown(columns: Columns, training: TrainingSet) -> Nodes:
         np.zeros(n_attributes, dtype=np.int64),
         training.averaged,
     )
-    workspace = growing.Workspace(
+    workspace = growing.GrowingSpace(
         np.zeros(n_rows, dtype=np.bool_),
         np.empty(n_rows, dtype=np.uint32),
         np.empty(n_rows),

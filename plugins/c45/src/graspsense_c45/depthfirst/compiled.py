@@ -55,7 +55,7 @@ def kept() -> bool:
 
 
 def grow(
-    nodes: Nodes, columns: Columns, rules: Rules, candidates: Candidates, workspace: growing.Workspace
+    nodes: Nodes, columns: Columns, rules: Rules, candidates: Candidates, workspace: growing.GrowingSpace
 ) -> int:
     """Call `growing.grow` compiled."""
     return int(_compiled(growing.grow)(nodes, columns, rules, candidates, workspace))
@@ -66,7 +66,9 @@ def collapse(nodes: Nodes, errors: FixedPoint, margin: Integer, slack: float) ->
     _compiled(pruning.collapse)(nodes, errors, margin, slack)
 
 
-def prune(nodes: Nodes, rows: Rows, constants: Pruning, errors: Errors, workspace: pruning.Workspace) -> None:
+def prune(
+    nodes: Nodes, rows: Rows, constants: Pruning, errors: Errors, workspace: pruning.PruningSpace
+) -> None:
     """Call `pruning.prune` compiled."""
     _compiled(pruning.prune)(nodes, rows, constants, errors, workspace)
 

@@ -65,7 +65,7 @@ class Candidates(NamedTuple):
     averaged: Mask
 
 
-class Workspace(NamedTuple):
+class GrowingSpace(NamedTuple):
     """Arrays that are written before they are read.
 
     goes_left, rows, values: for the rows of a node. passed: one entry per class. waiting: the nodes to look at.
@@ -79,7 +79,7 @@ class Workspace(NamedTuple):
 
 
 def grow(
-    nodes: Nodes, columns: Columns, rules: Rules, candidates: Candidates, workspace: Workspace
+    nodes: Nodes, columns: Columns, rules: Rules, candidates: Candidates, workspace: GrowingSpace
 ) -> Integer:
     """Grow the unpruned tree, whose thresholds are midpoints; return its number of nodes, and sort `columns` by leaf.
 
@@ -109,7 +109,12 @@ def grow(
 
 
 def best_split(
-    node: Integer, nodes: Nodes, columns: Columns, rules: Rules, candidates: Candidates, workspace: Workspace
+    node: Integer,
+    nodes: Nodes,
+    columns: Columns,
+    rules: Rules,
+    candidates: Candidates,
+    workspace: GrowingSpace,
 ) -> Integer:
     """Return the attribute to split a node on, -1 if it stays a leaf; write the cuts to `candidates`."""
     counts = nodes.counts[node]
@@ -164,7 +169,7 @@ def split(
     left: Integer,
     nodes: Nodes,
     columns: Columns,
-    workspace: Workspace,
+    workspace: GrowingSpace,
 ) -> None:
     """Split a node on the attribute `chosen` behind the entry `place`; its children become `left` and `left + 1`."""
     begin, stop = nodes.start[node], nodes.end[node]
@@ -185,7 +190,9 @@ def split(
     nodes.start[left + 1], nodes.end[left + 1] = place + 1, stop
 
 
-def partition(rows: RowIndices, values: Reals, begin: Integer, stop: Integer, workspace: Workspace) -> None:
+def partition(
+    rows: RowIndices, values: Reals, begin: Integer, stop: Integer, workspace: GrowingSpace
+) -> None:
     """Move the rows that go left to the front of an interval; both parts keep their order."""
     goes_left, spare_rows, spare_values = workspace.goes_left, workspace.rows, workspace.values
     # Every row is written to both arrays, and one counter advances: a branch would often be mispredicted.

@@ -36,7 +36,7 @@ class Errors(NamedTuple):
     joining: FixedPoint
 
 
-class Workspace(NamedTuple):
+class PruningSpace(NamedTuple):
     """Arrays that are written before they are read; the first three have an entry per node, the others one per row.
 
     listed: the nodes of a subtree. waiting: those to prune. joined: leaves that rows of another branch join.
@@ -80,7 +80,7 @@ def collapse(nodes: Nodes, errors: FixedPoint, margin: Integer, slack: float) ->
                 make_leaf(node, nodes)
 
 
-def prune(nodes: Nodes, rows: Rows, pruning: Pruning, errors: Errors, workspace: Workspace) -> None:
+def prune(nodes: Nodes, rows: Rows, pruning: Pruning, errors: Errors, workspace: PruningSpace) -> None:
     """Replace subtrees by leaves or by their heaviest branch where the estimated errors grow by no more than 0.1.
 
     `nodewise.pruning.prune_pessimistic` does the same; `tests/test_engines.py` checks that both agree to the bit.
@@ -97,7 +97,7 @@ def prune(nodes: Nodes, rows: Rows, pruning: Pruning, errors: Errors, workspace:
 
 
 def enter_subtree(
-    root: Integer, n_waiting: Integer, nodes: Nodes, pruning: Pruning, errors: Errors, workspace: Workspace
+    root: Integer, n_waiting: Integer, nodes: Nodes, pruning: Pruning, errors: Errors, workspace: PruningSpace
 ) -> Integer:
     """Estimate all nodes below a root as leaves, and add them to the waiting ones; return the number of these."""
     number = list_subtree(nodes, root, workspace.listed)
@@ -191,7 +191,7 @@ def increase(
     return result
 
 
-def reassign_rows(root: Integer, nodes: Nodes, rows: Rows, workspace: Workspace) -> None:
+def reassign_rows(root: Integer, nodes: Nodes, rows: Rows, workspace: PruningSpace) -> None:
     """Send the rows of a node down to the leaves below it; set intervals and counts of all nodes on the way."""
     begin, stop = nodes.start[root], nodes.end[root]
     number, n_classes = list_subtree(nodes, root, workspace.listed), nodes.counts.shape[1]
