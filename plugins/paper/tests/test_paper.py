@@ -210,7 +210,7 @@ def test_each_bottle_may_be_used_in_one_state_only():
 
 
 def test_worn_bottles_are_compared_with_other_new_ones():
-    cases = {case.at["variant"]: case for case in read_experiment("worn_bottles").cases}
+    cases = {case.levels["variant"]: case for case in read_experiment("worn_bottles").cases}
     assert set(cases) == {"other new bottles", "other worn bottles"}
     assert all(case.test is not None for case in cases.values())
 
