@@ -50,6 +50,8 @@ from graspsense.scaffold.make import KINDS, plugin_module, words_of
 from graspsense.sources.grasp_columns import GraspColumns, checked_recording
 from graspsense.store.stored_grasps import StoredGrasp
 from graspsense.testing import CHECKS, MINIMUM_CHECKS
+from graspsense_sim_gripper.scene.terms import Term
+from graspsense_sim_gripper.scene.terms.registry import TERMS
 
 DOORS = (plugin_api, gripper_api, classifier_api, experiment_api, testing_api, simulator_api)
 """The public modules for authors of plugins."""
@@ -298,6 +300,37 @@ def hooks_page() -> str:
 def hook_example(spec: Any) -> str:
     """Return the example in the docstring of a hook: the module of a plugin that implements it."""
     return dedent(inspect.cleandoc(spec.__doc__).partition(EXAMPLE)[2])
+
+
+def terms_page() -> str:
+    """Return the page of the terms of a simulated object, and of what declares one."""
+    lines = [HEAD + "# Terms of a simulated object", ""]
+    lines += [
+        "The force of an object is the sum of its terms. A term of a [scene](../simulator.md#a-scene-of-your-own) has "
+        "a `type` and the parameters below, in the SI units that their names end with; those with a value may be left "
+        "out. d is the compression in metres.",
+        "",
+    ]
+    for name, kind in TERMS.items():
+        parameters = (
+            f"`{key}`"
+            + (f" ({kind.params._field_defaults[key]:g})" if key in kind.params._field_defaults else "")
+            for key in kind.params._fields
+        )
+        lines += [f"## {name}", "", _text(kind.params), "", f"Parameters: {', '.join(parameters)}.", ""]
+        lines += _documented_fields(kind.params)
+    lines += [
+        "## Term",
+        "",
+        "[A term of your own](../simulator.md#a-term-of-your-own) is declared by these fields.",
+        "",
+        f"    {_fields_signature(Term)}",
+        "",
+        _text(Term),
+        "",
+        *_documented_fields(Term),
+    ]
+    return "\n".join(lines)
 
 
 def helpers_page() -> str:
@@ -565,6 +598,7 @@ def main() -> None:
     (FOLDER / "helpers.md").write_text(helpers_page(), encoding="utf-8")
     (FOLDER / "names.md").write_text(names_page(), encoding="utf-8")
     (FOLDER / "signals.md").write_text(signals_page(), encoding="utf-8")
+    (FOLDER / "terms.md").write_text(terms_page(), encoding="utf-8")
 
 
 if __name__ == "__main__":

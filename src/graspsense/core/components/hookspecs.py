@@ -51,6 +51,7 @@ def graspsense_sensor_backends() -> Iterable[SensorBackendEntry]:  # type: ignor
 
         from graspsense.plugin_api import SensorBackendEntry, hookimpl
 
+
         @hookimpl
         def graspsense_sensor_backends():
             yield SensorBackendEntry(
@@ -69,6 +70,7 @@ def graspsense_controllers() -> Iterable[ControllerEntry]:  # type: ignore[empty
     Example::
 
         from graspsense.plugin_api import ControllerEntry, hookimpl
+
 
         @hookimpl
         def graspsense_controllers():
@@ -89,6 +91,7 @@ def graspsense_feature_sets() -> Iterable[FeatureSetEntry]:  # type: ignore[empt
     Example::
 
         from graspsense.plugin_api import FeatureSetEntry, hookimpl
+
 
         @hookimpl
         def graspsense_feature_sets():
@@ -111,6 +114,7 @@ def graspsense_classifiers() -> Iterable[ClassifierEntry]:  # type: ignore[empty
 
         from graspsense.plugin_api import ClassifierEntry, hookimpl
 
+
         @hookimpl
         def graspsense_classifiers():
             yield ClassifierEntry(
@@ -131,6 +135,7 @@ def graspsense_pipelines() -> Iterable[PipelineEntry]:  # type: ignore[empty-bod
 
         from graspsense.plugin_api import PipelineEntry, hookimpl
 
+
         @hookimpl
         def graspsense_pipelines():
             yield PipelineEntry(
@@ -149,6 +154,7 @@ def graspsense_models() -> Iterable[ModelEntry]:  # type: ignore[empty-body]
 
         from graspsense.plugin_api import hookimpl
         from graspsense.simulator_api import ModelEntry
+
 
         @hookimpl
         def graspsense_models():
@@ -172,6 +178,7 @@ def graspsense_datasets() -> Iterable[DatasetEntry]:  # type: ignore[empty-body]
 
         from graspsense.plugin_api import DatasetEntry, hookimpl
 
+
         @hookimpl
         def graspsense_datasets():
             yield DatasetEntry(
@@ -192,6 +199,7 @@ def graspsense_commands() -> Iterable[CommandEntry]:  # type: ignore[empty-body]
     Example::
 
         from graspsense.plugin_api import CommandEntry, hookimpl
+
 
         @hookimpl
         def graspsense_commands():
@@ -215,6 +223,7 @@ def graspsense_emulators() -> Iterable[EmulatorEntry]:  # type: ignore[empty-bod
         from graspsense.gripper_api import EmulatorEntry
         from graspsense.plugin_api import hookimpl
 
+
         @hookimpl
         def graspsense_emulators():
             yield EmulatorEntry(
@@ -236,6 +245,7 @@ def graspsense_identifiers() -> Iterable[IdentifierEntry]:  # type: ignore[empty
 
         from graspsense.plugin_api import hookimpl
         from graspsense.simulator_api import IdentifierEntry
+
 
         @hookimpl
         def graspsense_identifiers():
@@ -259,6 +269,7 @@ def graspsense_live_observers() -> Iterable[LiveObserverEntry]:  # type: ignore[
         from graspsense.gripper_api import LiveObserverEntry
         from graspsense.plugin_api import hookimpl
 
+
         @hookimpl
         def graspsense_live_observers():
             yield LiveObserverEntry(
@@ -280,6 +291,7 @@ def graspsense_experiment_kinds() -> Iterable[ExperimentKindEntry]:  # type: ign
 
         from graspsense.experiment_api import ExperimentKindEntry
         from graspsense.plugin_api import hookimpl
+
 
         @hookimpl
         def graspsense_experiment_kinds():
@@ -303,6 +315,7 @@ def graspsense_experiments() -> Iterable[ExperimentEntry]:  # type: ignore[empty
         from graspsense.experiment_api import ExperimentEntry
         from graspsense.plugin_api import hookimpl
 
+
         @hookimpl
         def graspsense_experiments():
             yield ExperimentEntry(name="worn-cans", resource="lab_study:experiments/worn_cans.toml")
@@ -320,6 +333,7 @@ def graspsense_conformance_checks() -> Iterable[ConformanceCheckEntry]:  # type:
 
         from graspsense.plugin_api import hookimpl
         from graspsense.simulator_api import ConformanceCheckEntry
+
 
         @hookimpl
         def graspsense_conformance_checks():
@@ -343,6 +357,7 @@ def graspsense_probe_devices(timeout_s: float) -> Iterable[FoundDevice]:  # type
 
         from graspsense.gripper_api import FoundDevice
         from graspsense.plugin_api import hookimpl
+
 
         @hookimpl
         def graspsense_probe_devices(timeout_s):
@@ -369,6 +384,7 @@ def graspsense_diagnose(config: object, timeout_s: float) -> Iterable[Finding]: 
         from graspsense.gripper_api import Finding
         from graspsense.plugin_api import hookimpl
 
+
         @hookimpl
         def graspsense_diagnose(config, timeout_s):
             yield Finding(
@@ -391,6 +407,7 @@ def graspsense_run_starting(run: RunInfo) -> None:
 
         started = []
 
+
         @hookimpl
         def graspsense_run_starting(run):
             started.append(run.seed)
@@ -409,6 +426,7 @@ def graspsense_grasp_event(run: RunInfo, event: GraspEvent) -> None:
 
         events = []
 
+
         @hookimpl
         def graspsense_grasp_event(event):
             events.append(event.what)
@@ -424,6 +442,7 @@ def graspsense_run_finished(run: RunInfo, trial: Trial) -> None:
         from graspsense.plugin_api import hookimpl
 
         outcomes = []
+
 
         @hookimpl
         def graspsense_run_finished(trial):
