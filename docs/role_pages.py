@@ -18,6 +18,7 @@ from importlib.resources import files
 from itertools import pairwise
 from pathlib import Path
 from string import Template
+from textwrap import dedent
 from typing import Any
 
 import attrs
@@ -49,6 +50,8 @@ from graspsense.scaffold.make import KINDS, plugin_module, words_of
 from graspsense.sources.grasp_columns import GraspColumns, checked_recording
 from graspsense.store.stored_grasps import StoredGrasp
 from graspsense.testing import CHECKS, MINIMUM_CHECKS
+from graspsense_sim_gripper.scene.terms import Term
+from graspsense_sim_gripper.scene.terms.registry import TERMS
 
 DOORS = (plugin_api, gripper_api, classifier_api, experiment_api, testing_api, simulator_api)
 """The public modules for authors of plugins."""
@@ -134,6 +137,8 @@ FLOWING: tuple[Any, ...] = (
         Trial,
     ),
 )
+EXAMPLE = "\n\nExample::\n\n"
+"""What stands before the example in the docstring of a hook."""
 HEAD = "<!-- Written by docs/role_pages.py from the code: change that. -->\n"
 
 
@@ -156,7 +161,7 @@ def dataset_page() -> str:
             "gripper `replay`.",
             "",
             "`graspsense plugins new NAME --role dataset` creates a package to start from: the example below. The hook "
-            f"[graspsense_datasets](../hooks.md{_dataset_anchor()}) declares readers.",
+            "[graspsense_datasets](hooks.md#graspsense_datasets) declares readers.",
             "",
             "A reader that raises an exception ends its data set: the recordings before are used, and the error is "
             "told. `each_readable` reads one file, and yields an `UnreadableRecording` in its place if that fails, so "
@@ -203,13 +208,6 @@ def dataset_page() -> str:
     )
 
 
-def _dataset_anchor() -> str:
-    spec = hookspecs.graspsense_datasets
-    return _section(f"graspsense_datasets{inspect.signature(spec)}".replace("'", "")).removeprefix(
-        "../hooks.md"
-    )
-
-
 def page(role: str) -> str:
     """Return the page of a role."""
     if role == "dataset":
@@ -227,7 +225,7 @@ def page(role: str) -> str:
             "- [The tutorial](../tutorial.md) creates a package by hand.",
             "- [Values and units](signals.md) describes the values that pass between components.",
             "- [Helpers](helpers.md) describes the functions and constants that a component is written with.",
-            f"- The hook [{HOOKS[role]}](../hooks.md#{_anchor(role)}) declares components of this role.",
+            f"- The hook [{HOOKS[role]}](hooks.md#{HOOKS[role]}) declares components of this role.",
             *(FURTHER.get(role, ())),
             "",
             *_attributes(base),
@@ -280,37 +278,59 @@ def hooks_page() -> str:
     """Return the page of every hook and of what it gives."""
     lines = [HEAD + "# Hook reference", ""]
     lines += [
-        "This page lists every hook with its signature and the fields of the entries that it returns. "
-        "[Hooks](../hooks.md) has the rules, and an example of each hook.",
+        "This page has every hook: its signature, an example, and the fields of the entries that it returns. "
+        "[Hooks](../hooks.md) has the rules. A module of hooks also says `GRASPSENSE_API = (2, 0)`.",
+        "",
+        "An observer (`graspsense_run_starting`, `graspsense_grasp_event`, `graspsense_run_finished`) is called a few "
+        "times in a grasp. It cannot change the run. An exception in it does not stop the grasp; it is reported once, "
+        "as a warning of the logger `graspsense.plugins`.",
         "",
     ]
     specs = {name: spec for name, spec in vars(hookspecs).items() if name.startswith("graspsense_")}
     for name, spec in specs.items():
         signature = f"{name}{inspect.signature(spec)}".replace("'", "")
-        lines += [
-            f"## {name}",
-            "",
-            f"    {signature}",
-            "",
-            f"{_text(spec)} [Example]({_section(signature)}).",
-            "",
-        ]
+        lines += [f"## {name}", "", f"    {signature}", "", _text(spec).partition(EXAMPLE)[0], ""]
+        lines += ["```python", hook_example(spec), "```", ""]
         given = re.search(r"Iterable\[(\w+)\]", signature)
         if given:
             lines += _entry(getattr(entries, given[1]))
     return "\n".join(lines)
 
 
-def _section(signature: str) -> str:
-    """Return the link to the section of hooks.md with this signature as its heading."""
-    kept = re.sub(r"[^\w\s-]", "", signature.lower()).strip()
-    return "../hooks.md#" + re.sub(r"[-\s]+", "-", kept)
+def hook_example(spec: Any) -> str:
+    """Return the example in the docstring of a hook: the module of a plugin that implements it."""
+    return dedent(inspect.cleandoc(spec.__doc__).partition(EXAMPLE)[2])
 
 
-def _anchor(role: str) -> str:
-    """Return the anchor that the heading of this role's hook has in hooks.md."""
-    spec = getattr(hookspecs, HOOKS[role])
-    return _section(f"{HOOKS[role]}{inspect.signature(spec)}".replace("'", "")).partition("#")[2]
+def terms_page() -> str:
+    """Return the page of the terms of a simulated object, and of what declares one."""
+    lines = [HEAD + "# Terms of a simulated object", ""]
+    lines += [
+        "The force of an object is the sum of its terms. A term of a [scene](../simulator.md#a-scene-of-your-own) has "
+        "a `type` and the parameters below, in the SI units that their names end with; those with a value may be left "
+        "out. d is the compression in metres.",
+        "",
+    ]
+    for name, kind in TERMS.items():
+        parameters = (
+            f"`{key}`"
+            + (f" ({kind.params._field_defaults[key]:g})" if key in kind.params._field_defaults else "")
+            for key in kind.params._fields
+        )
+        lines += [f"## {name}", "", _text(kind.params), "", f"Parameters: {', '.join(parameters)}.", ""]
+        lines += _documented_fields(kind.params)
+    lines += [
+        "## Term",
+        "",
+        "[A term of your own](../simulator.md#a-term-of-your-own) is declared by these fields.",
+        "",
+        f"    {_fields_signature(Term)}",
+        "",
+        _text(Term),
+        "",
+        *_documented_fields(Term),
+    ]
+    return "\n".join(lines)
 
 
 def helpers_page() -> str:
@@ -549,7 +569,7 @@ def _entry(cls: Any) -> list[str]:
     for field in attrs.fields(cls):
         empty = field.default.factory() if isinstance(field.default, attrs.Factory) else field.default
         default = "required" if field.default is attrs.NOTHING else f"`{empty!r}`"
-        kind = re.sub(r"graspsense\.core\.entries\.|collections\.abc\.", "", strict._kind_words(field.type))
+        kind = re.sub(r"(?:graspsense|collections)(?:\.[a-z_]+)*\.", "", strict._kind_words(field.type))
         kind = kind.replace("|", "or")
         lines.append(f"| `{field.name}` | {_cell(kind)} | {default} | {_cell(meanings[field.name])} |")
     return [*lines, "", _text(cls), ""]
@@ -578,6 +598,7 @@ def main() -> None:
     (FOLDER / "helpers.md").write_text(helpers_page(), encoding="utf-8")
     (FOLDER / "names.md").write_text(names_page(), encoding="utf-8")
     (FOLDER / "signals.md").write_text(signals_page(), encoding="utf-8")
+    (FOLDER / "terms.md").write_text(terms_page(), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Writes the tables of `docs/which_gripper.md` from the results of the shipped experiment `which_gripper`.
+"""Writes `docs/which_gripper.md` and `benchmarks/results/which_gripper.md` from the results of the experiment.
 
 graspsense experiment which_gripper --out FOLDER
 python docs/which_gripper.py FOLDER
@@ -14,6 +14,7 @@ from graspsense.experiments.summary import ConditionResult, Summary
 from graspsense.experiments.versions import where_measured
 
 PAGE = Path(__file__).with_name("which_gripper.md")
+THINGS = PAGE.parents[1] / "benchmarks" / "results" / "which_gripper.md"
 BEGIN, END = "<!-- tables: which_gripper.py -->\n", "<!-- end of the tables -->\n"
 
 
@@ -35,27 +36,29 @@ def told_apart(condition: ConditionResult) -> dict[str, str]:
     return shares
 
 
-def tables(summary: Summary) -> str:
-    """Return both tables as Markdown."""
+def table_of_grippers(summary: Summary) -> str:
+    """Return the rates of each gripper as Markdown."""
     both, objects = of_target(summary, "both"), of_target(summary, "class")
     lines = ["| gripper | thing and state recognised | thing recognised | grasps |", "|---|---|---|---|"]
     for condition, of_class in zip(both, objects, strict=True):
         lines.append(
             f"| {condition.name} | {condition.rate.words} | {of_class.rate.words} | {condition.confusion.n} |"
         )
+    return "\n".join(lines) + "\n"
+
+
+def table_of_things(summary: Summary) -> str:
+    """Return what each gripper takes each thing for as Markdown."""
+    both = of_target(summary, "both")
     columns = [told_apart(condition) for condition in both]
-    lines += [
-        "",
-        f"| thing | {' | '.join(condition.name for condition in both)} |",
-        "|---|" + "---|" * len(both),
-    ]
+    lines = [f"| thing | {' | '.join(condition.name for condition in both)} |", "|---|" + "---|" * len(both)]
     for label in both[0].confusion.labels:
         lines.append(f"| `{label}` | {' | '.join(column[label] for column in columns)} |")
     return "\n".join(lines) + "\n"
 
 
 def main() -> None:
-    """Write the page."""
+    """Write both pages."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -66,8 +69,10 @@ def main() -> None:
     head, tail = text.split(BEGIN)
     after = tail.split(END)[1]
     measured = where_measured().partition(", python")[0]
-    written = f"{BEGIN}\nMeasured: {measured}.\n\n{tables(summary)}\n{END}"
+    written = f"{BEGIN}\nMeasured: {measured}.\n\n{table_of_grippers(summary)}\n{END}"
     PAGE.write_text(head + written + after, encoding="utf-8")
+    text = THINGS.read_text(encoding="utf-8").partition("Measured: ")[0]
+    THINGS.write_text(f"{text}Measured: {measured}.\n\n{table_of_things(summary)}", encoding="utf-8")
 
 
 if __name__ == "__main__":

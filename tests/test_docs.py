@@ -51,6 +51,11 @@ def test_the_page_of_the_hooks_is_what_the_code_says():
     assert written == PAGES.hooks_page(), "run: python docs/role_pages.py"
 
 
+def test_the_page_of_the_terms_is_what_the_code_says():
+    written = (ROOT / "docs" / "roles" / "terms.md").read_text(encoding="utf-8")
+    assert written == PAGES.terms_page(), "run: python docs/role_pages.py"
+
+
 def test_the_drawing_of_the_packages_is_that_of_the_imports():
     assert DRAWING.FILE.read_text() == DRAWING.drawing(), "run: python docs/package_drawing.py"
 

@@ -1,4 +1,4 @@
-"""The gripper of docs/tcp_gripper.md: its code runs, conforms, and does with one force sensor what the page says."""
+"""The example of docs/tcp_gripper.md runs, conforms, and does with one force sensor what the page says."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ from graspsense.testing import examine
 LATE_S = 0.15
 """Longer than the page's driver waits for an answer before it asks again; this is waited for in earnest."""
 PAGE = (Path(__file__).parents[1] / "docs" / "tcp_gripper.md").read_text(encoding="utf-8")
+EXAMPLE = Path(__file__).parents[1] / "examples" / "tcp_gripper"
 
 
 class Plugin:
@@ -30,22 +31,21 @@ class Plugin:
     @hookimpl
     def graspsense_sensor_backends(self):
         return [
-            SensorBackendEntry(name="lab-hand", target="lab_hand:TcpHand", summary="a hand on a socket"),
+            SensorBackendEntry(name="lab-hand", target="tcp_hand:TcpHand", summary="a hand on a socket"),
             SensorBackendEntry(
-                name="seeing", target="lab_hand:TcpHandWithCamera", summary="a hand with a camera"
+                name="seeing", target="tcp_hand:TcpHandWithCamera", summary="a hand with a camera"
             ),
         ]
 
 
 @pytest.fixture
 def hand(monkeypatch):
-    """The module of the page. Its time passes while the driver sleeps, and a little as anybody looks at it."""
-    (code,) = re.findall(r"<!-- example: tcp gripper -->\n```python\n(.*?)```", PAGE, re.DOTALL)
-    module = ModuleType("lab_hand")
-    monkeypatch.setitem(sys.modules, "lab_hand", module)
-    exec(compile(code, "tcp_gripper.md", "exec", dont_inherit=True), vars(module))
-    (camera,) = re.findall(r"<!-- example: camera -->\n```python\n(.*?)```", PAGE, re.DOTALL)
-    exec(compile(camera, "tcp_gripper.md", "exec", dont_inherit=True), vars(module))
+    """The modules of the example. Time passes while the driver sleeps, and a little as anybody looks at it."""
+    module = ModuleType("tcp_hand")
+    monkeypatch.setitem(sys.modules, "tcp_hand", module)
+    for name in ("tcp_hand.py", "tcp_hand_camera.py"):
+        code = (EXAMPLE / name).read_text(encoding="utf-8")
+        exec(compile(code, name, "exec", dont_inherit=True), vars(module))
     now_s, looked = 0.0, threading.Lock()
 
     def sleep(seconds):

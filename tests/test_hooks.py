@@ -1,10 +1,11 @@
-"""Every hook has a test `test_hook_NAME`, its exact signature in the documentation, and an example that runs."""
+"""Every hook has a test `test_hook_NAME`, and an example in its docstring that runs."""
 
 from __future__ import annotations
 
 import inspect
 import logging
 import re
+import textwrap
 import types
 from pathlib import Path
 
@@ -25,17 +26,18 @@ from graspsense.plugin_api import CommandEntry, PluginUnavailable, UnknownName, 
 from graspsense.simulator_api import collect
 
 HOOKS = {name: spec for name, spec in vars(hookspecs).items() if name.startswith("graspsense_")}
-DOCS = (Path(__file__).parents[1] / "docs" / "hooks.md").read_text()
+DOCS = (Path(__file__).parents[1] / "docs" / "hooks.md").read_text(encoding="utf-8")
 RUN = RunInfo(components={"gripper": "graspsense/replay 0.1.0"}, settings={"run": {"seed": 7}}, seed=7)
 EVENT = GraspEvent(1.5, Phase.SQUEEZE, "both pads touch")
 
 
 def example(hook: str) -> types.ModuleType:
-    """Return the plugin module that the documentation gives for this hook."""
-    section = re.search(rf"^## {hook}\(.*?```python\n(.*?)```", DOCS, re.DOTALL | re.MULTILINE)
-    assert section, f"docs/hooks.md has no example of {hook}"
+    """Return the plugin module that the docstring of this hook gives as its example."""
+    code = textwrap.dedent(inspect.cleandoc(HOOKS[hook].__doc__).partition("\n\nExample::\n\n")[2])
+    assert code, f"the docstring of {hook} has no example"
     module = types.ModuleType(f"example_of_{hook}")
-    exec(section[1], vars(module))
+    vars(module)["GRASPSENSE_API"] = (2, 0)
+    exec(code, vars(module))
     return module
 
 
@@ -59,22 +61,6 @@ def trial() -> Trial:
 @every_case("hook", HOOKS)
 def test_every_hook_has_a_test(hook):
     assert f"test_hook_{hook}" in globals()
-
-
-@every_case("hook", HOOKS)
-def test_every_hook_is_documented_with_its_exact_signature(hook):
-    signature = f"{hook}{inspect.signature(HOOKS[hook])}".replace("'", "")
-    assert f"\n## {signature}\n" in DOCS
-
-
-@every_case("hook", HOOKS)
-def test_every_hook_says_what_it_is_for(hook):
-    assert inspect.getdoc(HOOKS[hook])
-
-
-def test_the_documentation_knows_no_other_hook():
-    documented = re.findall(r"^## (graspsense_\w+)\(", DOCS, re.MULTILINE)
-    assert sorted(documented) == sorted(HOOKS)
 
 
 @every_case(

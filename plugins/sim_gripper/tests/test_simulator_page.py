@@ -60,14 +60,6 @@ def test_the_table_of_terms_has_every_term():
     assert [row[0].strip("`") for row in rows("Terms")] == list(TERMS)
 
 
-def test_the_list_of_parameters_has_every_parameter_of_every_term():
-    named = {
-        term: re.findall(r"`(\w+)`", words)
-        for term, words in re.findall(r"^- `(\w+)`: (.*)$", section("Terms"), re.MULTILINE)
-    }
-    assert named == {name: list(term.params._fields) for name, term in TERMS.items()}
-
-
 def test_the_table_of_the_report_has_every_key():
     gripper = create("sensor-backend", "sim", explain=True)
     gripper.open(0)

@@ -45,94 +45,406 @@ hookimpl = pluggy.HookimplMarker(PROJECT)
 
 @hookspec
 def graspsense_sensor_backends() -> Iterable[SensorBackendEntry]:  # type: ignore[empty-body]
-    """Return the grippers of this plugin."""
+    """Return the [grippers](sensor-backend.md) of this plugin.
+
+    Example::
+
+        from graspsense.plugin_api import SensorBackendEntry, hookimpl
+
+
+        @hookimpl
+        def graspsense_sensor_backends():
+            yield SensorBackendEntry(
+                name="lab-hand",
+                target="lab_hand.backend:LabHand",
+                summary="the two-finger hand of our lab, over a serial line",
+                needs="pip install pyserial",
+            )
+    """
 
 
 @hookspec
 def graspsense_controllers() -> Iterable[ControllerEntry]:  # type: ignore[empty-body]
-    """Return the control laws of this plugin."""
+    """Return the [control laws](controller.md) of this plugin.
+
+    Example::
+
+        from graspsense.plugin_api import ControllerEntry, hookimpl
+
+
+        @hookimpl
+        def graspsense_controllers():
+            yield ControllerEntry(
+                name="gentle",
+                target="lab_hand.gentle:GentleController",
+                summary="closes ever more slowly",
+            )
+    """
 
 
 @hookspec
 def graspsense_feature_sets() -> Iterable[FeatureSetEntry]:  # type: ignore[empty-body]
-    """Return the feature sets of this plugin."""
+    """Return the [feature sets](feature-set.md) of this plugin.
+
+    `Feature(..., width=True)` marks the feature that is the width of the object.
+
+    Example::
+
+        from graspsense.plugin_api import FeatureSetEntry, hookimpl
+
+
+        @hookimpl
+        def graspsense_feature_sets():
+            yield FeatureSetEntry(
+                name="stiffness",
+                target="lab_hand.stiffness:Stiffness",
+                summary="slope of force over gap in the squeeze",
+            )
+    """
 
 
 @hookspec
 def graspsense_classifiers() -> Iterable[ClassifierEntry]:  # type: ignore[empty-body]
-    """Return the classifiers of this plugin."""
+    """Return the [classifiers](classifier.md) of this plugin.
+
+    A classifier always predicts a label that it was trained on: unknown trials are detected by [one
+    rule](../evaluation.md#when-a-trial-is-unknown) for all.
+
+    Example::
+
+        from graspsense.plugin_api import ClassifierEntry, hookimpl
+
+
+        @hookimpl
+        def graspsense_classifiers():
+            yield ClassifierEntry(
+                name="nearest",
+                target="lab_hand.nearest:Nearest",
+                summary="the label of the nearest trial",
+            )
+    """
 
 
 @hookspec
 def graspsense_pipelines() -> Iterable[PipelineEntry]:  # type: ignore[empty-body]
-    """Return the pipeline files that this plugin ships."""
+    """Return the pipeline files that this plugin ships, for `--pipeline NAME` and `extends = "NAME"`.
+
+    A file must be in the wheel.
+
+    Example::
+
+        from graspsense.plugin_api import PipelineEntry, hookimpl
+
+
+        @hookimpl
+        def graspsense_pipelines():
+            yield PipelineEntry(
+                name="lab",
+                resource="lab_hand:pipelines/lab.toml",
+                summary="our hand, with hybrid control",
+            )
+    """
 
 
 @hookspec
 def graspsense_models() -> Iterable[ModelEntry]:  # type: ignore[empty-body]
-    """Return the trained models that this plugin ships."""
+    """Return the trained models that this plugin ships, as JSON files.
+
+    Example::
+
+        from graspsense.plugin_api import hookimpl
+        from graspsense.simulator_api import ModelEntry
+
+
+        @hookimpl
+        def graspsense_models():
+            yield ModelEntry(
+                name="lab-cans",
+                resource="lab_hand:models/cans.json",
+                summary="open and closed cans, trained on 400 grasps of our hand",
+            )
+    """
 
 
 @hookspec
 def graspsense_datasets() -> Iterable[DatasetEntry]:  # type: ignore[empty-body]
-    """Return the readers of recorded data of this plugin."""
+    """Return the [readers of recorded data](dataset.md) of this plugin, which the command line calls `NAME:FOLDER`.
+
+    A data set with features of its own names a function `read(folder, features, *, unreliable) -> Labelled` as
+    `target`: `features` is the feature set for traces, and `unreliable` says whether to include trials that the
+    author of the data calls unreliable.
+
+    Example::
+
+        from graspsense.plugin_api import DatasetEntry, hookimpl
+
+
+        @hookimpl
+        def graspsense_datasets():
+            yield DatasetEntry(
+                name="lab-csv",
+                recordings="lab_hand.csv:recordings",
+                summary="the CSV files of our lab",
+            )
+    """
 
 
 @hookspec
 def graspsense_commands() -> Iterable[CommandEntry]:  # type: ignore[empty-body]
-    """Return further subcommands of `graspsense`."""
+    """Return further subcommands of `graspsense`.
+
+    The commands of graspsense itself keep their names. A plugin command with the same name is called `graspsense
+    DISTRIBUTION/NAME`.
+
+    Example::
+
+        from graspsense.plugin_api import CommandEntry, hookimpl
+
+
+        @hookimpl
+        def graspsense_commands():
+            yield CommandEntry(
+                name="home-hand",
+                target="lab_hand.cli:home",
+                summary="move our hand to its home position",
+            )
+    """
 
 
 @hookspec
 def graspsense_emulators() -> Iterable[EmulatorEntry]:  # type: ignore[empty-body]
-    """Return the devices that this plugin can emulate as devices of the operating system."""
+    """Return the devices that `graspsense emulate NAME` can present as devices of the operating system.
+
+    `wire` is one of `wires`, or empty for the first that is available. If none is, the function raises `NoDevice`
+    and says what each one lacks. The device must disappear with its process, however that ends.
+
+    Example::
+
+        from graspsense.gripper_api import EmulatorEntry
+        from graspsense.plugin_api import hookimpl
+
+
+        @hookimpl
+        def graspsense_emulators():
+            yield EmulatorEntry(
+                name="lab-hand",
+                target="lab_hand.emulator:emulate",
+                summary="our hand, behind a pseudo terminal",
+                wires=("pty",),
+            )
+    """
 
 
 @hookspec
 def graspsense_identifiers() -> Iterable[IdentifierEntry]:  # type: ignore[empty-body]
-    """Return functions that identify objects from recorded squeezes."""
+    """Return functions that identify an object from recorded squeezes, for `graspsense identify`.
+
+    `block` may be empty.
+
+    Example::
+
+        from graspsense.plugin_api import hookimpl
+        from graspsense.simulator_api import IdentifierEntry
+
+
+        @hookimpl
+        def graspsense_identifiers():
+            yield IdentifierEntry(
+                name="lab-sim",
+                target="lab_sim.identification:identify",
+                summary="stiffness and width, as a scene of our simulator",
+            )
+    """
 
 
 @hookspec
 def graspsense_live_observers() -> Iterable[LiveObserverEntry]:  # type: ignore[empty-body]
-    """Return functions that receive grasps while they go on, each in a process of its own."""
+    """Return functions that receive grasps while they go on, for `--live`, each in a process of its own.
+
+    [What they receive](../live.md#an-observer-of-your-own) has a page. No tick waits for an observer, however it
+    fails.
+
+    Example::
+
+        from graspsense.gripper_api import LiveObserverEntry
+        from graspsense.plugin_api import hookimpl
+
+
+        @hookimpl
+        def graspsense_live_observers():
+            yield LiveObserverEntry(
+                name="lab-wall",
+                target="lab_hand.wall:observe",
+                summary="the screen on the wall of our lab",
+            )
+    """
 
 
 @hookspec
 def graspsense_experiment_kinds() -> Iterable[ExperimentKindEntry]:  # type: ignore[empty-body]
-    """Return the kinds of experiments of this plugin."""
+    """Return the kinds of experiments of this plugin, which an experiment file selects by `kind`.
+
+    `run(params, seed)` computes one task: `params` holds the resolved settings, the source of trials, the
+    classifiers and the keys under `[judge]` as JSON values.
+
+    Example::
+
+        from graspsense.experiment_api import ExperimentKindEntry
+        from graspsense.plugin_api import hookimpl
+
+
+        @hookimpl
+        def graspsense_experiment_kinds():
+            yield ExperimentKindEntry(
+                name="wear",
+                run="lab_study.wear:run",
+                keys="lab_study.wear:WearSettings",
+                result="lab_study.wear:WearResult",
+                findings="lab_study.wear:findings",
+                summary="how a bottle changes from squeeze to squeeze",
+            )
+    """
 
 
 @hookspec
 def graspsense_experiments() -> Iterable[ExperimentEntry]:  # type: ignore[empty-body]
-    """Return the experiment files that this plugin ships."""
+    """Return the experiment files that this plugin ships, for `graspsense experiment NAME`.
+
+    Example::
+
+        from graspsense.experiment_api import ExperimentEntry
+        from graspsense.plugin_api import hookimpl
+
+
+        @hookimpl
+        def graspsense_experiments():
+            yield ExperimentEntry(name="worn-cans", resource="lab_study:experiments/worn_cans.toml")
+    """
 
 
 @hookspec
 def graspsense_conformance_checks() -> Iterable[ConformanceCheckEntry]:  # type: ignore[empty-body]
-    """Return checks of what other plugins return from the hooks that this plugin owns."""
+    """Return checks of what other plugins return from a hook that this plugin defines.
+
+    `graspsense plugins check DISTRIBUTION` runs them. `target` is a function that takes the list of these values of
+    one distribution, and yields a sentence for each defect.
+
+    Example::
+
+        from graspsense.plugin_api import hookimpl
+        from graspsense.simulator_api import ConformanceCheckEntry
+
+
+        @hookimpl
+        def graspsense_conformance_checks():
+            yield ConformanceCheckEntry(
+                name="fingers-have-names",
+                target="lab_hand.checks:check_fingers",
+                hook="lab_hand_fingers",
+                summary="every finger has a name of its own",
+            )
+    """
 
 
 @hookspec
 def graspsense_probe_devices(timeout_s: float) -> Iterable[FoundDevice]:  # type: ignore[empty-body]
-    """Search for devices for at most `timeout_s` seconds. May import drivers: only `graspsense devices` calls it."""
+    """Search for devices for at most `timeout_s` seconds.
+
+    Only `graspsense devices` calls it, so it may import drivers. `ready` says whether the device can be opened now;
+    `advice` says what to do if not.
+
+    Example::
+
+        from graspsense.gripper_api import FoundDevice
+        from graspsense.plugin_api import hookimpl
+
+
+        @hookimpl
+        def graspsense_probe_devices(timeout_s):
+            yield FoundDevice(
+                backend="lab-hand",
+                serial="0042",
+                where="/dev/ttyUSB0",
+                ready=False,
+                advice="add yourself to the group dialout",
+            )
+    """
 
 
 @hookspec
 def graspsense_diagnose(config: object, timeout_s: float) -> Iterable[Finding]:  # type: ignore[empty-body]
-    """Examine the connected devices and why they fail. May import drivers: only `graspsense doctor` calls it."""
+    """Examine the connected devices: permissions, libraries, rate and latency, age of calibrations.
+
+    Only `graspsense doctor` calls it, so it may import drivers. `config` is that of the gripper that the user
+    named, or None; it may belong to another plugin. Each device may be opened for about `timeout_s` seconds, but
+    nothing may move. A `problem` makes the exit code 1; an exception is reported as one of this plugin.
+
+    Example::
+
+        from graspsense.gripper_api import Finding
+        from graspsense.plugin_api import hookimpl
+
+
+        @hookimpl
+        def graspsense_diagnose(config, timeout_s):
+            yield Finding(
+                subject="serial line",
+                state="problem",
+                words="no permission on /dev/ttyUSB0",
+                advice="add yourself to the group dialout",
+                numbers={"baud": 115200},
+            )
+    """
 
 
 @hookspec
 def graspsense_run_starting(run: RunInfo) -> None:
-    """Observe that a grasp is about to start."""
+    """Observe that a grasp is about to start.
+
+    Example::
+
+        from graspsense.plugin_api import hookimpl
+
+        started = []
+
+
+        @hookimpl
+        def graspsense_run_starting(run):
+            started.append(run.seed)
+    """
 
 
 @hookspec
 def graspsense_grasp_event(run: RunInfo, event: GraspEvent) -> None:
-    """Observe a change of phase, or an action of the guard."""
+    """Observe a change of phase, an action of the guard, or an event that the controller tells.
+
+    In the last case `source` is `controller`, and `what` the name of the event.
+
+    Example::
+
+        from graspsense.plugin_api import hookimpl
+
+        events = []
+
+
+        @hookimpl
+        def graspsense_grasp_event(event):
+            events.append(event.what)
+    """
 
 
 @hookspec
 def graspsense_run_finished(run: RunInfo, trial: Trial) -> None:
-    """Observe the finished trial, whatever its outcome."""
+    """Observe the finished trial, whatever its outcome.
+
+    Example::
+
+        from graspsense.plugin_api import hookimpl
+
+        outcomes = []
+
+
+        @hookimpl
+        def graspsense_run_finished(trial):
+            outcomes.append(trial.outcome.words)
+    """

@@ -14,7 +14,11 @@ LEAST_SOFT_N: Final = 0.1
 
 
 class Elastic(NamedTuple):
-    """An elastic shell: force k1 d + k3 d^3. With k3 < 0 it softens, but its force never falls (`shell_force`)."""
+    """An elastic shell: force k1 d + k3 d^3.
+
+    With k3 < 0 it softens until its slope is 5 % of k1, and goes on with that slope, so its force never falls. A k3
+    that softens the shell completely before it bears 0.1 N is refused.
+    """
 
     k1_n_m: float
     k3_n_m3: float = 0.0

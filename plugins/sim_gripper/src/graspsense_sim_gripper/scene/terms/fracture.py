@@ -11,7 +11,8 @@ from graspsense_sim_gripper.scene.terms.term import Rate, Term, WorkingPoint, no
 class Fracture(NamedTuple):
     """The object breaks where the sum of its other terms exceeds `force_n`, or its compression `compression_m`.
 
-    From then on it bears the fraction `left` of that sum.
+    From then on it bears the fraction `left` of that sum. The break is located within the tick. An object has at most
+    one such term.
     """
 
     force_n: float = math.inf

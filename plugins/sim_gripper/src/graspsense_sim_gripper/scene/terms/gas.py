@@ -30,7 +30,8 @@ class Gas(NamedTuple):
     exponent: float
     bulge_m3_pa: float
     vent_m2: float = 0.0
-    """Area of an opening, from a pinhole to an open neck; 0 for a sealed container."""
+    """Area of an opening, from a pinhole to an open neck; 0 for a sealed container. The flow is viscous below about
+    1 Pa, and that of an orifice above."""
     heat_s: float = math.inf
     """Time constant of the heat exchange with the walls."""
 
