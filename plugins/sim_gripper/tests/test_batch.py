@@ -35,8 +35,7 @@ from graspsense.plugin_api import (
 from graspsense.simulator_api import CompiledExtraction
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.backend import SimBackend
-from graspsense_sim_gripper.run.batch import job as batch_job
-from graspsense_sim_gripper.run.batch import threads, worker
+from graspsense_sim_gripper.run.batch import buffers, threads, worker
 from graspsense_sim_gripper.run.batch.job import Job, grasp_plain
 from graspsense_sim_gripper.run.batch.scenes import Scenes
 from graspsense_sim_gripper.run.batch.threads import SLICE, WORTH_A_PROCESS, run_many, slices_of
@@ -158,7 +157,7 @@ def test_features_without_traces_are_those_of_the_traces():
 @pytest.mark.slow
 @pytest.mark.parametrize("sensor", ["pads", "ideal"])
 def test_grasps_that_compiled_code_draws_are_those_of_their_setups(sensor, monkeypatch):
-    """Of each object, of one that breaks, of one beyond its law, and with more images than the buffers hold first."""
+    """Of each object, one that breaks, one beyond its law, and with more images or ticks than buffers hold at first."""
     pytest.importorskip("numba", reason="the compiled loop needs the extra `fast`")
     names = [*sorted(catalogue()), "odwalla:full_open#3", BREAKS, "none"]
     config, options = (
@@ -176,8 +175,10 @@ def test_grasps_that_compiled_code_draws_are_those_of_their_setups(sensor, monke
     drawn = told(1)
     assert told(3) == drawn
     for images in (48, 100):
-        monkeypatch.setattr(batch_job, "IMAGES", images)
+        monkeypatch.setattr(buffers, "IMAGES", images)
         assert told(1) == drawn
+    monkeypatch.setattr(buffers, "TICKS", 700)
+    assert told(1) == drawn
     assert any(report["broken"] for *_, report in drawn)
 
 
@@ -578,9 +579,8 @@ def test_without_numba_the_plain_loop_runs_and_says_so(monkeypatch):
 
 def test_room_is_made_on_the_way_without_beginning_again(monkeypatch):
     whole = run_many(SimConfig(), HYBRID, ["toy"], [3])[0].trace
-    monkeypatch.setattr(batch_job, "TICKS", 100)
-    monkeypatch.setattr(batch_job, "IMAGES", 64)
-    # Storage reads its sizes when it is made.
+    monkeypatch.setattr(buffers, "TICKS", 100)
+    monkeypatch.setattr(buffers, "IMAGES", 64)
     assert bits(run_many(SimConfig(), HYBRID, ["toy"], [3])[0].trace) == bits(whole)
 
 

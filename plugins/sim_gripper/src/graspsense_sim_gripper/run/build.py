@@ -40,11 +40,11 @@ from graspsense_sim_gripper.run.drawing import (
     scene_numbers,
 )
 from graspsense_sim_gripper.run.problem import GraspSetup, Problem
-from graspsense_sim_gripper.scene.instance import PAD_CELLS, Instance, draws_of_number, instance_of
+from graspsense_sim_gripper.scene.instance import PAD_CELLS, deepest_dent, draws_of_number, params_of_terms
 from graspsense_sim_gripper.scene.library import find, split_number
 from graspsense_sim_gripper.scene.random_numbers import key_of
 from graspsense_sim_gripper.scene.scaled import ScaledParameter
-from graspsense_sim_gripper.scene.spec import ObjectSpec
+from graspsense_sim_gripper.scene.spec import ObjectSpec, TermParams
 from graspsense_sim_gripper.solve.scheme import PlantParams, Steps
 
 EFFORT_LIMIT_N: Final = 100.0
@@ -171,18 +171,21 @@ def _setup(
     buffers = draw_buffers(scene)
     of_number = NO_NUMBER if number is None or spec is None else draws_of_number(spec, number)
     drawn = draw_grasp(scene, key_of(seed or 0), of_number, buffers)
-    instance = None if spec is None else instance_of(spec, drawn.placement, buffers.params)
-    if instance is not None and seed is not None:
-        check_fit(config, instance.spec, instance.width_m, instance.offset_m)
-    plant, state = _plant(config, instance, drawn)
-    if instance is not None and reduction is not None:
+    width_m, terms = drawn.placement.width_m, ()
+    if spec is not None:
+        width_m -= deepest_dent(spec, buffers.params)
+        terms = params_of_terms(spec, buffers.params)
+        if seed is not None:
+            check_fit(config, spec, width_m, drawn.placement.offset_m)
+    plant, state = _plant(config, spec, drawn, width_m, terms)
+    if reduction is not None:
         plant = reduction.applied_to(plant)
     return GraspSetup(
-        kinds=instance.kinds if instance else (),
-        terms=instance.terms if instance else (),
+        kinds=() if spec is None else spec.kinds,
+        terms=terms,
         plant=plant,
         state=state,
-        sensor=_sensor(config, 1.0 if instance is None else instance.share, drawn, buffers.cells),
+        sensor=_sensor(config, drawn, buffers.cells),
         sensor_state=_gripper(config).sensor_state,
         dt_s=1.0 / config.rate_hz,
         seed=seed or 0,
@@ -207,26 +210,23 @@ def check_fit(config: SimConfig, spec: ObjectSpec, width_m: float, offset_m: flo
         )
 
 
-def _plant(config: SimConfig, instance: Instance | None, drawn: Drawn) -> tuple[PlantParams, PlantState]:
+def _plant(
+    config: SimConfig, spec: ObjectSpec | None, drawn: Drawn, width_m: float, terms: tuple[TermParams, ...]
+) -> tuple[PlantParams, PlantState]:
     """Return the parameters of the plant, and its state before the grasp: open, at rest, without contact."""
     gripper = _gripper(config)
     friction = gripper.drive.friction._replace(coulomb_n=drawn.coulomb_n, breakaway_n=drawn.breakaway_n)
     drive = gripper.drive._replace(friction=friction)
-    if instance is None:
-        # A negative width: the fingers close without touching anything.
-        model = ObjectModel(-1.0, 0.0, gripper.pads, all_active(()))
-        at_rest, offset = _uncompressed(()), 0.0
-    else:
-        model = ObjectModel(
-            width_m=instance.width_m,
-            table_friction_n=instance.table_n,
-            terms=all_active(instance.terms),
-            pads=gripper.pads,
-            held=1 if instance.spec.held else 0,
-        )
-        at_rest, offset = _uncompressed(instance.kinds), instance.offset_m
+    model = ObjectModel(
+        width_m=width_m,
+        table_friction_n=0.0 if spec is None else spec.table_n,
+        terms=all_active(terms),
+        pads=gripper.pads,
+        held=1 if spec is not None and spec.held else 0,
+    )
+    at_rest = _uncompressed(() if spec is None else spec.kinds)
     right = (at_rest,) if model.held == 1 else ()
-    state = PlantState(gripper.motion, Contact(0.0, 0.0, offset, 0, at_rest, right))
+    state = PlantState(gripper.motion, Contact(0.0, 0.0, drawn.placement.offset_m, 0, at_rest, right))
     return PlantParams(drive, model, gripper.steps), state
 
 
@@ -295,8 +295,8 @@ def _inertia(config: SimConfig) -> float:
     return 4.0 * math.pi * math.pi * config.rotor_kg_m2
 
 
-def _sensor(config: SimConfig, share: float, drawn: Drawn, cells: CellArrays) -> SensorParams:
-    """Return the sensors of a grasp; `share`: that of the force which lands on the gripping faces."""
+def _sensor(config: SimConfig, drawn: Drawn, cells: CellArrays) -> SensorParams:
+    """Return the sensors of a grasp."""
     period = float(config.pad_period_s)
     if config.sensor == "ideal":
         clock = ImageClock(0.0, period, 0.0)
@@ -305,7 +305,7 @@ def _sensor(config: SimConfig, share: float, drawn: Drawn, cells: CellArrays) ->
         ideal=0,
         link=_linkage(config),
         clock=ImageClock(drawn.image_phase_s, period, float(config.pad_delay_s)),
-        share=float(share),
+        share=float(drawn.placement.share),
         noise_counts=float(config.noise_counts),
         left=PadCells(cells.weights, cells.left),
         right=PadCells(cells.weights, cells.right),

@@ -19,6 +19,7 @@ from graspsense_sim_gripper.scene.identified import check_identified
 from graspsense_sim_gripper.scene.terms.registry import find_term, in_order
 from graspsense_sim_gripper.scene.terms.term import not_dented
 
+GRAVITY_M_S2: Final = 9.80665
 PATCHES: Final = ("line", "face", "point")
 
 LARGEST: Final = 1e20
@@ -117,6 +118,11 @@ class ObjectSpec:
     def kinds(self) -> tuple[str, ...]:
         """The kinds of its terms."""
         return tuple(kind for kind, _ in self.terms)
+
+    @property
+    def table_n(self) -> float:
+        """Friction of the table, which a finger has to overcome to push the object."""
+        return self.friction * self.mass_kg * GRAVITY_M_S2
 
     @cached_property
     def nominal_params(self) -> NominalParams:

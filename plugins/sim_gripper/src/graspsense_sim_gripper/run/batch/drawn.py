@@ -17,10 +17,8 @@ from numpy.typing import NDArray
 from graspsense.simulator_api import CompileOptions, compile_function, entry_point
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant.sensing import PadCells
-from graspsense_sim_gripper.run.accuracy.model import Reduction
 from graspsense_sim_gripper.run.binding import bind_reachable
 from graspsense_sim_gripper.run.build import check_fit
-from graspsense_sim_gripper.run.compiled.compose import Composition
 from graspsense_sim_gripper.run.compiled.jit import generating
 from graspsense_sim_gripper.run.compiled.loop_code import (
     Arrays,
@@ -29,7 +27,7 @@ from graspsense_sim_gripper.run.compiled.loop_code import (
     Numbers,
     loop_start,
 )
-from graspsense_sim_gripper.run.compiled.padding import PaddedLayout, composition_of, layout_of
+from graspsense_sim_gripper.run.compiled.padding import PaddedLayout, layout_of
 from graspsense_sim_gripper.run.drawing import (
     NO_NUMBER,
     DrawBuffers,
@@ -148,8 +146,7 @@ class DrawnScene:
     """What the grasps of a scene are drawn from."""
 
     config: SimConfig
-    spec: ObjectSpec
-    composition: Composition
+    spec: ObjectSpec | None
     layout: PaddedLayout
     start: StartLayout
     numbers: Numbers
@@ -179,58 +176,39 @@ class DrawnScene:
         Its arrays are those of `memory`, until the next grasp is drawn to it. Raises ConfigError as `check_fit` does.
         """
         numbers, spec, places, (buffers, arrays) = self.numbers.copy(), self.spec, self.places, memory
-        of_number = NO_NUMBER if number is None else np.array(draws_of_number(spec, number))
+        of_number = NO_NUMBER
+        if number is not None and spec is not None:
+            of_number = np.array(draws_of_number(spec, number))
         drawing(self.scene, places, key, of_number, buffers, numbers)
-        if spec.dents:
+        if spec is not None and spec.dents:
             numbers[places.width_m] -= deepest_dent(spec, buffers.params.tolist())
-        if spec.file:
+        if spec is not None and spec.file:
             check_fit(self.config, spec, float(numbers[places.width_m]), float(numbers[places.offset_m]))
         return LoopStart(self.start.types, numbers, arrays)
 
 
-class DrawnInstances(NamedTuple):
-    """What grasps are drawn from, of any instances of a scene or of a particular one."""
-
-    scene: DrawnScene
-    number: int | None
-    """That of the instance."""
-
-
 def drawn_scene(
-    problem: Problem,
-    reduction: Reduction | None,
-    example: GraspSetup,
-    begun: tuple[GraspParams, SimulationState],
-    layouts: dict[Composition, StartLayout],
-) -> DrawnScene | None:
-    """Return what the grasps of a scene are drawn from; None if each of them needs a `GraspSetup`.
+    problem: Problem, example: GraspSetup, begun: tuple[GraspParams, SimulationState]
+) -> DrawnScene:
+    """Return what the grasps of a scene are drawn from.
 
-    `example`: one of them; `begun`: its parameters and its first state, padded. `layouts`: those that are known, to
-    which that of this scene is added.
+    `example`: one of them; `begun`: its parameters and its first state, padded.
     """
-    spec = problem.spec
-    if spec is None or reduction is None:
-        return None
-    layout, config = layout_of(example), problem.config
-    composition = composition_of(example)
-    if composition not in layouts:
-        layouts[composition] = StartLayout.made_of(*begun)
-    known = layouts[composition]
-    start, places = loop_start(*begun, known.types), _places(known.places, layout, spec)
+    layout, start = layout_of(example), StartLayout.made_of(*begun)
+    numbers = loop_start(*begun, start.types)
     return DrawnScene(
-        config=config,
-        spec=spec,
-        composition=composition,
+        config=problem.config,
+        spec=problem.spec,
         layout=layout,
-        start=known,
-        numbers=start.numbers,
-        arrays=start.arrays,
-        scene=_with_arrays(scene_numbers(config, spec)),
-        places=places,
+        start=start,
+        numbers=numbers.numbers,
+        arrays=numbers.arrays,
+        scene=_with_arrays(scene_numbers(problem.config, problem.spec)),
+        places=_places(start.places, layout),
     )
 
 
-def _places(known: Any, layout: PaddedLayout, spec: ObjectSpec) -> Places:
+def _places(known: Any, layout: PaddedLayout) -> Places:
     """Return where the numbers are that a seed decides; `known`: parameters and state with the place of each number."""
     params, state = known
     friction, model = params.plant.drive.friction, params.plant.object

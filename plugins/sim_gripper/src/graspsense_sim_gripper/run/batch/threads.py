@@ -37,7 +37,7 @@ from graspsense_sim_gripper.run.batch.worker import NotHandedOver, PlainProcess
 from graspsense_sim_gripper.run.compiled.compose import Composition
 from graspsense_sim_gripper.run.compiled.extraction import compiled_measure
 from graspsense_sim_gripper.run.compiled.loop_code import CompiledLoops
-from graspsense_sim_gripper.run.compiled.padding import compiled_kinds, composition_of
+from graspsense_sim_gripper.run.compiled.padding import compiled_kinds
 from graspsense_sim_gripper.scene.library import kinds_in
 from graspsense_sim_gripper.scene.scaled import ScaledParameter
 
@@ -170,7 +170,7 @@ class _Batch:
                         progress(finished, total)
                     which, future = running[0]
                     if wait([future], PROGRESS_S).done:
-                        yield from self._with_models(future.result(), which)
+                        yield from future.result()
                         finished += len(which)
                         running.popleft()
                 if progress is not None:
@@ -191,8 +191,8 @@ class _Batch:
             of_kinds[compiled_kinds(kinds_in(examples[key]))] += n
         for key, n in counts.items():
             worth = self._worth(of_kinds[compiled_kinds(kinds_in(examples[key]))])
-            self.models.add(examples[key], compiled=worth)
-            self.counts[composition_of(self.models.example(examples[key]))] += n
+            scene = self.models.add(examples[key], compiled=worth)
+            self.counts[scene.composition] += n
         for composition, n in self.counts.items():
             self.is_compiled[composition] = self._worth(n)
         if any(self.is_compiled.values()):
@@ -213,13 +213,6 @@ class _Batch:
                 self.measure = compiled_measure(self.job.extraction)
             except NotCompilable as error:
                 self.notes[f"features are extracted from traces, which takes longer: {error}"] = None
-
-    def _with_models(self, done: list[FinishedGrasp], which: range) -> list[FinishedGrasp]:
-        """Return the results of the grasps with these indices, each with its model."""
-        scenes = self.scenes[which.start : which.stop]
-        return [
-            grasp.in_model(self.models.model_of(scene)) for grasp, scene in zip(done, scenes, strict=True)
-        ]
 
     def _part(self, which: range) -> list[tuple[str, int]]:
         """Return the scene and the seed of the grasps with these indices."""
@@ -257,7 +250,7 @@ class _Batch:
             grasps: CompiledGrasps = self.local.grasps
             return grasps.grasp(scene, seed)
         except NotCompilable as error:
-            self._note_not_compilable(composition_of(self.models.setup(scene, seed)), error)
+            self._note_not_compilable(self.models.find(scene).composition, error)
             return None
 
     def _note_not_compilable(self, composition: Composition, error: NotCompilable) -> None:
@@ -280,7 +273,10 @@ class _Batch:
             except NotHandedOver as error:
                 local.without_process = True
                 self.notes[f"plain grasps run on one core: {error}"] = None
-        return [grasp_plain(self.job, self.models.setup(*grasp)) for grasp in grasps]
+        return [
+            grasp_plain(self.job, self.models.setup(scene, seed), self.models.find(scene).model)
+            for scene, seed in grasps
+        ]
 
 
 def slices_of(total: int, workers: int) -> list[range]:

@@ -125,6 +125,7 @@ class PlainProcess:
                     end=partial(like, initial, values),
                     extracted=None if job.extract is None or trace is None else job.extract(trace),
                     kept=trace if job.traces else None,
+                    model=self._scenes.find(scene).model,
                 )
             )
         return results
