@@ -101,6 +101,11 @@ def test_edited_code_finds_nothing_of_before(trials, monkeypatch):
     assert len(trials) == 2
 
 
+@pytest.mark.parametrize("source", ["config", "plant/contact", "run/loop", "scene/spec", "solve/advance"])
+def test_a_file_of_any_room_of_the_simulator_belongs_to_its_code(source):
+    assert f"graspsense_sim_gripper/{source}.py " in cache._own_code().decode()
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("damage", [b"", b"{", b"[]", b'{"verification": null}', b"\xff\xfe"])
 def test_a_damaged_one_is_made_anew(trials, folder, damage):
