@@ -473,7 +473,7 @@ def test_odd_numbers_and_every_object_come_back_from_another_process_to_the_bit(
     odd = job(config=SimConfig(pad_stiffness_n_m=math.inf, noise_counts=0.0, step_s=1e-4), run=run)
     names = [*catalogue(), *shipped_scenes(), "none"]
     with PlainProcess(Scenes(odd)) as process:
-        apart = process.run(names, np.arange(len(names)))
+        apart = [process.run(name, seed) for seed, name in enumerate(names)]
     # Nothing is there: channels that were never felt are NaN, and so are the features drawn.
     assert {grasp.outcome for grasp in apart} == {Outcome.ABORTED}
     for name, seed, grasp in zip(names, range(len(names)), apart, strict=True):
@@ -490,7 +490,7 @@ def test_odd_numbers_and_every_object_come_back_from_another_process_to_the_bit(
 def test_no_trace_is_handed_over_where_nobody_wants_one():
     run = RunConfig(grasp_timeout_s=0.01, opening_timeout_s=0.1)
     with PlainProcess(Scenes(job(run=run, traces=False))) as process:
-        (grasp,) = process.run(["none"], [0])
+        grasp = process.run("none", 0)
     assert grasp.kept is None
     assert grasp.extracted is None
     told = []
@@ -498,7 +498,7 @@ def test_no_trace_is_handed_over_where_nobody_wants_one():
     with PlainProcess(
         Scenes(job(run=run, traces=False, extract=lambda trace: told.append(len(trace)) or "felt"))
     ) as process:
-        (grasp,) = process.run(["none"], [0])
+        grasp = process.run("none", 0)
     assert (grasp.kept, grasp.extracted) == (None, "felt")
     assert told == [len(plainly(job(run=run), "none", 0).trace)]
 
@@ -558,12 +558,12 @@ def test_what_fails_in_another_process_is_said():
     with IsolatedPlugins(Here), PlainProcess(Scenes(job(Endless(HYBRID.config)))) as process:
         for _ in range(2):
             with pytest.raises(NotHandedOver, match="no controller named 'graspsense-test/endless'"):
-                process.run(["none"], [0])
+                process.run("none", 0)
     with (
         PlainProcess(Scenes(job())) as process,
         pytest.raises(NotHandedOver, match="UnknownName: no object named 'blok'"),
     ):
-        process.run(["blok"], [0])
+        process.run("blok", 0)
 
 
 def test_without_numba_the_plain_loop_runs_and_says_so(monkeypatch):

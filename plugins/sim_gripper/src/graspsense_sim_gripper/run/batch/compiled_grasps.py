@@ -20,7 +20,6 @@ from graspsense_sim_gripper.run.batch.job import (
     started,
 )
 from graspsense_sim_gripper.run.batch.scenes import Scenes, SelectedScene, number_in
-from graspsense_sim_gripper.run.compiled.compose import Composition
 from graspsense_sim_gripper.run.compiled.loop_code import (
     NO_NOISE,
     CellNoise,
@@ -35,10 +34,6 @@ from graspsense_sim_gripper.run.problem import GraspSetup
 from graspsense_sim_gripper.run.term_failure import not_finite_in_tick
 from graspsense_sim_gripper.scene.random_numbers import Word, key_of
 from graspsense_sim_gripper.scene.terms.term import LAW_ERRORS
-
-
-def _every(composition: Composition) -> bool:
-    return True
 
 
 class CompiledStart(NamedTuple):
@@ -59,10 +54,10 @@ class CompiledGrasps:
 
     scenes: Scenes
     loops: CompiledLoops
+    is_compiled: Callable[[tuple[str, ...]], bool]
+    """Whether loops with these kinds of terms are compiled."""
     measure: Measure | None = None
     """The compiled form of `Job.extraction`; None: `Job.extract` is called with a trace."""
-    is_compiled: Callable[[Composition], bool] = _every
-    """Whether the loop of a composition is compiled."""
     storage: Storage = field(factory=Storage, init=False)
     _memory: dict[SelectedScene, DrawMemory] = field(factory=dict, init=False)
 
@@ -72,7 +67,7 @@ class CompiledGrasps:
         Raises NotCompilable if it cannot be compiled, and otherwise as `Scenes.setup` does.
         """
         scene, number = self.scenes.find(name), number_in(name)
-        if not self.is_compiled(scene.composition):
+        if not self.is_compiled(scene.composition.kinds):
             return None
         loop, drawn = self.loops.loop_of(scene.composition), scene.drawn
         if scene not in self._memory:
