@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -197,15 +196,11 @@ def _interpreted(job: Job, setup: GraspSetup, loop: GraspLoop, model: GraspModel
     return FinishedGrasp(
         outcome=outcome,
         reason=reason,
-        end=partial(_same, plant),
+        end=lambda: plant,
         extracted=extracted,
         kept=kept,
         model=model,
     )
-
-
-def _same(plant: PlantState) -> PlantState:
-    return plant
 
 
 def started(job: Job, setup: GraspSetup) -> tuple[GraspParams, SimulationState]:

@@ -13,7 +13,6 @@ import os
 import signal
 import subprocess
 import sys
-from functools import partial
 from types import TracebackType
 from typing import IO, Any, Final
 
@@ -24,10 +23,11 @@ from graspsense.gripper_api import Outcome, Phase
 from graspsense.plugin_api import Controller, GraspEvent, Trace, create
 from graspsense.simulator_api import RunConfig, recipe_of
 from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.plant.state import PlantState
 from graspsense_sim_gripper.run.accuracy.cache import restored, stored
 from graspsense_sim_gripper.run.batch.job import FinishedGrasp, Job, grasp_plain
 from graspsense_sim_gripper.run.batch.scenes import Scenes
-from graspsense_sim_gripper.run.nested import like
+from graspsense_sim_gripper.run.nested import Stored, TupleType, append
 
 _ARRAYS: Final = tuple(
     column.name for column in fields(Trace) if column.name not in ("units", "signals", "events")
@@ -113,11 +113,19 @@ class PlainProcess:
         return FinishedGrasp(
             outcome=Outcome(answer["outcome"]),
             reason=answer["reason"],
-            end=partial(like, self._scenes.setup(scene, seed).state, answer["state"]),
+            end=Stored(
+                TupleType.made_of(self._scenes.setup(scene, seed).state), np.array(answer["state"], float)
+            ),
             extracted=None if job.extract is None or trace is None else job.extract(trace),
             kept=trace if job.traces else None,
             model=self._scenes.find(scene).model,
         )
+
+
+def _numbers(state: PlantState) -> list[float]:
+    numbers: list[float] = []
+    append(state, numbers, [])
+    return numbers
 
 
 def _told(grasp: FinishedGrasp) -> list[list[Any]]:
@@ -157,7 +165,7 @@ def main() -> None:
             answer = {
                 "outcome": grasp.outcome.value,
                 "reason": grasp.reason,
-                "state": grasp.state,
+                "state": _numbers(grasp.state),
                 "events": _told(grasp),
             }
         except Exception as error:
