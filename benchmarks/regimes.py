@@ -41,7 +41,7 @@ from graspsense_sim_gripper.run.accuracy.model import Reduction
 from graspsense_sim_gripper.run.accuracy.propose import NOT_VERIFIED
 from graspsense_sim_gripper.run.accuracy.select import select
 from graspsense_sim_gripper.run.batch.job import FinishedGrasp, Job, grasp_plain
-from graspsense_sim_gripper.run.build import instantiate, problem_of
+from graspsense_sim_gripper.run.build import Problem, instantiate
 from graspsense_sim_gripper.run.compiled.padding import padded
 from graspsense_sim_gripper.run.problem import GraspController, GraspSetup
 from graspsense_sim_gripper.scene.spec import ObjectSpec
@@ -148,7 +148,7 @@ class Interpreted(Bench):
         controller = create("controller", "hybrid", closing_speed_m_s=scene.speed_m_s)
         config = evolve(scene.config, accuracy=accuracy, fidelity=fidelity)
         run = RunConfig(grasp_timeout_s=20.0)
-        problem = problem_of(config, scene.spec)
+        problem = Problem(config, scene.spec)
         began = time.thread_time()
         reduction = select(problem, GraspController(controller, run))
         self.selection_s = time.thread_time() - began

@@ -33,7 +33,7 @@ from graspsense_sim_gripper.run.accuracy.select import select
 from graspsense_sim_gripper.run.batch.buffers import Storage
 from graspsense_sim_gripper.run.batch.compiled_grasps import CompiledStart, grasp_compiled
 from graspsense_sim_gripper.run.batch.job import FinishedGrasp, Job, started
-from graspsense_sim_gripper.run.build import instantiate, problem_of
+from graspsense_sim_gripper.run.build import Problem, instantiate
 from graspsense_sim_gripper.run.compiled.compose import Composition
 from graspsense_sim_gripper.run.compiled.loop_code import CompiledLoop, CompiledLoops, loop_start
 from graspsense_sim_gripper.run.compiled.padding import composition_of, layout_of, padded
@@ -167,7 +167,7 @@ class Bench:
         controller = create("controller", "hybrid", closing_speed_m_s=scene.speed_m_s)
         config = evolve(scene.config, accuracy=accuracy, fidelity=fidelity)
         run = RunConfig(grasp_timeout_s=20.0)
-        problem = problem_of(config, scene.spec)
+        problem = Problem(config, scene.spec)
         began = time.thread_time()
         reduction = select(problem, GraspController(controller, run), compiled=True, padding=KINDS)
         self.selection_s = time.thread_time() - began

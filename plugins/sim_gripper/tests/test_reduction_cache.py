@@ -12,7 +12,7 @@ from graspsense.simulator_api import RunConfig
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.accuracy import cache
 from graspsense_sim_gripper.run.accuracy import select as selection
-from graspsense_sim_gripper.run.build import problem_of
+from graspsense_sim_gripper.run.build import Problem
 from graspsense_sim_gripper.run.problem import GraspController
 from graspsense_sim_gripper.scene.spec import ObjectSpec
 
@@ -51,7 +51,7 @@ def select(config=CONFIG, spec=None, **settings):
 def again(config=CONFIG, spec=None, **settings):
     """Return the model that this process selects."""
     controller = GraspController(create("controller", "hybrid", **settings), RunConfig())
-    return selection.select(problem_of(config, spec or shell()), controller)
+    return selection.select(Problem(config, spec or shell()), controller)
 
 
 @pytest.mark.slow

@@ -32,7 +32,8 @@ from graspsense.simulator_api import (
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.accuracy.levels import Level
 from graspsense_sim_gripper.run.accuracy.model import Reduction
-from graspsense_sim_gripper.run.problem import ControllerStep, GraspController, Problem
+from graspsense_sim_gripper.run.build import Problem
+from graspsense_sim_gripper.run.problem import ControllerStep, GraspController
 from graspsense_sim_gripper.scene.terms.registry import active_laws
 from graspsense_sim_gripper.scene.terms.term import OnSum
 from graspsense_sim_gripper.solve.scheme import Steps

@@ -20,8 +20,8 @@ from graspsense_sim_gripper.run.accuracy.levels import (
     steps_for,
 )
 from graspsense_sim_gripper.run.accuracy.model import QUANTITIES, Reduction, StepDecision
-from graspsense_sim_gripper.run.accuracy.probe import FORCE_N, SPEED_M_S, Grip, nominal
-from graspsense_sim_gripper.run.problem import Problem
+from graspsense_sim_gripper.run.accuracy.probe import FORCE_N, SPEED_M_S, Grip
+from graspsense_sim_gripper.run.build import Problem
 from graspsense_sim_gripper.scene.terms.registry import find_term
 from graspsense_sim_gripper.scene.terms.switchable import Switchable
 from graspsense_sim_gripper.scene.terms.term import NO_STATE, WorkingPoint, no_rates
@@ -54,7 +54,7 @@ def propose(problem: Problem, grip: Grip | None, scale: LevelScale = CONTROLLED[
 
     Raises TypeError if there is no object.
     """
-    config, setup = problem.model_config, nominal(problem)
+    config, setup = problem.model_config, problem.nominal
     kinds, model, dt_s = setup.kinds, setup.plant.object, setup.dt_s
     level = scale.level(config.accuracy)
     angle = min(math.sqrt(SWING_SHARE * level.step_tol), MAX_SWING_RAD)

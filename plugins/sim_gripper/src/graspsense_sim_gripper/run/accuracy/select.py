@@ -34,7 +34,8 @@ from graspsense_sim_gripper.run.accuracy.verify import (
     trial_grasps,
     without_term,
 )
-from graspsense_sim_gripper.run.problem import GraspController, Problem
+from graspsense_sim_gripper.run.build import Problem
+from graspsense_sim_gripper.run.problem import GraspController
 from graspsense_sim_gripper.run.term_failure import TermFailed, raised_in_term
 from graspsense_sim_gripper.scene.spec import ObjectSpec
 from graspsense_sim_gripper.scene.terms.term import LAW_ERRORS

@@ -30,7 +30,7 @@ from graspsense_sim_gripper.plant.state import Motion, PlantState
 from graspsense_sim_gripper.run.accuracy.error import SCALES, UNIT_SCALES, GraspRecord
 from graspsense_sim_gripper.run.accuracy.model import Reduction
 from graspsense_sim_gripper.run.accuracy.own_features import OwnFeatures, beyond, own_features
-from graspsense_sim_gripper.run.accuracy.probe import nominal
+from graspsense_sim_gripper.run.build import Problem
 from graspsense_sim_gripper.run.compiled.compose import composition, grasp_loop
 from graspsense_sim_gripper.run.compiled.loop_code import CompiledLoops
 from graspsense_sim_gripper.run.compiled.padding import padded
@@ -46,7 +46,7 @@ from graspsense_sim_gripper.run.loop import (
     has_ended,
     uses_macro_steps,
 )
-from graspsense_sim_gripper.run.problem import GraspController, GraspSetup, Problem
+from graspsense_sim_gripper.run.problem import GraspController, GraspSetup
 from graspsense_sim_gripper.run.term_failure import TermFailed, not_finite_in_tick
 from graspsense_sim_gripper.scene.terms.switchable import switched_off
 
@@ -227,7 +227,7 @@ def trial_grasps(
     near = evolve(problem.device, opening=None)
     return TrialGrasps(
         config=evolve(problem.model_config, spread=False),
-        setup=nominal(problem),
+        setup=problem.nominal,
         controller=controller,
         params=tick_params(problem.device, law, run),
         params_near=tick_params(near, law, run),

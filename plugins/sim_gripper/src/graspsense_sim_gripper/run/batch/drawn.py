@@ -18,7 +18,7 @@ from graspsense.simulator_api import CompileOptions, compile_function, entry_poi
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant.sensing import PadCells
 from graspsense_sim_gripper.run.binding import bind_reachable
-from graspsense_sim_gripper.run.build import check_fit
+from graspsense_sim_gripper.run.build import Problem, check_fit
 from graspsense_sim_gripper.run.compiled.jit import generating
 from graspsense_sim_gripper.run.compiled.loop_code import (
     Arrays,
@@ -38,7 +38,7 @@ from graspsense_sim_gripper.run.drawing import (
 )
 from graspsense_sim_gripper.run.loop import GraspParams, SimulationState
 from graspsense_sim_gripper.run.nested import append, with_places
-from graspsense_sim_gripper.run.problem import GraspSetup, Problem
+from graspsense_sim_gripper.run.problem import GraspSetup
 from graspsense_sim_gripper.scene.instance import deepest_dent, draws_of_number
 from graspsense_sim_gripper.scene.random_numbers import IN_COMPILED_CODE, Word, key_of
 from graspsense_sim_gripper.scene.spec import NominalParams, ObjectSpec

@@ -11,11 +11,11 @@ from graspsense_sim_gripper.run.accuracy.model import Reduction
 from graspsense_sim_gripper.run.accuracy.select import select
 from graspsense_sim_gripper.run.batch.drawn import DrawnScene, drawn_scene
 from graspsense_sim_gripper.run.batch.job import Job, started
-from graspsense_sim_gripper.run.build import build, example_of, instantiate
+from graspsense_sim_gripper.run.build import Problem, build, example_of, instantiate
 from graspsense_sim_gripper.run.compiled.compose import Composition
 from graspsense_sim_gripper.run.compiled.padding import composition_of, padded
 from graspsense_sim_gripper.run.model_report import GraspModel
-from graspsense_sim_gripper.run.problem import GraspSetup, Problem
+from graspsense_sim_gripper.run.problem import GraspSetup
 from graspsense_sim_gripper.run.sampled_loop import instability
 from graspsense_sim_gripper.scene.library import split_number
 
