@@ -37,7 +37,6 @@ from graspsense_sim_gripper.run.compiled.jit import compile_part
 from graspsense_sim_gripper.run.compiled.padding import padded
 from graspsense_sim_gripper.scene.terms.registry import laws_of, moving_of, phases_of
 from graspsense_sim_gripper.solve.control import MIN_STEP_S
-from graspsense_sim_gripper.solve.stick import until_event
 
 STEP_S: Final = 1e-3
 """The longest step between two recorded times, if the settings give no `step_s`."""
@@ -174,7 +173,7 @@ def to_gap(model: ObjectModel, state: Driven, gap_m: float, h: float) -> Driven:
         if contact.touched == 1 or target <= reach:
             after = _at(model, contact, target, speed, ahead)
             if contact.touched == 1 and ahead > MIN_STEP_S and has_event(contact, after):
-                ahead = until_event(model, contact, gap, speed, ahead)
+                ahead = _until_event(model, contact, gap, speed, ahead)
                 target = gap - speed * ahead
                 after = restarted(_at(model, contact, target, speed, ahead))
             left_n, right_n, offset, _, left, right, pending, unbalanced = after
@@ -217,6 +216,18 @@ def to_force(model: ObjectModel, state: Driven, force_n: float, h: float) -> Dri
 def _at(model: ObjectModel, contact: Contact, gap_m: float, speed_m_s: float, h: float) -> Contact:
     """Return the contact at this gap; one that begins there has lasted no time."""
     return pad_forces(model, contact, gap_m, speed_m_s, h if contact.touched == 1 else 0.0, speed_m_s == 0.0)
+
+
+def _until_event(model: ObjectModel, contact: Contact, gap_m: float, speed_m_s: float, h: float) -> float:
+    """Return the time within `h` at which a term has an event."""
+    lower, upper = 0.0, h
+    while upper - lower > MIN_STEP_S:
+        middle = 0.5 * (lower + upper)
+        if has_event(contact, _at(model, contact, gap_m - speed_m_s * middle, speed_m_s, middle)):
+            upper = middle
+        else:
+            lower = middle
+    return upper
 
 
 @lru_cache(maxsize=64)
