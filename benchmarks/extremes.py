@@ -42,7 +42,7 @@ from graspsense_sim_gripper.run.accuracy.propose import NOT_VERIFIED, propose
 from graspsense_sim_gripper.run.accuracy.select import select
 from graspsense_sim_gripper.run.batch.job import FinishedGrasp, Job, grasp_plain
 from graspsense_sim_gripper.run.batch.threads import run_many
-from graspsense_sim_gripper.run.build import instantiate, problem_of
+from graspsense_sim_gripper.run.build import Problem, instantiate
 from graspsense_sim_gripper.run.compiled.compose import plant_move
 from graspsense_sim_gripper.run.compiled.jit import compile_part
 from graspsense_sim_gripper.run.problem import GraspController, GraspSetup
@@ -91,7 +91,7 @@ class Ready:
 
 def ready(config: SimConfig, spec: ObjectSpec) -> Ready:
     """Return the plant of this scene, as the backend has it."""
-    problem = problem_of(config, spec)
+    problem = Problem(config, spec)
     reduction = propose(problem, grip_of(problem))
     setup = instantiate(problem, reduction, 0)
     move = plant_move(laws_of(setup.kinds))
@@ -616,7 +616,7 @@ def whole_grasp(
     Raises ConfigError if the scene is refused.
     """
     run = RunConfig(grasp_timeout_s=20.0)
-    problem = problem_of(config, spec)
+    problem = Problem(config, spec)
     reduction = select(problem, GraspController(controller, run))
     setup = instantiate(problem, reduction, seed)
     job = Job(config=config, controller=controller, run=run, extract=None, traces=True)

@@ -23,10 +23,10 @@ from simulation_scene import KC, LIGHT, TICK, TICKS, X0, B, C, K, Law, M, Run
 
 from graspsense.simulator_api import RunConfig
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.run.batch.job import Job, Storage, grasp_compiled
+from graspsense_sim_gripper.run.batch.compiled_grasps import CompiledGrasps
+from graspsense_sim_gripper.run.batch.job import Job
 from graspsense_sim_gripper.run.batch.scenes import Scenes
 from graspsense_sim_gripper.run.compiled.loop_code import CompiledLoops
-from graspsense_sim_gripper.run.compiled.padding import composition_of
 
 REFERENCE_STEPS: Final = 64
 """Steps a millisecond of the reference: fourth order, with every event located. Four times as many change the trace of
@@ -65,14 +65,13 @@ def _our_engine(config: SimConfig, setting: str) -> Engine:
     job = Job(config=config, controller=Law(None), run=RunConfig(hold_s=0.0), extract=None, traces=True)
     scenes = Scenes(job)
     scenes.add(config.object, compiled=True)
-    setup = scenes.setup(config.object, 0)
-    composition = composition_of(setup)
-    loop = CompiledLoops(Law.step).loop_of(composition)
-    storage = Storage()
-    grasp_compiled(job, setup, loop, storage)
+    grasps = CompiledGrasps(scenes, CompiledLoops(Law.step), lambda kinds: True)
+    grasps.grasp(config.object, 0)
 
     def grasp() -> Run:
-        trace = grasp_compiled(job, setup, loop, storage).trace
+        done = grasps.grasp(config.object, 0)
+        assert done is not None
+        trace = done.trace
         part = slice(0, TICKS)
         return Run(
             x=config.open_gap_m - trace.gap_m[part], force=trace.force_left_n[part], u=trace.command[part]

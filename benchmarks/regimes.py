@@ -29,7 +29,7 @@ from typing import Any, Final
 
 import numpy as np
 from attrs import evolve
-from selection import KINDS, Bench, Scene, controller_is_stable, record_of
+from selection import KINDS, Bench, Scene, compiled_grasp, controller_is_stable, record_of
 
 from graspsense.evaluation.intervals import wilson
 from graspsense.experiments.versions import where_measured
@@ -40,8 +40,8 @@ from graspsense_sim_gripper.run.accuracy.error import deviation
 from graspsense_sim_gripper.run.accuracy.model import Reduction
 from graspsense_sim_gripper.run.accuracy.propose import NOT_VERIFIED
 from graspsense_sim_gripper.run.accuracy.select import select
-from graspsense_sim_gripper.run.batch.job import FinishedGrasp, Job, grasp_once, grasp_plain
-from graspsense_sim_gripper.run.build import instantiate, problem_of
+from graspsense_sim_gripper.run.batch.job import FinishedGrasp, Job, grasp_plain
+from graspsense_sim_gripper.run.build import Problem, instantiate
 from graspsense_sim_gripper.run.compiled.padding import padded
 from graspsense_sim_gripper.run.problem import GraspController, GraspSetup
 from graspsense_sim_gripper.scene.spec import ObjectSpec
@@ -148,7 +148,7 @@ class Interpreted(Bench):
         controller = create("controller", "hybrid", closing_speed_m_s=scene.speed_m_s)
         config = evolve(scene.config, accuracy=accuracy, fidelity=fidelity)
         run = RunConfig(grasp_timeout_s=20.0)
-        problem = problem_of(config, scene.spec)
+        problem = Problem(config, scene.spec)
         began = time.thread_time()
         reduction = select(problem, GraspController(controller, run))
         self.selection_s = time.thread_time() - began
@@ -167,7 +167,7 @@ def seconds_of(bench: Bench, job: Job, setup: GraspSetup) -> float:
         else:
             full = padded(setup, KINDS)
             loop = bench.loop_of(job.config, full, type(job.controller).step)
-            grasp_once(job, full, loop, bench.storage)
+            compiled_grasp(job, full, loop, bench.storage)
         spent.append(time.thread_time() - began)
     return float(np.median(spent))
 

@@ -37,7 +37,7 @@ from attrs import evolve
 from numpy.typing import NDArray
 from regimes import scene_of, share_words
 from scipy.stats import binomtest
-from selection import KINDS, Bench, Scene, controller_is_stable
+from selection import KINDS, Bench, Scene, compiled_grasp, controller_is_stable
 
 from graspsense.experiments.versions import where_measured
 from graspsense.gripper_api import Outcome
@@ -45,8 +45,8 @@ from graspsense.plugin_api import ConfigError, Features, create
 from graspsense.simulator_api import RunConfig
 from graspsense_sim_gripper.run.accuracy.error import UNIT_SCALES
 from graspsense_sim_gripper.run.accuracy.select import select
-from graspsense_sim_gripper.run.batch.job import Job, grasp_once, grasp_plain
-from graspsense_sim_gripper.run.build import instantiate, problem_of
+from graspsense_sim_gripper.run.batch.job import Job, grasp_plain
+from graspsense_sim_gripper.run.build import Problem, instantiate
 from graspsense_sim_gripper.run.compiled.padding import padded
 from graspsense_sim_gripper.run.model_report import accuracy_report, model_report
 from graspsense_sim_gripper.run.problem import GraspController
@@ -82,7 +82,7 @@ class Grasps:
         features = create("feature-set", "chitta")
         controller = create("controller", "hybrid", closing_speed_m_s=scene.speed_m_s)
         config, run = evolve(scene.config, **settings), RunConfig(grasp_timeout_s=20.0)
-        self.bench, self.problem = bench, problem_of(config, scene.spec)
+        self.bench, self.problem = bench, Problem(config, scene.spec)
         law = GraspController(controller, run, features)
         self.reduction = select(self.problem, law, compiled=bench is not None, padding=KINDS)
         self.job = Job(config=config, controller=controller, run=run, extract=features.extract, traces=False)
@@ -100,7 +100,7 @@ class Grasps:
             else:
                 full = padded(setup, KINDS)
                 loop = self.bench.loop_of(self.job.config, full, type(self.job.controller).step)
-                done = grasp_once(self.job, full, loop, self.bench.storage)
+                done = compiled_grasp(self.job, full, loop, self.bench.storage)
             self.features.append(done.extracted)
             self.outcomes.append(done.outcome)
             report = model_report(done.state, KINDS if self.bench else setup.kinds)

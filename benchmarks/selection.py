@@ -30,13 +30,17 @@ from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.accuracy.error import GraspRecord, deviation
 from graspsense_sim_gripper.run.accuracy.model import Reduction
 from graspsense_sim_gripper.run.accuracy.select import select
-from graspsense_sim_gripper.run.batch.job import FinishedGrasp, Job, Storage, grasp_once
-from graspsense_sim_gripper.run.build import instantiate, problem_of
+from graspsense_sim_gripper.run.batch.buffers import Storage
+from graspsense_sim_gripper.run.batch.compiled_grasps import CompiledStart, grasp_compiled
+from graspsense_sim_gripper.run.batch.job import FinishedGrasp, Job, started
+from graspsense_sim_gripper.run.build import Problem, instantiate
 from graspsense_sim_gripper.run.compiled.compose import Composition
-from graspsense_sim_gripper.run.compiled.loop_code import CompiledLoops
-from graspsense_sim_gripper.run.compiled.padding import composition_of, padded
+from graspsense_sim_gripper.run.compiled.loop_code import CompiledLoop, CompiledLoops, loop_start
+from graspsense_sim_gripper.run.compiled.padding import composition_of, layout_of, padded
+from graspsense_sim_gripper.run.model_report import NO_MODEL
 from graspsense_sim_gripper.run.problem import GraspController, GraspSetup
 from graspsense_sim_gripper.run.sampled_loop import instability
+from graspsense_sim_gripper.scene.random_numbers import key_of
 from graspsense_sim_gripper.scene.spec import ObjectSpec
 from graspsense_sim_gripper.scene.terms.registry import in_order
 
@@ -163,7 +167,7 @@ class Bench:
         controller = create("controller", "hybrid", closing_speed_m_s=scene.speed_m_s)
         config = evolve(scene.config, accuracy=accuracy, fidelity=fidelity)
         run = RunConfig(grasp_timeout_s=20.0)
-        problem = problem_of(config, scene.spec)
+        problem = Problem(config, scene.spec)
         began = time.thread_time()
         reduction = select(problem, GraspController(controller, run), compiled=True, padding=KINDS)
         self.selection_s = time.thread_time() - began
@@ -171,7 +175,7 @@ class Bench:
         job = Job(config=config, controller=controller, run=run, extract=None, traces=True)
         full = padded(setup, KINDS)
         loop = self.loop_of(config, full, type(controller).step)
-        return grasp_once(job, full, loop, self.storage), setup, reduction, job
+        return compiled_grasp(job, full, loop, self.storage), setup, reduction, job
 
     def loop_of(self, config: SimConfig, setup: GraspSetup, step: Any) -> Any:
         """Return the compiled loop of a padded setup."""
@@ -182,10 +186,18 @@ class Bench:
             controller = create("controller", "hybrid")
             short = RunConfig(grasp_timeout_s=0.01)
             job = Job(config=config, controller=controller, run=short, extract=None, traces=True)
-            grasp_once(job, setup, loop, self.storage)
+            compiled_grasp(job, setup, loop, self.storage)
             self.compiled[composition] = loop
             self.compile_s += time.process_time() - began
         return self.compiled[composition]
+
+
+def compiled_grasp(job: Job, setup: GraspSetup, loop: CompiledLoop, storage: Storage) -> FinishedGrasp:
+    """Simulate a grasp that is padded for this loop."""
+    key = None if setup.sensor.ideal == 1 else key_of(setup.seed)
+    layout = layout_of(setup, setup.kinds)
+    start = CompiledStart(loop_start(*started(job, setup)), lambda: setup, key, layout, NO_MODEL)
+    return grasp_compiled(job, loop, start, storage)
 
 
 def measure(bench: Bench, numbers: range) -> dict[str, Any]:

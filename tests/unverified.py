@@ -7,20 +7,20 @@ from types import SimpleNamespace
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.accuracy.probe import grip_of
 from graspsense_sim_gripper.run.accuracy.propose import propose
-from graspsense_sim_gripper.run.build import build, instantiate, problem_of
+from graspsense_sim_gripper.run.build import Problem, build, instantiate
 from graspsense_sim_gripper.run.problem import GraspSetup
 from graspsense_sim_gripper.scene.spec import ObjectSpec
 
 
 def unverified_setup(config: SimConfig, scene: str | ObjectSpec, seed: int) -> GraspSetup:
-    problem = build(config, scene) if isinstance(scene, str) else problem_of(config, scene)
+    problem = build(config, scene) if isinstance(scene, str) else Problem(config, scene)
     reduction = None if problem.spec is None else propose(problem, grip_of(problem))
     return instantiate(problem, reduction, seed)
 
 
 def sample(spec: ObjectSpec, seed: int | None, number: int | None = None) -> SimpleNamespace:
     """Return the instance that a seed draws, or that with this number; `seed` None: the nominal one."""
-    setup = instantiate(problem_of(SimConfig(spread=seed is not None), spec, number), None, seed or 0)
+    setup = instantiate(Problem(SimConfig(spread=seed is not None), spec, number), None, seed or 0)
     return SimpleNamespace(
         width_m=setup.plant.object.width_m,
         offset_m=setup.state.contact.offset_m,

@@ -35,8 +35,7 @@ from graspsense.plugin_api import (
 from graspsense.simulator_api import CompiledExtraction
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.backend import SimBackend
-from graspsense_sim_gripper.run.batch import job as batch_job
-from graspsense_sim_gripper.run.batch import threads, worker
+from graspsense_sim_gripper.run.batch import buffers, threads, worker
 from graspsense_sim_gripper.run.batch.job import Job, grasp_plain
 from graspsense_sim_gripper.run.batch.scenes import Scenes
 from graspsense_sim_gripper.run.batch.threads import SLICE, WORTH_A_PROCESS, run_many, slices_of
@@ -158,7 +157,7 @@ def test_features_without_traces_are_those_of_the_traces():
 @pytest.mark.slow
 @pytest.mark.parametrize("sensor", ["pads", "ideal"])
 def test_grasps_that_compiled_code_draws_are_those_of_their_setups(sensor, monkeypatch):
-    """Of each object, of one that breaks, of one beyond its law, and with more images than the buffers hold first."""
+    """Of each object, one that breaks, one beyond its law, and with more images or ticks than buffers hold at first."""
     pytest.importorskip("numba", reason="the compiled loop needs the extra `fast`")
     names = [*sorted(catalogue()), "odwalla:full_open#3", BREAKS, "none"]
     config, options = (
@@ -176,8 +175,10 @@ def test_grasps_that_compiled_code_draws_are_those_of_their_setups(sensor, monke
     drawn = told(1)
     assert told(3) == drawn
     for images in (48, 100):
-        monkeypatch.setattr(batch_job, "IMAGES", images)
+        monkeypatch.setattr(buffers, "IMAGES", images)
         assert told(1) == drawn
+    monkeypatch.setattr(buffers, "TICKS", 700)
+    assert told(1) == drawn
     assert any(report["broken"] for *_, report in drawn)
 
 
@@ -472,7 +473,7 @@ def test_odd_numbers_and_every_object_come_back_from_another_process_to_the_bit(
     odd = job(config=SimConfig(pad_stiffness_n_m=math.inf, noise_counts=0.0, step_s=1e-4), run=run)
     names = [*catalogue(), *shipped_scenes(), "none"]
     with PlainProcess(Scenes(odd)) as process:
-        apart = process.run(names, np.arange(len(names)))
+        apart = [process.run(name, seed) for seed, name in enumerate(names)]
     # Nothing is there: channels that were never felt are NaN, and so are the features drawn.
     assert {grasp.outcome for grasp in apart} == {Outcome.ABORTED}
     for name, seed, grasp in zip(names, range(len(names)), apart, strict=True):
@@ -489,7 +490,7 @@ def test_odd_numbers_and_every_object_come_back_from_another_process_to_the_bit(
 def test_no_trace_is_handed_over_where_nobody_wants_one():
     run = RunConfig(grasp_timeout_s=0.01, opening_timeout_s=0.1)
     with PlainProcess(Scenes(job(run=run, traces=False))) as process:
-        (grasp,) = process.run(["none"], [0])
+        grasp = process.run("none", 0)
     assert grasp.kept is None
     assert grasp.extracted is None
     told = []
@@ -497,7 +498,7 @@ def test_no_trace_is_handed_over_where_nobody_wants_one():
     with PlainProcess(
         Scenes(job(run=run, traces=False, extract=lambda trace: told.append(len(trace)) or "felt"))
     ) as process:
-        (grasp,) = process.run(["none"], [0])
+        grasp = process.run("none", 0)
     assert (grasp.kept, grasp.extracted) == (None, "felt")
     assert told == [len(plainly(job(run=run), "none", 0).trace)]
 
@@ -557,12 +558,12 @@ def test_what_fails_in_another_process_is_said():
     with IsolatedPlugins(Here), PlainProcess(Scenes(job(Endless(HYBRID.config)))) as process:
         for _ in range(2):
             with pytest.raises(NotHandedOver, match="no controller named 'graspsense-test/endless'"):
-                process.run(["none"], [0])
+                process.run("none", 0)
     with (
         PlainProcess(Scenes(job())) as process,
         pytest.raises(NotHandedOver, match="UnknownName: no object named 'blok'"),
     ):
-        process.run(["blok"], [0])
+        process.run("blok", 0)
 
 
 def test_without_numba_the_plain_loop_runs_and_says_so(monkeypatch):
@@ -578,9 +579,8 @@ def test_without_numba_the_plain_loop_runs_and_says_so(monkeypatch):
 
 def test_room_is_made_on_the_way_without_beginning_again(monkeypatch):
     whole = run_many(SimConfig(), HYBRID, ["toy"], [3])[0].trace
-    monkeypatch.setattr(batch_job, "TICKS", 100)
-    monkeypatch.setattr(batch_job, "IMAGES", 64)
-    # Storage reads its sizes when it is made.
+    monkeypatch.setattr(buffers, "TICKS", 100)
+    monkeypatch.setattr(buffers, "IMAGES", 64)
     assert bits(run_many(SimConfig(), HYBRID, ["toy"], [3])[0].trace) == bits(whole)
 
 

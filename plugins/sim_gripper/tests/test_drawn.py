@@ -16,7 +16,7 @@ from graspsense_sim_gripper.run.accuracy.probe import grip_of
 from graspsense_sim_gripper.run.accuracy.propose import propose
 from graspsense_sim_gripper.run.batch.drawn import compiled_drawing
 from graspsense_sim_gripper.run.batch.job import Job, started
-from graspsense_sim_gripper.run.batch.scenes import Scenes, scene_key
+from graspsense_sim_gripper.run.batch.scenes import Scenes, number_in, scene_key
 from graspsense_sim_gripper.run.build import build
 from graspsense_sim_gripper.run.compiled.loop_code import loop_start
 from graspsense_sim_gripper.run.compiled.padding import padded
@@ -64,6 +64,7 @@ NAMES = [
     HELD,
     f"{HELD}#4",
     WIDE,
+    "none",
 ]
 CONFIGS = {
     "pads": SimConfig(),
@@ -87,7 +88,8 @@ def scenes_of(config):
     models = {}
     for name in NAMES:
         problem = build(config, name)
-        models[scene_key(name)] = propose(problem, grip_of(problem))
+        if problem.spec is not None:
+            models[scene_key(name)] = propose(problem, grip_of(problem))
     return Scenes(job, models)
 
 
@@ -101,12 +103,12 @@ def scenes_with(name):
 @settings(max_examples=40)
 def test_a_drawn_grasp_is_that_of_the_seed(config, name, seeds):
     scenes, drawing = scenes_with(config), compiled_drawing()
-    scene, number = scenes.drawn(name)
-    memory = scene.memory()
+    drawn = scenes.find(name).drawn
+    memory = drawn.memory()
     for seed in seeds:
         setup = padded(scenes.setup(name, seed))
-        expected = loop_start(*started(scenes.job, setup, on_arrays=True))
-        start = scene.drawn(drawing, key_of(seed), number, memory)
+        expected = loop_start(*started(scenes.job, setup))
+        start = drawn.drawn(drawing, key_of(seed), number_in(name), memory)
 
         assert start.numbers.tobytes() == expected.numbers.tobytes()
         assert [array.tobytes() for array in start.arrays] == [array.tobytes() for array in expected.arrays]
@@ -114,7 +116,7 @@ def test_a_drawn_grasp_is_that_of_the_seed(config, name, seeds):
 
 def test_an_instance_that_does_not_fit_is_refused_as_it_is_by_itself():
     scenes, drawing = scenes_with("ideal"), compiled_drawing()
-    scene, number = scenes.drawn(WIDE)
+    drawn = scenes.find(WIDE).drawn
     messages = []
     for seed in range(40):
         try:
@@ -122,9 +124,9 @@ def test_an_instance_that_does_not_fit_is_refused_as_it_is_by_itself():
         except ConfigError as error:
             messages.append(str(error))
             with pytest.raises(ConfigError, match=re.escape(messages[-1])):
-                scene.drawn(drawing, key_of(seed), number, scene.memory())
+                drawn.drawn(drawing, key_of(seed), None, drawn.memory())
         else:
-            scene.drawn(drawing, key_of(seed), number, scene.memory())
+            drawn.drawn(drawing, key_of(seed), None, drawn.memory())
     assert 0 < len(messages) < 40
 
 
@@ -140,8 +142,4 @@ def test_a_scene_is_drawn_of_which_one_grasp_does_not_fit():
         return True
 
     name = next(name for name in numbered if not fits(name, 0) and not fits(name, 1))
-    assert scenes_of(CONFIGS["ideal"]).drawn(name).scene.spec.file == scenes.drawn(WIDE).scene.spec.file
-
-
-def test_grasps_of_nothing_are_not_drawn():
-    assert scenes_of(SimConfig()).drawn("none") is None
+    assert scenes_of(CONFIGS["ideal"]).find(name).drawn.spec.file == scenes.find(WIDE).drawn.spec.file

@@ -13,7 +13,7 @@ from graspsense.gripper_api import gap_and_rate, revolutions_at
 from graspsense.plugin_api import EFFORT, RELEASE, Command, create
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant.state import Contact, Motion, PlantState
-from graspsense_sim_gripper.run.batch import job, run_many
+from graspsense_sim_gripper.run.batch import buffers, run_many
 from graspsense_sim_gripper.run.binding import bind_reachable
 from graspsense_sim_gripper.run.compiled.compose import plant_move, step_parts, uncompressed
 from graspsense_sim_gripper.run.compiled.padding import composition_of
@@ -204,7 +204,7 @@ def test_a_step_that_is_repeated_ends_shortly_before_an_event_whose_place_is_kno
 def test_a_grasp_does_not_depend_on_the_length_of_its_buffers(monkeypatch):
     law = create("controller", "hybrid")
     whole = run_many(SimConfig(), law, ["toy"], [3])[0]
-    monkeypatch.setattr(job, "TICKS", 700)
+    monkeypatch.setattr(buffers, "TICKS", 700)
     parts = run_many(SimConfig(), law, ["toy"], [3])[0]
     assert whole.model.reduction.steps.macro_tolerance > 0.0
     assert parts.state == whole.state

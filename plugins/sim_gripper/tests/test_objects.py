@@ -10,11 +10,12 @@ import pytest
 from cases import every_case
 from unverified import sample
 
-from graspsense.plugin_api import ConfigError, UnknownName
+from graspsense.plugin_api import UnknownName
+from graspsense.simulator_api import fitted_results
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.backend import SimBackend
 from graspsense_sim_gripper.scene.instance import cell_weights
-from graspsense_sim_gripper.scene.library import catalogue, find, parse_entry
+from graspsense_sim_gripper.scene.library import catalogue, find
 from graspsense_sim_gripper.scene.spec import PATCHES, ObjectSpec
 from graspsense_sim_gripper.scene.terms import NoState, Term
 from graspsense_sim_gripper.scene.terms.registry import TERMS
@@ -45,23 +46,35 @@ def test_the_four_containers_have_their_states_and_the_rest_is_there():
     assert {"block", "toy", "egg"} <= set(catalogue())
 
 
-def test_every_figure_has_its_reason():
+KEYS = {
+    *("summary", "patch", "width_m", "width_spread_m", "stiffness_spread", "offset_spread_m"),
+    *("share", "share_spread", "friction", "mass_kg"),
+}
+RESULTS = {"table_2", "table_3", "authors_tree", "section_3f", "fig_6_contact"}
+
+
+def test_every_entry_is_whole_and_every_figure_has_its_origin_and_reason():
     text = files("graspsense_sim_gripper").joinpath("scene/catalogue.toml").read_text(encoding="utf-8")
+    tables, numbers = tomllib.loads(text), []
 
-    def figures(table):
-        for value in table.values():
-            if isinstance(value, dict):
-                if "value" in value:
-                    yield value
-                else:
-                    yield from figures(value)
-            elif isinstance(value, list):
-                for part in value:
-                    yield from figures(part)
+    def read(entry):
+        if isinstance(entry, dict) and "value" not in entry:
+            entry = list(entry.values())
+        if isinstance(entry, list):
+            for part in entry:
+                read(part)
+        elif not isinstance(entry, str):
+            numbers.append(entry)
 
-    all_figures = list(figures(tomllib.loads(text)))
-    assert len(all_figures) > 100
-    assert all(len(figure["reason"]) >= 5 for figure in all_figures)
+    read(tables)
+    assert len(numbers) > 100
+    for number in numbers:
+        assert number.keys() == {"value", "origin", "reason"}
+        assert len(number["reason"]) >= 5
+        assert set(fitted_results(number["origin"])) <= RESULTS
+    for table in tables.values():
+        for state in table.get("states", {"": {}}).values():
+            assert {*table, *state} >= KEYS
 
 
 @every_case(
@@ -115,58 +128,6 @@ def test_the_weights_of_the_cells_share_out_the_whole_force(patch):
     else:
         # Off the middle towards the base by 0.4 of a row: the third row still carries most.
         assert rows.index(max(rows)) == 2
-
-
-def good():
-    figure = {"value": 1.0, "origin": "assumed", "reason": "because of it"}
-    keys = (
-        "width_m",
-        "width_spread_m",
-        "stiffness_spread",
-        "offset_spread_m",
-        "share",
-        "share_spread",
-        "friction",
-    )
-    table = {key: dict(figure) for key in keys} | {
-        "mass_kg": dict(figure),
-        "summary": "a thing",
-        "patch": "line",
-    }
-    return table | {"terms": [{"type": "loss", "damping_n_s_m": dict(figure)}]}
-
-
-@every_case(
-    ("change", "says"),
-    [
-        (lambda t: t.pop("width_m"), "missing .*width_m"),
-        (lambda t: t.update(colour="red"), "colour: write"),
-        (lambda t: t["width_m"].update(value=-0.01), "negative"),
-        (lambda t: t["width_m"].update(value=math.nan), "not a finite number"),
-        (lambda t: t["width_m"].update(value=True), "not a finite number"),
-        (lambda t: t["width_m"].update(value=0.0), "'width_m' must be > 0"),
-        (lambda t: t["width_m"].pop("reason"), "write { value = NUMBER, origin = ORIGIN, reason = TEXT }"),
-        (lambda t: t["width_m"].update(origin="guessed"), "'guessed' is not an origin. Known: measured"),
-        (
-            lambda t: t["width_m"].update(origin="fitted to table_9"),
-            "'fitted to table_9' names an unknown result",
-        ),
-        (lambda t: t.update(patch="round"), "patch"),
-        (lambda t: t["terms"][0].update(type="spring"), "no term 'spring'. Known: elastic"),
-        (lambda t: t["terms"][0].pop("damping_n_s_m"), "missing damping_n_s_m"),
-        (
-            lambda t: t["terms"][0].update(tau_s={"value": 1.0, "origin": "assumed", "reason": "none"}),
-            "no such key 'tau_s'",
-        ),
-    ],
-)
-def test_a_faulty_entry_names_the_object_and_the_key(change, says):
-    table = good()
-    assert parse_entry("thing", table).name == "thing"
-    change(table)
-    with pytest.raises(ConfigError, match=says) as error:
-        parse_entry("thing", table)
-    assert "thing" in str(error.value)
 
 
 class Whole(NamedTuple):

@@ -12,7 +12,7 @@ from graspsense.simulator_api import RunConfig
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.accuracy import cache
 from graspsense_sim_gripper.run.accuracy import select as selection
-from graspsense_sim_gripper.run.build import problem_of
+from graspsense_sim_gripper.run.build import Problem
 from graspsense_sim_gripper.run.problem import GraspController
 from graspsense_sim_gripper.scene.spec import ObjectSpec
 
@@ -51,7 +51,7 @@ def select(config=CONFIG, spec=None, **settings):
 def again(config=CONFIG, spec=None, **settings):
     """Return the model that this process selects."""
     controller = GraspController(create("controller", "hybrid", **settings), RunConfig())
-    return selection.select(problem_of(config, spec or shell()), controller)
+    return selection.select(Problem(config, spec or shell()), controller)
 
 
 @pytest.mark.slow
@@ -99,6 +99,11 @@ def test_edited_code_finds_nothing_of_before(trials, monkeypatch):
     monkeypatch.setattr(step, "__code__", step.__code__.replace(co_consts=(*step.__code__.co_consts, 7)))
     assert select() == made
     assert len(trials) == 2
+
+
+@pytest.mark.parametrize("source", ["config", "plant/contact", "run/loop", "scene/spec", "solve/advance"])
+def test_a_file_of_any_room_of_the_simulator_belongs_to_its_code(source):
+    assert f"graspsense_sim_gripper/{source}.py " in cache._own_code().decode()
 
 
 @pytest.mark.slow

@@ -15,7 +15,7 @@ from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.accuracy.levels import PLAIN
 from graspsense_sim_gripper.run.accuracy.probe import grip_of
 from graspsense_sim_gripper.run.accuracy.propose import propose
-from graspsense_sim_gripper.run.build import instantiate, problem_of
+from graspsense_sim_gripper.run.build import Problem, instantiate
 from graspsense_sim_gripper.scene.library import find
 from graspsense_sim_gripper.scene.spec import ObjectSpec
 
@@ -24,7 +24,7 @@ SHELL = ("elastic", {"k1_n_m": 2000.0, "k3_n_m3": 2e6})
 
 
 def proposed(config, spec):
-    problem = problem_of(config, spec)
+    problem = Problem(config, spec)
     return propose(problem, grip_of(problem))
 
 
@@ -47,7 +47,7 @@ def test_a_contact_too_stiff_for_the_tick_is_said_to_be():
 
 
 def test_instances_share_the_steps_of_their_kind():
-    problem = problem_of(SimConfig(sensor="ideal"), find("odwalla:empty_open"))
+    problem = Problem(SimConfig(sensor="ideal"), find("odwalla:empty_open"))
     model = propose(problem, grip_of(problem))
     setup, other = (instantiate(problem, model, seed) for seed in (1, 2))
     assert setup.plant.steps == other.plant.steps == model.steps

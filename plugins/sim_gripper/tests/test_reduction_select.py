@@ -32,7 +32,7 @@ from graspsense_sim_gripper.run.accuracy.select import select
 from graspsense_sim_gripper.run.backend import SimBackend, default_controller
 from graspsense_sim_gripper.run.batch import run_many
 from graspsense_sim_gripper.run.batch.job import Job, grasp_plain
-from graspsense_sim_gripper.run.build import instantiate, problem_of
+from graspsense_sim_gripper.run.build import Problem, instantiate
 from graspsense_sim_gripper.run.problem import GraspController
 from graspsense_sim_gripper.run.sampled_loop import instability
 from graspsense_sim_gripper.scene.library import catalogue, find
@@ -54,7 +54,7 @@ def hybrid(**settings):
 
 
 def selected(config, spec, controller):
-    return select(problem_of(config, spec), controller)
+    return select(Problem(config, spec), controller)
 
 
 def thing(*terms):
@@ -64,7 +64,7 @@ def thing(*terms):
 @pytest.mark.parametrize("accuracy", [0.1, pytest.param(0.001, marks=pytest.mark.slow)])
 def test_without_spread_the_trial_grasp_is_the_grasp_that_runs(accuracy):
     config, law, odwalla = evolve(CONFIG, accuracy=accuracy), hybrid(), find("odwalla:full_closed")
-    problem, model = problem_of(config, odwalla), selected(config, odwalla, law)
+    problem, model = Problem(config, odwalla), selected(config, odwalla, law)
     trial = verify.trial_grasps(problem, law, compiled=False, padding=None)
     job = Job(config=config, controller=law.controller, run=law.run, extract=None, traces=True)
     ran = record_of(grasp_plain(job, instantiate(problem, model, 0)), 1.0 / config.rate_hz)
@@ -110,7 +110,7 @@ RINGING = thing(SHELL, ("surface", {"mass_kg": 0.02, "k_n_m": 3e3, "damping_n_s_
 def test_the_features_of_the_pipeline_are_verified_too(spec, above_n, flagged):
     law = hybrid()
     reference = evolve(CONFIG, fidelity="reference", accuracy=1e-4)
-    setup = instantiate(problem_of(reference, spec), selected(reference, spec, law), 0)
+    setup = instantiate(Problem(reference, spec), selected(reference, spec, law), 0)
     job = Job(config=reference, controller=law.controller, run=law.run, extract=None, traces=True)
     trace = grasp_plain(job, setup).trace
     steady_n = ForceAbove(Zero(0.0)).extract(trace)["above"]
@@ -121,7 +121,7 @@ def test_the_features_of_the_pipeline_are_verified_too(spec, above_n, flagged):
     if not flagged:
         # Per cent of one newton, not of the twenty that the fingers press with.
         job = evolve(job, config=CONFIG)
-        done = grasp_plain(job, instantiate(problem_of(CONFIG, spec), fine, 0))
+        done = grasp_plain(job, instantiate(Problem(CONFIG, spec), fine, 0))
         assert theirs.features.extract(done.trace)["above"] == pytest.approx(above_n, rel=CONFIG.accuracy)
 
 
@@ -370,7 +370,7 @@ def test_gas_that_is_spent_is_reported(tmp_path):
 
 def test_trial_grasps_end_at_a_limit_of_work_and_the_grasp_runs(monkeypatch):
     monkeypatch.setattr(verify, "MOST_WORK", 2000)
-    problem = problem_of(CONFIG, ObjectSpec(name="shell", width_m=0.05, terms=(SHELL,)))
+    problem = Problem(CONFIG, ObjectSpec(name="shell", width_m=0.05, terms=(SHELL,)))
     reduction = select(problem, hybrid(closing_speed_m_s=0.0117))
     assert reduction.verification is None
     assert reduction.not_verified == ("peak", "trace", "features")
@@ -449,7 +449,7 @@ def test_an_unstable_sampled_loop_is_named_in_the_report(gripper, gain, growth, 
 
 def test_no_object_of_the_catalogue_has_an_unstable_loop():
     for spec in catalogue().values():
-        problem = problem_of(CONFIG, spec)
+        problem = Problem(CONFIG, spec)
         model = propose(problem, grip_of(problem))
         for name in ("hybrid", "velocity", "force"):
             controller = GraspController(create("controller", name), RunConfig())

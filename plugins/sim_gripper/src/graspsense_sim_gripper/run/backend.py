@@ -246,9 +246,9 @@ class SimBackend(BatchBackend[SimConfig]):
     def perturbed(self, scenes: Sequence[str], share: float) -> Mapping[str, SimBackend]:
         """Return this gripper, and this gripper with each parameter larger by this share, see `perturbed`."""
         changed = {}
-        for name, variant in perturbed(self.config, scenes, share).items():
-            changed[name] = SimBackend(variant.config)
-            changed[name]._scaled = variant.scaled
+        for name, (config, scaled) in perturbed(self.config, scenes, share).items():
+            changed[name] = SimBackend(config)
+            changed[name]._scaled = scaled
         return changed
 
     def run_many(

@@ -6,14 +6,15 @@ This takes three steps: `build` gives the problem, `reduction.select` its steps,
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from contextlib import suppress
-from functools import lru_cache, partial
+from functools import cached_property, lru_cache
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from attrs import evolve, fields
+from attrs import evolve, fields, frozen
 
-from graspsense.gripper_api import ScrewLinkage, gap_and_rate, revolutions_at
+from graspsense.gripper_api import gap_and_rate, revolutions_at
 from graspsense.plugin_api import EFFORT, Command, ConfigError, DeviceInfo
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant.contact import ObjectModel, PadCompliance
@@ -39,12 +40,12 @@ from graspsense_sim_gripper.run.drawing import (
     draw_grasp,
     scene_numbers,
 )
-from graspsense_sim_gripper.run.problem import GraspSetup, Problem
-from graspsense_sim_gripper.scene.instance import PAD_CELLS, Instance, draws_of_number, instance_of
+from graspsense_sim_gripper.run.problem import GraspSetup
+from graspsense_sim_gripper.scene.instance import PAD_CELLS, deepest_dent, draws_of_number, params_of_terms
 from graspsense_sim_gripper.scene.library import find, split_number
 from graspsense_sim_gripper.scene.random_numbers import key_of
 from graspsense_sim_gripper.scene.scaled import ScaledParameter
-from graspsense_sim_gripper.scene.spec import ObjectSpec
+from graspsense_sim_gripper.scene.spec import ObjectSpec, TermParams
 from graspsense_sim_gripper.solve.scheme import PlantParams, Steps
 
 EFFORT_LIMIT_N: Final = 100.0
@@ -54,9 +55,7 @@ OPENING_N: Final = -20.0
 """The effort that opens the fingers. The recordings of the paper's authors show 17 and 20 N between squeezes."""
 TARE_IMAGES: Final = 6
 """Number of cell images in a tare."""
-EVEN_WEIGHTS: Final = (1.0 / PAD_CELLS,) * PAD_CELLS
-"""The share of each cell of the gripping face in the force, if there is no object."""
-IDEAL_CELLS: Final = PadCells(np.array(EVEN_WEIGHTS), np.full(CELLS, CELL_OFFSET[0]))
+IDEAL_CELLS: Final = PadCells(np.full(PAD_CELLS, 1.0 / PAD_CELLS), np.full(CELLS, CELL_OFFSET[0]))
 """The cells of an ideal sensor; they are never read."""
 EXAMPLES: Final = 4
 """Number of instances whose trial grasps verify a model whose steps have no estimate of their error."""
@@ -86,6 +85,46 @@ def device_info(config: SimConfig) -> DeviceInfo:
     )
 
 
+@frozen(eq=False)
+class Problem:
+    """An object in the gripper, before a seed draws an instance of it."""
+
+    config: SimConfig
+    spec: ObjectSpec | None
+    """None: there is no object."""
+    number: int | None = None
+    """The number of a particular instance; None: the seed draws the instance."""
+
+    @cached_property
+    def model_config(self) -> SimConfig:
+        """The settings that the choice of steps depends on; all others have fixed values, such as ideal sensors.
+
+        `spread` is True for a numbered instance, which differs from the nominal object like those that a seed draws.
+        """
+        return _model_config(self.config, self.config.spread or self.number is not None)
+
+    @cached_property
+    def device(self) -> DeviceInfo:
+        """The properties of the gripper with ideal sensors, for the controller of a trial grasp."""
+        return device_info(self.model_config)
+
+    @cached_property
+    def nominal(self) -> GraspSetup:
+        """The grasp of the nominal object with all its terms. Raises TypeError if there is no object."""
+        if self.spec is None:
+            raise TypeError("where there is no object there is nothing to grasp")
+        return _setup(_model_config(self.config, False), self.spec, None, None)
+
+    def examples(self) -> Iterator[GraspSetup]:
+        """Yield grasps of some instances with all their terms, always the same ones; none if they do not differ.
+
+        An instance that does not fit between the open fingers is left out.
+        """
+        for seed in range(EXAMPLES if self.model_config.spread else 0):
+            with suppress(ConfigError):
+                yield _setup(self.model_config, self.spec, None, seed)
+
+
 def build(config: SimConfig, scene: str, scaled: ScaledParameter | None = None) -> Problem:
     """Return the problem of grasping an object: a name, a scene file (`*.toml`), or `none` for no object.
 
@@ -94,47 +133,16 @@ def build(config: SimConfig, scene: str, scaled: ScaledParameter | None = None) 
     Raises UnknownName for an unknown name, ConfigError for a file that cannot be read as an object.
     """
     if scene == "none":
-        return problem_of(config, None)
+        return Problem(config, None)
     name, number = split_number(scene)
     spec = find(name)
-    return problem_of(config, spec if scaled is None else scaled.applied_to(spec), number)
-
-
-def problem_of(config: SimConfig, spec: ObjectSpec | None, number: int | None = None) -> Problem:
-    """Return the problem of an object, or of its instance with this number; `spec` None: no object."""
-    model_config = _model_config(config, config.spread)
-    nominal = None
-    if spec is not None:
-        nominal = _setup(_model_config(config, False), spec, None, None)
-        if number is not None:
-            # A numbered instance differs from the nominal object, like the instances that a seed draws.
-            model_config = _model_config(config, True)
-    return Problem(
-        config=config,
-        spec=spec,
-        number=number,
-        model_config=model_config,
-        device=device_info(model_config),
-        nominal=nominal,
-        examples=partial(_examples, model_config, spec),
-    )
+    return Problem(config, spec if scaled is None else scaled.applied_to(spec), number)
 
 
 @lru_cache(maxsize=64)
 def _model_config(config: SimConfig, spread: bool) -> SimConfig:
     """Return the settings that the choice of steps depends on, with this `spread`. A batch shares them."""
     return evolve(config, **_NOT_OF_THE_MODEL, spread=spread)
-
-
-def _examples(config: SimConfig, spec: ObjectSpec | None) -> tuple[GraspSetup, ...]:
-    """Return what `Problem.examples` returns. An instance that does not fit between the open fingers is left out."""
-    if spec is None or not config.spread:
-        return ()
-    setups = []
-    for seed in range(EXAMPLES):
-        with suppress(ConfigError):
-            setups.append(_setup(config, spec, None, seed))
-    return tuple(setups)
 
 
 def instantiate(problem: Problem, reduction: Reduction | None, seed: int) -> GraspSetup:
@@ -171,18 +179,21 @@ def _setup(
     buffers = draw_buffers(scene)
     of_number = NO_NUMBER if number is None or spec is None else draws_of_number(spec, number)
     drawn = draw_grasp(scene, key_of(seed or 0), of_number, buffers)
-    instance = None if spec is None else instance_of(spec, drawn.placement, buffers.params)
-    if instance is not None and seed is not None:
-        check_fit(config, instance.spec, instance.width_m, instance.offset_m)
-    plant, state = _plant(config, instance, drawn)
-    if instance is not None and reduction is not None:
+    width_m, terms = drawn.placement.width_m, ()
+    if spec is not None:
+        width_m -= deepest_dent(spec, buffers.params)
+        terms = params_of_terms(spec, buffers.params)
+        if seed is not None:
+            check_fit(config, spec, width_m, drawn.placement.offset_m)
+    plant, state = _plant(config, spec, drawn, width_m, terms)
+    if reduction is not None:
         plant = reduction.applied_to(plant)
     return GraspSetup(
-        kinds=instance.kinds if instance else (),
-        terms=instance.terms if instance else (),
+        kinds=() if spec is None else spec.kinds,
+        terms=terms,
         plant=plant,
         state=state,
-        sensor=_sensor(config, 1.0 if instance is None else instance.share, drawn, buffers.cells),
+        sensor=_sensor(config, drawn, buffers.cells),
         sensor_state=_gripper(config).sensor_state,
         dt_s=1.0 / config.rate_hz,
         seed=seed or 0,
@@ -207,26 +218,23 @@ def check_fit(config: SimConfig, spec: ObjectSpec, width_m: float, offset_m: flo
         )
 
 
-def _plant(config: SimConfig, instance: Instance | None, drawn: Drawn) -> tuple[PlantParams, PlantState]:
+def _plant(
+    config: SimConfig, spec: ObjectSpec | None, drawn: Drawn, width_m: float, terms: tuple[TermParams, ...]
+) -> tuple[PlantParams, PlantState]:
     """Return the parameters of the plant, and its state before the grasp: open, at rest, without contact."""
     gripper = _gripper(config)
     friction = gripper.drive.friction._replace(coulomb_n=drawn.coulomb_n, breakaway_n=drawn.breakaway_n)
     drive = gripper.drive._replace(friction=friction)
-    if instance is None:
-        # A negative width: the fingers close without touching anything.
-        model = ObjectModel(-1.0, 0.0, gripper.pads, all_active(()))
-        at_rest, offset = _uncompressed(()), 0.0
-    else:
-        model = ObjectModel(
-            width_m=instance.width_m,
-            table_friction_n=instance.table_n,
-            terms=all_active(instance.terms),
-            pads=gripper.pads,
-            held=1 if instance.spec.held else 0,
-        )
-        at_rest, offset = _uncompressed(instance.kinds), instance.offset_m
+    model = ObjectModel(
+        width_m=width_m,
+        table_friction_n=0.0 if spec is None else spec.table_n,
+        terms=all_active(terms),
+        pads=gripper.pads,
+        held=1 if spec is not None and spec.held else 0,
+    )
+    at_rest = _uncompressed(() if spec is None else spec.kinds)
     right = (at_rest,) if model.held == 1 else ()
-    state = PlantState(gripper.motion, Contact(0.0, 0.0, offset, 0, at_rest, right))
+    state = PlantState(gripper.motion, Contact(0.0, 0.0, drawn.placement.offset_m, 0, at_rest, right))
     return PlantParams(drive, model, gripper.steps), state
 
 
@@ -250,7 +258,7 @@ class _Gripper(NamedTuple):
 
 @lru_cache(maxsize=64)
 def _gripper(config: SimConfig) -> _Gripper:
-    link = _linkage(config)
+    link = LINKAGES[config.transmission]
     drive = Drive(
         link=link,
         inertia=_inertia(config),
@@ -284,10 +292,6 @@ def drive_and_pads(config: SimConfig) -> tuple[Drive, PadCompliance]:
     return gripper.drive, gripper.pads
 
 
-def _linkage(config: SimConfig) -> ScrewLinkage:
-    return LINKAGES[config.transmission]
-
-
 def _inertia(config: SimConfig) -> float:
     """Return the inertia `Drive.inertia`: m g^2 of straight jaws, (2 pi)^2 J of a rotor."""
     if config.transmission == "straight":
@@ -295,17 +299,17 @@ def _inertia(config: SimConfig) -> float:
     return 4.0 * math.pi * math.pi * config.rotor_kg_m2
 
 
-def _sensor(config: SimConfig, share: float, drawn: Drawn, cells: CellArrays) -> SensorParams:
-    """Return the sensors of a grasp; `share`: that of the force which lands on the gripping faces."""
+def _sensor(config: SimConfig, drawn: Drawn, cells: CellArrays) -> SensorParams:
+    """Return the sensors of a grasp."""
     period = float(config.pad_period_s)
     if config.sensor == "ideal":
         clock = ImageClock(0.0, period, 0.0)
-        return SensorParams(1, _linkage(config), clock, 1.0, 0.0, IDEAL_CELLS, IDEAL_CELLS)
+        return SensorParams(1, LINKAGES[config.transmission], clock, 1.0, 0.0, IDEAL_CELLS, IDEAL_CELLS)
     return SensorParams(
         ideal=0,
-        link=_linkage(config),
+        link=LINKAGES[config.transmission],
         clock=ImageClock(drawn.image_phase_s, period, float(config.pad_delay_s)),
-        share=float(share),
+        share=float(drawn.placement.share),
         noise_counts=float(config.noise_counts),
         left=PadCells(cells.weights, cells.left),
         right=PadCells(cells.weights, cells.right),

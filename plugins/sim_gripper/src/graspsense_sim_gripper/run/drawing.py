@@ -41,7 +41,8 @@ FRICTION, PHASE, OFFSETS, INSTANCE = 0, 1, 2, 2 + 2 * CELLS
 """The places of the draws of a grasp; those of the instance are last, since their number differs."""
 NO_NUMBER: Final = np.zeros(0)
 """The draws of an object without a number."""
-NO_OBJECT: Final = NominalParams((), (), ()), InstanceSpread(*(0.0,) * 7)
+NO_OBJECT: Final = NominalParams((), (), ()), InstanceSpread(0.0, -1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
+"""No terms, and a negative width: the fingers close without touching anything."""
 
 
 class SceneNumbers(NamedTuple):

@@ -307,17 +307,6 @@ def ending(state: SimulationState) -> Ending:
     )
 
 
-def run_plain(
-    loop: Callable[[GraspParams, SimulationState, Buffers], SimulationState],
-    params: GraspParams,
-    progress: SimulationState,
-    buffers: Buffers,
-) -> LoopEnd:
-    """Run a loop in the interpreter from a state to its end."""
-    state = loop(params, progress, buffers)
-    return LoopEnd(ending(state), lambda: state, lambda: state.plant)
-
-
 def has_ended(state: TickState) -> bool:
     """Return whether the controller or the guard has ended the grasp."""
     return bool(state.done == 1 or state.guard.stopped == 1)

@@ -1,4 +1,4 @@
-"""Nested tuples and the numbers in them: from an array of these, or from the nested lists that JSON makes of them."""
+"""Nested tuples and the numbers in them."""
 
 from __future__ import annotations
 
@@ -65,17 +65,6 @@ def structure(values: Any) -> Any:
     if isinstance(values, tuple):
         return (type(values), *map(structure, values))
     return (values.dtype.str, values.ndim) if isinstance(values, np.ndarray) else type(values)
-
-
-def like(pattern: Any, values: Any) -> Any:
-    """Return nested lists of values as nested tuples of the same types as `pattern`.
-
-    Raises ValueError if the numbers of values differ.
-    """
-    if not isinstance(pattern, tuple):
-        return values
-    parts = [like(*part) for part in zip(pattern, values, strict=True)]
-    return type(pattern)(*parts) if hasattr(pattern, "_fields") else tuple(parts)
 
 
 def with_places(pattern: Any, begin: int = 0) -> Any:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
 
-from attrs import evolve, fields, frozen
+from attrs import evolve, fields
 
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.scene.library import find, split_number
@@ -16,18 +16,13 @@ OF_THE_MODEL: Final = ("accuracy", "step_s", "rate_hz", "expected_force_n", "exp
 """Numbers among the settings that are no property of the gripper or its sensors."""
 
 
-@frozen
-class Perturbed:
-    """The settings of a gripper, and the parameter of its objects that is scaled, if any."""
-
-    config: SimConfig
-    scaled: ScaledParameter | None = None
-
-
-def perturbed(config: SimConfig, scenes: Sequence[str], share: float) -> Mapping[str, Perturbed]:
+def perturbed(
+    config: SimConfig, scenes: Sequence[str], share: float
+) -> Mapping[str, tuple[SimConfig, ScaledParameter | None]]:
     """Return the gripper with each parameter scaled, by the name of the parameter; "" is the gripper as it is.
 
-    A parameter that is 0, infinite or not used is left out. Raises UnknownName and ConfigError as `find` does.
+    Each is given by its settings, and by the parameter of its objects that is scaled, if any. A parameter that is 0,
+    infinite or not used is left out. Raises UnknownName and ConfigError as `find` does.
     """
     # Steps of a fixed length depend smoothly on the parameters, so what 1 ppm moves is not due to their control.
     step_s = config.step_s or 1.0 / config.rate_hz
@@ -38,12 +33,12 @@ def perturbed(config: SimConfig, scenes: Sequence[str], share: float) -> Mapping
         for name in parameters_of(find(scene))
     )
     return {
-        "": Perturbed(steady),
+        "": (steady, None),
         **{
-            f"gripper.{name}": Perturbed(evolve(steady, **{name: getattr(steady, name) * (1.0 + share)}))
+            f"gripper.{name}": (evolve(steady, **{name: getattr(steady, name) * (1.0 + share)}), None)
             for name in _settings(steady)
         },
-        **{name: Perturbed(steady, ScaledParameter(name, share)) for name in names},
+        **{name: (steady, ScaledParameter(name, share)) for name in names},
     }
 
 

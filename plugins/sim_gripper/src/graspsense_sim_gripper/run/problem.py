@@ -1,4 +1,4 @@
-"""The description of what is simulated: the object in the gripper, the controller, and one grasp before it begins."""
+"""The controller of simulated grasps, and one grasp before it begins."""
 
 from __future__ import annotations
 
@@ -10,14 +10,13 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from graspsense.plugin_api import Controller, DeviceInfo, FeatureSet
+from graspsense.plugin_api import Controller, FeatureSet
 from graspsense.simulator_api import RunConfig
-from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant.sensing import SensorParams, SensorState
 from graspsense_sim_gripper.plant.state import PlantState
 from graspsense_sim_gripper.run.drawing import image_noise
 from graspsense_sim_gripper.scene.random_numbers import key_of
-from graspsense_sim_gripper.scene.spec import ObjectSpec, TermParams
+from graspsense_sim_gripper.scene.spec import TermParams
 from graspsense_sim_gripper.solve.scheme import PlantParams
 
 IMAGES_PER_BLOCK: Final = 64
@@ -70,24 +69,3 @@ class GraspSetup:
     def noise(self, begin: int, count: int) -> NDArray[np.float64]:
         """Return the noise of the cell images from image `begin` on: normal numbers (count, 2 CELLS)."""
         return image_noise(key_of(self.seed), begin, count)
-
-
-@frozen(kw_only=True)
-class Problem:
-    """An object in the gripper, before a seed draws an instance of it."""
-
-    config: SimConfig
-    spec: ObjectSpec | None
-    """None: there is no object."""
-    number: int | None
-    """The number of a particular instance; None: the seed draws the instance."""
-    model_config: SimConfig
-    """The settings that the choice of steps depends on; all others have fixed values, such as ideal sensors. `spread`
-    is True for a numbered instance, which also differs from the nominal object."""
-    device: DeviceInfo
-    """The properties of the gripper with ideal sensors, for the controller of a trial grasp."""
-    nominal: GraspSetup | None
-    """The grasp of the nominal object with all its terms, with `model_config`; None if there is no object."""
-    examples: Callable[[], tuple[GraspSetup, ...]]
-    """Returns grasps of some instances with all their terms and ideal sensors, always the same ones; none if there is
-    no object or if instances do not differ."""

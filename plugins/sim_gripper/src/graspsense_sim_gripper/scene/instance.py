@@ -9,7 +9,6 @@ from functools import cache, lru_cache
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from attrs import frozen
 from numpy.typing import NDArray
 
 from graspsense_sim_gripper.scene.random_numbers import OBJECT, draw_normals, key_of
@@ -21,7 +20,6 @@ from graspsense_sim_gripper.scene.spec import (
     TermParams,
 )
 
-GRAVITY_M_S2: Final = 9.80665
 PAD_CELLS: Final = 15
 """Cells of the gripping face: five rows of three, the row at the tip first."""
 ROW_MM: Final = 6.0
@@ -46,35 +44,9 @@ class Placement(NamedTuple):
     """Position of the contact on the pad, in rows from its middle."""
 
 
-@frozen(kw_only=True)
-class Instance:
-    """One individual object and its placement: sampled from its spec, or with the nominal values."""
-
-    spec: ObjectSpec
-    width_m: float
-    """The present width, from which a dent of earlier use is subtracted."""
-    offset_m: float
-    share: float
-    """As in `ObjectSpec`."""
-    table_n: float
-    """Friction of the table, which a finger has to overcome to push the object."""
-    kinds: tuple[str, ...]
-    terms: tuple[TermParams, ...]
-    """The parameters of its terms."""
-
-
-def instance_of(spec: ObjectSpec, placement: Placement, params: Sequence[float]) -> Instance:
-    """Return the instance of an object with this placement and these parameters of all its terms."""
-    terms = tuple([tuple.__new__(kind, params[begin:end]) for kind, begin, end in spec.params_of_terms])
-    return Instance(
-        spec=spec,
-        width_m=placement.width_m - deepest_dent(spec, params),
-        offset_m=placement.offset_m,
-        share=placement.share,
-        table_n=spec.friction * spec.mass_kg * GRAVITY_M_S2,
-        kinds=spec.kinds,
-        terms=terms,
-    )
+def params_of_terms(spec: ObjectSpec, params: Sequence[float]) -> tuple[TermParams, ...]:
+    """Return the parameters of each term of an instance with these parameters of all its terms."""
+    return tuple([tuple.__new__(kind, params[begin:end]) for kind, begin, end in spec.params_of_terms])
 
 
 def take_number(draws: Any, of_number: Any) -> None:

@@ -7,15 +7,12 @@ In the catalogue every value has an origin and a reason; a scene file needs neit
 
 from __future__ import annotations
 
-import math
 import tomllib
 from collections.abc import Mapping
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
 from typing import Final
-
-from attrs import fields_dict
 
 from graspsense.plugin_api import ConfigError, ObjectKind, UnknownName
 from graspsense.simulator_api import fitted_results, given_claims, suggestion
@@ -24,8 +21,7 @@ from graspsense_sim_gripper.scene.spec import (
     TomlTable,
     TomlValue,
     parse_scene,
-    parse_term,
-    spec_with_sorted_terms,
+    spec_of,
 )
 
 CONTAINERS: Final = ("odwalla", "naked", "can", "water")
@@ -34,8 +30,6 @@ LONGEST_SCENE: Final = 2**18
 """Limit on the characters of a scene file; those that are shipped have some thousand."""
 SCENE_IN_MEMORY: Final = "scene in memory"
 """The name of an object that is given by the text of its scene."""
-FITTED_RESULTS: Final = frozenset(("table_2", "table_3", "authors_tree", "section_3f", "fig_6_contact"))
-"""The published results that values may be fitted to."""
 
 
 @cache
@@ -46,11 +40,11 @@ def catalogue() -> Mapping[str, ObjectSpec]:
     for name, table in tomllib.loads(text).items():
         states = table.pop("states", None)
         if states is None:
-            specs[name] = parse_entry(name, table)
+            specs[name] = _entry(name, table)
             continue
         for state, extra in states.items():
             both = {**table, **extra, "terms": [*table.get("terms", []), *extra.get("terms", [])]}
-            specs[f"{name}:{state}"] = parse_entry(f"{name}:{state}", both)
+            specs[f"{name}:{state}"] = _entry(f"{name}:{state}", both)
     return specs
 
 
@@ -170,74 +164,22 @@ def _read_scene(path: Path) -> ObjectSpec:
     return parse_scene(text, path.stem, str(path))
 
 
-def parse_entry(name: str, table: TomlTable) -> ObjectSpec:
-    """Return the object of an entry of the catalogue. Each value must have an origin and a reason, and no key may lack.
-
-    Raises ConfigError that names the object and the key.
-    """
+def _entry(name: str, table: TomlTable) -> ObjectSpec:
+    """Return the object of an entry of the catalogue, a scene whose numbers are tables: value, origin and reason."""
     reasons: dict[str, str] = {}
     fitted_to: set[str] = set()
 
-    def figure(where: str, entry: TomlValue, signed: bool = False) -> float:
-        value = _figure(where, entry, signed)
+    def plain(entry: TomlValue, where: str) -> TomlValue:
+        if isinstance(entry, list):
+            return [plain(term, f"{name}.{term['type']}") for term in entry]
+        if not isinstance(entry, dict):
+            return entry
+        if "value" not in entry:
+            return {key: plain(part, f"{where}.{key}") for key, part in entry.items()}
         reasons[where] = entry["reason"]
-        fitted_to.update(_fitted_to(where, entry["origin"]))
-        return value
+        fitted_to.update(fitted_results(entry["origin"]))
+        return entry["value"]
 
-    values: dict[str, TomlValue] = {"name": name}
-    for key, entry in table.items():
-        if key != "terms":
-            values[key] = entry if key in ("summary", "patch") else figure(f"{name}.{key}", entry)
-    fields = fields_dict(ObjectSpec)
-    unknown = values.keys() - fields.keys()
-    missing = (
-        fields.keys()
-        - values.keys()
-        - {"terms", "spreads", "reasons", "fitted_to", "offset_m", "held", "file"}
-    )
-    if unknown or missing:
-        raise ConfigError(f"object {name!r}: unknown {sorted(unknown)}, missing {sorted(missing)}")
-    problems: list[str] = []
-    terms = []
-    for entry in table.get("terms", []):
-        kind = entry.get("type")
-        term = parse_term(entry, f"object {name!r}, term {kind!r}", f"{name}.{kind}.", problems, figure)
-        if term is not None:
-            terms.append(term)
-    if problems:
-        raise ConfigError("\n".join(problems))
-    try:
-        return spec_with_sorted_terms(
-            {**values, "reasons": reasons, "fitted_to": tuple(sorted(fitted_to))}, terms
-        )
-    except ValueError as error:
-        raise ConfigError(f"object {name!r}: {error}") from error
-
-
-def _figure(where: str, entry: TomlValue, signed: bool) -> float:
-    if not isinstance(entry, Mapping) or set(entry) != {"value", "origin", "reason"} or not entry["reason"]:
-        raise ConfigError(
-            f"{where}: write {{ value = NUMBER, origin = ORIGIN, reason = TEXT }}, not {entry!r}"
-        )
-    value = entry["value"]
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise ConfigError(f"{where}: {value!r} is not a finite number")
-    if value < 0.0 and not signed:
-        raise ConfigError(f"{where}: {value!r} is negative")
-    return float(value)
-
-
-def _fitted_to(where: str, origin: TomlValue) -> list[str]:
-    """Return the published results that a value of this origin was fitted to.
-
-    Raises ConfigError if the text is not an origin.
-    """
-    try:
-        results = list(fitted_results(str(origin)))
-    except ValueError as error:
-        raise ConfigError(f"{where}: {error}") from error
-    if not set(results) <= FITTED_RESULTS:
-        raise ConfigError(
-            f"{where}: {origin!r} names an unknown result. Known: {', '.join(sorted(FITTED_RESULTS))}"
-        )
-    return results
+    values = plain(table, name)
+    more = {"name": name, "reasons": reasons, "fitted_to": tuple(sorted(fitted_to))}
+    return spec_of(values, f"object {name!r}", more)

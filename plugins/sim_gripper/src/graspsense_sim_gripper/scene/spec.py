@@ -19,6 +19,7 @@ from graspsense_sim_gripper.scene.identified import check_identified
 from graspsense_sim_gripper.scene.terms.registry import find_term, in_order
 from graspsense_sim_gripper.scene.terms.term import not_dented
 
+GRAVITY_M_S2: Final = 9.80665
 PATCHES: Final = ("line", "face", "point")
 
 LARGEST: Final = 1e20
@@ -108,6 +109,7 @@ class ObjectSpec:
     spreads: tuple[TermSpread, ...] = ()
     """The spread of each term's parameters, in the same order; () if no parameter has a spread of its own."""
     reasons: Mapping[str, str] = field(factory=dict)
+    """That of each number in the catalogue, by object, term and key."""
     fitted_to: tuple[str, ...] = ()
     """The published results to which values of this object were fitted, sorted."""
     file: str = ""
@@ -117,6 +119,11 @@ class ObjectSpec:
     def kinds(self) -> tuple[str, ...]:
         """The kinds of its terms."""
         return tuple(kind for kind, _ in self.terms)
+
+    @property
+    def table_n(self) -> float:
+        """Friction of the table, which a finger has to overcome to push the object."""
+        return self.friction * self.mass_kg * GRAVITY_M_S2
 
     @cached_property
     def nominal_params(self) -> NominalParams:
@@ -169,7 +176,7 @@ class ObjectSpec:
         return repr(self)
 
 
-def spec_with_sorted_terms(values: TomlTable, terms: list[ParsedTerm]) -> ObjectSpec:
+def _with_sorted_terms(values: TomlTable, terms: list[ParsedTerm]) -> ObjectSpec:
     """Return the spec with these values, and its terms in the canonical order.
 
     Raises ValueError if a value is out of the range of its field, or if two terms act on the sum of the others.
@@ -201,12 +208,20 @@ def parse_scene(text: str, name: str, where: str) -> ObjectSpec:
         why = str(error).removeprefix("not TOML: ")
         raise ConfigError(f"{where}: is not valid TOML{line}: {why}") from error
     refuse_other_kind(table, "scene", where)
+    return spec_of(table, where, {"name": name, "file": where})
+
+
+def spec_of(table: TomlTable, where: str, more: TomlTable) -> ObjectSpec:
+    """Return the object of a table with the keys of a scene file; `more`: further fields of it.
+
+    Raises ConfigError that lists all problems of the table, each after `where`.
+    """
     problems: list[str] = []
-    values = {"name": name, "file": where, **_scene_values(table, problems)}
+    values = {**more, **_scene_values(table, problems)}
     terms = _scene_terms(table.get("terms", []), problems)
     if not problems:
         try:
-            return spec_with_sorted_terms(values, terms)
+            return _with_sorted_terms(values, terms)
         except ValueError as error:
             problems.append(str(error.args[0]))
     raise ConfigError("\n".join(f"{where}: {problem}" for problem in problems))
@@ -240,17 +255,10 @@ def _scene_terms(tables: TomlValue, problems: list[str]) -> list[ParsedTerm]:
     if len(tables) > MOST_TERMS:
         problems.append(f"terms: {len(tables)} terms, and an object has at most {MOST_TERMS}")
         return []
-
-    def number(where: str, entry: TomlValue, signed: bool) -> float:
-        return _number(entry, where, problems, signed)
-
-    terms = []
-    for i, table in enumerate(tables, 1):
-        label = f"[[terms]] {i} ({table.get('type')})"
-        term = parse_term(table, label, f"{label} ", problems, number)
-        if term is not None:
-            terms.append(term)
-    return terms
+    terms = [
+        _term(table, f"[[terms]] {i} ({table.get('type')})", problems) for i, table in enumerate(tables, 1)
+    ]
+    return [term for term in terms if term is not None]
 
 
 def _number(entry: TomlValue, label: str, problems: list[str], negative: bool = False) -> float:
@@ -270,18 +278,8 @@ def _number(entry: TomlValue, label: str, problems: list[str], negative: bool = 
     return 0.0
 
 
-def parse_term(
-    table: TomlTable,
-    label: str,
-    prefix: str,
-    problems: list[str],
-    number: Callable[[str, TomlValue, bool], float],
-) -> ParsedTerm | None:
-    """Return a term as it was read; None if its kind is unknown.
-
-    Problems are added to `problems`, and begin with `label`. `number(where, entry, signed)` reads one value, which may
-    be negative if it is `signed`; `where` is `prefix` followed by the key.
-    """
+def _term(table: TomlTable, label: str, problems: list[str]) -> ParsedTerm | None:
+    """Return a term as it was read; None if its kind is unknown. Problems begin with `label`."""
     try:
         kind, term = find_term(str(table.get("type", "")))
     except UnknownName as error:
@@ -298,7 +296,11 @@ def parse_term(
     if missing:
         problems.append(f"{label}: missing {', '.join(missing)}")
     n_problems = len(problems)
-    values = {key: number(f"{prefix}{key}", table[key], key in term.signed) for key in given if key in names}
+    values = {
+        key: _number(table[key], f"{label} {key}", problems, key in term.signed)
+        for key in given
+        if key in names
+    }
     spread = _spread(table.get("spread", {}), label, names, problems)
     if len(problems) == n_problems:
         problems += [

@@ -17,7 +17,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from attrs import asdict
+import cattrs
 
 import graspsense.plugin_api as plugin_api
 from graspsense.plugin_api import FeatureSet
@@ -31,8 +31,9 @@ from graspsense.simulator_api import (
 )
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.accuracy.levels import Level
-from graspsense_sim_gripper.run.accuracy.model import Reduction, StepDecision, Verification
-from graspsense_sim_gripper.run.problem import ControllerStep, GraspController, Problem
+from graspsense_sim_gripper.run.accuracy.model import Reduction
+from graspsense_sim_gripper.run.build import Problem
+from graspsense_sim_gripper.run.problem import ControllerStep, GraspController
 from graspsense_sim_gripper.scene.terms.registry import active_laws
 from graspsense_sim_gripper.scene.terms.term import OnSum
 from graspsense_sim_gripper.solve.scheme import Steps
@@ -138,7 +139,7 @@ def _file_name(key: Key) -> str | None:
 @cache
 def _own_code() -> bytes:
     """Return text that identifies the files of the simulator and of the core: their paths, sizes and times."""
-    packages = (Path(__file__).parent.parent, Path(plugin_api.__file__).parent / "core")
+    packages = (Path(__file__).parents[2], Path(plugin_api.__file__).parent / "core")
     return "".join(_stamp(source) for folder in packages for source in sorted(folder.rglob("*.py"))).encode()
 
 
@@ -214,31 +215,20 @@ def _delete_old_files(folder: Path) -> None:
         path.unlink(missing_ok=True)
 
 
-def stored(model: Reduction) -> dict[str, Json]:
+def stored(model: Reduction) -> Json:
     """Return a model as values that JSON can represent."""
-    values = asdict(model, recurse=True, filter=lambda attribute, _: attribute.init)
-    tuples = {
-        "steps": model.steps._asdict(),
-        "level": model.level._asdict(),
-    }
-    return {**values, **tuples}
+    return _CONVERTER.unstructure(model)
 
 
-def restored(values: dict[str, Json]) -> Reduction:
-    """Return the model of which `stored` has given these values. Raises KeyError or TypeError for others."""
-    verification = values["verification"]
-    return Reduction(
-        **{
-            **values,
-            "steps": Steps(**values["steps"]),
-            "decisions": tuple(StepDecision(**decision) for decision in values["decisions"]),
-            "unresolved": tuple(values["unresolved"]),
-            "left_out": tuple(values["left_out"]),
-            "level": Level(**values["level"]),
-            "verification": None if verification is None else _verification(verification),
-        }
-    )
+def restored(values: Json) -> Reduction:
+    """Return the model of which `stored` has given these values.
+
+    Raises KeyError, TypeError or ValueError for others.
+    """
+    return _CONVERTER.structure(values, Reduction)
 
 
-def _verification(values: dict[str, Json]) -> Verification:
-    return Verification(**{**values, "features": tuple(values["features"])})
+_CONVERTER: Final = cattrs.Converter(detailed_validation=False)
+for _kind in (Steps, Level):
+    # Their numbers in order: not all versions of cattrs know named tuples.
+    _CONVERTER.register_structure_hook(_kind, lambda values, kind: kind(*values))

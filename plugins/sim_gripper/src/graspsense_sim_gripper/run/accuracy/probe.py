@@ -7,8 +7,8 @@ from typing import Final, NamedTuple
 
 from graspsense.gripper_api import gap_and_rate, revolutions_at
 from graspsense_sim_gripper.run.accuracy.levels import MAX_BALANCE_RTOL
+from graspsense_sim_gripper.run.build import Problem
 from graspsense_sim_gripper.run.compiled.compose import contact_solver, hardens, uncompressed
-from graspsense_sim_gripper.run.problem import GraspSetup, Problem
 
 FORCE_N: Final = 20.0
 SPEED_M_S: Final = 0.01
@@ -46,7 +46,7 @@ def grip_of(problem: Problem, force_n: float | None = None, speed_m_s: float | N
     `expected_force_n` and `expected_speed_m_s` of the settings take precedence over the arguments. Without either, the
     values of the paper are used. Raises TypeError if there is no object.
     """
-    config, setup = problem.model_config, nominal(problem)
+    config, setup = problem.model_config, problem.nominal
     drive, model = setup.plant.drive, setup.plant.object
     # Only orders of magnitude follow from the forces, so their balance need not be that of a reference.
     model = model._replace(balance_rtol=MAX_BALANCE_RTOL)
@@ -74,10 +74,3 @@ def grip_of(problem: Problem, force_n: float | None = None, speed_m_s: float | N
         largest,
         touch.force_n / FIRST_M,
     )
-
-
-def nominal(problem: Problem) -> GraspSetup:
-    """Return the grasp of the nominal object. Raises TypeError if there is no object."""
-    if problem.nominal is None:
-        raise TypeError("where there is no object there is nothing to grasp")
-    return problem.nominal

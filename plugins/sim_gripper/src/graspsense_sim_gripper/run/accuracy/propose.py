@@ -20,11 +20,11 @@ from graspsense_sim_gripper.run.accuracy.levels import (
     steps_for,
 )
 from graspsense_sim_gripper.run.accuracy.model import QUANTITIES, Reduction, StepDecision
-from graspsense_sim_gripper.run.accuracy.probe import FORCE_N, SPEED_M_S, Grip, nominal
-from graspsense_sim_gripper.run.problem import Problem
+from graspsense_sim_gripper.run.accuracy.probe import FORCE_N, SPEED_M_S, Grip
+from graspsense_sim_gripper.run.build import Problem
 from graspsense_sim_gripper.scene.terms.registry import find_term
 from graspsense_sim_gripper.scene.terms.switchable import Switchable
-from graspsense_sim_gripper.scene.terms.term import NO_STATE, WorkingPoint, no_rates
+from graspsense_sim_gripper.scene.terms.term import NO_STATE, Term, WorkingPoint, no_rates
 from graspsense_sim_gripper.solve.scheme import Steps
 
 USUAL_POINT: Final = WorkingPoint(1e-3, SPEED_M_S, 1.0, FORCE_N)
@@ -54,7 +54,7 @@ def propose(problem: Problem, grip: Grip | None, scale: LevelScale = CONTROLLED[
 
     Raises TypeError if there is no object.
     """
-    config, setup = problem.model_config, nominal(problem)
+    config, setup = problem.model_config, problem.nominal
     kinds, model, dt_s = setup.kinds, setup.plant.object, setup.dt_s
     level = scale.level(config.accuracy)
     angle = min(math.sqrt(SWING_SHARE * level.step_tol), MAX_SWING_RAD)
@@ -127,7 +127,12 @@ def _oscillates(kind: str, term: Switchable) -> bool:
     law = find_term(kind)[1]
     if law.rates is no_rates:
         return term.active == 1 and bool(law.at_rest != NO_STATE)
-    return term.active == 1 and any(rate.what == "swings" for rate in law.rates(term.params, USUAL_POINT))
+    return term.active == 1 and bool(_swings(law, term))
+
+
+def _swings(law: Term, term: Switchable) -> list[float]:
+    """Return the angular frequencies (rad/s) with which a term oscillates."""
+    return [rate.per_s for rate in law.rates(term.params, USUAL_POINT) if rate.what == "swings"]
 
 
 def _frequencies(kinds: Sequence[str], model: ObjectModel) -> dict[int, float]:
@@ -135,10 +140,9 @@ def _frequencies(kinds: Sequence[str], model: ObjectModel) -> dict[int, float]:
 
     A term that divides its steps by itself is left out.
     """
-    swings = {}
-    for i, kind in enumerate(kinds):
-        term = find_term(kind)[1]
-        if not term.divides_steps:
-            rates = term.rates(model.terms[i].params, USUAL_POINT)
-            swings[i] = max((rate.per_s for rate in rates if rate.what == "swings"), default=0.0)
-    return swings
+    laws = [find_term(kind)[1] for kind in kinds]
+    return {
+        i: max(_swings(law, model.terms[i]), default=0.0)
+        for i, law in enumerate(laws)
+        if not law.divides_steps
+    }

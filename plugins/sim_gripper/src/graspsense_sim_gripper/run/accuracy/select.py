@@ -34,7 +34,8 @@ from graspsense_sim_gripper.run.accuracy.verify import (
     trial_grasps,
     without_term,
 )
-from graspsense_sim_gripper.run.problem import GraspController, Problem
+from graspsense_sim_gripper.run.build import Problem
+from graspsense_sim_gripper.run.problem import GraspController
 from graspsense_sim_gripper.run.term_failure import TermFailed, raised_in_term
 from graspsense_sim_gripper.scene.spec import ObjectSpec
 from graspsense_sim_gripper.scene.terms.term import LAW_ERRORS
@@ -256,27 +257,20 @@ def _culprit(problem: Problem, grip: Grip, trial: TrialGrasps) -> str:
 
 
 def _refusal(problem: Problem, error: float, quantity: str, term: str) -> str:
+    config = problem.model_config
     miss = f"{quantity} differs by {error:.2g}" if math.isfinite(error) else "even the outcome differs"
     cause = (
         f"the steps because of the term {term!r}" if term else "the steps, and not because of a single term"
     )
+    reachable = 2.0 * error / _accepted_share(config)
+    advice = f"ask for {reachable:.1g} (gripper.accuracy), or " if reachable <= 0.5 else ""
     return (
-        f"{_inaccurate(problem)}: with every term and the smallest steps, {miss} between two step lengths. The grasp "
-        f"depends on {cause}; {_advice(2.0 * error / _accepted_share(problem.model_config))}"
+        f"{_scene_in_words(problem)}: no model of it reaches gripper.accuracy = {config.accuracy:g}: with every term "
+        f"and the smallest steps, {miss} between two step lengths. The grasp depends on {cause}; {advice}accept an "
+        'unverified result with gripper.fidelity = "reference"'
     )
-
-
-def _inaccurate(problem: Problem) -> str:
-    accuracy = problem.model_config.accuracy
-    return f"{_scene_in_words(problem)}: no model of it reaches gripper.accuracy = {accuracy:g}"
 
 
 def _scene_in_words(problem: Problem) -> str:
     spec: ObjectSpec | None = problem.spec
     return "the scene" if spec is None else spec.file or f"object {spec.name!r}"
-
-
-def _advice(reachable: float) -> str:
-    """Return the advice of an error message; `reachable` is an accuracy that a model would probably reach."""
-    advice = f"ask for {reachable:.1g} (gripper.accuracy), or " if reachable <= 0.5 else ""
-    return f'{advice}accept an unverified result with gripper.fidelity = "reference"'

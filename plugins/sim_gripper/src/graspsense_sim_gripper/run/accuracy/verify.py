@@ -8,7 +8,7 @@ from __future__ import annotations
 import logging
 import math
 import time
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from attrs import define, evolve, field
@@ -30,7 +30,7 @@ from graspsense_sim_gripper.plant.state import Motion, PlantState
 from graspsense_sim_gripper.run.accuracy.error import SCALES, UNIT_SCALES, GraspRecord
 from graspsense_sim_gripper.run.accuracy.model import Reduction
 from graspsense_sim_gripper.run.accuracy.own_features import OwnFeatures, beyond, own_features
-from graspsense_sim_gripper.run.accuracy.probe import nominal
+from graspsense_sim_gripper.run.build import Problem
 from graspsense_sim_gripper.run.compiled.compose import composition, grasp_loop
 from graspsense_sim_gripper.run.compiled.loop_code import CompiledLoops
 from graspsense_sim_gripper.run.compiled.padding import padded
@@ -46,7 +46,7 @@ from graspsense_sim_gripper.run.loop import (
     has_ended,
     uses_macro_steps,
 )
-from graspsense_sim_gripper.run.problem import GraspController, GraspSetup, Problem
+from graspsense_sim_gripper.run.problem import GraspController, GraspSetup
 from graspsense_sim_gripper.run.term_failure import TermFailed, not_finite_in_tick
 from graspsense_sim_gripper.scene.terms.switchable import switched_off
 
@@ -68,6 +68,14 @@ PROGRESS_S: Final = 3.0
 
 class TooMuchWork(Exception):
     """The trial grasps would take more than `MOST_WORK` ticks and steps."""
+
+
+class TrialGrasp(NamedTuple):
+    """A trial grasp in the steps of one level."""
+
+    record: GraspRecord
+    features: OwnFeatures | None
+    """Those of the pipeline; None: it has none, or ideal sensors do not suffice for them."""
 
 
 @define(eq=False)
@@ -92,9 +100,7 @@ class TrialGrasps:
     """The feature set of the pipeline; None: only the features of the paper are compared."""
     near: bool = False
     """Whether they begin `NEAR_M` from the object, not with the fingers open."""
-    _records: dict[Any, GraspRecord] = field(factory=dict, init=False)
-    _features: dict[Any, OwnFeatures | None] = field(factory=dict, init=False)
-    """The features of the pipeline in the grasps of `_records`."""
+    _grasps: dict[Any, TrialGrasp] = field(factory=dict, init=False)
     _loops: CompiledLoops = field(init=False)
     work: int = field(default=0, init=False)
     """Ticks and steps of all trial grasps so far."""
@@ -107,14 +113,7 @@ class TrialGrasps:
 
     def record(self, reduction: Reduction) -> GraspRecord:
         """Return the grasp in these steps."""
-        key = (reduction.steps, reduction.left_out)
-        if key not in self._records:
-            try:
-                self._records[key] = self._grasp(reduction)
-            except NotCompilable:
-                self.compiled = False
-                self._records[key] = self._grasp(reduction)
-        return self._records[key]
+        return self._grasp(reduction).record
 
     def features_beyond(self, reduction: Reduction, full: Reduction) -> tuple[str, ...]:
         """Return the features of the pipeline that differ from those in finer steps by more than the accuracy.
@@ -123,18 +122,15 @@ class TrialGrasps:
         """
         if self.features is None:
             return ()
-        self.record(reduction)
-        self.record(full)
-        grasp, expected = (self._features[model.steps] for model in (reduction, full))
-        return beyond(grasp, expected, self.config.accuracy)
+        grasp, expected = self._grasp(reduction), self._grasp(full)
+        return beyond(grasp.features, expected.features, self.config.accuracy)
 
     def values(self, reduction: Reduction) -> dict[str, tuple[float, float]]:
         """Return the features of the pipeline and the peak force in these steps, each with the scale of its unit.
 
         The features of the paper, if the pipeline has none or ideal sensors do not suffice for them.
         """
-        record = self.record(reduction)
-        own = self._features.get(reduction.steps)
+        record, own = self._grasp(reduction)
         if own is None:
             return {name: (value, SCALES[name]) for name, value in record.quantities.items()}
         names, values, units = own.features.names, own.features.values, own.features.units
@@ -143,16 +139,26 @@ class TrialGrasps:
             "peak": (record.peak_n, SCALES["peak"])
         }
 
-    def _grasp(self, reduction: Reduction) -> GraspRecord:
-        """Simulate what `record` returns. Raises NotCompilable."""
+    def _grasp(self, reduction: Reduction) -> TrialGrasp:
+        """Return the grasp in these steps, which is simulated once."""
+        key = (reduction.steps, reduction.left_out)
+        if key not in self._grasps:
+            try:
+                self._grasps[key] = self._simulated(reduction)
+            except NotCompilable:
+                self.compiled = False
+                self._grasps[key] = self._simulated(reduction)
+        return self._grasps[key]
+
+    def _simulated(self, reduction: Reduction) -> TrialGrasp:
+        """Return what `_grasp` returns. Raises NotCompilable."""
         setup = evolve(self.setup, plant=reduction.applied_to(self.setup.plant))
         end, rows = self._run(setup)
         if not self.near and not has_ended(end.controller):
             self.near = True
             end, rows = self._run(setup)
-        if self.features is not None:
-            self._features[reduction.steps] = own_features(self.features, rows[:-1], rows[-1])
-        return _record(end, rows, setup.dt_s)
+        own = None if self.features is None else own_features(self.features, rows[:-1], rows[-1])
+        return TrialGrasp(_record(end, rows, setup.dt_s), own)
 
     def with_setup(self, setup: GraspSetup) -> TrialGrasps:
         """Return trial grasps of another instance of the object, which begin near it and go on counting the work."""
@@ -221,7 +227,7 @@ def trial_grasps(
     near = evolve(problem.device, opening=None)
     return TrialGrasps(
         config=evolve(problem.model_config, spread=False),
-        setup=nominal(problem),
+        setup=problem.nominal,
         controller=controller,
         params=tick_params(problem.device, law, run),
         params_near=tick_params(near, law, run),

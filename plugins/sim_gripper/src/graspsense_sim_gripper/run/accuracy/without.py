@@ -13,7 +13,8 @@ from attrs import evolve
 
 from graspsense_sim_gripper.run.accuracy.model import Reduction
 from graspsense_sim_gripper.run.accuracy.verify import TooMuchWork, TrialGrasps, trial_grasps, without_term
-from graspsense_sim_gripper.run.problem import GraspController, Problem
+from graspsense_sim_gripper.run.build import Problem
+from graspsense_sim_gripper.run.problem import GraspController
 from graspsense_sim_gripper.run.term_failure import TermFailed
 from graspsense_sim_gripper.scene.terms.term import LAW_ERRORS
 

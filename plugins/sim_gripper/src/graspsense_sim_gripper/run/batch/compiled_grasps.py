@@ -1,42 +1,51 @@
-"""The compiled grasps of a batch in one thread: drawn in compiled code where that is possible."""
+"""The compiled grasps of a batch in one thread, drawn in compiled code."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from importlib.util import find_spec
+from functools import partial
+from typing import NamedTuple
 
 from attrs import field, frozen
 
-from graspsense.simulator_api import ended_by_itself
-from graspsense_sim_gripper.run.batch.drawn import (
-    Drawing,
-    DrawMemory,
-    DrawnInstances,
-    DrawnScene,
-    compiled_drawing,
-)
+from graspsense_sim_gripper.run.batch.buffers import Storage, begin_images, first_images, longer
+from graspsense_sim_gripper.run.batch.drawn import DrawMemory, compiled_drawing
 from graspsense_sim_gripper.run.batch.job import (
-    EndedGrasp,
     FinishedGrasp,
     Job,
     Measure,
-    Storage,
-    begin_images,
-    grasp_compiled,
-    result_of,
-    with_more_images,
+    ended_as,
+    extracted_from,
+    grasp_plain,
+    started,
 )
-from graspsense_sim_gripper.run.batch.scenes import Scenes
-from graspsense_sim_gripper.run.compiled.compose import Composition
-from graspsense_sim_gripper.run.compiled.loop_code import CellNoise, CompiledLoop, CompiledLoops
-from graspsense_sim_gripper.run.compiled.padding import composition_of
-from graspsense_sim_gripper.run.loop import Buffers, Ending
-from graspsense_sim_gripper.scene.random_numbers import key_of
+from graspsense_sim_gripper.run.batch.scenes import Scenes, SelectedScene, number_in
+from graspsense_sim_gripper.run.compiled.loop_code import (
+    NO_NOISE,
+    CellNoise,
+    CompiledLoop,
+    CompiledLoops,
+    LoopStart,
+)
+from graspsense_sim_gripper.run.compiled.padding import PaddedLayout, padded
+from graspsense_sim_gripper.run.loop import Buffers, LoopEnd, before_failure
+from graspsense_sim_gripper.run.model_report import GraspModel
+from graspsense_sim_gripper.run.problem import GraspSetup
+from graspsense_sim_gripper.run.term_failure import not_finite_in_tick
+from graspsense_sim_gripper.scene.random_numbers import Word, key_of
 from graspsense_sim_gripper.scene.terms.term import LAW_ERRORS
 
 
-def _every(composition: Composition) -> bool:
-    return True
+class CompiledStart(NamedTuple):
+    """A compiled grasp before it begins."""
+
+    start: LoopStart
+    setup: Callable[[], GraspSetup]
+    """Returns the same grasp as named tuples, which is needed if a term fails in it."""
+    key: Word | None
+    """That of its seed; None: its sensors are ideal."""
+    layout: PaddedLayout
+    model: GraspModel
 
 
 @frozen(eq=False)
@@ -45,72 +54,77 @@ class CompiledGrasps:
 
     scenes: Scenes
     loops: CompiledLoops
+    is_compiled: Callable[[tuple[str, ...]], bool]
+    """Whether loops with these kinds of terms are compiled."""
     measure: Measure | None = None
     """The compiled form of `Job.extraction`; None: `Job.extract` is called with a trace."""
-    is_compiled: Callable[[Composition], bool] = _every
-    """Whether the loop of a composition is compiled."""
     storage: Storage = field(factory=Storage, init=False)
-    _drawing: Drawing | None = field(init=False)
-    """None if nothing can be compiled."""
-    _memory: dict[DrawnScene, DrawMemory] = field(factory=dict, init=False)
+    _memory: dict[SelectedScene, DrawMemory] = field(factory=dict, init=False)
 
-    @_drawing.default
-    def _compiled_drawing(self) -> Drawing | None:
-        return None if find_spec("numba") is None else compiled_drawing()
-
-    @property
-    def job(self) -> Job:
-        """The job of the scenes."""
-        return self.scenes.job
-
-    def grasp(self, scene: str, seed: int) -> FinishedGrasp | None:
+    def grasp(self, name: str, seed: int) -> FinishedGrasp | None:
         """Simulate a grasp of a scene; None if its loop is not compiled.
 
         Raises NotCompilable if it cannot be compiled, and otherwise as `Scenes.setup` does.
         """
-        instances = self.scenes.drawn(scene)
-        if instances is not None and self._drawing is not None:
-            composition = instances.scene.composition
-            if not self.is_compiled(composition):
-                return None
-            done = self._drawn(self._drawing, instances, seed, self.loops.loop_of(composition))
-            if done is not None:
-                return done
-        setup = self.scenes.setup(scene, seed)
-        composition = composition_of(setup)
-        if not self.is_compiled(composition):
+        scene, number = self.scenes.find(name), number_in(name)
+        if not self.is_compiled(scene.composition.kinds):
             return None
-        return grasp_compiled(self.job, setup, self.loops.loop_of(composition), self.storage, self.measure)
-
-    def _drawn(
-        self, drawing: Drawing, instances: DrawnInstances, seed: int, loop: CompiledLoop
-    ) -> FinishedGrasp | None:
-        """Simulate a grasp; None if it has to be simulated from its setup.
-
-        That is so if a term fails in it, or if it does not end within the ticks that the buffers hold.
-        """
-        scene, number = instances
+        loop, drawn = self.loops.loop_of(scene.composition), scene.drawn
         if scene not in self._memory:
-            self._memory[scene] = scene.memory()
-        memory, buffers = self._memory[scene], self.storage.buffers
+            self._memory[scene] = drawn.memory()
         key = key_of(seed)
-        start = scene.drawn(drawing, key, number, memory)
+        start = drawn.drawn(compiled_drawing(), key, number, self._memory[scene])
+        prepared = CompiledStart(
+            start,
+            partial(scene.setup, seed, number),
+            key if drawn.has_cells else None,
+            drawn.layout,
+            scene.model,
+        )
+        return grasp_compiled(self.scenes.job, loop, prepared, self.storage, self.measure)
+
+
+def grasp_compiled(
+    job: Job, loop: CompiledLoop, prepared: CompiledStart, storage: Storage, measure: Measure | None = None
+) -> FinishedGrasp:
+    """Simulate a grasp with the compiled loop of its composition; `measure`: as for `extracted_from`.
+
+    Raises NotCompilable if the loop cannot be compiled.
+    """
+    try:
+        (end, state, plant), buffers = _run(loop, prepared, storage.buffers, job.max_ticks)
+    except LAW_ERRORS:
+        # Compiled code does not say which term raised it.
+        return grasp_plain(job, prepared.setup(), prepared.model)
+    outcome, reason = ended_as(job, end)
+    if end.failed == 1:
+        setup = padded(prepared.setup(), prepared.layout.kinds)
         begin_images(buffers)
-        try:
-            end = loop.run_from(start, buffers, CellNoise(int(scene.has_cells), key))
-            while scene.has_cells and _needs_images(end.ending, buffers):
-                buffers = with_more_images(buffers, key)
-                start = start.after(end)
-                end = loop.run_from(start, buffers)
-        except LAW_ERRORS:
-            return None
-        if end.ending.failed == 1 or end.ending.ended == 0:
-            return None
-        outcome, reason = ended_by_itself(end.ending.stopped, end.ending.outcome)
-        done = EndedGrasp(outcome, reason, end.plant, scene.layout, end.ending)
-        return result_of(self.job, done, buffers, self.storage, self.measure)
+        last_plant = before_failure(loop, *started(job, setup), buffers, end.ticks)
+        effort_n, plant = state().loop.effort_n, lambda: last_plant
+        reason = not_finite_in_tick(setup.kinds, setup.plant, last_plant, effort_n, setup.dt_s)
+    storage.buffers = first_images(buffers)
+    extracted, kept = extracted_from(job, buffers, end, measure)
+    return FinishedGrasp(
+        outcome=outcome,
+        reason=reason,
+        end=plant,
+        extracted=extracted,
+        kept=kept,
+        model=prepared.model,
+        layout=prepared.layout,
+    )
 
 
-def _needs_images(ending: Ending, buffers: Buffers) -> bool:
-    """Return whether a grasp has not ended, but has filled the buffers of images."""
-    return ending.ended == 0 and ending.failed == 0 and ending.images == len(buffers.pads.images)
+def _run(
+    loop: CompiledLoop, prepared: CompiledStart, buffers: Buffers, max_ticks: int
+) -> tuple[LoopEnd, Buffers]:
+    """Run the loop to the end of a grasp, with longer buffers where these do not suffice."""
+    start, key = prepared.start, prepared.key
+    begin_images(buffers)
+    end = loop.run_from(start, buffers, NO_NOISE if key is None else CellNoise(1, key))
+    while end.ending.ended == 0 and end.ending.failed == 0 and end.ending.ticks < max_ticks:
+        buffers = longer(buffers, end.ending, key)
+        start = start.after(end)
+        end = loop.run_from(start, buffers)
+    return end, buffers

@@ -7,7 +7,7 @@ bit as by `build.instantiate` (`test_a_drawn_grasp_is_that_of_the_seed`).
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,10 +17,8 @@ from numpy.typing import NDArray
 from graspsense.simulator_api import CompileOptions, compile_function, entry_point
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant.sensing import PadCells
-from graspsense_sim_gripper.run.accuracy.model import Reduction
 from graspsense_sim_gripper.run.binding import bind_reachable
-from graspsense_sim_gripper.run.build import check_fit
-from graspsense_sim_gripper.run.compiled.compose import Composition
+from graspsense_sim_gripper.run.build import Problem, check_fit
 from graspsense_sim_gripper.run.compiled.jit import generating
 from graspsense_sim_gripper.run.compiled.loop_code import (
     Arrays,
@@ -29,7 +27,7 @@ from graspsense_sim_gripper.run.compiled.loop_code import (
     Numbers,
     loop_start,
 )
-from graspsense_sim_gripper.run.compiled.padding import PaddedLayout, composition_of, layout_of
+from graspsense_sim_gripper.run.compiled.padding import PaddedLayout, layout_of
 from graspsense_sim_gripper.run.drawing import (
     NO_NUMBER,
     DrawBuffers,
@@ -40,7 +38,7 @@ from graspsense_sim_gripper.run.drawing import (
 )
 from graspsense_sim_gripper.run.loop import GraspParams, SimulationState
 from graspsense_sim_gripper.run.nested import append, with_places
-from graspsense_sim_gripper.run.problem import GraspSetup, Problem
+from graspsense_sim_gripper.run.problem import GraspSetup
 from graspsense_sim_gripper.scene.instance import deepest_dent, draws_of_number
 from graspsense_sim_gripper.scene.random_numbers import IN_COMPILED_CODE, Word, key_of
 from graspsense_sim_gripper.scene.spec import NominalParams, ObjectSpec
@@ -124,23 +122,20 @@ class StartLayout(NamedTuple):
     cells: tuple[int, ...]
     """The places of the weights and offsets of the left and of the right cells among all arrays."""
 
-    @classmethod
-    def made_of(cls, params: GraspParams, state: SimulationState) -> StartLayout:
-        """Return that of a grasp with these parameters and this first state."""
-        # Other arrays in their stead are told apart, while both fingertips may share theirs.
-        left, right = (PadCells(np.zeros(0), np.zeros(0)) for _ in range(2))
-        arrays: list[NDArray[Any]] = []
-        told_apart = params._replace(sensor=params.sensor._replace(left=left, right=right))
-        append(told_apart, [], arrays)
 
-        def place(wanted: Any) -> int:
-            return next(i for i, array in enumerate(arrays) if array is wanted)
+@lru_cache(maxsize=64)
+def _start_layout(types: LoopTypes) -> StartLayout:
+    """Return that of the grasps of these types. It takes a millisecond, and scenes of a composition share it."""
+    params, state = types.pattern.values
+    # Other arrays in their stead are told apart, while both fingertips may share theirs.
+    left, right = (PadCells(np.zeros(0), np.zeros(0)) for _ in range(2))
+    arrays: list[NDArray[Any]] = []
+    append(params._replace(sensor=params.sensor._replace(left=left, right=right)), [], arrays)
 
-        return cls(
-            LoopTypes.made_of(params, state),
-            with_places((params, state)),
-            tuple(place(array) for array in (*left, *right)),
-        )
+    def place(wanted: Any) -> int:
+        return next(i for i, array in enumerate(arrays) if array is wanted)
+
+    return StartLayout(types, with_places((params, state)), tuple(place(array) for array in (*left, *right)))
 
 
 @frozen(eq=False)
@@ -148,8 +143,7 @@ class DrawnScene:
     """What the grasps of a scene are drawn from."""
 
     config: SimConfig
-    spec: ObjectSpec
-    composition: Composition
+    spec: ObjectSpec | None
     layout: PaddedLayout
     start: StartLayout
     numbers: Numbers
@@ -179,58 +173,39 @@ class DrawnScene:
         Its arrays are those of `memory`, until the next grasp is drawn to it. Raises ConfigError as `check_fit` does.
         """
         numbers, spec, places, (buffers, arrays) = self.numbers.copy(), self.spec, self.places, memory
-        of_number = NO_NUMBER if number is None else np.array(draws_of_number(spec, number))
+        of_number = NO_NUMBER
+        if number is not None and spec is not None:
+            of_number = np.array(draws_of_number(spec, number))
         drawing(self.scene, places, key, of_number, buffers, numbers)
-        if spec.dents:
+        if spec is not None and spec.dents:
             numbers[places.width_m] -= deepest_dent(spec, buffers.params.tolist())
-        if spec.file:
+        if spec is not None and spec.file:
             check_fit(self.config, spec, float(numbers[places.width_m]), float(numbers[places.offset_m]))
         return LoopStart(self.start.types, numbers, arrays)
 
 
-class DrawnInstances(NamedTuple):
-    """What grasps are drawn from, of any instances of a scene or of a particular one."""
-
-    scene: DrawnScene
-    number: int | None
-    """That of the instance."""
-
-
 def drawn_scene(
-    problem: Problem,
-    reduction: Reduction | None,
-    example: GraspSetup,
-    begun: tuple[GraspParams, SimulationState],
-    layouts: dict[Composition, StartLayout],
-) -> DrawnScene | None:
-    """Return what the grasps of a scene are drawn from; None if each of them needs a `GraspSetup`.
+    problem: Problem, example: GraspSetup, begun: tuple[GraspParams, SimulationState]
+) -> DrawnScene:
+    """Return what the grasps of a scene are drawn from.
 
-    `example`: one of them; `begun`: its parameters and its first state, padded. `layouts`: those that are known, to
-    which that of this scene is added.
+    `example`: one of them; `begun`: its parameters and its first state, padded.
     """
-    spec = problem.spec
-    if spec is None or reduction is None:
-        return None
-    layout, config = layout_of(example), problem.config
-    composition = composition_of(example)
-    if composition not in layouts:
-        layouts[composition] = StartLayout.made_of(*begun)
-    known = layouts[composition]
-    start, places = loop_start(*begun, known.types), _places(known.places, layout, spec)
+    layout, start = layout_of(example), _start_layout(LoopTypes.made_of(*begun))
+    numbers = loop_start(*begun, start.types)
     return DrawnScene(
-        config=config,
-        spec=spec,
-        composition=composition,
+        config=problem.config,
+        spec=problem.spec,
         layout=layout,
-        start=known,
-        numbers=start.numbers,
-        arrays=start.arrays,
-        scene=_with_arrays(scene_numbers(config, spec)),
-        places=places,
+        start=start,
+        numbers=numbers.numbers,
+        arrays=numbers.arrays,
+        scene=_with_arrays(scene_numbers(problem.config, problem.spec)),
+        places=_places(start.places, layout),
     )
 
 
-def _places(known: Any, layout: PaddedLayout, spec: ObjectSpec) -> Places:
+def _places(known: Any, layout: PaddedLayout) -> Places:
     """Return where the numbers are that a seed decides; `known`: parameters and state with the place of each number."""
     params, state = known
     friction, model = params.plant.drive.friction, params.plant.object

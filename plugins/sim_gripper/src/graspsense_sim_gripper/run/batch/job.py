@@ -1,15 +1,13 @@
-"""Simulating one grasp of a batch, with buffers that the grasps of a thread reuse, and keeping its results."""
+"""The settings of a batch, its grasps in the interpreter, and what is kept of a grasp."""
 
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Callable
-from functools import partial
-from typing import Any, Final, NamedTuple
+from typing import Any
 
 import numpy as np
-from attrs import define, field, frozen
+from attrs import field, frozen
 
 from graspsense.gripper_api import Outcome
 from graspsense.plugin_api import Controller, FeatureSet, Trace
@@ -26,30 +24,20 @@ from graspsense.simulator_api import (
     tick_params,
 )
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.plant.fingertip import CELL_OFFSET, CELLS
-from graspsense_sim_gripper.plant.sensing import PadBuffers, with_listed_cells
+from graspsense_sim_gripper.plant.sensing import with_listed_cells
 from graspsense_sim_gripper.plant.state import PlantState
+from graspsense_sim_gripper.run.batch.buffers import as_lists, begin_images, longer, new_buffers
 from graspsense_sim_gripper.run.build import device_info
 from graspsense_sim_gripper.run.compiled.compose import grasp_loop, guarded_loop
-from graspsense_sim_gripper.run.compiled.loop_code import CompiledLoop
-from graspsense_sim_gripper.run.compiled.padding import (
-    PaddedLayout,
-    composition_of,
-    layout_of,
-    padded,
-    unpadded,
-)
-from graspsense_sim_gripper.run.drawing import image_noise
+from graspsense_sim_gripper.run.compiled.padding import PaddedLayout, composition_of, unpadded
 from graspsense_sim_gripper.run.loop import (
-    COLUMNS,
     NOT_STARTED,
     Buffers,
     Ending,
     GraspParams,
-    LoopEnd,
     SimulationState,
     before_failure,
-    run_plain,
+    ending,
     uses_macro_steps,
 )
 from graspsense_sim_gripper.run.model_report import (
@@ -60,26 +48,16 @@ from graspsense_sim_gripper.run.model_report import (
     stored_report,
 )
 from graspsense_sim_gripper.run.nested import Stored
-from graspsense_sim_gripper.run.problem import (
-    IMAGES_PER_BLOCK,
-    GraspController,
-    GraspSetup,
-)
+from graspsense_sim_gripper.run.problem import GraspController, GraspSetup
 from graspsense_sim_gripper.run.recorded_trace import recorded_trace
 from graspsense_sim_gripper.run.term_failure import not_finite_in_tick, raised_in_term
-from graspsense_sim_gripper.scene.random_numbers import Word, key_of
+from graspsense_sim_gripper.scene.random_numbers import key_of
 from graspsense_sim_gripper.scene.scaled import ScaledParameter
 from graspsense_sim_gripper.scene.terms.term import LAW_ERRORS
 
-TICKS: Final = 8200
-"""Ticks that the buffers hold at first; a grasp that needs more continues with longer ones. It is not a power of two,
-because all columns would then share one set of the processor's cache and evict each other."""
-IMAGES: Final = 160
-"""Cell images that the buffers hold at first, which suffice for nearly all grasps of the catalogue."""
-
 Extracted = Any
 """What `Job.extract` returns, such as features."""
-GraspLoop = CompiledLoop | Callable[[GraspParams, SimulationState, Buffers], SimulationState]
+GraspLoop = Callable[[GraspParams, SimulationState, Buffers], SimulationState]
 """The loop of a grasp, compiled or in the interpreter."""
 Measure = Callable[[Any, Any, Any, int], Any]
 """`compiled.extraction.measure_buffers` of a job, compiled."""
@@ -119,19 +97,6 @@ class FinishedGrasp:
             report |= accuracy_report(report, reduction, unstable_loop)
         return report
 
-    def in_model(self, model: GraspModel) -> FinishedGrasp:
-        """Return the same result, simulated in this model."""
-        # `evolve` would take three times as long.
-        return FinishedGrasp(
-            outcome=self.outcome,
-            reason=self.reason,
-            end=self.end,
-            layout=self.layout,
-            extracted=self.extracted,
-            kept=self.kept,
-            model=model,
-        )
-
     @property
     def trace(self) -> Trace:
         """The trace. Raises ValueError if traces are not kept."""
@@ -163,6 +128,8 @@ class Job:
     """The parameters of controller and guard in every grasp."""
     initial: TickState = field(init=False)
     """The state of controller and guard before the first tick."""
+    max_ticks: int = field(init=False)
+    """The most ticks of a grasp."""
 
     @extraction.default
     def _extraction(self) -> CompiledExtraction | None:
@@ -183,231 +150,105 @@ class Job:
     def _initial(self) -> TickState:
         return first_state(self.controller.init())
 
+    @max_ticks.default
+    def _max_ticks(self) -> int:
+        return math.ceil(seconds_at_most(self.run) / (1.0 / self.config.rate_hz))
+
     @property
     def grasp_controller(self) -> GraspController:
         """The controller with the settings of its runs, and the feature set."""
         return GraspController(self.controller, self.run, self.features)
 
 
-def _new_buffers() -> Buffers:
-    return Buffers(
-        pads=PadBuffers(
-            left_zero=np.zeros(CELLS),
-            right_zero=np.zeros(CELLS),
-            noise=np.zeros((IMAGES, 2 * CELLS)),
-            images=np.full((IMAGES, 2, CELLS), np.nan),
-        ),
-        image_times=np.zeros(IMAGES),
-        columns=np.zeros((len(COLUMNS), TICKS)),
-        phases=np.zeros(TICKS, np.int64),
-    )
-
-
-@define(eq=False)
-class Storage:
-    """The buffers of a thread. Its grasps use them one after the other."""
-
-    buffers: Buffers = field(factory=_new_buffers)
-
-
-def grasp_compiled(
-    job: Job, setup: GraspSetup, loop: CompiledLoop, storage: Storage, measure: Measure | None = None
-) -> FinishedGrasp:
-    """Simulate a grasp with the compiled loop of its composition (see `composition_of`).
-
-    `measure`: the compiled form of `Job.extraction`; None: `Job.extract` is called with a trace.
-    """
-    try:
-        whole, layout = padded(setup), layout_of(setup)
-        return grasp_once(job, whole, loop, storage, layout=layout, measure=measure)
-    except LAW_ERRORS:
-        # Compiled code does not say which term raised it.
-        return grasp_plain(job, setup)
-
-
-def grasp_plain(job: Job, setup: GraspSetup) -> FinishedGrasp:
-    """Simulate a grasp in the interpreter."""
+def grasp_plain(job: Job, setup: GraspSetup, model: GraspModel = NO_MODEL) -> FinishedGrasp:
+    """Simulate a grasp in the interpreter; `model`: that of its object, for the report."""
     composition, step = composition_of(setup, pad=False), type(job.controller).step
     try:
-        return grasp_once(job, setup, grasp_loop(composition, step), Storage())
+        return _interpreted(job, setup, grasp_loop(composition, step), model)
     except LAW_ERRORS as error:
         if not raised_in_term(error, setup.kinds):
             raise
-    return grasp_once(job, setup, guarded_loop(composition, step), Storage())
+    return _interpreted(job, setup, guarded_loop(composition, step), model)
 
 
-def grasp_once(
-    job: Job,
-    setup: GraspSetup,
-    loop: GraspLoop,
-    storage: Storage,
-    *,
-    layout: PaddedLayout | None = None,
-    measure: Measure | None = None,
-) -> FinishedGrasp:
-    """Grasp what `setup` describes with the loop: on arrays if it is compiled, on lists if it is not.
-
-    `layout`: that in which the grasp is padded; None: it is not. `measure`: as for `grasp_compiled`.
-    """
-    (ending, state, plant), buffers = _run(job, setup, loop, storage)
-    outcome, reason = ended_by_itself(ending.stopped, ending.outcome)
-    if ending.failed == 1:
-        outcome = Outcome.ABORTED
-        effort_n = state().loop.effort_n
-        # Once and now: the loop runs again for it, in buffers that the next grasp uses.
-        last_plant = plant()
-        plant = partial(_same, last_plant)
-        reason = not_finite_in_tick(setup.kinds, setup.plant, last_plant, effort_n, setup.dt_s)
-    elif ending.ended == 0:
-        outcome, reason = Outcome.ABORTED, overdue(job.run)
-    done = EndedGrasp(outcome, reason, plant, layout, ending)
-    return result_of(job, done, buffers, storage, measure)
-
-
-def _same(plant: PlantState) -> PlantState:
-    return plant
-
-
-class EndedGrasp(NamedTuple):
-    """A grasp that has ended, of which nothing was extracted yet."""
-
-    outcome: Outcome
-    reason: str
-    plant: Callable[[], PlantState]
-    layout: PaddedLayout | None
-    """As in `FinishedGrasp`."""
-    ending: Ending
-
-    def finished(self, extracted: Extracted, kept: Trace | None) -> FinishedGrasp:
-        """Return its result, with what was extracted, and the trace if it is kept."""
-        return FinishedGrasp(
-            outcome=self.outcome,
-            reason=self.reason,
-            end=self.plant,
-            layout=self.layout,
-            extracted=extracted,
-            kept=kept,
-        )
-
-
-def result_of(
-    job: Job, done: EndedGrasp, buffers: Buffers, storage: Storage, measure: Measure | None
-) -> FinishedGrasp:
-    """Return the result of a grasp that has been recorded in these buffers; `measure`: as for `grasp_compiled`."""
-    on_arrays = isinstance(buffers.columns, np.ndarray)
-    if on_arrays:
-        storage.buffers = first_images(buffers)
-    if not job.traces and job.extract is None:
-        return done.finished(None, None)
-    n, k, form = done.ending.recorded, done.ending.images, job.extraction
-    columns, phases = buffers.columns, buffers.phases
-    events = type(job.controller).events
-    if measure is not None and form is not None:
-        try:
-            measured = measure(form.params, columns, phases, n)
-        except Exception:
-            # Compiled code does not say where an exception comes from. `extract` does, if it raises one too.
-            pass
-        else:
-            return done.finished(form.result(measured), None)
-    table, numbers = np.asarray(columns)[:, :n], np.asarray(phases)[:n]
-    images, times = np.asarray(buffers.pads.images[:k]), np.asarray(buffers.image_times[:k])
-    if job.traces and 2 * n < len(columns[0]):
-        trace = recorded_trace(events, table.copy(), numbers.copy(), images, times)
-        return done.finished(None if job.extract is None else job.extract(trace), trace)
-    # A trace that fills most of the buffers, or that only features are extracted from, is a view of them.
-    # While a column of it is referenced, those buffers are kept, and the next grasps have new ones.
-    references = sys.getrefcount(columns), sys.getrefcount(phases)
-    trace = recorded_trace(events, table, numbers, images, times)
-    extracted = None if job.extract is None else job.extract(trace)
-    result = done.finished(extracted, trace if job.traces else None)
-    del trace, extracted
-    if on_arrays and (sys.getrefcount(columns), sys.getrefcount(phases)) != references:
-        storage.buffers = first_images(buffers)._replace(
-            columns=np.empty_like(columns), phases=np.empty_like(phases)
-        )
-    return result
-
-
-def _run(job: Job, setup: GraspSetup, loop: GraspLoop, storage: Storage) -> tuple[LoopEnd, Buffers]:
-    """Run the loop to the end of the grasp, with longer buffers where those of the storage do not suffice."""
-    ideal, buffers, on_arrays = setup.sensor.ideal == 1, storage.buffers, isinstance(loop, CompiledLoop)
-    run = loop.run if isinstance(loop, CompiledLoop) else partial(run_plain, loop)
-    if not ideal:
-        buffers.pads.noise[:] = setup.noise(0, len(buffers.pads.noise))
-    begin_images(buffers)
-    if not on_arrays:
-        # The interpreter indexes lists faster than arrays.
-        buffers = _as_lists(buffers)
-    params, progress = started(job, setup, on_arrays=on_arrays)
-    most_ticks = params.max_ticks
+def _interpreted(job: Job, setup: GraspSetup, loop: GraspLoop, model: GraspModel) -> FinishedGrasp:
+    """Simulate a grasp in the interpreter with this loop."""
+    params, state = started(job, setup)
+    params = params._replace(sensor=with_listed_cells(setup.sensor))
+    key, arrays = None, new_buffers()
+    if setup.sensor.ideal == 0:
+        key = key_of(setup.seed)
+        arrays.pads.noise[:] = setup.noise(0, len(arrays.pads.noise))
+    begin_images(arrays)
+    buffers = as_lists(arrays)
     while True:
-        end = run(params, progress, buffers)
-        if end.ending.failed == 1:
-            last_plant = partial(before_failure, loop, params, progress, buffers, end.ending.ticks)
-            return end._replace(plant=last_plant), buffers
-        if end.ending.ended == 1 or end.ending.ticks >= most_ticks:
-            return end, buffers
-        progress = end.state()
-        if not ideal and end.ending.images == len(buffers.pads.images):
-            buffers = with_more_images(buffers, key_of(setup.seed))
-        else:
-            buffers = _with_more_ticks(buffers)
-        if not on_arrays:
-            buffers = _as_lists(buffers)
+        begun, state = state, loop(params, state, buffers)
+        end = ending(state)
+        if end.failed == 1 or end.ended == 1 or end.ticks >= params.max_ticks:
+            break
+        buffers = as_lists(longer(buffers, end, key))
+    plant = state.plant
+    outcome, reason = ended_as(job, end)
+    if end.failed == 1:
+        plant = before_failure(loop, params, begun, buffers, end.ticks)
+        reason = not_finite_in_tick(setup.kinds, setup.plant, plant, state.loop.effort_n, setup.dt_s)
+    extracted, kept = extracted_from(job, buffers, end)
+    return FinishedGrasp(
+        outcome=outcome,
+        reason=reason,
+        end=lambda: plant,
+        extracted=extracted,
+        kept=kept,
+        model=model,
+    )
 
 
-def started(job: Job, setup: GraspSetup, *, on_arrays: bool) -> tuple[GraspParams, SimulationState]:
+def started(job: Job, setup: GraspSetup) -> tuple[GraspParams, SimulationState]:
     """Return the parameters of the loop for a grasp, and the state in which it begins."""
     params = GraspParams(
         plant=setup.plant,
-        sensor=setup.sensor if on_arrays else with_listed_cells(setup.sensor),
+        sensor=setup.sensor,
         controller=job.params,
         dt_s=setup.dt_s,
-        max_ticks=math.ceil(seconds_at_most(job.run) / setup.dt_s),
+        max_ticks=job.max_ticks,
         macro_steps=uses_macro_steps(setup.plant.steps),
     )
     return params, SimulationState(NOT_STARTED, setup.state, setup.sensor_state, job.initial)
 
 
-def _as_lists(buffers: Buffers) -> Buffers:
-    pads = PadBuffers(*(np.asarray(array).tolist() for array in buffers.pads))
-    return Buffers(pads, *(np.asarray(array).tolist() for array in buffers[1:]))
+def ended_as(job: Job, end: Ending) -> tuple[Outcome, str]:
+    """Return the outcome of a grasp, and its reason if no term has failed."""
+    if end.failed == 1:
+        return Outcome.ABORTED, ""
+    if end.ended == 0:
+        return Outcome.ABORTED, overdue(job.run)
+    return ended_by_itself(end.stopped, end.outcome)
 
 
-def begin_images(buffers: Buffers) -> None:
-    """Prepare buffers for the cell images of another grasp."""
-    buffers.pads.images[-1] = math.nan
-    buffers.pads.left_zero[:] = buffers.pads.right_zero[:] = CELL_OFFSET[0]
+def extracted_from(
+    job: Job, buffers: Buffers, end: Ending, measure: Measure | None = None
+) -> tuple[Extracted, Trace | None]:
+    """Return what `Job.extract` gives for a grasp that was recorded in these buffers, and its trace if it is kept.
 
-
-def with_more_images(buffers: Buffers, key: Word) -> Buffers:
-    """Return buffers for more images of a grasp, `key`: that of its seed; they begin with the same values."""
-    noise = image_noise(key, len(buffers.pads.images), IMAGES_PER_BLOCK)
-    left_zero, right_zero, drawn, images = (np.asarray(array) for array in buffers.pads)
-    images = np.concatenate([images, np.zeros((len(noise), 2, CELLS))])
-    images[-1] = math.nan
-    return buffers._replace(
-        pads=PadBuffers(left_zero, right_zero, np.concatenate([drawn, noise]), images),
-        image_times=np.concatenate([np.asarray(buffers.image_times), np.zeros(len(noise))]),
+    `measure`: the compiled form of `Job.extraction`; None: `Job.extract` is called with a trace.
+    """
+    if not job.traces and job.extract is None:
+        return None, None
+    n, k, form = end.recorded, end.images, job.extraction
+    if measure is not None and form is not None:
+        try:
+            measured = measure(form.params, buffers.columns, buffers.phases, n)
+        except Exception:
+            # Compiled code does not say where an exception comes from. `extract` does, if it raises one too.
+            pass
+        else:
+            return form.result(measured), None
+    trace = recorded_trace(
+        type(job.controller).events,
+        # Copies, since the next grasp is recorded in the same buffers.
+        np.asarray(buffers.columns)[:, :n].copy(),
+        np.asarray(buffers.phases)[:n].copy(),
+        np.asarray(buffers.pads.images[:k]),
+        np.asarray(buffers.image_times[:k]),
     )
-
-
-def _with_more_ticks(buffers: Buffers) -> Buffers:
-    """Return buffers for twice as many ticks; they begin with the same values."""
-    columns, phases = np.asarray(buffers.columns), np.asarray(buffers.phases)
-    return buffers._replace(
-        columns=np.concatenate([columns, np.zeros_like(columns)], axis=1),
-        phases=np.concatenate([phases, np.zeros_like(phases)]),
-    )
-
-
-def first_images(buffers: Buffers) -> Buffers:
-    """Return the buffers with the images that every grasp begins with, so that none draws noise which it needs not."""
-    pads = buffers.pads
-    if len(pads.images) == IMAGES:
-        return buffers
-    return buffers._replace(
-        pads=pads._replace(noise=pads.noise[:IMAGES], images=pads.images[:IMAGES]),
-        image_times=buffers.image_times[:IMAGES],
-    )
+    return None if job.extract is None else job.extract(trace), trace if job.traces else None

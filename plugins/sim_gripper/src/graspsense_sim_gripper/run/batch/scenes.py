@@ -3,115 +3,106 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 from attrs import define, evolve, field
 
 from graspsense_sim_gripper.run.accuracy.model import Reduction
 from graspsense_sim_gripper.run.accuracy.select import select
-from graspsense_sim_gripper.run.batch.drawn import DrawnInstances, DrawnScene, StartLayout, drawn_scene
+from graspsense_sim_gripper.run.batch.drawn import DrawnScene, drawn_scene
 from graspsense_sim_gripper.run.batch.job import Job, started
-from graspsense_sim_gripper.run.build import build, example_of, instantiate
+from graspsense_sim_gripper.run.build import Problem, build, example_of, instantiate
 from graspsense_sim_gripper.run.compiled.compose import Composition
-from graspsense_sim_gripper.run.compiled.padding import padded
+from graspsense_sim_gripper.run.compiled.padding import composition_of, padded
 from graspsense_sim_gripper.run.model_report import GraspModel
-from graspsense_sim_gripper.run.problem import GraspSetup, Problem
+from graspsense_sim_gripper.run.problem import GraspSetup
 from graspsense_sim_gripper.run.sampled_loop import instability
 from graspsense_sim_gripper.scene.library import split_number
 
 
-@define
+@define(eq=False)
+class SelectedScene:
+    """A scene of a job with its steps, which all seeds share. The instances with a number are one scene."""
+
+    job: Job
+    problem: Problem
+    reduction: Reduction | None
+    """None: there is no object."""
+
+    def setup(self, seed: int, number: int | None) -> GraspSetup:
+        """Return the grasp with this seed; `number`: that of a particular instance. Raises as `instantiate` does."""
+        problem = self.problem
+        if problem.number != number:
+            problem = evolve(problem, number=number)
+        return instantiate(problem, self.reduction, seed)
+
+    @cached_property
+    def example(self) -> GraspSetup:
+        """Any of its grasps, for what all of them have in common."""
+        return example_of(self.problem, self.reduction)
+
+    @cached_property
+    def composition(self) -> Composition:
+        """That of its compiled grasps."""
+        return composition_of(self.example)
+
+    @cached_property
+    def drawn(self) -> DrawnScene:
+        """What its compiled grasps are drawn from."""
+        return drawn_scene(self.problem, self.example, started(self.job, padded(self.example)))
+
+    @cached_property
+    def model(self) -> GraspModel:
+        """The model of its object, for the reports of its grasps."""
+        if self.problem.spec is None or self.reduction is None:
+            return GraspModel((), None, "")
+        unstable = instability(self.example, self.job.grasp_controller, self.reduction)
+        return GraspModel(self.problem.spec.kinds, self.reduction, unstable)
+
+
+@define(eq=False)
 class Scenes:
-    """The scenes of a job, each with its steps. All seeds of a scene share them."""
+    """The scenes of a job."""
 
     job: Job
     selected: Mapping[tuple[str, bool], Reduction | None] = field(factory=dict)
     """Models that were selected elsewhere, by `scene_key`."""
-    _scenes: dict[tuple[str, bool], tuple[Problem, Reduction | None]] = field(factory=dict, init=False)
+    _scenes: dict[tuple[str, bool], SelectedScene] = field(factory=dict, init=False)
     """By `scene_key`."""
-    _problems: dict[str, tuple[Problem, Reduction | None]] = field(factory=dict, init=False)
-    """By the name of the scene, with the number of the instance."""
-    _examples: dict[tuple[str, bool], GraspSetup] = field(factory=dict, init=False)
-    """What `example` returns, by `scene_key`."""
-    _models: dict[tuple[str, bool], GraspModel] = field(factory=dict, init=False)
-    """By `scene_key`."""
-    _drawn_scenes: dict[tuple[str, bool], DrawnScene | None] = field(factory=dict, init=False)
-    """By `scene_key`."""
-    _layouts: dict[Composition, StartLayout] = field(factory=dict, init=False)
-    _drawn: dict[str, DrawnInstances | None] = field(factory=dict, init=False)
-    """What `drawn` returns, by the name of the scene, with the number of the instance."""
 
-    def add(self, scene: str, *, compiled: bool = False) -> None:
+    def add(self, name: str, *, compiled: bool = False) -> SelectedScene:
         """Select the model of a scene. `compiled`: run the trial grasps compiled, not in the interpreter.
 
         Raises UnknownName and ConfigError as `build` and `select` do.
         """
-        job, key = self.job, scene_key(scene)
+        job, key = self.job, scene_key(name)
         reduction = self.selected.get(key)
-        problem = build(job.config, scene, job.scaled)
+        problem = build(job.config, name, job.scaled)
         if problem.spec is not None and reduction is None:
             reduction = select(problem, job.grasp_controller, compiled=compiled)
-        self._scenes[key] = problem, reduction
+        self._scenes[key] = SelectedScene(job, problem, reduction)
+        return self._scenes[key]
+
+    def find(self, name: str) -> SelectedScene:
+        """Return a scene. Its model is selected if it was not added before. Raises as `add` does."""
+        return self._scenes.get(scene_key(name)) or self.add(name)
+
+    def setup(self, name: str, seed: int) -> GraspSetup:
+        """Return the grasp of a scene with this seed. Raises as `add` and `instantiate` do."""
+        return self.find(name).setup(seed, number_in(name))
 
     def models(self) -> dict[tuple[str, bool], Reduction | None]:
         """Return the models of the scenes that were added, by `scene_key`."""
-        return {key: reduction for key, (_, reduction) in self._scenes.items()}
-
-    def setup(self, scene: str, seed: int) -> GraspSetup:
-        """Return the grasp of a scene with this seed. The model is selected if the scene was not added before.
-
-        Raises as `add` and `instantiate` do.
-        """
-        known = self._problems.get(scene)
-        if known is None:
-            key = scene_key(scene)
-            if key not in self._scenes:
-                self.add(scene)
-            problem, reduction = self._scenes[key]
-            if key[1]:
-                problem = evolve(problem, number=split_number(scene)[1])
-            known = self._problems[scene] = problem, reduction
-        return instantiate(*known, seed)
-
-    def example(self, scene: str) -> GraspSetup:
-        """Return any grasp of a scene, for what all of them have in common. Raises as `add` does."""
-        key = scene_key(scene)
-        if key not in self._examples:
-            if key not in self._scenes:
-                self.add(scene)
-            self._examples[key] = example_of(*self._scenes[key])
-        return self._examples[key]
-
-    def drawn(self, scene: str) -> DrawnInstances | None:
-        """Return what the compiled grasps of a scene are drawn from; None if each of them needs a `GraspSetup`."""
-        if scene not in self._drawn:
-            key = scene_key(scene)
-            if key not in self._drawn_scenes:
-                setup = self.example(scene)
-                begun = started(self.job, padded(setup), on_arrays=True)
-                self._drawn_scenes[key] = drawn_scene(*self._scenes[key], setup, begun, self._layouts)
-            of_key = self._drawn_scenes[key]
-            number = split_number(scene)[1] if key[1] else None
-            self._drawn[scene] = None if of_key is None else DrawnInstances(of_key, number)
-        return self._drawn[scene]
-
-    def model_of(self, scene: str) -> GraspModel:
-        """Return the model of a scene that was added."""
-        key = scene_key(scene)
-        known = self._models.get(key)
-        if known is None:
-            problem, reduction = self._scenes[key]
-            kinds, unstable = () if problem.spec is None else problem.spec.kinds, ""
-            if reduction is not None:
-                unstable = instability(self.example(scene), self.job.grasp_controller, reduction)
-            known = self._models[key] = GraspModel(kinds, reduction, unstable)
-        return known
+        return {key: scene.reduction for key, scene in self._scenes.items()}
 
 
 @lru_cache(maxsize=4096)
-def scene_key(scene: str) -> tuple[str, bool]:
+def scene_key(name: str) -> tuple[str, bool]:
     """Return the key of a scene's model: the name without the number of an instance, and whether there is a number."""
-    if scene == "none":
-        return scene, False
-    name, number = split_number(scene)
-    return name, number is not None
+    return split_number(name)[0], number_in(name) is not None
+
+
+@lru_cache(maxsize=4096)
+def number_in(name: str) -> int | None:
+    """Return the number of an instance that the name of a scene ends with; None if there is none."""
+    return split_number(name)[1]

@@ -34,15 +34,14 @@ from graspsense_sim_gripper.run.batch.job import (
 )
 from graspsense_sim_gripper.run.batch.scenes import Scenes, scene_key
 from graspsense_sim_gripper.run.batch.worker import NotHandedOver, PlainProcess
-from graspsense_sim_gripper.run.compiled.compose import Composition
 from graspsense_sim_gripper.run.compiled.extraction import compiled_measure
 from graspsense_sim_gripper.run.compiled.loop_code import CompiledLoops
-from graspsense_sim_gripper.run.compiled.padding import compiled_kinds, composition_of
+from graspsense_sim_gripper.run.compiled.padding import compiled_kinds
 from graspsense_sim_gripper.scene.library import kinds_in
 from graspsense_sim_gripper.scene.scaled import ScaledParameter
 
 WORTH_COMPILING: Final = 50
-"""Number of grasps of one composition from which compiling saves more time than it takes."""
+"""Number of grasps with the same kinds of terms from which compiling saves more time than it takes."""
 WORTH_A_PROCESS: Final = 16
 """Number of grasps per worker in the interpreter from which a process, which starts in half a second, saves time."""
 WORTH_A_WORKER: Final = 16
@@ -70,9 +69,9 @@ def run_many(
     """Simulate a grasp of each scene with its seed, and return the results in that order.
 
     The results are the same for any number of workers. Traces are kept unless the options say otherwise. `compiled`:
-    True compiles every loop, False none; None compiles a composition that at least `WORTH_COMPILING` grasps have. If
-    numba is missing, or a controller or term cannot be compiled, the loop runs in the interpreter, and a warning gives
-    the reason.
+    True compiles every loop, False none; None compiles where at least `WORTH_COMPILING` grasps have the same kinds of
+    terms. If numba is missing, or a controller or term cannot be compiled, the loop runs in the interpreter, and a
+    warning gives the reason.
 
     Raises TypeError for an unknown option, ValueError if there are not as many seeds as scenes, UnknownName for an
     unknown object, and ConfigError if the object cannot be read or no model reaches the accuracy.
@@ -135,9 +134,10 @@ class _Batch:
     measure: Measure | None = field(default=None, init=False)
     """The compiled form of `Job.extraction`."""
     models: Scenes = field(init=False)
-    counts: Counter[Composition] = field(factory=Counter, init=False)
-    """Number of grasps of each composition."""
-    is_compiled: dict[Composition, bool] = field(factory=dict, init=False)
+    counts: Counter[tuple[str, ...]] = field(factory=Counter, init=False)
+    """Number of grasps by the kinds of terms in their loop."""
+    is_compiled: dict[tuple[str, ...], bool] = field(factory=dict, init=False)
+    """Whether loops with these kinds of terms are compiled."""
     loops: CompiledLoops = field(init=False)
     local: threading.local = field(factory=threading.local, init=False)
     """The compiled grasps of each thread, and its process for those in the interpreter."""
@@ -170,7 +170,7 @@ class _Batch:
                         progress(finished, total)
                     which, future = running[0]
                     if wait([future], PROGRESS_S).done:
-                        yield from self._with_models(future.result(), which)
+                        yield from future.result()
                         finished += len(which)
                         running.popleft()
                 if progress is not None:
@@ -182,19 +182,17 @@ class _Batch:
                 raise
 
     def _plan(self) -> None:
-        """Select the models, and decide which compositions are compiled. Raises as `Scenes.add` does."""
+        """Decide which scenes are compiled, and select their models. Raises as `Scenes.add` does."""
         # In the order of the scenes, so that an error names the first unknown scene.
-        counts = Counter(scene_key(scene) for scene in self.scenes)
-        examples = {scene_key(scene): scene for scene in reversed(self.scenes)}
-        of_kinds: Counter[tuple[str, ...]] = Counter()
-        for key, n in counts.items():
-            of_kinds[compiled_kinds(kinds_in(examples[key]))] += n
-        for key, n in counts.items():
-            worth = self._worth(of_kinds[compiled_kinds(kinds_in(examples[key]))])
-            self.models.add(examples[key], compiled=worth)
-            self.counts[composition_of(self.models.example(examples[key]))] += n
-        for composition, n in self.counts.items():
-            self.is_compiled[composition] = self._worth(n)
+        names = {scene_key(scene): scene for scene in reversed(self.scenes)}
+        grasps = Counter(scene_key(scene) for scene in self.scenes)
+        kinds = {key: compiled_kinds(kinds_in(names[key])) for key in grasps}
+        for key, n in grasps.items():
+            self.counts[kinds[key]] += n
+        for own, n in self.counts.items():
+            self.is_compiled[own] = n >= WORTH_COMPILING if self.compiled is None else self.compiled
+        for key in grasps:
+            self.models.add(names[key], compiled=self.is_compiled[kinds[key]])
         if any(self.is_compiled.values()):
             self._compile_around_the_loop()
 
@@ -214,36 +212,13 @@ class _Batch:
             except NotCompilable as error:
                 self.notes[f"features are extracted from traces, which takes longer: {error}"] = None
 
-    def _with_models(self, done: list[FinishedGrasp], which: range) -> list[FinishedGrasp]:
-        """Return the results of the grasps with these indices, each with its model."""
-        scenes = self.scenes[which.start : which.stop]
-        return [
-            grasp.in_model(self.models.model_of(scene)) for grasp, scene in zip(done, scenes, strict=True)
-        ]
-
-    def _part(self, which: range) -> list[tuple[str, int]]:
-        """Return the scene and the seed of the grasps with these indices."""
-        part = slice(which.start, which.stop)
-        return list(zip(self.scenes[part], map(index, self.seeds[part]), strict=True))
-
-    def _worth(self, n: int) -> bool:
-        return n >= WORTH_COMPILING if self.compiled is None else self.compiled
-
     def _slice(self, which: range) -> list[FinishedGrasp]:
         """Run the grasps with these indices."""
-        part = self._part(which)
-        done: dict[int, FinishedGrasp] = {}
-        plain: list[int] = []
-        for i, grasp_of in enumerate(part):
-            grasp = self._compiled(*grasp_of)
-            if grasp is None:
-                plain.append(i)
-            else:
-                done[i] = grasp
-        if plain:
-            grasps = self._plain([part[i] for i in plain])
-            done.update(zip(plain, grasps, strict=True))
-        return [done[i] for i in range(len(part))]
+        part = slice(which.start, which.stop)
+        return [
+            self._compiled(scene, seed) or self._plain(scene, seed)
+            for scene, seed in zip(self.scenes[part], map(index, self.seeds[part]), strict=True)
+        ]
 
     def _compiled(self, scene: str, seed: int) -> FinishedGrasp | None:
         """Return the result of a compiled grasp; None if it has to run in the interpreter."""
@@ -252,35 +227,36 @@ class _Batch:
         try:
             if not hasattr(self.local, "grasps"):
                 self.local.grasps = CompiledGrasps(
-                    self.models, self.loops, self.measure, self.is_compiled.__getitem__
+                    self.models, self.loops, self.is_compiled.__getitem__, self.measure
                 )
             grasps: CompiledGrasps = self.local.grasps
             return grasps.grasp(scene, seed)
         except NotCompilable as error:
-            self._note_not_compilable(composition_of(self.models.setup(scene, seed)), error)
+            self.is_compiled[self.models.find(scene).composition.kinds] = False
+            how = f"on {self.workers} cores" if self._worth_processes() else "on one core"
+            self.notes[f"these grasps run in plain Python {how}, about a hundred times slower: {error}"] = (
+                None
+            )
             return None
-
-    def _note_not_compilable(self, composition: Composition, error: NotCompilable) -> None:
-        self.is_compiled[composition] = False
-        how = f"on {self.workers} cores" if self._worth_processes() else "on one core"
-        self.notes[f"these grasps run in plain Python {how}, about a hundred times slower: {error}"] = None
 
     def _worth_processes(self) -> bool:
         """Return whether separate processes save time for the grasps in the interpreter."""
-        plain = sum(n for composition, n in self.counts.items() if not self.is_compiled[composition])
+        plain = sum(n for kinds, n in self.counts.items() if not self.is_compiled[kinds])
         return self.workers > 1 and plain >= WORTH_A_PROCESS * self.workers
 
-    def _plain(self, grasps: Sequence[tuple[str, int]]) -> list[FinishedGrasp]:
+    def _plain(self, scene: str, seed: int) -> FinishedGrasp:
+        """Return the result of a grasp in the interpreter: of another process, if that saves time."""
         local = self.local
         if self._worth_processes() and not getattr(local, "without_process", False):
             try:
                 if not hasattr(local, "process"):
                     local.process = self.processes.enter_context(PlainProcess(self.models))
-                return local.process.run(*zip(*grasps, strict=True))  # type: ignore[no-any-return]
+                done: FinishedGrasp = local.process.run(scene, seed)
+                return done
             except NotHandedOver as error:
                 local.without_process = True
                 self.notes[f"plain grasps run on one core: {error}"] = None
-        return [grasp_plain(self.job, self.models.setup(*grasp)) for grasp in grasps]
+        return grasp_plain(self.job, self.models.setup(scene, seed), self.models.find(scene).model)
 
 
 def slices_of(total: int, workers: int) -> list[range]:

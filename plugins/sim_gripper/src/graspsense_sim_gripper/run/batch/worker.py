@@ -1,9 +1,8 @@
 """Simulating grasps in the interpreter of a separate process, because loops in one process share the interpreter lock.
 
 The process is a new interpreter that runs `main`, so that the script of the caller is not imported a second time. It
-reads one line of JSON with the settings and the registered name of the controller, and then lines with scenes and
-seeds. It answers each of these with a line of JSON, followed by the traces in numpy's npy format. The caller extracts
-the features.
+reads one line of JSON with the settings and the registered name of the controller, and then a line for each grasp. It
+answers with a line of JSON, followed by the trace in numpy's npy format. The caller extracts the features.
 """
 
 from __future__ import annotations
@@ -14,8 +13,6 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Sequence
-from functools import partial
 from types import TracebackType
 from typing import IO, Any, Final
 
@@ -26,10 +23,11 @@ from graspsense.gripper_api import Outcome, Phase
 from graspsense.plugin_api import Controller, GraspEvent, Trace, create
 from graspsense.simulator_api import RunConfig, recipe_of
 from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.plant.state import PlantState
 from graspsense_sim_gripper.run.accuracy.cache import restored, stored
 from graspsense_sim_gripper.run.batch.job import FinishedGrasp, Job, grasp_plain
 from graspsense_sim_gripper.run.batch.scenes import Scenes
-from graspsense_sim_gripper.run.nested import like
+from graspsense_sim_gripper.run.nested import Stored, TupleType, append
 
 _ARRAYS: Final = tuple(
     column.name for column in fields(Trace) if column.name not in ("units", "signals", "events")
@@ -90,44 +88,44 @@ class PlainProcess:
         self._process.kill()
         self._process.communicate()
 
-    def run(self, scenes: Sequence[str], seeds: Sequence[int]) -> list[FinishedGrasp]:
-        """Simulate these scenes with these seeds, and return the results in that order.
+    def run(self, scene: str, seed: int) -> FinishedGrasp:
+        """Simulate a scene with a seed.
 
-        Raises NotHandedOver if the process has ended, and if a grasp raises an exception in it. The caller then runs
-        the grasps itself, which raises the original exception.
+        Raises NotHandedOver if the process has ended, and if the grasp raises an exception in it. The caller then runs
+        the grasp itself, which raises the original exception.
         """
         requests, answers = self._process.stdin, self._process.stdout
         assert requests is not None
         assert answers is not None
         try:
-            requests.write(
-                self._greeting + _line({"scenes": list(scenes), "seeds": [int(seed) for seed in seeds]})
-            )
+            requests.write(self._greeting + _line([scene, int(seed)]))
             requests.flush()
             self._greeting = b""
             answer = _read_line(answers)
-            traces = io.BytesIO(_read(answers, answer["bytes"]))
+            columns = io.BytesIO(_read(answers, answer["bytes"]))
         except (OSError, EOFError) as error:
             raise NotHandedOver(f"the process for plain grasps has ended ({error})") from error
         if "refused" in answer:
             raise NotHandedOver(answer["refused"])
-        job = self._scenes.job
-        results = []
-        for scene, seed, (outcome, reason, values, told) in zip(scenes, seeds, answer["done"], strict=True):
-            initial = self._scenes.setup(scene, seed).state
-            trace = _read_trace(traces) if job.traces or job.extract is not None else None
-            if trace is not None:
-                trace = evolve(trace, events=tuple(_event(*event) for event in told))
-            results.append(
-                FinishedGrasp(
-                    outcome=Outcome(outcome),
-                    reason=reason,
-                    end=partial(like, initial, values),
-                    extracted=None if job.extract is None or trace is None else job.extract(trace),
-                    kept=trace if job.traces else None,
-                )
-            )
-        return results
+        job, trace = self._scenes.job, None
+        if answer["bytes"] > 0:
+            trace = evolve(_read_trace(columns), events=tuple(_event(*event) for event in answer["events"]))
+        return FinishedGrasp(
+            outcome=Outcome(answer["outcome"]),
+            reason=answer["reason"],
+            end=Stored(
+                TupleType.made_of(self._scenes.setup(scene, seed).state), np.array(answer["state"], float)
+            ),
+            extracted=None if job.extract is None or trace is None else job.extract(trace),
+            kept=trace if job.traces else None,
+            model=self._scenes.find(scene).model,
+        )
+
+
+def _numbers(state: PlantState) -> list[float]:
+    numbers: list[float] = []
+    append(state, numbers, [])
+    return numbers
 
 
 def _told(grasp: FinishedGrasp) -> list[list[Any]]:
@@ -158,24 +156,23 @@ def main() -> None:
             wanted = _read_line(asked)
         except EOFError:
             return
-        traces = io.BytesIO()
+        columns = io.BytesIO()
         try:
             scenes = scenes or _scenes(greeting)
-            setups = (scenes.setup(*grasp) for grasp in zip(wanted["scenes"], wanted["seeds"], strict=True))
-            done = [grasp_plain(scenes.job, setup) for setup in setups]
-            for grasp in done:
-                if grasp.kept is not None:
-                    _write_trace(traces, grasp.kept)
+            grasp = grasp_plain(scenes.job, scenes.setup(*wanted))
+            if grasp.kept is not None:
+                _write_trace(columns, grasp.kept)
             answer = {
-                "done": [[grasp.outcome.value, grasp.reason, grasp.state, _told(grasp)] for grasp in done]
+                "outcome": grasp.outcome.value,
+                "reason": grasp.reason,
+                "state": _numbers(grasp.state),
+                "events": _told(grasp),
             }
-            line = _line({**answer, "bytes": traces.tell()})
         except Exception as error:
             what = "a plain grasp" if scenes is not None else "the controller"
-            traces = io.BytesIO()
-            refused = f"{what} fails in another process: {type(error).__name__}: {error}"
-            line = _line({"refused": refused, "bytes": 0})
-        answers.write(line + traces.getbuffer())
+            columns = io.BytesIO()
+            answer = {"refused": f"{what} fails in another process: {type(error).__name__}: {error}"}
+        answers.write(_line({**answer, "bytes": columns.tell()}) + columns.getbuffer())
         answers.flush()
 
 

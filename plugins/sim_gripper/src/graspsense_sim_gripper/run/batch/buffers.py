@@ -1,0 +1,98 @@
+"""The memory that the grasps of a thread write to, one after the other, and its growth in a grasp that needs more."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+from attrs import define, field
+
+from graspsense_sim_gripper.plant.fingertip import CELL_OFFSET, CELLS
+from graspsense_sim_gripper.plant.sensing import PadBuffers
+from graspsense_sim_gripper.run.drawing import image_noise
+from graspsense_sim_gripper.run.loop import COLUMNS, Buffers, Ending
+from graspsense_sim_gripper.run.problem import IMAGES_PER_BLOCK
+from graspsense_sim_gripper.scene.random_numbers import Word
+
+TICKS: Final = 8200
+"""Ticks that the buffers hold at first; a grasp that needs more continues with longer ones. It is not a power of two,
+because all columns would then share one set of the processor's cache and evict each other."""
+IMAGES: Final = 160
+"""Cell images that the buffers hold at first, which suffice for nearly all grasps of the catalogue."""
+
+
+def new_buffers() -> Buffers:
+    """Return buffers for the first grasp of a thread."""
+    return Buffers(
+        pads=PadBuffers(
+            left_zero=np.zeros(CELLS),
+            right_zero=np.zeros(CELLS),
+            noise=np.zeros((IMAGES, 2 * CELLS)),
+            images=np.full((IMAGES, 2, CELLS), np.nan),
+        ),
+        image_times=np.zeros(IMAGES),
+        columns=np.zeros((len(COLUMNS), TICKS)),
+        phases=np.zeros(TICKS, np.int64),
+    )
+
+
+@define(eq=False)
+class Storage:
+    """The buffers of a thread. Its grasps use them one after the other."""
+
+    buffers: Buffers = field(factory=new_buffers)
+
+
+def as_lists(buffers: Buffers) -> Buffers:
+    """Return the same values for the interpreter, which indexes lists faster than arrays."""
+    pads = PadBuffers(*(np.asarray(array).tolist() for array in buffers.pads))
+    return Buffers(pads, *(np.asarray(array).tolist() for array in buffers[1:]))
+
+
+def begin_images(buffers: Buffers) -> None:
+    """Prepare arrays for the cell images of another grasp."""
+    buffers.pads.images[-1] = math.nan
+    buffers.pads.left_zero[:] = buffers.pads.right_zero[:] = CELL_OFFSET[0]
+
+
+def longer(buffers: Buffers, ending: Ending, key: Word | None) -> Buffers:
+    """Return arrays for more images or ticks, whichever the loop has used up; they begin with the same values.
+
+    `key`: that of the seed, whose noise is in them; None: the sensors are ideal.
+    """
+    if key is not None and ending.images == len(buffers.pads.images):
+        return _with_more_images(buffers, key)
+    columns, phases = np.asarray(buffers.columns), np.asarray(buffers.phases)
+    pads = PadBuffers(*map(np.asarray, buffers.pads))
+    if key is not None:
+        # The loop draws it on the way, and does not know any more how far it had come.
+        pads.noise[:] = image_noise(key, 0, len(pads.noise))
+    return Buffers(
+        pads,
+        np.asarray(buffers.image_times),
+        np.concatenate([columns, np.zeros_like(columns)], axis=1),
+        np.concatenate([phases, np.zeros_like(phases)]),
+    )
+
+
+def _with_more_images(buffers: Buffers, key: Word) -> Buffers:
+    noise = image_noise(key, len(buffers.pads.images), IMAGES_PER_BLOCK)
+    left_zero, right_zero, drawn, images = (np.asarray(array) for array in buffers.pads)
+    images = np.concatenate([images, np.zeros((len(noise), 2, CELLS))])
+    images[-1] = math.nan
+    return buffers._replace(
+        pads=PadBuffers(left_zero, right_zero, np.concatenate([drawn, noise]), images),
+        image_times=np.concatenate([np.asarray(buffers.image_times), np.zeros(len(noise))]),
+    )
+
+
+def first_images(buffers: Buffers) -> Buffers:
+    """Return the arrays with the images that every grasp begins with, so that none draws noise which it needs not."""
+    pads = buffers.pads
+    if len(pads.images) == IMAGES:
+        return buffers
+    return buffers._replace(
+        pads=pads._replace(noise=pads.noise[:IMAGES], images=pads.images[:IMAGES]),
+        image_times=buffers.image_times[:IMAGES],
+    )
