@@ -273,7 +273,7 @@ def test_a_force_that_falls_while_the_fingers_open_is_no_break():
 @pytest.mark.parametrize("sensor", [pytest.param("ideal", marks=pytest.mark.slow), "pads"])
 def test_the_release_of_a_container_with_contents_is_no_break(label, sensor):
     backend, controller = create("sensor-backend", "sim", sensor=sensor), create("controller", "hybrid")
-    for grasp in backend.run_many(controller, [label] * 6, list(range(6)), traces=True):
+    for grasp in backend.run_many(controller, [label] * 3, list(range(3)), traces=True):
         squeeze = RecordedSqueeze(name=label, sha256="0" * 64, trace=grasp.trace)
         assert grasp.report["broken"] is False
         assert prepared(squeeze, 0.0).broken_n is None
