@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import ast
+import gc
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
+from graspsense.core.control.garbage_collection import no_collection
+
 
 @cache
 def parsed(path: Path) -> ast.Module:
-    return ast.parse(path.read_text(encoding="utf-8"))
+    with no_collection():
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+    gc.freeze()  # millions of nodes that stay: each later search for cycles took seconds
+    return tree
 
 
 def statements(node: ast.AST) -> Iterator[ast.AST]:

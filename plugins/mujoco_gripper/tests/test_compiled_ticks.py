@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import ClassVar
 
 import numpy as np
@@ -49,6 +50,12 @@ def told(done):
     assert all(isinstance(column, np.ndarray) for column in trace)
     words = done.outcome, done.reason, done.report, done.counts, done.events, done.trace.events, done.warnings
     return [column.tobytes() for column in trace], words, done.seconds_simulated
+
+
+@cache
+def plain_grasp():
+    """Return the grasp of a block in the interpreter."""
+    return grasp(FAST, grasps=1)[0]
 
 
 @every_case(
@@ -126,7 +133,7 @@ def test_a_controller_that_cannot_be_compiled_runs_in_the_interpreter():
             Reflecting.looked.append(type(reading).__name__)
             return STEP(params, state, reading)
 
-    plain, _ = grasp(FAST, grasps=1)
+    plain = plain_grasp()
     for controller in (Worded, Reflecting):
         done, at_once = grasp(controller(FAST.config))
         assert at_once == 0
@@ -136,7 +143,7 @@ def test_a_controller_that_cannot_be_compiled_runs_in_the_interpreter():
 def test_steps_with_many_contacts_for_the_memory_run_in_the_interpreter(monkeypatch):
     # MuJoCo ends a process where it lacks memory, unless Python has called it.
     monkeypatch.setattr(backend, "AMPLE", 1000)
-    plain, _ = grasp(FAST, grasps=1)
+    plain = plain_grasp()
     done, at_once = grasp(FAST)
     assert 100 < at_once < 0.6 * plain.counts["ticks"]
     assert told(done) == told(plain)

