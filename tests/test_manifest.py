@@ -480,6 +480,15 @@ def test_what_looks_wrong_is_noticed_with_its_remedy(columns, says, tmp_path):
     assert fine.notices == ()
 
 
+def test_noise_alone_is_neither_a_pull_nor_a_contact(tmp_path):
+    noise = np.random.default_rng(2).normal(0.0, 0.01, 300)
+    for force in (noise, -noise):
+        (recording,) = plain(tmp_path, "", force=force)
+        assert not [n for n in recording.notices if "pull" in n or "begins in contact" in n], (
+            recording.notices
+        )
+
+
 def test_a_gap_in_millimetres_and_counts_called_newtons_are_refused(tmp_path):
     pandas_csv(tmp_path / "jar.csv", {"t": T_S, "gap": squeezing()[0] * 1e3, "F": squeezing()[1]})
     with pytest.raises(DataDamaged, match=r"the gap reaches 60 m, which no gripper has.*\[mm\]"):

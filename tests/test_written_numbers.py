@@ -20,6 +20,10 @@ def numbers(*cells, **others):
     [
         (["0", "1.5", "1.500"], [0, 1.5, 1.5]),
         (["975", "1,000", "2,475"], [975, 1000, 2475]),
+        (["975", "1.000", "2.475"], [975, 1000, 2475]),
+        (["0", "250", "-1.500"], [0, 250, -1500]),
+        (["100", "99.875", "0"], [100, 99.875, 0]),
+        (["0", "1.500"], [0, 1.5]),
         (["0", "1,234,567", "12.5"], [0, 1234567, 12.5]),
         (["80"] * 60 + ["49,5"], [80] * 60 + [49.5]),
         (["1.234,5", "0,25"], [1234.5, 0.25]),
@@ -65,6 +69,7 @@ def test_the_other_columns_decide_what_a_column_alone_does_not():
     assert isinstance(numbers(*cells, other=["0.01", "1"], third=["0,5", "1"]), NotNumbers)
     assert numbers("1.500", "2.000", other=["49,5", "1"]).tolist() == [1500, 2000]
     assert numbers("1.500", "2.000").tolist() == [1.5, 2.0]
+    assert isinstance(numbers("975", "1.000", other=["0.01", "1"]), NotNumbers)
 
 
 @given(st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=1), st.sampled_from([".", ","]))

@@ -120,7 +120,9 @@ def _echo_file(file: UnderstoodFile) -> None:
         echo_entry("squeezes", "no channel is known to be a force")
     for line in file.suggested:
         echo_entry("" if line is not file.suggested[0] else "most likely", line)
-    echo("To import it, name its columns (--time, --gap, --force) or write a manifest: --suggest FILE.toml")
+    echo(
+        "To import it, name its columns (--time, --gap, --force), or let --suggest write a manifest for its folder"
+    )
 
 
 def _draw(file: UnderstoodFile, picture: Path) -> None:

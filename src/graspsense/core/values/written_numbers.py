@@ -188,16 +188,16 @@ def _read(cells: Sequence[str], fit: _Fit, of_file: int) -> Numbers | NotNumbers
     """Return the numbers; `of_file` holds COMMA and THOUSANDS where other columns prove decimal commas or points."""
     common = fit.notations
     if common & POINT:
-        # `1.500` is 1500 where all other columns have decimal commas.
-        grouped = common & COMMA and of_file & COMMA and any("." in cell for cell in cells)
-        if not grouped:
+        # `1.500` is 1500 where all other columns have decimal commas, and beside 975 and 1.000.
+        grouped = common & COMMA and any("." in cell for cell in cells)
+        if not grouped or not (of_file & COMMA or _signs_of_thousands(cells, ".") == 2):
             return _values(cells, POINT) if fit.values is None else fit.values
-        if of_file == COMMA:
+        if not of_file & THOUSANDS:
             return _values(cells, COMMA)
     elif common == THOUSANDS | COMMA:
         if of_file == COMMA:
             return _values(cells, COMMA)
-        if of_file == THOUSANDS or _are_thousands(cells):
+        if of_file == THOUSANDS or _signs_of_thousands(cells, ",") > 0:
             return _values(cells, THOUSANDS)
     else:
         return _values(cells, common)
@@ -210,15 +210,16 @@ def _read(cells: Sequence[str], fit: _Fit, of_file: int) -> Numbers | NotNumbers
     )
 
 
-def _are_thousands(cells: Sequence[str]) -> bool:
-    """Return whether commas before three digits separate thousands, since the cells without one would have one too.
+def _signs_of_thousands(cells: Sequence[str], mark: str) -> int:
+    """Return how many of two signs tell that marks before three digits separate thousands: 0 to 2.
 
     A program that writes three decimals writes them in every cell, and one that leaves out zeros leaves out the last.
     """
-    plain = [cell for cell in cells if "," not in cell and not is_missing(cell)]
-    return bool(plain) and (
-        any(cell.endswith("0") for cell in cells if "," in cell)
-        or any(len(cell.lstrip("+-\u2212")) == 3 for cell in plain)
+    plain = [cell for cell in cells if mark not in cell and not is_missing(cell)]
+    if not plain:
+        return 0
+    return any(cell.endswith("0") for cell in cells if mark in cell) + any(
+        len(cell.lstrip("+-\u2212")) == 3 for cell in plain
     )
 
 

@@ -22,6 +22,8 @@ JUMP: Final = 20.0
 MILLIMETRES: Final = 0.5
 """A gap beyond this (m) is in another unit."""
 ZERO_SAMPLES: Final = 10
+NOISE: Final = 6.0
+"""A force whose range is at most so many usual second differences is noise alone."""
 STEADY: Final = 0.1
 """Share of its range by which the force may change in the samples that a zero is taken from."""
 _OFFSET: Final = ' If the fingers were free, the sensor has an offset: zero = "10 samples"'
@@ -35,8 +37,8 @@ def notices_of(columns: GraspColumns, *, zeroed: bool) -> Iterator[str]:
         return
     force, gap = columns.force_n, columns.gap_m
     low, high, start = float(force.min()), float(force.max()), float(force[0])
-    peak = int(force.argmax())
-    if abs(low) > abs(high) and low < 0.0:
+    peak, felt = int(force.argmax()), _is_felt(force)
+    if felt and abs(low) > abs(high) and low < 0.0:
         yield "the force is negative where it is largest: is it a pull? Turn its sign: -FORCE"
     moved, span = float(gap[peak] - gap[0]), float(np.ptp(gap))
     if span == 0.0 and not columns.units.get("gap"):
@@ -60,7 +62,7 @@ def notices_of(columns: GraspColumns, *, zeroed: bool) -> Iterator[str]:
             "the force falls while the gap closes: does the sensor fall on contact? Turn its sign and write its zero: "
             'force = "-FORCE" and zero = "10 samples", or force = "999 - FORCE" where 999 is its value without contact'
         )
-    elif high > low and start - low > BEGINS_LOADED * (high - low):
+    elif felt and start - low > BEGINS_LOADED * (high - low):
         if zeroed:
             yield (
                 "the recording begins in contact, so the zero of its first samples removes a part of the force: leave "
@@ -90,6 +92,12 @@ def _falls_on_contact(columns: GraspColumns) -> bool:
     closed = float(gap[0] - gap[int(force.argmin())])
     falls = fall > (1.0 - STEADY) * span > 0.0 and closed > 0.5 * float(np.ptp(gap)) > 0.0
     return bool(columns.units.get("force")) and falls and _is_steady(force)
+
+
+def _is_felt(force: Numbers) -> bool:
+    """Return whether a force leaves its noise: what noise looks like is neither a pull nor a contact."""
+    noise = float(np.median(np.abs(np.diff(force, 2)))) if len(force) > 2 else 0.0
+    return float(np.ptp(force)) > NOISE * noise
 
 
 def _is_steady(force: Numbers) -> bool:
