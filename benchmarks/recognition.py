@@ -55,7 +55,18 @@ POINTS = 128
 """Number of times of a curve."""
 LONGEST = 0.95
 """Quantile of the durations up to which curves are compared; the last value of a shorter one goes on."""
-SHORT = "--classifiers tree --feature-sets chitta,catch22 --instances 3 --trials 1 --folds 3".split()
+SHORT = [
+    "--classifiers",
+    "tree",
+    "--feature-sets",
+    "chitta,catch22",
+    "--instances",
+    "3",
+    "--trials",
+    "1",
+    "--folds",
+    "3",
+]
 
 
 def measured(source: str, given: argparse.Namespace, options: Sequence[str]) -> Ranking:
