@@ -372,7 +372,9 @@ def test_a_damaged_data_set_is_an_error_that_says_what_is_wrong(tmp_path, damage
     with pytest.raises(kind) as caught:
         _refusal(folder)
     assert word in str(caught.value)
-    done = CliRunner().invoke(cli, ["import", f"lerobot:{folder}", "--check"])
+    done = CliRunner().invoke(
+        cli, ["import", f"lerobot:{folder}", "--check", "--plot", str(tmp_path / "p.png")]
+    )
     assert isinstance(done.exception, kind | SystemExit)
     assert done.exit_code
 
