@@ -3,7 +3,7 @@
     M x'' = u - B x' - f,    m y'' = f - k y - c y',    f = kc max(0, x - y - x0)
 
 M = 1 kg, B = 20 N s/m, m = 20 g, c = 5 N s/m, k = 2 kN/m, kc = 20 kN/m, x0 = 20 mm; 7 s under control at 1 kHz, u held
-over each millisecond. For our simulator it is an ordinary scene (`peers_surface`) in the shipped loop, on a straight
+over each millisecond. For our simulator it is an ordinary scene (`light_surface`) in the shipped loop, on a straight
 drive of constant mass with the ideal sensor, x being 70 mm less the gap; the control law is an ordinary controller.
 """
 
@@ -31,7 +31,7 @@ M, B, LIGHT, C, K, KC, X0 = 1.0, 20.0, 0.02, 5.0, 2e3, 2e4, 0.02
 TICK, TICKS = 1e-3, 7000
 OPEN_M = 0.07
 CONFIG = SimConfig(
-    object="peers_surface",
+    object="light_surface",
     spread=False,
     sensor="ideal",
     transmission="straight",
