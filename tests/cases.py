@@ -13,22 +13,29 @@ def every_case(names: str | tuple[str, ...], cases: Iterable[Any]) -> Callable[.
     """Run a test with each case in turn, as `pytest.mark.parametrize` does, but within one test.
 
     A case has a folder `tmp_path`, a `monkeypatch` and a `capsys` to itself; other fixtures are shared by all cases.
-    What fails is raised as one group, each failure with its case as a note.
+    What fails is raised as one group, each failure with its case as a note. A case that is skipped does not stop the
+    others; if none fails, the test counts as skipped. Raises ValueError if there is no case.
     """
     names = (names,) if isinstance(names, str) else names
     rows = [tuple(case) if len(names) > 1 else (case,) for case in cases]
+    if not rows:
+        raise ValueError(f"no case of {', '.join(names)}: a test without cases checks nothing")
 
     def decorate(test: Callable[..., None]) -> Callable[..., None]:
         def loop(*args: Any, **fixtures: Any) -> None:
-            failures = []
+            failures, skipped = [], []
             for number, row in enumerate(rows):
                 try:
                     _run(test, args, fixtures | dict(zip(names, row, strict=True)), number)
                 except (Exception, pytest.fail.Exception) as error:
                     error.add_note(f"case {number}: {', '.join(map(repr, row)):.400}")
                     failures.append(error)
+                except pytest.skip.Exception as error:
+                    skipped.append(error)
             if failures:
                 raise BaseExceptionGroup(f"{len(failures)} of {len(rows)} cases of {test.__name__}", failures)
+            if skipped:
+                raise skipped[0]
 
         signature = inspect.signature(test)
         fixtures_of_test = [fixture for name, fixture in signature.parameters.items() if name not in names]

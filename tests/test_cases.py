@@ -30,3 +30,22 @@ def test_a_case_has_its_own_folder_and_patches(text, tmp_path, monkeypatch, caps
     (tmp_path / "file").touch()
     print(text)  # noqa: T201
     assert capsys.readouterr().out == f"{text}\n"
+
+
+def test_a_test_without_cases_is_refused():
+    with pytest.raises(ValueError, match="no case of name"):
+        every_case("name", [])
+
+
+@pytest.mark.parametrize(
+    ("cases", "outcome"), [([1, 2, 9], BaseExceptionGroup), ([1, 2, 3], pytest.skip.Exception)]
+)
+def test_a_skipped_case_hides_no_failure_and_does_not_count_as_passed(cases, outcome):
+    @every_case("number", cases)
+    def ends(number):
+        if number == 2:
+            pytest.skip("not here")
+        assert number < 9
+
+    with pytest.raises(outcome):
+        ends()
