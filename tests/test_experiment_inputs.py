@@ -139,6 +139,19 @@ def test_files_that_a_file_names_count(tmp_path):
         assert contents_of(params) != contents
 
 
+def test_a_model_in_an_installed_package_counts(tmp_path, monkeypatch):
+    models = tmp_path / "lab_models" / "grippers"
+    models.mkdir(parents=True)
+    (tmp_path / "lab_models" / "__init__.py").write_text("raise AssertionError('imported')")
+    (models / "jaw.xml").write_text("<mujoco/>")
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / "gripper.toml").write_text('model = "package:lab_models:grippers/jaw.xml"\n')
+    params = {"gripper": {"file": str(tmp_path / "gripper.toml")}}
+    contents = contents_of(params)
+    (models / "jaw.xml").write_text("<mujoco />")
+    assert contents_of(params) != contents
+
+
 @every_case(
     "source", ["s", "s/store.sqlite", "store:s", "manifest:m.toml", "identified:m.toml,n.toml", "t.parquet"]
 )

@@ -279,6 +279,19 @@ def test_backend_says_that_times_are_frames_and_units_nominal(tmp_path: Path) ->
     assert "nominal" in said
 
 
+def test_backend_tells_a_force_that_is_the_same_all_along(tmp_path: Path) -> None:
+    (tmp_path / "g.csv").write_text(
+        "t,gap,l,r\n"
+        + "".join(f"{k * 0.01},{0.08 - k * 0.0005},0.35,{max(0, k - 60) * 0.1}\n" for k in range(100))
+    )
+    (tmp_path / "m.toml").write_text(
+        'files = "g.csv"\nlabel = "jar"\ntime = "t [s]"\ngap = "gap [m]"\nleft = "l [N]"\nright = "r [N]"\n'
+    )
+    info = ReplayBackend(ReplayConfig(f"manifest:{tmp_path}/m.toml#1")).open(seed=0)
+    assert [note for note in info.notes if "the left pad does not change" in note]
+    assert not [note for note in info.notes if "the right pad does not change" in note]
+
+
 def test_backend_closes_twice_and_plays_again(tmp_path: Path) -> None:
     backend, _ = opened(write(tmp_path / "g.txt", frame_lines()))
     frame = backend.read(timeout_s=0.0)

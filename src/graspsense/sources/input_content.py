@@ -153,7 +153,8 @@ def _hash_of_files(path: str, kind: str) -> str:
 def _named_files(path: str, folders: tuple[str, ...], known: set[str]) -> set[str]:
     """Add the files that a TOML or XML file names, and those that these name: models, their parts and meshes.
 
-    They are in the folder of the file, in a folder that it names (meshdir), or in `folders`, those of what names it.
+    They are in the folder of the file, in a folder that it names (meshdir), in `folders`, those of what names it, or in
+    an installed package (`package:NAME:PATH`).
     """
     if not path.lower().endswith((".toml", ".xml")) or not os.path.isfile(path):
         return known
@@ -163,11 +164,23 @@ def _named_files(path: str, folders: tuple[str, ...], known: set[str]) -> set[st
         return known  # the task tells it
     folder = os.path.dirname(path)
     folders += (folder, *(place for text in texts if os.path.isdir(place := os.path.join(folder, text))))
-    for place in sorted({os.path.join(name, text) for name in folders for text in texts} - known - {path}):
+    places = {os.path.join(name, text) for name in folders for text in texts}
+    places |= {place for text in texts for place in _places_in_package(text)}
+    for place in sorted(places - known - {path}):
         if os.path.isfile(place):
             known.add(place)
             _named_files(place, folders, known)
     return known
+
+
+def _places_in_package(text: str) -> Iterator[str]:
+    """Yield where the file of an installed package can be that `package:NAME:PATH` names."""
+    scheme, _, rest = text.partition(":")
+    package, _, resource = rest.partition(":")
+    if scheme == "package" and package.isidentifier() and resource:
+        spec = find_spec(package)
+        for folder in (spec and spec.submodule_search_locations) or ():
+            yield os.path.join(folder, resource)
 
 
 def _hash_of_tree(path: str) -> str:

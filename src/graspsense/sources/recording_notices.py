@@ -24,11 +24,12 @@ FREE: Final = 0.2
 
 def with_notices(labelled: LabelledRecording) -> LabelledRecording:
     """Return the recording with all that looks wrong: what its reader noticed, and what its forces show."""
-    notices = (*labelled.notices, *labelled.recording.notices, *_notices(labelled.recording))
+    notices = (*labelled.notices, *labelled.recording.notices, *force_notices(labelled.recording))
     return evolve(labelled, notices=tuple(dict.fromkeys(notices)))
 
 
-def _notices(recording: Recording) -> Iterator[str]:
+def force_notices(recording: Recording) -> Iterator[str]:
+    """Return what looks wrong in the forces of the pads: no number, one value all along, or a value that stays."""
     pads = {
         "left": np.array([reading.frame.force_left_n for reading in recording.readings]),
         "right": np.array([reading.frame.force_right_n for reading in recording.readings]),
