@@ -98,9 +98,11 @@ class FaultyGrasp:
     words: str
 
 
-def grasped(controller: Controller[Any], faults: FaultConfig, seed: int = SEED) -> Grasp:
-    """Grasp with the emulated board, treated as a real gripper."""
-    config = Pr2Config(transport="emulated", pace="device", calibration="none", object=OBJECT, faults=faults)
+def grasped(controller: Controller[Any], faults: FaultConfig, seed: int = SEED, **body: Any) -> Grasp:
+    """Grasp with the emulated board, treated as a real gripper; `body` are settings of its simulated fingers."""
+    config = Pr2Config(
+        transport="emulated", pace="device", calibration="none", object=OBJECT, faults=faults, body_config=body
+    )
     backend: SensorBackend[Any] = Pr2Backend(config).dry_run_backend()
     return run_grasp(backend, controller, evolve(RUN, seed=seed))
 
@@ -149,12 +151,15 @@ def result_of(fault: str, side: str, phase: str, controller: str, at_s: float, g
 
 
 def injected(
-    controllers: Iterable[str], faults: Iterable[Injected] = FAULTS, sides: Iterable[str] = ("left", "right")
+    controllers: Iterable[str],
+    faults: Iterable[Injected] = FAULTS,
+    sides: Iterable[str] = ("left", "right"),
+    **body: Any,
 ) -> Iterator[FaultyGrasp]:
     """Grasp with each of these faults at each of five times, on each side, under each controller."""
     sides = tuple(sides)
     for name in controllers:
-        healthy = grasped(controller_named(name), FaultConfig())
+        healthy = grasped(controller_named(name), FaultConfig(), **body)
         yield result_of("none", "", "", name, inf, healthy)
         for fault in faults:
             for side in sides if fault.sided else ("both",):
@@ -162,7 +167,7 @@ def injected(
                     settings = {**fault.settings, fault.time_key: at_s}
                     if fault.sided:
                         settings["pad_side"] = side
-                    grasp = grasped(controller_named(name), FaultConfig(**settings))
+                    grasp = grasped(controller_named(name), FaultConfig(**settings), **body)
                     yield result_of(fault.name, side, phase, name, at_s, grasp)
 
 

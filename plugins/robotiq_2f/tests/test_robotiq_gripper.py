@@ -16,6 +16,7 @@ from pymodbus.simulator import DataType, SimData, SimDevice
 
 from graspsense import WiringError, load_pipeline
 from graspsense.core.components import emulated_serial
+from graspsense.gripper_api import SerialFaults
 from graspsense.plugin_api import POSITION, VELOCITY, Command, DeviceLost, NoDevice, create
 from graspsense.testing_api import parametrize_checks
 from graspsense_robotiq_2f import backend
@@ -26,6 +27,7 @@ from graspsense_robotiq_2f.emulator.device import EmulatedGripper
 from graspsense_robotiq_2f.emulator.modbus import checksum
 from graspsense_robotiq_2f.link import ModbusLink, NoReply
 from graspsense_robotiq_2f.registers import INPUT, MODELS, OUTPUT, byte_of
+from graspsense_robotiq_2f.ur_cap import opened_link
 
 PATIENT_S = 60.0
 """For a reply that comes: when it does is this machine's business."""
@@ -157,14 +159,18 @@ def test_a_ur_cap_takes_all_bytes_and_answers_each_line(emulated):
 @pytest.mark.parametrize("mood", ["damaged", "silent", "late", "repeated"])
 def test_whatever_becomes_of_replies_the_fingers_are_told_to_stop(emulated, wire, mood):
     """The gripper still hears: what it is told last is to stop."""
-    gripper = emulated(wire)
-    driver = create("sensor-backend", "robotiq", port=gripper.where, reply_timeout_s=0.5)
+    gripper = emulated(wire, faults=SerialFaults(late_s=0.01))
+    driver = create("sensor-backend", "robotiq", port=gripper.where, reply_timeout_s=PATIENT_S)
     driver.open(1)
     for _ in range(20):
         driver.read(0.1)
         driver.apply(Command(VELOCITY, -0.03, 25.0, 0.15))
     assert gripper.state()["going"]
     gripper.tell(mood)
+    if mood in ("damaged", "silent"):
+        # No valid reply comes any more, so it need not be waited for.
+        driver._link.close()
+        driver._link = opened_link(gripper.where, driver.config.address, 0.02)
     try:
         for _ in range(4):
             driver.read(0.1)
