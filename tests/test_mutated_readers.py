@@ -38,8 +38,8 @@ from graspsense.store.store import Store
 from graspsense.store.verify import verify_store
 
 QUICK = 6
-SLOW = int(os.environ.get("GRASPSENSE_MUTATIONS", "0")) or 150
-SLOWER = min(SLOW, 40)
+SLOW = int(os.environ.get("GRASPSENSE_MUTATIONS", "0")) or 60
+SLOWER = min(SLOW, 20)
 """Files of a format that takes long to open."""
 IMPORTED_OF = 4
 """One of so many of the recordings that can be read is imported as well."""
