@@ -31,6 +31,8 @@ hertz_n_m15 = 2e7
 crush_force_n = 10.0
 broken_n_m = 2000.0
 """
+REFERENCE = {"fidelity": "reference", "compile": "always"}
+"""The finest steps, which take minutes where they are not compiled."""
 FORCED = {"tolerance": math.inf, "longest_s": 1e-3, "growth": math.inf}
 
 
@@ -96,7 +98,7 @@ type = "elastic"
 k1_n_m = 4000.0
 """
     traces = []
-    for settings in ({}, {"compile": "always"}, {"fidelity": "reference"}):
+    for settings in ({}, {"compile": "always"}, REFERENCE):
         gripper = create("sensor-backend", "sim", sensor="ideal", spread=False, **settings)
         done = gripper.run_many(create("controller", "hybrid"), [scene], [0], traces=True, workers=1)[0]
         assert done.report["broken"]
