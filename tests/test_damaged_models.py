@@ -8,6 +8,7 @@ import json
 import math
 import subprocess
 import sys
+from functools import cache
 from io import BytesIO
 from pathlib import Path
 from zipfile import ZIP_DEFLATED, ZIP_STORED, ZipFile
@@ -48,6 +49,7 @@ def labelled(n=5):
     return Labelled(source="a test", table=table, labels=tuple(labels), provenance={"simulated": True})
 
 
+@cache
 def trained(name, **config):
     """A model with everything that a file can have: certainty, prediction sets, a temperature and a checkpoint."""
     component = installed().find("classifier", name)

@@ -24,7 +24,7 @@ def total(said):
 
 @pytest.mark.parametrize("features", [FULL_CAN, MISSING])
 def test_contributions_of_a_forest_add_up_to_the_probability(features):
-    classifier = fitted("forest", *trials(missing=0.1), trees=30)
+    classifier = fitted("forest", *trials(missing=0.1), trees=10)
     said = classifier.explain(features)
 
     assert total(said) == pytest.approx(said.probabilities[said.label], abs=1e-12)

@@ -134,7 +134,13 @@ def test_a_viewer_that_runs_receives_the_grasp(viewer, tmp_path):
     check_complete(logged(tmp_path / "received.rrd"))
 
 
-@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP], ids=["killed", "stopped"])
+@pytest.mark.parametrize(
+    "how",
+    [
+        pytest.param(signal.SIGKILL, id="killed"),
+        pytest.param(signal.SIGSTOP, id="stopped", marks=pytest.mark.slow),  # waits until the feed gives up
+    ],
+)
 def test_a_viewer_that_goes_away_loses_no_grasp(viewer, how):
     running, address = viewer
     feed = LiveFeed(RERUN, [address])
