@@ -47,14 +47,25 @@ def test_it_prompts_counts_undoes_retakes_and_stops_when_everything_is_there(tmp
     assert "next: block  (1 of 2)" in done.stderr
 
 
-def test_a_fault_that_ends_no_grasp_is_told_with_each_trial(tmp_path):
-    frozen = ["--gripper", "pr2", "-o", "gripper.transport=emulated", "-o", "gripper.faults.freeze_cell=15"]
-    done = collect(tmp_path / "t", "\n", labels="block", each=1, more=frozen)
+EMULATED = ("--gripper", "pr2", "-o", "gripper.transport=emulated")
+
+
+@pytest.fixture(scope="module")
+def emulated(tmp_path_factory):
+    """The folder with a grasp of an individual object by an emulated PR2 with a frozen cell, and what was told."""
+    folder = tmp_path_factory.mktemp("emulated") / "t"
+    frozen = (*EMULATED, "-o", "gripper.faults.freeze_cell=15")
+    done = collect(folder, "\n", labels="can:full_open#2", each=1, more=frozen)
     assert done.returncode == 0, done.stderr
-    told = [line for line in done.stderr.splitlines() if "frozen cells" in line]
+    return folder, done.stderr
+
+
+def test_a_fault_that_ends_no_grasp_is_told_with_each_trial(emulated):
+    folder, said = emulated
+    told = [line for line in said.splitlines() if "frozen cells" in line]
     assert len(told) == 1
     assert "warning" in told[0]
-    with Store.read(tmp_path / "t") as store:
+    with Store.read(folder) as store:
         assert "(15)" in store.trial(1).result.details["warnings"][0]
 
 
@@ -231,9 +242,6 @@ def test_the_advice_on_a_missing_model_fits_the_gripper(tmp_path):
     assert "simulated" not in real.stderr
 
 
-EMULATED = ("--gripper", "pr2", "-o", "gripper.transport=emulated")
-
-
 def held(folder):
     """Return label, object and whether it is simulated of each trial, in their order."""
     with Store.read(folder) as store:
@@ -255,11 +263,8 @@ def test_an_emulated_pr2_grasps_what_the_label_says(tmp_path):
     ]
 
 
-def test_a_label_of_an_individual_object_selects_this_object_on_an_emulated_pr2(tmp_path):
-    done = collect(tmp_path / "t", "\n", labels="can:full_open#2", each=1, more=EMULATED)
-
-    assert done.returncode == 0, done.stderr
-    assert held(tmp_path / "t") == [("can:full_open", "can:full_open#2", True)]
+def test_a_label_of_an_individual_object_selects_this_object_on_an_emulated_pr2(emulated):
+    assert held(emulated[0]) == [("can:full_open", "can:full_open#2", True)]
 
 
 @every_case("gripper", [(), EMULATED])

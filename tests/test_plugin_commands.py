@@ -15,7 +15,7 @@ from mutants import MUTANTS
 from graspsense.core.components.registry import IsolatedPlugins
 from graspsense.plugin_api import hookimpl
 from graspsense.scaffold.make import make
-from graspsense.testing import CHECKS
+from graspsense.testing import CHECKS, MINIMUM_CHECKS
 
 
 class Lab:
@@ -31,6 +31,10 @@ class Lab:
     @hookimpl
     def graspsense_sensor_backends(self):
         return [entry for entry in self.entries if hasattr(entry, "accepts")]
+
+
+CHECKS_WITH_SETTINGS = {"settings-survive-a-file", "reports-a-lost-device", "reports-a-missing-device"}
+"""Checks of a gripper that need the settings of the command line; the others take seconds."""
 
 
 def test_a_part_that_conforms():
@@ -64,7 +68,11 @@ def test_a_part_that_does_not():
     assert {check["state"] for check in answer["results"]} == {"passed", "failed"}
 
 
-def test_settings_reach_the_part_that_is_checked():
+def test_settings_reach_the_part_that_is_checked(monkeypatch):
+    asking = [check for check in CHECKS["sensor-backend"] if check.id in CHECKS_WITH_SETTINGS]
+    assert len(asking) == len(CHECKS_WITH_SETTINGS)
+    monkeypatch.setitem(CHECKS, "sensor-backend", tuple(asking))
+    monkeypatch.setitem(MINIMUM_CHECKS, "sensor-backend", len(asking))
     with IsolatedPlugins(Lab(parts.ENTRIES["sensor-backend"])):
         code, out, err = graspsense(
             "plugins",
