@@ -25,7 +25,7 @@ from graspsense.evaluation.results import Evaluation
 from graspsense.report.verdict import verdict
 
 
-def learner(name="c45"):
+def learner(name="tree"):
     component = installed().find("classifier", name)
     return SelectedComponent(component, component.config_class()())
 
@@ -40,7 +40,7 @@ def labelled(labels, *columns, **more):
     return Labelled(source="a test", table=table(*columns), labels=tuple(labels), **more)
 
 
-def judged(trials, name="c45", **more):
+def judged(trials, name="tree", **more):
     """Evaluate with one permutation of the labels instead of 19, and without a learning curve, unless it is asked for.
 
     Each permutation and each point of the curve is a cross-validation of its own.

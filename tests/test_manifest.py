@@ -660,12 +660,15 @@ def test_a_recording_without_a_gap_is_a_trial_of_its_force(tmp_path):
     result = read_recorded(stored.recording).record().result
     assert result.outcome == "force only"
     assert "no gap" in result.reason
-    for features, needed in (
-        ("chitta", ()),
-        ("quantiles", ("contact_time", "high_force_whole_max", "low_force_rate_second_max")),
-        ("curve", ("peak_force", "loading_time", "load_t50", "relaxation", "hold_t50", "pad_difference")),
+    kept, given = f"store:{tmp_path / 'trials'}", f"manifest:{place}"
+    curve = ("peak_force", "loading_time", "load_t50", "relaxation", "hold_t50", "pad_difference")
+    quantiles = ("contact_time", "high_force_whole_max", "low_force_rate_second_max")
+    for features, needed, sources in (
+        ("chitta", (), (kept,)),
+        ("quantiles", quantiles, (given,)),
+        ("curve", curve, (kept, given)),
     ):
-        for source in (f"store:{tmp_path / 'trials'}", f"manifest:{place}"):
+        for source in sources:
             table = load_trials(source, options=[f"features.type={features}"]).table
             known = [
                 name

@@ -234,7 +234,7 @@ def eval_list(text):
 
 def test_the_user_who_closes_the_pipe_sees_no_traceback():
     done = subprocess.run(
-        f"{sys.executable} -m graspsense run --json | head -1",
+        f"{sys.executable} -m graspsense config show --json | head -1",
         shell=True,
         capture_output=True,
         text=True,
@@ -245,7 +245,9 @@ def test_the_user_who_closes_the_pipe_sees_no_traceback():
 
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs a device that is always full")
-@pytest.mark.parametrize("arguments", [["run", "--json"], ["config", "show"]])
+@pytest.mark.parametrize(
+    "arguments", [pytest.param(["run", "--json"], marks=pytest.mark.slow), ["config", "show"]]
+)
 def test_a_full_disk_under_stdout_is_told_without_a_traceback(arguments):
     with open("/dev/full", "wb") as full:
         ran = subprocess.run(

@@ -10,7 +10,7 @@ from cases import every_case
 
 from graspsense.core.components.registry import Component, IsolatedPlugins
 from graspsense.plugin_api import Feature, hookimpl
-from graspsense.testing import CHECKS, MINIMUM_CHECKS, examine
+from graspsense.testing import CHECKS, MINIMUM_CHECKS, examine, session
 from graspsense.testing.checks import ConformanceReport, Result, outcome_of
 from graspsense.testing.conformance import Examined
 from graspsense.testing.subject import Subject
@@ -21,6 +21,12 @@ ROLES = tuple(parts.ENTRIES)
 def subject(role, entry, keys=None):
     given = {"unplugged": parts.HAND_LOST, "absent": parts.HAND_ABSENT} if role == "sensor-backend" else {}
     return Subject(component=Component(entry, "graspsense-test", "0.1", role), keys=keys or {}, **given)
+
+
+@pytest.fixture(autouse=True)
+def short_openings(monkeypatch):
+    """The hand is open after a fifth of a second; it is used for a whole one."""
+    monkeypatch.setattr(session, "OPENING_S", 0.2)
 
 
 SLOW_CHECKS = {
