@@ -13,7 +13,7 @@ from graspsense.core.values.errors import ConfigError
 from graspsense.store.collecting import Collection, Wanted
 from graspsense.store.store import Store
 
-PLAIN = ["-o", "classifier.type=none"]
+PLAIN = ["-o", "classifier.type=none", "-o", "run.hold_s=0.1"]
 
 
 def collect(folder, answers, labels="can:full_open,block", each=2, more=()):
@@ -107,8 +107,8 @@ def test_other_settings_are_refused_unless_told(tmp_path):
 
 def test_another_classifier_is_no_other_setting(tmp_path):
     collect(tmp_path / "t", "\n")
-    command = ["collect", "--labels", "block,can:full_open", "--save", str(tmp_path / "t"), "-o"]
-    done = graspsense(*command, "classifier.type=knn", answers="q\n")
+    command = ["collect", "--labels", "block,can:full_open", "--save", str(tmp_path / "t"), *PLAIN]
+    done = graspsense(*command, "-o", "classifier.type=knn", answers="q\n")
     assert done.returncode == 0, done.stderr
 
 

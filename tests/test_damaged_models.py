@@ -108,7 +108,7 @@ def test_damages_of_a_model_are_refused_or_answer(tmp_path, name, damages, least
     assert read_damaged(*damages, tmp_path / "m.json") >= least
 
 
-@pytest.mark.parametrize(("damages", "least"), [pytest.param((3, 10, 3), 30, id="few"), SOME, EVERY])
+@pytest.mark.parametrize(("damages", "least"), [SOME, EVERY])
 def test_damages_of_the_weights_of_a_network_are_refused_or_answer(tmp_path, damages, least):
     write_model(tmp_path / "m.json", trained("mlp", kept_as="weights"))
     assert read_damaged(*damages, tmp_path / "m.json") >= least

@@ -7,8 +7,6 @@ import json
 import os
 import socket
 import struct
-import subprocess
-import sys
 import threading
 import time
 from contextlib import ExitStack, closing, suppress
@@ -17,6 +15,7 @@ from xml.etree import ElementTree
 
 import pytest
 from cases import every_case
+from commands import graspsense
 from live_grasp import COMMAND, device, port_of, reading
 from mcap.reader import make_reader
 
@@ -356,8 +355,7 @@ def test_a_port_that_is_taken_is_an_error_before_the_grasp(tmp_path):
         port = taken.getsockname()[1]
         with pytest.raises(ConfigError, match=f"--foxglove.*{port}"):
             LiveFeed("graspsense.live.foxglove_process", [str(port)])
-        command = [sys.executable, "-m", "graspsense", "run", "--foxglove", str(port), "--save", "store"]
-        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=300, check=False)
+        done = graspsense("run", "--foxglove", port, "--save", tmp_path / "store")
     assert done.returncode == 2
     assert str(port) in done.stderr
     assert not (tmp_path / "store").exists()

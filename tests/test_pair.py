@@ -170,9 +170,11 @@ def test_the_trials_of_a_pair_are_kept_and_name_each_other(tmp_path):
         "--beside",
         str(plain),
         "--object",
-        "sponge",
+        "toy",
         "-o",
         "classifier.type=none",
+        "-o",
+        "run.hold_s=0.1",
         "--save",
         str(store),
     ]

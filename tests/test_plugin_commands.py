@@ -8,7 +8,6 @@ import subprocess
 import sys
 
 import parts
-import pytest
 from commands import graspsense
 from mutants import MUTANTS
 
@@ -107,12 +106,11 @@ bound = api.bind
 """
 
 
-@pytest.mark.parametrize("module", ["older", "plugin"])
-def test_imports_that_moved_are_printed_with_the_new_form_beside(tmp_path, module):
+def test_imports_that_moved_are_printed_with_the_new_form_beside(tmp_path):
     make("lab-old", ["observer"], tmp_path / "old")
     source = tmp_path / "old" / "src"
-    path = source / "lab_old" / f"{module}.py"
-    path.write_text(OLD + (path.read_text() if path.exists() else ""))
+    for path in (source / "lab_old" / "older.py", source / "lab_old" / "plugin.py"):
+        path.write_text(OLD + (path.read_text() if path.exists() else ""))
     (source / "lab_old-1.dist-info").mkdir()
     (source / "lab_old-1.dist-info" / "METADATA").write_text(
         "Metadata-Version: 2.1\nName: lab-old\nVersion: 1\n"
@@ -132,9 +130,10 @@ def test_imports_that_moved_are_printed_with_the_new_form_beside(tmp_path, modul
     assert ran.returncode == 1, ran.stderr
     said = ran.stdout + ran.stderr
     old = "from graspsense.plugin_api import"
-    assert f"{module}.py:4: {old} Stillness -> from graspsense.plugin_api import RestState" in said
-    assert f"{module}.py:5: {old} tare -> from graspsense.gripper_api import tare" in said
-    assert f"{module}.py:7: api.bind -> from graspsense.simulator_api import bind" in said
+    for module in ("older", "plugin"):
+        assert f"{module}.py:4: {old} Stillness -> from graspsense.plugin_api import RestState" in said
+        assert f"{module}.py:5: {old} tare -> from graspsense.gripper_api import tare" in said
+        assert f"{module}.py:7: api.bind -> from graspsense.simulator_api import bind" in said
     assert "Channel ->" not in said
 
 

@@ -115,6 +115,7 @@ def test_a_page_loads_nothing_and_runs_only_its_own_script(page):
     assert f"script-src 'sha256-{digest}'" in policy
 
 
+@pytest.mark.slow
 def test_a_page_answers_first_and_says_what_it_rests_on(page):
     reader = Reader(page)
     text = reader.text

@@ -267,7 +267,7 @@ LAWS = [
 @every_case(("law", "sends"), LAWS)
 def test_what_every_law_becomes_is_told(pipeline, law, sends):
     # It is told before anything moves, so the grasp need not be whole.
-    loaded = pipeline(f"controller.type={law}", f"controller.sends={sends}", "run.grasp_timeout_s=0.5")
+    loaded = pipeline(f"controller.type={law}", f"controller.sends={sends}", "run.grasp_timeout_s=0.1")
     assert any(f"as a {sends}, the controller sends" in note for note in loaded.grasp().device.notes)
 
 
