@@ -732,7 +732,7 @@ def test_most_grasps_too_wide_is_an_error_that_stores_nothing(tmp_path):
         assert "5 of 5 recordings end as too wide" in err
         assert "controller.too_wide_m=0" in err
     assert not (tmp_path / "trials").exists()
-    code, out, _ = graspsense("import", place, "--check", "--plot", tmp_path / "x.png")
+    code, out, _ = graspsense("import", place, "--save", tmp_path / "trials")
     assert code == 0
     assert "5 steady" in out
 
@@ -753,7 +753,7 @@ def test_counts_below_zero_throughout_are_an_error_that_says_what_to_set(tmp_pat
         assert 'zero = "10 samples"' in err
     assert not (tmp_path / "trials").exists()
     zeroed = manifest(tmp_path, COUNTS + 'zero = "10 samples"')
-    code, out, _ = graspsense("import", zeroed, "--check", "--plot", tmp_path / "x.png")
+    code, out, _ = graspsense("import", zeroed, "--save", tmp_path / "trials")
     assert code == 0
     assert "5 steady" in out
 

@@ -6,7 +6,7 @@ import ast
 import re
 
 import numpy as np
-from cases import every_case
+import pytest
 from click.testing import CliRunner
 
 from graspsense.cli.main import cli
@@ -54,7 +54,14 @@ def proposed(words):
     return options(*ast.literal_eval(re.search(r"For its array palm: options=(\[.*?\])", words)[1]))
 
 
-@every_case("command", ["import", "check", "evaluate", "train", "compare"])
+@pytest.mark.parametrize(
+    "command",
+    [
+        "import",
+        "evaluate",
+        *(pytest.param(command, marks=pytest.mark.slow) for command in ("check", "train", "compare")),
+    ],
+)
 def test_an_array_that_the_features_do_not_name_is_told_with_the_options_that_choose_it(tmp_path, command):
     source = manifest(tmp_path, "set")
     arguments = {

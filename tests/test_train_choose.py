@@ -143,6 +143,7 @@ def test_options_that_do_not_go_with_it(store, tmp_path, option):
     assert not (tmp_path / "own.json").exists()
 
 
+@pytest.mark.slow
 def test_recordings_without_contact_are_told_apart_by_the_features_that_need_none(store, tmp_path):
     given = ("-o", "features.contact_force_n=15", "--classifier", "extra-trees", "-o", "classifier.trees=10")
     code, told, err = graspsense("train", store, "--choose", *given, "--out", tmp_path / "own.json", "--json")
