@@ -148,7 +148,15 @@ def test_each_grasp_that_run_saves_is_another_one_unless_a_seed_is_given(tmp_pat
     store = str(tmp_path / "s")
 
     def run(*words):
-        plain = ("-o", "classifier.type=none", "--label", "can:empty_open", "--json")
+        plain = (
+            "-o",
+            "classifier.type=none",
+            "-o",
+            "gripper.rate_hz=250",
+            "--label",
+            "can:empty_open",
+            "--json",
+        )
         done = graspsense("run", "--save", store, *plain, *words)
         assert done.returncode == 0
         return done.json["seed"], done.stderr
@@ -165,7 +173,8 @@ def test_each_grasp_that_run_saves_is_another_one_unless_a_seed_is_given(tmp_pat
 def test_a_damaged_recording_and_its_recovered_copy_are_one_trial(tmp_path):
     folder = tmp_path / "s"
     for seed, label in enumerate(["can:empty_open", "odwalla:full_open"]):
-        printed("run", "--save", folder, "--label", label, "--seed", seed, "-o", "classifier.type=none")
+        plain = ("-o", "classifier.type=none", "-o", "gripper.rate_hz=250")
+        printed("run", "--save", folder, "--label", label, "--seed", seed, *plain)
     recording = sorted((folder / "recordings").glob("*.mcap"))[0]
     recording.write_bytes(recording.read_bytes()[:-200])
     copy = recover_file(recording, tmp_path / "copy.mcap").recording

@@ -482,13 +482,25 @@ def done(folder, name, force, trials, seeds):
 
 @pytest.fixture(scope="module")
 def weak(tmp_path_factory):
-    return done(tmp_path_factory.mktemp("small"), "weak", 14.0, 1, 1)
+    """An experiment on recorded trials."""
+    folder = tmp_path_factory.mktemp("recorded")
+    (folder / "mine.csv").write_text(wayward.CSV)
+    return judged(folder, "weak", 2)
 
 
 @pytest.fixture(scope="module")
 def strong(weak):
     """The same with another setting, beside it."""
-    return done(weak.parent, "strong", 20.0, 1, 1)
+    return judged(weak.parent, "strong", 3)
+
+
+def judged(folder, name, folds):
+    """Run an experiment on recorded trials in this folder; return the folder of its results."""
+    file = folder / f"{name}.toml"
+    one = EXPERIMENT.replace('[sweep]\n"judge.folds" = [2, 4]\n', "").replace("seeds = 2", "seeds = 1")
+    file.write_text(one.replace("[judge]", f"[judge]\nfolds = {folds}"))
+    run_experiment(read_experiment(str(file)), Results(folder / name), Serial, command=f"run {name}")
+    return folder / name
 
 
 @pytest.fixture(scope="module")
@@ -560,7 +572,7 @@ def test_a_report_of_results_with_other_settings_says_what_happened_and_what_to_
     changed = tmp_path / "changed"
     subprocess.run(["cp", "-r", strong, changed], check=True)
     text = (changed / "experiment.toml").read_text()
-    (changed / "experiment.toml").write_text(text.replace("trials = 1", "trials = 2"))
+    (changed / "experiment.toml").write_text(text.replace("folds = 3", "folds = 4"))
     code, _, err = graspsense("report", changed)
 
     assert code == 2
@@ -576,7 +588,7 @@ def test_what_cannot_be_compared_is_refused_in_one_line(weak, strong, tmp_path):
         subprocess.run(["cp", "-r", strong, copy], check=True)
     text = (old / "experiment.toml").read_text()
     (old / "experiment.toml").write_text(text.replace("[judge]", "[judge]\nno_such_key = 1"))
-    (changed / "experiment.toml").write_text(text.replace("trials = 1", "trials = 2"))
+    (changed / "experiment.toml").write_text(text.replace("folds = 3", "folds = 4"))
     for arguments, reason in (
         ([weak], "give at least two experiments to compare"),
         (

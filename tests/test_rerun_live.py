@@ -116,6 +116,7 @@ def viewer(tmp_path):
             os.killpg(running.pid, signal.SIGKILL)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:RRD file has no footer")
 def test_a_viewer_that_runs_receives_the_grasp(viewer, tmp_path):
     running, address = viewer
