@@ -25,8 +25,9 @@ def subject(role, entry, keys=None):
 
 @pytest.fixture(autouse=True)
 def short_openings(monkeypatch):
-    """The hand is open after a fifth of a second; it is used for a whole one."""
+    """The hand is open after a fifth of a second and touches its object within one; it is used for longer."""
     monkeypatch.setattr(session, "OPENING_S", 0.2)
+    monkeypatch.setattr(session, "CLOSING_S", 1.5)
 
 
 SLOW_CHECKS = {
