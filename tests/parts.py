@@ -139,7 +139,7 @@ class Hand(SensorBackend[HandConfig]):
         if not self.config.here:
             raise NoDevice("no hand at port 7: plug it in, then `graspsense devices`")
         self._bench, self._zero = (
-            ModelGripper(frozenset((*CHANNELS_OF_HAND, ACCELERATION, CAMERA)), 0.05, 1500.0),
+            ModelGripper(frozenset((*CHANNELS_OF_HAND, ACCELERATION, CAMERA)), 0.065, 1500.0),
             None,
         )
         self._info = self._bench.open(seed)

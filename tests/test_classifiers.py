@@ -6,6 +6,7 @@ import json
 import math
 import subprocess
 import sys
+from functools import cache
 
 import numpy as np
 import pytest
@@ -30,7 +31,13 @@ def trials(n=40, seed=0, missing=0.0):
     return FeatureTable(names=NAMES, units=UNITS, values=values), labels
 
 
-FAST = {"ebm": {"bags": 2, "pairs": 2}, "boosted": {"stages": 40}}
+FAST = {
+    "ebm": {"bags": 2, "pairs": 2},
+    "boosted": {"stages": 10},
+    "forest": {"trees": 10},
+    "extra-trees": {"trees": 10},
+    "backprop": {"epochs": 60},
+}
 """Settings of the classifiers that are slow to fit."""
 
 
@@ -39,6 +46,12 @@ def fitted(name, table, labels, seed=0, **config):
     classifier = create("classifier", name, **config)
     classifier.fit(table, labels, seed)
     return classifier
+
+
+@cache
+def learned(name):
+    """Return a classifier that has learned the trials of seed 0; the tests that share it only ask it."""
+    return fitted(name, *trials())
 
 
 def rate(classifier, table, labels):
@@ -50,13 +63,13 @@ def rate(classifier, table, labels):
 @pytest.mark.parametrize("name", ALL)
 class TestEvery:
     def test_it_learns_what_can_be_learned(self, name):
-        classifier = fitted(name, *trials())
+        classifier = learned(name)
 
         assert set(classifier.classes()) == {"bottle:full", "bottle:empty", "can:full"}
         assert rate(classifier, *trials(seed=1)) > 0.95
 
     def test_probabilities_sum_to_one_and_lead_to_what_it_explains(self, name):
-        classifier = fitted(name, *trials())
+        classifier = learned(name)
         table, _ = trials(n=5, seed=2)
         shares = classifier.probabilities(table)
 
@@ -96,7 +109,7 @@ class TestEvery:
         assert np.isfinite(classifier.probabilities(wide)).all()
 
     def test_the_order_of_columns_does_not_matter(self, name):
-        classifier = fitted(name, *trials())
+        classifier = learned(name)
         table, _ = trials(n=4, seed=3)
 
         turned = table.columns(("noise", "p_first", "f_steady"))

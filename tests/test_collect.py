@@ -13,7 +13,7 @@ from graspsense.core.values.errors import ConfigError
 from graspsense.store.collecting import Collection, Wanted
 from graspsense.store.store import Store
 
-PLAIN = ["-o", "classifier.type=none"]
+PLAIN = ["-o", "classifier.type=none", "-o", "run.hold_s=0.1"]
 
 
 def collect(folder, answers, labels="can:full_open,block", each=2, more=()):
@@ -47,14 +47,25 @@ def test_it_prompts_counts_undoes_retakes_and_stops_when_everything_is_there(tmp
     assert "next: block  (1 of 2)" in done.stderr
 
 
-def test_a_fault_that_ends_no_grasp_is_told_with_each_trial(tmp_path):
-    frozen = ["--gripper", "pr2", "-o", "gripper.transport=emulated", "-o", "gripper.faults.freeze_cell=15"]
-    done = collect(tmp_path / "t", "\n", labels="block", each=1, more=frozen)
+EMULATED = ("--gripper", "pr2", "-o", "gripper.transport=emulated")
+
+
+@pytest.fixture(scope="module")
+def emulated(tmp_path_factory):
+    """The folder with a grasp of an individual object by an emulated PR2 with a frozen cell, and what was told."""
+    folder = tmp_path_factory.mktemp("emulated") / "t"
+    frozen = (*EMULATED, "-o", "gripper.faults.freeze_cell=15")
+    done = collect(folder, "\n", labels="can:full_open#2", each=1, more=frozen)
     assert done.returncode == 0, done.stderr
-    told = [line for line in done.stderr.splitlines() if "frozen cells" in line]
+    return folder, done.stderr
+
+
+def test_a_fault_that_ends_no_grasp_is_told_with_each_trial(emulated):
+    folder, said = emulated
+    told = [line for line in said.splitlines() if "frozen cells" in line]
     assert len(told) == 1
     assert "warning" in told[0]
-    with Store.read(tmp_path / "t") as store:
+    with Store.read(folder) as store:
         assert "(15)" in store.trial(1).result.details["warnings"][0]
 
 
@@ -96,8 +107,8 @@ def test_other_settings_are_refused_unless_told(tmp_path):
 
 def test_another_classifier_is_no_other_setting(tmp_path):
     collect(tmp_path / "t", "\n")
-    command = ["collect", "--labels", "block,can:full_open", "--save", str(tmp_path / "t"), "-o"]
-    done = graspsense(*command, "classifier.type=knn", answers="q\n")
+    command = ["collect", "--labels", "block,can:full_open", "--save", str(tmp_path / "t"), *PLAIN]
+    done = graspsense(*command, "-o", "classifier.type=knn", answers="q\n")
     assert done.returncode == 0, done.stderr
 
 
@@ -134,7 +145,7 @@ def test_another_gripper_is_refused_before_it_moves(tmp_path):
         return evolve(settings, gripper=Choice(settings.gripper.component, settings.gripper.config))
 
     said = []
-    answers = iter(["", "", "q"])
+    answers = iter(["", "q"])
     with Store.open(tmp_path / "t") as store:
         collection = Collection(
             store=store,
@@ -145,18 +156,18 @@ def test_another_gripper_is_refused_before_it_moves(tmp_path):
             say=said.append,
         )
         collection.run()
-        assert collection.counts() == {"jar:full": 2}
+        assert collection.counts() == {"jar:full": 1}
         Serial.serial, Serial.commanded = "B", 0
         answers = iter([""])
         with pytest.raises(ConfigError, match="serial was 'A' and is 'B'"):
             collection.run()
         assert Serial.commanded == 0
-        assert collection.counts() == {"jar:full": 2}
+        assert collection.counts() == {"jar:full": 1}
         assert list(store.recordings.glob("*.part")) == []
         collection.changed = True
         answers = iter(["", "q"])
         collection.run()
-        assert collection.counts() == {"jar:full": 3}
+        assert collection.counts() == {"jar:full": 2}
 
 
 @pytest.mark.slow
@@ -231,9 +242,6 @@ def test_the_advice_on_a_missing_model_fits_the_gripper(tmp_path):
     assert "simulated" not in real.stderr
 
 
-EMULATED = ("--gripper", "pr2", "-o", "gripper.transport=emulated")
-
-
 def held(folder):
     """Return label, object and whether it is simulated of each trial, in their order."""
     with Store.read(folder) as store:
@@ -255,11 +263,8 @@ def test_an_emulated_pr2_grasps_what_the_label_says(tmp_path):
     ]
 
 
-def test_a_label_of_an_individual_object_selects_this_object_on_an_emulated_pr2(tmp_path):
-    done = collect(tmp_path / "t", "\n", labels="can:full_open#2", each=1, more=EMULATED)
-
-    assert done.returncode == 0, done.stderr
-    assert held(tmp_path / "t") == [("can:full_open", "can:full_open#2", True)]
+def test_a_label_of_an_individual_object_selects_this_object_on_an_emulated_pr2(emulated):
+    assert held(emulated[0]) == [("can:full_open", "can:full_open#2", True)]
 
 
 @every_case("gripper", [(), EMULATED])

@@ -286,7 +286,7 @@ def test_thresholds_of_other_labels_are_refused(tmp_path):
 
 
 def test_evaluate_measures_coverage_size_and_reliability_with_instances_held_out():
-    evaluation = judged(bottles(20, spread=0.7), "knn", controls=False, learning_curve=False)
+    evaluation = judged(bottles(20, spread=0.7), "knn", controls=False)
     again = from_json(to_json(evaluation), Evaluation)
 
     assert again == evaluation
@@ -303,14 +303,14 @@ def test_noise_gives_sets_of_both_labels():
     trials = bottles(20)
     noise = evolve(trials.table, values=np.random.default_rng(3).normal(size=trials.table.values.shape))
 
-    evaluation = judged(evolve(trials, table=noise), "svm", controls=False, learning_curve=False)
+    evaluation = judged(evolve(trials, table=noise), "svm", controls=False)
 
     assert evaluation.sets.mean_size > 1.7
     assert evaluation.sets.covered.rate > 0.85
 
 
 def test_too_few_instances_have_no_coverage_with_the_reason():
-    evaluation = judged(bottles(4), "tree", controls=False, learning_curve=False)
+    evaluation = judged(bottles(4), "tree", controls=False)
 
     assert evaluation.sets.covered is None
     assert "90 % needs 9" in evaluation.sets.reason
@@ -320,7 +320,7 @@ def test_states_within_classes_are_covered_too():
     labels = [f"{cls}:{state}" for cls in ("can", "jar") for state in ("full", "empty") for _ in range(30)]
     rng = np.random.default_rng(0)
     force = [(3.0 if label.endswith("full") else 0.0) + rng.normal() for label in labels]
-    evaluation = judged(labelled(labels, force), "knn", target="state", controls=False, learning_curve=False)
+    evaluation = judged(labelled(labels, force), "knn", target="state", controls=False)
 
     assert evaluation.sets.unit == "trials"
     assert evaluation.sets.covered.rate > 0.85
@@ -378,8 +378,8 @@ def test_the_commands_print_and_keep_the_sets(csv_file, tmp_path, monkeypatch):
 def test_the_page_shows_coverage_and_reliability():
     from graspsense.report.evaluation_sections import doubt_section
 
-    evaluation = judged(bottles(20), "forest", controls=False, learning_curve=False)
-    few = judged(bottles(4), "tree", controls=False, learning_curve=False)
+    evaluation = judged(bottles(20), "forest", controls=False)
+    few = judged(bottles(4), "tree", controls=False)
     section = doubt_section(evaluation.sets, evaluation.reliability)
 
     assert evaluation.sets.covered.words in section.body

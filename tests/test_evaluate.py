@@ -25,7 +25,7 @@ from graspsense.evaluation.results import Evaluation
 from graspsense.report.verdict import verdict
 
 
-def learner(name="c45"):
+def learner(name="tree"):
     component = installed().find("classifier", name)
     return SelectedComponent(component, component.config_class()())
 
@@ -40,9 +40,14 @@ def labelled(labels, *columns, **more):
     return Labelled(source="a test", table=table(*columns), labels=tuple(labels), **more)
 
 
-def judged(trials, name="c45", permutations=1, **more):
-    """Evaluate. One permutation of the labels instead of 19: each is a cross-validation of its own."""
-    return evaluate(learner(name), trials, classifier=name, permutations=permutations, **more)
+def judged(trials, name="tree", **more):
+    """Evaluate with one permutation of the labels instead of 19, and without a learning curve, unless it is asked for.
+
+    Each permutation and each point of the curve is a cross-validation of its own.
+    """
+    return evaluate(
+        learner(name), trials, **{"classifier": name, "permutations": 1, "learning_curve": False, **more}
+    )
 
 
 STATES = ["can:full", "can:empty", "jar:full", "jar:empty"]
@@ -239,7 +244,9 @@ def names_in(value):
 def test_the_json_is_whole_and_stable():
     labels, width, force = four_states()
     trials = labelled(labels, width, force, order=tuple(range(120)))
-    text, again = (json.dumps(to_json(judged(trials, seed=2)), allow_nan=False) for _ in range(2))
+    text, again = (
+        json.dumps(to_json(judged(trials, seed=2, learning_curve=True)), allow_nan=False) for _ in range(2)
+    )
     evaluation = json.loads(text)
 
     assert text == again
@@ -270,14 +277,14 @@ def test_the_json_is_whole_and_stable():
 
 def test_the_learning_curve_ends_at_the_headline_and_grows():
     labels, width, force = four_states(n=60)
-    evaluation = judged(labelled(labels, width, force))
+    evaluation = judged(labelled(labels, width, force), learning_curve=True)
     curve = evaluation.learning_curve
 
     assert curve[-1].rate == evaluation.headline
     assert [round(point.trained_on) for point in curve] == [20, 44, 88, 152, 216]
     # Of few trials a tenth and a fifth come to the same ones: that is one point.
     labels, width, force = four_states(n=4)
-    few = judged(labelled(labels, width, force), folds=4).learning_curve
+    few = judged(labelled(labels, width, force), folds=4, learning_curve=True).learning_curve
     assert [point.trained_on for point in few] == sorted({point.trained_on for point in few})
     assert len(few) < len(curve)
 
@@ -326,7 +333,7 @@ def test_a_fit_that_refuses_few_trials_costs_its_figure_only():
     labels, width, force = four_states()
     trials = labelled(labels, width, force)
 
-    evaluation = evaluate(Choosy(60), trials, classifier="choosy")
+    evaluation = evaluate(Choosy(60), trials, classifier="choosy", permutations=1)
 
     assert evaluation.headline.rate > 0.95
     assert [point.trained_on >= 60 for point in evaluation.learning_curve] == [True, True]
@@ -368,7 +375,7 @@ def test_a_confusion_has_every_label_of_either_side():
 def test_an_evaluation_is_read_back_from_its_json():
     rng = np.random.default_rng(4)
     labels = [f"can:{'full' if k % 2 else 'empty'}" for k in range(40)]
-    made = judged(labelled(labels, rng.normal(size=40), rng.normal(size=40)))
+    made = judged(labelled(labels, rng.normal(size=40), rng.normal(size=40)), learning_curve=True)
     assert from_json(json.loads(json.dumps(to_json(made))), Evaluation) == made
 
 

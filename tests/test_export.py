@@ -207,7 +207,7 @@ def test_evaluate_gives_the_same_figures_for_a_store_and_its_export(tmp_path):
     assert export(folder, tmp_path / "t.csv")[0] == 0
     component = select_component("classifier", "c45")
     stored, from_export = (
-        to_json(evaluate(component, trials, classifier="c45", folds=3, learning_curve=False))
+        to_json(evaluate(component, trials, classifier="c45", folds=3, permutations=1, learning_curve=False))
         for trials in (labelled_store(str(folder)), read_labelled(tmp_path / "t.csv", "label"))
     )
     for own in ("source", "notes"):

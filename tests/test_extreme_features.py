@@ -12,7 +12,7 @@ from attrs import evolve
 from cases import every_case
 from commands import graspsense
 from test_classifiers import NAMES, UNITS, trials
-from test_damaged_models import KINDS, labelled, trained
+from test_damaged_models import KINDS, SMALL, labelled, trained
 
 from graspsense.core.learn.target_value import TargetValue
 from graspsense.core.values.errors import DataDamaged
@@ -62,8 +62,7 @@ def test_features_of_any_usual_size_are_learned(name, factor):
     """Those below the square root of the least number may count as constant; the answer is still one."""
     table, labels = trials(n=6)
     table = evolve(table, values=table.values * factor)
-    settings = {"ebm": {"bags": 1, "pairs": 1}, "boosted": {"stages": 3}, "backprop": {"epochs": 5}}
-    classifier = create("classifier", name, **settings.get(name, {}))
+    classifier = create("classifier", name, **SMALL.get(name, {}))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # a network that has not converged
         classifier.fit(table, labels, 1)
@@ -111,7 +110,8 @@ def test_commands_answer_or_name_the_column(table, tmp_path, name):
 
 @pytest.mark.filterwarnings("error::RuntimeWarning")
 @every_case("name", ESTIMATORS)
-def test_a_number_is_predicted_from_extreme_features(name):
+def test_a_number_is_predicted_from_extreme_features(name, monkeypatch):
+    monkeypatch.setattr("graspsense.regression.model.FOLDS", 2)
     given = labelled()
     target = TargetValue(name="force", unit="N", values=tuple(float(i % 7) for i in range(len(given))))
     with warnings.catch_warnings():

@@ -7,8 +7,6 @@ import json
 import os
 import socket
 import struct
-import subprocess
-import sys
 import threading
 import time
 from contextlib import ExitStack, closing, suppress
@@ -16,6 +14,8 @@ from importlib.resources import files
 from xml.etree import ElementTree
 
 import pytest
+from cases import every_case
+from commands import graspsense
 from live_grasp import COMMAND, device, port_of, reading
 from mcap.reader import make_reader
 
@@ -200,12 +200,12 @@ def test_what_is_kept_for_viewers_who_come_later_does_not_grow(monkeypatch):
     assert 10_000 - len(tick) < kept[0] <= 10_000
 
 
-@pytest.mark.parametrize("path", ["", "wrong", "wrong/"])
+@every_case("path", ["", "wrong", "wrong/"])
 def test_without_the_token_nothing_is_answered(feed, path):
     assert refused(feed, f"ws://127.0.0.1:{port_of(feed)}/{path}") == 404
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("headers", "status"),
     [
         ({"Origin": "https://elsewhere.example"}, 403),
@@ -217,7 +217,7 @@ def test_the_pages_of_others_cannot_listen(feed, headers, status):
     assert refused(feed, headers=headers) == status
 
 
-@pytest.mark.parametrize(
+@every_case(
     ("head", "status"),
     [
         ("GET {path} HTTP/1.1\r\nHost: elsewhere.example:{port}\r\n\r\n", 403),
@@ -227,7 +227,6 @@ def test_the_pages_of_others_cannot_listen(feed, headers, status):
         ("x" * 100_000, None),
         ("GET {path} HTTP/1.1\r\n" + "A: 1\r\n" * 500 + "\r\n", None),
     ],
-    ids=["host", "post", "empty", "origin", "long", "headers"],
 )
 def test_what_is_no_request_of_a_viewer_is_refused_or_dropped(feed, head, status):
     address = feed.answer["address"]
@@ -247,29 +246,26 @@ def test_what_is_no_viewer_of_foxglove_is_told_so(feed):
     assert refused(feed, protocols=("chat",)) == 400
 
 
-@pytest.mark.parametrize("origin", ["https://app.foxglove.dev", "file://"])
+@every_case("origin", ["https://app.foxglove.dev", "file://"])
 def test_foxglove_itself_is_let_in(feed, origin):
     with connect(feed.answer["address"], subprotocols=[SDK], additional_headers={"Origin": origin}) as viewer:
         assert json.loads(viewer.recv(timeout=PATIENCE_S))["op"] == "serverInfo"
 
 
-@pytest.mark.parametrize(
-    "sent",
-    [
+def test_what_is_not_a_subscription_is_an_error_and_the_others_go_on(feed):
+    good = Viewer(feed)
+    for sent in (
         "x",
         b"\x99" * 100,
         '{"op":"subscribe"}',
         '{"op":"subscribe","subscriptions":[{"id":1,"channelId":99}]}',
         '{"op":"fetchAsset","uri":"package://../../etc/passwd","requestId":1}',
         '{"op":"setParameters","parameters":[{"name":"x","value":1}]}',
-    ],
-)
-def test_what_is_not_a_subscription_is_an_error_and_the_others_go_on(feed, sent):
-    good = Viewer(feed)
-    with connect(feed.answer["address"], subprotocols=[SDK]) as bad:
-        bad.send(sent)
-        said = [json.loads(bad.recv(timeout=PATIENCE_S)) for _ in range(3)]
-    assert said[-1]["op"] == "status"
+    ):
+        with connect(feed.answer["address"], subprotocols=[SDK]) as bad:
+            bad.send(sent)
+            said = [json.loads(bad.recv(timeout=PATIENCE_S)) for _ in range(3)]
+        assert said[-1]["op"] == "status", sent
     shown(feed)
     good.wait_for_all()
     feed.close()
@@ -359,8 +355,7 @@ def test_a_port_that_is_taken_is_an_error_before_the_grasp(tmp_path):
         port = taken.getsockname()[1]
         with pytest.raises(ConfigError, match=f"--foxglove.*{port}"):
             LiveFeed("graspsense.live.foxglove_process", [str(port)])
-        command = [sys.executable, "-m", "graspsense", "run", "--foxglove", str(port), "--save", "store"]
-        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=300, check=False)
+        done = graspsense("run", "--foxglove", port, "--save", tmp_path / "store")
     assert done.returncode == 2
     assert str(port) in done.stderr
     assert not (tmp_path / "store").exists()

@@ -102,6 +102,7 @@ def test_it_grasps_with_the_default_pipeline(plugins):
     assert trial.features.as_dict()["f_steady"] == pytest.approx(20.0, abs=1.5)
 
 
+@pytest.mark.slow
 def test_its_camera_conforms_and_sees_the_force(hand, plugins):
     keys = {"patience_s": 60.0}
     examined = examine("lab-hand/seeing", keys=keys, unplugged={"vanishes_s": 0.5}, plugins=plugins)
@@ -119,6 +120,7 @@ def test_its_camera_conforms_and_sees_the_force(hand, plugins):
     assert (eye.cells[:, 0, 0] == 40).all()
 
 
+@pytest.mark.slow
 def test_answers_that_are_late_are_asked_for_again_and_counted(plugins):
     trial = grasp(plugins, f"gripper.late_s={LATE_S}")
 

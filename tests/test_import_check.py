@@ -305,6 +305,7 @@ def test_a_manifest_is_not_written_over_another_one(tmp_path):
     assert not (tmp_path / "n.toml").exists()
 
 
+@pytest.mark.slow
 def test_check_draws_a_grasp_whose_object_is_not_known(tmp_path):
     pytest.importorskip("matplotlib", reason="needs the extra plot")
     shutil.copytree(SAMPLES / "trials", tmp_path / "trials")

@@ -204,7 +204,8 @@ def recordings(tmp_path_factory):
     """Return the folder of a store with three trials, with CSV files of the same grasps beside it."""
     store = tmp_path_factory.mktemp("recordings") / "t"
     for seed in ("1", "2", "3"):
-        printed("run", "--label", "block", "--seed", seed, "-o", "classifier.type=none", "--save", store)
+        plain = ("-o", "classifier.type=none", "-o", "gripper.rate_hz=250")
+        printed("run", "--label", "block", "--seed", seed, *plain, "--save", store)
         printed("export", f"{store}#{seed}", "--to", store.parent / f"{seed}.csv")
     return store
 

@@ -44,7 +44,7 @@ def flags(*spans):
 
 
 def write(folder, name, values, slips, head="t,F,slip"):
-    rows = (f"{t:.3f},{f:.5f},{slip}" for t, f, slip in zip(T_S, values, slips, strict=True))
+    rows = (f"{t:.3f},{f:.5f},{slip}" for t, f, slip in zip(T_S[: len(values)], values, slips, strict=True))
     (folder / f"{name}.csv").write_text("\n".join([head, *rows]) + "\n")
 
 
@@ -285,13 +285,10 @@ def boxes(folder, newtons=0.15):
     for label, level in (("box", 5.0), ("can", 6.0)):
         for order in (1, 2):
             begin = 1.0 + 0.3 * order
-            kicks = (Kick(begin, newtons), Kick(begin + 2.0, newtons))
-            write(
-                folder,
-                f"{label}_{order}",
-                force(*kicks, level=level),
-                flags(*((k.at_s, k.at_s + 0.1) for k in kicks)),
-            )
+            kicks = (Kick(begin, newtons), Kick(begin + 1.0, newtons))
+            slips = flags(*((k.at_s, k.at_s + 0.1) for k in kicks))
+            lasting = int(3.0 * RATE_HZ)
+            write(folder, f"{label}_{order}", force(*kicks, level=level)[:lasting], slips[:lasting])
 
 
 def test_slips_of_a_force_are_found_and_what_cannot_be_told_is_said(tmp_path, capsys):

@@ -660,12 +660,15 @@ def test_a_recording_without_a_gap_is_a_trial_of_its_force(tmp_path):
     result = read_recorded(stored.recording).record().result
     assert result.outcome == "force only"
     assert "no gap" in result.reason
-    for features, needed in (
-        ("chitta", ()),
-        ("quantiles", ("contact_time", "high_force_whole_max", "low_force_rate_second_max")),
-        ("curve", ("peak_force", "loading_time", "load_t50", "relaxation", "hold_t50", "pad_difference")),
+    kept, given = f"store:{tmp_path / 'trials'}", f"manifest:{place}"
+    curve = ("peak_force", "loading_time", "load_t50", "relaxation", "hold_t50", "pad_difference")
+    quantiles = ("contact_time", "high_force_whole_max", "low_force_rate_second_max")
+    for features, needed, sources in (
+        ("chitta", (), (kept,)),
+        ("quantiles", quantiles, (given,)),
+        ("curve", curve, (kept, given)),
     ):
-        for source in (f"store:{tmp_path / 'trials'}", f"manifest:{place}"):
+        for source in sources:
             table = load_trials(source, options=[f"features.type={features}"]).table
             known = [
                 name
@@ -729,7 +732,7 @@ def test_most_grasps_too_wide_is_an_error_that_stores_nothing(tmp_path):
         assert "5 of 5 recordings end as too wide" in err
         assert "controller.too_wide_m=0" in err
     assert not (tmp_path / "trials").exists()
-    code, out, _ = graspsense("import", place, "--check", "--plot", tmp_path / "x.png")
+    code, out, _ = graspsense("import", place, "--save", tmp_path / "trials")
     assert code == 0
     assert "5 steady" in out
 
@@ -750,7 +753,7 @@ def test_counts_below_zero_throughout_are_an_error_that_says_what_to_set(tmp_pat
         assert 'zero = "10 samples"' in err
     assert not (tmp_path / "trials").exists()
     zeroed = manifest(tmp_path, COUNTS + 'zero = "10 samples"')
-    code, out, _ = graspsense("import", zeroed, "--check", "--plot", tmp_path / "x.png")
+    code, out, _ = graspsense("import", zeroed, "--save", tmp_path / "trials")
     assert code == 0
     assert "5 steady" in out
 

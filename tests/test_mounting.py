@@ -29,8 +29,7 @@ THUMB = "0 20 95 mm, 0 0 90 deg in tool"
 
 
 def settings(*options):
-    plain = ("classifier.type=none",)
-    return load_pipeline(options=[*plain, *options]).settings
+    return load_pipeline(options=["classifier.type=none", *options]).settings
 
 
 def test_a_pose_is_in_metres_and_radians_whatever_it_was_written_in():

@@ -37,7 +37,7 @@ from graspsense.store.imported_contents import AlreadyImported, ImportedContents
 from graspsense.store.store import Store
 from graspsense.store.verify import verify_store
 
-QUICK = 6
+QUICK = 2
 SLOW = int(os.environ.get("GRASPSENSE_MUTATIONS", "0")) or 60
 SLOWER = min(SLOW, 20)
 """Files of a format that takes long to open."""

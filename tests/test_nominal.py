@@ -75,8 +75,9 @@ def shapes(folder, seed=0, trials=60):
 def test_a_text_reaches_every_classifier(tmp_path, classifier):
     trials = read_labelled(shapes(tmp_path), "what")
     assert trials.table.names == ("colour=blue", "colour=green", "colour=red", "weight")
+    few = {"forest": {"trees": 10}, "boosted": {"stages": 20}}.get(classifier, {})
     evaluation = evaluate(
-        select_component("classifier", classifier),
+        select_component("classifier", classifier, **few),
         trials,
         classifier=classifier,
         folds=5,

@@ -152,6 +152,7 @@ def test_a_plot_is_that_of_run_and_can_be_added_to(monkeypatch):
     pyplot.close(forces.figure)
 
 
+@pytest.mark.slow
 def test_a_plot_and_a_notebook_show_arrays_at_their_moments_and_fast_channels(monkeypatch):
     monkeypatch.setenv("MPLBACKEND", "Agg")
     pyplot = pytest.importorskip("matplotlib.pyplot")

@@ -163,16 +163,19 @@ def test_a_gripper_that_is_not_there_is_told_and_the_other_is_closed():
 def test_the_trials_of_a_pair_are_kept_and_name_each_other(tmp_path):
     plain = tmp_path / "second.toml"
     plain.write_text(
-        '[gripper]\ntype = "sim"\nobject = "block"\n[controller]\ntype = "hybrid"\n[features]\ntype = "chitta"\n'
+        '[gripper]\ntype = "sim"\nobject = "block"\nrate_hz = 250.0\n'
+        '[controller]\ntype = "hybrid"\n[features]\ntype = "chitta"\n'
     )
     store = tmp_path / "trials"
     options = [
         "--beside",
         str(plain),
         "--object",
-        "sponge",
+        "toy",
         "-o",
         "classifier.type=none",
+        "-o",
+        "gripper.rate_hz=250",
         "--save",
         str(store),
     ]

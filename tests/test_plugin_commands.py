@@ -8,14 +8,13 @@ import subprocess
 import sys
 
 import parts
-import pytest
 from commands import graspsense
 from mutants import MUTANTS
 
 from graspsense.core.components.registry import IsolatedPlugins
 from graspsense.plugin_api import hookimpl
 from graspsense.scaffold.make import make
-from graspsense.testing import CHECKS
+from graspsense.testing import CHECKS, MINIMUM_CHECKS
 
 
 class Lab:
@@ -31,6 +30,10 @@ class Lab:
     @hookimpl
     def graspsense_sensor_backends(self):
         return [entry for entry in self.entries if hasattr(entry, "accepts")]
+
+
+CHECKS_WITH_SETTINGS = {"settings-survive-a-file", "reports-a-lost-device", "reports-a-missing-device"}
+"""Checks of a gripper that need the settings of the command line; the others take seconds."""
 
 
 def test_a_part_that_conforms():
@@ -64,7 +67,11 @@ def test_a_part_that_does_not():
     assert {check["state"] for check in answer["results"]} == {"passed", "failed"}
 
 
-def test_settings_reach_the_part_that_is_checked():
+def test_settings_reach_the_part_that_is_checked(monkeypatch):
+    asking = [check for check in CHECKS["sensor-backend"] if check.id in CHECKS_WITH_SETTINGS]
+    assert len(asking) == len(CHECKS_WITH_SETTINGS)
+    monkeypatch.setitem(CHECKS, "sensor-backend", tuple(asking))
+    monkeypatch.setitem(MINIMUM_CHECKS, "sensor-backend", len(asking))
     with IsolatedPlugins(Lab(parts.ENTRIES["sensor-backend"])):
         code, out, err = graspsense(
             "plugins",
@@ -99,12 +106,11 @@ bound = api.bind
 """
 
 
-@pytest.mark.parametrize("module", ["older", "plugin"])
-def test_imports_that_moved_are_printed_with_the_new_form_beside(tmp_path, module):
+def test_imports_that_moved_are_printed_with_the_new_form_beside(tmp_path):
     make("lab-old", ["observer"], tmp_path / "old")
     source = tmp_path / "old" / "src"
-    path = source / "lab_old" / f"{module}.py"
-    path.write_text(OLD + (path.read_text() if path.exists() else ""))
+    for path in (source / "lab_old" / "older.py", source / "lab_old" / "plugin.py"):
+        path.write_text(OLD + (path.read_text() if path.exists() else ""))
     (source / "lab_old-1.dist-info").mkdir()
     (source / "lab_old-1.dist-info" / "METADATA").write_text(
         "Metadata-Version: 2.1\nName: lab-old\nVersion: 1\n"
@@ -124,9 +130,10 @@ def test_imports_that_moved_are_printed_with_the_new_form_beside(tmp_path, modul
     assert ran.returncode == 1, ran.stderr
     said = ran.stdout + ran.stderr
     old = "from graspsense.plugin_api import"
-    assert f"{module}.py:4: {old} Stillness -> from graspsense.plugin_api import RestState" in said
-    assert f"{module}.py:5: {old} tare -> from graspsense.gripper_api import tare" in said
-    assert f"{module}.py:7: api.bind -> from graspsense.simulator_api import bind" in said
+    for module in ("older", "plugin"):
+        assert f"{module}.py:4: {old} Stillness -> from graspsense.plugin_api import RestState" in said
+        assert f"{module}.py:5: {old} tare -> from graspsense.gripper_api import tare" in said
+        assert f"{module}.py:7: api.bind -> from graspsense.simulator_api import bind" in said
     assert "Channel ->" not in said
 
 

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from commands import graspsense
 
 from graspsense.cli.main import COMMANDS
 
@@ -26,10 +27,9 @@ def pipeline_file(tmp_path: Path) -> Path:
     return path
 
 
-def test_pipeline_example_is_valid(pipeline_file: Path) -> None:
-    program = [sys.executable, "-c", "from graspsense.cli.main import main; main()"]
-    arguments = ["config", "validate", pipeline_file.name]
-    done = subprocess.run([*program, *arguments], cwd=pipeline_file.parent, capture_output=True, text=True)
+def test_pipeline_example_is_valid(pipeline_file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(pipeline_file.parent)
+    done = graspsense("config", "validate", pipeline_file.name)
     assert (done.returncode, done.stderr) == (0, "")
     assert pipeline_file.name in done.stdout
 

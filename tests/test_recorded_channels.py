@@ -7,7 +7,6 @@ import re
 
 import numpy as np
 import pytest
-from cases import every_case
 from click.testing import CliRunner
 
 from graspsense.cli.main import cli
@@ -55,7 +54,14 @@ def proposed(words):
     return options(*ast.literal_eval(re.search(r"For its array palm: options=(\[.*?\])", words)[1]))
 
 
-@every_case("command", ["import", "check", "evaluate", "train", "compare"])
+@pytest.mark.parametrize(
+    "command",
+    [
+        "import",
+        "evaluate",
+        *(pytest.param(command, marks=pytest.mark.slow) for command in ("check", "train", "compare")),
+    ],
+)
 def test_an_array_that_the_features_do_not_name_is_told_with_the_options_that_choose_it(tmp_path, command):
     source = manifest(tmp_path, "set")
     arguments = {
@@ -88,19 +94,22 @@ def test_recordings_that_have_the_array_are_imported_and_the_others_told(tmp_pat
     assert done.output.count("'palm'") == 6
 
 
-@pytest.mark.parametrize("command", ["features", "evaluate", "train"])
-def test_trials_of_a_store_that_lack_the_array_are_left_out_and_told(tmp_path, command):
+def test_trials_of_a_store_that_lack_the_array_are_left_out_and_told(tmp_path):
     for name, palm in (("without", False), ("whole", True)):
         done, words = ran("import", manifest(tmp_path, name, palm=palm), "--save", tmp_path / "s")
         assert done.exit_code == 0, done.output + words
-    more = {"features": [], "evaluate": ["--folds", 3], "train": ["--out", tmp_path / "m.json"]}[command]
     given = options("features.type=contact-image", *CHOSEN)
-    done, words = ran(command, tmp_path / "s", *more, *given, *([] if command == "train" else ["--json"]))
+    for command, *more in (
+        ("features", "--json"),
+        ("evaluate", "--folds", 3, "--json"),
+        ("train", "--out", tmp_path / "m.json"),
+    ):
+        done, words = ran(command, tmp_path / "s", *more, *given)
 
-    assert done.exit_code == 0, done.output + words
-    if command != "train":
-        assert "6 of 12 recordings" in done.output
-        assert "palm" in done.output
+        assert done.exit_code == 0, done.output + words
+        if command != "train":
+            assert "6 of 12 recordings" in done.output
+            assert "palm" in done.output
 
 
 def test_a_replay_says_which_channels_the_recording_has(tmp_path):

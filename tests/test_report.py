@@ -115,6 +115,7 @@ def test_a_page_loads_nothing_and_runs_only_its_own_script(page):
     assert f"script-src 'sha256-{digest}'" in policy
 
 
+@pytest.mark.slow
 def test_a_page_answers_first_and_says_what_it_rests_on(page):
     reader = Reader(page)
     text = reader.text
@@ -148,6 +149,7 @@ def test_a_page_answers_first_and_says_what_it_rests_on(page):
         assert part in text, part
 
 
+@pytest.mark.slow
 def test_a_page_can_be_read_aloud(page):
     reader = Reader(page)
     ids = [attrs["id"] for _, attrs in reader.elements if "id" in attrs]
@@ -356,6 +358,7 @@ def test_long_names_are_wrapped_within_a_picture():
         assert name in " ".join(texts)
 
 
+@pytest.mark.slow
 def test_features_have_their_unit_and_meaning_from_their_plugin(page):
     text = Reader(page).text
     (chitta,) = [feature_set for feature_set in installed().feature_sets() if feature_set.name == "chitta"]

@@ -91,13 +91,6 @@ def test_the_reader_of_rerun_finds_the_whole_grasp(tmp_path):
     assert all(reason.words in text for reason in trial.prediction.because)
 
 
-def test_images_samples_and_further_channels_are_logged_too(tmp_path):
-    feed = LiveFeed(RERUN, [str(tmp_path / "grasp.rrd")])
-    shown(feed)
-    assert feed.close() == ""
-    check_complete(logged(tmp_path / "grasp.rrd"))
-
-
 @pytest.fixture
 def viewer(tmp_path):
     """A program of Rerun that receives as its viewer does, and writes what comes to a file."""
@@ -123,6 +116,7 @@ def viewer(tmp_path):
             os.killpg(running.pid, signal.SIGKILL)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:RRD file has no footer")
 def test_a_viewer_that_runs_receives_the_grasp(viewer, tmp_path):
     running, address = viewer
@@ -134,6 +128,7 @@ def test_a_viewer_that_runs_receives_the_grasp(viewer, tmp_path):
     check_complete(logged(tmp_path / "received.rrd"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP], ids=["killed", "stopped"])
 def test_a_viewer_that_goes_away_loses_no_grasp(viewer, how):
     running, address = viewer

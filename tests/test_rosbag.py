@@ -282,7 +282,7 @@ def test_bag_that_is_cut_short_or_changed_raises_nothing_but_our_own(grasp: Any,
     data = whole.read_bytes()
     chance = np.random.default_rng(5)
     damaged = 0
-    for i in range(60):
+    for i in range(20):
         broken = bytearray(data[: int(chance.integers(len(data)))] if i % 2 else data)
         if not i % 2:
             for integer in chance.integers(len(broken), size=40):
@@ -293,7 +293,7 @@ def test_bag_that_is_cut_short_or_changed_raises_nothing_but_our_own(grasp: Any,
             read_bag(str(path))
         except (DataDamaged, ConfigError):
             damaged += 1
-    assert damaged >= 30, "at least those that are cut short"
+    assert damaged >= 10, "at least those that are cut short"
 
 
 def test_bag_without_fingertips_says_what_it_has(tmp_path: Path) -> None:

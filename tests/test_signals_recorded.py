@@ -80,7 +80,7 @@ class Palm(SensorBackend[NoKeys]):
     accepts = ("effort",)
 
     def open(self, seed):
-        self._fingers = ModelGripper(frozenset(self.channels), 0.05, 1500.0)
+        self._fingers = ModelGripper(frozenset(self.channels), 0.065, 1500.0)
         self._fingers.open(seed)
         self._tick, self._sampled = -1, 0
         return DeviceInfo(
@@ -166,7 +166,7 @@ GRASPSENSE_API = (2, 0)
 def recorded(tmp_path_factory):
     """One grasp, which no test changes: the trial, the path of its recording, and the plugins."""
     folder = tmp_path_factory.mktemp("recorded") / "trials"
-    options = ["gripper.type=palm", "features.type=shaking", "classifier.type=none"]
+    options = ["gripper.type=palm", "features.type=shaking", "classifier.type=none", "run.hold_s=0.1"]
     with (
         pytest.MonkeyPatch.context() as patch,
         IsolatedPlugins() as plugins,
@@ -363,7 +363,7 @@ def test_the_images_of_every_array_are_counted(recorded, tmp_path):
     assert json.loads(done.stdout)["images"] == len(trial.trace.signals["palm"].t_s) > 20
 
 
-@every_case("cells", [0, 1, 5, 22, 300])
+@every_case("cells", [0, 5, 300])
 def test_fingertips_of_any_size_are_recorded_and_read(tmp_path, cells):
     recorder = Recorder(tmp_path / "g.mcap")
     recorder.metadata(START, begun().section(START))

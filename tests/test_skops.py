@@ -25,7 +25,8 @@ def trials(seed=1):
 
 
 def trained(name, tmp_path):
-    config = create("classifier", name, kept_as="skops").config
+    few = {"trees": 5} if name in ("forest", "extra-trees") else {}
+    config = create("classifier", name, kept_as="skops", **few).config
     model = train(installed().find("classifier", name), config, trials(), name="m")
     write_model(tmp_path / "m.json", model)
     return model

@@ -66,7 +66,7 @@ def test_few_trials_leave_the_probabilities_as_they_are():
 
 
 def test_evaluate_measures_the_calibrated_probabilities_and_those_before():
-    evaluation = judged(bottles(20, spread=1.2), "tree", controls=False, learning_curve=False)
+    evaluation = judged(bottles(20, spread=1.2), "tree", controls=False)
 
     # A full-grown tree gives 100 % to every prediction, and a third of them are wrong.
     assert evaluation.reliability.uncalibrated_error > 0.1

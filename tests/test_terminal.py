@@ -65,7 +65,7 @@ def test_columns_override_the_width_of_the_terminal():
 
 
 @pytest.mark.parametrize("width", QUICK_WIDTHS)
-@pytest.mark.parametrize("lang", ["C", "C.UTF-8"])
+@pytest.mark.parametrize("lang", ["C", pytest.param("C.UTF-8", marks=pytest.mark.slow)])
 def test_the_list_of_plugins_fits_the_terminal(width, lang):
     shown = in_terminal(["plugins", "list"], width, LANG=lang)
 

@@ -10,7 +10,7 @@ from cases import every_case
 
 from graspsense.core.components.registry import Component, IsolatedPlugins
 from graspsense.plugin_api import Feature, hookimpl
-from graspsense.testing import CHECKS, MINIMUM_CHECKS, examine
+from graspsense.testing import CHECKS, MINIMUM_CHECKS, examine, session
 from graspsense.testing.checks import ConformanceReport, Result, outcome_of
 from graspsense.testing.conformance import Examined
 from graspsense.testing.subject import Subject
@@ -21,6 +21,13 @@ ROLES = tuple(parts.ENTRIES)
 def subject(role, entry, keys=None):
     given = {"unplugged": parts.HAND_LOST, "absent": parts.HAND_ABSENT} if role == "sensor-backend" else {}
     return Subject(component=Component(entry, "graspsense-test", "0.1", role), keys=keys or {}, **given)
+
+
+@pytest.fixture(autouse=True)
+def short_openings(monkeypatch):
+    """The hand is open after a fifth of a second and touches its object within one; it is used for longer."""
+    monkeypatch.setattr(session, "OPENING_S", 0.2)
+    monkeypatch.setattr(session, "CLOSING_S", 1.5)
 
 
 SLOW_CHECKS = {

@@ -166,7 +166,10 @@ def test_a_simulated_gripper_that_cannot_be_told_what_it_holds_grasps_nothing_un
     assert numbers_in(tmp_path / "t") == []
 
 
-@pytest.mark.parametrize("what", SPOILT)
+@pytest.mark.parametrize(
+    "what",
+    [pytest.param(what, marks=() if what in ("image", "signals") else pytest.mark.slow) for what in SPOILT],
+)
 def test_what_a_gripper_does_not_declare_ends_the_grasp_and_the_trial_until_then_is_kept(tmp_path, what):
     folder = tmp_path / "t"
     more = ("--gripper", "shortening", "-o", f"gripper.what={what}", "--save", str(folder))

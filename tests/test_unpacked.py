@@ -233,10 +233,10 @@ def test_our_mcap(tmp_path, declared, monkeypatch):
 
 def test_many_chunks_count_together(tmp_path, monkeypatch):
     path = tmp_path / "g.mcap"
-    write_recording(path, 20_000, ended())
+    write_recording(path, 10_000, ended())
     read_recorded(path)
-    monkeypatch.setenv(LIMIT_VARIABLE, "2")  # 20 000 ticks of 155 bytes are 3.1 MB
-    with pytest.raises(TooLarge, match=r"3 MB"):
+    monkeypatch.setenv(LIMIT_VARIABLE, "1")  # 10 000 ticks of 155 bytes are 1.55 MB
+    with pytest.raises(TooLarge, match=r"2 MB"):
         read_recorded(path)
 
 

@@ -113,6 +113,10 @@ def test_of_a_manifest(folder, kind):
         assert "disk" in bad.line
         assert not isinstance(bad.error, DataDamaged)
 
+
+@pytest.mark.parametrize("kind", ["zlib", "huge", "disk"])
+def test_the_others_of_a_manifest_are_imported_and_loaded(folder, kind):
+    SPOIL[kind](folder / "can_2.npz")
     code, out, err = graspsense("import", folder / "manifest.toml", "--save", folder / "trials", "--json")
     assert code == 5, err
     told = json.loads(out)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
 from cases import every_case
 
 from graspsense import read_experiment
@@ -17,12 +18,17 @@ THINGS = (ROOT / "benchmarks" / "results" / "which_gripper.md").read_text(encodi
 
 
 @every_case("case", CASES)
+def test_each_gripper_of_the_experiment_fits_its_settings_and_is_told_what_to_hold(case):
+    check(case.settings)
+    assert case.settings.gripper.create().objects()
+
+
+@pytest.mark.slow
+@every_case("case", CASES)
 def test_each_gripper_grasps_the_things_of_the_experiment(case):
     settings = case.settings
-    check(settings)
-    gripper = settings.gripper.create()
-    assert gripper.objects(), "an emulated gripper is told what to hold"
-    grasp = run_grasp(gripper.with_object("block"), settings.controller.create(), settings.run)
+    gripper = settings.gripper.create().with_object("block")
+    grasp = run_grasp(gripper, settings.controller.create(), settings.run)
     assert grasp.outcome.words == "steady", grasp.reason
     assert not settings.features.create().extract(grasp.trace).reasons
 

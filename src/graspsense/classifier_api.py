@@ -25,6 +25,9 @@ _TABLE: Final[Table] = {
         "core.values.features": ("table_of",),
         "core.values.nominal": ("CodedColumn", "codes_of", "with_codes"),
     },
+    "Linear algebra": {
+        "core.learn.one_thread": ("one_thread",),
+    },
     "Stored models": {
         "core.learn.stored_values": ("LARGEST_SEED",),
     },

@@ -20,5 +20,8 @@ from graspsense.core.values.nominal import CodedColumn as CodedColumn
 from graspsense.core.values.nominal import codes_of as codes_of
 from graspsense.core.values.nominal import with_codes as with_codes
 
+# Linear algebra
+from graspsense.core.learn.one_thread import one_thread as one_thread
+
 # Stored models
 from graspsense.core.learn.stored_values import LARGEST_SEED as LARGEST_SEED

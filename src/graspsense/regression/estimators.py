@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from graspsense.core.learn.one_thread import one_thread
 from graspsense.core.values.errors import ConfigError, counted, suggestion
 from graspsense.core.values.features import LARGEST_VALUE
 
@@ -83,7 +84,6 @@ class FittedRegression:
         from sklearn.impute import SimpleImputer
         from sklearn.pipeline import make_pipeline
         from sklearn.preprocessing import StandardScaler
-        from threadpoolctl import threadpool_limits
 
         check_estimator(name)
         if len(values) < 2:
@@ -94,8 +94,7 @@ class FittedRegression:
         self._estimator = TransformedTargetRegressor(
             regressor=ESTIMATORS[name](seed, len(values)), transformer=StandardScaler()
         )
-        # One thread: on small tables more threads cost time, and the order of sums would depend on the machine.
-        with threadpool_limits(1):
+        with one_thread():
             self._estimator.fit(self._scaling.fit_transform(features), values)
 
     def predict(self, features: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import namedtuple
 from collections.abc import Iterable, Mapping
-from functools import lru_cache
+from functools import cache, lru_cache
 from math import nan
 from typing import TYPE_CHECKING, Any, Final
 
@@ -81,7 +81,14 @@ def declared_shape(channel: Channel) -> tuple[int, ...]:
 
 def dtype_of(value: Any) -> str:
     """Return the type of the numbers of a value of `Reading.signals`: that of an image which is a numpy array."""
-    return str(getattr(value.cells, "dtype", FLOATS)) if isinstance(value, Image) else FLOATS
+    dtype = getattr(value.cells, "dtype", None) if isinstance(value, Image) else None
+    return FLOATS if dtype is None else _name_of(dtype)
+
+
+@cache
+def _name_of(dtype: Any) -> str:
+    """Return the name of a type of numpy, which takes numpy longer than all else that is checked in a tick."""
+    return str(dtype)
 
 
 def declared_dtype(channel: Channel) -> str:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
+from functools import cached_property
 from textwrap import indent, wrap
 from typing import TYPE_CHECKING, Any, Final, cast
 
@@ -88,9 +89,12 @@ class SelectedComponent:
         """Return the component built from its config. Raises PluginUnavailable."""
         return self.component.create(self.config)
 
-    @property
+    @cached_property
     def declared(self) -> Any:
-        """Its entry with all that its class declares under this config. Raises PluginUnavailable."""
+        """Its entry with all that its class declares under this config. Raises PluginUnavailable.
+
+        It is found once: the channels of a replay are those of its recording, which is read for them.
+        """
         return self.component.declared(self.config)
 
 

@@ -80,7 +80,9 @@ class Delivered:
         if names != self._names:
             return f"its further channels are {', '.join(names) or 'none'}, and were {', '.join(self._names)}"
         for name, value in zip(names, signals, strict=True):
-            shape, dtype = self._forms.setdefault(name, (shape_of(value), dtype_of(value)))
+            if name not in self._forms:
+                self._forms[name] = (shape_of(value), dtype_of(value))
+            shape, dtype = self._forms[name]
             problem = _problem(value, shape, dtype)
             if problem:
                 return f"the channel {name!r} {problem}"

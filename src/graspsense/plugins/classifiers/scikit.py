@@ -23,6 +23,7 @@ from graspsense.classifier_api import (
     contribution_reasons,
     in_words,
     missing_feature,
+    one_thread,
 )
 from graspsense.plugin_api import (
     Classifier,
@@ -164,7 +165,6 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
         import warnings
 
         import numpy as np
-        from threadpoolctl import threadpool_limits
 
         if len(set(labels)) < 2:
             raise ValueError(f"all {len(labels)} trials have one label: there is nothing to tell apart")
@@ -185,9 +185,8 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
             mean=origin,
             scale=np.where(constant, 1.0, scale),
         )
-        # One thread: on small tables more threads cost time, and the order of sums would depend on the machine.
         # A training that diverges is told by what it gives, and not by warnings of numpy.
-        with threadpool_limits(1), np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        with one_thread(), np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             fitted.estimator.fit(fitted.ready(table.values), np.array(labels))
         self._fitted = fitted
 

@@ -94,7 +94,10 @@ class Motor:
     def apply(self, frame: Frame, command: Command) -> None:
         """Take the command that is applied after this frame."""
         effort_n = command.value if command.kind == EFFORT else nan
-        self._commands.append(Asked(frame.t_s, effort_n, direction_of(command, frame.gap_m)))
+        asked = Asked(frame.t_s, effort_n, direction_of(command, frame.gap_m))
+        # Where the clock of the gripper stands still, the commands would gather.
+        if not self._commands or asked != self._commands[-1]:
+            self._commands.append(asked)
 
     def see(self, frame: Frame, phase: int) -> Fault | None:
         """Take the frame of a tick and return a fault that it shows."""
@@ -125,6 +128,8 @@ class Motor:
         self._strong_s = lasting(self._strong_s, strong, frame.dt_s)
         weak = short_n > ALLOWED_N + ALLOWED_SHARE * asked_n
         self._weak_s = lasting(self._weak_s, weak, frame.dt_s)
+        if max(self._reversed_s, self._strong_s, self._weak_s) <= self._lasts_s:
+            return None  # most ticks end here
         answer = f"it answers {answered_n:.1f} N to a command of {least if least > 0.0 else most:.1f} N"
         if self._reversed_s > self._lasts_s:
             return Fault("motor reversed", f"{answer}: check its wiring", ends=True, relaxes=True)
