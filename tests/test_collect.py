@@ -13,7 +13,7 @@ from graspsense.core.values.errors import ConfigError
 from graspsense.store.collecting import Collection, Wanted
 from graspsense.store.store import Store
 
-PLAIN = ["-o", "classifier.type=none", "-o", "run.hold_s=0.1"]
+PLAIN = ["-o", "classifier.type=none"]
 
 
 def collect(folder, answers, labels="can:full_open,block", each=2, more=()):

@@ -497,8 +497,8 @@ def strong(weak):
 def judged(folder, name, folds):
     """Run an experiment on recorded trials in this folder; return the folder of its results."""
     file = folder / f"{name}.toml"
-    one = EXPERIMENT.replace('[sweep]\n"judge.folds" = [2, 4]\n', "").replace("seeds = 2", "seeds = 1")
-    file.write_text(one.replace("[judge]", f"[judge]\nfolds = {folds}"))
+    text = EXPERIMENT.replace('[sweep]\n"judge.folds" = [2, 4]\n', "").replace("seeds = 2", "seeds = 1")
+    file.write_text(text.replace("[judge]", f"[judge]\nfolds = {folds}"))
     run_experiment(read_experiment(str(file)), Results(folder / name), Serial, command=f"run {name}")
     return folder / name
 

@@ -38,7 +38,6 @@ from graspsense.plugin_api import (
     Command,
     Controller,
     ControllerEntry,
-    DeviceInfo,
     Frame,
     Image,
     ObjectKind,
@@ -94,26 +93,19 @@ class Held:
     object: str = setting(default="cup:full", effect=NAMES_INPUT, meaning="What it holds.")
 
 
-class Eyes(SensorBackend[Held]):
+class Eyes(ModelGripper, SensorBackend[Held]):
     """The model gripper with a camera, an image of 16 bits, one of floats with a missing cell, and force vectors."""
 
     channels = (*FRAME, *IMAGES)
     accepts = ("effort",)
 
+    def __init__(self, config):
+        super().__init__(frozenset(FRAME), 0.065, 1500.0)
+        self.config = config
+
     def open(self, seed):
-        self._fingers = ModelGripper(frozenset(FRAME), 0.065, 1500.0)
-        self._fingers.open(seed)
-        self._tick, self._signals = -1, no_signals(self.channels)
-        return DeviceInfo(
-            name="eyes",
-            clock="virtual",
-            simulated=True,
-            rate_hz=1000.0,
-            effort_limit_n=100.0,
-            speed_limit_m_s=0.2,
-            opening=Command(EFFORT, -15.0, inf, inf),
-            relaxed=Command(EFFORT, 0.0, inf, inf),
-        )
+        self._tick, self._images = -1, no_signals(self.channels)
+        return evolve(super().open(seed), name="eyes", opening=Command(EFFORT, -15.0, inf, inf))
 
     def objects(self):
         return (ObjectKind(name="cup", states=("full",)),)
@@ -128,22 +120,13 @@ class Eyes(SensorBackend[Held]):
         return Image(t_s, counter, cells_of(array, numbers))
 
     def read(self, timeout_s):
-        frame, _, _ = self._fingers.read(timeout_s)
+        frame, _, _ = super().read(timeout_s)
         self._tick += 1
         if self._tick % TICKS_OF_AN_IMAGE == 0:
             counter = 1 + self._tick // TICKS_OF_AN_IMAGE
             images = (self.image(array, frame.t_s, counter) for array in IMAGES)
-            self._signals = signal_type(self.channels)(*images)
-        return Reading(frame, NO_PADS, self._signals)
-
-    def apply(self, command):
-        self._fingers.apply(command)
-
-    def tare(self, images):
-        pass
-
-    def close(self):
-        pass
+            self._images = signal_type(self.channels)(*images)
+        return Reading(frame, NO_PADS, self._images)
 
 
 @hookimpl
@@ -305,7 +288,7 @@ def grasped(image, monkeypatch, array=EYE):
         Eyes,
         "read",
         lambda self, timeout_s: Reading(
-            self._fingers.read(timeout_s).frame, NO_PADS, signals(Image(0.0, 1, image))
+            ModelGripper.read(self, timeout_s).frame, NO_PADS, signals(Image(0.0, 1, image))
         ),
     )
     return run_grasp(Eyes(Held()), GentleController(EFFORT), RunConfig())

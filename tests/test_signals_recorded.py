@@ -9,7 +9,7 @@ from math import inf, isnan
 
 import numpy as np
 import pytest
-from attrs import frozen
+from attrs import evolve, frozen
 from cases import every_case
 from click.testing import CliRunner
 from kept import begun
@@ -25,7 +25,6 @@ from graspsense.plugin_api import (
     NO_PADS,
     Channel,
     Command,
-    DeviceInfo,
     FastChannel,
     Features,
     FeatureSet,
@@ -70,7 +69,7 @@ class NoKeys:
     pass
 
 
-class Palm(SensorBackend[NoKeys]):
+class Palm(ModelGripper, SensorBackend[NoKeys]):
     """The model gripper with a palm of 2 x 3 cells, an accelerometer of three samples a tick, and a thermometer.
 
     Every number follows from the tick, so that a test knows what has to be in the recording.
@@ -79,23 +78,16 @@ class Palm(SensorBackend[NoKeys]):
     channels = (*FRAME, PALM, ACCELERATION, TEMPERATURE)
     accepts = ("effort",)
 
+    def __init__(self, config):
+        super().__init__(frozenset(self.channels), 0.065, 1500.0)
+        self.config = config
+
     def open(self, seed):
-        self._fingers = ModelGripper(frozenset(self.channels), 0.065, 1500.0)
-        self._fingers.open(seed)
         self._tick, self._sampled = -1, 0
-        return DeviceInfo(
-            name="palm",
-            clock="virtual",
-            simulated=True,
-            rate_hz=1000.0,
-            effort_limit_n=100.0,
-            speed_limit_m_s=0.2,
-            opening=Command(EFFORT, -15.0, inf, inf),
-            relaxed=Command(EFFORT, 0.0, inf, inf),
-        )
+        return evolve(super().open(seed), name="palm", opening=Command(EFFORT, -15.0, inf, inf))
 
     def read(self, timeout_s):
-        frame, pads, signals = self._fingers.read(timeout_s)
+        frame, pads, signals = super().read(timeout_s)
         self._tick += 1
         tick = self._tick
         image = signals.palm
@@ -109,15 +101,6 @@ class Palm(SensorBackend[NoKeys]):
         samples = Samples(frame.t_s, self._sampled, new, rows)
         own = signals._replace(palm=image, acceleration=samples, motor_temperature=300.0 + tick)
         return Reading(frame, pads, own)
-
-    def apply(self, command):
-        self._fingers.apply(command)
-
-    def tare(self, images):
-        pass
-
-    def close(self):
-        pass
 
 
 class Shaking(FeatureSet[NoKeys]):
@@ -166,7 +149,7 @@ GRASPSENSE_API = (2, 0)
 def recorded(tmp_path_factory):
     """One grasp, which no test changes: the trial, the path of its recording, and the plugins."""
     folder = tmp_path_factory.mktemp("recorded") / "trials"
-    options = ["gripper.type=palm", "features.type=shaking", "classifier.type=none", "run.hold_s=0.1"]
+    options = ["gripper.type=palm", "features.type=shaking", "classifier.type=none"]
     with (
         pytest.MonkeyPatch.context() as patch,
         IsolatedPlugins() as plugins,
@@ -317,7 +300,7 @@ class Camera(Palm):
     )
 
     def read(self, timeout_s):
-        return self._fingers.read(timeout_s)
+        return ModelGripper.read(self, timeout_s)
 
 
 @pytest.fixture
