@@ -101,7 +101,12 @@ class FaultyGrasp:
 def grasped(controller: Controller[Any], faults: FaultConfig, seed: int = SEED, **body: Any) -> Grasp:
     """Grasp with the emulated board, treated as a real gripper; `body` are settings of its simulated fingers."""
     config = Pr2Config(
-        transport="emulated", pace="device", calibration="none", object=OBJECT, faults=faults, body_config=body
+        transport="emulated",
+        pace="device",
+        calibration="none",
+        object=OBJECT,
+        faults=faults,
+        body_config=body,
     )
     backend: SensorBackend[Any] = Pr2Backend(config).dry_run_backend()
     return run_grasp(backend, controller, evolve(RUN, seed=seed))

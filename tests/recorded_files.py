@@ -6,8 +6,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import scipy
 from kept import ended, keep, write_recording
-from scipy.io import savemat
 
 from graspsense.recording.export_trace import write_csv, write_npz, write_parquet
 from graspsense.recording.reader import read_recorded
@@ -43,11 +43,11 @@ def npy(path: Path) -> None:
 
 
 def mat(path: Path) -> None:
-    savemat(path, COLUMNS, do_compression=True)
+    scipy.io.savemat(path, COLUMNS, do_compression=True)
 
 
 def plain_mat(path: Path) -> None:
-    savemat(path, COLUMNS)
+    scipy.io.savemat(path, COLUMNS)
 
 
 def parquet(path: Path) -> None:

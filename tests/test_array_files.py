@@ -7,9 +7,9 @@ import sys
 import h5py
 import numpy as np
 import pytest
+import scipy
 from cases import every_case
 from commands import printed
-from scipy.io import savemat
 
 from graspsense.core.values.errors import ConfigError, DataDamaged, TooLarge
 from graspsense.recording.labelled_recording import UnreadableRecording
@@ -50,7 +50,7 @@ def test_an_array_of_three_dimensions_is_read_alike_in_every_file_and_asked_abou
     elif ending == "npz":
         np.savez(path, data=solid(), kind=np.array([3, 4, 5]))
     elif ending == "mat":
-        savemat(path, {"data": solid()})
+        scipy.io.savemat(path, {"data": solid()})
     else:
         with h5py.File(path, "w") as file:
             file["data"] = solid()
@@ -91,7 +91,7 @@ def test_hundreds_of_named_arrays_are_told_apart_by_a_pattern(ending, tmp_path):
     names = [(label, k) for label in ("jar", "tin_can") for k in range(1, 101)]
     parts = {f"{label}_{k}_gap": GAP for label, k in names}
     parts |= {f"{label}_{k}_force": k * FORCE / 10.0 for label, k in names}
-    save = savemat if ending == "mat" else lambda path, given: np.savez(path, **given)
+    save = scipy.io.savemat if ending == "mat" else lambda path, given: np.savez(path, **given)
     save(tmp_path / f"all.{ending}", {**parts, "t": T_S})
     text = f'files = "all.{ending}"\narrays = "{{label}}_{{order:d}}_{{column}}"\n'
     text += 'time = "t"\ngap = "gap"\nforce = "force"\n'
@@ -110,7 +110,7 @@ def test_hundreds_of_named_arrays_are_told_apart_by_a_pattern(ending, tmp_path):
 
 
 def test_arrays_without_a_column_have_numbered_columns(tmp_path):
-    savemat(tmp_path / "all.mat", {f"jar_{k}": solid()[k] for k in range(3)})
+    scipy.io.savemat(tmp_path / "all.mat", {f"jar_{k}": solid()[k] for k in range(3)})
     grasps = recordings(tmp_path, f'files = "all.mat"\narrays = "{{label}}_{{order:d}}"\n{COLUMNS}')
     assert peaks(grasps) == pytest.approx([FORCE.max() * k for k in (1, 2, 3)])
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import scipy
 from attrs import evolve
 from parts import Nearest
-from scipy.stats import binom
 from test_evaluate import learner
 
 from graspsense.core.learn.labelled import Labelled
@@ -108,7 +108,7 @@ def test_the_rate_of_labels_without_information_is_that_of_guessing():
         right += choice.rate.correct
         best += choice.best.rates[choice.ranking.protocol].correct
         total += choice.rate.n
-    low, high = binom.interval(0.999, total, 0.5)
+    low, high = scipy.stats.binom.interval(0.999, total, 0.5)
 
     assert right <= high
     assert right >= low - 0.05 * total  # labels that are held out are rarer in training: below one half

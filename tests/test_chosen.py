@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.special import ndtr
-from scipy.stats import binom
+import scipy
 
 from graspsense.evaluation.chosen import comparisons_of, rate_of_chosen
 from graspsense.evaluation.intervals import difference
@@ -19,7 +18,7 @@ def independent(rng, candidates):
 def alike(rng, candidates):
     """Trials that are hard are hard for every candidate."""
     hard, own = rng.normal(size=120), rng.normal(size=(candidates, 120))
-    return 0.7 * hard + np.sqrt(0.51) * own < 0.5, np.full(candidates, ndtr(0.5)), None
+    return 0.7 * hard + np.sqrt(0.51) * own < 0.5, np.full(candidates, scipy.special.ndtr(0.5)), None
 
 
 def of_instances(rng, candidates):
@@ -27,7 +26,7 @@ def of_instances(rng, candidates):
     hard, own = rng.normal(size=15), rng.normal(size=(candidates, 15))
     each = 0.5 * np.repeat(hard, 8) + 0.4 * np.repeat(own, 8, axis=1)
     right = each + np.sqrt(0.59) * rng.normal(size=(candidates, 120)) < 0.6
-    return right, np.full(candidates, ndtr(0.6)), [f"#{i}" for i in np.repeat(np.arange(15), 8)]
+    return right, np.full(candidates, scipy.special.ndtr(0.6)), [f"#{i}" for i in np.repeat(np.arange(15), 8)]
 
 
 def unequal(rng, candidates):
@@ -57,7 +56,7 @@ def test_no_equal_is_called_worse_and_the_rate_of_the_best_is_covered(drawn, can
         covered += chosen.interval[0] <= rates[best] <= chosen.interval[1]
         excess.append(chosen.rate - rates[best])
 
-    most = binom.ppf(0.999, repeats, 0.05)
+    most = scipy.stats.binom.ppf(0.999, repeats, 0.05)
     assert worse <= most
     assert covered >= repeats - most
     assert abs(np.mean(excess)) < 3.3 * 0.07 / np.sqrt(

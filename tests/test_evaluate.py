@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from attrs import evolve
-from sklearn.exceptions import ConvergenceWarning
 
 from graspsense.core.components.config import SelectedComponent
 from graspsense.core.components.registry import installed
@@ -387,6 +386,8 @@ class Unconverged(SelectedComponent):
         fit = classifier.fit
 
         def warning_fit(*arguments):
+            from sklearn.exceptions import ConvergenceWarning
+
             text = "lbfgs failed to converge after 500 iteration(s) (status=1):\nIncrease the number of iterations."
             warnings.warn(text, ConvergenceWarning, stacklevel=2)
             fit(*arguments)

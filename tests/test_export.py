@@ -7,11 +7,11 @@ import tomllib
 
 import numpy as np
 import pytest
+import scipy
 from attrs import evolve
 from cases import every_case
 from commands import graspsense, printed
 from kept import ended, frame, keep, pads, write_recording
-from scipy.io import arff
 
 from graspsense.core.components.config import select_component
 from graspsense.core.values.errors import ConfigError, PluginUnavailable
@@ -90,7 +90,7 @@ def test_the_table_as_arff_is_read_by_scipy(folder, tmp_path):
     with Store.open(folder) as store:
         set_aside(store, [3], "no label")
     assert export(folder, tmp_path / "t.arff")[0] == 0
-    data, about = arff.loadarff(tmp_path / "t.arff")
+    data, about = scipy.io.arff.loadarff(tmp_path / "t.arff")
     assert about.names() == ["p_first", "f_steady", "label"]
     assert data["p_first"][:2].tolist() == [0.066, 0.1 + 0.2]
     assert math.isnan(data["f_steady"][1])

@@ -12,7 +12,6 @@ from cases import every_case
 from commands import graspsense
 from hypothesis import given
 from hypothesis import strategies as st
-from matplotlib.figure import Figure
 
 import graspsense_sim_gripper.plugin as simulator
 from graspsense import load_pipeline
@@ -266,6 +265,8 @@ def test_an_export_declares_the_fingers_and_has_their_forces(grasped, tmp_path, 
 def test_the_pages_and_the_picture_draw_the_force_of_each_finger(grasped):
     trial, _, _, _ = grasped
     figures = channel_figures(trial.trace, trial.device.channels)
+    from matplotlib.figure import Figure
+
     force, gap = Figure().subplots(2)
     draw_trace(trial.trace, force, gap, fingers_of(trial.device.channels))
 

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy
 from cases import every_case
 from commands import graspsense
-from scipy.io import savemat
 
 from graspsense.sources.channel_facts import channel_facts
 from graspsense.sources.manifest.reader import read_recordings
@@ -146,7 +146,7 @@ def pr2_biotac(folder):
                 "JPos": gap[None], "JEff": -force[None], "F0pdc": np.round(1000 + 10 * force)[None],
                 "F1pdc": np.round(1000 + 9 * force)[None], "F0Electrodes": np.arange(19 * N).reshape(19, N),
             }  # fmt: skip
-            savemat(folder / f"data/{material}_{number}_{order}_HOLD.mat", variables)
+            scipy.io.savemat(folder / f"data/{material}_{number}_{order}_HOLD.mat", variables)
 
 
 def biotac_sp(folder):
@@ -193,7 +193,7 @@ def slides(folder):
 def presses(folder):
     folder.mkdir()
     names = [f"Vertical_{i}_{j}_d{d}" for i in (1, 2) for j in (1, 2, 3) for d in (100, 120)]
-    savemat(folder / "all.mat", {name: np.ones((N, 8, 3)) for name in names})
+    scipy.io.savemat(folder / "all.mat", {name: np.ones((N, 8, 3)) for name in names})
 
 
 RIGHT = {

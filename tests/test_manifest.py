@@ -9,9 +9,9 @@ from textwrap import dedent
 
 import numpy as np
 import pytest
+import scipy
 from cases import every_case
 from commands import graspsense
-from scipy.io import savemat
 
 from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.core.values.trace import signals_of
@@ -151,7 +151,7 @@ def test_matrices_of_a_mat_file_become_columns_and_arrays(tmp_path):
         "F0Electrodes": np.arange(19 * 300).reshape(19, 300), "F1Electrodes": np.ones((19, 300)),
     }  # fmt: skip
     for trial in (2, 10):
-        savemat(tmp_path / f"data/black_foam_110_{trial}_HOLD.mat", variables)
+        scipy.io.savemat(tmp_path / f"data/black_foam_110_{trial}_HOLD.mat", variables)
 
     later_press, tenth = recordings(tmp_path, BIOTAC)
 
@@ -178,7 +178,7 @@ def test_images_and_blocks_of_samples_become_arrays_with_their_shape_and_fast_ch
     if ending == "npz":
         np.savez(tmp_path / "cup.npz", **arrays)
     else:
-        savemat(tmp_path / "cup.mat", {**arrays, "taxels": np.moveaxis(taxels, 0, -1)})
+        scipy.io.savemat(tmp_path / "cup.mat", {**arrays, "taxels": np.moveaxis(taxels, 0, -1)})
     text = f"""
         files = "{{label}}.{ending}"
         rate_hz = 1000

@@ -6,8 +6,8 @@ import struct
 
 import numpy as np
 import pytest
+import scipy
 from cases import every_case
-from scipy.io import loadmat, savemat
 
 from graspsense.core.values.errors import ConfigError, DataDamaged
 from graspsense.sources.manifest.mat_file import mat_variables
@@ -40,25 +40,25 @@ def assert_same(content, expected):
 @pytest.mark.parametrize("compressed", [False, True])
 def test_numbers_and_texts_are_what_scipy_reads_and_the_rest_is_left_out(compressed, tmp_path):
     path = tmp_path / "a.mat"
-    savemat(path, VARIABLES | OTHERS, do_compression=compressed)
-    expected = {name: value for name, value in loadmat(path).items() if name in VARIABLES}
+    scipy.io.savemat(path, VARIABLES | OTHERS, do_compression=compressed)
+    expected = {name: value for name, value in scipy.io.loadmat(path).items() if name in VARIABLES}
     assert len(expected) == len(VARIABLES)
     assert_same(mat_variables(path), expected)
 
 
 def test_a_file_of_structures_alone_says_how_to_save_it(tmp_path):
     path = tmp_path / "a.mat"
-    savemat(path, {"jar": {"gap": np.arange(9.0), "force": np.arange(9.0)}})
+    scipy.io.savemat(path, {"jar": {"gap": np.arange(9.0), "force": np.arange(9.0)}})
     with pytest.raises(ConfigError, match=r"structures.*-v7\.3"):
         mat_variables(path)
 
 
 def test_version_4(tmp_path):
     path = tmp_path / "a.mat"
-    savemat(
+    scipy.io.savemat(
         path, {name: VARIABLES[name] for name in ("matrix", "single", "one")} | {"text": "jar"}, format="4"
     )
-    expected = {name: value for name, value in loadmat(path).items() if not name.startswith("__")}
+    expected = {name: value for name, value in scipy.io.loadmat(path).items() if not name.startswith("__")}
     assert_same(mat_variables(path), expected)
     data = path.read_bytes()
     with path.open("ab") as file:
@@ -98,7 +98,7 @@ def test_what_is_no_mat_file_is_refused(content, says, tmp_path):
 
 def test_a_shape_without_its_numbers_allocates_nothing(tmp_path):
     path = tmp_path / "a.mat"
-    savemat(path, {"t": np.arange(7.0)})
+    scipy.io.savemat(path, {"t": np.arange(7.0)})
     data = path.read_bytes()
     position = data.index(struct.pack("<ii", 1, 7))
     for shape in ((2**31 - 1, 2**31 - 1), (-1, -7), (0, 7)):

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.io import savemat
+import scipy
 
 from graspsense.core.values.signals import NO_GAP
 from graspsense.core.values.trace import signals_of
@@ -36,7 +36,9 @@ def test_presses_in_named_arrays_of_three_dimensions_beside_arrays_of_other_shap
     arrays = {f"Vertical_{i}_{j}": np.moveaxis(presses * 1, 0, -1) for i in (1, 2) for j in (1, 2)}
     turns = {f"Rotate_1_1_d{d}_r100": np.ones((61, 8, 3)) for d in (100, 120)}
     (tmp_path / "data").mkdir()
-    savemat(tmp_path / "data" / "properties_exp.mat", {"nodules": np.ones((4, 4, 4)), **turns, **arrays})
+    scipy.io.savemat(
+        tmp_path / "data" / "properties_exp.mat", {"nodules": np.ones((4, 4, 4)), **turns, **arrays}
+    )
 
     grasps = recordings(tmp_path, "palpation")
 

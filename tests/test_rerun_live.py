@@ -9,10 +9,12 @@ import subprocess
 import sys
 import time
 from contextlib import suppress
+from importlib.util import find_spec
 
 import click
 import numpy as np
 import pytest
+from cases import every_case
 from live_grasp import COMMAND, device, reading
 
 from graspsense import load_pipeline
@@ -22,10 +24,8 @@ from graspsense.core.values.signals import SQUEEZE
 from graspsense.live.feeds import LiveFeed
 from graspsense.recording.layout import TICK_FIELDS
 
-pytest.importorskip("rerun")
-
-from cases import every_case
-from rerun.chunk import RrdReader
+if find_spec("rerun") is None:
+    pytest.skip("needs the extra rerun", allow_module_level=True)
 
 PATIENCE_S = 60.0
 RERUN = "graspsense.live.rerun_process"
@@ -33,6 +33,8 @@ RERUN = "graspsense.live.rerun_process"
 
 def logged(path):
     """Return for each entity its times in nanoseconds and its values, by the reader of Rerun."""
+    from rerun.chunk import RrdReader
+
     columns = {}
     for chunk in RrdReader(path).stream().to_chunks():
         batch = chunk.to_record_batch()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -10,16 +11,13 @@ import numpy as np
 import pytest
 from cases import every_case
 
-rosbags = pytest.importorskip("rosbags", reason="rosbags is the extra `ros`")
+from graspsense import load_pipeline
+from graspsense.core.values.errors import ConfigError, DataDamaged
+from graspsense.core.values.trace import signals_of
+from graspsense.sources.rosbag import read_bag
 
-from rosbags.rosbag1 import Writer as Writer1  # noqa: E402
-from rosbags.rosbag2 import Writer as Writer2  # noqa: E402
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore  # noqa: E402
-
-from graspsense import load_pipeline  # noqa: E402
-from graspsense.core.values.errors import ConfigError, DataDamaged  # noqa: E402
-from graspsense.core.values.trace import signals_of  # noqa: E402
-from graspsense.sources.rosbag import read_bag  # noqa: E402
+if find_spec("rosbags") is None:
+    pytest.skip("rosbags is the extra `ros`", allow_module_level=True)
 
 PRESSURE_NOW = (
     "pr2_msgs/msg/PressureState",
@@ -49,14 +47,21 @@ class Bag:
     """A bag being written, of either kind: `add(topic, (type, definition), t_s, **fields)`."""
 
     def __init__(self, path: Path, ros: int, definitions: bool = True) -> None:
+        from rosbags import rosbag1, rosbag2
+        from rosbags.typesys import Stores, get_typestore
+
         self.ros, self.definitions = ros, definitions
         self.store = get_typestore(Stores.ROS1_NOETIC if ros == 1 else Stores.ROS2_HUMBLE)
-        self.writer: Any = Writer1(path) if ros == 1 else Writer2(path, version=9 if definitions else 8)
+        self.writer: Any = (
+            rosbag1.Writer(path) if ros == 1 else rosbag2.Writer(path, version=9 if definitions else 8)
+        )
         self.writer.open()
         self.connections: dict[str, Any] = {}
         self.sequence = 0
 
     def add(self, topic: str, kind: tuple[str, str] | str, t_s: float, **fields: Any) -> None:
+        from rosbags.typesys import get_types_from_msg
+
         name = kind if isinstance(kind, str) else kind[0]
         if not isinstance(kind, str) and name not in self.store.fielddefs:
             self.store.register(get_types_from_msg(kind[1], name))

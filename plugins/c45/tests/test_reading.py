@@ -6,7 +6,6 @@ import json
 import math
 import re
 
-import matplotlib as mpl
 import numpy as np
 import pytest
 from cases import every_case
@@ -29,8 +28,6 @@ from graspsense_c45 import (
     to_text,
 )
 from graspsense_c45.numbers_as_text import short, weka_number, weka_weight
-
-mpl.use("Agg")
 
 
 def grasp_tree() -> Tree:
@@ -104,6 +101,9 @@ def test_dot_has_every_node_and_edge_and_quotes() -> None:
 
 
 def test_drawing_names_every_node() -> None:
+    import matplotlib as mpl
+
+    mpl.use("Agg")
     tree = grasp_tree()
     axes = draw(tree)
     words = [text.get_text() for text in axes.texts]

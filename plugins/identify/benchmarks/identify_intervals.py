@@ -16,9 +16,9 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
+import scipy
 from identify import table_head, write_between
 from numpy.typing import NDArray
-from scipy.stats import chi2, norm
 
 from graspsense_identify.interval import normal, student
 from graspsense_identify.spread import at_least
@@ -54,7 +54,7 @@ def sum_of_both(scatter: Floats, degrees: int) -> Floats:
 
 def after_test(scatter: Floats, degrees: int) -> Floats:
     """Student's t where Cochran's Q is improbable for objects that are alike, and otherwise the error of the fit."""
-    differs = scatter * degrees > chi2.ppf(1.0 - CLAIM, degrees)
+    differs = scatter * degrees > scipy.stats.chi2.ppf(1.0 - CLAIM, degrees)
     return np.where(differs, student(degrees) ** 2 * scatter, normal() ** 2)
 
 
@@ -70,8 +70,8 @@ def coverage(rule: Rule, squeezes: int, ratio: float) -> float:
     """Return the coverage of a rule where a squeeze has this variance, in units of that of its fit."""
     degrees = squeezes - 1
     levels = (np.arange(POINTS) + 0.5) / POINTS
-    scatter = ratio * chi2.ppf(levels, degrees) / degrees
-    within = 2.0 * norm.cdf(np.sqrt(rule(scatter, degrees) / ratio)) - 1.0
+    scatter = ratio * scipy.stats.chi2.ppf(levels, degrees) / degrees
+    within = 2.0 * scipy.stats.norm.cdf(np.sqrt(rule(scatter, degrees) / ratio)) - 1.0
     return float(np.mean(within))
 
 

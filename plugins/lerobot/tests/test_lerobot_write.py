@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 from commands import graspsense, printed
@@ -33,8 +33,14 @@ def written(tmp_path_factory):
     return folder / "out", folder / "s"
 
 
-def frames(folder: Path) -> pd.DataFrame:
-    return pd.read_parquet(folder / "data/chunk-000/file-000.parquet")
+def table_of(path: Path) -> Any:
+    import pandas as pd
+
+    return pd.read_parquet(path)
+
+
+def frames(folder: Path) -> Any:
+    return table_of(folder / "data/chunk-000/file-000.parquet")
 
 
 def info(folder: Path) -> dict:
@@ -58,7 +64,7 @@ def test_the_indices_are_those_that_lerobot_needs(written):
     rows = frames(written[0])
     assert rows["index"].tolist() == list(range(len(rows)))
     assert rows["timestamp"].dtype == np.float32
-    episodes = pd.read_parquet(written[0] / "meta/episodes/chunk-000/file-000.parquet")
+    episodes = table_of(written[0] / "meta/episodes/chunk-000/file-000.parquet")
     for row in episodes.itertuples():
         own = rows[rows["episode_index"] == row.episode_index]
         assert (row.dataset_from_index, row.dataset_to_index) == (own["index"].min(), own["index"].max() + 1)
@@ -68,7 +74,7 @@ def test_the_indices_are_those_that_lerobot_needs(written):
 
 
 def test_the_tasks_are_the_index_of_their_table(written):
-    tasks = pd.read_parquet(written[0] / "meta/tasks.parquet")
+    tasks = table_of(written[0] / "meta/tasks.parquet")
     assert tasks.loc["pick_the_red_cup"].task_index == 0
     assert [*tasks.columns] == ["task_index"]
 
@@ -93,7 +99,7 @@ def test_phase_event_and_prediction_have_a_meaning(written):
 
 
 def test_what_was_felt_and_the_features_are_columns_of_the_episodes(written):
-    episodes = pd.read_parquet(written[0] / "meta/episodes/chunk-000/file-000.parquet")
+    episodes = table_of(written[0] / "meta/episodes/chunk-000/file-000.parquet")
     assert episodes["graspsense/felt"].all()
     assert not episodes["graspsense/crushed"].any()
     with Store.read(written[1]) as store:
@@ -104,9 +110,9 @@ def test_what_was_felt_and_the_features_are_columns_of_the_episodes(written):
 
 
 def test_the_raw_rate_is_kept_beside(written):
-    raw = pd.read_parquet(written[0] / "graspsense/raw/episode_000000.parquet")
+    raw = table_of(written[0] / "graspsense/raw/episode_000000.parquet")
     assert np.diff(raw["t_s"]) == pytest.approx(1 / 30, abs=1e-6)
-    cells = pd.read_parquet(written[0] / "graspsense/raw/episode_000000-f0.parquet")
+    cells = table_of(written[0] / "graspsense/raw/episode_000000-f0.parquet")
     assert len(cells["f0"].iloc[0]) == 12
 
 
@@ -143,7 +149,7 @@ def test_simulated_trials_are_written(tmp_path):
         float(np.stack(rows["observation.state"])[:, names.index("gripper.effort")].max())
     )
     assert "synthetic" in (tmp_path / "out/README.md").read_text()
-    assert ":" in pd.read_parquet(tmp_path / "out/meta/tasks.parquet").index[0]
+    assert ":" in table_of(tmp_path / "out/meta/tasks.parquet").index[0]
 
 
 def test_an_existing_folder_is_not_written_to(written):
@@ -210,8 +216,10 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
-def all_frames(folder: Path) -> pd.DataFrame:
-    return pd.concat([pd.read_parquet(path) for path in sorted((folder / "data").rglob("*.parquet"))])
+def all_frames(folder: Path) -> Any:
+    import pandas as pd
+
+    return pd.concat([table_of(path) for path in sorted((folder / "data").rglob("*.parquet"))])
 
 
 def test_a_copy_has_what_it_had_and_phase_event_and_prediction(annotated):
@@ -241,7 +249,7 @@ def test_a_copy_says_what_each_trial_of_an_episode_was(annotated):
             for row in rows
         ]
     else:
-        table = pd.read_parquet(copy / "meta/episodes/chunk-000/file-000.parquet")
+        table = table_of(copy / "meta/episodes/chunk-000/file-000.parquet")
         both = zip(table["graspsense/label"], table["graspsense/felt"], strict=True)
         trials = [list(zip(labels.tolist(), felt.tolist(), strict=True)) for labels, felt in both]
     cup, sponge = ("pick_the_red_cup", True), ("squeeze-_sponge", True)

@@ -121,23 +121,26 @@ def worded(params, state, reading):
 STEP = type(FAST).step
 
 
-def test_a_controller_that_cannot_be_compiled_runs_in_the_interpreter():
-    class Worded(type(FAST)):
-        step = staticmethod(worded)
+class Worded(type(FAST)):
+    step = staticmethod(worded)
 
-    class Reflecting(type(FAST)):
-        looked: ClassVar[list[str]] = []
 
-        @staticmethod
-        def step(params, state, reading):
-            Reflecting.looked.append(type(reading).__name__)
-            return STEP(params, state, reading)
+class Reflecting(type(FAST)):
+    looked: ClassVar[list[str]] = []
 
-    plain = plain_grasp()
-    for controller in (Worded, Reflecting):
-        done, at_once = grasp(controller(FAST.config))
-        assert at_once == 0
-        assert told(done) == told(plain)
+    @staticmethod
+    def step(params, state, reading):
+        Reflecting.looked.append(type(reading).__name__)
+        return STEP(params, state, reading)
+
+
+# Slow: numba reads all of the loop before it finds what it cannot compile.
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", [Worded, Reflecting])
+def test_a_controller_that_cannot_be_compiled_runs_in_the_interpreter(kind):
+    done, at_once = grasp(kind(FAST.config))
+    assert at_once == 0
+    assert told(done) == told(plain_grasp())
 
 
 def test_steps_with_many_contacts_for_the_memory_run_in_the_interpreter(monkeypatch):

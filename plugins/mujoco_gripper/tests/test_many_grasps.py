@@ -18,11 +18,8 @@ RUN = RunConfig(hold_s=0.05)
 GRASPS = [
     ("block", 1),
     ("can", 1),
-    ("egg", 2),
     ("block", 2),
     ("can#1", 3),
-    ("ball", 1),
-    ("block#1", 1),
     ("egg", 1),
 ]
 GRIPPER = create("sensor-backend", "mujoco")
@@ -47,9 +44,13 @@ def alone():
     return {grasp: felt([grasp])[0] for grasp in GRASPS}
 
 
-def test_processes_grasp_as_one_process_does(alone):
-    assert felt(GRASPS, workers=2) == [alone[grasp] for grasp in GRASPS]
+def test_processes_grasp_as_one_process_does_and_tell_their_progress(alone):
+    told = []
+    many = felt(GRASPS, workers=2, progress=lambda done, total: told.append((done, total)))
+    assert many == [alone[grasp] for grasp in GRASPS]
     assert len(set(map(repr, alone.values()))) == len(GRASPS)
+    assert told[-1] == (len(GRASPS), len(GRASPS))
+    assert all(after >= earlier for earlier, after in pairwise(told))
 
 
 @pytest.mark.slow
@@ -61,18 +62,13 @@ def test_order_and_number_change_no_grasp(alone, order, count, workers):
 
 
 def test_a_batch_grasps_as_the_runner_does(alone):
-
     for thing, seed in GRASPS[:2]:
         grasp = run_uninterrupted(GRIPPER.with_object(thing), HYBRID, evolve(RUN, seed=seed))
         assert (grasp.outcome, Values()(grasp.trace)) == alone[thing, seed][:2]
 
 
-def test_progress_is_told_and_an_unknown_thing_ends_the_batch_before_any_grasp():
+def test_an_unknown_thing_ends_the_batch_before_any_grasp():
     told = []
-    felt(GRASPS, workers=2, progress=lambda done, total: told.append((done, total)))
-    assert told[-1] == (len(GRASPS), len(GRASPS))
-    assert all(after >= earlier for earlier, after in pairwise(told))
-    told.clear()
     with pytest.raises(UnknownName, match="blok"):
         felt([*GRASPS, ("blok", 1)], progress=lambda done, total: told.append(done))
     assert told == []
@@ -82,7 +78,7 @@ def test_a_controller_that_other_processes_cannot_make_again_grasps_here(alone):
     class Unregistered(type(HYBRID)):
         pass
 
-    things, seeds = zip(*GRASPS, strict=True)
+    things, seeds = zip(*GRASPS[:2], strict=True)
     own = Unregistered(HYBRID.config)
     done = GRIPPER.run_many(own, things, seeds, run=RUN, extract=Values(), workers=2)
-    assert [grasped.extracted for grasped in done] == [alone[grasp][1] for grasp in GRASPS]
+    assert [grasped.extracted for grasped in done] == [alone[grasp][1] for grasp in GRASPS[:2]]

@@ -57,9 +57,20 @@ def hinged_file(folder: Path, **changed: str) -> Path:
     )
 
 
+GENTLE = "controller.closing_speed_m_s=0.03"
+"""For what a faster finger would break."""
+
+
 def grasped(*options, thing="can", seed=0):
     pipeline = load_pipeline(
-        "default", options=["gripper.type=mujoco", "classifier.type=none", "gripper.spread=false", *options]
+        "default",
+        options=[
+            "gripper.type=mujoco",
+            "classifier.type=none",
+            "gripper.spread=false",
+            "controller.closing_speed_m_s=0.1",
+            *options,
+        ],
     )
     return pipeline.grasp(object=thing, seed=seed)
 
@@ -83,7 +94,7 @@ def gripper_file(folder: Path, model: Path = PARALLEL, **changed: str) -> Path:
 
 def test_a_can_yields_as_its_springs_do():
     """Two walls of 18 000 N/m in series yield by 20 N / 9000 N/m; the contacts yield by a few hundredths of a mm."""
-    trial = grasped()
+    trial = grasped(GENTLE)
     assert trial.outcome.words == "steady"
     assert trial.features["f_steady"] == pytest.approx(20.0, abs=0.1)
     assert trial.features["p_steady"] == pytest.approx(0.0662 - 20.0 / 9000.0, abs=1e-4)
@@ -99,7 +110,7 @@ def test_a_block_is_as_wide_as_it_is_and_both_pads_feel_the_effort(sends):
 
 
 def test_an_egg_survives_20_newtons_and_breaks_at_60():
-    whole, broken = grasped(thing="egg"), grasped("controller.probing_force_n=60", thing="egg")
+    whole, broken = (grasped(GENTLE, f"controller.probing_force_n={n}", thing="egg") for n in (20, 60))
     assert (whole.outcome.words, whole.report["broken"]) == ("steady", False)
     assert (broken.outcome.words, broken.report["broken"]) == ("crushed", True)
 

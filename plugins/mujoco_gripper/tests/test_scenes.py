@@ -33,7 +33,7 @@ def grasped(thing, *options, hold_s=1.0, seed=0):
             "classifier.type=none",
             "gripper.spread=false",
             "controller.sends=velocity",
-            "controller.closing_speed_m_s=0.04",
+            "controller.closing_speed_m_s=0.1",
             f"run.hold_s={hold_s}",
             *options,
         ],

@@ -34,10 +34,10 @@ def opened(thing, **settings):
     return backend
 
 
-def squeezed(backend, gap_m, ticks):
+def squeezed(backend, gap_m, ticks, speed_m_s=0.15):
     """Close to a gap and return the last reading."""
     for _ in range(ticks):
-        backend.apply(Command(POSITION, gap_m, 50.0, 0.05))
+        backend.apply(Command(POSITION, gap_m, 50.0, speed_m_s))
         reading = backend.read(1.0)
     return reading
 
@@ -57,7 +57,7 @@ def test_a_cell_image_is_the_pressure_of_a_bed_of_springs(tmp_path):
     The tips of the cells are spheres of 1.9 mm, which makes R larger by as much.
     """
     backend = opened(thing_file(tmp_path, 'type="sphere" size="0.02"'))
-    reading = squeezed(backend, 0.0395, 1500)
+    reading = squeezed(backend, 0.0395, 800)
     image = np.array(reading.pads.left).reshape(5, 3)
     rows, columns = np.meshgrid([-8, -4, 0, 4, 8], [-4, 0, 4], indexing="ij")
     deeper_m = (rows**2 + columns**2) * 1e-6 / (2.0 * (0.02 + 0.0019))
@@ -69,7 +69,7 @@ def test_a_cell_image_is_the_pressure_of_a_bed_of_springs(tmp_path):
 
 def test_a_flat_thing_presses_on_all_cells_alike(tmp_path):
     backend = opened(thing_file(tmp_path, 'type="box" size="0.02 0.02 0.02"'))
-    image = np.array(squeezed(backend, 0.0395, 1500).pads.right)
+    image = np.array(squeezed(backend, 0.0395, 800).pads.right)
     assert image.min() > 0.1
     assert np.ptp(image) < 0.1 * image.mean()
 
@@ -97,7 +97,7 @@ def scene(folder, *lines):
 
 def test_a_thing_that_is_filled_weighs_more(tmp_path):
     backend = opened(scene(tmp_path, "fill = [[0.0, 0.0], [0.2, 0.3]]"))
-    squeezed(backend, 0.035, 1500)
+    squeezed(backend, 0.035, 1500, 0.05)
     model = backend._model
     masses = [model.body_mass[k] for k in range(model.nbody) if model.body(k).name.startswith("thing/")]
     assert sum(masses) == pytest.approx(0.15 + 0.3)
@@ -106,13 +106,13 @@ def test_a_thing_that_is_filled_weighs_more(tmp_path):
 def test_the_table_rises_as_the_scene_says(tmp_path):
     backend = opened(scene(tmp_path, "table_height = [[0.0, 0.0], [0.2, 0.02]]"))
     resting_m = float(backend._data.mocap_pos[0, 2])
-    squeezed(backend, 0.035, 1700)
+    squeezed(backend, 0.035, 1700, 0.05)
     assert backend._data.mocap_pos[0, 2] - resting_m == pytest.approx(0.02)
 
 
 def test_roughness_disturbs_cells_that_slide_and_no_others(tmp_path):
     backend = opened(scene(tmp_path, "friction = 0.05", "roughness_m = 4e-5"))
-    still = [squeezed(backend, 0.0395, 1500 if k == 0 else 1).frame.force_left_n for k in range(100)]
+    still = [squeezed(backend, 0.0395, 800 if k == 0 else 1).frame.force_left_n for k in range(100)]
     thing = next(k for k in range(backend._model.nbody) if backend._model.body(k).name.startswith("thing/"))
     sliding = []
     for _ in range(100):
@@ -174,7 +174,7 @@ def bumped(tmp_path, *lines):
     """Close on a block that a scene bumps; return the forces on both edges over time."""
     backend = opened(scene(tmp_path, "[bump]", "t_s = 0.2", *lines))
     edges = []
-    for _ in range(2200):
+    for _ in range(1200):
         frame = squeezed(backend, 0.0395, 1).frame
         edges.append((frame.edge_left_n, frame.edge_right_n))
     return np.array(edges)

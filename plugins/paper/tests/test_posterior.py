@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 import sys
 import tomllib
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy
 from attrs import NOTHING, fields
 from cases import every_case
-from scipy.stats import norm
 
 from graspsense.core.values.trace import Trace
 
@@ -23,10 +24,12 @@ sys.path.insert(0, str(ROOT / "benchmarks"))
 import paper_model  # noqa: E402
 import posterior_page  # noqa: E402
 
-VALUES = {
-    **{prior.name: float(prior.distribution().median()) for prior in paper_model.PRIORS},
-    **dict.fromkeys(paper_model.EXPLANATIONS, 0.2),
-}
+
+@cache
+def medians():
+    """Return the median of every prior, which needs scipy.stats, with explanations that are absent."""
+    priors = {prior.name: float(prior.distribution().median()) for prior in paper_model.PRIORS}
+    return {**priors, **dict.fromkeys(paper_model.EXPLANATIONS, 0.2)}
 
 
 def trace_of_forces(forces_n):
@@ -36,7 +39,7 @@ def trace_of_forces(forces_n):
 
 
 def scene(name, force_n=20.0, node=0.0, **values):
-    return tomllib.loads(paper_model.scene_of(name, {**VALUES, **values}, force_n, node))
+    return tomllib.loads(paper_model.scene_of(name, {**medians(), **values}, force_n, node))
 
 
 def test_the_page_is_that_of_the_result():
@@ -90,7 +93,7 @@ def test_later_squeezes_of_a_placement_are_better_centred():
     )
     assert at_20_n["offset_spread_m"] == pytest.approx(at_17_n["offset_spread_m"] / 2)
     assert at_23_n["offset_spread_m"] == pytest.approx(at_17_n["offset_spread_m"] / 4)
-    assert scene("can:full_open", 23.0)["offset_spread_m"] == VALUES["offset_spread_m"]
+    assert scene("can:full_open", 23.0)["offset_spread_m"] == medians()["offset_spread_m"]
 
 
 def test_placements_differ_in_stiffness_as_their_spread_says():
@@ -101,8 +104,8 @@ def test_placements_differ_in_stiffness_as_their_spread_says():
 
 
 def test_pads_stiffen_only_where_that_explanation_is_present():
-    assert paper_model.config_of({**VALUES, "hardening": 0.4}).pad_hardening_m is None
-    assert paper_model.config_of({**VALUES, "hardening": 1.0}).pad_hardening_m == pytest.approx(0.0002)
+    assert paper_model.config_of({**medians(), "hardening": 0.4}).pad_hardening_m is None
+    assert paper_model.config_of({**medians(), "hardening": 1.0}).pad_hardening_m == pytest.approx(0.0002)
 
 
 def test_nonlinear_cells_show_other_forces_in_proportion_to_the_force():
@@ -135,7 +138,7 @@ def test_the_density_of_a_proposal_is_that_of_its_samples():
     transition.fit(pd.DataFrame(rng.normal(1.0, 0.3, (100, 2)), columns=["a", "b"]), np.full(100, 0.01))
     drawn = pd.DataFrame([dict(transition.rvs_single()) for _ in range(2000)])
     # Weighted by prior over proposal, the proposals are a sample of the prior.
-    w = norm.pdf(drawn["a"]) * norm.pdf(drawn["b"]) / transition.pdf(drawn)
+    w = scipy.stats.norm.pdf(drawn["a"]) * scipy.stats.norm.pdf(drawn["b"]) / transition.pdf(drawn)
     assert np.average(drawn["a"], weights=w) == pytest.approx(0.0, abs=0.2)
     assert np.average(drawn["a"] ** 2, weights=w) == pytest.approx(1.0, abs=0.3)
     assert transition.pdf(drawn.iloc[0]) == pytest.approx(transition.pdf(drawn)[0])

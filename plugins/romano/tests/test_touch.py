@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import scipy
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.stats import mannwhitneyu
 
 from graspsense import load_pipeline
 from graspsense_mujoco_gripper.scene import read_scene
@@ -47,7 +47,7 @@ def test_a_trade_counts_what_is_above_each_threshold():
 )
 def test_the_area_under_a_curve_is_the_statistic_of_mann_and_whitney(positive, negative):
     share, least, most = area(positive, negative)
-    u = mannwhitneyu(positive, negative).statistic
+    u = scipy.stats.mannwhitneyu(positive, negative).statistic
     assert share == pytest.approx(u / (len(positive) * len(negative)))
     assert 0.0 <= least <= share + 1e-4
     assert share - 1e-4 <= most <= 1.0

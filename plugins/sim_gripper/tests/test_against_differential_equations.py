@@ -13,8 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
-from scipy.optimize import brentq
+import scipy
 from unverified import unverified_setup
 
 from graspsense.gripper_api import gap_and_rate, revolutions_at
@@ -414,7 +413,7 @@ class Half:
         near = s[0] + way * step
         while miss(near) * way < 0.0:
             near += way * 1e-6
-        d = brentq(miss, near - way * 1e-6, near, xtol=1e-17)
+        d = scipy.optimize.brentq(miss, near - way * 1e-6, near, xtol=1e-17)
         moved = [v for t, g in zip(self.terms, groups, strict=True) for v in t.jumped(s[0], d, g)]
         self.parts = [t.part(d, p) for t, p in zip(self.terms, self.parts, strict=True)]
         return [d, closure - d, s[2] - self.branch * (d - s[0]), *moved]
@@ -632,7 +631,7 @@ class Gripper:
         how = {"dense_output": True, "rtol": 1e-9, "atol": 1e-12, "max_step": self.longest_s}
         # The first step that is tried after an event may be far too long.
         with np.errstate(over="ignore", invalid="ignore"):
-            run = solve_ivp(self.slope, (t, end), s, "DOP853", events=events, **how)
+            run = scipy.integrate.solve_ivp(self.slope, (t, end), s, "DOP853", events=events, **how)
         assert run.status >= 0, run.message
         return run
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+import scipy
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy import stats
 
 from graspsense_sim_gripper.run.drawing import image_noise
 from graspsense_sim_gripper.scene.random_numbers import (
@@ -47,9 +47,9 @@ def test_the_normal_numbers_are_the_inverse_of_their_distribution_function():
     p = np.concatenate([small, 1.0 - small])
     made = p.copy()
     make_normal(made, len(made))
-    assert np.abs(stats.norm.cdf(made) - p).max() < 1e-4
+    assert np.abs(scipy.stats.norm.cdf(made) - p).max() < 1e-4
     outer = np.minimum(p, 1.0 - p) <= 1.0 / INTERVALS
-    assert made[outer] == pytest.approx(stats.norm.ppf(p[outer]), rel=3e-7)
+    assert made[outer] == pytest.approx(scipy.stats.norm.ppf(p[outer]), rel=3e-7)
     assert made[outer].min() < -6.0
 
 
@@ -57,12 +57,12 @@ def test_the_normal_numbers_are_the_inverse_of_their_distribution_function():
 def test_numbers_have_their_distributions(seed):
     normal, unit = drawn(draw_normals, seed, 400_000), drawn(draw_units, seed, 400_000)
     # A true generator fails once in a thousand seeds; these seeds are always the same.
-    assert stats.kstest(normal, "norm").pvalue > 1e-3
-    assert stats.kstest(unit, "uniform").pvalue > 1e-3
+    assert scipy.stats.kstest(normal, "norm").pvalue > 1e-3
+    assert scipy.stats.kstest(unit, "uniform").pvalue > 1e-3
     assert normal.mean() == pytest.approx(0.0, abs=5e-3)
     assert normal.std() == pytest.approx(1.0, abs=5e-3)
-    assert stats.skew(normal) == pytest.approx(0.0, abs=1.5e-2)
-    assert stats.kurtosis(normal) == pytest.approx(0.0, abs=3e-2)
+    assert scipy.stats.skew(normal) == pytest.approx(0.0, abs=1.5e-2)
+    assert scipy.stats.kurtosis(normal) == pytest.approx(0.0, abs=3e-2)
     assert np.abs(normal).max() > 4.0
     lagged = [np.corrcoef(normal[:-k], normal[k:])[0, 1] for k in (1, 2, 3, 4, 44)]
     assert np.abs(lagged).max() < 7e-3
@@ -70,7 +70,7 @@ def test_numbers_have_their_distributions(seed):
 
 def test_grasps_of_neighbouring_seeds_are_independent():
     rows = np.array([drawn(draw_normals, seed, 52) for seed in range(4000)])
-    assert stats.kstest(rows[:, 0], "norm").pvalue > 1e-3
+    assert scipy.stats.kstest(rows[:, 0], "norm").pvalue > 1e-3
     off_diagonal = np.corrcoef(rows.T) - np.eye(52)
     assert np.abs(off_diagonal).max() < 0.08
 
