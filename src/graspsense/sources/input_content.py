@@ -175,8 +175,7 @@ def _named_files(path: str, folders: tuple[str, ...], known: set[str]) -> set[st
 
 def _places_in_package(text: str) -> Iterator[str]:
     """Yield where the file of an installed package can be that `package:NAME:PATH` names."""
-    scheme, _, rest = text.partition(":")
-    package, _, resource = rest.partition(":")
+    scheme, package, resource = (*text.split(":", 2), "", "")[:3]
     if scheme == "package" and package.isidentifier() and resource:
         spec = find_spec(package)
         for folder in (spec and spec.submodule_search_locations) or ():
