@@ -11,7 +11,6 @@ from graspsense.simulator_api import CompileOptions, Inlining, compile_function,
 from graspsense_sim_gripper.plant.contact import _pressed, solve_contact
 from graspsense_sim_gripper.solve.advance import advance, move, take_step, take_steps
 from graspsense_sim_gripper.solve.converge import refine_until_converged
-from graspsense_sim_gripper.solve.macro_step import _rested
 
 _REMAIN_CALLS: Final = {
     # The laws of the object are called through the contact: inlined, they would be compiled once per call.
@@ -19,8 +18,6 @@ _REMAIN_CALLS: Final = {
     solve_contact.__code__: ("_release_from_rigid_pads",),
     # These are rarely called: inlined, they would take registers from velocity Verlet.
     take_step.__code__: ("stick", "_after_event"),
-    # Too long to be inlined at two places. As a seldom call it has the code of that in `take_step`.
-    _rested.__code__: ("stick",),
 }
 
 
