@@ -30,7 +30,7 @@ from typing import Any, Final
 import numpy as np
 from attrs import evolve, frozen
 from numpy.typing import NDArray
-from selection import controller_is_stable, error_of
+from random_scenes import controller_is_stable, error_of
 
 from graspsense.plugin_api import ConfigError, create
 from graspsense.simulator_api import NotCompilable, RunConfig, bind
