@@ -49,8 +49,8 @@ PATH_ERROR: Final = 3e-4
 """Standard deviation of the logarithm of a value that the finite number of nodes of a path causes, at least."""
 PATH_FORCE_ERROR: Final = 3e-5
 """The same of the force, over the peak. With both, the intervals from one squeeze with an ideal sensor cover more than
-nine of ten (`benchmarks/identify.py --true-terms --sensors ideal --recordings 1`): `path_error` takes most of the error
-away, and what is left is mostly that of the simulated recordings. No recording of a real sensor is as exact."""
+nine of ten (`benchmarks/identify.py --sensors ideal --recordings 1`): `path_error` takes most of the error away, and
+what is left is mostly that of the simulated recordings. No recording of a real sensor is as exact."""
 
 
 @frozen(kw_only=True, eq=False)
