@@ -9,14 +9,13 @@ from cases import every_case
 from identify import SCENES, scene_text, squeezes_of
 from scipy.stats import chi2, norm
 
-from graspsense.plugin_api import ConfigError
 from graspsense_identify.fit import fit
 from graspsense_identify.forward import ForwardModel
 from graspsense_identify.interval import normal, student
 from graspsense_identify.laws import memories, static_candidates
 from graspsense_identify.path_error import NODES_PER_TICK, on_fine_path, path_bias
 from graspsense_identify.prepare import prepared
-from graspsense_identify.run import _scale, identify
+from graspsense_identify.run import _scale
 from graspsense_identify.share import measured_share
 from graspsense_identify.spread import at_least
 from graspsense_sim_gripper.config import SimConfig
@@ -104,12 +103,3 @@ def coverage(squeezes, ratio):
 @every_case("ratio", [1.0, 3.0, 100.0])
 def test_an_interval_covers_at_least_what_it_says_however_much_objects_differ(squeezes, ratio):
     assert 0.899 < coverage(squeezes, ratio) < 0.98
-
-
-@pytest.mark.slow
-def test_given_terms_are_not_chosen():
-    squeeze = squeeze_of("creeping", sensor="ideal")
-    result = identify(SimConfig(), [squeeze], lambda *_: None, only="elastic (k1)")
-    assert [candidate.terms for candidate in result.candidates if candidate.chosen] == ["elastic (k1)"]
-    with pytest.raises(ConfigError, match="no candidate"):
-        identify(SimConfig(), [squeeze], lambda *_: None, only="elastic (k7)")
