@@ -17,21 +17,16 @@ import argparse
 import itertools
 import json
 import math
-import os
-import platform
-import subprocess
 from collections.abc import Callable, Iterator
-from datetime import date
 from functools import cache
-from importlib.metadata import version
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 from attrs import evolve, frozen
 from numpy.typing import NDArray
-from selection import controller_is_stable, error_of
+from random_scenes import controller_is_stable, error_of
 
+from graspsense.experiments.versions import measured_on, where_measured
 from graspsense.plugin_api import ConfigError, create
 from graspsense.simulator_api import NotCompilable, RunConfig, bind
 from graspsense_sim_gripper.config import SimConfig
@@ -53,7 +48,6 @@ from graspsense_sim_gripper.solve.scheme import PlantParams
 
 Row = dict[str, Any]
 FloatArray = NDArray[np.float64]
-HERE: Final = Path(__file__).parent
 ERRORS: Final = ("peak_error", "rms_error", "error")
 HELD: Final = 0.05
 """Largest relative difference of peak and rms."""
@@ -741,18 +735,6 @@ CASES: Final = (
 )
 
 
-def machine() -> str:
-    """Return date, machine, interpreter and commit, as the documentation has them."""
-    today = date.today()
-    told = ["git", "describe", "--always", "--dirty", "--exclude=*"]
-    try:
-        commit = subprocess.run(told, capture_output=True, text=True, check=True, cwd=HERE).stdout.strip()
-    except (OSError, subprocess.CalledProcessError):
-        commit = "unknown"
-    where = f"{platform.machine()} with {os.cpu_count()} cores, Python {platform.python_version()}"
-    return f"{today.day} {today:%B %Y}, {where}, commit {commit}"
-
-
 def table(rows: list[Row]) -> Iterator[str]:
     """Yield Markdown: a line a kind of case, then each row that does not hold with its figures."""
     yield (
@@ -768,7 +750,6 @@ def table(rows: list[Row]) -> Iterator[str]:
         cells.append(f"{max(errors):.1e}" if errors else "-")
         held, told = (sum(bool(row.get(name)) for row in mine) for name in ("holds", "flagged"))
         yield f"| {case} | {len(mine)} | {held} | {told} | {' | '.join(cells)} |"
-    yield from _stiff_rows(rows)
     missed = [row for row in rows if not row["holds"]]
     if missed:
         yield ""
@@ -777,23 +758,6 @@ def table(rows: list[Row]) -> Iterator[str]:
     for row in missed:
         figures = ", ".join(f"{k} {v:.1e}" for k, v in row.items() if isinstance(v, float) and k != "value")
         yield f"- {row['case']}, {row['value']}: {figures}"
-
-
-def _stiff_rows(rows: list[Row]) -> Iterator[str]:
-    """Yield a table of the contacts above 1e6 N/m, each with its errors, flagged or not."""
-    stiff = [row for row in rows if "above 1e6 N/m" in row["case"]]
-    if stiff:
-        yield ""
-        yield "Contacts above 1e6 N/m, row by row:"
-        yield ""
-        yield "| stiffness, N/m | mass ratio | static friction, N | error of peak | of the trace (rms) | flagged |"
-        yield "|---|---|---|---|---|---|"
-    for row in stiff:
-        stiffness, ratio, breakaway_n = row["value"]
-        yield (
-            f"| {stiffness:g} | {ratio:g} | {breakaway_n:g} | {row['peak_error']:.1e} | {row['rms_error']:.1e} "
-            f"| {'yes' if row['flagged'] else 'no'} |"
-        )
 
 
 def _largest(rows: list[Row], name: str) -> str:
@@ -813,27 +777,16 @@ def main() -> None:
     given = parser.parse_args()
     cases = [case for case in CASES if not given.only or case.__name__ in given.only]
     rows = [row for case in cases for row in case(given.short)]
-    result = {
-        "date": date.today().isoformat(),
-        "machine": f"{platform.machine()}, {platform.system()} {platform.release()}",
-        "python": platform.python_version(),
-        "graspsense-sim-gripper": version("graspsense-sim-gripper"),
-        "run": machine(),
-        "hold": sum(bool(row["holds"]) for row in rows),
-        "cases": len(rows),
-        "rows": rows,
-    }
     if given.json:
-        print(json.dumps(result, indent=2))
+        print(json.dumps({**measured_on(), "rows": rows}, indent=2))
         return
     if given.table:
-        short = " --short" if given.short else ""
-        print(f"From `python benchmarks/extremes.py{short} --table`, {machine()}.\n")
+        print(f"{where_measured()}.\n")
         print("\n".join(table(rows)))
         return
     for row in rows:
         print("ok  " if row["holds"] else "NOT ", {k: v for k, v in row.items() if k != "holds"})
-    print(f"{result['hold']} of {result['cases']} hold")
+    print(f"{sum(bool(row['holds']) for row in rows)} of {len(rows)} hold")
 
 
 if __name__ == "__main__":

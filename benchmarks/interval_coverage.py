@@ -13,8 +13,6 @@ from __future__ import annotations
 
 import argparse
 import math
-import platform
-import time
 
 import numpy as np
 from scipy.special import stdtrit
@@ -25,6 +23,7 @@ from graspsense.core.learn.labelled import Labelled
 from graspsense.core.values.features import FeatureTable
 from graspsense.evaluation.evaluate import evaluate
 from graspsense.evaluation.intervals import Interval, clustered, wilson
+from graspsense.experiments.versions import where_measured
 
 TRIALS = 8
 """Trials of each instance."""
@@ -104,7 +103,7 @@ def main() -> None:
     parser.add_argument("--short", action="store_true", help="least work, only to show that it runs")
     given = parser.parse_args()
     repeats = 2 if given.short else given.repeats
-    print(f"{time.strftime('%Y-%m-%d', time.gmtime())}, {platform.platform()}, {repeats} repeats\n")
+    print(f"{where_measured()}, {repeats} repeats\n")
     print("| instances | rate | correlation | Wilson | t | bootstrap | graspsense | mean width |")
     print("|---|---|---|---|---|---|---|---|")
     for k in INSTANCES:

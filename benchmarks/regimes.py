@@ -1,15 +1,13 @@
-"""A map of regimes: where the chosen steps and fixed steps of 1 ms have the accuracy. Simulated.
+"""Where the chosen steps have the accuracy that is asked for. Simulated.
 
     python benchmarks/regimes.py [--scenes 1500] [--rows FILE] [--markdown FILE] [--first N] [--short]
 
 The scenes are drawn from the ranges that gripper, object and controller may physically have, not from those in which
-the simulator works, and apart from those of `benchmarks/selection.py`. Their seeds are fresh unless `--first` names the
-first. Each is grasped by the hybrid controller in the steps that are selected for 10, 1 and 0.1 %, in
-fixed steps of 1 ms, and in the reference. The error is that of
-`graspsense_sim_gripper.run.accuracy.error`; a different outcome is an infinite error. A reference that has not settled
-in some tick, or that a selected grasp differs from, is compared with even steps of 10 us. Finished scenes are
-appended to the file of `--rows`, and are not run again if the program is started again with the same file. Times are
-processor times of the compiled loop that holds all kinds of terms; selecting the steps is measured apart.
+the simulator works, and apart from those of `random_scenes.py`. Their seeds are fresh unless `--first` names the first.
+Each is grasped by the hybrid controller in the steps that are selected for 10, 1 and 0.1 %, and in the reference. The
+error is that of `graspsense_sim_gripper.run.accuracy.error`; a different outcome is an infinite error. A reference that
+has not settled in some tick, or that a selected grasp differs from, is compared with even steps of 10 us. Finished
+scenes are appended to the file of `--rows`, and are not run again if the program is started again with the same file.
 """
 
 from __future__ import annotations
@@ -17,33 +15,24 @@ from __future__ import annotations
 import argparse
 import json
 import math
-import os
 import secrets
 import sys
 import tempfile
-import time
-from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 from attrs import evolve
-from selection import KINDS, Bench, Scene, compiled_grasp, controller_is_stable, record_of
+from random_scenes import Bench, Scene, controller_is_stable, record_of
 
 from graspsense.evaluation.intervals import wilson
 from graspsense.experiments.versions import where_measured
-from graspsense.plugin_api import ConfigError, create
-from graspsense.simulator_api import RunConfig
+from graspsense.plugin_api import ConfigError
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.run.accuracy.error import deviation
-from graspsense_sim_gripper.run.accuracy.model import Reduction
 from graspsense_sim_gripper.run.accuracy.propose import NOT_VERIFIED
-from graspsense_sim_gripper.run.accuracy.select import select
-from graspsense_sim_gripper.run.batch.job import FinishedGrasp, Job, grasp_plain
-from graspsense_sim_gripper.run.build import Problem, instantiate
-from graspsense_sim_gripper.run.compiled.padding import padded
-from graspsense_sim_gripper.run.problem import GraspController, GraspSetup
+from graspsense_sim_gripper.run.batch.job import FinishedGrasp
 from graspsense_sim_gripper.scene.spec import ObjectSpec
 from graspsense_sim_gripper.scene.terms.registry import in_order
 
@@ -52,12 +41,11 @@ ACCURACIES: Final = (0.1, 0.01, 0.001)
 EVEN_S: Final = 1e-5
 """Steps so short that they show whether a reference in doubt is right."""
 REFERENCE: Final = 1e-4
-TIMES: Final = 3
 ATMOSPHERE_PA: Final = 101325.0
 
 
-def scene_of(number: int) -> tuple[Scene, Row]:
-    """Return the scene with this number, and the quantities that it is mapped by."""
+def scene_of(number: int) -> Scene:
+    """Return the scene with this number."""
     rng = np.random.default_rng([77_003, number])
 
     def log(least: float, most: float) -> float:
@@ -66,43 +54,34 @@ def scene_of(number: int) -> tuple[Scene, Row]:
     stiffness, speed, rate = log(1e2, 1e7), log(1e-3, 0.1), log(200.0, 5000.0)
     # A light plastic jaw to a large geared hand, as seen at the gap.
     mass = log(0.5, 300.0)
-    quantities: Row = {
-        "stiffness_n_m": stiffness,
-        "speed_m_s": speed,
-        "tick_s": 1.0 / rate,
-        "moving_mass_kg": mass,
-    }
     terms: dict[str, dict[str, float]] = {"elastic": {"k1_n_m": stiffness}}
     if rng.random() < 0.2:
         terms = {"rigid": {"hertz_n_m15": (stiffness / 1.5) ** 1.5 / math.sqrt(20.0)}}
     if rng.random() < 0.5:
-        quantities["mass_ratio"] = ratio = log(1e-5, 10.0)
+        ratio = log(1e-5, 10.0)
         terms["surface"] = {"mass_kg": mass * ratio, "k_n_m": max(stiffness * log(0.01, 1.0), 100.0)}
         critical = 2.0 * math.sqrt(terms["surface"]["k_n_m"] * mass * ratio)
         terms["surface"] |= {"damping_n_s_m": critical * log(0.01, 10.0), "contact_n_m": stiffness}
     if rng.random() < 0.5:
-        quantities["damping_ratio"] = share = log(1e-3, 30.0)
-        terms["loss"] = {"damping_n_s_m": share * 2.0 * math.sqrt(stiffness * mass)}
+        terms["loss"] = {"damping_n_s_m": log(1e-3, 30.0) * 2.0 * math.sqrt(stiffness * mass)}
     if rng.random() < 0.5:
-        quantities["relaxation_s"] = log(1e-6, 1e4)
-        terms["maxwell"] = {"k_n_m": stiffness * log(0.01, 3.0), "tau_s": quantities["relaxation_s"]}
+        relaxation_s = log(1e-6, 1e4)
+        terms["maxwell"] = {"k_n_m": stiffness * log(0.01, 3.0), "tau_s": relaxation_s}
     if rng.random() < 0.5:
-        quantities["head_space_m3"], quantities["vent_m2"] = (
-            log(1e-7, 2e-3),
-            log(1e-11, 1e-4) if rng.random() < 0.7 else 0.0,
-        )
+        head_space_m3 = log(1e-7, 2e-3)
+        vent_m2 = log(1e-11, 1e-4) if rng.random() < 0.7 else 0.0
         terms["gas"] = {
             "area_m2": log(1e-4, 5e-3),
             "area_slope_m": 0.0,
-            "volume_m3": quantities["head_space_m3"],
+            "volume_m3": head_space_m3,
         }
         terms["gas"] |= {"pressure_pa": ATMOSPHERE_PA, "exponent": 1.4, "bulge_m3_pa": log(1e-11, 1e-9)}
-        terms["gas"] |= {"heat_s": log(1e-2, 1e2), "vent_m2": quantities["vent_m2"]}
+        terms["gas"] |= {"heat_s": log(1e-2, 1e2), "vent_m2": vent_m2}
     if rng.random() < 0.15:
-        quantities["slosh_hz"] = log(0.5, 2000.0)
+        slosh_hz = log(0.5, 2000.0)
         terms["slosh"] = {
             "mass_kg": log(1e-3, 1.0),
-            "frequency_hz": quantities["slosh_hz"],
+            "frequency_hz": slosh_hz,
             "damping_ratio": log(1e-3, 2.0),
         }
     order = list(terms)
@@ -116,9 +95,9 @@ def scene_of(number: int) -> tuple[Scene, Row]:
     )
     straight = bool(rng.random() < 0.5)
     friction = log(0.1, 10.0)
-    quantities["sensor"] = "pads" if rng.random() < 0.3 else "ideal"
+    sensor: Any = "pads" if rng.random() < 0.3 else "ideal"
     config = SimConfig(
-        sensor=quantities["sensor"],
+        sensor=sensor,
         spread=False,
         rate_hz=rate,
         transmission="straight" if straight else "pr2",
@@ -133,49 +112,12 @@ def scene_of(number: int) -> tuple[Scene, Row]:
         pad_damping_n_s_m=0.0 if rng.random() < 0.5 else log(0.1, 100.0),
         open_gap_m=spec.width_m + 2.0 * abs(spec.offset_m) + min(max(0.5 * speed, 2e-3), 0.01),
     )
-    # Pads, and the object, in series.
-    series = 1.0 / (1.0 / stiffness + 2.0 / config.pad_stiffness_n_m)
-    quantities["phase_rad"] = math.sqrt(series / (mass if straight else 100.0)) / rate
-    return Scene(number=number, spec=spec, config=config, speed_m_s=speed), quantities
+    return Scene(spec=spec, config=config, speed_m_s=speed)
 
 
-class Interpreted(Bench):
-    """The same in the interpreter: slower, but without the half minute that compiling takes."""
-
-    def grasp(
-        self, scene: Scene, accuracy: float, fidelity: str
-    ) -> tuple[FinishedGrasp, GraspSetup, Reduction, Job]:
-        controller = create("controller", "hybrid", closing_speed_m_s=scene.speed_m_s)
-        config = evolve(scene.config, accuracy=accuracy, fidelity=fidelity)
-        run = RunConfig(grasp_timeout_s=20.0)
-        problem = Problem(config, scene.spec)
-        began = time.thread_time()
-        reduction = select(problem, GraspController(controller, run))
-        self.selection_s = time.thread_time() - began
-        setup = instantiate(problem, reduction, 0)
-        job = Job(config=config, controller=controller, run=run, extract=None, traces=True)
-        return grasp_plain(job, setup), setup, reduction, job
-
-
-def seconds_of(bench: Bench, job: Job, setup: GraspSetup) -> float:
-    """Return the processor time of a grasp once more, the median of some."""
-    spent = []
-    for _ in range(1 if isinstance(bench, Interpreted) else TIMES):
-        began = time.thread_time()
-        if isinstance(bench, Interpreted):
-            grasp_plain(job, setup)
-        else:
-            full = padded(setup, KINDS)
-            loop = bench.loop_of(job.config, full, type(job.controller).step)
-            compiled_grasp(job, full, loop, bench.storage)
-        spent.append(time.thread_time() - began)
-    return float(np.median(spent))
-
-
-def measured(bench: Bench, number: int) -> Row:
-    """Return the errors, decisions and times of a scene."""
-    scene, quantities = scene_of(number)
-    row: Row = {"scene": number, **quantities}
+def measured(bench: Bench, scene: Scene) -> Row:
+    """Return the errors and flags of the grasps in a scene."""
+    row: Row = {"sensor": scene.config.sensor}
     dt = 1.0 / scene.config.rate_hz
     try:
         reference, setup, reduction, _ = bench.grasp(scene, REFERENCE, "reference")
@@ -185,8 +127,6 @@ def measured(bench: Bench, number: int) -> Row:
     row["reference_resolved"] = reference.state.step.unresolved + reference.state.contact.unbalanced == 0
     for accuracy in ACCURACIES:
         row[f"{accuracy:g}"] = _case(bench, scene, accuracy, "scene", reference, dt)
-    fixed = evolve(scene, config=evolve(scene.config, step_s=1e-3))
-    row["fixed"] = _case(bench, fixed, 0.01, "scene", reference, dt)
     if not row["reference_resolved"] or any(row[f"{a:g}"]["error"] > a for a in ACCURACIES):
         even = evolve(scene, config=evolve(scene.config, step_s=EVEN_S))
         row["even"] = _case(bench, even, 0.01, "scene", reference, dt)["error"]
@@ -197,7 +137,7 @@ def _case(
     bench: Bench, scene: Scene, accuracy: float, fidelity: str, reference: FinishedGrasp, dt_s: float
 ) -> Row:
     try:
-        done, setup, reduction, job = bench.grasp(scene, accuracy, fidelity)
+        done, _, reduction, job = bench.grasp(scene, accuracy, fidelity)
     except ConfigError as error:
         return {"error": math.inf, "refused": str(error)[:200]}
     except ArithmeticError as error:
@@ -216,9 +156,6 @@ def _case(
         "of": quantity,
         "flags": flags,
         "chosen": reduction.decisions[0].decision,
-        "steps": state.step.n_steps,
-        "ms": 1e3 * seconds_of(bench, job, setup),
-        "selection_ms": 1e3 * bench.selection_s,
     }
 
 
@@ -230,7 +167,7 @@ def run(bench: Bench, file: Path, scenes: int, first_scene: int) -> list[Row]:
     rows = [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
     begin = rows[-1]["scene"] + 1 if rows else first_scene
     for number in range(begin, begin + scenes - len(rows)):
-        row = measured(bench, number)
+        row = {"scene": number, **measured(bench, scene_of(number))}
         rows.append(row)
         with file.open("a") as out:
             out.write(json.dumps(row) + "\n")
@@ -246,7 +183,7 @@ def share_words(n: int, total: int) -> str:
     return f"{n} of {total} ({n / total:.1%}; at least {wilson(n, total)[0]:.1%})"
 
 
-def page(rows: Sequence[Row], picture: str | None) -> str:
+def page(rows: Sequence[Row]) -> str:
     """Return the page in Markdown."""
     done = [row for row in rows if "failed" not in row]
     stable = [row for row in done if row["stable"] and row["sensor"] == "ideal"]
@@ -273,13 +210,11 @@ def page(rows: Sequence[Row], picture: str | None) -> str:
         "- *Unstable loop*: the sampled loop of controller and fingers amplifies a deviation from tick to tick. The "
         "report says so (`unstable_loop`), and lists peak, trace and features as not verified. This is not counted as "
         "a flag here.",
-        "- *Beyond 10, 1, 0.1 %*: the numbers of scenes with a larger error, in this order.",
         "- *At least*: the lower end of the 95 % Wilson interval.",
         "",
         _confirmed(stable, "Stable loop, ideal sensors"),
         _confirmed(unstable, "Unstable loop"),
         "",
-        *([f"![Regimes]({picture})", ""] if picture else []),
     ]
     for title, some in (
         ("Ideal sensors, stable loop", stable),
@@ -290,8 +225,6 @@ def page(rows: Sequence[Row], picture: str | None) -> str:
         ("Unstable loop", unstable),
     ):
         lines += ["", f"## {title}", "", *_within(some)]
-    lines += ["", "## Chosen steps", "", *_needed(stable + pads)]
-    lines += ["", "## Where fixed steps of 1 ms fail", "", *_fixed(stable)]
     lines += ["", "## Largest errors without a flag", "", *_misses(stable)]
     return "\n".join(lines) + "\n"
 
@@ -299,10 +232,9 @@ def page(rows: Sequence[Row], picture: str | None) -> str:
 def _summary(rows: Sequence[Row]) -> Iterator[str]:
     """Yield the result for an accuracy of 1 % with ideal sensors and a stable loop."""
     kept = sum(_is_kept(row["0.01"], 0.01) for row in rows)
-    beyond = sum(not _is_kept(row["fixed"], 0.01) for row in rows)
     yield (
         f"With ideal sensors and a stable loop, {kept} of {len(rows)} grasps are within an accuracy of 1 %, flagged or "
-        f"refused. Fixed steps of 1 ms are beyond 1 % without a flag in {beyond} of {len(rows)} scenes."
+        "refused."
     )
     yield ""
 
@@ -329,71 +261,20 @@ def _confirmed(rows: Sequence[Row], what: str) -> str:
 
 def _within(rows: Sequence[Row]) -> Iterator[str]:
     yield (
-        "| model | within | within, flagged or refused | flagged | refused | worst without a flag / accuracy "
-        "| ms a grasp | selection, ms |"
+        "| steps | within | within, flagged or refused | flagged | refused | worst without a flag / accuracy |"
     )
-    yield "|---|---|---|---|---|---|---|---|"
-    cases = [(f"{a:g}", a, f"selected for {a:.1%}") for a in ACCURACIES]
-    cases.append(("fixed", 0.01, "fixed steps of 1 ms, against 1 %"))
-    for name, accuracy, what in cases:
-        mine = [row[name] for row in rows]
-        if not mine:
-            continue
+    yield "|---|---|---|---|---|---|"
+    for accuracy in ACCURACIES if rows else ():
+        mine = [row[f"{accuracy:g}"] for row in rows]
         within = sum(case["error"] <= accuracy for case in mine)
         refused = sum("refused" in case for case in mine)
         flagged = sum(bool(case.get("flags")) for case in mine)
         silent = [case["error"] / accuracy for case in mine if "refused" not in case and not case["flags"]]
         kept = sum(_is_kept(case, accuracy) for case in mine)
-        ms = [case["ms"] for case in mine if "ms" in case]
-        selection = [case["selection_ms"] for case in mine if "ms" in case]
         yield (
-            f"| {what} | {share_words(within, len(mine))} | {share_words(kept, len(mine))} | {flagged} | {refused} "
-            f"| {max(silent, default=math.nan):.3g} | {_median(ms):.3g} | {_median(selection):.0f} |"
+            f"| selected for {accuracy:.1%} | {share_words(within, len(mine))} | {share_words(kept, len(mine))} "
+            f"| {flagged} | {refused} | {max(silent, default=math.nan):.3g} |"
         )
-
-
-def _median(values: Sequence[float]) -> float:
-    return float(np.median(values)) if values else math.nan
-
-
-def _needed(rows: Sequence[Row]) -> Iterator[str]:
-    yield "| accuracy | steps |"
-    yield "|---|---|"
-    for accuracy in ACCURACIES:
-        mine = [row[f"{accuracy:g}"] for row in rows if "refused" not in row[f"{accuracy:g}"]]
-        chosen = ", ".join(
-            f"{name} {n}" for name, n in Counter(case["chosen"] for case in mine).most_common()
-        )
-        yield f"| {accuracy:.1%} | {chosen} |"
-
-
-BINS: Final[Sequence[tuple[str, str, Sequence[float]]]] = (
-    ("phase_rad", "natural frequency of the contact times the tick, rad", (0.03, 0.1, 0.3, 1.0)),
-    ("mass_ratio", "mass ratio", (1e-4, 1e-2, 1.0)),
-    ("damping_ratio", "damping ratio", (0.1, 1.0, 10.0)),
-    ("relaxation_s", "relaxation time, s", (1e-4, 1e-2, 1.0)),
-    ("head_space_m3", "head space, m³", (1e-6, 1e-4)),
-    ("vent_m2", "vent, m²", (1e-9, 1e-7)),
-    ("speed_m_s", "approach, m/s", (0.01, 0.03)),
-    ("tick_s", "tick, s", (5e-4, 2e-3)),
-    ("slosh_hz", "slosh, Hz", (10.0, 100.0)),
-)
-
-
-def _fixed(rows: Sequence[Row]) -> Iterator[str]:
-    yield ("| quantity | range | scenes | fixed beyond 10, 1, 0.1 % | selected for 1 %: beyond, unflagged |")
-    yield "|---|---|---|---|---|"
-    for key, what, edges in BINS:
-        for least, most in zip((-math.inf, *edges), (*edges, math.inf), strict=True):
-            mine = [row for row in rows if least <= row.get(key, math.nan) < most]
-            if not mine:
-                continue
-            beyond = ", ".join(str(sum(row["fixed"]["error"] > a for row in mine)) for a in ACCURACIES)
-            silent = sum(not _is_kept(row["0.01"], 0.01) for row in mine)
-            within = f"below {most:g}" if math.isinf(least) else f"from {least:g}"
-            if math.isfinite(least) and math.isfinite(most):
-                within = f"{least:g} to {most:g}"
-            yield f"| {what} | {within} | {len(mine)} | {beyond} | {silent} |"
 
 
 def _misses(rows: Sequence[Row]) -> Iterator[str]:
@@ -421,48 +302,6 @@ def _misses(rows: Sequence[Row]) -> Iterator[str]:
     )
 
 
-def draw(rows: Sequence[Row], file: Path) -> None:
-    """Draw the errors over the regimes, as a small PNG."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    some = [row for row in rows if "failed" not in row and row["stable"] and row["sensor"] == "ideal"]
-    figure = Figure(figsize=(13.0, 4.0), dpi=80, layout="constrained")
-    FigureCanvasAgg(figure)
-    axes: Any = figure.subplots(1, 3)
-    for ax, (name, what) in zip(
-        axes.ravel(),
-        (
-            ("0.01", "selected for 1 %"),
-            ("0.001", "selected for 0.1 %"),
-            ("fixed", "fixed 1 ms"),
-        ),
-        strict=True,
-    ):
-        looks: Sequence[tuple[str, str, Callable[[Row], bool]]] = (
-            ("C0", "no flag", lambda case: not case.get("flags") and "refused" not in case),
-            ("C1", "flagged", lambda case: bool(case.get("flags"))),
-            ("C3", "refused", lambda case: "refused" in case),
-        )
-        for colour, label, has in looks:
-            mine = [row for row in some if has(row[name])]
-            ax.plot(
-                [row["phase_rad"] for row in mine],
-                [min(max(row[name]["error"], 1e-7), 3.0) for row in mine],
-                ".",
-                color=colour,
-                label=label,
-            )
-        for accuracy in ACCURACIES:
-            ax.axhline(accuracy, color="0.7", lw=0.7)
-        ax.set(xscale="log", yscale="log", title=what, ylim=(5e-8, 5.0))
-        ax.set(
-            xlabel="natural frequency of the contact times the tick, rad", ylabel="error (3: other outcome)"
-        )
-        ax.legend(fontsize=8)
-    figure.savefig(file, format="png")
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -478,16 +317,12 @@ def main() -> None:
     if given.short:
         given.scenes, first_scene = 1, 1  # a scene drawn anew may take minutes
     with tempfile.TemporaryDirectory() as folder:
-        bench = Interpreted() if given.short or given.interpreter else Bench()
+        bench = Bench(compiled=not (given.short or given.interpreter))
         rows = run(bench, given.rows or Path(folder) / "rows.jsonl", given.scenes, first_scene)
     if given.markdown:
-        picture = given.markdown.with_suffix(".png")
-        draw(rows, picture)
-        given.markdown.write_text(
-            page(rows, os.path.relpath(picture, given.markdown.parent)), encoding="utf-8"
-        )
+        given.markdown.write_text(page(rows), encoding="utf-8")
     else:
-        print(page(rows, None))
+        print(page(rows))
 
 
 if __name__ == "__main__":

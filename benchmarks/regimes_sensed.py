@@ -35,19 +35,17 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from attrs import evolve
 from numpy.typing import NDArray
+from random_scenes import KINDS, Bench, Scene, controller_is_stable
 from regimes import scene_of, share_words
 from scipy.stats import binomtest
-from selection import KINDS, Bench, Scene, compiled_grasp, controller_is_stable
 
 from graspsense.experiments.versions import where_measured
 from graspsense.gripper_api import Outcome
 from graspsense.plugin_api import ConfigError, Features, create
 from graspsense.simulator_api import RunConfig
 from graspsense_sim_gripper.run.accuracy.error import UNIT_SCALES
-from graspsense_sim_gripper.run.accuracy.select import select
-from graspsense_sim_gripper.run.batch.job import Job, grasp_plain
+from graspsense_sim_gripper.run.batch.job import Job
 from graspsense_sim_gripper.run.build import Problem, instantiate
-from graspsense_sim_gripper.run.compiled.padding import padded
 from graspsense_sim_gripper.run.model_report import accuracy_report, model_report
 from graspsense_sim_gripper.run.problem import GraspController
 
@@ -62,10 +60,6 @@ RESAMPLES: Final = 400
 LEAST_PAIRS: Final = 5
 DIFFERS: Final = 0.05
 """Probability below which two distributions are taken as different."""
-WAYS: Final = {
-    "selected": {"accuracy": ACCURACY},
-    "fixed": {"fidelity": "scene", "step_s": 1e-3},
-}
 
 
 def sensed(scene: Scene) -> Scene:
@@ -78,13 +72,12 @@ def sensed(scene: Scene) -> Scene:
 class Grasps:
     """The instances of a scene, grasped in one model."""
 
-    def __init__(self, bench: Bench | None, scene: Scene, settings: Row) -> None:
+    def __init__(self, bench: Bench, scene: Scene, settings: Row) -> None:
         features = create("feature-set", "chitta")
         controller = create("controller", "hybrid", closing_speed_m_s=scene.speed_m_s)
         config, run = evolve(scene.config, **settings), RunConfig(grasp_timeout_s=20.0)
         self.bench, self.problem = bench, Problem(config, scene.spec)
-        law = GraspController(controller, run, features)
-        self.reduction = select(self.problem, law, compiled=bench is not None, padding=KINDS)
+        self.reduction = bench.selected(self.problem, GraspController(controller, run, features))
         self.job = Job(config=config, controller=controller, run=run, extract=features.extract, traces=False)
         self.features: list[Features] = []
         self.outcomes: list[Outcome] = []
@@ -95,15 +88,10 @@ class Grasps:
         """Grasp further instances until there are so many."""
         for seed in range(len(self.features), instances):
             setup = instantiate(self.problem, self.reduction, seed)
-            if self.bench is None:
-                done = grasp_plain(self.job, setup)
-            else:
-                full = padded(setup, KINDS)
-                loop = self.bench.loop_of(self.job.config, full, type(self.job.controller).step)
-                done = compiled_grasp(self.job, full, loop, self.bench.storage)
+            done = self.bench.run(self.job, setup)
             self.features.append(done.extracted)
             self.outcomes.append(done.outcome)
-            report = model_report(done.state, KINDS if self.bench else setup.kinds)
+            report = model_report(done.state, KINDS if self.bench.compiled else setup.kinds)
             self.doubts.update(accuracy_report(report, self.reduction, "")["not_verified"])
 
 
@@ -162,7 +150,7 @@ def compared(ours: Sequence[Features], theirs: Sequence[Features]) -> dict[str, 
     return result
 
 
-def finest(bench: Bench | None, scene: Scene) -> Grasps:
+def finest(bench: Bench, scene: Scene) -> Grasps:
     """Return the grasps that a model is compared with. Raises ConfigError if the reference is refused."""
     fast, reference = FINEST
     with suppress(ConfigError):
@@ -172,10 +160,9 @@ def finest(bench: Bench | None, scene: Scene) -> Grasps:
     return Grasps(bench, scene, reference)
 
 
-def measured(bench: Bench | None, number: int, instances: int) -> Row:
+def measured(bench: Bench, number: int, instances: int) -> Row:
     """Return the distances of a scene, from so many instances."""
-    scene, _ = scene_of(number)
-    scene, row = sensed(scene), {"scene": number}
+    scene, row = sensed(scene_of(number)), {"scene": number}
     try:
         best = finest(bench, scene)
         row["by"] = best.job.config.fidelity
@@ -191,15 +178,14 @@ def measured(bench: Bench | None, number: int, instances: int) -> Row:
             best.extend(instances)
     except (ArithmeticError, ConfigError) as error:
         return {**row, "failed": f"the reference: {error}"[:200]}
-    for way, settings in WAYS.items():
-        try:
-            grasps = Grasps(bench, scene, settings)
-            row[way] = compared = against(best, grasps, 0, instances)
-            if largest(compared) > ACCURACY and not compared["doubts"]:
-                fresh = against(best, grasps, instances, (1 + AGAIN) * instances)
-                row[way] = {**fresh, "before": largest(compared)}
-        except (ArithmeticError, ConfigError) as error:
-            row[way] = {"refused": f"{type(error).__name__}: {error}"[:200]}
+    try:
+        grasps = Grasps(bench, scene, {"accuracy": ACCURACY})
+        row["selected"] = compared = against(best, grasps, 0, instances)
+        if largest(compared) > ACCURACY and not compared["doubts"]:
+            fresh = against(best, grasps, instances, (1 + AGAIN) * instances)
+            row["selected"] = {**fresh, "before": largest(compared)}
+    except (ArithmeticError, ConfigError) as error:
+        row["selected"] = {"refused": f"{type(error).__name__}: {error}"[:200]}
     return row
 
 
@@ -248,35 +234,26 @@ def page(rows: Sequence[Row], instances: int) -> list[str]:
         "| largest distance without a flag |",
         "|---|---|---|---|---|---|---|---|",
     ]
-    for way, words in (("selected", "selected for 1 %"), ("fixed", "fixed steps of 1 ms")):
-        mine = [row[way] for row in done]
-        known = [case for case in mine if "refused" not in case]
-        worst = [(largest(case), case) for case in known]
-        upper = [max(max(u, gone) for _, u, gone, _ in case["features"].values()) for case in known]
-        different = sum(differs(case) and not case["doubts"] for case in known)
-        within = sum(d <= ACCURACY for d, _ in worst)
-        told = sum(d <= ACCURACY or bool(case["doubts"]) for d, case in worst) + len(mine) - len(known)
-        silent = max((d for d, case in worst if not case["doubts"]), default=math.nan)
-        lines.append(
-            f"| {words} | {share_words(within, len(mine))} | {share_words(told, len(mine))} "
-            f"| {share_words(sum(u <= ACCURACY for u in upper), len(mine))} "
-            f"| {share_words(len(mine) - different, len(mine))} "
-            f"| {sum(bool(case['doubts']) for case in known)} | {len(mine) - len(known)} | {silent:.2g} |"
-        )
+    cases = [row["selected"] for row in done]
+    known = [case for case in cases if "refused" not in case]
+    worst = [(largest(case), case) for case in known]
+    upper = [max(max(u, gone) for _, u, gone, _ in case["features"].values()) for case in known]
+    different = sum(differs(case) and not case["doubts"] for case in known)
+    within = sum(d <= ACCURACY for d, _ in worst)
+    told = sum(d <= ACCURACY or bool(case["doubts"]) for d, case in worst) + len(cases) - len(known)
+    silent = max((d for d, case in worst if not case["doubts"]), default=math.nan)
     lines += [
+        f"| selected for 1 % | {share_words(within, len(cases))} | {share_words(told, len(cases))} "
+        f"| {share_words(sum(u <= ACCURACY for u in upper), len(cases))} "
+        f"| {share_words(len(cases) - different, len(cases))} "
+        f"| {sum(bool(case['doubts']) for case in known)} | {len(cases) - len(known)} | {silent:.2g} |",
         "",
-        "| feature | median distance | 95th percentile | scenes beyond 1 %, unflagged |",
-        "|---|---|---|---|",
+        "| feature | median distance |",
+        "|---|---|",
     ]
-    known = [row["selected"] for row in done if "refused" not in row["selected"]]
     for name in known[0]["features"] if known else ():
         distances = [case["features"][name][0] for case in known]
-        beyond = sum(
-            Distance(*case["features"][name]).largest > ACCURACY and not case["doubts"] for case in known
-        )
-        lines.append(
-            f"| `{name}` | {np.median(distances):.1e} | {np.quantile(distances, 0.95):.1e} | {beyond} |"
-        )
+        lines.append(f"| `{name}` | {np.median(distances):.1e} |")
     return lines
 
 
@@ -298,7 +275,7 @@ def main() -> None:
         rows = [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
         first_scene = rows[0]["scene"] if rows else first_scene
         known = {row["scene"] for row in rows}
-        bench = None if given.short else Bench()
+        bench = Bench(compiled=not given.short)
         for number in range(first_scene, first_scene + given.scenes):
             if number in known:
                 continue

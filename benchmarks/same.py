@@ -8,9 +8,9 @@ own: the `.venv` of its checkout, or a new one with the same packages (some minu
 next time). Compiled code and chosen models are cached apart for each version.
 
 Compared are the traces, outcomes and features of every object of the catalogue under three controllers, with ideal
-sensors and with pads, one grasp at a time and as a batch; sixty random scenes of `benchmarks/selection.py`, with the
-spread of friction and without; an emulated PR2 gripper; the trees of the C4.5 oracles by both engines; and the default
-model, as shipped and trained again. Two numbers are the same where all their bits are; NaN equals NaN. Whatever differs
+sensors and with pads, one grasp at a time and as a batch; sixty random scenes of `random_scenes.py`, with the spread of
+friction and without; an emulated PR2 gripper; the trees of the C4.5 oracles by both engines; and the default model, as
+shipped and trained again. Two numbers are the same where all their bits are; NaN equals NaN. Whatever differs
 is listed with the largest difference, and the exit code is then 1. Times are processor times of one thread; the two
 versions are timed in turn, and the table gives the median ratio of the rounds with its range.
 """
@@ -193,8 +193,8 @@ def catalogue() -> list[str]:
 
 
 def scene_files(count: int, folder: Path) -> list[dict[str, Any]]:
-    """Write random scenes of `benchmarks/selection.py` as files; return each with its gripper settings and speed."""
-    from selection import scene_of
+    """Write random scenes of `random_scenes.py` as files; return each with its gripper settings and speed."""
+    from random_scenes import scene_of
 
     scenes = []
     for number in range(count):

@@ -5,30 +5,23 @@
 Many grasps (`many`): the catalogue in turn, with features, on one core and on all, with pads and with ideal sensors,
 in turn; the median, the least and the most of the repeats. By their number (`number`): batches of a hundred to
 `--largest` grasps on all cores. Compiling (`compile`): all of the catalogue in a fresh process, with an empty cache and
-a full one. Values that were not measured are null. On a busy machine only processor times are meaningful. `--short`
-simulates 300 grasps once. Other engines: `peers.py`.
+a full one. On a busy machine only processor times are meaningful. `--short` simulates 300 grasps once.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-import math
 import os
-import platform
 import resource
 import subprocess
 import sys
 import tempfile
 import time
-from datetime import date
-from importlib.metadata import PackageNotFoundError, version
-from importlib.util import find_spec
-from pathlib import Path
 from statistics import median
 from typing import Any, Final
 
-from graspsense import __version__
+from graspsense.experiments.versions import measured_on
 from graspsense.plugin_api import create
 from graspsense.sources.simulated import BATCH_WITHOUT_TRACES
 from graspsense_sim_gripper.config import SimConfig
@@ -55,7 +48,7 @@ def main() -> None:
         print(json.dumps(compile_catalogue()))
         return
     wanted = {"many"} if given.short else set(given.only.split(","))
-    result: dict[str, Any] = {"made": made()}
+    result: dict[str, Any] = {**measured_on()}
     if "compile" in wanted:
         result.update(compiling())
     if "many" in wanted:
@@ -64,7 +57,7 @@ def main() -> None:
         result.update(by_number(given.largest))
     result["load_at_the_end"] = os.getloadavg()[0]
     if given.json:
-        print(json.dumps(finite(result), indent=2))
+        print(json.dumps(result, indent=2))
         return
     for key, value in result.items():
         print(f"{key:<32}{in_words(value)}")
@@ -75,33 +68,6 @@ def in_words(value: Any) -> str:
     if isinstance(value, dict) and "median" in value:
         return f"{value['median']:.0f} ({value['least']:.0f} to {value['most']:.0f})"
     return f"{value:.4g}" if isinstance(value, float) else str(value)
-
-
-def made() -> dict[str, Any]:
-    measured: dict[str, Any] = {
-        "date": date.today().isoformat(),
-        "processor": processor(),
-        "cores": os.cpu_count(),
-        "python": platform.python_version(),
-        "graspsense": __version__,
-        "load_at_the_start": round(os.getloadavg()[0], 1),
-    }
-    for name in ("numpy", "numba", "scipy", "mujoco", "scikit-sundae"):
-        try:
-            measured[name] = version(name)
-        except PackageNotFoundError:
-            measured[name] = "not installed"
-    return measured
-
-
-def processor() -> str:
-    try:
-        for line in Path("/proc/cpuinfo").read_text().splitlines():
-            if line.startswith("model name"):
-                return line.partition(":")[2].strip()
-    except OSError:
-        pass
-    return platform.processor() or platform.machine()
 
 
 # -------------------------------------------------------------------------------------------------- many
@@ -182,8 +148,6 @@ def compile_catalogue() -> dict[str, float]:
 
 def compiling() -> dict[str, Any]:
     """Return what compiling the catalogue takes with an empty and with a full cache: seconds of processor, and wall."""
-    if find_spec("numba") is None:
-        return {"compile_cold_s": None, "compile_warm_s": None}
     result: dict[str, Any] = {}
     with tempfile.TemporaryDirectory() as folder:
         environment = {**os.environ, "NUMBA_CACHE_DIR": folder, "XDG_CACHE_HOME": folder}
@@ -199,15 +163,6 @@ def compiling() -> dict[str, Any]:
             result[name] = spent["processor"]
             result[f"{name}_on_the_clock"] = spent["wall"]
     return result
-
-
-def finite(value: Any) -> Any:
-    """Return the value with null for what JSON has no number for."""
-    if isinstance(value, dict):
-        return {key: finite(part) for key, part in value.items()}
-    if isinstance(value, list):
-        return [finite(part) for part in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 if __name__ == "__main__":

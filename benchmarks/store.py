@@ -10,14 +10,12 @@ from __future__ import annotations
 
 import argparse
 import json
-import platform
 import random
 import sqlite3
 import statistics
 import tempfile
 import time
 from collections.abc import Callable
-from datetime import date
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +23,7 @@ import numpy as np
 from graspsense.core.components.registry import installed
 from graspsense.core.learn.model import load_model, train
 from graspsense.core.values.errors import GraspsenseError
+from graspsense.experiments.versions import measured_on
 from graspsense.plugin_api import create
 from graspsense.recording.recording_info import RecordingInfo
 from graspsense.recording.trial_record import DeviceRecord, FeatureValues, TrialRecord, TrialResult
@@ -107,7 +106,7 @@ def main() -> None:
         print(json.dumps(result, indent=2))
         return
     for key, value in result.items():
-        print(f"{key:<24}{value if not isinstance(value, float) else round(value, 4)}")
+        print(f"{key:<34}{value if not isinstance(value, float) else round(value, 4)}")
 
 
 def measure(folder: Path) -> dict[str, object]:
@@ -139,9 +138,7 @@ def measure(folder: Path) -> dict[str, object]:
         model.answers(labelled_store(str(folder)).table)
 
     return {
-        "date": date.today().isoformat(),
-        "machine": f"{platform.processor() or platform.machine()}, {platform.system()} {platform.release()}",
-        "python": platform.python_version(),
+        **measured_on(),
         "sqlite": sqlite3.sqlite_version,
         "trials": len(labelled),
         "store_bytes": (folder / "store.sqlite").stat().st_size,

@@ -3,9 +3,7 @@
     python plugins/identify/benchmarks/identify.py [--repeats 4] [--only NAME...] [--sensors NAME...] [...]
     python plugins/identify/benchmarks/identify.py --delays 0 0.01 0.025 [...] [--rows FILE] [--markdown FILE]
     python plugins/identify/benchmarks/identify.py --spreads 0 0.3 [...] [--rows FILE] [--markdown FILE]
-    python plugins/identify/benchmarks/identify.py --true-terms [...] [--rows FILE] [--markdown FILE]
     python plugins/identify/benchmarks/identify.py --rows FILE --markdown FILE
-    python plugins/identify/benchmarks/identify.py --true-steps 6 [--recordings 30] [--rows FILE] [--markdown FILE]
     python plugins/identify/benchmarks/identify.py --transfer [--rows FILE] [--markdown FILE] [--png FILE]
 
 Each scene below is grasped in simulation by the hybrid controller with a hold, with ideal sensors, with PR2 pads, and
@@ -15,13 +13,6 @@ between objects (10 %). The scene is then identified from these grasps. A row sa
 chosen, and how many of the 90 % intervals hold the true values where they were. An interval of a single squeeze is of
 this squeeze, whose object has the nominal stiffness. Rows are appended to the file of `--rows`, and `--markdown` writes
 its tables between the marks of a page.
-
-With `--true-terms`: the true terms are given, and only they are fitted, which takes a fifth of the time. Their table is
-that of the coverage of intervals. Many scenes are needed for it: the parameters of a scene share an error that is
-drawn once, that of the mean stiffness of its objects, or, with one squeeze and pads, that of the friction of the drive.
-How often this error lies within its own 90 % interval is known without a measurement, and is nine of ten. So the table
-also has the coverage with the scenes of both kinds weighted by nine and one tenths (post-stratification: Cochran,
-Sampling Techniques, 3rd edition, 1977, section 5A.9).
 
 With `--delays`: the forces of the recordings are late by these times (s), of which the settings of the gripper do not
 know, and their table is that of the delays that come back.
@@ -33,9 +24,6 @@ With `--transfer`: four containers of the catalogue are the real world. From 1, 
 a classifier is trained on the recordings, and another on simulated squeezes of the scenes that they were identified as.
 A third is trained on as many simulated squeezes of the true scenes: an identification does no better on average. All
 are tested on 40 other recordings of each container.
-
-With `--true-steps 6`: what is replaced in the identified scenes by the numbers of the true ones, step by step, and what
-rate classifiers trained on six draws of them have.
 """
 
 from __future__ import annotations
@@ -43,14 +31,11 @@ from __future__ import annotations
 import argparse
 import json
 import math
-import os
-import platform
 import tempfile
 import time
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
-from datetime import date
-from itertools import product
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import groupby, product
 from pathlib import Path
 from typing import Any, Final
 
@@ -61,18 +46,16 @@ from graspsense import load_pipeline
 from graspsense.classifier_api import table_of
 from graspsense.core.components.identification import Identification, RecordedSqueeze
 from graspsense.evaluation.intervals import wilson
+from graspsense.experiments.versions import where_measured
 from graspsense.plugin_api import create
 from graspsense.simulator_api import RunConfig
 from graspsense_identify.gas import combinations
-from graspsense_identify.interval import LEVEL, interval_of_mean, normal
+from graspsense_identify.interval import interval_of_mean
 from graspsense_identify.laws import SLOTS
 from graspsense_identify.run import identify
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.run.drawing import FRICTION
 from graspsense_sim_gripper.scene.instance import _draws_of_number
 from graspsense_sim_gripper.scene.library import SCENE_IN_MEMORY
-from graspsense_sim_gripper.scene.library import find as find_object
-from graspsense_sim_gripper.scene.random_numbers import GRASP, draw_normals, key_of
 from graspsense_sim_gripper.scene.terms.gas import Gas
 
 WIDTH_M: Final = 0.05
@@ -148,16 +131,6 @@ TOLD_APART: Final = 1.03
 FORCE_N: Final = 18.0
 CONTAINERS: Final = ("odwalla:empty_open", "naked:empty_open", "can:empty_open", "water:empty_open")
 TRANSFER_COUNTS: Final = (1, 3, 10, 30)
-TRUE_STEPS: Final[Sequence[tuple[str, Sequence[str] | None]]] = (
-    ("nothing", ()),
-    ("also the spread of the share", ("share_spread",)),
-    ("also offset, mass and friction on the table", ("offset_spread_m", "mass_kg", "friction")),
-    ("also the share of the cells", ("share",)),
-    ("also the width and its spread", ("width_m", "width_spread_m")),
-    ("also the spread of the stiffness", ("stiffness_spread",)),
-    ("everything", None),
-)
-"""What is replaced by the true values in the rows of `--true-steps`, one after the other."""
 TESTED: Final = 40
 SIMULATED: Final = 40
 """Simulated squeezes of each scene, each of another object: with fewer objects, their spreads show less."""
@@ -316,22 +289,6 @@ def mean_is_covered(row: Mapping[str, Any]) -> bool:
     return low < 0.0 < high
 
 
-def drawn_are_covered(row: Mapping[str, Any]) -> bool | None:
-    """Return whether the error that is common to the parameters of a scene lies within its 90 % interval.
-
-    It is that of the mean stiffness of its objects; of a single squeeze with pads that of the friction of the drive.
-    None for a single squeeze with ideal sensors, which has no such error. It uses no measurement.
-    """
-    if row["recordings"] > 1:
-        return mean_is_covered(row)
-    if row["sensor"] == "ideal":
-        return None
-    (seed,) = seeds_of(row["scene"], row["sensor"], 1, row["repeat"])
-    friction = np.empty(2)
-    draw_normals(key_of(seed), GRASP, FRICTION, len(friction), friction)
-    return bool(abs(friction[0]) < normal())
-
-
 def measured(
     name: str,
     sensor: str,
@@ -339,17 +296,14 @@ def measured(
     repeat: int,
     late_s: float = 0.0,
     own_spread: float = 0.0,
-    *,
-    terms_known: bool = False,
 ) -> Row:
-    """Return the row of a scene. `terms_known`: only the true terms are fitted."""
+    """Return the row of a scene."""
     terms = drawn(ALL_SCENES[name], repeat)
     text = scene_text(terms, STIFFNESS_SPREAD if count > 1 else 0.0, OWN_SPREADS.get(name, ""), own_spread)
     seeds = seeds_of(name, sensor, count, repeat)
     squeezes = squeezes_of(text, name, SENSORS[sensor], [str(seed) for seed in seeds], seeds)
-    only = named(terms) if terms_known else ""
     late = [delayed(squeeze, late_s) for squeeze in squeezes]
-    result = identify(SimConfig(), late, lambda *_: None, only=only)
+    result = identify(SimConfig(), late, lambda *_: None)
     chosen = next(candidate for candidate in result.candidates if candidate.chosen)
     true = next((candidate for candidate in result.candidates if candidate.terms == named(terms)), None)
     right = true is chosen
@@ -436,11 +390,11 @@ def _covered_share(group: Sequence[Mapping[str, Any]]) -> str:
 def as_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
     """Return the tables of these rows: by sensor and number of recordings, and by scene."""
 
-    def line(head: Sequence[str], group: Sequence[Mapping[str, Any]]) -> str:
+    def line(head: Sequence[str], group: Sequence[Mapping[str, Any]]) -> Sequence[str]:
         apart = [row for row in group if row["told_apart"]]
         several = [row for row in group if row["recordings"] > 1]
         errors = [abs(value / truth - 1.0) for row in group for _, truth, value, *_ in row["parameters"]]
-        cells = (
+        return (
             *head,
             str(len(group)),
             _share(sum(row["right_terms"] for row in group), len(group)),
@@ -450,78 +404,39 @@ def as_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
             f"{100.0 * float(np.median(errors)):.2g} %" if errors else "–",
             f"{float(np.median([row['seconds'] for row in group])):.1f} s",
         )
-        return "| " + " | ".join(cells) + " |"
 
     columns = ("scenes", "right terms", "where the data tell them apart", "90 % intervals that cover")
     columns += ("scenes whose drawn objects cover", "median error", "median time")
-
-    def header(head: Sequence[str]) -> list[str]:
-        names = (*head, *columns)
-        return table_head(names)
-
-    lines = header(("sensor", "squeezes"))
-    for sensor in SENSORS:
-        for count in COUNTS:
-            group = [row for row in rows if row["sensor"] == sensor and row["recordings"] == count]
-            if group:
-                lines.append(line((sensor, str(count)), group))
-    lines += [line(("all", "all"), rows), "", *header(("scene",))]
-    for name in ALL_SCENES:
-        group = [row for row in rows if row["scene"] == name]
-        if group:
-            lines.append(line((name,), group))
-    return "\n".join(lines)
-
-
-def table_head(columns: Sequence[str]) -> list[str]:
-    """Return the first lines of a table in Markdown."""
-    return ["| " + " | ".join(columns) + " |", "|" + "---|" * len(columns)]
-
-
-def coverage_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
-    """Return the table of the coverage with the true terms given: by sensor and number of recordings."""
-    columns = (
-        "sensor",
-        "squeezes",
-        "scenes",
-        "90 % intervals that cover",
-        "scenes whose drawn error is covered",
-    )
-    columns += ("intervals that cover there", "and in the other scenes", "weighted by nine and one tenths")
-    lines = table_head(columns)
-    for sensor, count in product(SENSORS, COUNTS):
-        group = [row for row in rows if row["sensor"] == sensor and row["recordings"] == count]
-        within = [row for row in group if drawn_are_covered(row)]
-        beyond = [row for row in group if drawn_are_covered(row) is False]
-        if not group:
-            continue
-        cells = (
-            *(sensor, str(count), str(len(group)), _covered_share(group)),
-            _share(len(within), len(within) + len(beyond)),
-            *(_hits(within), _hits(beyond), _weighted(within, beyond)),
+    by_sensor = [line(map(str, head), group) for head, group in grouped(rows, "sensor", "recordings")]
+    by_scene = [line(head, group) for head, group in grouped(rows, "scene")]
+    return "\n\n".join(
+        (
+            table(("sensor", "squeezes", *columns), [*by_sensor, line(("all", "all"), rows)]),
+            table(("scene", *columns), by_scene),
         )
-        lines.append("| " + " | ".join(cells) + " |")
-    return "\n".join(lines)
+    )
 
 
-def _hits(group: Sequence[Mapping[str, Any]]) -> str:
-    covered = _covered([row["parameters"] for row in group])
-    return f"{sum(covered)} of {len(covered)}" if covered else "–"
+def table(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Return a table in Markdown."""
+    head, *lines = (f"| {' | '.join(cells)} |" for cells in (columns, *rows))
+    return "\n".join((head, "|" + "---|" * len(columns), *lines))
 
 
-def _weighted(within: Sequence[Mapping[str, Any]], beyond: Sequence[Mapping[str, Any]]) -> str:
-    """Return the coverage with the probabilities of both kinds of scenes, and its standard error between scenes."""
-    if len(within) < 2 or len(beyond) < 2:
-        return "–"
-    share = variance = 0.0
-    for weight, group in ((LEVEL, within), (1.0 - LEVEL, beyond)):
-        sizes = np.array([len(row["parameters"]) for row in group])
-        hits = np.array([sum(_covered([row["parameters"]])) for row in group])
-        own = float(hits.sum() / sizes.sum())
-        squares = float(np.sum((hits - own * sizes) ** 2)) * len(group) / (len(group) - 1)
-        share += weight * own
-        variance += weight**2 * squares / float(sizes.sum()) ** 2
-    return f"{100.0 * share:.0f} ± {100.0 * math.sqrt(variance):.1f} %"
+def grouped(
+    rows: Sequence[Mapping[str, Any]], *keys: str
+) -> Iterator[tuple[tuple[Any, ...], Sequence[Mapping[str, Any]]]]:
+    """Yield the rows with the same values of these keys, with these values: by sensor, and in order."""
+
+    def values(row: Mapping[str, Any]) -> tuple[Any, ...]:
+        return tuple(row[key] for key in keys)
+
+    def place(row: Mapping[str, Any]) -> tuple[Any, ...]:
+        order = {"sensor": list(SENSORS), "scene": list(ALL_SCENES)}
+        return tuple(order[key].index(row[key]) if key in order else row[key] for key in keys)
+
+    for group_values, group in groupby(sorted(rows, key=place), key=values):
+        yield group_values, list(group)
 
 
 def delays_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
@@ -529,29 +444,22 @@ def delays_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
     columns = ("sensor", "squeezes", "forces late by", "scenes", "delay used", "not determined")
     columns += ("90 % intervals of the delay that cover", "median error of the delay", "right terms")
     columns += ("90 % intervals of the parameters that cover",)
-    lines = table_head(columns)
-    for key in sorted(
-        {(list(SENSORS).index(row["sensor"]), row["recordings"], row["late_s"]) for row in rows}
-    ):
-        sensor, count, late_s = list(SENSORS)[key[0]], key[1], key[2]
-        group = [
-            row
-            for row in rows
-            if (row["sensor"], row["recordings"], row["late_s"]) == (sensor, count, late_s)
-        ]
+    lines = []
+    for (sensor, count, late_s), group in grouped(rows, "sensor", "recordings", "late_s"):
         delays = [row["delay"] for row in group if row["delay"]]
         errors = [1e3 * abs(value - late_s) for value, *_ in delays]
         covered = _covered([row["parameters"] for row in group])
-        cells = (
-            *(sensor, str(count), f"{1e3 * late_s:.0f} ms", str(len(group))),
-            *(str(sum(delay[3] for delay in delays)), str(len(group) - len(delays))),
-            _share(sum(low <= late_s <= high for _, low, high, _ in delays), len(delays)),
-            f"{float(np.median(errors)):.2g} ms" if errors else "–",
-            _share(sum(row["right_terms"] for row in group), len(group)),
-            _share(sum(covered), len(covered)),
+        lines.append(
+            (
+                *(sensor, str(count), f"{1e3 * late_s:.0f} ms", str(len(group))),
+                *(str(sum(delay[3] for delay in delays)), str(len(group) - len(delays))),
+                _share(sum(low <= late_s <= high for _, low, high, _ in delays), len(delays)),
+                f"{float(np.median(errors)):.2g} ms" if errors else "–",
+                _share(sum(row["right_terms"] for row in group), len(group)),
+                _share(sum(covered), len(covered)),
+            )
         )
-        lines.append("| " + " | ".join(cells) + " |")
-    return "\n".join(lines)
+    return table(columns, lines)
 
 
 def spreads_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
@@ -566,29 +474,22 @@ def spreads_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
         "claimed of another parameter",
     )
     columns += ("90 % intervals that cover", "median of what was claimed")
-    lines = table_head(columns)
-    keys = {
-        (list(SENSORS).index(row["sensor"]), row["recordings"], row["scene"], row["own_spread"])
-        for row in rows
-    }
-    for place, count, scene, spread in sorted(keys):
-        sensor, parameter = list(SENSORS)[place], OWN_SPREADS[scene]
-        group = [
-            row
-            for row in rows
-            if (row["sensor"], row["recordings"], row["scene"], row["own_spread"])
-            == (sensor, count, scene, spread)
-        ]
+    lines = []
+    for (sensor, count, scene, spread), group in grouped(rows, "sensor", "recordings", "scene", "own_spread"):
+        parameter = OWN_SPREADS[scene]
         claims = [claim for row in group for claim in row["spreads"] if claim[0] == parameter]
         others = sum(any(claim[0] != parameter for claim in row["spreads"]) for row in group)
-        cells = (
-            *(sensor, str(count), f"`{parameter}`", f"{spread:g}", str(len(group))),
-            *(_share(len(claims), len(group)), str(others)),
-            _share(sum(low <= spread <= high for *_, low, high in claims), len(claims)) if spread else "–",
-            f"{float(np.median([value for _, value, *_ in claims])):.2g}" if claims else "–",
+        lines.append(
+            (
+                *(sensor, str(count), f"`{parameter}`", f"{spread:g}", str(len(group))),
+                *(_share(len(claims), len(group)), str(others)),
+                _share(sum(low <= spread <= high for *_, low, high in claims), len(claims))
+                if spread
+                else "–",
+                f"{float(np.median([value for _, value, *_ in claims])):.2g}" if claims else "–",
+            )
         )
-        lines.append("| " + " | ".join(cells) + " |")
-    return "\n".join(lines)
+    return table(columns, lines)
 
 
 def write_between(path: Path, mark: str, text: str) -> None:
@@ -601,8 +502,8 @@ def write_between(path: Path, mark: str, text: str) -> None:
     path.write_text(f"{head}{begin}\n{text}\n{end}{after}", encoding="utf-8")
 
 
-def transfer(counts: Sequence[int], tested: int, classifier: str = "forest") -> list[dict[str, float]]:
-    """Return the recognition rates of classifiers trained on recordings, and on the scenes identified from them."""
+def transfer(counts: Sequence[int], tested: int, classifier: str = "forest") -> Iterator[dict[str, float]]:
+    """Yield the recognition rates of classifiers trained on recordings, and on the scenes identified from them."""
     settings = load_pipeline("default", options=[f"classifier.type={classifier}"]).settings
     extract = settings.features.create().extract
     pads = SENSORS["PR2 pads"]
@@ -614,7 +515,6 @@ def transfer(counts: Sequence[int], tested: int, classifier: str = "forest") -> 
     test = [(extract(squeeze.trace), name) for name in CONTAINERS for squeeze in recorded[name][-tested:]]
     true = [(extract(squeeze.trace), name) for name in CONTAINERS for squeeze in simulated_of(name, name)]
     on_true = _right(settings, true, test)
-    rows = []
     with tempfile.TemporaryDirectory() as folder:
         for count in counts:
             own = [
@@ -627,53 +527,15 @@ def transfer(counts: Sequence[int], tested: int, classifier: str = "forest") -> 
                 result = identify(SimConfig(), recorded[name][:count], lambda *_: None)
                 path.write_text(result.scene, encoding="utf-8")
                 simulated += [(extract(squeeze.trace), name) for squeeze in simulated_of(str(path), name)]
-            rows.append(
-                {
-                    "recordings": count,
-                    "tested": len(test),
-                    "on_recordings": _right(settings, own, test),
-                    "on_identified": _right(settings, simulated, test),
-                    "on_true": on_true,
-                    "on_both": _right(settings, [*own, *simulated], test),
-                    "seconds": time.monotonic() - begin,
-                }
-            )
-            print(rows[-1], flush=True)
-    return rows
-
-
-def true_steps(count: int, tested: int, runs: int, classifier: str = "forest") -> list[dict[str, Any]]:
-    """Return the recognition rates of classifiers trained on scenes identified from so many recordings of each
-    container, of which more and more numbers are replaced by the true ones."""
-    settings = load_pipeline("default", options=[f"classifier.type={classifier}"]).settings
-    extract = settings.features.create().extract
-    pads, total = SENSORS["PR2 pads"], max(TRANSFER_COUNTS) + tested
-    scenes, test = {}, []
-    for name in CONTAINERS:
-        recorded = squeezes_of(name, name, pads, [str(i // 3) for i in range(total)], range(total))
-        scenes[name] = identify(SimConfig(), recorded[:count], lambda *_: None).scene
-        test += [(extract(squeeze.trace), name) for squeeze in recorded[-tested:]]
-    rows = []
-    for step, keys in TRUE_STEPS:
-        if keys is None:
-            scenes = {name: name for name in CONTAINERS}
-        else:
-            scenes = {name: with_true(scene, find_object(name), keys) for name, scene in scenes.items()}
-        right = []
-        for run in range(runs):
-            new = {name: simulated_of(scene, name, 10_000 * (run + 1)) for name, scene in scenes.items()}
-            train = [(extract(squeeze.trace), name) for name, squeezes in new.items() for squeeze in squeezes]
-            right.append(_right(settings, train, test))
-        rows.append({"step": step, "recordings": count, "tested": len(test), "right": right})
-        print(rows[-1], flush=True)
-    return rows
-
-
-def with_true(scene: str, true: Any, keys: Sequence[str]) -> str:
-    """Return the text of a scene with the values that the true object has of these keys."""
-    head, mark, terms = scene.partition("[[terms]]")
-    kept = [line for line in head.splitlines() if line.partition(" = ")[0] not in keys]
-    return "\n".join([*kept, *(f"{key} = {getattr(true, key)}" for key in keys), "", mark + terms])
+            yield {
+                "recordings": count,
+                "tested": len(test),
+                "on_recordings": _right(settings, own, test),
+                "on_identified": _right(settings, simulated, test),
+                "on_true": on_true,
+                "on_both": _right(settings, [*own, *simulated], test),
+                "seconds": time.monotonic() - begin,
+            }
 
 
 def simulated_of(scene: str, label: str, first_seed: int = 10_000) -> list[RecordedSqueeze]:
@@ -701,25 +563,13 @@ _CURVES: Final = (
 
 def transfer_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
     """Return the table of the transfer."""
-    names = ["recordings a class", *(f"trained on {name}" for _, name in _CURVES)]
-    lines = table_head(names)
-    for row in rows:
-        rates = [_share(int(row[key]), int(row["tested"])) for key, _ in _CURVES]
-        lines.append("| " + " | ".join([str(row["recordings"]), *rates]) + " |")
-    return "\n".join(lines)
-
-
-def true_steps_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
-    """Return the table of the rates with more and more true values."""
-    lines = [
-        "| true values instead of the identified ones | recognised, mean of the runs | each run |",
-        "|---|---|---|",
-    ]
-    for row in rows:
-        right, tested = row["right"], row["tested"]
-        rate = f"{100.0 * float(np.mean(right)) / tested:.1f} %"
-        lines.append(f"| {row['step']} | {rate} | {', '.join(map(str, right))} of {tested} |")
-    return "\n".join(lines)
+    return table(
+        ("recordings a class", *(f"trained on {name}" for _, name in _CURVES)),
+        [
+            (str(row["recordings"]), *(_share(int(row[key]), int(row["tested"])) for key, _ in _CURVES))
+            for row in rows
+        ],
+    )
 
 
 def draw_transfer(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
@@ -760,88 +610,59 @@ def main() -> None:
     parser.add_argument(
         "--spreads", nargs="+", type=float, help="the spreads of the parameters of OWN_SPREADS"
     )
-    parser.add_argument("--true-terms", action="store_true", help="fit the true terms only")
     parser.add_argument("--transfer", action="store_true")
-    parser.add_argument("--true-steps", type=int, metavar="RUNS", help="simulated trainings of each step")
     parser.add_argument("--rows", type=Path, help="append the rows to this file (JSON lines)")
     parser.add_argument(
         "--markdown", type=Path, help="write the tables of --rows to this page, and run nothing"
     )
     parser.add_argument("--png", type=Path, help="draw the transfer of --rows, and run nothing")
-    parser.add_argument("--json", action="store_true")
     parser.add_argument("--short", action="store_true", help="least work, only to show that it runs")
     asked = parser.parse_args()
     if asked.markdown or asked.png:
         if asked.rows is None:
             parser.error("--markdown and --png need --rows FILE")
-        _publish(asked)
+        rows = [json.loads(line) for line in asked.rows.read_text(encoding="utf-8").splitlines()]
+        if asked.png:
+            draw_transfer(rows, asked.png)
+        if asked.markdown:
+            write_between(asked.markdown, *published(asked, rows))
         return
     if asked.short:
         asked.only, asked.recordings, asked.repeats = ["creeping"], [1], 1
         asked.sensors = ["PR2 pads"]
-    begin = time.monotonic()
-    rows: list[Any] = []
-    if asked.transfer or asked.true_steps:
-        counts = asked.recordings or TRANSFER_COUNTS
-        rows = (
-            true_steps(max(counts), TESTED, asked.true_steps)
-            if asked.true_steps
-            else transfer(counts, TESTED)
-        )
+    begin, rows = time.monotonic(), []
+    # A run that is stopped has all scenes in its rows.
+    for row in transfer(asked.recordings or TRANSFER_COUNTS, TESTED) if asked.transfer else scenes(asked):
+        rows.append(row)
         if asked.rows:
             with asked.rows.open("a", encoding="utf-8") as out:
-                out.writelines(f"{json.dumps(row)}\n" for row in rows)
-    else:
-        # A run that is stopped has all scenes in its rows.
-        for repeat in range(asked.first, asked.first + asked.repeats):
-            for count in asked.recordings or COUNTS:
-                for sensor, name, late_s, own in product(
-                    asked.sensors, asked.only, asked.delays or [0.0], asked.spreads or [0.0]
-                ):
-                    row = measured(name, sensor, count, repeat, late_s, own, terms_known=asked.true_terms)
-                    rows.append(asdict(row))
-                    if asked.rows:
-                        with asked.rows.open("a", encoding="utf-8") as out:
-                            out.write(f"{json.dumps(rows[-1])}\n")
-                    if not asked.json:
-                        print(in_words(row), flush=True)
-
-    made = {"date": str(date.today()), "python": platform.python_version(), "cores": os.cpu_count()}
-    if asked.json:
-        print(json.dumps({"rows": rows, "made": made}, indent=2))
-    else:
-        if not (asked.transfer or asked.true_steps):
-            print(_tables(asked)(rows))
-        print(f"{made}, {time.monotonic() - begin:.0f} s")
+                out.write(f"{json.dumps(row)}\n")
+    print(published(asked, rows)[1])
+    print(f"{where_measured()}, {time.monotonic() - begin:.0f} s")
 
 
-def _tables(asked: argparse.Namespace) -> Callable[[Sequence[Mapping[str, Any]]], str]:
-    """Return what writes the tables of the asked rows."""
-    if asked.true_terms:
-        return coverage_markdown
+def scenes(asked: argparse.Namespace) -> Iterator[dict[str, Any]]:
+    """Yield the rows of the scenes that are asked for."""
+    repeats = range(asked.first, asked.first + asked.repeats)
+    for repeat, count, sensor, name, late_s, own in product(
+        *(repeats, asked.recordings or COUNTS, asked.sensors, asked.only),
+        *(asked.delays or [0.0], asked.spreads or [0.0]),
+    ):
+        row = measured(name, sensor, count, repeat, late_s, own)
+        print(in_words(row), flush=True)
+        yield asdict(row)
+
+
+def published(asked: argparse.Namespace, rows: Sequence[Mapping[str, Any]]) -> tuple[str, str]:
+    """Return the mark on the page, and the tables, of rows of what is asked for."""
+    if asked.transfer:
+        return "transfer", transfer_markdown(rows)
     if asked.spreads:
-        return spreads_markdown
-    return delays_markdown if asked.delays else as_markdown
-
-
-def _publish(asked: argparse.Namespace) -> None:
-    """Write the tables and the picture of rows that were measured before."""
-    rows = [json.loads(line) for line in asked.rows.read_text(encoding="utf-8").splitlines()]
-    if asked.png:
-        draw_transfer(rows, asked.png)
-    if asked.markdown and asked.true_steps:
-        write_between(asked.markdown, "true steps", true_steps_markdown(rows))
-    elif asked.markdown and asked.transfer:
-        write_between(asked.markdown, "transfer", transfer_markdown(rows))
-    elif asked.markdown and asked.true_terms:
-        write_between(asked.markdown, "coverage", coverage_markdown(rows))
-    elif asked.markdown and asked.spreads:
-        write_between(asked.markdown, "spreads", spreads_markdown(rows))
-    elif asked.markdown and asked.delays:
-        write_between(asked.markdown, "delays", delays_markdown(rows))
-    elif asked.markdown:
-        of_gas = all(row["scene"] in SCENES_WITH_GAS for row in rows)
-        write_between(asked.markdown, "gas" if of_gas else "known scenes", as_markdown(rows))
+        return "spreads", spreads_markdown(rows)
+    if asked.delays:
+        return "delays", delays_markdown(rows)
+    of_gas = all(row["scene"] in SCENES_WITH_GAS for row in rows)
+    return "gas" if of_gas else "known scenes", as_markdown(rows)
 
 
 if __name__ == "__main__":

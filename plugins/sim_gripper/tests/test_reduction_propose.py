@@ -1,12 +1,12 @@
 """The steps of a scene: what they cannot resolve, and that they have the accuracy."""
 
-import importlib.util
 import json
 import math
-import sys
-from pathlib import Path
 
+import numpy as np
 import pytest
+import random_scenes
+import regimes
 from attrs import evolve
 from click.testing import CliRunner
 
@@ -71,45 +71,43 @@ def test_run_reports_each_decision_with_its_number():
 
 
 @pytest.fixture(scope="module")
-def benchmark():
-    path = Path(__file__).parents[3] / "benchmarks" / "selection.py"
-    spec = importlib.util.spec_from_file_location("selection_benchmark", path)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["selection_benchmark"] = module
-    spec.loader.exec_module(module)
-    return module, module.Bench()
+def bench():
+    return random_scenes.Bench()
+
+
+def errors_of(row):
+    """Return the error of each accuracy over it; a refusal has an infinite one."""
+    return {accuracy: row[f"{accuracy:g}"]["error"] / accuracy for accuracy in regimes.ACCURACIES}
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("scenes", [8, pytest.param(20, marks=pytest.mark.long)])
-def test_the_choice_keeps_its_word_on_random_scenes(benchmark, scenes):
-    module, bench = benchmark
-    result = module.measure(bench, range(scenes))
-    assert result["scenes"] + result["left_out_unstable"] == scenes
-    for accuracy in module.ACCURACIES:
-        assert result["refused"][accuracy] == 0
-        assert result["within"][accuracy] >= 0.95
-        assert result["worst"][accuracy] <= 3.0
+def test_the_choice_keeps_its_word_on_random_scenes(bench, scenes):
+    rows = [regimes.measured(bench, random_scenes.scene_of(number)) for number in range(scenes)]
+    stable = [errors_of(row) for row in rows if row["stable"]]
+    for accuracy in regimes.ACCURACIES:
+        errors = [row[accuracy] for row in stable]
+        assert np.mean(np.array(errors) <= 1.0) >= 0.95
+        assert max(errors) <= 3.0
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [24, 63, 69, 87, 128, 141, 198, 605, 1968, 2164])
-def test_scenes_on_which_it_was_once_broken(benchmark, number):
+def test_scenes_on_which_it_was_once_broken(bench, number):
     # Gas pressed out of its container, light surfaces that bounce, contacts that come to rest within a tick or two, a
     # second finger that meets what the first pushes or presses, a contact that is sensitive to the approach.
-    module, bench = benchmark
-    (row,) = module.measure(bench, range(number, number + 1))["rows"]
-    missed = [accuracy for accuracy in module.ACCURACIES if row[f"{accuracy:g}"]["error"] > accuracy]
+    row = regimes.measured(bench, random_scenes.scene_of(number))
+    assert row["stable"]
+    missed = [accuracy for accuracy, error in errors_of(row).items() if error > 1.0]
     # At 0.1 % the trial grasps of the last scene reach their limit of work: its report says that nothing is verified.
     assert missed == ([0.001] if number == 2164 else [])
-    assert all(row[f"{accuracy:g}"]["verified"] is None for accuracy in missed)
+    assert all("not verified" in row[f"{accuracy:g}"]["flags"] for accuracy in missed)
 
 
 @pytest.mark.slow
-def test_a_sampled_loop_of_too_great_a_gain_is_found_unstable(benchmark, monkeypatch):
-    module, bench = benchmark
-    _, setup, model, _ = bench.grasp(module.scene_of(0), 0.1, "reference")
-    assert module.controller_is_stable(setup, model)
+def test_a_sampled_loop_of_too_great_a_gain_is_found_unstable(bench):
+    _, setup, model, _ = bench.grasp(random_scenes.scene_of(0), 0.1, "reference")
+    assert random_scenes.controller_is_stable(setup, model)
     # The loop takes 15000 N s/m of the free mass in a tick of 1 ms: more than 2 of that makes it swing up.
     for dt, stable in ((5e-3, True), (2e-2, False)):
-        assert module.controller_is_stable(evolve(setup, dt_s=dt), model) == stable
+        assert random_scenes.controller_is_stable(evolve(setup, dt_s=dt), model) == stable

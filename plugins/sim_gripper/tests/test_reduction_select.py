@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from attrs import evolve, frozen
-from selection import error_of, record_of
+from random_scenes import error_of, record_of
 
 from graspsense.core.grasp.runner import run_grasp
 from graspsense.core.learn.checkpoints import with_checkpoints

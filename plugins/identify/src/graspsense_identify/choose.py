@@ -14,10 +14,9 @@ import numpy as np
 from attrs import evolve, frozen
 from numpy.typing import NDArray
 
-from graspsense.plugin_api import ConfigError
 from graspsense.simulator_api import CandidateScore
 from graspsense_identify.corners import with_corners
-from graspsense_identify.fit import LEAST_ERROR, Fitted, Mask, fit, held_out_rms
+from graspsense_identify.fit import LEAST_ERROR, Fitted, Mask, fit, fit_to, held_out_rms
 from graspsense_identify.forward import ForwardModel
 from graspsense_identify.laws import GAS, CandidateLaw, DataScale, memories, static_candidates
 from graspsense_identify.prepare import Squeeze
@@ -64,13 +63,8 @@ def choose(
     *,
     has_memory: bool,
     progress: Callable[[int, int], None],
-    only: str = "",
 ) -> Choice:
-    """Return the chosen fit.
-
-    `has_memory`: whether the squeezes can determine a term with a memory. `only`: the name of the candidate that is
-    fitted without a choice.
-    """
+    """Return the chosen fit. `has_memory`: whether the squeezes can determine a term with a memory."""
     direct = evolve(model, direct=True)
     statics = static_candidates(scale)
     with_memory = memories(scale) if has_memory else []
@@ -79,15 +73,12 @@ def choose(
         progress,
     )
     rough = _rough(direct, statics, squeezes, with_memory, counter)
-    kept = list(range(len(statics))) if only else _kept(rough)
+    kept = _kept(rough)
     candidates = [
         joined.starting_at(_values(rough[k]))
         for k in kept
         for joined in (statics[k], *_joined(statics[k], with_memory))
-        if only in ("", joined.name)
     ]
-    if not candidates:
-        raise ConfigError(f"no candidate for these squeezes has the terms {only}")
     directly = in_threads(lambda candidate: fit(direct, candidate, squeezes), candidates, counter.done)
     least_directly = max(min(fitted.rms for fitted in directly), LEAST_ERROR)
     near = [fitted for fitted in directly if fitted.rms <= WORTH_REFINING * least_directly]
@@ -211,8 +202,12 @@ def _contains(fitted: Fitted, simpler: Fitted) -> bool:
 
 def information(fitted: Fitted) -> float:
     """Return half of the Bayesian information criterion, less a constant: smaller is better."""
-    n = len(fitted.residuals)
-    return n * math.log(least_error(fitted)) + 0.5 * fitted.parameters * math.log(n)
+    return information_of(fitted.rms, fitted.parameters, len(fitted.residuals))
+
+
+def information_of(rms: float, parameters: int, n: int) -> float:
+    """Return that of a fit to so many residuals with this rms."""
+    return n * math.log(math.hypot(rms, LEAST_ERROR)) + 0.5 * parameters * math.log(n)
 
 
 def least_error(fitted: Fitted) -> float:
@@ -254,17 +249,7 @@ def _judged(model: ForwardModel, fitted: Fitted, squeezes: Sequence[Squeeze]) ->
         return _Judged(fitted=fitted, errors=np.array(errors))
     folds = min(n, MAX_FOLDS)
     for k in range(folds):
-        train = [i for i in range(n) if i % folds != k]
-        part = fit(
-            model,
-            fitted.candidate,
-            [squeezes[i] for i in train],
-            start=evolve(
-                fitted,
-                widths_m=tuple(fitted.widths_m[i] for i in train),
-                factors=tuple(fitted.factors[i] for i in train),
-            ),
-        )
+        part = fit_to(model, fitted, squeezes, [i for i in range(n) if i % folds != k])
         errors += [
             held_out_rms(model, part, squeezes[i], fitted.widths_m[i], own_stiffness=True)
             for i in range(n)

@@ -19,7 +19,7 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
-from attrs import frozen
+from attrs import evolve, frozen
 from numpy.typing import NDArray
 
 from graspsense_identify.forward import ForwardModel, Runs
@@ -263,6 +263,23 @@ def fit(
         lag_s=float(problem.lags_s(best.x)),
         lag_error_s=_lag_error_s(np.asarray(best.jac), best.fun) if has_lag else math.nan,
     )
+
+
+def fit_to(
+    model: ForwardModel,
+    fitted: Fitted,
+    squeezes: Sequence[Squeeze],
+    kept: Sequence[int],
+    *,
+    has_lag: bool = False,
+) -> Fitted:
+    """Return the fit to some of the squeezes of another fit, whose stiffness is that of the mean of these."""
+    start = evolve(
+        fitted,
+        widths_m=tuple(fitted.widths_m[i] for i in kept),
+        factors=tuple(fitted.factors[i] for i in kept),
+    )
+    return fit(model, fitted.candidate, [squeezes[i] for i in kept], start=start, has_lag=has_lag)
 
 
 def linear_covariance(

@@ -204,8 +204,7 @@ def _whole(model: ForwardModel, fitted: Fitted, squeeze: Squeeze, i: int) -> tup
 
 def _lognormal(breaks: Floats, survived: Floats) -> tuple[float, float]:
     """Return mean and standard deviation of the logarithm; the deviation is 0 for a single break."""
-    from scipy.optimize import minimize
-    from scipy.stats import norm
+    from scipy.stats import CensoredData, norm
 
     logs, beyond = np.log(breaks), np.log(np.maximum(survived, 1e-12))
     mean = float(np.mean(logs))
@@ -214,10 +213,5 @@ def _lognormal(breaks: Floats, survived: Floats) -> tuple[float, float]:
     deviation = max(float(np.std(logs, ddof=1)), SMALLEST_SPREAD)
     if not len(beyond) or float(np.max(beyond)) < mean - 4.0 * deviation:
         return mean, deviation
-
-    def negative(x: Floats) -> float:
-        spread = math.exp(x[1])
-        return -float(np.sum(norm.logpdf(logs, x[0], spread)) + np.sum(norm.logsf(beyond, x[0], spread)))
-
-    solution = minimize(negative, np.array([mean, math.log(deviation)]), method="Nelder-Mead")
-    return float(solution.x[0]), math.exp(float(solution.x[1]))
+    likeliest = norm.fit(CensoredData(uncensored=logs, right=beyond), loc=mean, scale=deviation)
+    return float(likeliest[0]), float(likeliest[1])

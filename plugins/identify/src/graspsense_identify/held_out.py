@@ -10,10 +10,9 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
-from attrs import evolve
 
 from graspsense_identify.choose import MAX_FOLDS
-from graspsense_identify.fit import Fitted, fit, held_out_rms
+from graspsense_identify.fit import Fitted, fit_to, held_out_rms
 from graspsense_identify.forward import ForwardModel
 from graspsense_identify.prepare import Squeeze
 from graspsense_identify.threads import in_threads
@@ -38,14 +37,8 @@ def _of_fold(
     model: ForwardModel, fitted: Fitted, squeezes: Sequence[Squeeze], held_out: range
 ) -> dict[int, float]:
     train = [i for i in range(len(squeezes)) if i not in held_out]
-    start = evolve(
-        fitted,
-        widths_m=tuple(fitted.widths_m[i] for i in train),
-        factors=tuple(fitted.factors[i] for i in train),
-    )
-    others = [squeezes[i] for i in train]
-    part = fit(model, fitted.candidate, others, start=start)
-    beyond_m = float(np.mean(np.array(part.widths_m) - [other.width_m for other in others]))
+    part = fit_to(model, fitted, squeezes, train)
+    beyond_m = float(np.mean(np.array(part.widths_m) - [squeezes[i].width_m for i in train]))
     return {
         i: held_out_rms(model, part, squeezes[i], squeezes[i].width_m + beyond_m, own_stiffness=False)
         for i in held_out

@@ -7,7 +7,6 @@ then that of a single squeeze.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -15,9 +14,9 @@ import numpy as np
 from attrs import evolve
 from numpy.typing import NDArray
 
-from graspsense_identify.choose import Choice, chosen_instead
+from graspsense_identify.choose import Choice, chosen_instead, information_of
 from graspsense_identify.delay import EVIDENCE, Lag, lag_beyond_settings
-from graspsense_identify.fit import LEAST_ERROR, Fitted, fit
+from graspsense_identify.fit import Fitted, fit
 from graspsense_identify.forward import ForwardModel
 from graspsense_identify.prepare import Squeeze
 from graspsense_identify.spread import LEAST_INSTANCES
@@ -85,16 +84,12 @@ def _evidence(fits: Sequence[Fitted]) -> float:
     """Return half of the Bayesian information criterion of fits to each squeeze, less a constant."""
     residuals = np.concatenate([fitted.residuals for fitted in fits])
     free = sum(len(fitted.values) for fitted in fits)
-    return _information(float(np.sqrt(np.mean(residuals**2))), free, len(residuals))
+    return information_of(float(np.sqrt(np.mean(residuals**2))), free, len(residuals))
 
 
 def _common_evidence(fitted: Fitted) -> float:
     """Return that of a fit with common values, and a factor of each squeeze on the stiffness."""
-    return _information(fitted.rms, len(fitted.values) + len(fitted.factors) - 1, len(fitted.residuals))
-
-
-def _information(rms: float, free: int, n: int) -> float:
-    return n * math.log(math.hypot(rms, LEAST_ERROR)) + 0.5 * free * math.log(n)
+    return information_of(fitted.rms, len(fitted.values) + len(fitted.factors) - 1, len(fitted.residuals))
 
 
 def stiffnesses(fitted: Fitted) -> list[int]:

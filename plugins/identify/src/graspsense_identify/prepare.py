@@ -67,8 +67,6 @@ class Stretches(NamedTuple):
     """Median closing speed during the compression."""
     has_approach: bool
     """Whether the recording begins before the contact."""
-    has_release: bool
-    """Whether it shows the object released."""
 
 
 @frozen(kw_only=True, eq=False)
@@ -381,5 +379,4 @@ def _stretches(t_s: Floats, gap: Floats, width: float, *, has_approach: bool) ->
         hold_s=longest,
         speed_m_s=0.95 * depth / load_s if load_s > 0.0 else 0.0,
         has_approach=has_approach,
-        has_release=bool(gap[-1] > width - 0.5 * depth),
     )

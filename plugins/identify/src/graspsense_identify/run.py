@@ -68,13 +68,12 @@ def identify(
     squeezes: Sequence[RecordedSqueeze],
     progress: Progress,
     block: Sequence[RecordedSqueeze] = (),
-    only: str = "",
 ) -> Identification:
     """Return the object of these squeezes; `config` is that of a gripper whose recordings say nothing of their own.
 
-    `block`: squeezes of a rigid block, from which the fingertips are identified before. `only`: the terms, as in the
-    table of candidates, if they are not chosen. A note names each recording that is left out: a copy, or one without
-    contact or with too few measurements of the force. Raises ConfigError if all are.
+    `block`: squeezes of a rigid block, from which the fingertips are identified before. A note names each recording
+    that is left out: a copy, or one without contact or with too few measurements of the force. Raises ConfigError if
+    all are.
     """
     begin = time.monotonic()
     config, notes = _settings(config, squeezes, block)
@@ -83,7 +82,7 @@ def identify(
 
     def timed(lag: Lag) -> Timed:
         parts = _ready(config, recorded, [] if lag.lag_s else notes, cells=cells, lag_s=lag.lag_s)
-        return Timed(*parts, _chosen(model, parts[1], progress, only), lag)
+        return Timed(*parts, _chosen(model, parts[1], progress), lag)
 
     used, delay = with_delay(timed, lambda used: _delay(model, used, config.force_delay_s), model)
     progress("computing intervals", 0, 1)
@@ -145,14 +144,13 @@ def _distinct(squeezes: Sequence[RecordedSqueeze], notes: list[str]) -> list[Rec
     return list(by_content.values())
 
 
-def _chosen(model: ForwardModel, squeezes: Sequence[Squeeze], progress: Progress, only: str) -> Individual:
+def _chosen(model: ForwardModel, squeezes: Sequence[Squeeze], progress: Progress) -> Individual:
     choice = choose(
         model,
         squeezes,
         _scale(squeezes),
         has_memory=shows_memory(squeezes),
         progress=lambda done, total: progress("fitting candidates", done, total),
-        only=only,
     )
     return simplest_alone(model, choice, squeezes)
 

@@ -19,7 +19,7 @@ from attrs import evolve, frozen
 from numpy.typing import NDArray
 
 from graspsense_identify.choose import fit_residuals
-from graspsense_identify.fit import Fitted, fit, linear_covariance
+from graspsense_identify.fit import Fitted, fit, fit_to, linear_covariance
 from graspsense_identify.forward import ForwardModel
 from graspsense_identify.gas import AREA_FACTOR
 from graspsense_identify.interval import normal, student
@@ -49,8 +49,8 @@ PATH_ERROR: Final = 3e-4
 """Standard deviation of the logarithm of a value that the finite number of nodes of a path causes, at least."""
 PATH_FORCE_ERROR: Final = 3e-5
 """The same of the force, over the peak. With both, the intervals from one squeeze with an ideal sensor cover more than
-nine of ten (`benchmarks/identify.py --true-terms --sensors ideal --recordings 1`): `path_error` takes most of the error
-away, and what is left is mostly that of the simulated recordings. No recording of a real sensor is as exact."""
+nine of ten (`benchmarks/identify.py --sensors ideal --recordings 1`): `path_error` takes most of the error away, and
+what is left is mostly that of the simulated recordings. No recording of a real sensor is as exact."""
 
 
 @frozen(kw_only=True, eq=False)
@@ -95,11 +95,8 @@ def uncertainty(
     own = _scale_errors(model, fitted, squeezes, force_scale) + PATH_ERROR**2 * np.eye(len(fitted_logs))
     own += np.diag(corner_errors(model, fitted, squeezes) ** 2)
     if lag_error_s > 0.0:
-        later = fit(
-            model, fitted.candidate, [squeeze.delayed(lag_error_s) for squeeze in squeezes], start=fitted
-        )
-        shift = np.log(later.values) - fitted_logs
-        own += np.outer(shift, shift)
+        later = [squeeze.delayed(lag_error_s) for squeeze in squeezes]
+        own += _of_shift(fitted, fit(model, fitted.candidate, later, start=fitted))
     own += _area_errors(model, fitted, squeezes)
     covariance = covariance + own * (normal() / factor) ** 2
     spread = np.sqrt(np.diag(covariance))
@@ -139,6 +136,12 @@ def at_least(covariance: Floats, other: Floats) -> Floats:
     return both * np.outer(ratio, ratio)
 
 
+def _of_shift(fitted: Fitted, shifted: Fitted) -> Floats:
+    """Return the covariance of the logarithms if an error of one standard deviation leads to another fit."""
+    shift = np.log(shifted.values) - np.log(fitted.values)
+    return np.outer(shift, shift)
+
+
 def _scale_errors(
     model: ForwardModel, fitted: Fitted, squeezes: Sequence[Squeeze], force_scale: float
 ) -> Floats:
@@ -154,9 +157,8 @@ def _scale_errors(
         value * more if parameter.is_force else value
         for parameter, value in zip(fitted.candidate.free, fitted.values, strict=True)
     ]
-    refit = fit(model, fitted.candidate, stronger, start=evolve(fitted, values=tuple(scaled)))
-    shift = np.log(refit.values) - np.log(fitted.values)
-    return np.outer(shift, shift)
+    start = evolve(fitted, values=tuple(scaled))
+    return _of_shift(fitted, fit(model, fitted.candidate, stronger, start=start))
 
 
 class Refits(NamedTuple):
@@ -187,7 +189,7 @@ def refits(
         scale = BLOCKS / degrees / (BOOTSTRAPS - 1)
         return Refits(fits, scale, student(degrees), "within one squeeze; not between squeezes")
     kept = [[i for i in range(len(squeezes)) if i not in group] for group in groups]
-    fits = in_threads(lambda left: _refit(model, fitted, squeezes, left, has_lag=has_lag), kept)
+    fits = in_threads(lambda left: fit_to(model, fitted, squeezes, left, has_lag=has_lag), kept)
     g = len(groups)
     what = "objects" if _instances(squeezes) >= LEAST_INSTANCES else "squeezes"
     basis = f"between {g} {what if g == len(groups) else 'groups'}"
@@ -200,8 +202,7 @@ def _area_errors(model: ForwardModel, fitted: Fitted, squeezes: Sequence[Squeeze
     if key not in law.fixed:
         return np.zeros((len(fitted.values), len(fitted.values)))
     wider = evolve(law, fixed={**law.fixed, key: AREA_FACTOR * law.fixed[key]})
-    shift = np.log(fit(model, wider, squeezes, start=fitted).values) - np.log(fitted.values)
-    return np.outer(shift, shift)
+    return _of_shift(fitted, fit(model, wider, squeezes, start=fitted))
 
 
 def corner_errors(model: ForwardModel, fitted: Fitted, squeezes: Sequence[Squeeze]) -> Floats:
@@ -263,18 +264,6 @@ def _groups(squeezes: Sequence[Squeeze]) -> list[list[int]]:
     if len(groups) > MAX_GROUPS:
         groups = [list(chain.from_iterable(groups[k::MAX_GROUPS])) for k in range(MAX_GROUPS)]
     return groups
-
-
-def _refit(
-    model: ForwardModel, fitted: Fitted, squeezes: Sequence[Squeeze], kept: Sequence[int], *, has_lag: bool
-) -> Fitted:
-    """Return the fit without some squeezes, whose stiffness is that of the mean of the others."""
-    start = evolve(
-        fitted,
-        widths_m=tuple(fitted.widths_m[i] for i in kept),
-        factors=tuple(fitted.factors[i] for i in kept),
-    )
-    return fit(model, fitted.candidate, [squeezes[i] for i in kept], start=start, has_lag=has_lag)
 
 
 def _bootstrapped(

@@ -101,21 +101,10 @@ class Law(Controller[None]):
 
 @frozen(kw_only=True, eq=False)
 class Run:
-    """One run: gap closed x (m), force (N) and what was commanded, at each millisecond; processor seconds."""
+    """The exact solution: gap closed x (m) and force (N) at each millisecond."""
 
     x: Any
     force: Any
-    u: Any
-    seconds: float = math.nan
-    what: str = ""
-
-    def error(self, reference: Run) -> tuple[float, float]:
-        """Return the rms error of the force over the peak force, and that of the peak, both relative."""
-        peak = float(np.max(reference.force))
-        if not np.all(np.isfinite(self.force)):
-            return math.inf, math.inf
-        rms = float(np.sqrt(np.mean((self.force - reference.force) ** 2))) / peak
-        return rms, abs(float(np.max(self.force)) - peak) / peak
 
 
 # ------------------------------------------------------------------------------------------------ exact
@@ -149,12 +138,12 @@ def exact(u_of: Callable[[int, float, float, float], float], ticks: int = TICKS)
             rows.append(power)
         powers[touching] = np.array(rows)
     state = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
-    xs, forces, us = np.zeros(ticks), np.zeros(ticks), np.zeros(ticks)
+    xs, forces = np.zeros(ticks), np.zeros(ticks)
     touching = False
     for tick in range(ticks):
         force = KC * max(state[0] - state[2] - X0, 0.0)
         xs[tick], forces[tick] = state[0], force
-        us[tick] = state[4] = u_of(tick, state[0], state[1], force)
+        state[4] = u_of(tick, state[0], state[1], force)
         left = TICK
         while left > 0.0:
             path = powers[touching] @ state
@@ -178,7 +167,7 @@ def exact(u_of: Callable[[int, float, float, float], float], ticks: int = TICKS)
             spent, state = _turn(rates[touching], last_state, touching, TICK / PIECES)
             left -= k * TICK / PIECES + spent
             touching = not touching
-    return Run(x=xs, force=forces, u=us, what="exact")
+    return Run(x=xs, force=forces)
 
 
 def _turn(rates: Any, state: Any, touching: bool, span: float) -> tuple[float, Any]:
@@ -203,7 +192,3 @@ def exact_closed() -> Run:
         return u
 
     return exact(u_of)
-
-
-def exact_open(us: Any) -> Run:
-    return exact(lambda tick, x, v, f: float(us[tick]))
