@@ -1,8 +1,8 @@
-"""A constant mass on a light surface, against an exact solution."""
+"""The scene on which other engines are measured: a constant mass on a light surface, against an exact solution."""
 
 import numpy as np
 import pytest
-from linear_contact import CONFIG, OPEN_M, TICK, Law, exact, exact_closed
+from simulation_scene import CONFIG, OPEN_M, TICK, Law, exact, exact_closed
 from unverified import unverified_setup
 
 from graspsense.simulator_api import RunConfig

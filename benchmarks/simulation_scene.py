@@ -101,10 +101,21 @@ class Law(Controller[None]):
 
 @frozen(kw_only=True, eq=False)
 class Run:
-    """The exact solution: gap closed x (m) and force (N) at each millisecond."""
+    """One run: gap closed x (m), force (N) and what was commanded, at each millisecond; processor seconds."""
 
     x: Any
     force: Any
+    u: Any
+    seconds: float = math.nan
+    what: str = ""
+
+    def error(self, reference: Run) -> tuple[float, float]:
+        """Return the rms error of the force over the peak force, and that of the peak, both relative."""
+        peak = float(np.max(reference.force))
+        if not np.all(np.isfinite(self.force)):
+            return math.inf, math.inf
+        rms = float(np.sqrt(np.mean((self.force - reference.force) ** 2))) / peak
+        return rms, abs(float(np.max(self.force)) - peak) / peak
 
 
 # ------------------------------------------------------------------------------------------------ exact
@@ -138,12 +149,12 @@ def exact(u_of: Callable[[int, float, float, float], float], ticks: int = TICKS)
             rows.append(power)
         powers[touching] = np.array(rows)
     state = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
-    xs, forces = np.zeros(ticks), np.zeros(ticks)
+    xs, forces, us = np.zeros(ticks), np.zeros(ticks), np.zeros(ticks)
     touching = False
     for tick in range(ticks):
         force = KC * max(state[0] - state[2] - X0, 0.0)
         xs[tick], forces[tick] = state[0], force
-        state[4] = u_of(tick, state[0], state[1], force)
+        us[tick] = state[4] = u_of(tick, state[0], state[1], force)
         left = TICK
         while left > 0.0:
             path = powers[touching] @ state
@@ -167,7 +178,7 @@ def exact(u_of: Callable[[int, float, float, float], float], ticks: int = TICKS)
             spent, state = _turn(rates[touching], last_state, touching, TICK / PIECES)
             left -= k * TICK / PIECES + spent
             touching = not touching
-    return Run(x=xs, force=forces)
+    return Run(x=xs, force=forces, u=us, what="exact")
 
 
 def _turn(rates: Any, state: Any, touching: bool, span: float) -> tuple[float, Any]:
@@ -192,3 +203,7 @@ def exact_closed() -> Run:
         return u
 
     return exact(u_of)
+
+
+def exact_open(us: Any) -> Run:
+    return exact(lambda tick, x, v, f: float(us[tick]))
