@@ -34,10 +34,10 @@ def opened(thing, **settings):
     return backend
 
 
-def squeezed(backend, gap_m, ticks, speed_m_s=0.15):
+def squeezed(backend, gap_m, ticks):
     """Close to a gap and return the last reading."""
     for _ in range(ticks):
-        backend.apply(Command(POSITION, gap_m, 50.0, speed_m_s))
+        backend.apply(Command(POSITION, gap_m, 50.0, 0.15))
         reading = backend.read(1.0)
     return reading
 
@@ -97,7 +97,7 @@ def scene(folder, *lines):
 
 def test_a_thing_that_is_filled_weighs_more(tmp_path):
     backend = opened(scene(tmp_path, "fill = [[0.0, 0.0], [0.2, 0.3]]"))
-    squeezed(backend, 0.035, 1500, 0.05)
+    squeezed(backend, 0.035, 1000)
     model = backend._model
     masses = [model.body_mass[k] for k in range(model.nbody) if model.body(k).name.startswith("thing/")]
     assert sum(masses) == pytest.approx(0.15 + 0.3)
@@ -106,7 +106,7 @@ def test_a_thing_that_is_filled_weighs_more(tmp_path):
 def test_the_table_rises_as_the_scene_says(tmp_path):
     backend = opened(scene(tmp_path, "table_height = [[0.0, 0.0], [0.2, 0.02]]"))
     resting_m = float(backend._data.mocap_pos[0, 2])
-    squeezed(backend, 0.035, 1700, 0.05)
+    squeezed(backend, 0.035, 1200)
     assert backend._data.mocap_pos[0, 2] - resting_m == pytest.approx(0.02)
 
 

@@ -430,6 +430,7 @@ class ArmMotion:
         self._start_m: Floats = np.zeros(3)
         self._above_finger_m = 0.0
         self._highest_m, self._height_m, self._slip_m = 0.0, 0.0, 0.0
+        self._ended = False
 
     def set(self, data: mujoco.MjData, t_s: float, *, touched: bool) -> None:
         """Set the servo of the arm and the force of the cord for the time after this tick."""
@@ -441,9 +442,11 @@ class ArmMotion:
             self._above_finger_m = float(self._start_m[2] - data.geom_xpos[self._finger, 2])
         if not isfinite(self._contact_s):
             return
-        since_s = t_s - self._contact_s
-        if since_s > self._end_s:
+        if self._ended:
             return
+        # The last tick may lie behind the end, where everything has its last value.
+        since_s = min(t_s - self._contact_s, self._end_s)
+        self._ended = since_s == self._end_s
         self._height_m = float((self._centre(data) - self._start_m)[2])
         self._highest_m = max(self._highest_m, self._height_m)
         above_m = float(self._centre(data)[2] - data.geom_xpos[self._finger, 2])
