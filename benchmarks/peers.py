@@ -34,8 +34,10 @@ from peer_engines import (
     timed,
 )
 from peer_scenes import SCENES, PeerScene
-from simulation import finite, made
 from simulation_scene import Run
+
+from graspsense.core.values.json_values import json_ready
+from graspsense.experiments.versions import measured_on
 
 WARM_S = 0.1
 """A shorter grasp is preceded by one that is not timed, since the engine before has left other data in the caches."""
@@ -68,14 +70,18 @@ def main() -> None:
     given = parser.parse_args()
     wanted = ["snap", "linear"] if given.short else [name for name in given.scenes.split(",") if name]
     scenes = [s for s in SCENES if not wanted or any(name in s.name for name in wanted)]
-    result: dict[str, Any] = {"made": made(), "repeats": 1 if given.short else given.repeats, "scenes": []}
+    result: dict[str, Any] = {
+        "made": measured_on(),
+        "repeats": 1 if given.short else given.repeats,
+        "scenes": [],
+    }
     for scene in scenes:
         measured = compared(scene, result["repeats"], adaptive=not given.short)
         result["scenes"].append(measured)
         print("\n".join(table(measured)), flush=True)
     print(", ".join(f"{key} {value}" for key, value in result["made"].items()))
     if given.json:
-        Path(given.json).write_text(json.dumps(finite(result), indent=2) + "\n", encoding="utf-8")
+        Path(given.json).write_text(json.dumps(json_ready(result), indent=2) + "\n", encoding="utf-8")
     if given.markdown:
         Path(given.markdown).write_text("\n".join(page(result)) + "\n", encoding="utf-8")
 
