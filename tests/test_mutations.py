@@ -69,8 +69,7 @@ def test_recordings(tmp_path):
     assert told > 0.8 * NUMBER
 
 
-@pytest.mark.parametrize("number", [25, pytest.param(NUMBER, marks=pytest.mark.slow)])
-def test_stores(number, tmp_path):
+def test_stores(tmp_path):
     """A store that opens is one in which `verify` finds what was changed, or nothing that matters was."""
     folder = tmp_path / "trials"
     with Store.open(folder) as store:
@@ -83,7 +82,7 @@ def test_stores(number, tmp_path):
     good = (folder / "store.sqlite").read_bytes()
     rng = random.Random(2)
     told = silent = 0
-    for _ in range(number):
+    for _ in range(NUMBER):
         for path in folder.glob("store.sqlite*"):
             path.unlink()
         (folder / "store.sqlite").write_bytes(bytes_of(good, rng))
