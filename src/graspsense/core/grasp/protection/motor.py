@@ -136,10 +136,8 @@ class Motor:
         if self._strong_s > self._lasts_s:
             ends = self._strong_s > STRONG_S or above_n > STRONG_N + STRONG_SHARE * asked_n
             return Fault("motor too strong", f"{answer}: check its drive and its scale", ends=ends)
-        if self._weak_s > self._lasts_s:
-            ends = self._weak_s > max(WEAK_S, 2.0 * self._lasts_s)
-            return Fault("motor too weak", f"{answer}: check its supply and its limits", ends=ends)
-        return None
+        ends = self._weak_s > max(WEAK_S, 2.0 * self._lasts_s)
+        return Fault("motor too weak", f"{answer}: check its supply and its limits", ends=ends)
 
     def _wrong_way(self, frame: Frame, phase: int) -> Fault | None:
         """The fingers open while every recent command closes, or close while every one opens."""
