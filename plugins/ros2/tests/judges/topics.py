@@ -33,6 +33,8 @@ RUN = (
 )
 GRASP = "/graspsense/grasp"
 PATIENCE_S = 120.0
+QUIET_S = 3.0
+"""Time without a message after which none is left."""
 EXPECTED = {
     "/graspsense/joint_states": "sensor_msgs/msg/JointState",
     "/graspsense/wrench/left": "geometry_msgs/msg/WrenchStamped",
@@ -83,6 +85,15 @@ def wait_for(look, what):
     return result
 
 
+def until_quiet(messages):
+    """Wait for the last messages: each topic has a thread of its own here, so the outcome may overtake the ticks."""
+    taken, quiet_s = 0, time.monotonic()
+    while time.monotonic() - quiet_s < QUIET_S:
+        if (now := sum(map(len, messages.values()))) > taken:
+            taken, quiet_s = now, time.monotonic()
+        time.sleep(0.1)
+
+
 def listed_topics(port):
     """Return the listed topics with their types, nothing while one is missing."""
     listed = {
@@ -106,6 +117,7 @@ def judge_node(port):
         ROS2Subscriber(topic, type_name, messages[topic].append, whole, type_hash=type_hash, router_port=port)
     trial = asked_to_grasp(port)
     wait_for(lambda: messages["/graspsense/outcome"], "outcome")
+    until_quiet(messages)
     judge(trial, messages)
 
 
