@@ -30,6 +30,10 @@ class LinkedLibrary(JITCodeLibrary):
         self._finalize_dynamic_globals()  # type: ignore[no-untyped-call]
         self._finalized = True
 
+    def _optimize_functions(self, ll_module: Any) -> None:
+        """Optimise nothing: the outermost function does it, once for all."""
+        ll_module.data_layout = self._codegen._data_layout
+
     def own_module(self) -> Any:
         """Return the code of this function alone."""
         return super()._get_module_for_linking()  # type: ignore[no-untyped-call]
@@ -53,6 +57,11 @@ class OutermostLibrary(JITCodeLibrary):
             self._reload_init.update(library._reload_init)
         self._linking_libraries = []
         super().finalize()  # type: ignore[no-untyped-call]
+
+    def _optimize_final_module(self) -> None:
+        """Optimise once. numba does so twice, to find counts of references, which most code here has not."""
+        passes, builder = self._codegen._module_pass_manager()  # type: ignore[no-untyped-call]
+        passes.run(self._final_module, builder)
 
 
 def _all_called(library: JITCodeLibrary) -> list[Any]:
