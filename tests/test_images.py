@@ -100,7 +100,7 @@ class Eyes(ModelGripper, SensorBackend[Held]):
     accepts = ("effort",)
 
     def __init__(self, config):
-        super().__init__(frozenset(FRAME), 0.065, 1500.0)
+        super().__init__(frozenset(FRAME), 0.074, 1500.0)
         self.config = config
 
     def open(self, seed):

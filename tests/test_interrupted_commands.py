@@ -33,11 +33,11 @@ pytestmark = [
     pytest.mark.skipif(not hasattr(os, "pidfd_open"), reason="needs Linux, to kill at a moment"),
 ]
 
-KILLS = int(os.environ.get("GRASPSENSE_KILLS", "25"))
+KILLS = int(os.environ.get("GRASPSENSE_KILLS", "12"))
 FULL_DISKS = 11
 INJECTED = {"run": 1, "import": 10, "export": 4, "train": 4, "change": 1, "recover": 10}
 """The fewest writes of each command, each of which fails once, without those of SQLite and of the writer process."""
-POWER_LOSSES = 17
+POWER_LOSSES = 12
 TRIALS = 8
 BARE = ("-o", "classifier.type=none")
 COLUMNS = ("--time", "t", "--gap", "g", "--force", "f", "--force", "f", "--label", "can")
@@ -74,10 +74,20 @@ class Lab:
         out.mkdir(exist_ok=True)
         self.made += 1
         if kind == "run":
-            return ["run", "--save", self.store, "--label", "block", "--changed", *BARE]
+            return [
+                "run",
+                "--save",
+                self.store,
+                "--label",
+                "block",
+                "--changed",
+                *BARE,
+                "-o",
+                "gripper.rate_hz=250",
+            ]
         if kind == "import":
             # Another grasp each time: none is imported twice.
-            rows = (f"{k / 1000},{squeezing(k / 1000)},{bottle(k / 1000)[0]}" for k in range(2200))
+            rows = (f"{k / 100},{squeezing(k / 100)},{bottle(k / 100)[0]}" for k in range(220))
             text = "\n".join(["t,g,f", *rows, f"2.3,0.054,{8 + self.made / 1000}"])
             (self.folder / "grasp.csv").write_text(text)
             return ["import", self.folder / "grasp.csv", *COLUMNS, "--save", self.store, *BARE]

@@ -27,6 +27,18 @@ from graspsense.store.store import Store
 ENDS = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
 IN_THE_SQUEEZE = 1200
 COMMAND = [sys.executable, "-m", "graspsense"]
+COLUMNS = (
+    "--time",
+    "t",
+    "--gap",
+    "gap",
+    "--force",
+    "force",
+    "--label",
+    "jar:full",
+    "-o",
+    "classifier.type=none",
+)
 
 
 class Signalled(Scripted):
@@ -94,7 +106,9 @@ def collection_of(store, settings, answers):
     )
 
 
-@pytest.mark.parametrize("number", ENDS)
+@pytest.mark.parametrize(
+    "number", [ENDS[0], *(pytest.param(end, marks=pytest.mark.slow) for end in ENDS[1:])]
+)
 def test_a_signal_in_a_squeeze_stops_the_collection_with_the_grasp_stored_as_aborted(
     signalled, tmp_path, number
 ):
@@ -140,6 +154,7 @@ def test_a_signal_while_a_trial_is_saved_loses_nothing(signalled, tmp_path):
     assert gripper.begun == 1
 
 
+@pytest.mark.slow
 def test_a_repeated_trial_keeps_the_label_of_the_session_whatever_became_of_the_first(signalled, tmp_path):
     settings, gripper = signalled
     gripper.number = signal.SIGWINCH  # ignored: these grasps end by themselves
@@ -201,13 +216,13 @@ def interrupting(monkeypatch, after):
 
 @pytest.fixture(scope="module")
 def recordings(tmp_path_factory):
-    """Return the folder of a store with three trials, with CSV files of the same grasps beside it."""
-    store = tmp_path_factory.mktemp("recordings") / "t"
-    for seed in ("1", "2", "3"):
-        plain = ("-o", "classifier.type=none", "-o", "gripper.rate_hz=250")
-        printed("run", "--label", "block", "--seed", seed, *plain, "--save", store)
-        printed("export", f"{store}#{seed}", "--to", store.parent / f"{seed}.csv")
-    return store
+    """Return the folder of a store with three trials, beside the CSV files from which they were imported."""
+    folder = tmp_path_factory.mktemp("recordings")
+    for k in (1, 2, 3):
+        rows = [f"{t},{squeezing(t)},{k * bottle(t)[0]}" for t in (0.01 * i for i in range(220))]
+        (folder / f"{k}.csv").write_text("\n".join(["t,gap,force", *rows]) + "\n")
+        printed("import", folder / f"{k}.csv", *COLUMNS, "--save", folder / "t")
+    return folder / "t"
 
 
 @pytest.mark.parametrize("after", [3, 4])
@@ -215,7 +230,7 @@ def test_ctrl_c_in_an_import_stores_no_aborted_grasp_and_is_told(recordings, tmp
     """Each recording is tried before it is imported: the second one is opened for the third and fourth time."""
     begun = interrupting(monkeypatch, after=after)
     files = [str(recordings.parent / f"{k}.csv") for k in (1, 2)]
-    importing = [graspsense("import", file, "--label", "block", "--save", tmp_path / "i") for file in files]
+    importing = [graspsense("import", file, *COLUMNS, "--save", tmp_path / "i") for file in files]
     assert [done.returncode for done in importing] == [0, 130]
     assert len(begun) == after
     with Store.read(tmp_path / "i") as store:
@@ -237,8 +252,7 @@ def collecting(folder, labels):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", ENDS)
-def test_a_process_that_collects_with_piped_answers_stops_at_the_first_signal(tmp_path, number):
+def test_a_process_that_collects_with_piped_answers_stops_at_the_first_signal(tmp_path):
     # 1e5 ticks a second make a grasp long enough to be interrupted.
     options = ("-o", "classifier.type=none", "-o", "gripper.rate_hz=100000")
     process = subprocess.Popen(
@@ -254,7 +268,7 @@ def test_a_process_that_collects_with_piped_answers_stops_at_the_first_signal(tm
     while "next: " not in line:
         line = process.stderr.readline()
         assert line, "it ended by itself"
-    process.send_signal(number)
+    process.send_signal(signal.SIGTERM)
     out, err = process.communicate(timeout=300)
     assert process.returncode == 130, err
     assert "next: " not in err

@@ -1,6 +1,6 @@
 """SIGKILL at random moments: of a recorder together with its writer, and of `graspsense collect`.
 
-Ten kills each, or as many as GRASPSENSE_KILLS says; with GRASPSENSE_KILLS_REPORT a file gets what was found.
+Six kills each, or as many as GRASPSENSE_KILLS says; with GRASPSENSE_KILLS_REPORT a file gets what was found.
 """
 
 import json
@@ -26,7 +26,7 @@ pytestmark = [
     pytest.mark.skipif(not Path("/proc/self/cmdline").exists(), reason="needs /proc, to see a writer end"),
 ]
 
-KILLS = int(os.environ.get("GRASPSENSE_KILLS", "10"))
+KILLS = int(os.environ.get("GRASPSENSE_KILLS", "6"))
 MOST_MISSING_S = 0.1
 TICKS = 400
 HERE = Path(__file__).parent

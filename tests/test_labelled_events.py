@@ -302,6 +302,13 @@ def test_slips_of_a_force_are_found_and_what_cannot_be_told_is_said(tmp_path, ca
     assert scores["held_out"] == "label"
     assert scores["not_told"] == ["jump"]
     assert scores["not_labelled"]["no acceleration is measured: placing is told by force alone"] == 4
+
+
+@pytest.mark.slow
+def test_the_score_in_words_has_what_cannot_be_told(tmp_path, capsys):
+    boxes(tmp_path)
+    path = manifest(tmp_path, events='events = { slip = "slip", jump = "slip" }')
+    source = f"manifest:{path}"
     code, out, err = run(capsys, "evaluate", source, "--events", "--tolerance", "0.1")
     assert code == 0, err
     assert "8 of 8" in out
@@ -319,6 +326,7 @@ def test_a_force_in_another_unit_is_scored_by_fitted_thresholds(tmp_path, capsys
     assert any("counts" in note for note in scores["notes"])
 
 
+@pytest.mark.slow
 def test_an_acceleration_of_one_axis_is_told_and_its_threshold_can_be_set(tmp_path, capsys):
     shock = 30.0 * ((T_S >= 2.0) & (T_S < 2.01))
     write(tmp_path, "box_1", 9.8 + shock, flags((2.0, 2.1)))
@@ -350,6 +358,7 @@ def test_wrong_uses_are_told(arguments, code, says, tmp_path, capsys):
     assert says in err
 
 
+@pytest.mark.slow
 def test_a_copy_of_a_recording_counts_once(tmp_path, capsys):
     boxes(tmp_path)
     (tmp_path / "can_3.csv").write_text((tmp_path / "can_1.csv").read_text())

@@ -8,6 +8,7 @@ import subprocess
 import sys
 
 import parts
+import pytest
 from commands import graspsense
 from mutants import MUTANTS
 
@@ -106,6 +107,7 @@ bound = api.bind
 """
 
 
+@pytest.mark.slow
 def test_imports_that_moved_are_printed_with_the_new_form_beside(tmp_path):
     make("lab-old", ["observer"], tmp_path / "old")
     source = tmp_path / "old" / "src"

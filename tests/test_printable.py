@@ -6,17 +6,19 @@ import re
 from pathlib import Path
 
 import pytest
+from attrs import evolve
 from cases import every_case
 from commands import graspsense
 from hypothesis import given
 from hypothesis import strategies as st
 from kept import BENCH, keep
 
-from graspsense import cli
+from graspsense import Prediction, cli
 from graspsense.cli.terminal import echo, echo_as_it_is, echo_entry, echo_table, talk, warn
 from graspsense.core.values.printable import in_one_line, printable
 from graspsense.store.changes import relabel, set_aside
 from graspsense.store.store import Store
+from graspsense.testing_api import a_trial
 
 HOSTILE = "can\x1b]0;owned\x07\x1b[2J\x9b31m\u202egnp.\u2066\x7f\u2028\r:full"
 """Sets the title, clears the screen, colours by a C1 code, and turns the direction of writing."""
@@ -84,8 +86,6 @@ def test_a_row_of_a_table_is_one_line_whatever_is_in_it(capsys):
 @pytest.fixture
 def store(tmp_path):
     """Return a store whose labels, reasons and gripper an attacker has chosen, as in a store from elsewhere."""
-    from attrs import evolve
-
     with Store.open(tmp_path / "t") as store:
         for label in (HOSTILE, FORGED):
             for value in (0.06, 0.07, 0.065):
@@ -170,20 +170,20 @@ def test_all_that_is_printed_passes_through_the_terminal_module():
             assert name not in ("print", "click.echo", "click.secho"), f"{path.name}:{node.lineno}"
 
 
+def shown_as(label):
+    """Return a trial whose prediction has this label."""
+    return evolve(a_trial(), prediction=Prediction(label=label, probabilities={label: 0.9}, because=("x",)))
+
+
 def test_what_an_interpreter_shows_of_a_trial_is_one_harmless_line():
-    from attrs import evolve
-
-    from graspsense import load_pipeline
-
-    pipeline = load_pipeline(options=["gripper.object=block"])
-    trial = pipeline.grasp(labels={"label": HOSTILE + "\n"})
-    prediction = evolve(trial.prediction, label=HOSTILE + "\n")
+    trial = shown_as(HOSTILE + "\n")
+    trial = evolve(trial, run=evolve(trial.run, labels={"label": HOSTILE + "\n"}))
     features = evolve(
         trial.features,
         names=(FORGED, *trial.features.names[1:]),
         reasons={FORGED: "x", **trial.features.reasons},
     )
-    for shown in map(repr, (trial, evolve(trial, prediction=prediction), prediction, features)):
+    for shown in map(repr, (trial, trial.prediction, features)):
         assert acts(shown) == []
         assert "\n" not in shown
 
@@ -198,12 +198,15 @@ def test_pictures_show_a_dollar_as_it_is(tmp_path):
 
     from graspsense.evaluation.confusion import Confusion
     from graspsense.report.confusion import confusion_png
+    from graspsense.report.grasp_picture import grasp_png
     from graspsense.report.literal_text import show_literally
 
     labels = tuple(MATHEMATICS)
     counts = tuple(tuple(3 * (i == k) for k in range(len(labels))) for i in range(len(labels)))
     confusion_png(Confusion(labels, counts), "$\\frac$", tmp_path / "matrix.png")
-    assert (tmp_path / "matrix.png").stat().st_size > 1000
+    grasp_png(shown_as(" ".join(MATHEMATICS)), tmp_path / "grasp.png")
+    for name in ("matrix.png", "grasp.png"):
+        assert (tmp_path / name).stat().st_size > 1000
 
     figure = Figure()
     axes = figure.add_subplot()
@@ -215,16 +218,3 @@ def test_pictures_show_a_dollar_as_it_is(tmp_path):
     (text,) = axes.get_legend().get_texts()
     assert (text.get_text(), text.get_parse_math()) == ("$\\frac$", False)
     assert all(label.get_parse_math() for label in axes.yaxis.get_ticklabels())
-
-
-def test_the_picture_of_a_grasp_shows_any_label(tmp_path):
-    pytest.importorskip("matplotlib", reason="drawing needs the extra `plot`")
-    from attrs import evolve
-
-    from graspsense import load_pipeline
-    from graspsense.report.grasp_picture import grasp_png
-
-    trial = load_pipeline(options=["gripper.object=block"]).grasp()
-    label = " ".join(MATHEMATICS)
-    grasp_png(evolve(trial, prediction=evolve(trial.prediction, label=label)), tmp_path / "grasp.png")
-    assert (tmp_path / "grasp.png").stat().st_size > 1000

@@ -450,6 +450,7 @@ def test_the_page_of_a_store_that_cannot_be_judged(tmp_path):
     assert "One grasp, from the approach to rest" in Reader(page.html()).text
 
 
+@pytest.mark.slow
 def test_the_page_of_an_experiment_once_more(tmp_path, capsys):
     (tmp_path / "trials.csv").write_text(wayward.CSV)
     (tmp_path / "it.toml").write_text(

@@ -129,8 +129,6 @@ def write(
 CASES = {
     "ros1": {"ros": 1, "source": "/joint_states", "kind": PRESSURE_NOW},
     "ros1-2009": {"ros": 1, "source": "/pr2_gripper_controller/state", "kind": PRESSURE_2009},
-    "ros1-controller": {"ros": 1, "source": "/r_gripper_controller/state", "kind": PRESSURE_NOW},
-    "ros2": {"ros": 2, "source": "/joint_states", "kind": PRESSURE_NOW},
     "ros2-without-definitions": {
         "ros": 2,
         "source": "/r_gripper_controller/state",

@@ -56,7 +56,7 @@ def graspsense_sensor_backends():
 GRASPSENSE_API = (2, 0)
 
 
-@pytest.mark.parametrize("emulated", [False, True], ids=["real", "emulated"])
+@pytest.mark.parametrize("emulated", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_a_trial_is_simulated_where_the_gripper_says_so_and_not_by_its_settings(
     tmp_path, monkeypatch, emulated
 ):
@@ -109,6 +109,7 @@ def test_many_trials_are_run_in_parts_of_equal_size_and_only_their_numbers_are_k
     assert (in_parts.labels, in_parts.table.names) == (whole.labels, whole.table.names)
 
 
+@pytest.mark.slow
 def test_a_note_says_in_how_many_grasps_of_which_objects_the_accuracy_is_not_verified(tmp_path):
     rod = tmp_path / "rod.toml"
     rod.write_text('width_m = 0.05\n[[terms]]\ntype = "elastic"\nk1_n_m = 1e7\n')

@@ -86,6 +86,7 @@ def test_a_number_that_is_not_there_says_which_are(store):
         set_aside(store, [5], "why")
 
 
+@pytest.mark.slow
 def test_readers_read_beside_a_writer_in_another_process(store):
     """A reader sees what was committed, while a transaction is open and after it."""
     keep(store)

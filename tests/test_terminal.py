@@ -16,8 +16,8 @@ from terminals import in_terminal
 
 from graspsense.cli import terminal
 
-WIDTHS = (60, 80, 140)
-QUICK_WIDTHS = (60, *(pytest.param(width, marks=pytest.mark.slow) for width in WIDTHS[1:]))
+WIDTHS = (60, 140)
+QUICK_WIDTHS = (60, pytest.param(140, marks=pytest.mark.slow))
 """The same, of which the quick run has the one that is most difficult to fit."""
 
 TABLE = """
@@ -31,7 +31,7 @@ echo_table(
 """
 
 
-@every_case("width", [40, *WIDTHS])
+@every_case("width", [40, 140])
 def test_a_table_fits_the_terminal_and_keeps_every_word(width):
     shown = in_terminal([TABLE], width, program=[sys.executable, "-c"])
 
@@ -118,7 +118,8 @@ def outcome_colours(shown):
     }
 
 
-@pytest.mark.parametrize("width", QUICK_WIDTHS)
+@pytest.mark.slow
+@pytest.mark.parametrize("width", WIDTHS)
 def test_a_grasp_fits_the_terminal_with_outcome_prediction_and_warning_in_colour(width):
     shown = in_terminal(["run", "-o", "gripper.explain=true"], width)
 

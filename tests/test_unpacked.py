@@ -133,14 +133,14 @@ def test_the_limit_is_a_setting(monkeypatch):
 
 @pytest.mark.parametrize("kind", ["zstd", "lz4", "bz2"])
 def test_what_is_unpacked_is_what_was_packed_and_is_counted(kind, monkeypatch):
-    data = os.urandom(1000) * 2200
+    data = os.urandom(1000) * 1100
     packed = {"zstd": zstandard.compress, "lz4": lz4.frame.compress, "bz2": bz2.compress}[kind](data)
     unpacked = Unpacked("f")
     assert unpacked.unpack(kind, packed) == data
     assert unpacked.total == len(data)
     with pytest.raises((ValueError, zstandard.ZstdError, RuntimeError)):
         Unpacked("f").unpack(kind, packed[:-9])
-    monkeypatch.setenv(LIMIT_VARIABLE, "2")
+    monkeypatch.setenv(LIMIT_VARIABLE, "1")
     with pytest.raises(TooLarge):
         Unpacked("f").unpack(kind, packed)
 
@@ -212,8 +212,7 @@ def test_arrays_come_back_as_numpy_wrote_them(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["zstd", "lz4"])
-@pytest.mark.parametrize("declared", [None, 1000])
+@pytest.mark.parametrize(("kind", "declared"), [("zstd", None), ("lz4", 1000)])
 def test_mcap_of_ros(tmp_path, kind, declared):
     path = tmp_path / "bomb.mcap"
     chunked_mcap(path, kind, compressed(kind, BOMB), declared)
@@ -295,10 +294,10 @@ def test_mat(tmp_path, monkeypatch):
 
     path = tmp_path / "a.mat"
     savemat(
-        path, {"t": np.arange(MB / 1.0), "cells": np.array([[1, "a"]], dtype=object)}, do_compression=True
+        path, {"t": np.arange(MB / 5.0), "cells": np.array([[1, "a"]], dtype=object)}, do_compression=True
     )
-    assert read_arrays(path)[0].numbers["t"].shape == (MB,)
-    monkeypatch.setenv(LIMIT_VARIABLE, "5")
+    assert read_arrays(path)[0].numbers["t"].shape == (MB // 5,)
+    monkeypatch.setenv(LIMIT_VARIABLE, "1")
     with pytest.raises(TooLarge, match=r"a\.mat"):
         read_arrays(path)
     monkeypatch.setenv(LIMIT_VARIABLE, "100")
@@ -308,8 +307,9 @@ def test_mat(tmp_path, monkeypatch):
         read_arrays(path)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", ["lz4", "bz2"])
+@pytest.mark.parametrize(
+    "kind", [pytest.param("lz4", marks=pytest.mark.slow), pytest.param("bz2", marks=pytest.mark.long)]
+)
 def test_ros1_bag(tmp_path, kind):
     rosbag1 = pytest.importorskip("rosbags.rosbag1")
     from rosbags.typesys import Stores, get_typestore
