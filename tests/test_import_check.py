@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scipy
-from cases import every_case
 from commands import graspsense
 
 from graspsense.sources.channel_facts import channel_facts
@@ -258,7 +257,9 @@ RIGHT = {
 }
 
 
-@every_case("make", RIGHT)
+@pytest.mark.parametrize(
+    "make", [pytest.param(make, marks=() if make in (jaco, fruit) else pytest.mark.slow) for make in RIGHT]
+)
 def test_at_least_half_of_a_suggested_manifest_is_right_and_nothing_is_wrong_in_silence(make, tmp_path):
     folder = tmp_path / "set"
     make(folder)

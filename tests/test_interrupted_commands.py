@@ -74,17 +74,8 @@ class Lab:
         out.mkdir(exist_ok=True)
         self.made += 1
         if kind == "run":
-            return [
-                "run",
-                "--save",
-                self.store,
-                "--label",
-                "block",
-                "--changed",
-                *BARE,
-                "-o",
-                "gripper.rate_hz=250",
-            ]
+            quick = ("--label", "block", "-o", "gripper.rate_hz=250")
+            return ["run", "--save", self.store, "--changed", *quick, *BARE]
         if kind == "import":
             # Another grasp each time: none is imported twice.
             rows = (f"{k / 100},{squeezing(k / 100)},{bottle(k / 100)[0]}" for k in range(220))
@@ -104,16 +95,8 @@ class Lab:
             with Store.read(self.store) as store:
                 present = store.trial(1).summary.label
             label = "can:half_open" if present == "can:full_open" else "can:full_open"
-            return [
-                "trials",
-                "relabel",
-                f"{self.store}#1",
-                f"{self.store}#3",
-                "--label",
-                label,
-                "--why",
-                "so",
-            ]
+            refs = (f"{self.store}#1", f"{self.store}#3")
+            return ["trials", "relabel", *refs, "--label", label, "--why", "so"]
         assert kind == "recover"
         with Store.open(self.store) as store:
             name = store.new_recording("2026-11-21T10:30:15.123+00:00")

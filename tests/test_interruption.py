@@ -26,7 +26,6 @@ from graspsense.store.store import Store
 
 ENDS = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
 IN_THE_SQUEEZE = 1200
-COMMAND = [sys.executable, "-m", "graspsense"]
 COLUMNS = (
     "--time",
     "t",
@@ -247,21 +246,30 @@ def test_ctrl_c_in_features_writes_no_table_of_aborted_grasps(recordings, tmp_pa
     assert not out.exists()
 
 
-def collecting(folder, labels):
-    return "collect", "--labels", labels, "--each", "9", "--save", str(folder), "--json"
+def collecting(folder, labels, *options, stream=subprocess.PIPE, **more):
+    """Start a collection as a process of its own, with its input, output and errors on this stream."""
+    words = (
+        "collect",
+        "--labels",
+        labels,
+        "--each",
+        "9",
+        "--save",
+        str(folder),
+        "-o",
+        "classifier.type=none",
+    )
+    command = [sys.executable, "-m", "graspsense", *words, *options]
+    return subprocess.Popen(command, stdin=stream, stdout=stream, stderr=stream, **more)
+
+
+LONG = ("-o", "gripper.rate_hz=30000")
+"""So many ticks a second make a grasp long enough to be interrupted."""
 
 
 @pytest.mark.slow
 def test_a_process_that_collects_with_piped_answers_stops_at_the_first_signal(tmp_path):
-    # 1e5 ticks a second make a grasp long enough to be interrupted.
-    options = ("-o", "classifier.type=none", "-o", "gripper.rate_hz=100000")
-    process = subprocess.Popen(
-        [*COMMAND, *collecting(tmp_path / "t", "block,toy"), *options],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+    process = collecting(tmp_path / "t", "block,toy", "--json", *LONG, text=True)
     process.stdin.write("\n" * 20)
     process.stdin.flush()
     line = ""
@@ -281,14 +289,7 @@ def test_a_process_that_collects_with_piped_answers_stops_at_the_first_signal(tm
 
 
 def operator(folder, labels):
-    process = subprocess.Popen(
-        [*COMMAND, *collecting(folder, labels), "-o", "classifier.type=none"],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        env={**os.environ, "PYTHONUNBUFFERED": "1"},
-    )
+    process = collecting(folder, labels, text=True, env={**os.environ, "PYTHONUNBUFFERED": "1"})
 
     def answer(key, until):
         """Give an answer and return the lines up to one with this text."""
@@ -343,14 +344,7 @@ def test_a_second_session_leaves_the_trials_of_an_earlier_one_alone(tmp_path):
 @pytest.mark.slow
 def test_a_terminal_that_goes_ends_the_collection_though_nothing_can_be_printed(tmp_path):
     master, slave = pty.openpty()
-    options = ("-o", "classifier.type=none", "-o", "gripper.rate_hz=100000")
-    process = subprocess.Popen(
-        [*COMMAND, *collecting(tmp_path / "t", "block,toy")[:-1], *options],
-        stdin=slave,
-        stdout=slave,
-        stderr=slave,
-        start_new_session=True,
-    )
+    process = collecting(tmp_path / "t", "block,toy", *LONG, stream=slave, start_new_session=True)
     os.close(slave)
     said = b""
     while b"next: " not in said:

@@ -105,13 +105,7 @@ def test_a_recorder_killed_with_its_writer_loses_at_most_100_ms_of_the_running_t
     missing = []
     for k in range(KILLS):
         folder, progress = tmp_path / f"{k}", tmp_path / f"{k}.progress"
-        program = [
-            sys.executable,
-            str(HERE / "paced_recorder.py"),
-            str(folder),
-            str(progress),
-            f"{TICKS / 1000}",
-        ]
+        program = [sys.executable, HERE / "paced_recorder.py", folder, progress, f"{TICKS / 1000}"]
         with subprocess.Popen(program, stdout=subprocess.PIPE, text=True) as process:
             writer = until_tick(progress, rng.randrange(2 * TICKS), process)
             if k % 3 == 2:

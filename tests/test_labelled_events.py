@@ -161,6 +161,7 @@ def test_lists_in_cells_count_as_cells_of_the_table(tmp_path, monkeypatch):
         events_in(tmp_path, events='events = { slip = "slip[0]" }')
 
 
+@pytest.mark.slow
 def test_an_imported_trial_keeps_the_labels_among_its_events(tmp_path, capsys):
     write(tmp_path, "box_1", force(), flags((1.0, 1.5)))
     write(tmp_path, "box_2", force(Kick(2.0, 0.3)), flags())

@@ -271,24 +271,6 @@ def test_a_feature_set_that_raises_on_simulated_grasps_is_named(monkeypatch):
     assert "internal error" not in err
 
 
-def test_train_replaces_no_file_unless_told(csv, tmp_path):
-    model, kept = tmp_path / "model.json", tmp_path / "kept.csv"
-    command = ("train", csv, "--label", "what", "--out", model, "--keep", kept)
-    assert graspsense(*command, "--classifier", "tree")[0] == 0
-    contents = model.read_bytes(), kept.read_bytes()
-
-    code, _, err = graspsense(*command, "--classifier", "knn")
-    assert code == 2
-    assert f"{model} already exists: name another file, or add --overwrite to replace it" in err
-    model.rename(tmp_path / "other.json")
-    assert f"{kept} already exists" in graspsense(*command)[2]
-    (tmp_path / "other.json").rename(model)
-    assert (model.read_bytes(), kept.read_bytes()) == contents
-
-    assert graspsense(*command, "--classifier", "knn", "--overwrite")[0] == 0
-    assert model.read_bytes() != contents[0]
-
-
 @pytest.mark.parametrize("option", ["--out", "--keep"])
 @pytest.mark.parametrize("disk", ["ro", "full"])
 def test_train_finds_out_before_the_grasps_that_it_cannot_write(mounted, tmp_path, option, disk):

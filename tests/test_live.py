@@ -320,6 +320,7 @@ def test_an_observer_of_a_plugin_receives_the_whole_grasp(tmp_path, observer):
     assert messages[-1]["outcome"] == "steady"
 
 
+@pytest.mark.slow
 def test_an_observer_that_fails_is_named_and_the_grasp_goes_on(observer):
     feed = observer("fail")
     trial = load_pipeline("default").grasp(sinks=[feed])

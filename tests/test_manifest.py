@@ -772,9 +772,8 @@ def test_features_are_of_the_whole_recording_and_not_of_what_the_controller_saw(
     assert stored.values[0] == pytest.approx(whole.values[0], nan_ok=True)
 
 
-@pytest.mark.parametrize(
-    "resample_hz", [100, pytest.param(0, marks=pytest.mark.slow), pytest.param(1000, marks=pytest.mark.slow)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("resample_hz", [0, 100, 1000])
 def test_rest_is_found_on_a_coarse_gap_at_any_rate(tmp_path, resample_hz):
     """A squeeze of 2.4 mm in 3 s and a hold of 1.5 s, in steps of 0.1 mm at 45 Hz."""
     times = np.arange(270) / 45.0

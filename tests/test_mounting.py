@@ -81,6 +81,7 @@ def test_a_trial_without_a_mounting_is_stored_as_before_there_was_one():
     assert DeviceRecord.from_text(record.to_text()) == record
 
 
+@pytest.mark.slow
 def test_another_mounting_is_no_other_experiment(tmp_path):
     with Store.open(tmp_path / "trials") as store:
         record_grasp(store, settings(), installed(), labels={}, origin="run")

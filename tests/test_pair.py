@@ -159,6 +159,7 @@ def test_a_gripper_that_is_not_there_is_told_and_the_other_is_closed():
     assert sound.closed == 1
 
 
+@pytest.mark.slow
 def test_the_trials_of_a_pair_are_kept_and_name_each_other(tmp_path):
     plain = tmp_path / "second.toml"
     plain.write_text(

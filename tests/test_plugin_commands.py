@@ -171,11 +171,3 @@ def test_a_package_is_made_for_several_roles(tmp_path, monkeypatch):
         "law.py",
         "plugin.py",
     ]
-
-
-def test_a_role_is_given_once(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    code, _, err = graspsense("plugins", "new", "lab-hand", "--role", "controller", "--role", "controller")
-
-    assert (code, list(tmp_path.iterdir())) == (2, [])
-    assert "--role controller is given 2 times: give each role once" in err

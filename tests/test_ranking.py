@@ -123,6 +123,7 @@ def test_an_unknown_name_is_refused_by_the_option_that_was_typed_before_any_gras
         assert "grasping" not in done.stderr
 
 
+@pytest.mark.slow
 def test_the_page_has_verdict_rates_losses_sets_and_the_command(tmp_path):
     page = tmp_path / "page.html"
     shown = printed(*compared(tmp_path), "--classifiers", "tree,knn", "--out", str(page))

@@ -139,7 +139,7 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize(("ros", "definitions"), [(1, True), (2, False)])
+@pytest.mark.parametrize(("ros", "definitions"), [pytest.param(1, True, marks=pytest.mark.slow), (2, False)])
 def test_the_accelerometer_of_a_bag_is_a_fast_channel_with_every_sample(ros, definitions, tmp_path):
     path = tmp_path / ("grasp.bag" if ros == 1 else "grasp")
     bag = Bag(path, ros, definitions)

@@ -9,10 +9,11 @@ from math import inf, isnan
 
 import numpy as np
 import pytest
-from attrs import evolve, frozen
+from attrs import evolve
 from cases import every_case
 from click.testing import CliRunner
 from kept import begun
+from parts import NoKeys, channels
 
 from graspsense import load_pipeline
 from graspsense.cli.main import cli
@@ -53,20 +54,9 @@ HERE = sys.modules[__name__]
 PALM = TactileArray("palm", "N", 100.0, rows=2, columns=3)
 ACCELERATION = FastChannel("acceleration", "m/s2", 3000.0, samples=3, axes=("x", "y"))
 TEMPERATURE = Channel("motor_temperature", "K", 1000.0)
-FRAME = tuple(
-    Channel(name, unit, 1000.0)
-    for name, unit in (
-        *(("gap", "m"), ("velocity", "m/s"), ("effort", "N")),
-        *(("force_left", "N"), ("force_right", "N")),
-    )
-)
+FRAME = channels("gap", "velocity", "effort", "force_left", "force_right")
 LOST_AT = 700
 """The tick before which five samples of the acceleration are lost."""
-
-
-@frozen(kw_only=True)
-class NoKeys:
-    pass
 
 
 class Palm(ModelGripper, SensorBackend[NoKeys]):

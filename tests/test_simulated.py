@@ -6,21 +6,19 @@ import sys
 
 import pytest
 from attrs import evolve, frozen
-from parts import CHANNELS_OF_HAND, Hand, HandConfig
+from parts import CHANNELS_OF_HAND, Hand, HandConfig, channels
 
 from graspsense import load_pipeline
 from graspsense.core.components.config import resolve
 from graspsense.core.components.registry import IsolatedPlugins
 from graspsense.core.values.errors import ConfigError
 from graspsense.plugin_api import (
-    Channel,
     ObjectKind,
     SensorBackend,
     SensorBackendEntry,
     hookimpl,
     setting,
 )
-from graspsense.simulator_api import CHANNELS
 from graspsense.sources.simulated import Group, plan_trials, simulated
 from graspsense.store.dataset import labelled_store
 from graspsense.store.labels import labels_of
@@ -38,7 +36,7 @@ class TcpHandConfig(HandConfig):
 
 
 class TcpHand(Hand, SensorBackend[TcpHandConfig]):
-    channels = tuple(Channel(name, CHANNELS[name], 1000.0) for name in CHANNELS_OF_HAND)
+    channels = channels(*CHANNELS_OF_HAND)
     accepts = ("effort",)
 
     def objects(self):
@@ -88,6 +86,7 @@ def test_a_gripper_without_default_objects_names_those_that_can_be_given(monkeyp
         plan_trials(settings, [Group(instances=2, trials=1)], 0)
 
 
+@pytest.mark.slow
 def test_many_trials_are_run_in_parts_of_equal_size_and_only_their_numbers_are_kept(monkeypatch):
     settings = resolve("default", options=["gripper.sensor=ideal"])
     group = Group(objects=("block",), instances=1, trials=5)

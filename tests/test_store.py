@@ -303,6 +303,7 @@ def test_a_store_on_a_read_only_disk_is_read_and_not_written(mounted, log):
         Store.open(disk)
 
 
+@pytest.mark.slow
 def test_a_disk_that_is_full_is_told_and_what_was_kept_stays(mounted):
     disk = mounted("size=1500k")
     with Store.open(disk) as store:

@@ -17,8 +17,6 @@ from terminals import in_terminal
 from graspsense.cli import terminal
 
 WIDTHS = (60, 140)
-QUICK_WIDTHS = (60, pytest.param(140, marks=pytest.mark.slow))
-"""The same, of which the quick run has the one that is most difficult to fit."""
 
 TABLE = """
 from graspsense.cli.terminal import Style, echo_table
@@ -64,8 +62,9 @@ def test_columns_override_the_width_of_the_terminal():
     assert 40 < max(map(len, shown.lines)) <= 60
 
 
-@pytest.mark.parametrize("width", QUICK_WIDTHS)
-@pytest.mark.parametrize("lang", ["C", pytest.param("C.UTF-8", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize("lang", ["C", "C.UTF-8"])
 def test_the_list_of_plugins_fits_the_terminal(width, lang):
     shown = in_terminal(["plugins", "list"], width, LANG=lang)
 

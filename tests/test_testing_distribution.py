@@ -126,7 +126,10 @@ MUTANTS = {
 }
 
 
-@pytest.mark.parametrize("name", MUTANTS)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=pytest.mark.slow if "light" in name else ()) for name in MUTANTS],
+)
 def test_a_check_catches_its_mutant(site, name):
     plugin, says = MUTANTS[name]
 

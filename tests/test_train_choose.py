@@ -62,7 +62,12 @@ def runs(store, pipeline):
     ("given", "least"),
     [
         pytest.param(("-o", "features.type=curve"), 6, marks=pytest.mark.slow, id="every classifier"),
-        pytest.param(("--classifier", "extra-trees"), 4, marks=pytest.mark.slow, id="every feature set"),
+        pytest.param(
+            ("--classifier", "extra-trees", "-o", "classifier.trees=10"),
+            4,
+            marks=pytest.mark.slow,
+            id="every feature set",
+        ),
         pytest.param((), 24, marks=pytest.mark.long, id="all"),
     ],
 )

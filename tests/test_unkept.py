@@ -137,6 +137,7 @@ def test_run_says_in_outcome_and_exit_code_that_the_trial_is_not_kept(tmp_path):
     assert "kept as trial" not in err
 
 
+@pytest.mark.slow
 def test_collect_neither_counts_it_nor_goes_on(tmp_path):
     folder = str(tmp_path / "t")
     command = ("collect", "--labels", "cup:full", "--each", "2", "--save", folder, "--gripper", "uncountable")
