@@ -168,38 +168,41 @@ def test_a_command_that_is_killed_at_a_random_moment(commands, tmp_path, kind):
     assert [path for path in (tmp_path / "out").iterdir() if path.name.endswith(".part")] == []
 
 
-def test_a_disk_that_is_full_wherever_it_becomes_so(commands, tmp_path):
-    """No file may become longer than so many bytes, which every user can have: what the disk says is the same."""
-    rng = random.Random(2)
+def refused_by_the_disk(lab, run):
+    """Run commands in turn, until the disk has refused enough of them; `run` runs one and returns how it ended."""
     refused = 0
-    lab = Lab(tmp_path, commands)
     for k in range(10 * FULL_DISKS):
         kind = KINDS[k % len(KINDS)]
-        done = commands.run(*lab.command(kind), longest_file=int(10 ** rng.uniform(0.0, 5.0)))
+        done = run(lab.command(kind))
         lab.check(kind, done)
         refused += done.code != 0
         if refused == FULL_DISKS:
             break
     assert refused == FULL_DISKS
+
+
+def test_a_disk_that_is_full_wherever_it_becomes_so(commands, tmp_path):
+    """No file may become longer than so many bytes, which every user can have: what the disk says is the same."""
+    rng = random.Random(2)
+    refused_by_the_disk(
+        Lab(tmp_path, commands),
+        lambda words: commands.run(*words, longest_file=int(10 ** rng.uniform(0.0, 5.0))),
+    )
 
 
 def test_a_real_disk_that_is_full(commands, tmp_path, mounted):
     rng = random.Random(3)
     lab = Lab(mounted("size=8m") / "lab", commands)
-    refused = 0
-    for k in range(10 * FULL_DISKS):
-        kind = KINDS[k % len(KINDS)]
-        arguments = lab.command(kind)
+
+    def on_a_full_disk(words):
         filler = lab.folder / "filler"
         free = shutil.disk_usage(lab.folder).free
         filler.write_bytes(bytes(max(0, free - int(10 ** rng.uniform(0.0, 5.5)))))
-        done = commands.run(*arguments)
+        done = commands.run(*words)
         filler.unlink()
-        lab.check(kind, done)
-        refused += done.code != 0
-        if refused == FULL_DISKS:
-            break
-    assert refused == FULL_DISKS
+        return done
+
+    refused_by_the_disk(lab, on_a_full_disk)
 
 
 @pytest.mark.parametrize("kind", KINDS)

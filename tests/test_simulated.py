@@ -59,7 +59,8 @@ def test_a_trial_is_simulated_where_the_gripper_says_so_and_not_by_its_settings(
     tmp_path, monkeypatch, emulated
 ):
     monkeypatch.setitem(sys.modules, __name__, HERE)
-    options = ["gripper.type=tcp-hand", f"gripper.emulated={str(emulated).lower()}", "classifier.type=none"]
+    hand = ["gripper.type=tcp-hand", f"gripper.emulated={str(emulated).lower()}", "run.hold_s=0.01"]
+    options = [*hand, "controller.closing_speed_m_s=0.04", "run.first_speed_m_s=0.1", "classifier.type=none"]
     with IsolatedPlugins() as plugins, Store.open(tmp_path / "trials") as store:
         plugins.add(HERE, "lab-hand")
         settings = load_pipeline(options=options, plugins=plugins).settings
