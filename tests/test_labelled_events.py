@@ -318,6 +318,7 @@ def test_the_score_in_words_has_what_cannot_be_told(tmp_path, capsys):
     assert "2 instances, at least 6 are needed" in out
 
 
+@pytest.mark.slow
 def test_a_force_in_another_unit_is_scored_by_fitted_thresholds(tmp_path, capsys):
     boxes(tmp_path, newtons=150.0)
     path = manifest(tmp_path)

@@ -285,7 +285,7 @@ def test_bag_that_is_cut_short_or_changed_raises_nothing_but_our_own(grasp: Any,
     data = whole.read_bytes()
     chance = np.random.default_rng(5)
     damaged = 0
-    for i in range(20):
+    for i in range(12):
         broken = bytearray(data[: int(chance.integers(len(data)))] if i % 2 else data)
         if not i % 2:
             for integer in chance.integers(len(broken), size=40):
@@ -296,7 +296,7 @@ def test_bag_that_is_cut_short_or_changed_raises_nothing_but_our_own(grasp: Any,
             read_bag(str(path))
         except (DataDamaged, ConfigError):
             damaged += 1
-    assert damaged >= 10, "at least those that are cut short"
+    assert damaged >= 6, "at least those that are cut short"
 
 
 def test_bag_without_fingertips_says_what_it_has(tmp_path: Path) -> None:

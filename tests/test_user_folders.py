@@ -85,6 +85,7 @@ def test_without_a_home_nothing_is_disabled_calibrated_or_kept(tmp_path, monkeyp
     assert disabled_in_config() == ("lab-peak",)
 
 
+@pytest.mark.slow
 def test_commands_work_without_a_home_and_leave_nothing_behind(tmp_path):
     scratch = tmp_path / "tmp"
     scratch.mkdir()
