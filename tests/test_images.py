@@ -17,6 +17,7 @@ from attrs import evolve, frozen
 from cases import every_case
 from kept import begun
 from mcap.reader import make_reader
+from parts import NoKeys, channels
 
 from graspsense import load_pipeline
 from graspsense.core.components.channels import as_json, cells_of, from_json, no_signals, read_only
@@ -72,13 +73,7 @@ DEPTH = TactileArray("depth", "um", 50.0, rows=4, columns=5, dtype="uint16")
 HEAT = TactileArray("heat", "K", 50.0, rows=3, columns=2, dtype="float32")
 FORCES = TactileArray("forces", "N", 50.0, rows=2, columns=2, components=3)
 IMAGES = (EYE, DEPTH, HEAT, FORCES)
-FRAME = tuple(
-    Channel(name, unit, 1000.0)
-    for name, unit in (
-        *(("gap", "m"), ("velocity", "m/s"), ("effort", "N")),
-        *(("force_left", "N"), ("force_right", "N")),
-    )
-)
+FRAME = channels("gap", "velocity", "effort", "force_left", "force_right")
 TICKS_OF_AN_IMAGE = 20
 
 
@@ -100,7 +95,7 @@ class Eyes(ModelGripper, SensorBackend[Held]):
     accepts = ("effort",)
 
     def __init__(self, config):
-        super().__init__(frozenset(FRAME), 0.065, 1500.0)
+        super().__init__(frozenset(FRAME), 0.074, 1500.0)
         self.config = config
 
     def open(self, seed):
@@ -309,6 +304,7 @@ def fixed(array):
         (np.zeros((6, 8, 3), np.uint8), "can still be changed"),
         (fixed(np.zeros((6, 8, 3), np.uint8)[::1, ::-1][:, ::-1]), "can still be changed"),
         (fixed(fixed(np.zeros((6, 16, 3), np.uint8))[:, ::2]), "not contiguous"),
+        (fixed(np.zeros((6, 8, 3), np.uint8)[:]), "can still be changed"),
     ],
 )
 def test_an_image_that_is_not_as_declared_ends_the_grasp_and_is_told(image, word, monkeypatch):
@@ -316,12 +312,6 @@ def test_an_image_that_is_not_as_declared_ends_the_grasp_and_is_told(image, word
     assert ended.outcome is Outcome.ABORTED
     assert "'eye'" in ended.reason
     assert word in ended.reason
-
-
-def test_a_read_only_view_of_an_array_that_can_be_changed_is_refused(monkeypatch):
-    view = np.zeros((6, 8, 3), np.uint8)[:]
-    view.setflags(write=False)
-    assert "can still be changed" in grasped(view, monkeypatch).reason
 
 
 def test_floats_of_three_components_are_tuples_of_three_in_each_cell(monkeypatch):
@@ -456,11 +446,6 @@ def step_with_reference(params, state, reading):
     changed = new and float(abs(image.cells.astype(float) - reference).mean()) > 40.0
     phase, outcome = (HOLD, STEADY) if changed else (gentle.phase, gentle.outcome)
     return command, Reference(phase, outcome, gentle, max(state.counter, image.counter), reference)
-
-
-@frozen(kw_only=True)
-class NoKeys:
-    pass
 
 
 class Watching(Controller[NoKeys]):

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scipy
-from cases import every_case
 from commands import graspsense
 
 from graspsense.sources.channel_facts import channel_facts
@@ -19,6 +18,8 @@ N = 300
 T_S = np.arange(N) * 0.01
 GAP_MM = np.where(T_S < 1.0, 60.0 - 10.0 * T_S, 50.0)
 FORCE_N = np.where((T_S > 1.0) & (T_S < 1.5) | (T_S > 2.0) & (T_S < 2.5), 8.0, 0.1 * (T_S % 0.02 > 0.01))
+
+TABLE = {"t (ms)": T_S * 1e3, "pos (mm)": GAP_MM, "F (N)": FORCE_N, "still": np.ones(N)}
 
 
 def table(path, columns):
@@ -37,9 +38,7 @@ def test_the_facts_of_a_channel_are_those_of_its_samples():
 
 def test_check_on_a_table_tells_each_channel_and_draws_its_squeezes(tmp_path):
     pytest.importorskip("matplotlib", reason="needs the extra plot")
-    table(
-        tmp_path / "jar.csv", {"t (ms)": T_S * 1e3, "pos (mm)": GAP_MM, "F (N)": FORCE_N, "still": np.ones(N)}
-    )
+    table(tmp_path / "jar.csv", TABLE)
     code, out, err = graspsense(
         "import", tmp_path / "jar.csv", "--check", "--json", "--plot", tmp_path / "x.png"
     )
@@ -53,6 +52,11 @@ def test_check_on_a_table_tells_each_channel_and_draws_its_squeezes(tmp_path):
     assert len(load["squeezes"]) == 2
     assert load["squeezes"][0] == pytest.approx([1.01, 1.49])
     assert (tmp_path / "x.png").stat().st_size > 5000
+
+
+@pytest.mark.slow
+def test_check_on_a_table_in_words(tmp_path):
+    table(tmp_path / "jar.csv", TABLE)
     code, out, _ = graspsense("import", tmp_path / "jar.csv", "--check", "--plot", tmp_path / "x.png")
     assert code == 0
     assert all(word in out for word in ("Resolution", "Age, s", "2 in F (N)", "t (ms)' [ms]"))
@@ -85,6 +89,7 @@ def test_check_on_a_bag_shows_a_topic_that_died(tmp_path):
     assert by_name["/hand/force.data"]["age_s"] > 1.5
 
 
+@pytest.mark.slow
 def test_check_of_a_manifest_tells_each_channel(tmp_path):
     table(tmp_path / "jar_1.csv", {"t": T_S, "pos": GAP_MM, "F": FORCE_N})
     (tmp_path / "m.toml").write_text(
@@ -252,7 +257,9 @@ RIGHT = {
 }
 
 
-@every_case("make", RIGHT)
+@pytest.mark.parametrize(
+    "make", [pytest.param(make, marks=() if make in (jaco, fruit) else pytest.mark.slow) for make in RIGHT]
+)
 def test_at_least_half_of_a_suggested_manifest_is_right_and_nothing_is_wrong_in_silence(make, tmp_path):
     folder = tmp_path / "set"
     make(folder)

@@ -26,7 +26,18 @@ from graspsense.store.store import Store
 
 ENDS = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
 IN_THE_SQUEEZE = 1200
-COMMAND = [sys.executable, "-m", "graspsense"]
+COLUMNS = (
+    "--time",
+    "t",
+    "--gap",
+    "gap",
+    "--force",
+    "force",
+    "--label",
+    "jar:full",
+    "-o",
+    "classifier.type=none",
+)
 
 
 class Signalled(Scripted):
@@ -94,7 +105,9 @@ def collection_of(store, settings, answers):
     )
 
 
-@pytest.mark.parametrize("number", ENDS)
+@pytest.mark.parametrize(
+    "number", [ENDS[0], *(pytest.param(end, marks=pytest.mark.slow) for end in ENDS[1:])]
+)
 def test_a_signal_in_a_squeeze_stops_the_collection_with_the_grasp_stored_as_aborted(
     signalled, tmp_path, number
 ):
@@ -140,6 +153,7 @@ def test_a_signal_while_a_trial_is_saved_loses_nothing(signalled, tmp_path):
     assert gripper.begun == 1
 
 
+@pytest.mark.slow
 def test_a_repeated_trial_keeps_the_label_of_the_session_whatever_became_of_the_first(signalled, tmp_path):
     settings, gripper = signalled
     gripper.number = signal.SIGWINCH  # ignored: these grasps end by themselves
@@ -201,13 +215,13 @@ def interrupting(monkeypatch, after):
 
 @pytest.fixture(scope="module")
 def recordings(tmp_path_factory):
-    """Return the folder of a store with three trials, with CSV files of the same grasps beside it."""
-    store = tmp_path_factory.mktemp("recordings") / "t"
-    for seed in ("1", "2", "3"):
-        plain = ("-o", "classifier.type=none", "-o", "gripper.rate_hz=250")
-        printed("run", "--label", "block", "--seed", seed, *plain, "--save", store)
-        printed("export", f"{store}#{seed}", "--to", store.parent / f"{seed}.csv")
-    return store
+    """Return the folder of a store with three trials, beside the CSV files from which they were imported."""
+    folder = tmp_path_factory.mktemp("recordings")
+    for k in (1, 2, 3):
+        rows = [f"{t},{squeezing(t)},{k * bottle(t)[0]}" for t in (0.01 * i for i in range(220))]
+        (folder / f"{k}.csv").write_text("\n".join(["t,gap,force", *rows]) + "\n")
+        printed("import", folder / f"{k}.csv", *COLUMNS, "--save", folder / "t")
+    return folder / "t"
 
 
 @pytest.mark.parametrize("after", [3, 4])
@@ -215,7 +229,7 @@ def test_ctrl_c_in_an_import_stores_no_aborted_grasp_and_is_told(recordings, tmp
     """Each recording is tried before it is imported: the second one is opened for the third and fourth time."""
     begun = interrupting(monkeypatch, after=after)
     files = [str(recordings.parent / f"{k}.csv") for k in (1, 2)]
-    importing = [graspsense("import", file, "--label", "block", "--save", tmp_path / "i") for file in files]
+    importing = [graspsense("import", file, *COLUMNS, "--save", tmp_path / "i") for file in files]
     assert [done.returncode for done in importing] == [0, 130]
     assert len(begun) == after
     with Store.read(tmp_path / "i") as store:
@@ -232,29 +246,37 @@ def test_ctrl_c_in_features_writes_no_table_of_aborted_grasps(recordings, tmp_pa
     assert not out.exists()
 
 
-def collecting(folder, labels):
-    return "collect", "--labels", labels, "--each", "9", "--save", str(folder), "--json"
+def collecting(folder, labels, *options, stream=subprocess.PIPE, **more):
+    """Start a collection as a process of its own, with its input, output and errors on this stream."""
+    words = (
+        "collect",
+        "--labels",
+        labels,
+        "--each",
+        "9",
+        "--save",
+        str(folder),
+        "-o",
+        "classifier.type=none",
+    )
+    command = [sys.executable, "-m", "graspsense", *words, *options]
+    return subprocess.Popen(command, stdin=stream, stdout=stream, stderr=stream, **more)
+
+
+LONG = ("-o", "gripper.rate_hz=30000")
+"""So many ticks a second make a grasp long enough to be interrupted."""
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", ENDS)
-def test_a_process_that_collects_with_piped_answers_stops_at_the_first_signal(tmp_path, number):
-    # 1e5 ticks a second make a grasp long enough to be interrupted.
-    options = ("-o", "classifier.type=none", "-o", "gripper.rate_hz=100000")
-    process = subprocess.Popen(
-        [*COMMAND, *collecting(tmp_path / "t", "block,toy"), *options],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+def test_a_process_that_collects_with_piped_answers_stops_at_the_first_signal(tmp_path):
+    process = collecting(tmp_path / "t", "block,toy", "--json", *LONG, text=True)
     process.stdin.write("\n" * 20)
     process.stdin.flush()
     line = ""
     while "next: " not in line:
         line = process.stderr.readline()
         assert line, "it ended by itself"
-    process.send_signal(number)
+    process.send_signal(signal.SIGTERM)
     out, err = process.communicate(timeout=300)
     assert process.returncode == 130, err
     assert "next: " not in err
@@ -267,14 +289,7 @@ def test_a_process_that_collects_with_piped_answers_stops_at_the_first_signal(tm
 
 
 def operator(folder, labels):
-    process = subprocess.Popen(
-        [*COMMAND, *collecting(folder, labels), "-o", "classifier.type=none"],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        env={**os.environ, "PYTHONUNBUFFERED": "1"},
-    )
+    process = collecting(folder, labels, text=True, env={**os.environ, "PYTHONUNBUFFERED": "1"})
 
     def answer(key, until):
         """Give an answer and return the lines up to one with this text."""
@@ -329,14 +344,7 @@ def test_a_second_session_leaves_the_trials_of_an_earlier_one_alone(tmp_path):
 @pytest.mark.slow
 def test_a_terminal_that_goes_ends_the_collection_though_nothing_can_be_printed(tmp_path):
     master, slave = pty.openpty()
-    options = ("-o", "classifier.type=none", "-o", "gripper.rate_hz=100000")
-    process = subprocess.Popen(
-        [*COMMAND, *collecting(tmp_path / "t", "block,toy")[:-1], *options],
-        stdin=slave,
-        stdout=slave,
-        stderr=slave,
-        start_new_session=True,
-    )
+    process = collecting(tmp_path / "t", "block,toy", *LONG, stream=slave, start_new_session=True)
     os.close(slave)
     said = b""
     while b"next: " not in said:

@@ -66,7 +66,7 @@ def test_equal_judgements_differ_by_nothing():
 def test_the_interval_of_a_difference_covers_the_true_one_nineteen_times_in_twenty():
     rng = np.random.default_rng(0)
     both, only_first, only_second = 0.55, 0.20, 0.08
-    covered, runs = 0, 2000
+    covered, runs = 0, 1000
     for _ in range(runs):
         u = rng.random(100)
         left = u < both + only_first

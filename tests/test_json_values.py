@@ -43,25 +43,10 @@ class Hand:
 
 
 def test_settings_are_read_back_as_they_were():
-    written = json.loads(
-        json_text(
-            {
-                "name": "inf",
-                "limit_n": inf,
-                "floor_n": -inf,
-                "levels": [1.0, inf],
-                "cable": {"vanishes_s": inf},
-            }
-        )
-    )
+    values = {"name": "inf", "limit_n": inf, "floor_n": -inf, "levels": [1.0, inf]}
+    values["cable"] = {"vanishes_s": inf}
 
-    assert settings_from_json(written, Hand) == {
-        "name": "inf",
-        "limit_n": inf,
-        "floor_n": -inf,
-        "levels": [1.0, inf],
-        "cable": {"vanishes_s": inf},
-    }
+    assert settings_from_json(json.loads(json_text(values)), Hand) == values
 
 
 @pytest.fixture

@@ -161,6 +161,7 @@ def test_lists_in_cells_count_as_cells_of_the_table(tmp_path, monkeypatch):
         events_in(tmp_path, events='events = { slip = "slip[0]" }')
 
 
+@pytest.mark.slow
 def test_an_imported_trial_keeps_the_labels_among_its_events(tmp_path, capsys):
     write(tmp_path, "box_1", force(), flags((1.0, 1.5)))
     write(tmp_path, "box_2", force(Kick(2.0, 0.3)), flags())
@@ -302,6 +303,13 @@ def test_slips_of_a_force_are_found_and_what_cannot_be_told_is_said(tmp_path, ca
     assert scores["held_out"] == "label"
     assert scores["not_told"] == ["jump"]
     assert scores["not_labelled"]["no acceleration is measured: placing is told by force alone"] == 4
+
+
+@pytest.mark.slow
+def test_the_score_in_words_has_what_cannot_be_told(tmp_path, capsys):
+    boxes(tmp_path)
+    path = manifest(tmp_path, events='events = { slip = "slip", jump = "slip" }')
+    source = f"manifest:{path}"
     code, out, err = run(capsys, "evaluate", source, "--events", "--tolerance", "0.1")
     assert code == 0, err
     assert "8 of 8" in out
@@ -310,6 +318,7 @@ def test_slips_of_a_force_are_found_and_what_cannot_be_told_is_said(tmp_path, ca
     assert "2 instances, at least 6 are needed" in out
 
 
+@pytest.mark.slow
 def test_a_force_in_another_unit_is_scored_by_fitted_thresholds(tmp_path, capsys):
     boxes(tmp_path, newtons=150.0)
     path = manifest(tmp_path)
@@ -319,6 +328,7 @@ def test_a_force_in_another_unit_is_scored_by_fitted_thresholds(tmp_path, capsys
     assert any("counts" in note for note in scores["notes"])
 
 
+@pytest.mark.slow
 def test_an_acceleration_of_one_axis_is_told_and_its_threshold_can_be_set(tmp_path, capsys):
     shock = 30.0 * ((T_S >= 2.0) & (T_S < 2.01))
     write(tmp_path, "box_1", 9.8 + shock, flags((2.0, 2.1)))
@@ -350,6 +360,7 @@ def test_wrong_uses_are_told(arguments, code, says, tmp_path, capsys):
     assert says in err
 
 
+@pytest.mark.slow
 def test_a_copy_of_a_recording_counts_once(tmp_path, capsys):
     boxes(tmp_path)
     (tmp_path / "can_3.csv").write_text((tmp_path / "can_1.csv").read_text())

@@ -107,6 +107,7 @@ def test_without_a_block_or_enough_force_it_is_said_why_there_is_none():
         measured_latency(gripper, gripper.accepts, gripper.info(), RunConfig(first_effort_n=4.0), 1)
 
 
+@pytest.mark.slow
 def test_doctor_measures_any_gripper_and_needs_its_name():
     told = json.loads(printed("doctor", "--gripper", "sim", "--latency", "2", "--json"))
     [diagnosis] = [row for row in told["diagnoses"] if row["distribution"] == "graspsense-sim-gripper/sim"]

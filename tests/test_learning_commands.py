@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 from cases import every_case
-from commands import graspsense
+from commands import graspsense, printed
 
 
 @pytest.fixture
@@ -25,10 +25,14 @@ def csv(tmp_path):
 
 
 @pytest.mark.slow
-def test_an_honest_rate_of_ones_own_csv_in_one_command(csv):
-    code, out, _ = graspsense("evaluate", csv, "--label", "what", "--instance", "thing")
+def test_an_honest_rate_and_a_picture_of_ones_own_csv_in_one_command(csv, tmp_path):
+    pytest.importorskip("matplotlib", reason="needs matplotlib, the extra `plot`")
+    picture = tmp_path / "confusion.png"
+    code, out, err = graspsense("evaluate", csv, "--label", "what", "--instance", "thing", "--png", picture)
 
     assert code == 0
+    assert f"drawn in {picture}" in err
+    assert picture.read_bytes().startswith(b"\x89PNG")
     assert "\nrate        9" in out
     assert out.startswith("c45 recognises the object and its state in 9")
     for line in (
@@ -117,27 +121,15 @@ def test_a_model_of_states_or_classes(csv, tmp_path):
 @pytest.mark.slow
 def test_features_are_kept(csv, tmp_path):
     kept = tmp_path / "kept.csv"
-    graspsense("evaluate", csv, "--label", "what", "--instance", "thing", "--keep", kept)
-    result = json.loads(graspsense("evaluate", csv, "--label", "what", "--instance", "thing", "--json")[1])
-    again = json.loads(
-        graspsense(
-            "evaluate", kept, "--label", "label", "--instance", "instance", "--order", "order", "--json"
-        )[1]
+    own = ("--label", "what", "--instance", "thing", "--keep", kept)
+    columns = ("--label", "label", "--instance", "instance", "--order", "order")
+    result, again = (
+        json.loads(printed("evaluate", source, *options, "--json", "--classifier", "tree"))
+        for source, options in ((csv, own), (kept, columns))
     )
 
     assert again["confusion"] == result["confusion"]
     assert again["controls"]["recording_order"] == result["controls"]["recording_order"]
-
-
-@pytest.mark.slow
-def test_the_picture_of_the_confusion(csv, tmp_path):
-    pytest.importorskip("matplotlib", reason="needs matplotlib, the extra `plot`")
-    picture = tmp_path / "confusion.png"
-    code, _, err = graspsense("evaluate", csv, "--label", "what", "--png", picture)
-
-    assert code == 0
-    assert f"drawn in {picture}" in err
-    assert picture.read_bytes().startswith(b"\x89PNG")
 
 
 @every_case(
@@ -218,22 +210,9 @@ def test_other_columns_than_the_model_takes(csv, tmp_path):
 
 @pytest.mark.slow
 def test_simulated_trials_small_and_whole():
-    code, out, _ = graspsense(
-        "evaluate",
-        "simulated",
-        "--objects",
-        "can",
-        "--instances",
-        "2",
-        "--trials",
-        "2",
-        "--folds",
-        "2",
-        "--json",
-    )
-    answer = json.loads(out)
+    few = ("--objects", "can", "--instances", "2", "--trials", "2", "--folds", "2")
+    answer = json.loads(printed("evaluate", "simulated", *few, "--json"))
 
-    assert code == 0
     assert answer["headline"]["n"] == 12
     assert answer["protocol"] == "instance_held_out"
     assert answer["controls"]["before_contact"]["rate"]["n"] == 12
@@ -241,23 +220,12 @@ def test_simulated_trials_small_and_whole():
     assert "each instance is grasped in all of its states" in answer["notes"]
 
 
+@pytest.mark.slow
 def test_simulated_trials_with_each_instance_in_one_state_only(tmp_path):
-    code, out, _ = graspsense(
-        *("evaluate", "simulated", "--objects", "can:full_open,can:empty_open", "--instances", "4"),
-        *(
-            "--trials",
-            "1",
-            "--folds",
-            "2",
-            "--states-per-instance",
-            "one",
-            "--keep",
-            tmp_path / "t.csv",
-            "--json",
-        ),
-    )
+    few = ("--objects", "can:full_open,can:empty_open", "--instances", "4", "--trials", "1", "--folds", "2")
+    more = ("--states-per-instance", "one", "--keep", tmp_path / "t.csv", "--json")
+    out = printed("evaluate", "simulated", *few, *more)
 
-    assert code == 0
     assert any("in one of its states only" in note for note in json.loads(out)["notes"])
     rows = [line.split(",") for line in (tmp_path / "t.csv").read_text().splitlines()[1:]]
     assert len(rows) == len({row[1] for row in rows}) == 4
@@ -301,24 +269,6 @@ def test_a_feature_set_that_raises_on_simulated_grasps_is_named(monkeypatch):
         in err
     )
     assert "internal error" not in err
-
-
-def test_train_replaces_no_file_unless_told(csv, tmp_path):
-    model, kept = tmp_path / "model.json", tmp_path / "kept.csv"
-    command = ("train", csv, "--label", "what", "--out", model, "--keep", kept)
-    assert graspsense(*command)[0] == 0
-    contents = model.read_bytes(), kept.read_bytes()
-
-    code, _, err = graspsense(*command, "--classifier", "knn")
-    assert code == 2
-    assert f"{model} already exists: name another file, or add --overwrite to replace it" in err
-    model.rename(tmp_path / "other.json")
-    assert f"{kept} already exists" in graspsense(*command)[2]
-    (tmp_path / "other.json").rename(model)
-    assert (model.read_bytes(), kept.read_bytes()) == contents
-
-    assert graspsense(*command, "--classifier", "knn", "--overwrite")[0] == 0
-    assert model.read_bytes() != contents[0]
 
 
 @pytest.mark.parametrize("option", ["--out", "--keep"])

@@ -182,6 +182,7 @@ def test_times_at_the_ends_of_the_calendar_have_an_order_or_none():
     assert order == (2, 1, 0) or (order is None and "recorded_at" in why)
 
 
+@pytest.mark.slow
 def test_a_local_dask_cluster_without_shared_memory_is_refused_with_the_other_choice(monkeypatch):
     pytest.importorskip("distributed")
     import _multiprocessing

@@ -243,54 +243,48 @@ def test_a_model_of_other_features_is_refused_before_the_grasp_with_what_to_do()
         assert "-o features.type=curve --classifier c45" in done.stderr
 
 
-class TestDamage:
-    def test_a_changed_number(self, file):
-        file.write_text(file.read_text().replace("0.25", "0.26", 1))
+@every_case(
+    ("spoil", "says"),
+    [
+        (lambda data: data.replace(b"0.25", b"0.26", 1), "its sha256 does not match"),
+        (lambda data: data[:400], "is not JSON"),
+        (lambda data: b"", "is not JSON"),
+        (lambda data: b"\x80\x04\x95pickle", "is not JSON"),
+        (lambda data: b"[]", "is not a model"),
+        (lambda data: b"{}", "is not a model"),
+        (lambda data: b'{"format": "other"}', "is not a model"),
+    ],
+)
+def test_a_damaged_file_is_refused(file, spoil, says):
+    data = file.read_bytes()
+    file.write_bytes(spoil(data))
+    with pytest.raises(DataDamaged, match=says):
+        load_model(str(file), installed())
+    file.write_bytes(data)
 
-        with pytest.raises(DataDamaged, match="its sha256 does not match"):
-            load_model(str(file), installed())
 
-    def test_half_a_file(self, file):
-        file.write_bytes(file.read_bytes()[:400])
-
-        with pytest.raises(DataDamaged, match="is not JSON"):
-            load_model(str(file), installed())
-
-    @pytest.mark.parametrize("content", [b"", b"[]", b"{}", b"\x80\x04\x95pickle", b'{"format": "other"}'])
-    def test_another_file(self, file, content):
-        file.write_bytes(content)
-
-        with pytest.raises(DataDamaged):
-            load_model(str(file), installed())
-
-    def test_a_later_version(self, file):
-        rewritten(file, version=3)
-
-        with pytest.raises(DataDamaged, match=r"has version 3; this graspsense .* reads up to 2"):
-            load_model(str(file), installed())
-
-    @pytest.mark.parametrize(
-        "changes",
-        [
-            {"features": None},
-            {"features": [["p_first"]]},
-            {"model": None},
-            {"model": {}},
-            {"unknown": {"reach": 3.0}},
+@pytest.mark.parametrize(
+    ("changes", "error", "says"),
+    [
+        ({"version": 3}, DataDamaged, r"has version 3; this graspsense .* reads up to 2"),
+        ({"features": None}, DataDamaged, "is damaged"),
+        ({"features": [["p_first"]]}, DataDamaged, "is damaged"),
+        ({"model": None}, DataDamaged, "is damaged"),
+        ({"model": {}}, DataDamaged, "is damaged"),
+        ({"unknown": {"reach": 3.0}}, DataDamaged, "is damaged"),
+        (
             {"unknown": {"reach": 5.0, "featureless": False, "ranges": {}, "spread": []}},
-        ],
-    )
-    def test_parts_that_are_missing(self, file, changes):
-        rewritten(file, **changes)
-
-        with pytest.raises(DataDamaged, match="is damaged"):
-            load_model(str(file), installed())
-
-    def test_a_classifier_that_is_not_installed_is_not_imported(self, file):
-        rewritten(file, classifier="os/system")
-
-        with pytest.raises(UnknownName, match="no classifier named 'os/system'"):
-            load_model(str(file), installed())
+            DataDamaged,
+            "is damaged",
+        ),
+        # A classifier that is not installed is not imported.
+        ({"classifier": "os/system"}, UnknownName, "no classifier named 'os/system'"),
+    ],
+)
+def test_a_file_with_impossible_content_is_refused(file, changes, error, says):
+    rewritten(file, **changes)
+    with pytest.raises(error, match=says):
+        load_model(str(file), installed())
 
 
 def test_no_such_file_or_name(tmp_path):

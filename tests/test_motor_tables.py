@@ -29,7 +29,7 @@ def readings(seed, count):
 
 def test_nine_of_ten_further_readings_are_within_the_error():
     inside = []
-    for seed in range(40):
+    for seed in range(20):
         table = motor_table(readings(seed, 60))
         for motor, load_n in readings(1000 + seed, 50):
             estimate_n, error_n = load_within(table, motor)

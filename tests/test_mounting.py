@@ -29,7 +29,8 @@ THUMB = "0 20 95 mm, 0 0 90 deg in tool"
 
 
 def settings(*options):
-    return load_pipeline(options=["classifier.type=none", *options]).settings
+    quick = ["gripper.object=block", "gripper.rate_hz=250"] if "gripper.type=replay" not in options else []
+    return load_pipeline(options=["classifier.type=none", *quick, *options]).settings
 
 
 def test_a_pose_is_in_metres_and_radians_whatever_it_was_written_in():
@@ -62,7 +63,7 @@ def test_the_mounting_of_the_settings_is_kept_with_the_trial_replayed_and_export
 
 
 def test_the_settings_add_to_the_mounting_that_a_gripper_declares():
-    gripper = create("sensor-backend", "sim", object="block")
+    gripper = create("sensor-backend", "sim", object="block", rate_hz=250.0)
     opened = gripper.open
     palm = Mounting(link="palm", model="hand.xml")
     gripper.open = lambda seed: evolve(opened(seed), mounting={"palm": palm, "tool": palm})
@@ -80,6 +81,7 @@ def test_a_trial_without_a_mounting_is_stored_as_before_there_was_one():
     assert DeviceRecord.from_text(record.to_text()) == record
 
 
+@pytest.mark.slow
 def test_another_mounting_is_no_other_experiment(tmp_path):
     with Store.open(tmp_path / "trials") as store:
         record_grasp(store, settings(), installed(), labels={}, origin="run")

@@ -37,9 +37,9 @@ from graspsense.store.imported_contents import AlreadyImported, ImportedContents
 from graspsense.store.store import Store
 from graspsense.store.verify import verify_store
 
-QUICK = 2
-SLOW = int(os.environ.get("GRASPSENSE_MUTATIONS", "0")) or 60
-SLOWER = min(SLOW, 20)
+QUICK = 1
+SLOW = int(os.environ.get("GRASPSENSE_MUTATIONS", "0")) or 40
+SLOWER = min(SLOW, 14)
 """Files of a format that takes long to open."""
 IMPORTED_OF = 4
 """One of so many of the recordings that can be read is imported as well."""

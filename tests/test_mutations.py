@@ -1,7 +1,7 @@
 """Stores, recordings, models and settings that were truncated or changed at random places.
 
 Whatever is read of them, it is what was written or an error of ours; nothing is run, and no file changes by being
-read. A few hundred each; with GRASPSENSE_MUTATIONS as many as it says.
+read. Some dozens each; with GRASPSENSE_MUTATIONS as many as it says.
 """
 
 import hashlib
@@ -28,7 +28,7 @@ from graspsense.store.store import Store
 from graspsense.store.verify import verify_store
 
 MUTATIONS = int(os.environ.get("GRASPSENSE_MUTATIONS", "0"))
-NUMBER = MUTATIONS or 150
+NUMBER = MUTATIONS or 40
 
 
 def digests(folder):
@@ -159,9 +159,8 @@ def test_settings(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_hundred_times_as_many(tmp_path, monkeypatch):
-    """The same with thousands of each; a hundredth of it is what the quick run takes."""
-    monkeypatch.setitem(globals(), "NUMBER", MUTATIONS or 600)
+def test_many_more(tmp_path, monkeypatch):
+    monkeypatch.setitem(globals(), "NUMBER", MUTATIONS or 300)
     for test in (test_recordings, test_stores, test_models, test_settings):
         (tmp_path / test.__name__).mkdir()
         test(tmp_path / test.__name__)

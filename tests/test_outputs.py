@@ -5,7 +5,8 @@ import os
 import shutil
 
 import pytest
-from commands import graspsense
+from cases import every_case
+from commands import graspsense, printed
 
 from graspsense.experiments.results import Results
 
@@ -22,15 +23,25 @@ EVALUATE = ("--label", "kind", "--folds", "2", "--classifier", "knn")
 TRAIN = ("--label", "kind", "--classifier", "knn")
 
 
-def test_evaluate_replaces_no_file_without_being_asked(table, tmp_path):
-    kept = tmp_path / "kept.csv"
+def test_no_file_is_replaced_unless_told(table, tmp_path):
+    kept, model = tmp_path / "kept.csv", tmp_path / "m.json"
     kept.write_text("precious")
-    done = graspsense("evaluate", table, *EVALUATE, "--keep", kept)
-    assert done.returncode == 2
-    assert "--overwrite" in done.stderr
-    assert kept.read_text() == "precious"
-    assert graspsense("evaluate", table, *EVALUATE, "--keep", kept, "--overwrite").returncode == 0
+    evaluate = ("evaluate", table, *EVALUATE, "--keep", kept)
+    train = ("train", table, *TRAIN, "--out", model)
+    for command in (evaluate, (*train, "--keep", kept)):
+        done = graspsense(*command)
+        assert done.returncode == 2
+        assert f"{kept} already exists: name another file, or add --overwrite to replace it" in done.stderr
+        assert kept.read_text() == "precious"
+    assert graspsense(*evaluate, "--overwrite").returncode == 0
     assert kept.read_text().startswith("label,")
+    assert graspsense(*train).returncode == 0
+    knn = model.read_bytes()
+    tree = ("--classifier", "tree")
+    assert graspsense(*train, *tree).returncode == 2
+    assert model.read_bytes() == knn
+    assert graspsense(*train, *tree, "--overwrite").returncode == 0
+    assert model.read_bytes() != knn
 
 
 @pytest.mark.parametrize("command", ["evaluate", "train"])
@@ -85,17 +96,27 @@ def test_a_negative_seed_is_refused(table, tmp_path, command):
     assert "--seed" in done.stderr
 
 
-@pytest.mark.parametrize("name", [".", "..", "/", "sub", "pipe.png"])
-def test_a_picture_that_is_no_file_is_refused_before_the_grasp(tmp_path, monkeypatch, name):
+@every_case(
+    ("name", "says"),
+    [
+        (".", "picture"),
+        ("..", "picture"),
+        ("/", "picture"),
+        ("sub", "picture"),
+        ("pipe.png", "picture"),
+        ("grasp.svg", "picture"),
+        ("no_such_folder/grasp.png", "there is no folder no_such_folder"),
+    ],
+)
+def test_a_picture_that_is_no_file_is_refused_before_the_grasp(tmp_path, monkeypatch, name, says):
     pytest.importorskip("matplotlib", reason="drawing needs the extra `plot`")
     monkeypatch.chdir(tmp_path)
     (tmp_path / "sub").mkdir()
     os.mkfifo(tmp_path / "pipe.png")
     done = graspsense("run", "--plot", name)
     assert done.returncode == 2
-    said = done.stderr
-    assert "picture" in said
-    assert "approach" not in said
+    assert says in done.stderr
+    assert "approach" not in done.stderr
 
 
 def test_a_matrix_is_drawn_into_pictures_only(table):
@@ -113,12 +134,7 @@ def experiment(table, tmp_path):
         'title = "mine"\nseeds = [0, 1, 2, 3]\n[judge]\nfolds = 2\n[data]\n'
         f'source = "{table}"\nlabel = "kind"\n'
     )
-    assert (
-        graspsense(
-            "experiment", tmp_path / "mine.toml", "--executor", "serial", "--out", tmp_path / "out"
-        ).returncode
-        == 0
-    )
+    printed("experiment", tmp_path / "mine.toml", "--executor", "serial", "--out", tmp_path / "out")
     shutil.copytree(tmp_path / "out", tmp_path / "whole")
     result, other, *_ = sorted((tmp_path / "out" / "results").glob("*.json"))
     result.write_text("{")

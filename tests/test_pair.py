@@ -109,8 +109,7 @@ def test_a_grasp_of_a_pair_is_the_grasp_alone():
     assert any("beside scripted" in note for note in left.device.notes)
 
 
-@every_case("lost", ["lose_at", "silent_from"])
-@every_case("place", [0, 1])
+@every_case(("lost", "place"), [("lose_at", 0), ("silent_from", 1)])
 def test_both_let_go_if_one_is_lost(lost, place):
     sound, broken = Scripted(squeezing, bottle), Scripted(squeezing, bottle, **{lost: 1300})
     both = [sound, broken] if place else [broken, sound]
@@ -160,6 +159,7 @@ def test_a_gripper_that_is_not_there_is_told_and_the_other_is_closed():
     assert sound.closed == 1
 
 
+@pytest.mark.slow
 def test_the_trials_of_a_pair_are_kept_and_name_each_other(tmp_path):
     plain = tmp_path / "second.toml"
     plain.write_text(
@@ -167,18 +167,8 @@ def test_the_trials_of_a_pair_are_kept_and_name_each_other(tmp_path):
         '[controller]\ntype = "hybrid"\n[features]\ntype = "chitta"\n'
     )
     store = tmp_path / "trials"
-    options = [
-        "--beside",
-        str(plain),
-        "--object",
-        "toy",
-        "-o",
-        "classifier.type=none",
-        "-o",
-        "gripper.rate_hz=250",
-        "--save",
-        str(store),
-    ]
+    simple = ["--object", "block", "-o", "classifier.type=none", "-o", "gripper.rate_hz=250"]
+    options = ["--beside", str(plain), *simple, "--save", str(store)]
 
     result = CliRunner().invoke(cli, ["run", *options, "--json"])
 

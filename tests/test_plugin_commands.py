@@ -8,6 +8,7 @@ import subprocess
 import sys
 
 import parts
+import pytest
 from commands import graspsense
 from mutants import MUTANTS
 
@@ -106,6 +107,7 @@ bound = api.bind
 """
 
 
+@pytest.mark.slow
 def test_imports_that_moved_are_printed_with_the_new_form_beside(tmp_path):
     make("lab-old", ["observer"], tmp_path / "old")
     source = tmp_path / "old" / "src"
@@ -169,11 +171,3 @@ def test_a_package_is_made_for_several_roles(tmp_path, monkeypatch):
         "law.py",
         "plugin.py",
     ]
-
-
-def test_a_role_is_given_once(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    code, _, err = graspsense("plugins", "new", "lab-hand", "--role", "controller", "--role", "controller")
-
-    assert (code, list(tmp_path.iterdir())) == (2, [])
-    assert "--role controller is given 2 times: give each role once" in err

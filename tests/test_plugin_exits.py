@@ -231,7 +231,7 @@ class TwoFaced(Command):
     ],
 )
 def test_no_number_of_a_controller_passes_the_limits(command):
-    gripper = Scripted(squeezing, bottle)
+    gripper = Scripted(squeezing, bottle, lose_at=1150)
     run_grasp(gripper, law(lambda usual, state: (command, state), after=900), RUN)
     squeezed = gripper.commands[1000:]
     assert all(type(commanded) is Command for commanded in squeezed)

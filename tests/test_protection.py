@@ -186,17 +186,16 @@ def test_fingers_that_stop_without_a_feeling_are_released():
     assert after_s < 0.3
 
 
-def test_fingers_that_are_closed_are_not_stalled():
-    # From 90 mm at 10 mm/s to the end of the stroke, without an object.
-    assert Approach(seconds=8.8).go(2.0, speed=0.0)[0] is None
-
-
-def test_fingers_that_have_not_moved_yet_are_not_stalled():
-    assert Approach(seconds=0.0).go(2.0, speed=0.0)[0] is None
-
-
-def test_a_law_that_pauses_is_not_stalled():
-    assert Approach().go(1.0, speed=0.0, effort=0.0)[0] is None
+@every_case(
+    ("before_s", "effort"),
+    [
+        (8.8, 8.0),  # from 90 mm at 10 mm/s to the end of the stroke, without an object
+        (0.0, 8.0),  # they have not moved yet
+        (2.0, 0.0),  # the law pauses
+    ],
+)
+def test_fingers_that_are_closed_or_are_not_driven_are_not_stalled(before_s, effort):
+    assert Approach(seconds=before_s).go(2.0, speed=0.0, effort=effort)[0] is None
 
 
 # ------------------------------------------------------------------------------------------------------- the motor
@@ -335,7 +334,7 @@ def seen(pads):
 
 
 @every_case("noise", [0.0, 0.4, 2.0, 15.0])
-@every_case("seed", range(5))
+@every_case("seed", range(2))
 def test_sound_cells_are_never_frozen(noise, seed):
     assert seen(images(100, noise=noise, seed=seed)) == []
 
@@ -501,7 +500,7 @@ def test_frames_that_come_unevenly_are_not_lost():
 
 
 @every_case("share", [0.5, 0.8])
-@every_case("seed", range(6))
+@every_case("seed", range(3))
 def test_cells_that_change_now_and_then_are_not_frozen(share, seed):
     rng, tips = np.random.default_rng(seed), Fingertips()
     cells = 1000.0 * np.arange(1.0, 9.0).reshape(2, 4)

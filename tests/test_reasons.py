@@ -34,8 +34,8 @@ def test_contributions_of_a_forest_add_up_to_the_probability(features):
     assert given[-1].words.endswith(" % for can:full")
 
 
+@pytest.mark.parametrize("name", ["boosted", pytest.param("ebm", marks=pytest.mark.slow)])
 @every_case("classes", [2, 3])
-@every_case("name", ["boosted", "ebm"])
 def test_contributions_in_log_odds_add_up_to_the_odds(name, classes):
     table, labels = trials(missing=0.1)
     if classes == 2:
@@ -52,7 +52,7 @@ def test_contributions_in_log_odds_add_up_to_the_odds(name, classes):
         assert given[0].against == sorted(said.probabilities, key=said.probabilities.get)[-2]
 
 
-@pytest.mark.parametrize("name", ["forest", "boosted", "ebm"])
+@pytest.mark.parametrize("name", ["forest", "boosted", pytest.param("ebm", marks=pytest.mark.slow)])
 def test_the_feature_that_tells_the_labels_apart_contributes_most(name):
     said = fitted(name, *trials()).explain(FULL_CAN)
     largest = said.because[0]
@@ -98,20 +98,27 @@ def test_smaller_contributions_are_told_together_and_still_add_up():
     assert math.fsum(reason.contribution.value for reason in reasons) == pytest.approx(0.75)
 
 
-def test_a_text_becomes_a_reason_and_json_has_what_a_reason_has():
+def test_a_text_becomes_a_reason():
     said = Prediction(label="can", probabilities={"can": 1.0}, because=("nearest to the mean of can",))
     assert said.because == (Reason(words="nearest to the mean of can"),)
     assert said.as_json()["because"] == [{"words": "nearest to the mean of can"}]
 
-    for name in ("forest", "boosted", "ebm", "c45", "knn", "mlp", "backprop", "svm", "tree"):
-        listed = json.loads(json.dumps(fitted(name, *trials()).explain(MISSING).as_json()))["because"]
-        assert all(reason["words"] for reason in listed)
-        missing = [reason for reason in listed if "is missing" in reason["words"]]
-        assert missing[0]["features"][0] == {"name": "f_steady", "value": None, "unit": "N"}
-        if name in ("c45", "tree"):
-            assert any("rule" in reason for reason in listed)
-        if name not in ("c45", "tree"):
-            assert any(reason.get("contribution", {}).get("label") == "can:full" for reason in listed)
+
+SLOWER = ("boosted", "ebm", "mlp", "backprop", "svm")
+
+
+@pytest.mark.parametrize(
+    "name", ["forest", "c45", "knn", "tree", *(pytest.param(name, marks=pytest.mark.slow) for name in SLOWER)]
+)
+def test_json_has_what_a_reason_has(name):
+    listed = json.loads(json.dumps(fitted(name, *trials()).explain(MISSING).as_json()))["because"]
+    assert all(reason["words"] for reason in listed)
+    missing = [reason for reason in listed if "is missing" in reason["words"]]
+    assert missing[0]["features"][0] == {"name": "f_steady", "value": None, "unit": "N"}
+    if name in ("c45", "tree"):
+        assert any("rule" in reason for reason in listed)
+    else:
+        assert any(reason.get("contribution", {}).get("label") == "can:full" for reason in listed)
 
 
 def test_a_boosted_model_comes_back_from_json_with_its_settings():

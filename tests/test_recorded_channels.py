@@ -58,8 +58,10 @@ def proposed(words):
     "command",
     [
         "import",
-        "evaluate",
-        *(pytest.param(command, marks=pytest.mark.slow) for command in ("check", "train", "compare")),
+        *(
+            pytest.param(command, marks=pytest.mark.slow)
+            for command in ("evaluate", "check", "train", "compare")
+        ),
     ],
 )
 def test_an_array_that_the_features_do_not_name_is_told_with_the_options_that_choose_it(tmp_path, command):
@@ -94,6 +96,7 @@ def test_recordings_that_have_the_array_are_imported_and_the_others_told(tmp_pat
     assert done.output.count("'palm'") == 6
 
 
+@pytest.mark.slow
 def test_trials_of_a_store_that_lack_the_array_are_left_out_and_told(tmp_path):
     for name, palm in (("without", False), ("whole", True)):
         done, words = ran("import", manifest(tmp_path, name, palm=palm), "--save", tmp_path / "s")

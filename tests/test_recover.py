@@ -34,7 +34,7 @@ def part(store, name="20261121-103015-0001.mcap", ticks=200):
 
 
 def test_a_cut_recording_becomes_a_trial_that_does_not_count(store):
-    path = part(store)
+    part(store)
     (recovered,) = recover_store(store)
     assert (recovered.what, recovered.trial) == ("recovered", 1)
     # Of 200 ticks, those of the last chunk that was closed are there: 50 ms of 1 kHz at most are missing.
@@ -53,7 +53,8 @@ def test_a_cut_recording_becomes_a_trial_that_does_not_count(store):
     assert len(read_recorded(kept.recording)) == recovered.ticks
     with kept.recording.open("rb") as file:  # complete for other readers: it has a summary again
         assert make_reader(file).get_summary().statistics.channel_message_counts[1] == recovered.ticks
-    assert path.with_name("20261121-103015-0001.mcap.cut").is_file()
+    names = sorted(file.name for file in store.recordings.iterdir())
+    assert "20261121-103015-0001.mcap.cut" in names
     assert store.counts() == {}
     assert verify_store(store.folder).as_json() == {
         "intact": True,
@@ -62,14 +63,9 @@ def test_a_cut_recording_becomes_a_trial_that_does_not_count(store):
         "problems": [],
         "unfinished": [],
     }
-
-
-def test_recovering_twice_changes_nothing(store):
-    part(store)
-    recover_store(store)
-    names = sorted(path.name for path in store.recordings.iterdir())
+    # To recover twice changes nothing.
     assert recover_store(store) == []
-    assert sorted(path.name for path in store.recordings.iterdir()) == names
+    assert sorted(file.name for file in store.recordings.iterdir()) == names
 
 
 def test_a_finished_trial_that_only_lacks_its_row_counts(store):

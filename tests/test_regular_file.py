@@ -64,7 +64,8 @@ def test_a_pipe_for_a_recorded_grasp_or_a_calibration_is_refused(tmp_path):
 
 
 @pytest.mark.skipif(not ZERO.exists(), reason="needs /dev/zero")
-def test_a_device_or_an_endless_file_as_a_model_is_refused(tmp_path):
+def test_a_device_or_an_endless_file_as_a_model_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setenv("GRASPSENSE_MAX_MODEL_BYTES", "1000000")
     (tmp_path / "zero.json").symlink_to(ZERO)
     with (tmp_path / "sparse.json").open("wb") as file:
         file.truncate(40 * 10**9)

@@ -16,6 +16,7 @@ from cases import every_case
 from commands import Done, graspsense
 from hypothesis import given
 from hypothesis import strategies as st
+from kept import keep
 
 from graspsense.core.components.config import Flag, resolve
 from graspsense.core.components.registry import installed
@@ -419,9 +420,8 @@ def test_a_replayed_trial_has_the_trace_of_the_grasp_to_the_last_bit(
 
 
 def test_a_recording_offers_the_rate_at_which_it_was_recorded(tmp_path: Path) -> None:
-    settings = resolve(options=["classifier.type=none"])
     with Store.open(tmp_path) as store:
-        record_grasp(store, settings, installed(), labels={}, origin="run")
+        keep(store, ticks=1000)
     replay = ReplayBackend(ReplayConfig(recording=f"store:{tmp_path}#1"))
     rates = {channel.name: channel.rate_hz for channel in replay.channels}
 

@@ -282,16 +282,17 @@ def test_the_page_of_an_empty_answer():
     )
 
 
-def test_the_page_of_a_store(tmp_path):
-    folder = tmp_path / "trials"
-    with Store.open(folder) as store:
+@pytest.fixture
+def folder(tmp_path):
+    """The folder of a store with eight trials of two labels."""
+    with Store.open(tmp_path / "trials") as store:
         for k in range(8):
-            keep(
-                store,
-                ["can:full_open", "can:empty_open"][k % 2],
-                values=(0.066 + 0.001 * (k % 3), 5.0 + k % 2),
-                grasp=k,
-            )
+            label = ("can:full_open", "can:empty_open")[k % 2]
+            keep(store, label, values=(0.066 + 0.001 * (k % 3), 5.0 + 3 * (k % 2) + 0.01 * k), grasp=k)
+    return tmp_path / "trials"
+
+
+def test_the_page_of_a_store(folder, tmp_path):
     told = printed("report", folder, "--out", tmp_path / "page", "--folds", "2", "--grasp", "3", "--json")
     reader = Reader((tmp_path / "page" / "report.html").read_text())
 
@@ -321,16 +322,7 @@ def test_the_warnings_of_a_trial_are_on_its_page(tmp_path):
     assert '<ul class="warning"><li>left fingertip stuck: check its cable</li></ul>' in page
 
 
-def test_evaluate_writes_a_page_and_replaces_none_of_a_store(tmp_path):
-    folder = tmp_path / "trials"
-    with Store.open(folder) as store:
-        for k in range(8):
-            keep(
-                store,
-                ["can:full_open", "can:empty_open"][k % 2],
-                values=(0.066, 5.0 + 3 * (k % 2) + 0.01 * k),
-                grasp=k,
-            )
+def test_evaluate_writes_a_page_and_replaces_none_of_a_store(folder, tmp_path):
     command = ("evaluate", folder, "--folds", "2", "--report")
     written = graspsense(*command, tmp_path / "page")
     assert written.returncode == 0
@@ -450,6 +442,7 @@ def test_the_page_of_a_store_that_cannot_be_judged(tmp_path):
     assert "One grasp, from the approach to rest" in Reader(page.html()).text
 
 
+@pytest.mark.slow
 def test_the_page_of_an_experiment_once_more(tmp_path, capsys):
     (tmp_path / "trials.csv").write_text(wayward.CSV)
     (tmp_path / "it.toml").write_text(

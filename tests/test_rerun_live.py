@@ -73,6 +73,15 @@ def check_complete(columns, n=20):
     assert columns["/grasp/events"][1][-1] == "outcome: steady"
 
 
+def test_the_reader_of_rerun_finds_what_was_logged(tmp_path):
+    path = tmp_path / "grasp.rrd"
+    feed = LiveFeed(RERUN, [str(path)])
+    shown(feed)
+    assert feed.close() == ""
+    check_complete(logged(path))
+
+
+@pytest.mark.slow
 def test_the_reader_of_rerun_finds_the_whole_grasp(tmp_path):
     path = tmp_path / "grasp.rrd"
     feed = LiveFeed(RERUN, [str(path)])
@@ -141,6 +150,7 @@ def test_a_viewer_that_goes_away_loses_no_grasp(viewer, how):
     assert address in feed.close()
 
 
+@pytest.mark.slow
 def test_without_a_viewer_the_command_says_so_before_the_grasp(tmp_path):
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))

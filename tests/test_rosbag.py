@@ -129,8 +129,6 @@ def write(
 CASES = {
     "ros1": {"ros": 1, "source": "/joint_states", "kind": PRESSURE_NOW},
     "ros1-2009": {"ros": 1, "source": "/pr2_gripper_controller/state", "kind": PRESSURE_2009},
-    "ros1-controller": {"ros": 1, "source": "/r_gripper_controller/state", "kind": PRESSURE_NOW},
-    "ros2": {"ros": 2, "source": "/joint_states", "kind": PRESSURE_NOW},
     "ros2-without-definitions": {
         "ros": 2,
         "source": "/r_gripper_controller/state",
@@ -141,7 +139,7 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize(("ros", "definitions"), [(1, True), (2, False)])
+@pytest.mark.parametrize(("ros", "definitions"), [pytest.param(1, True, marks=pytest.mark.slow), (2, False)])
 def test_the_accelerometer_of_a_bag_is_a_fast_channel_with_every_sample(ros, definitions, tmp_path):
     path = tmp_path / ("grasp.bag" if ros == 1 else "grasp")
     bag = Bag(path, ros, definitions)
@@ -287,7 +285,7 @@ def test_bag_that_is_cut_short_or_changed_raises_nothing_but_our_own(grasp: Any,
     data = whole.read_bytes()
     chance = np.random.default_rng(5)
     damaged = 0
-    for i in range(20):
+    for i in range(12):
         broken = bytearray(data[: int(chance.integers(len(data)))] if i % 2 else data)
         if not i % 2:
             for integer in chance.integers(len(broken), size=40):
@@ -298,7 +296,7 @@ def test_bag_that_is_cut_short_or_changed_raises_nothing_but_our_own(grasp: Any,
             read_bag(str(path))
         except (DataDamaged, ConfigError):
             damaged += 1
-    assert damaged >= 10, "at least those that are cut short"
+    assert damaged >= 6, "at least those that are cut short"
 
 
 def test_bag_without_fingertips_says_what_it_has(tmp_path: Path) -> None:

@@ -52,12 +52,6 @@ def test_json_has_the_promised_keys_and_says_nothing_else_on_stdout():
 
 
 @pytest.mark.slow
-def test_the_same_seed_prints_the_same_features():
-    answer, again = (json.loads(graspsense("run", "--json", "--seed", "3").stdout) for _ in range(2))
-    assert answer["features"] == again["features"]
-
-
-@pytest.mark.slow
 def test_nothing_there_is_an_outcome_with_reasons_and_exit_code_0():
     done = graspsense("run", "--json", "--object", "none")
     result = json.loads(done.stdout)
@@ -93,13 +87,6 @@ def test_a_mistake_says_what_was_found_and_what_to_do(arguments, code, says):
         assert done.returncode == code, done.stderr
         assert "Traceback" not in done.stderr
         assert options or says in done.stderr
-
-
-def test_a_mistake_ends_the_process_with_its_code():
-    done = subprocess.run([*COMMAND, "run", "--gripper", "pr3"], capture_output=True, text=True, check=False)
-    assert done.returncode == 2
-    assert "Did you mean 'pr2'?" in done.stderr
-    assert "Traceback" not in done.stderr
 
 
 @pytest.mark.slow
@@ -138,18 +125,6 @@ def test_a_trial_that_is_kept_runs_again_from_its_recording_and_from_its_setting
 
 
 @pytest.mark.slow
-def test_the_picture_of_a_grasp_is_a_png_of_the_grasp_that_was_printed(tmp_path):
-    pytest.importorskip("matplotlib", reason="drawing needs the extra `plot`")
-    picture = tmp_path / "grasp.png"
-    done = graspsense("run", "--plot", str(picture))
-    assert done.returncode == 0, done.stderr
-    assert f"picture written to {picture}" in done.stderr
-    assert "prediction  odwalla:full_closed" in done.stdout
-    assert picture.read_bytes().startswith(b"\x89PNG")
-    assert picture.stat().st_size < 150_000
-
-
-@pytest.mark.slow
 def test_a_recording_is_drawn_as_the_grasp_itself_was(tmp_path):
     pytest.importorskip("matplotlib", reason="drawing needs the extra `plot`")
     picture, again, store = tmp_path / "first.png", tmp_path / "again.png", tmp_path / "kept"
@@ -161,23 +136,15 @@ def test_a_recording_is_drawn_as_the_grasp_itself_was(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("arguments", [["--object", "none"], ["-o", "classifier.type=none"]])
-def test_a_grasp_without_contact_or_prediction_is_drawn_as_well(tmp_path, arguments):
+@pytest.mark.parametrize("arguments", [[], ["--object", "none"], ["-o", "classifier.type=none"]])
+def test_every_grasp_is_drawn(tmp_path, arguments):
     pytest.importorskip("matplotlib", reason="drawing needs the extra `plot`")
     picture = tmp_path / "grasp.png"
-    done = graspsense("run", "--json", "--plot", str(picture), *arguments)
+    done = graspsense("run", "--plot", str(picture), *arguments)
     assert done.returncode == 0, done.stderr
-    assert picture.is_file()
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["no_such_folder/grasp.png", "grasp.svg"])
-def test_a_picture_that_cannot_be_written_is_refused_before_the_grasp(tmp_path, name):
-    pytest.importorskip("matplotlib", reason="drawing needs the extra `plot`")
-    done = graspsense("run", "--plot", str(tmp_path / name))
-    assert done.returncode == 2
-    assert "picture" in done.stderr
-    assert "approach" not in done.stderr
+    assert f"picture written to {picture}" in done.stderr
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert picture.stat().st_size < 150_000
 
 
 @pytest.mark.slow
@@ -211,31 +178,23 @@ def test_a_signal_ends_the_grasp_with_the_gripper_let_go(number):
     assert "Traceback" not in err
 
 
-HEAVY = ("rich", "numpy", "scipy", "sklearn", "numba", "pandas", "matplotlib", "hid", "usb")
+HEAVY = ("rich", "scipy", "sklearn", "numba", "pandas", "matplotlib", "hid", "usb")
 
 
-@pytest.mark.parametrize(
-    ("arguments", "allowed"), [(["--help"], ()), (["plugins", "list"], ()), (["run"], ("numpy",))]
-)
-def test_start_up_imports_nothing_heavy(arguments, allowed):
+@pytest.mark.slow
+def test_a_grasp_imports_nothing_heavy():
     program = (
-        "import sys\nfrom graspsense.cli.main import main\n"
-        f"sys.argv = ['graspsense', *{arguments!r}]\n"
+        "import sys\nfrom graspsense.cli.main import main\nsys.argv = ['graspsense', 'run']\n"
         "try:\n    main()\nexcept SystemExit as end:\n    assert not end.code, end.code\n"
-        f"print([name for name in {HEAVY!r} if name in sys.modules], file=sys.stderr)"
+        f"print(*[name for name in {HEAVY!r} if name in sys.modules], file=sys.stderr)"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-    assert eval_list(done.stderr.splitlines()[-1]) == list(allowed)
-
-
-def eval_list(text):
-    return json.loads(text.replace("'", '"'))
+    assert done.stderr.splitlines()[-1] == ""
 
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs a device that is always full")
-@pytest.mark.parametrize(
-    "arguments", [pytest.param(["run", "--json"], marks=pytest.mark.slow), ["config", "show"]]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("arguments", [["run", "--json"], ["config", "show"]])
 def test_a_full_disk_under_stdout_is_told_without_a_traceback(arguments):
     with open("/dev/full", "wb") as full:
         ran = subprocess.run(

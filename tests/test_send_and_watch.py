@@ -48,9 +48,9 @@ class Body(ModelGripper):
 
     accepts = ("position", "velocity", "force")
 
-    def __init__(self, names, thing="a soft object", clock="device", width_m=0.07):
+    def __init__(self, names, thing="a soft object", clock="device", width_m=0.075):
         channels = frozenset(Channel(name, CHANNELS[name], 1000.0) for name in names)
-        # A wider object than that of the bench, which is reached in a second at 10 mm/s instead of three.
+        # A wider object than that of the bench, which is reached in 0.3 s at 10 mm/s instead of three.
         super().__init__(channels, 0.0 if thing == "nothing" else width_m, OBJECTS[thing][1])
         self._declared, self.clock, self.sent, self.k = tuple(channels), clock, [], 0
 
@@ -73,7 +73,7 @@ class Body(ModelGripper):
         super().apply(self.now)
 
 
-RUN = RunConfig(first_effort_n=100.0)
+RUN = RunConfig(first_effort_n=100.0, hold_s=0.05)
 
 
 def grasped(names=PADLESS, thing="a soft object", run=RUN, **keys):
@@ -138,7 +138,7 @@ def test_hybrid_approaches_gently_and_raises_the_force_in_steps(thing, keys):
     assert trace.force_left_n[(trace.t_s >= contact_s) & (trace.t_s < contact_s + 0.1)].max() < 8.0
 
 
-@pytest.mark.parametrize("rate_hz", [100.0, 1000.0])
+@pytest.mark.parametrize("rate_hz", [100.0, pytest.param(1000.0, marks=pytest.mark.slow)])
 def test_hybrid_with_the_simulated_body_behind_such_an_interface(rate_hz):
     body = runpy.run_path(str(BENCHMARK))["OwnLoop"](create("sensor-backend", "sim", object="block"), rate_hz)
     grasp = run_grasp(body, HybridController(HybridConfig(sends="position")), RunConfig(seed=1))
@@ -171,7 +171,8 @@ def test_force_sends_its_force_with_the_closed_position(sends):
 
 
 def test_nothing_between_the_fingers_is_said():
-    _, grasp = grasped(thing="nothing")
+    run = evolve(RUN, first_speed_m_s=0.1)
+    _, grasp = grasped(thing="nothing", run=run, closing_speed_m_s=0.05)
     assert grasp.outcome is Outcome.NOTHING_THERE
 
 
@@ -252,20 +253,15 @@ def test_what_its_commands_become_is_told_with_the_grasp(pipeline):
     assert any(note.startswith("as a velocity, the controller sends the closing speed") for note in notes)
 
 
-LAWS = [
-    ("hybrid", "position"),
-    ("hybrid", "velocity"),
-    ("velocity", "position"),
-    ("velocity", "velocity"),
-    ("force", "position"),
-    ("force", "force"),
-    ("send-and-watch", "position"),
-    ("send-and-watch", "velocity"),
-    ("send-and-watch", "force"),
-]
+SENT = {
+    "hybrid": ("position", "velocity"),
+    "velocity": ("position", "velocity"),
+    "force": ("position", "force"),
+    "send-and-watch": ("position", "velocity", "force"),
+}
 
 
-@every_case(("law", "sends"), LAWS)
+@every_case(("law", "sends"), [(law, kind) for law, kinds in SENT.items() for kind in kinds])
 def test_what_every_law_becomes_is_told(pipeline, monkeypatch, law, sends):
     def lost(self, timeout_s):
         raise DeviceLost("its cable was pulled")

@@ -6,21 +6,19 @@ import sys
 
 import pytest
 from attrs import evolve, frozen
-from parts import CHANNELS_OF_HAND, Hand, HandConfig
+from parts import CHANNELS_OF_HAND, Hand, HandConfig, channels
 
 from graspsense import load_pipeline
 from graspsense.core.components.config import resolve
 from graspsense.core.components.registry import IsolatedPlugins
 from graspsense.core.values.errors import ConfigError
 from graspsense.plugin_api import (
-    Channel,
     ObjectKind,
     SensorBackend,
     SensorBackendEntry,
     hookimpl,
     setting,
 )
-from graspsense.simulator_api import CHANNELS
 from graspsense.sources.simulated import Group, plan_trials, simulated
 from graspsense.store.dataset import labelled_store
 from graspsense.store.labels import labels_of
@@ -38,7 +36,7 @@ class TcpHandConfig(HandConfig):
 
 
 class TcpHand(Hand, SensorBackend[TcpHandConfig]):
-    channels = tuple(Channel(name, CHANNELS[name], 1000.0) for name in CHANNELS_OF_HAND)
+    channels = channels(*CHANNELS_OF_HAND)
     accepts = ("effort",)
 
     def objects(self):
@@ -56,12 +54,13 @@ def graspsense_sensor_backends():
 GRASPSENSE_API = (2, 0)
 
 
-@pytest.mark.parametrize("emulated", [False, True], ids=["real", "emulated"])
+@pytest.mark.parametrize("emulated", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_a_trial_is_simulated_where_the_gripper_says_so_and_not_by_its_settings(
     tmp_path, monkeypatch, emulated
 ):
     monkeypatch.setitem(sys.modules, __name__, HERE)
-    options = ["gripper.type=tcp-hand", f"gripper.emulated={str(emulated).lower()}", "classifier.type=none"]
+    hand = ["gripper.type=tcp-hand", f"gripper.emulated={str(emulated).lower()}", "run.hold_s=0.01"]
+    options = [*hand, "controller.closing_speed_m_s=0.04", "run.first_speed_m_s=0.1", "classifier.type=none"]
     with IsolatedPlugins() as plugins, Store.open(tmp_path / "trials") as store:
         plugins.add(HERE, "lab-hand")
         settings = load_pipeline(options=options, plugins=plugins).settings
@@ -88,6 +87,7 @@ def test_a_gripper_without_default_objects_names_those_that_can_be_given(monkeyp
         plan_trials(settings, [Group(instances=2, trials=1)], 0)
 
 
+@pytest.mark.slow
 def test_many_trials_are_run_in_parts_of_equal_size_and_only_their_numbers_are_kept(monkeypatch):
     settings = resolve("default", options=["gripper.sensor=ideal"])
     group = Group(objects=("block",), instances=1, trials=5)
@@ -109,6 +109,7 @@ def test_many_trials_are_run_in_parts_of_equal_size_and_only_their_numbers_are_k
     assert (in_parts.labels, in_parts.table.names) == (whole.labels, whole.table.names)
 
 
+@pytest.mark.slow
 def test_a_note_says_in_how_many_grasps_of_which_objects_the_accuracy_is_not_verified(tmp_path):
     rod = tmp_path / "rod.toml"
     rod.write_text('width_m = 0.05\n[[terms]]\ntype = "elastic"\nk1_n_m = 1e7\n')

@@ -86,6 +86,7 @@ def test_a_number_that_is_not_there_says_which_are(store):
         set_aside(store, [5], "why")
 
 
+@pytest.mark.slow
 def test_readers_read_beside_a_writer_in_another_process(store):
     """A reader sees what was committed, while a transaction is open and after it."""
     keep(store)
@@ -302,6 +303,7 @@ def test_a_store_on_a_read_only_disk_is_read_and_not_written(mounted, log):
         Store.open(disk)
 
 
+@pytest.mark.slow
 def test_a_disk_that_is_full_is_told_and_what_was_kept_stays(mounted):
     disk = mounted("size=1500k")
     with Store.open(disk) as store:

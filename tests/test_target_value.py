@@ -8,6 +8,7 @@ import math
 
 import numpy as np
 import pytest
+from attrs import evolve
 from cases import every_case
 from commands import graspsense
 from kept import keep
@@ -51,7 +52,7 @@ def bottles(objects=20, each=4, seed=0, noise=0.1, **more):
 
 
 def measured(trials, estimator="ridge", **more):
-    return evaluate_regression(estimator, trials, folds=5, **{"permutations": 3, **more})
+    return evaluate_regression(estimator, trials, folds=5, **{"permutations": 1, **more})
 
 
 @pytest.mark.slow
@@ -82,16 +83,8 @@ def test_the_error_is_that_of_the_predictions_and_its_interval_that_of_the_insta
 def test_noise_is_not_predicted_and_said_so():
     trials = bottles()
     rng = np.random.default_rng(3)
-    evaluation = measured(
-        Labelled(
-            source="noise",
-            table=table(rng.normal(size=80), rng.normal(size=80)),
-            labels=trials.labels,
-            instances=trials.instances,
-            value=trials.value,
-        ),
-        permutations=19,
-    )
+    noise = table(rng.normal(size=80), rng.normal(size=80))
+    evaluation = measured(evolve(trials, table=noise, width=None, order=None), permutations=19)
     assert any(
         "not shown to be below that of always predicting the mean" in warning
         for warning in evaluation.warnings
@@ -106,16 +99,7 @@ def test_a_number_that_is_the_instance_is_found_out():
     trials = bottles()
     rng = np.random.default_rng(1)
     fingerprint = rng.normal(size=20).repeat(4) + 1e-4 * rng.normal(size=80)
-    evaluation = measured(
-        Labelled(
-            source="fingerprints",
-            table=table(fingerprint),
-            labels=trials.labels,
-            instances=trials.instances,
-            value=trials.value,
-        ),
-        "tree",
-    )
+    evaluation = measured(evolve(trials, table=table(fingerprint), width=None, order=None), "tree")
     assert evaluation.protocols["5_fold"].error.mean_absolute < 0.5 * evaluation.headline.mean_absolute
     assert any("having seen the same objects" in warning for warning in evaluation.warnings)
 
@@ -123,18 +107,8 @@ def test_a_number_that_is_the_instance_is_found_out():
 def test_what_the_width_or_the_recording_tells_is_a_warning():
     trials = bottles()
     told = ControlFeatures(table=trials.table.columns(["f_steady"]), what="all of it")
-    evaluation = measured(
-        Labelled(
-            source="told",
-            table=trials.table,
-            labels=trials.labels,
-            instances=trials.instances,
-            value=trials.value,
-            width=told,
-            before_contact=told,
-            first_line=ControlFeatures(table=table(np.full(80, np.nan)), what="the first frame"),
-        )
-    )
+    nothing = ControlFeatures(table=table(np.full(80, np.nan)), what="the first frame")
+    evaluation = measured(evolve(trials, width=told, before_contact=told, first_line=nothing, order=None))
     assert any(
         "the error with the width alone is not shown to be larger" in warning
         for warning in evaluation.warnings
@@ -154,6 +128,7 @@ def test_prediction_intervals_contain_nine_of_ten_new_objects():
     assert few.reason.endswith("calibration instances, 90 % needs 9")
 
 
+@pytest.mark.slow
 def test_the_evaluation_is_json_and_repeatable():
     trials = bottles(each=1)
     text, again = (
@@ -239,16 +214,8 @@ def test_a_store_is_trained_on_predicted_and_evaluated(folder, tmp_path):
     assert "2 trials left out: no fill" in answer["notes"]
 
     model = tmp_path / "m.json"
-    arguments = (
-        "train",
-        f"store:{folder}",
-        "--target-value",
-        "fill",
-        "--classifier",
-        "ridge",
-        "--out",
-        model,
-    )
+    number = ("--target-value", "fill", "--classifier", "ridge")
+    arguments = ("train", f"store:{folder}", *number, "--out", model)
     code, out, err = graspsense(*arguments)
     assert code == 0, err
     assert "ridge predicts fill [ml], trained on 22 trials" in out

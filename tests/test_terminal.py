@@ -16,9 +16,7 @@ from terminals import in_terminal
 
 from graspsense.cli import terminal
 
-WIDTHS = (60, 80, 140)
-QUICK_WIDTHS = (60, *(pytest.param(width, marks=pytest.mark.slow) for width in WIDTHS[1:]))
-"""The same, of which the quick run has the one that is most difficult to fit."""
+WIDTHS = (60, 140)
 
 TABLE = """
 from graspsense.cli.terminal import Style, echo_table
@@ -31,7 +29,7 @@ echo_table(
 """
 
 
-@every_case("width", [40, *WIDTHS])
+@every_case("width", [40, 140])
 def test_a_table_fits_the_terminal_and_keeps_every_word(width):
     shown = in_terminal([TABLE], width, program=[sys.executable, "-c"])
 
@@ -64,8 +62,9 @@ def test_columns_override_the_width_of_the_terminal():
     assert 40 < max(map(len, shown.lines)) <= 60
 
 
-@pytest.mark.parametrize("width", QUICK_WIDTHS)
-@pytest.mark.parametrize("lang", ["C", pytest.param("C.UTF-8", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize("lang", ["C", "C.UTF-8"])
 def test_the_list_of_plugins_fits_the_terminal(width, lang):
     shown = in_terminal(["plugins", "list"], width, LANG=lang)
 
@@ -118,7 +117,8 @@ def outcome_colours(shown):
     }
 
 
-@pytest.mark.parametrize("width", QUICK_WIDTHS)
+@pytest.mark.slow
+@pytest.mark.parametrize("width", WIDTHS)
 def test_a_grasp_fits_the_terminal_with_outcome_prediction_and_warning_in_colour(width):
     shown = in_terminal(["run", "-o", "gripper.explain=true"], width)
 

@@ -264,6 +264,7 @@ def test_labels_that_look_the_same_are_the_same(tmp_path):
     assert isinstance(labelled, Labelled)
 
 
+@pytest.mark.slow
 def test_evaluate_and_train_read_what_pandas_wrote(tmp_path):
     path = tmp_path / "trials.csv"
     path.write_text("\n".join([",what,p,q", *(f"{k},{trial}" for k, trial in enumerate(TRIALS))]) + "\n")

@@ -166,7 +166,7 @@ title = "Small"
 seeds = 2
 [data]
 objects = ["can:full_closed", "can:empty_open"]
-instances = 5
+instances = 3
 trials = {trials}
 [judge]
 targets = ["state"]

@@ -58,23 +58,34 @@ def runs(store, pipeline):
     assert "warning" not in out
 
 
-@pytest.mark.slow
-def test_among_all_candidates_one_that_knows_the_hold_is_chosen(store, tmp_path):
-    code, out, err = graspsense("train", store, "--choose", "--out", tmp_path / "own.json", "--json")
+@pytest.mark.parametrize(
+    ("given", "least"),
+    [
+        pytest.param(("-o", "features.type=curve"), 6, marks=pytest.mark.slow, id="every classifier"),
+        pytest.param(
+            ("--classifier", "extra-trees", "-o", "classifier.trees=10"),
+            4,
+            marks=pytest.mark.slow,
+            id="every feature set",
+        ),
+        pytest.param((), 24, marks=pytest.mark.long, id="all"),
+    ],
+)
+def test_among_all_candidates_one_that_knows_the_hold_is_chosen(store, tmp_path, given, least):
+    code, out, err = graspsense("train", store, "--choose", *given, "--out", tmp_path / "own.json", "--json")
     assert code == 0, err
-    load = json.loads(out)["choice"]
+    choice = json.loads(out)["choice"]
 
-    assert load["rate"]["rate"] >= 0.9
-    assert load["rate"]["instances"] == 8
-    candidates = {
-        (candidate["classifier"], candidate["features"]) for candidate in load["ranking"]["candidates"]
-    }
-    assert ("extra-trees", "union") in candidates
-    assert len(candidates) >= 24
+    assert choice["rate"]["rate"] >= 0.9
+    assert choice["rate"]["instances"] == 8
+    candidates = {(named["classifier"], named["features"]) for named in choice["ranking"]["candidates"]}
+    assert ("extra-trees", "curve" if given[:1] == ("-o",) else "union") in candidates
+    assert len(candidates) >= least
     runs(store, tmp_path / "own.toml")
 
 
-def test_what_is_written_runs_on_a_recording(store, tmp_path):
+@pytest.mark.slow
+def test_the_text_names_the_pipeline_and_the_procedure(store, tmp_path):
     fixed = ("--classifier", "extra-trees", "-o", "classifier.trees=10", "-o", "features.type=union")
     code, out, err = graspsense("train", store, "--choose", *fixed, "--out", tmp_path / "own.json")
 
@@ -84,15 +95,14 @@ def test_what_is_written_runs_on_a_recording(store, tmp_path):
     runs(store, tmp_path / "own.toml")
 
 
-def test_a_component_that_is_given_stays_and_files_are_not_replaced(store, tmp_path):
-    given = ("train", store, "--choose", "-o", "features.type=chitta", "--classifier", "knn")
+def test_components_that_are_given_stay_run_on_a_recording_and_are_not_replaced(store, tmp_path):
+    given = ("train", store, "--choose", "-o", "features.type=curve", "--classifier", "knn")
     code, out, err = graspsense(*given, "--out", tmp_path / "own.json", "--json")
     assert code == 0, err
-    candidates = json.loads(out)["choice"]["ranking"]["candidates"]
+    (candidate,) = json.loads(out)["choice"]["ranking"]["candidates"]
 
-    assert [(candidate["classifier"], candidate["features"]) for candidate in candidates] == [
-        ("knn", "chitta")
-    ]
+    assert (candidate["classifier"], candidate["features"]) == ("knn", "curve")
+    runs(store, tmp_path / "own.toml")
     (tmp_path / "own.json").unlink()
     code, _, err = graspsense(*given, "--out", tmp_path / "own.json")
     assert code == 2
@@ -123,6 +133,7 @@ def test_a_table_has_its_features_and_gets_no_pipeline(tmp_path):
     assert not (tmp_path / "own.toml").exists()
 
 
+@pytest.mark.slow
 def test_trials_from_which_nothing_can_be_chosen(store, tmp_path):
     out = ("--out", tmp_path / "own.json")
     code, _, err = graspsense("train", store, "--choose", "--only", "foam", *out)
@@ -156,6 +167,7 @@ def test_recordings_without_contact_are_told_apart_by_the_features_that_need_non
     assert any("curve" in note and "0 of 16" in note for note in choice["ranking"]["notes"])
 
 
+@pytest.mark.slow
 def test_sets_of_many_features_are_left_to_classifiers_that_take_them_quickly(store, tmp_path):
     code, told, err = graspsense(
         "train", store, "--choose", "--classifier", "knn", "--out", tmp_path / "own.json", "--json"

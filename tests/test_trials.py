@@ -182,6 +182,7 @@ changes.relabel(store, [1, 2], {"label": "block"}, "killed")
 """
 
 
+@pytest.mark.slow
 def test_a_process_that_is_killed_within_a_change_leaves_the_store_as_it_was(store):
     keep(store, "toy", device=REAL)
     keep(store, "toy", device=REAL)

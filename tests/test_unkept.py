@@ -128,6 +128,7 @@ def test_a_grasp_whose_recorder_fails_is_not_kept_and_its_outcome_says_why(plugi
     assert [path.suffix for path in (tmp_path / "t" / "recordings").iterdir()] == [".part"]
 
 
+@pytest.mark.slow
 def test_run_says_in_outcome_and_exit_code_that_the_trial_is_not_kept(tmp_path):
     code, out, err = plainly("run", "--gripper", "uncountable", "--save", str(tmp_path / "t"))
     assert code == 2
@@ -136,6 +137,7 @@ def test_run_says_in_outcome_and_exit_code_that_the_trial_is_not_kept(tmp_path):
     assert "kept as trial" not in err
 
 
+@pytest.mark.slow
 def test_collect_neither_counts_it_nor_goes_on(tmp_path):
     folder = str(tmp_path / "t")
     command = ("collect", "--labels", "cup:full", "--each", "2", "--save", folder, "--gripper", "uncountable")
@@ -168,7 +170,7 @@ def test_a_simulated_gripper_that_cannot_be_told_what_it_holds_grasps_nothing_un
 
 @pytest.mark.parametrize(
     "what",
-    [pytest.param(what, marks=() if what in ("image", "signals") else pytest.mark.slow) for what in SPOILT],
+    [pytest.param(what, marks=() if what == "image" else pytest.mark.slow) for what in SPOILT],
 )
 def test_what_a_gripper_does_not_declare_ends_the_grasp_and_the_trial_until_then_is_kept(tmp_path, what):
     folder = tmp_path / "t"

@@ -133,14 +133,14 @@ def test_the_limit_is_a_setting(monkeypatch):
 
 @pytest.mark.parametrize("kind", ["zstd", "lz4", "bz2"])
 def test_what_is_unpacked_is_what_was_packed_and_is_counted(kind, monkeypatch):
-    data = os.urandom(1000) * 2200
+    data = os.urandom(1000) * 1100
     packed = {"zstd": zstandard.compress, "lz4": lz4.frame.compress, "bz2": bz2.compress}[kind](data)
     unpacked = Unpacked("f")
     assert unpacked.unpack(kind, packed) == data
     assert unpacked.total == len(data)
     with pytest.raises((ValueError, zstandard.ZstdError, RuntimeError)):
         Unpacked("f").unpack(kind, packed[:-9])
-    monkeypatch.setenv(LIMIT_VARIABLE, "2")
+    monkeypatch.setenv(LIMIT_VARIABLE, "1")
     with pytest.raises(TooLarge):
         Unpacked("f").unpack(kind, packed)
 
@@ -179,15 +179,21 @@ def test_an_array_that_says_more_than_there_is(tmp_path, ending, shape):
         read_arrays(path)
 
 
-@every_case("descr", ["|O", "|V0", "<U0", "|S0", [("a", "|O")]])
-def test_an_array_of_what_is_no_number_is_refused(tmp_path, descr):
+OBJECTS = "Python objects in it are not loaded, because that can run any code"
+
+
+@every_case(
+    ("descr", "says"),
+    [("|O", OBJECTS), ([("a", "|O")], OBJECTS), ("|V0", "shape"), ("<U0", "shape"), ("|S0", "shape")],
+)
+def test_an_array_of_what_is_no_number_is_refused(tmp_path, descr, says):
     path = tmp_path / "a.npy"
     header = (
         f"{{'descr': {descr!r}, 'fortran_order': False, 'shape': (1000000000,), }}".encode().ljust(117)
         + b"\n"
     )
     path.write_bytes(b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header)) + header)
-    with pytest.raises(DataDamaged, match=r"a\.npy"):
+    with pytest.raises(DataDamaged, match=rf"a\.npy.*{says}"):
         npy_array(path)
 
 
@@ -212,8 +218,7 @@ def test_arrays_come_back_as_numpy_wrote_them(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["zstd", "lz4"])
-@pytest.mark.parametrize("declared", [None, 1000])
+@pytest.mark.parametrize(("kind", "declared"), [("zstd", None), ("lz4", 1000)])
 def test_mcap_of_ros(tmp_path, kind, declared):
     path = tmp_path / "bomb.mcap"
     chunked_mcap(path, kind, compressed(kind, BOMB), declared)
@@ -295,10 +300,10 @@ def test_mat(tmp_path, monkeypatch):
 
     path = tmp_path / "a.mat"
     savemat(
-        path, {"t": np.arange(MB / 1.0), "cells": np.array([[1, "a"]], dtype=object)}, do_compression=True
+        path, {"t": np.arange(MB / 5.0), "cells": np.array([[1, "a"]], dtype=object)}, do_compression=True
     )
-    assert read_arrays(path)[0].numbers["t"].shape == (MB,)
-    monkeypatch.setenv(LIMIT_VARIABLE, "5")
+    assert read_arrays(path)[0].numbers["t"].shape == (MB // 5,)
+    monkeypatch.setenv(LIMIT_VARIABLE, "1")
     with pytest.raises(TooLarge, match=r"a\.mat"):
         read_arrays(path)
     monkeypatch.setenv(LIMIT_VARIABLE, "100")
@@ -308,8 +313,9 @@ def test_mat(tmp_path, monkeypatch):
         read_arrays(path)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", ["lz4", "bz2"])
+@pytest.mark.parametrize(
+    "kind", [pytest.param("lz4", marks=pytest.mark.slow), pytest.param("bz2", marks=pytest.mark.long)]
+)
 def test_ros1_bag(tmp_path, kind):
     rosbag1 = pytest.importorskip("rosbags.rosbag1")
     from rosbags.typesys import Stores, get_typestore

@@ -146,16 +146,8 @@ def test_an_absolute_path_and_one_outside_are_read_and_a_wrong_row_is_of_its_own
     manifest = folder / "set" / "m.toml"
     manifest.write_text('list = "list.csv"\ntime = "t"\ngap = "gap [mm]"\nforce = "f"\n')
     recordings = list(readable_or_not("manifest", str(manifest)))
-    assert [getattr(recording, "label", "") for recording in recordings] == [
-        "a",
-        "b",
-        "c",
-        "",
-        "",
-        "",
-        "",
-        "h",
-    ]
+    labels = [getattr(recording, "label", "") for recording in recordings]
+    assert labels == ["a", "b", "c", "", "", "", "", "h"]
     lines = [recording.line for recording in recordings if isinstance(recording, UnreadableRecording)]
     for line, words in zip(
         lines, ("line 5: there is no file", "/dev/zero", "first_row", "first_row"), strict=True
@@ -355,14 +347,8 @@ def test_of_a_plugin(monkeypatch):
 
     dataset_of(fails_after_five, monkeypatch)
     recordings = list(readable_or_not("lab", "place"))
-    assert [isinstance(recording, UnreadableRecording) for recording in recordings] == [
-        False,
-        False,
-        True,
-        True,
-        False,
-        True,
-    ]
+    unreadable = [isinstance(recording, UnreadableRecording) for recording in recordings]
+    assert unreadable == [False, False, True, True, False, True]
     assert "no frames" in recordings[2].line
     assert "time" in recordings[3].line
     assert re.search(

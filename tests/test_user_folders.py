@@ -85,6 +85,7 @@ def test_without_a_home_nothing_is_disabled_calibrated_or_kept(tmp_path, monkeyp
     assert disabled_in_config() == ("lab-peak",)
 
 
+@pytest.mark.slow
 def test_commands_work_without_a_home_and_leave_nothing_behind(tmp_path):
     scratch = tmp_path / "tmp"
     scratch.mkdir()
@@ -92,6 +93,7 @@ def test_commands_work_without_a_home_and_leave_nothing_behind(tmp_path):
     assert list(tmp_path.rglob("*")) == [scratch]
 
 
+@pytest.mark.slow
 def test_disabling_without_a_home_says_what_to_set(site, tmp_path):
     site.install("lab-peak", "GRASPSENSE_API = (2, 0)\n")
     path = os.pathsep.join(entry for entry in (str(site.folder), os.environ.get("PYTHONPATH", "")) if entry)

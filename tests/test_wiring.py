@@ -106,52 +106,49 @@ def test_what_fits_passes(misfit, gripper, controller, features):
     assert misfit(gripper, controller, features) == ""
 
 
-def test_a_missing_channel(misfit):
-    assert (
-        misfit("mute", "still", "rapid")
-        == """\
-two components do not fit together:
-  features lab/rapid needs the channel 'force_left' in N at 100 Hz or more, which gripper lab/mute \
-does not have (it has: none). Choose another gripper.type or features.type (graspsense plugins list)
-  No other installed gripper offers what controller lab/still and features lab/rapid need"""
-    )
-
-
-def test_a_rate_that_is_too_low(misfit):
-    assert (
-        misfit("full", "still", "rapid")
-        == """\
-two components do not fit together:
-  features lab/rapid needs the channel 'force_left' in N at 100 Hz or more, but gripper lab/full gives it at \
-24 Hz. Choose another gripper.type or features.type (graspsense plugins list)
-  No other installed gripper offers what controller lab/still and features lab/rapid need"""
-    )
+@every_case(
+    ("gripper", "controller", "features", "says"),
+    [
+        (
+            "mute",
+            "still",
+            "rapid",
+            "features lab/rapid needs the channel 'force_left' in N at 100 Hz or more, which gripper lab/mute does "
+            "not have (it has: none). Choose another gripper.type or features.type (graspsense plugins list)",
+        ),
+        (
+            "full",
+            "still",
+            "rapid",
+            "features lab/rapid needs the channel 'force_left' in N at 100 Hz or more, but gripper lab/full gives it "
+            "at 24 Hz. Choose another gripper.type or features.type (graspsense plugins list)",
+        ),
+        (
+            "full",
+            "still",
+            "celsius",
+            "features lab/celsius needs the channel 'heat' in degC, but gripper lab/full gives it in K. "
+            "Choose another gripper.type or features.type (graspsense plugins list)",
+        ),
+        (
+            "full",
+            "fast",
+            "nothing",
+            "controller lab/fast commands position, which gripper lab/full does not take (it takes: effort, "
+            "velocity). Choose another gripper.type or controller.type (graspsense plugins list)",
+        ),
+    ],
+)
+def test_one_misfit_is_told_with_both_sides_and_what_to_choose(misfit, gripper, controller, features, says):
+    assert misfit(gripper, controller, features).splitlines() == [
+        "two components do not fit together:",
+        f"  {says}",
+        f"  No other installed gripper offers what controller lab/{controller} and features lab/{features} need",
+    ]
 
 
 def test_a_rate_that_nobody_promises(misfit):
     assert "but gripper lab/bare gives it at no promised rate." in misfit("bare", "fast", "nothing")
-
-
-def test_another_unit(misfit):
-    assert (
-        misfit("full", "still", "celsius")
-        == """\
-two components do not fit together:
-  features lab/celsius needs the channel 'heat' in degC, but gripper lab/full gives it in K. \
-Choose another gripper.type or features.type (graspsense plugins list)
-  No other installed gripper offers what controller lab/still and features lab/celsius need"""
-    )
-
-
-def test_a_command_that_is_not_taken(misfit):
-    assert (
-        misfit("full", "fast", "nothing")
-        == """\
-two components do not fit together:
-  controller lab/fast commands position, which gripper lab/full does not take (it takes: effort, velocity). \
-Choose another gripper.type or controller.type (graspsense plugins list)
-  No other installed gripper offers what controller lab/fast and features lab/nothing need"""
-    )
 
 
 def test_installed_grippers_that_would_fit_are_listed(misfit):

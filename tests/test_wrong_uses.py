@@ -128,17 +128,26 @@ def test_a_value_of_several_types_is_asked_for_in_words():
     assert "a whole number or a list" in problem.text
 
 
-def test_a_store_may_be_named_in_every_way(run, tmp_path):
-    folder = tmp_path / "trials"
-    with Store.open(folder) as store:
+@pytest.fixture
+def store(tmp_path):
+    with Store.open(tmp_path / "trials") as store:
         for k in range(12):
             label = ("can:full_open", "can:empty_open")[k % 2]
             keep(store, label, values=(0.066 + 0.001 * (k % 3), 5.0 + k % 2 + 0.01 * k), grasp=k)
-    for named in (str(folder), f"store:{folder}", f"{folder}/store.sqlite"):
-        assert store_folder(named) == str(folder)
-        assert as_source(named) == f"store:{folder}"
+    return tmp_path / "trials"
+
+
+def test_a_store_may_be_named_in_every_way(store):
+    for named in (str(store), f"store:{store}", f"{store}/store.sqlite"):
+        assert store_folder(named) == str(store)
+        assert as_source(named) == f"store:{store}"
         assert len(load_trials(named)) == 12
+
+
+@pytest.mark.slow
+def test_every_command_takes_the_database_of_a_store(run, store):
     # Other tests name the folder, or `store:` and the folder.
+    named = f"{store}/store.sqlite"
     for command in (
         ("verify", named),
         ("trials", "list", named),
