@@ -39,7 +39,7 @@ def device_identity() -> Any:
     return identity
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def board() -> Any:
     """Makes a board over a simulated gripper: `board(object="block", faults=..., serial=...)`."""
 

@@ -82,7 +82,7 @@ def take_all(link: Link, times_us: list[int]) -> None:
         times_us.append(arrival.report.time_us)
 
 
-@every_case(("rate", "at_s"), [(0.0, 0.1), (0.0, 1.4), (0.5, 1.0), (3.0, 1.6)])
+@every_case(("rate", "at_s"), [(0.0, 1.4), (0.5, 0.1)])
 def test_grasp_ends_soon_after_the_clock_of_the_board_goes_wrong(rate: float, at_s: float) -> None:
     """In lock-step: 50 ms where it stands still, 0.2 s where it loses half.
 
