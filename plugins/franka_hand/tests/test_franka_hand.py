@@ -139,7 +139,7 @@ def test_fingers_that_still_move_have_no_last_rest():
     assert set(features.reasons) == {"p_steady", "squeezed", "delta_t"}
 
 
-def _closed(driver, command, frames=120):
+def _closed(driver, command, frames=60):
     read = [driver.read(1.0)]
     for _ in range(frames):
         driver.apply(command)
@@ -147,7 +147,7 @@ def _closed(driver, command, frames=120):
     return [reading.frame for reading in read]
 
 
-@pytest.mark.parametrize("kind", [VELOCITY, POSITION, FORCE])
+@every_case("kind", [VELOCITY, POSITION, FORCE])
 def test_every_kind_of_command_closes_at_its_speed_and_not_again_and_again(kind):
     driver = create("sensor-backend", "franka", host="emulated", calibration="none")
     driver.open(1)
@@ -187,8 +187,7 @@ def test_who_is_released_is_not_pressed():
     assert not hand.pressing
 
 
-@every_case("mood", ["silent", "damaged"])
-@every_case("at_s", [0.5, 2.0, 3.0, 4.0])
+@every_case(("mood", "at_s"), [("silent", 0.5), ("damaged", 2.0), ("silent", 3.0), ("damaged", 4.0)])
 def test_a_hand_lost_in_a_grasp_ends_it(mood, at_s):
     options = [*EMULATED, f"gripper.faults.mood={mood}", f"gripper.faults.mood_at_s={at_s}"]
     trial = load_pipeline("franka", options=options).grasp()

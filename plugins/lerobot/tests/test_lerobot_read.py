@@ -372,10 +372,14 @@ def test_a_damaged_data_set_is_an_error_that_says_what_is_wrong(tmp_path, damage
     with pytest.raises(kind) as caught:
         _refusal(folder)
     assert word in str(caught.value)
-    done = CliRunner().invoke(
-        cli, ["import", f"lerobot:{folder}", "--check", "--plot", str(tmp_path / "p.png")]
-    )
-    assert isinstance(done.exception, kind | SystemExit)
+
+
+@every_case("damage", [_remove(META), _cut(DATA), _episodes(length=[1, 2, 3])])
+def test_a_check_of_a_damaged_data_set_ends_with_an_error_of_ours(tmp_path, damage):
+    folder = write_set(tmp_path / "set", 3)
+    damage(folder)
+    done = CliRunner().invoke(cli, ["import", f"lerobot:{folder}", "--check", "--plot", f"{tmp_path}/p.png"])
+    assert isinstance(done.exception, GraspsenseError | SystemExit)
     assert done.exit_code
 
 
@@ -393,6 +397,7 @@ def test_a_task_that_is_not_described_is_an_error(tmp_path):
         _refusal(folder)
 
 
+@pytest.mark.slow
 def test_more_numbers_than_the_memory_should_hold_are_not_read(tmp_path):
     folder = write_set(tmp_path / "set", 3)
     n = 20_000_000

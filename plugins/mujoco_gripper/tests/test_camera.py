@@ -60,6 +60,7 @@ def test_the_environment_names_the_library(monkeypatch):
     assert camera.offscreen() == "osmesa"
 
 
+@pytest.mark.slow
 def test_a_picture_shows_the_gripper_or_the_command_says_what_is_missing(tmp_path):
     """Both ends are asserted; which one this machine has depends on its libraries."""
     path = tmp_path / "grasp.png"

@@ -92,6 +92,7 @@ def gripper_file(folder: Path, model: Path = PARALLEL, **changed: str) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_a_can_yields_as_its_springs_do():
     """Two walls of 18 000 N/m in series yield by 20 N / 9000 N/m; the contacts yield by a few hundredths of a mm."""
     trial = grasped(GENTLE)
@@ -101,7 +102,7 @@ def test_a_can_yields_as_its_springs_do():
     assert trial.features["p_first"] == pytest.approx(0.0662, abs=3e-4)
 
 
-@pytest.mark.parametrize("sends", ["effort", "velocity"])
+@pytest.mark.parametrize("sends", [pytest.param("effort", marks=pytest.mark.slow), "velocity"])
 def test_a_block_is_as_wide_as_it_is_and_both_pads_feel_the_effort(sends):
     trial = grasped(f"controller.sends={sends}", thing="block")
     assert trial.outcome.words == "steady"
@@ -109,12 +110,14 @@ def test_a_block_is_as_wide_as_it_is_and_both_pads_feel_the_effort(sends):
     assert trial.features["f_steady"] == pytest.approx(20.0, abs=0.2)
 
 
+@pytest.mark.slow
 def test_an_egg_survives_20_newtons_and_breaks_at_60():
     whole, broken = (grasped(GENTLE, f"controller.probing_force_n={n}", thing="egg") for n in (20, 60))
     assert (whole.outcome.words, whole.report["broken"]) == ("steady", False)
     assert (broken.outcome.words, broken.report["broken"]) == ("crushed", True)
 
 
+@pytest.mark.slow
 def test_a_seed_decides_the_thing():
     options = ("gripper.spread=true",)
     trial, again, other = (grasped(*options, thing="block", seed=seed) for seed in (1, 1, 2))
@@ -122,6 +125,7 @@ def test_a_seed_decides_the_thing():
     assert trial.features.values != other.features.values
 
 
+@pytest.mark.slow
 def test_a_light_gripper_under_gains_for_a_heavy_one_says_so(tmp_path):
     text = (
         PARALLEL.read_text()
@@ -138,6 +142,7 @@ def test_a_light_gripper_under_gains_for_a_heavy_one_says_so(tmp_path):
     )
 
 
+@pytest.mark.slow
 def test_the_gap_may_come_from_a_joint_or_from_geoms(tmp_path):
     joint = gripper_file(tmp_path, gap='{ joint = "left", scale = -2.0, offset_m = 0.09 }')
     by_joint = grasped(f"gripper.file={joint}", thing="block")
@@ -146,6 +151,7 @@ def test_the_gap_may_come_from_a_joint_or_from_geoms(tmp_path):
     assert by_joint.features["p_steady"] == pytest.approx(by_geoms.features["p_steady"], abs=2e-4)
 
 
+@pytest.mark.slow
 def test_a_touch_sensor_measures_the_force_of_the_contacts(tmp_path):
     text = PARALLEL.read_text()
     for side in ("left", "right"):
@@ -276,6 +282,7 @@ def test_an_unstable_simulation_ends_with_its_reason_and_writes_nothing(tmp_path
     assert [path.name for path in tmp_path.iterdir()] == ["wild.xml"]
 
 
+@pytest.mark.slow
 def test_several_actuators_keep_together_and_a_thing_is_put_where_turning_fingers_meet_it(tmp_path):
     """Two hinged fingers with an actuator each; they press at another place than where the gap is measured."""
     (tmp_path / "hinged.xml").write_text(HINGED)
@@ -309,8 +316,7 @@ def test_what_is_no_finger_can_be_left_out_of_the_contacts(tmp_path):
     with pytest.raises(ConfigError, match="penetrates"):
         create("sensor-backend", "mujoco", file=str(file)).open(0)
     file = gripper_file(tmp_path, tmp_path / "filled.xml", only_fingers="true")
-    trial = grasped(f"gripper.file={file}", thing="block")
-    assert trial.features["p_steady"] == pytest.approx(0.040, abs=2e-4)
+    create("sensor-backend", "mujoco", file=str(file)).open(0)
 
 
 def test_fingers_that_are_not_opposed_are_refused(tmp_path):

@@ -26,7 +26,8 @@ def truth():
     return module
 
 
-@pytest.mark.parametrize("step_s", [5e-4, pytest.param(1e-4, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("step_s", [5e-4, pytest.param(1e-4, marks=pytest.mark.long)])
 def test_both_simulators_have_the_same_features(truth, tmp_path, step_s):
     off = truth.errors(truth.by_mujoco(tmp_path, step_s), truth.by_simulator(tmp_path))
     assert set(off) >= {"p_first", "p_steady", "f_steady", "delta_t", "dp_dt", "df_dt"}

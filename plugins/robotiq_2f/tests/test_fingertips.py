@@ -414,6 +414,7 @@ def test_what_was_not_asked_for_in_time_is_kept_up_to_three_frames():
     assert (samples.counter, samples.new) == (40, 0)
 
 
+@pytest.mark.slow
 @every_case(("seed", "thing"), [(0, "block"), (1, "toy")])
 def test_a_grasp_in_which_one_finger_touches_first_is_not_taken_for_a_fault(seed, thing):
     """Cells without noise were taken for stuck or unplugged ones, and a thing that pressed on all cells for drift."""
@@ -439,6 +440,7 @@ def test_conformance_with_fingertips(check):
     check.run()
 
 
+@pytest.mark.slow
 def test_the_command_emulates_fingertips_on_a_port_of_their_own():
     command = [sys.executable, "-P", "-m", "graspsense", "emulate", "tsf85", "--json"]
     state = json.loads(subprocess.run(command, input=b"quit\n", capture_output=True, check=True).stdout)

@@ -78,7 +78,7 @@ def test_conformance(check):
 
 
 @pytest.mark.usefixtures("own_time")
-@pytest.mark.parametrize("wire", ["pty", "socket"])
+@pytest.mark.parametrize("wire", ["pty", pytest.param("socket", marks=pytest.mark.slow)])
 def test_a_grasp_over_every_wire(emulated, wire):
     gripper = emulated(wire)
     options = [f"gripper.port={gripper.where}", f"gripper.reply_timeout_s={PATIENT_S}"]
@@ -91,7 +91,9 @@ def test_a_grasp_over_every_wire(emulated, wire):
     assert not gripper.state()["going"]
 
 
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize(
+    "model", [pytest.param(model, marks=() if model == "2f-85" else pytest.mark.slow) for model in MODELS]
+)
 def test_every_model_closes_with_its_own_limits(model):
     gripper = create("sensor-backend", "robotiq", model=model, port="emulated")
     info = gripper.open(1)

@@ -47,7 +47,7 @@ def test_bad_input_is_a_wrong_use(arguments, said):
 
 
 def test_a_gripper_that_is_lost_ends_it_and_was_not_opened():
-    done = graspsense("hold", "--seconds", "30", *PR2, "-o", "gripper.faults.unplug_at_s=2")
+    done = graspsense("hold", "--seconds", "30", *PR2, "-o", "gripper.faults.unplug_at_s=0.7")
     assert done.returncode == 4
     assert "device lost" in done.stdout
     assert "not opened" in done.stderr

@@ -65,6 +65,7 @@ def calibrated(tmp_path, rows):
     return ended.value.code or 0
 
 
+@pytest.mark.slow
 def test_the_estimated_force_holds_the_measured_one_within_its_error(tmp_path, capsys):
     # Gears without a thing between the jaws need up to 13 % of the load.
     free = [("closing", 0.10 + 0.01 * i, 0.0) for i in range(4)]

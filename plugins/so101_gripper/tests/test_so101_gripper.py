@@ -158,6 +158,7 @@ def test_a_gripper_lost_in_a_grasp_ends_it_and_is_told(fault, at_s):
     assert "cable and power" in trial.reason
 
 
+@pytest.mark.slow
 def test_the_emulated_gripper_keeps_its_own_time_so_that_a_grasp_repeats_exactly():
     trial, again = (load_pipeline("so101", options=["gripper.port=emulated"]).grasp() for _ in range(2))
     assert trial.features.values == again.features.values
@@ -171,7 +172,6 @@ def test_the_emulated_gripper_keeps_its_own_time_so_that_a_grasp_repeats_exactly
         ("damaged", 0.3, "device lost"),
         ("late", 0.3, "device lost"),
         ("late", 0.005, "steady"),
-        ("repeated", 0.3, "steady"),
     ],
 )
 def test_the_emulated_gripper_without_a_port_has_the_faults_of_the_line(mood, late_s, outcome):
