@@ -94,14 +94,15 @@ def test_a_sponge_yields_more_than_a_block_and_is_lifted(tmp_path):
         (('thing = "block"', "arm = [[0.5]]"), ("arm", "pairs")),
         (('thing = "block"', "cord = { force = [[0, 1]], direction = [0, 0, 0] }"), ("direction",)),
         (('thing = "block"', "mass_kg = -1.0"), ("mass_kg",)),
+        (('thing = "block"', "fill = [[0.0, -1.0]]"), ("fill",)),
+        (('thing = "block"', "roughness_m = 1.0"), ("roughness_m",)),
+        (('thing = "block"', "table = false", "table_height = [[0.0, 0.0]]"), ("table",)),
+        (('thing = "block"', "[bump]", "t_s = 0.2", "speed_m_s = 0.0"), ("speed_m_s",)),
+        (('thing = "block"', "[bump]", "t_s = 0.2", "mass_kg = nan"), ("mass_kg",)),
+        (('thing = "block"', "[bump]", "t_s = 0.2", "touch_s = 0.2"), ("touch_s",)),
+        (('thing = "block"', "[bump]", "t_s = 0.2", 'at = "table"'), ("finger",)),
         (('thing = "block"', "mas = 1.0"), ("mas", "mass_kg")),
-        (
-            (
-                'thing = "block"',
-                "table = [",
-            ),
-            ("line",),
-        ),
+        (('thing = "block"', "table = ["), ("line",)),
     ],
 )
 def test_a_scene_file_that_is_wrong_says_what_is(tmp_path, lines, said):

@@ -128,21 +128,6 @@ def test_the_scenes_of_the_package_are_read(name):
     assert isinstance(read_scene(name).spec, mujoco.MjSpec)
 
 
-@pytest.mark.parametrize(
-    ("lines", "said"),
-    [
-        (("fill = [[0.0, -1.0]]",), "fill"),
-        (("roughness_m = 1.0",), "roughness_m"),
-        (("table = false", "table_height = [[0.0, 0.0]]"), "table"),
-    ],
-)
-def test_a_scene_that_cannot_be_says_why(tmp_path, lines, said):
-    path = tmp_path / "scene.toml"
-    path.write_text("\n".join(['thing = "block"', *lines]) + "\n")
-    with pytest.raises(ConfigError, match=said):
-        read_scene(str(path))
-
-
 @every_case(
     ("wrong", "said"),
     [
@@ -200,20 +185,6 @@ def test_a_finger_without_an_edge_sensor_is_not_bumped_into(tmp_path):
     path = scene(tmp_path, "[bump]", "t_s = 0.2")
     with pytest.raises(ConfigError, match="edge"):
         create("sensor-backend", "mujoco", object=str(path)).open(0)
-
-
-@every_case(
-    ("line", "said"),
-    [
-        ("speed_m_s = 0.0", "speed_m_s"),
-        ("mass_kg = nan", "mass_kg"),
-        ("touch_s = 0.2", "touch_s"),
-        ('at = "table"', "finger"),
-    ],
-)
-def test_a_bump_that_cannot_be_says_why(tmp_path, line, said):
-    with pytest.raises(ConfigError, match=said):
-        read_scene(str(scene(tmp_path, "[bump]", "t_s = 0.2", line)))
 
 
 @pytest.mark.slow

@@ -21,7 +21,7 @@ from graspsense_pr2_gripper.backend import Pr2Backend
 from graspsense_pr2_gripper.config import FaultConfig, Pr2Config
 from graspsense_pr2_gripper.faults import Wire
 from graspsense_pr2_gripper.linkage import FRICTION_N
-from graspsense_pr2_gripper.protocol import EFFORT_KIND, ProtocolError, decode_output
+from graspsense_pr2_gripper.protocol import EFFORT_KIND, decode_output
 from graspsense_sim_gripper.run.build import device_info
 
 BARE = "classifier.type=none"
@@ -342,32 +342,6 @@ def test_body_takes_its_own_keys() -> None:
     images = {image.counter: image.left for image in pads if image.counter}
     assert len(images) > 3
     assert len(set(images.values())) == 1
-
-
-def test_driver_sends_no_effort_that_is_no_number(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The guard stops NaN before; where a caller has no guard, the driver lets go instead."""
-    from graspsense.plugin_api import EFFORT, Command
-
-    backend = Pr2Backend(Pr2Config(transport="emulated"))
-    backend.open(0)
-    try:
-        firmware = backend._open().emulation.wire.firmware  # type: ignore[union-attr]
-        for value, most, speed, expected in [
-            (20.0, math.inf, math.inf, 20_000_000),
-            (math.nan, math.inf, math.inf, 0),
-            (1e12, math.inf, math.inf, 100_000_000),
-            (-math.inf, math.inf, math.inf, -100_000_000),
-            (20.0, math.nan, math.inf, 0),
-            (20.0, math.inf, math.nan, 0),
-            (20.0, 5.0, 0.1, 5_000_000),
-        ]:
-            backend.read(0.1)
-            backend.apply(Command(EFFORT, value, most, speed))
-            assert firmware.effort_un == expected
-    finally:
-        backend.close()
-    with pytest.raises(ProtocolError):
-        decode_output(bytes(64))
 
 
 @pytest.mark.slow

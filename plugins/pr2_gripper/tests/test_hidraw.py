@@ -35,12 +35,12 @@ def following(backend: Pr2Backend, machine: Any) -> Any:
 
 
 def test_device_says_who_it_is(machine: Any, board: Any) -> None:
-    machine.plug("/dev/hidraw3", board(effort_limit_un=50_000_000))
+    machine.plug("/dev/hidraw3", board(effort_limit_un=50_000_000, speed_limit_um_s=100_000))
     backend = Pr2Backend(Pr2Config())
     info = backend.open(0)
     backend.close()
     assert (info.serial, info.firmware, info.clock, info.rate_hz) == ("L7", "1.2.3", "device", 1000.0)
-    assert (info.effort_limit_n, info.speed_limit_m_s) == (50.0, 0.2)
+    assert (info.effort_limit_n, info.speed_limit_m_s) == (50.0, 0.1)
     assert any("private tests" in note for note in info.notes)
 
 

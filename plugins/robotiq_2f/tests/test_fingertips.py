@@ -431,7 +431,7 @@ def test_a_grasp_in_which_one_finger_touches_first_is_not_taken_for_a_fault(seed
 
 @pytest.mark.slow
 @parametrize_checks(
-    "graspsense-robotiq-2f",
+    "graspsense-robotiq-2f/robotiq",
     keys={"port": "emulated", "tactile_port": "emulated"},
     unplugged={"faults": {"unplug_at_s": 0.5}},
     absent={"tactile_port": "/dev/nowhere"},

@@ -105,8 +105,14 @@ def test_ctrl_c_opens_the_fingers(when):
     assert float(opened.split()[-2]) > 80.0
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["grab", "pick-and-place", "event-detector"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param("pick-and-place", marks=pytest.mark.slow),
+        pytest.param("grab", marks=pytest.mark.long),
+        pytest.param("event-detector", marks=pytest.mark.long),
+    ],
+)
 def test_laws_give_the_same_grasp_compiled_and_plain(name):
     law, runs = create("controller", name), []
     for compiled in ("always", "never"):

@@ -89,7 +89,10 @@ def grasped(tmp_path, settings, *options):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("mass_kg", "friction"), [(0.001, 0.05), (0.001, 2.0), (5.0, 0.05), (5.0, 2.0)])
+@pytest.mark.parametrize(
+    ("mass_kg", "friction"),
+    [(0.001, 0.05), pytest.param(0.001, 2.0, marks=pytest.mark.long), (5.0, 0.05), (5.0, 2.0)],
+)
 def test_the_corners_of_weight_and_friction_are_held_or_lost_with_a_reason(tmp_path, mass_kg, friction):
     """With 20 N on each finger: 5 kg need 12.3 N at a friction of 2, and 490 N at 0.05."""
     settings = TouchSettings(mass_kg=mass_kg, friction=friction, lift_s=2.5)
