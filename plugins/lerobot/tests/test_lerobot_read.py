@@ -105,10 +105,11 @@ def test_a_gripper_in_percent_is_told_and_mended(tmp_path):
     assert column(mended, "gap_m") == pytest.approx(0.0008 * (column(plain, "gap_m") - 10.0))
 
 
-def test_a_gripper_in_radians_is_told(tmp_path):
+@every_case(("scale", "unit"), [(0.015, "rad"), (0.01, "share")])
+def test_a_gripper_in_another_unit_than_percent_is_told(tmp_path, scale, unit):
     state = episode()
-    state[:, 1] *= 0.015
-    assert read(write_set(tmp_path / "set", 3, [state]))[0].recording.units["gap"] == "rad"
+    state[:, 1] *= scale
+    assert read(write_set(tmp_path / "set", 3, [state]))[0].recording.units["gap"] == unit
 
 
 def test_a_gripper_whose_number_grows_while_it_closes_is_told(tmp_path):
@@ -146,13 +147,7 @@ def test_missing_frames_are_told_and_divide_the_episode(tmp_path):
     assert [len(squeeze.recording.readings) for squeeze in read(f"{folder}?gaps=cut")] == [88, 84]
 
 
-def test_a_gripper_from_0_to_1_is_told(tmp_path):
-    state = episode()
-    state[:, 1] /= 100.0
-    assert read(write_set(tmp_path / "set", 3, [state]))[0].recording.units["gap"] == "share"
-
-
-@pytest.mark.parametrize("value", [np.nan, np.inf])
+@every_case("value", [np.nan, np.inf])
 def test_frames_without_a_number_are_told_and_left_out(tmp_path, value):
     state = episode()
     state[10, 1] = value
@@ -217,9 +212,10 @@ def test_cells_are_known_in_other_styles_of_names(style):
     assert arrays[1].normal == tuple(names[14::3])
 
 
-def test_numbered_joints_are_no_cells():
+def test_numbered_joints_are_no_cells_and_cells_that_are_not_all_there_no_array():
     names = [f"left_joint_{k}" for k in range(7)] + [f"finger_{k}" for k in range(5)]
     assert meaning_of(names).arrays == ()
+    assert [array.name for array in meaning_of(CELLS[:-1]).arrays] == ["f0"]
 
 
 def test_numbers_that_sound_like_touch_and_are_not_understood_are_told(tmp_path):
@@ -300,11 +296,6 @@ def test_a_finger_that_is_not_connected_leaves_the_force_to_the_other(tmp_path):
 def test_a_video_that_is_missing_is_told(tmp_path):
     folder = write_set(tmp_path / "set", 3, [episode()])
     assert any("missing" in line for line in read(folder)[0].recording.notes if "video" in line)
-
-
-def test_cells_that_are_not_all_there_are_no_array():
-    assert meaning_of(CELLS[:-1]).arrays[0].name == "f0"
-    assert len(meaning_of(CELLS[:-1]).arrays) == 1
 
 
 def damage_info(folder: Path, **changed: object) -> None:
