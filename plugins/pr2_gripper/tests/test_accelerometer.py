@@ -34,7 +34,6 @@ from graspsense_pr2_gripper.protocol import (
     encode_input,
 )
 from graspsense_pr2_gripper.stream import Stream
-from graspsense_pr2_gripper.transports.interface import Transport
 
 NEAR: dict[str, Any] = {"object": "can:empty_open", "body_config": {"open_gap_m": 0.075}}
 """A can, and fingers that stand near it: a grasp of half the ticks."""
@@ -69,25 +68,6 @@ class Sent(Wire):
         return arriving
 
 
-class Waiting(Transport):
-    """Reports that wait all at once, as after a program that was held up."""
-
-    def __init__(self, *reports: bytes) -> None:
-        self.reports = list(reports)
-
-    def read(self, timeout_s: float) -> bytes:
-        return self.reports.pop(0) if self.reports else b""
-
-    def write(self, report: bytes) -> None:
-        pass
-
-    def feature(self, report_id: int) -> bytes:
-        return b""
-
-    def close(self) -> None:
-        pass
-
-
 def test_a_word_holds_three_signed_axes_and_is_limited_to_the_full_scale() -> None:
     def back(sample: tuple[float, ...]) -> tuple[float, ...]:
         read: Samples = Accelerometer(8).signals(0.0, (word_of(sample, 8),), 1).acceleration
@@ -116,15 +96,15 @@ def test_lost_reports_and_samples_that_the_board_missed_are_counted() -> None:
     assert stream.sampled == 17, "at least one more than the report holds"
 
 
-def test_samples_of_a_report_that_was_skipped_come_with_the_next_one() -> None:
-    link = LockStepLink(Waiting(report(1, (1, 2)), report(2, (3, 4))), 1e-3)
+def test_samples_of_a_report_that_was_skipped_come_with_the_next_one(fed: Any) -> None:
+    link = LockStepLink(fed(report(1, (1, 2)), report(2, (3, 4))), 1e-3)
     arrival = link.next(1e-3)
     assert arrival is not None
     assert (arrival.words, arrival.sampled) == ((1, 2, 3, 4), 4)
 
 
-def test_samples_before_a_gap_are_not_joined_to_those_after_it() -> None:
-    link = LockStepLink(Waiting(report(1, (1, 2)), report(3, (5, 6))), 1e-3)
+def test_samples_before_a_gap_are_not_joined_to_those_after_it(fed: Any) -> None:
+    link = LockStepLink(fed(report(1, (1, 2)), report(3, (5, 6))), 1e-3)
     arrival = link.next(1e-3)
     assert arrival is not None
     assert (arrival.words, arrival.sampled) == ((5, 6), 6)
