@@ -26,7 +26,7 @@ from graspsense.plugin_api import (
     create,
 )
 from graspsense.testing_api import a_trial, parametrize_checks
-from graspsense_franka_hand import link, protocol
+from graspsense_franka_hand import link
 from graspsense_franka_hand.config import FrankaConfig
 from graspsense_franka_hand.discovery import diagnose
 from graspsense_franka_hand.emulator.hand import FrankaHand
@@ -251,10 +251,6 @@ def test_any_bytes_are_requests_or_refused(data):
     with suppress(NotARequest):
         for request in HandRequests().fed(data):
             assert request.command <= STOP
-
-
-def test_a_state_has_the_layout_of_the_protocol():
-    assert len(protocol.state(5, 0.04, 0.08, True, 30)) == 4 + 8 + 8 + 1 + 2
 
 
 @given(

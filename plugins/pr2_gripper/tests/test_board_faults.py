@@ -173,11 +173,6 @@ def test_feature_report_has_the_numbers_that_are_set(number: str) -> None:
     assert getattr(decode_identity(emulated_board(config, 0).wire.feature()), number) == body
 
 
-def test_feature_report_can_be_cut_short(board: Any) -> None:
-    assert len(board(faults=FaultConfig(feature_bytes=10)).feature()) == 10
-    assert board(faults=FaultConfig(feature_bytes=0)).feature() == b""
-
-
 @every_case(
     ("key", "needed"),
     [

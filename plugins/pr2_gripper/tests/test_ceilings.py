@@ -80,7 +80,7 @@ def test_real_board_is_refused_too_and_closed(machine: Any, board: Any, numbers:
     assert machine.open_handles == []
 
 
-@pytest.mark.parametrize("answer", [None, [], b"", bytes(10), b"\3GSPR", 0, "GSPR", [999] * 64], ids=repr)
+@every_case("answer", [None, [], b"", bytes(10), b"\3GSPR", 0, "GSPR", [999] * 64, bytes(64)])
 def test_feature_report_that_is_none_is_no_gripper(
     machine: Any, board: Any, monkeypatch: pytest.MonkeyPatch, answer: Any
 ) -> None:

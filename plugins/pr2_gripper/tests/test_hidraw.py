@@ -163,15 +163,6 @@ def test_first_opening_does_not_wait(machine: Any) -> None:
     assert machine.listings == 1, "nobody looked again"
 
 
-def test_mouse_under_our_numbers_is_not_driven(machine: Any, board: Any) -> None:
-    wire = board()
-    wire.firmware.feature = lambda: bytes(64)
-    machine.plug("/dev/hidraw3", wire)
-    with pytest.raises(NoDevice, match="does not answer as a PR2 gripper: wrong CRC"):
-        Pr2Backend(Pr2Config()).open(0)
-    assert machine.open_handles == []
-
-
 def test_serial_of_the_usb_string_must_be_the_boards_own(machine: Any, board: Any) -> None:
     machine.plug("/dev/hidraw3", board(serial="R2"), "L7")
     with pytest.raises(NoDevice, match="'R2', but the settings ask for 'L7'"):
