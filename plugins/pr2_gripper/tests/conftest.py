@@ -36,7 +36,7 @@ def identity(**changes: Any) -> Identity:
     return Identity(**{**numbers, **changes})
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def device_identity() -> Any:
     return identity
 
