@@ -50,6 +50,7 @@ EMULATED = ["gripper.host=emulated", "gripper.calibration=none"]
 @pytest.mark.slow
 @parametrize_checks(
     "graspsense-franka-hand",
+    wheel=False,  # .ci/grippers runs from the wheel
     keys={"host": "emulated", "calibration": "none"},
     unplugged={"faults": {"unplug_at_s": 1.0}},
     absent={"host": "127.9.9.9", "calibration": "none"},

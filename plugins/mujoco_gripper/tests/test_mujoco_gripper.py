@@ -18,7 +18,7 @@ PARALLEL = FOLDER.parent / "parallel.xml"
 
 
 @pytest.mark.slow
-@parametrize_checks("graspsense-mujoco-gripper")
+@parametrize_checks("graspsense-mujoco-gripper", wheel=False)  # .ci/mujoco runs from the wheel
 def test_the_distribution_conforms(check):
     check.run()
 
