@@ -224,7 +224,7 @@ def commanded_safely(
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("grasps", "seed", "faults", "twice"),
-    [(6, 11, random_faults, "STEADY"), (8, 13, random_board_faults, "ABORTED")],
+    [(6, 22, random_faults, "STEADY"), (8, 20, random_board_faults, "ABORTED")],
     ids=["wire", "board"],
 )
 def test_commands_stay_within_limits_whatever_wire_and_board_do(
