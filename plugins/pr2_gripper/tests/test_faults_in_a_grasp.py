@@ -37,7 +37,7 @@ NEAR = {"open_gap_m": 0.062}
 
 def rows_of(controller, faults=FAULTS, sides=("left", "right"), **body):
     healthy, *rows = gripper_faults.injected((controller,), faults, sides, **body)
-    assert (healthy.outcome, healthy.words) == ("steady", ""), healthy
+    assert healthy.outcome == "steady", healthy
     return healthy, rows
 
 
@@ -93,7 +93,7 @@ def test_hostile_laws_crush_nothing():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [0, 1, 2])
 def test_a_healthy_grasp_has_no_warnings(seed):
     for name in ("hybrid", "force"):
         grasp = grasped(name, seed, {})
